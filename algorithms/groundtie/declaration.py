@@ -1,0 +1,175 @@
+"""One declaration per tool: a typed Python function whose annotations carry the rest.
+
+A tool is a function decorated with `tool`. Its signature gives the order and the defaults of the
+parameters, `Annotated` types give their kind, label, range and help, and its docstring gives the
+help text. The command line and the QGIS algorithm are made from this declaration alone.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ParamSpec, Protocol, TypeVar, cast
+
+from .kinds import Kind, check_paths
+from .errors import ParameterError
+
+
+class ToolResult(Protocol):
+    """What a tool returns: numbers for programs, lines for people."""
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+
+
+P = ParamSpec("P")
+R = TypeVar("R", bound=ToolResult)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a tool: name, kind and default (None: chosen from the data, or left out)."""
+
+    name: str
+    kind: Kind
+    required: bool
+    default: Any = None
+
+    @property
+    def positional(self) -> bool:
+        """Whether the command line takes it by position, without an option's name."""
+        return self.required and not self.kind.option
+
+    def check(self, value: Any) -> Any:
+        """Return `value` in its proper type; raise `ParameterError` if it cannot be right."""
+        if value is None:
+            if self.required:
+                raise ParameterError(f"parameter {self.name} is missing")
+            return None
+        return self.kind.check(self.name, value)
+
+
+@dataclass(frozen=True)
+class Output:
+    """A number or text in a result's summary that QGIS models can go on with.
+
+    `path` names its place in the summary, with dots between the levels.
+    """
+
+    name: str
+    label: str
+    path: str
+
+    def value(self, summary: Mapping[str, Any]) -> Any:
+        """Return this output's value in `summary`."""
+        return functools.reduce(lambda level, key: level[key], self.path.split("."), summary)
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A tool: everything that the command line, Python and QGIS need to know of it."""
+
+    name: str
+    title: str
+    group: str
+    summary: str
+    description: str
+    parameters: tuple[Parameter, ...]
+    outputs: tuple[Output, ...]
+    run: Callable[..., ToolResult]
+
+    def parameter(self, name: str) -> Parameter:
+        """Return the parameter called `name`."""
+        return next(parameter for parameter in self.parameters if parameter.name == name)
+
+    def check(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return `values` completed with defaults and in their proper types.
+
+        Raises
+        ------
+        ParameterError
+            A value is missing, unknown, of the wrong type or out of its range.
+        SameFileError, OutputError
+            An output would overwrite another file of this call, or cannot be written.
+        """
+        unknown = set(values) - {parameter.name for parameter in self.parameters}
+        if unknown:
+            raise ParameterError(f"{self.name} has no parameter {sorted(unknown)[0]}")
+        checked = {
+            parameter.name: parameter.check(values.get(parameter.name, parameter.default))
+            for parameter in self.parameters
+        }
+        check_paths([(p.name, p.kind, checked[p.name]) for p in self.parameters])
+        return checked
+
+
+def tool(
+    *, title: str, group: str, outputs: tuple[Output, ...] = ()
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Declare the decorated function as a tool (see `tool_of`).
+
+    Its keyword `progress` is handed through unchecked; every other parameter must be annotated
+    with a `Kind`.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        signature = inspect.signature(function)
+
+        @functools.wraps(function)
+        def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+            bound = signature.bind(*args, **kwargs).arguments
+            progress = {key: bound.pop(key) for key in ("progress",) if key in bound}
+            return function(**declared.check(bound), **progress)  # type: ignore[arg-type]
+
+        declared = _declare(function, signature, checked, title, group, outputs)
+        checked.__groundtie_tool__ = declared  # type: ignore[attr-defined]
+        return checked
+
+    return decorate
+
+
+def tool_of(function: Callable[..., Any]) -> Tool:
+    """Return the declaration of a function that `tool` decorated."""
+    return cast(Tool, function.__groundtie_tool__)  # type: ignore[attr-defined]
+
+
+def _declare(
+    function: Callable[..., Any],
+    signature: inspect.Signature,
+    run: Callable[..., Any],
+    title: str,
+    group: str,
+    outputs: tuple[Output, ...],
+) -> Tool:
+    summary, _, rest = (inspect.getdoc(function) or "").partition("\n")
+    description = rest.strip().partition("\nReturns\n")[0].strip()
+    return Tool(
+        name=function.__name__,
+        title=title,
+        group=group,
+        summary=summary,
+        description=description,
+        parameters=tuple(_parameters(function, signature)),
+        outputs=outputs,
+        run=run,
+    )
+
+
+def _parameters(function: Callable[..., Any], signature: inspect.Signature) -> list[Parameter]:
+    hints = typing.get_type_hints(function, include_extras=True)
+    found = []
+    for name, argument in signature.parameters.items():
+        if name == "progress":
+            continue
+        kinds = [m for m in getattr(hints[name], "__metadata__", ()) if isinstance(m, Kind)]
+        if len(kinds) != 1:
+            raise TypeError(f"{function.__name__}: parameter {name} has no kind")
+        required = argument.default is inspect.Parameter.empty
+        found.append(Parameter(name, kinds[0], required, None if required else argument.default))
+    return found

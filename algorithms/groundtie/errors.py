@@ -1,0 +1,74 @@
+"""The errors that users meet; each says what is wrong, with which file, and what to do.
+
+Every member also inherits the builtin that a caller would expect, and carries the exit code of
+the command line: 2 for bad input, 3 for a refused registration.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .quality.verdict import Verdict
+
+
+class GroundTieError(Exception):
+    """Base of all errors that are meant for the user."""
+
+    exit_code = 2
+
+
+class ParameterError(GroundTieError, ValueError):
+    """A parameter is missing, of the wrong type or out of its range."""
+
+
+class RasterOpenError(GroundTieError, OSError):
+    """A raster is missing, unreadable or truncated."""
+
+
+class BandError(GroundTieError, IndexError):
+    """A raster has no such band."""
+
+
+class RasterContentError(GroundTieError, ValueError):
+    """A raster can be read but holds nothing to match: all nodata, or constant."""
+
+
+class GeoreferencingError(GroundTieError, ValueError):
+    """Georeferencing is missing, contradictory or of a kind that is not supported."""
+
+
+class NoOverlapError(GroundTieError, ValueError):
+    """Reference and input do not overlap."""
+
+
+class SameFileError(GroundTieError, ValueError):
+    """Two parameters that must name different files name the same one."""
+
+
+class OutputError(GroundTieError, OSError):
+    """An output cannot be written."""
+
+
+class TransformFileError(GroundTieError, ValueError):
+    """A transform or tie-point file cannot be understood."""
+
+
+class TooFewPointsError(GroundTieError, ValueError):
+    """There are fewer tie points than the model needs."""
+
+
+class CancelledError(GroundTieError, RuntimeError):
+    """The user cancelled the work."""
+
+    exit_code = 130
+
+
+class NotRegisteredError(GroundTieError, RuntimeError):
+    """The registration was refused; `verdict` tells why."""
+
+    exit_code = 3
+
+    def __init__(self, message: str, verdict: Verdict | None = None) -> None:
+        super().__init__(message)
+        self.verdict = verdict

@@ -1,0 +1,201 @@
+"""The kinds of parameters that tools have, and what makes a value of each kind valid."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .errors import OutputError, ParameterError, SameFileError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """What every kind has: a label and a help text.
+
+    `advanced` parameters are folded away in dialogs; `option` makes a required parameter an
+    option with a name on the command line instead of a positional argument.
+    """
+
+    label: str
+    help: str
+    advanced: bool = False
+    option: bool = False
+
+    def check(self, name: str, value: Any) -> Any:
+        """Return `value` in the type that tools work with, or raise `ParameterError`."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathKind(Kind):
+    """A path; the value is a `pathlib.Path`, but for GDAL's own names (`/vsi…`, `DRIVER:…`)."""
+
+    def check(self, name: str, value: Any) -> Path:
+        if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
+            raise ParameterError(f"{name} must be a path, not {value!r}")
+        return Path(value)
+
+
+class InputKind(PathKind):
+    """A file that is read."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputKind(PathKind):
+    """A file that is written; `suffixes` are the endings it may have, the usual one first."""
+
+    suffixes: tuple[str, ...]
+
+    def check(self, name: str, value: Any) -> Path:
+        path = super().check(name, value)
+        if path.suffix.lower() not in self.suffixes:
+            raise ParameterError(f"{name} must end in {' or '.join(self.suffixes)}: {path}")
+        return path
+
+
+class RasterIn(InputKind):
+    """A raster that is read."""
+
+
+class VectorIn(InputKind):
+    """A vector layer that is read."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileIn(InputKind):
+    """Any other file that is read."""
+
+    suffixes: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RasterOut(OutputKind):
+    """A raster that is written."""
+
+    suffixes: tuple[str, ...] = (".tif", ".tiff")
+
+
+@dataclass(frozen=True, kw_only=True)
+class VectorOut(OutputKind):
+    """A vector layer that is written."""
+
+    suffixes: tuple[str, ...] = (".gpkg", ".geojson")
+
+
+class FileOut(OutputKind):
+    """Any other file that is written."""
+
+
+class FolderOut(PathKind):
+    """A folder that is written into, made if it is missing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Number(Kind):
+    """A number within a range, with its unit; `integer` allows whole numbers only."""
+
+    unit: str = ""
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    integer: bool = False
+
+    def check(self, name: str, value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            try:
+                value = float(value)
+            except (TypeError, ValueError):
+                raise ParameterError(f"{name} must be a number, not {value!r}") from None
+        if not self.minimum <= value <= self.maximum:
+            bounds = f"between {self.minimum:g} and {self.maximum:g}"
+            raise ParameterError(f"{name} must be {bounds} {self.unit}".rstrip() + f": {value:g}")
+        if self.integer and value != int(value):
+            raise ParameterError(f"{name} must be a whole number: {value:g}")
+        return int(value) if self.integer else float(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Distance(Number):
+    """A distance on the ground, in metres (in pixels where images have no georeferencing)."""
+
+    unit: str = "m"
+    minimum: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice(Kind):
+    """One of several words."""
+
+    choices: tuple[str, ...]
+
+    def check(self, name: str, value: Any) -> str:
+        if value not in self.choices:
+            raise ParameterError(f"{name} must be one of {', '.join(self.choices)}: {value!r}")
+        return str(value)
+
+
+class Flag(Kind):
+    """Yes or no."""
+
+    def check(self, name: str, value: Any) -> bool:
+        if not isinstance(value, bool):
+            raise ParameterError(f"{name} must be true or false, not {value!r}")
+        return value
+
+
+class Text(Kind):
+    """Any text."""
+
+    def check(self, name: str, value: Any) -> str:
+        if not isinstance(value, str):
+            raise ParameterError(f"{name} must be a text, not {value!r}")
+        return value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Band(Kind):
+    """The number of a band, from 1, of the raster that the parameter `of` names."""
+
+    of: str
+
+    def check(self, name: str, value: Any) -> int:
+        number = Number(label=self.label, help=self.help, minimum=1, integer=True)
+        return int(number.check(name, value))
+
+
+def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
+    """Check the paths of one call against each other and against the disk.
+
+    Parameters
+    ----------
+    values
+        Name, kind and checked value of every parameter.
+
+    Raises
+    ------
+    SameFileError
+        An output is also an input, or is named twice.
+    OutputError
+        An output's folder is missing or cannot be written to.
+    """
+    taken: dict[Path, str] = {}
+    outputs: list[tuple[str, Path]] = []
+    for name, kind, value in values:
+        if isinstance(kind, InputKind) and value is not None:
+            taken[value.resolve()] = name
+        elif isinstance(kind, OutputKind) and value is not None:
+            outputs.append((name, value))
+    for name, path in outputs:
+        other = taken.setdefault(path.resolve(), name)
+        if other != name:
+            raise SameFileError(f"{name} is the same file as {other}: {path}")
+        folder = path.resolve().parent
+        if path.is_dir():
+            raise OutputError(f"{name} is a folder, not a file: {path}")
+        if not folder.is_dir():
+            raise OutputError(f"the folder of {name} does not exist: {folder}")
+        if not os.access(folder, os.W_OK):
+            raise OutputError(f"the folder of {name} cannot be written to: {folder}")
