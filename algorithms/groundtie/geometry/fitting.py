@@ -1,0 +1,101 @@
+"""Least-squares fits of the models of `models` to pairs of positions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import TooFewPointsError
+from .models import (
+    DEGREE,
+    PARAMETERS,
+    Frame,
+    Model,
+    PolynomialModel,
+    ThinPlateSpline,
+    monomials,
+    thin_plate_kernel,
+)
+
+FloatArray = NDArray[np.float64]
+
+# Stiffness of the thin-plate spline: residual variance of a point against bending energy, in
+# frame units. A knot a tenth of the scene away then sways a point's neighbourhood, not a pixel.
+TPS_STIFFNESS = 1e-2
+
+
+def fit_model(
+    kind: str,
+    xy: FloatArray,
+    claimed_xy: FloatArray,
+    weights: FloatArray | None = None,
+    frame: Frame | None = None,
+) -> Model:
+    """Fit a model to pairs of positions by weighted least squares.
+
+    Parameters
+    ----------
+    kind
+        One of `models.KINDS`.
+    xy, claimed_xy
+        Positions on the reference map and where the input claims them to be, shape (n, 2).
+    weights
+        Weight of each pair, shape (n,); by default all the same. Zero leaves a pair out.
+    frame
+        Frame of the coefficients; by default the one around `xy`.
+
+    Raises
+    ------
+    TooFewPointsError
+        Fewer pairs with a weight than half the model's parameters.
+    """
+    weights = np.ones(len(xy)) if weights is None else weights
+    taken = weights > 0
+    if taken.sum() < PARAMETERS[kind] / 2:
+        needed = -(-PARAMETERS[kind] // 2)
+        raise TooFewPointsError(
+            f"the {kind} model needs at least {needed} points; there are {taken.sum()}"
+        )
+    frame = frame or Frame.around(xy[taken])
+    uv, claimed_uv, weights = frame.enter(xy[taken]), frame.enter(claimed_xy[taken]), weights[taken]
+    if kind == "tps":
+        return _fit_thin_plate(frame, uv, claimed_uv - uv, weights)
+    if kind in ("rigid", "similarity"):
+        coefficients = _fit_similarity(uv, claimed_uv, weights, scaled=kind == "similarity")
+    else:
+        coefficients = _solve(monomials(uv, DEGREE[kind]), claimed_uv - uv, weights)
+    return PolynomialModel(kind, frame, coefficients)
+
+
+def _solve(design: FloatArray, target: FloatArray, weights: FloatArray) -> FloatArray:
+    root = np.sqrt(weights)[:, None]
+    return np.asarray(np.linalg.lstsq(design * root, target * root, rcond=None)[0])
+
+
+def _fit_similarity(
+    uv: FloatArray, claimed_uv: FloatArray, weights: FloatArray, *, scaled: bool
+) -> FloatArray:
+    """Rotation, shift and, if `scaled`, scale, in closed form (Umeyama 1991), as coefficients."""
+    share = (weights / weights.sum())[:, None]
+    centre, claimed_centre = (share * uv).sum(axis=0), (share * claimed_uv).sum(axis=0)
+    z = (uv - centre) @ [1, 1j]
+    claimed_z = (claimed_uv - claimed_centre) @ [1, 1j]
+    turn = np.sum(weights * claimed_z * z.conj())
+    turn = turn / np.sum(weights * np.abs(z) ** 2) if scaled else turn / np.abs(turn)
+    linear = np.array([[turn.real, turn.imag], [-turn.imag, turn.real]])
+    return np.vstack([claimed_centre - centre @ linear, linear - np.eye(2)])
+
+
+def _fit_thin_plate(
+    frame: Frame, uv: FloatArray, displacement: FloatArray, weights: FloatArray
+) -> ThinPlateSpline:
+    """Smoothing thin-plate spline (Wahba 1990): residuals weigh against bending."""
+    count = len(uv)
+    affine_part = monomials(uv, 1)
+    stiffness = TPS_STIFFNESS * weights.mean() / weights
+    system = np.zeros((count + 3, count + 3))
+    system[:count, :count] = thin_plate_kernel(uv, uv) + np.diag(stiffness)
+    system[:count, count:] = affine_part
+    system[count:, :count] = affine_part.T
+    solution = np.linalg.solve(system, np.vstack([displacement, np.zeros((3, 2))]))
+    return ThinPlateSpline(frame, uv, solution[:count], solution[count:])

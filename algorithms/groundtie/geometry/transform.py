@@ -1,0 +1,125 @@
+"""The transform of a registration: reference map position ↔ input pixel position."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from affine import Affine
+from numpy.typing import ArrayLike, NDArray
+from rasterio.crs import CRS
+from rasterio.errors import CRSError
+
+from ..errors import TransformFileError
+from ..rasters.grid import Grid, reproject
+from .models import Frame, Model, PolynomialModel, model_from_json
+
+FloatArray = NDArray[np.float64]
+FORMAT = "groundtie-transform/1"
+
+
+@dataclass(frozen=True)
+class Transform:
+    """Reference map position ↔ input pixel position.
+
+    The model takes a reference map position to where the input claims this ground to be; the
+    input's own georeferencing takes that to a pixel.
+
+    Parameters
+    ----------
+    model
+        The misregistration, in reference map units.
+    crs
+        CRS of the reference map.
+    input_grid
+        The input's own georeferencing.
+    """
+
+    model: Model
+    crs: CRS | None
+    input_grid: Grid
+
+    @classmethod
+    def as_claimed(cls, crs: CRS | None, input_grid: Grid) -> Transform:
+        """Return the transform that believes the input's georeferencing."""
+        return cls(PolynomialModel.identity(Frame((0.0, 0.0), 1.0)), crs, input_grid)
+
+    def __call__(self, xy: ArrayLike) -> FloatArray:
+        """Return the input pixels (col, row), centres at integers, of map positions (n, 2)."""
+        claimed = reproject(self.model(xy), self.crs, self.input_grid.crs)
+        return self.input_grid.map_to_pixel(claimed)
+
+    def claimed_xy(self, px: ArrayLike) -> FloatArray:
+        """Return where the input claims its pixels (col, row) to be on the reference map."""
+        return reproject(self.input_grid.pixel_to_map(px), self.input_grid.crs, self.crs)
+
+    def inverse(self, px: ArrayLike) -> FloatArray:
+        """Return the reference map positions, shape (n, 2), of input pixels (col, row)."""
+        return self.model.inverse(self.claimed_xy(px))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the transform as values that JSON can carry."""
+        grid = self.input_grid
+        return {
+            "format": FORMAT,
+            "crs": _crs_to_text(self.crs),
+            "model": self.model.to_json(),
+            "input": {
+                "crs": _crs_to_text(grid.crs),
+                "geotransform": list(grid.transform.to_gdal()),
+                "width": grid.width,
+                "height": grid.height,
+            },
+        }
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> Transform:
+        """Return the transform that `to_json` described.
+
+        Raises
+        ------
+        TransformFileError
+            The values do not describe a transform.
+        """
+        try:
+            if values["format"] != FORMAT:
+                raise TransformFileError(f"not a {FORMAT} file but {values['format']!r}")
+            claimed = values["input"]
+            grid = Grid(
+                Affine.from_gdal(*claimed["geotransform"]),
+                _crs_from_text(claimed["crs"]),
+                int(claimed["width"]),
+                int(claimed["height"]),
+            )
+            return cls(model_from_json(values["model"]), _crs_from_text(values["crs"]), grid)
+        except (KeyError, TypeError, ValueError, CRSError) as error:
+            if isinstance(error, TransformFileError):
+                raise
+            raise TransformFileError(f"not a transform: {error!r}") from error
+
+
+def load_transform(path: str | Path) -> Transform:
+    """Read a transform from a JSON file.
+
+    Raises
+    ------
+    TransformFileError
+        The file cannot be read or does not hold a transform.
+    """
+    try:
+        return Transform.from_json(json.loads(Path(path).read_text(encoding="utf-8")))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise TransformFileError(f"cannot read the transform {path}: {error}") from error
+    except TransformFileError as error:
+        raise TransformFileError(f"{path}: {error}") from error
+
+
+def _crs_to_text(crs: CRS | None) -> str | None:
+    return None if crs is None else str(crs.to_wkt())
+
+
+def _crs_from_text(text: str | None) -> CRS | None:
+    return None if text is None else CRS.from_wkt(text)

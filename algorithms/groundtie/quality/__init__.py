@@ -1,0 +1,1 @@
+"""Quality: the verdict on a registration, and the report that shows it."""

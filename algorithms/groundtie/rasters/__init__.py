@@ -1,0 +1,1 @@
+"""Rasters: where they lie, reading windows of them, bringing them onto other grids, writing."""

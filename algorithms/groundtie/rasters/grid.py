@@ -1,0 +1,155 @@
+"""Where the pixels of a raster lie.
+
+This is the only module that converts between the corner-based geotransforms of files (GDAL,
+rasterio, QGIS: the first pixel's corner is at 0) and the centre-based pixel coordinates used
+everywhere else (the first pixel's centre is at 0).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import rasterio.warp
+from affine import Affine
+from numpy.typing import ArrayLike, NDArray
+from rasterio.crs import CRS
+
+FloatArray = NDArray[np.float64]
+
+# Metres per degree on the sphere of the Earth's mean radius: for sizes and search radii only.
+METRES_PER_DEGREE = 111_195.0
+
+# Geotransform of images without georeferencing: map positions are then pixel coordinates.
+PIXEL_COORDINATES = Affine.translation(-0.5, -0.5)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A lattice of pixels on the map.
+
+    Parameters
+    ----------
+    transform
+        Corner-based geotransform, as in raster files.
+    crs
+        Coordinate reference system; None for local coordinates and pixel coordinates.
+    width, height
+        Size in pixels.
+    """
+
+    transform: Affine
+    crs: CRS | None
+    width: int
+    height: int
+
+    @cached_property
+    def _centres(self) -> Affine:
+        return self.transform * Affine.translation(0.5, 0.5)
+
+    def pixel_to_map(self, px: ArrayLike) -> FloatArray:
+        """Return the map positions, shape (n, 2), of the pixel positions `px` (col, row)."""
+        return apply_affine(self._centres, px)
+
+    def map_to_pixel(self, xy: ArrayLike) -> FloatArray:
+        """Return the pixel positions (col, row), shape (n, 2), of the map positions `xy`."""
+        return apply_affine(~self._centres, xy)
+
+    def contains(self, px: ArrayLike) -> NDArray[np.bool_]:
+        """Tell for each pixel position, shape (n, 2), whether it lies on a pixel of this grid."""
+        px = np.asarray(px, float)
+        size = np.array([self.width, self.height])
+        return np.asarray(np.all((px >= -0.5) & (px <= size - 0.5), axis=-1))
+
+    @cached_property
+    def is_georeferenced(self) -> bool:
+        """Whether map positions are more than pixel coordinates."""
+        return self.crs is not None or self.transform != PIXEL_COORDINATES
+
+    @cached_property
+    def pixel_size(self) -> tuple[float, float]:
+        """Width and height of a pixel in map units."""
+        t = self.transform
+        return float(np.hypot(t.a, t.d)), float(np.hypot(t.b, t.e))
+
+    @cached_property
+    def metres_per_unit(self) -> tuple[float, float]:
+        """Metres per map unit along x and y at the grid's centre (1 without a CRS)."""
+        if self.crs is None:
+            return 1.0, 1.0
+        if self.crs.is_geographic:
+            latitude = self.pixel_to_map([self.centre_px])[0, 1]
+            shrink = max(float(np.cos(np.deg2rad(latitude))), 1e-6)
+            return METRES_PER_DEGREE * shrink, METRES_PER_DEGREE
+        factor = float(self.crs.linear_units_factor[1])
+        return factor, factor
+
+    @cached_property
+    def pixel_size_m(self) -> float:
+        """Side of the square as large as a pixel, in metres (in pixels without georeferencing)."""
+        t = self.transform
+        area = abs(t.a * t.e - t.b * t.d) * self.metres_per_unit[0] * self.metres_per_unit[1]
+        return float(np.sqrt(area))
+
+    @property
+    def centre_px(self) -> tuple[float, float]:
+        """Pixel position (col, row) of the centre."""
+        return (self.width - 1) / 2, (self.height - 1) / 2
+
+    def scaled(self, factor: float) -> Grid:
+        """Return the grid of pixels `factor` times as large from the same corner, cut to fit."""
+        return Grid(
+            self.transform * Affine.scale(factor),
+            self.crs,
+            max(int(self.width / factor + 1e-6), 1),
+            max(int(self.height / factor + 1e-6), 1),
+        )
+
+    def window(self, col: int, row: int, width: int, height: int) -> Grid:
+        """Return the part of this lattice that starts at a pixel; it may reach beyond the grid."""
+        return replace(
+            self,
+            transform=self.transform * Affine.translation(col, row),
+            width=width,
+            height=height,
+        )
+
+    def shifted(self, dx: float, dy: float) -> Grid:
+        """Return this grid moved by map units."""
+        return replace(self, transform=Affine.translation(dx, dy) * self.transform)
+
+    def outline(self, points_per_side: int = 21) -> FloatArray:
+        """Return pixel positions along the outer border, shape (4 n, 2), in order."""
+        along = np.linspace(0, 1, points_per_side, endpoint=False)
+        corner = np.zeros_like(along)
+        unit = np.concatenate(
+            [
+                np.column_stack(side)
+                for side in (
+                    (along, corner),
+                    (corner + 1, along),
+                    (1 - along, corner + 1),
+                    (corner, 1 - along),
+                )
+            ]
+        )
+        return np.asarray(unit * [self.width, self.height] - 0.5)
+
+
+def apply_affine(transform: Affine, points: ArrayLike) -> FloatArray:
+    """Return `points`, shape (n, 2), moved by an affine transform."""
+    x, y = np.asarray(points, float).reshape(-1, 2).T
+    t = transform
+    return np.column_stack([t.a * x + t.b * y + t.c, t.d * x + t.e * y + t.f])
+
+
+def reproject(xy: FloatArray, source: CRS | None, target: CRS | None) -> FloatArray:
+    """Return positions, shape (n, 2), in another CRS; without a CRS they stay as they are.
+
+    Positions outside of a projection's domain become infinite.
+    """
+    if source is None or target is None or source == target:
+        return xy
+    moved = rasterio.warp.transform(source, target, xy[:, 0], xy[:, 1])
+    return np.column_stack(moved[:2])
