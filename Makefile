@@ -1,0 +1,53 @@
+# `make help` lists the targets.
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+
+VENV := .venv
+PY := $(VENV)/bin/python
+PLUGIN := dist/groundtie_qgis.zip
+
+.PHONY: help install demo test test-newest test-debian lint bench plugin clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+install: $(VENV)/.installed ## make .venv with the groundtie command
+
+$(VENV)/.installed: pyproject.toml
+	scripts/make_venv.sh $(VENV)
+	$(PY) -m pip install --quiet --upgrade pip
+	$(PY) -m pip install --quiet --editable .
+	touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.installed
+	$(PY) -m pip install --quiet --editable '.[dev]'
+	touch $@
+
+demo: install ## simulate a SAR-optical pair, register it, compare with the truth; results in demo/
+	$(PY) scripts/demo.py demo
+
+test: test-newest test-debian ## everything, with the newest packages and with Debian's (incl. QGIS)
+
+test-newest: lint
+	$(PY) -m pytest --ignore=tests/qgis
+
+test-debian: plugin
+	scripts/test_debian.sh
+
+lint: $(VENV)/.installed-dev ## ruff, mypy, import contracts
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+	$(VENV)/bin/lint-imports
+
+bench: $(VENV)/.installed-dev ## accuracy on real pairs, speed
+	$(PY) benchmarks/run.py
+
+plugin: $(VENV)/.installed ## build dist/groundtie_qgis.zip
+	$(PY) scripts/build_plugin.py $(PLUGIN)
+
+clean: ## remove everything that can be made again
+	rm -rf $(VENV) build demo dist algorithms/*.egg-info
+	rm -rf .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +
