@@ -1,0 +1,127 @@
+"""What is declared is what is imported, and what is installed is complete."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from email.parser import Parser
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+tomllib = pytest.importorskip("tomllib", reason="reading pyproject.toml needs Python 3.11")
+
+from groundtie.version import __version__  # noqa: E402
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+# Distributions whose modules have another name, and modules that come with a declared one.
+MODULES = {"opencv-python-headless": "cv2", "scikit-learn": "sklearn"}
+COMES_WITH = {"affine": "rasterio"}
+# Debian 12's versions (packages.debian.org/bookworm).
+DEBIAN_12 = {
+    "click": "8.1.3",
+    "fiona": "1.9.0",
+    "jinja2": "3.1.2",
+    "matplotlib": "3.6.3",
+    "numpy": "1.24.2",
+    "opencv-python-headless": "4.6.0",
+    "rasterio": "1.3.5",
+    "scikit-learn": "1.2.1",
+    "scipy": "1.10.1",
+    "shapely": "1.8.5",
+}
+
+
+def declared() -> dict[str, str]:
+    """Return the lower bounds of the dependencies."""
+    return dict(dependency.split(">=") for dependency in PROJECT["dependencies"])
+
+
+def imported() -> set[str]:
+    """Return the top-level modules of others that the package imports."""
+    found = set()
+    for path in (ROOT / "algorithms/groundtie").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                found.add(str(node.module).split(".")[0])
+    return found - set(sys.stdlib_module_names)
+
+
+def test_every_import_is_declared() -> None:
+    modules = {MODULES.get(name, name) for name in declared()}
+    assert {COMES_WITH.get(name, name) for name in imported()} <= modules
+
+
+def test_every_dependency_is_imported() -> None:
+    assert {MODULES.get(name, name) for name in declared()} <= imported()
+
+
+def test_the_package_calls_itself_by_relative_imports() -> None:
+    """Inside the plugin it has another name."""
+    assert "groundtie" not in imported()
+
+
+def test_the_lower_bounds_are_debian_12s() -> None:
+    """The suite runs with Debian's packages: what is promised is tested."""
+    for name, bound in declared().items():
+        assert bound == ".".join(DEBIAN_12[name].split(".")[:2]), name
+
+
+@pytest.fixture(scope="module")
+def distributions(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Return an sdist of the tree, and a wheel built from nothing but this sdist."""
+    if int(metadata.version("setuptools").split(".")[0]) < 77:
+        pytest.skip("building needs setuptools 77 (PEP 639 licences)")
+    folder = tmp_path_factory.mktemp("dist")
+    tree = folder / "tree"
+    junk = shutil.ignore_patterns("*.egg-info", "__pycache__")
+    shutil.copytree(ROOT / "algorithms", tree / "algorithms", ignore=junk)
+    papers = ("README.md", "LICENSE", "CHANGELOG.md")
+    for name in ("pyproject.toml", "MANIFEST.in", "metadata.txt", *papers):
+        shutil.copy(ROOT / name, tree)
+    build(tree, "build_sdist", folder)
+    (sdist,) = folder.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        archive.extractall(folder / "unpacked", filter="data")
+    (unpacked,) = (folder / "unpacked").iterdir()
+    build(unpacked, "build_wheel", folder)
+    (wheel,) = folder.glob("*.whl")
+    return sdist, wheel
+
+
+def build(tree: Path, hook: str, target: Path) -> None:
+    code = f"from setuptools import build_meta; build_meta.{hook}({str(target)!r})"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tree, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_sdist_carries_the_version_file(distributions: tuple[Path, Path]) -> None:
+    with tarfile.open(distributions[0]) as archive:
+        names = {name.split("/", 1)[-1] for name in archive.getnames()}
+    assert {"metadata.txt", "LICENSE", "README.md", "pyproject.toml"} <= names
+
+
+def test_wheel_is_complete(distributions: tuple[Path, Path]) -> None:
+    with zipfile.ZipFile(distributions[1]) as archive:
+        names = set(archive.namelist())
+        info = f"groundtie-{__version__}.dist-info"
+        about = Parser().parsestr(archive.read(f"{info}/METADATA").decode("utf-8"))
+        entry_points = archive.read(f"{info}/entry_points.txt").decode("utf-8")
+    assert about["Version"] == __version__
+    assert about["License-Expression"] == "GPL-2.0-or-later"
+    assert re.search(r"^groundtie = groundtie\.cli:main$", entry_points, re.MULTILINE)
+    package = ROOT / "algorithms"
+    for path in (package / "groundtie").rglob("*"):
+        if path.suffix in {".py", ".j2", ".css", ".js"}:
+            assert path.relative_to(package).as_posix() in names
