@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import functools
 import inspect
+import operator
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
-from .kinds import Kind, check_paths
 from .errors import ParameterError
+from .kinds import Kind, check_paths
 
 
 class ToolResult(Protocol):
@@ -46,13 +47,16 @@ class Parameter:
         """Whether the command line takes it by position, without an option's name."""
         return self.required and not self.kind.option
 
-    def check(self, value: Any) -> Any:
-        """Return `value` in its proper type; raise `ParameterError` if it cannot be right."""
+    def check(self, value: Any, called: str) -> Any:
+        """Return `value` in its proper type; raise `ParameterError` if it cannot be right.
+
+        `called` is the parameter's name in the error message.
+        """
         if value is None:
             if self.required:
-                raise ParameterError(f"parameter {self.name} is missing")
+                raise ParameterError(f"{called} is missing")
             return None
-        return self.kind.check(self.name, value)
+        return self.kind.check(called, value)
 
 
 @dataclass(frozen=True)
@@ -88,8 +92,19 @@ class Tool:
         """Return the parameter called `name`."""
         return next(parameter for parameter in self.parameters if parameter.name == name)
 
-    def check(self, values: Mapping[str, Any]) -> dict[str, Any]:
+    def check(
+        self,
+        values: Mapping[str, Any],
+        spell: Callable[[Parameter], str] = operator.attrgetter("name"),
+    ) -> dict[str, Any]:
         """Return `values` completed with defaults and in their proper types.
+
+        Parameters
+        ----------
+        values
+            Values by the parameters' names; None and what is missing take the default.
+        spell
+            Gives a parameter the name that error messages call it by.
 
         Raises
         ------
@@ -102,10 +117,10 @@ class Tool:
         if unknown:
             raise ParameterError(f"{self.name} has no parameter {sorted(unknown)[0]}")
         checked = {
-            parameter.name: parameter.check(values.get(parameter.name, parameter.default))
+            parameter.name: parameter.check(_value(parameter, values), spell(parameter))
             for parameter in self.parameters
         }
-        check_paths([(p.name, p.kind, checked[p.name]) for p in self.parameters])
+        check_paths([(spell(p), p.kind, checked[p.name]) for p in self.parameters])
         return checked
 
 
@@ -137,6 +152,11 @@ def tool(
 def tool_of(function: Callable[..., Any]) -> Tool:
     """Return the declaration of a function that `tool` decorated."""
     return cast(Tool, function.__groundtie_tool__)  # type: ignore[attr-defined]
+
+
+def _value(parameter: Parameter, values: Mapping[str, Any]) -> Any:
+    value = values.get(parameter.name)
+    return parameter.default if value is None else value
 
 
 def _declare(

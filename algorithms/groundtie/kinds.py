@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from .errors import OutputError, ParameterError, SameFileError
+
+# GDAL's own names, such as /vsizip/a.zip/b.tif, HDF5:"a.h5"://b or https://…; C:\\… is a path.
+_GDAL_NAME = re.compile(r"/vsi|[A-Za-z][\w+.-]+:")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +36,7 @@ class Kind:
 
 @dataclass(frozen=True, kw_only=True)
 class PathKind(Kind):
-    """A path; the value is a `pathlib.Path`, but for GDAL's own names (`/vsi…`, `DRIVER:…`)."""
+    """A path; the value is a `pathlib.Path`."""
 
     def check(self, name: str, value: Any) -> Path:
         if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
@@ -58,11 +62,17 @@ class OutputKind(PathKind):
 
 
 class RasterIn(InputKind):
-    """A raster that is read."""
+    """A raster that is read; GDAL's own names (`/vsi…`, `DRIVER:…`) stay text."""
+
+    def check(self, name: str, value: Any) -> Any:
+        return value if _is_gdal_name(value) else super().check(name, value)
 
 
 class VectorIn(InputKind):
-    """A vector layer that is read."""
+    """A vector layer that is read; GDAL's own names stay text."""
+
+    def check(self, name: str, value: Any) -> Any:
+        return value if _is_gdal_name(value) else super().check(name, value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,12 +119,23 @@ class Number(Kind):
                 value = float(value)
             except (TypeError, ValueError):
                 raise ParameterError(f"{name} must be a number, not {value!r}") from None
+        if not math.isfinite(value):
+            raise ParameterError(f"{name} must be a finite number, not {value}")
         if not self.minimum <= value <= self.maximum:
-            bounds = f"between {self.minimum:g} and {self.maximum:g}"
-            raise ParameterError(f"{name} must be {bounds} {self.unit}".rstrip() + f": {value:g}")
+            bounds = f"{self.range_text} {self.unit}".rstrip()
+            raise ParameterError(f"{name} must be {bounds}, not {value:g}")
         if self.integer and value != int(value):
-            raise ParameterError(f"{name} must be a whole number: {value:g}")
+            raise ParameterError(f"{name} must be a whole number, not {value:g}")
         return int(value) if self.integer else float(value)
+
+    @property
+    def range_text(self) -> str:
+        """The range in words, without the unit; empty if any number will do."""
+        if math.isfinite(self.minimum) and math.isfinite(self.maximum):
+            return f"{self.minimum:g} to {self.maximum:g}"
+        if math.isfinite(self.minimum):
+            return f"at least {self.minimum:g}"
+        return f"at most {self.maximum:g}" if math.isfinite(self.maximum) else ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +154,7 @@ class Choice(Kind):
 
     def check(self, name: str, value: Any) -> str:
         if value not in self.choices:
-            raise ParameterError(f"{name} must be one of {', '.join(self.choices)}: {value!r}")
+            raise ParameterError(f"{name} must be one of {', '.join(self.choices)}, not {value!r}")
         return str(value)
 
 
@@ -166,6 +187,10 @@ class Band(Kind):
         return int(number.check(name, value))
 
 
+def _is_gdal_name(value: Any) -> bool:
+    return isinstance(value, str) and bool(_GDAL_NAME.match(value)) and not Path(value).exists()
+
+
 def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
     """Check the paths of one call against each other and against the disk.
 
@@ -184,7 +209,7 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
     taken: dict[Path, str] = {}
     outputs: list[tuple[str, Path]] = []
     for name, kind, value in values:
-        if isinstance(kind, InputKind) and value is not None:
+        if isinstance(kind, InputKind) and isinstance(value, Path):
             taken[value.resolve()] = name
         elif isinstance(kind, OutputKind) and value is not None:
             outputs.append((name, value))

@@ -1,0 +1,269 @@
+"""The command line, made from the tools' declarations: `groundtie TOOL INPUTS… OUTPUT [--options]`.
+
+Standard output carries the result alone. An error is one line on standard error and an exit code:
+2 for bad input, 3 for a refused registration, 128 plus the signal's number when cancelled.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import shutil
+import signal
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, TextIO
+
+import click
+
+from .declaration import Parameter, Tool
+from .errors import CancelledError, GroundTieError, NotRegisteredError
+from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind
+from .progress import Progress
+from .version import __version__
+
+
+def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    args
+        Arguments without the program's name (default: those of the process).
+    tools
+        Tools to offer (default: all).
+
+    Returns
+    -------
+    int
+        The exit code.
+    """
+    _silence_libraries()
+    with _signals() as received:
+        try:
+            command = _group(_all_tools() if tools is None else tools)
+            command.main(args, prog_name="groundtie", standalone_mode=False, obj=received)
+        except click.ClickException as error:
+            return _fail(_usage(error), error.exit_code)
+        except (CancelledError, KeyboardInterrupt) as error:
+            number = received[0] if received else signal.SIGINT
+            return _fail(str(error) or "cancelled", 128 + number)
+        except GroundTieError as error:
+            return _fail(str(error), error.exit_code)
+    return 0
+
+
+def _all_tools() -> Sequence[Tool]:
+    from .tools import TOOLS  # heavy
+
+    return TOOLS
+
+
+def _fail(message: str, exit_code: int) -> int:
+    click.echo("groundtie: error: " + " ".join(message.split()), err=True)
+    return exit_code
+
+
+def _usage(error: click.ClickException) -> str:
+    message = error.format_message()
+    if isinstance(error, click.UsageError) and error.ctx is not None:
+        message = f"{message.rstrip('.')} (see {error.ctx.command_path} --help)"
+    return message
+
+
+def _silence_libraries() -> None:
+    """Keep what GDAL, OpenCV and Python's warnings say off standard error.
+
+    The tools raise errors of their own; who wants the libraries' words says so by `python -W`,
+    `PYTHONWARNINGS`, `CPL_LOG` or `OPENCV_LOG_LEVEL`.
+    """
+    os.environ.setdefault("CPL_LOG", os.devnull)  # GDAL's words where rasterio does not listen
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
+    logging.getLogger().addHandler(logging.NullHandler())  # GDAL's words through rasterio
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
+
+
+@contextmanager
+def _signals() -> Iterator[list[int]]:
+    """Collect SIGINT and SIGTERM in a list, so that work ends at its next step and cleans up.
+
+    A second signal does not wait for that step.
+    """
+    received: list[int] = []
+
+    def handle(number: int, frame: object) -> None:
+        if received:
+            raise KeyboardInterrupt
+        received.append(number)
+
+    previous = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield received
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+def _group(tools: Sequence[Tool]) -> click.Group:
+    group = click.Group(
+        "groundtie",
+        help="Register satellite images to one another and to the ground.",
+        commands={command.name: command for command in map(ToolCommand, tools)},  # type: ignore[misc]
+        invoke_without_command=True,
+        callback=_help_without_command,
+        context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    )
+    return click.version_option(__version__, message="%(prog)s %(version)s")(group)
+
+
+@click.pass_context
+def _help_without_command(context: click.Context) -> None:
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+class ToolCommand(click.Command):
+    """The command of one tool."""
+
+    def __init__(self, tool: Tool) -> None:
+        self.tool = tool
+        super().__init__(
+            tool.name.replace("_", "-"),
+            help=f"{tool.summary}\n\n{tool.description}",
+            short_help=tool.summary,
+            params=[_click_parameter(parameter) for parameter in tool.parameters],
+            callback=self._run,
+        )
+        self.params += [
+            click.Option(["--json", "as_json"], is_flag=True, help="Print the result as JSON."),
+            click.Option(["--quiet"], is_flag=True, help="Show no progress."),
+        ]
+
+    def _run(self, as_json: bool, quiet: bool, **values: Any) -> None:
+        given = {name: value for name, value in values.items() if value is not None}
+        checked = self.tool.check(given, spell=spelled)
+        received = click.get_current_context().obj
+        try:
+            with _reporter(sys.stderr, quiet) as report:
+                progress = Progress(report, is_cancelled=lambda: bool(received))
+                result = self.tool.run(**checked, progress=progress)
+        except NotRegisteredError as error:
+            if as_json and error.verdict is not None:
+                _echo_json({"verdict": error.verdict.summary()})
+            raise
+        if as_json:
+            _echo_json(result.summary())
+        else:
+            click.echo("\n".join(result.lines()))
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the arguments, the options, and then the options for experts."""
+        declared = self.tool.parameters
+        arguments = [p for p in declared if p.positional]
+        plain = [p for p in declared if not p.positional and not p.kind.advanced]
+        advanced = [p for p in declared if not p.positional and p.kind.advanced]
+        common = [
+            record
+            for option in self.get_params(ctx)[len(declared) :]
+            if (record := option.get_help_record(ctx))
+        ]
+        for title, parameters, more in (
+            ("Arguments", arguments, []),
+            ("Options", plain, common),
+            ("Advanced options", advanced, []),
+        ):
+            rows = [(_synopsis(p), _describe(p)) for p in parameters] + more
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
+
+class KindType(click.ParamType):
+    """Lets a parameter's kind check the words of the command line."""
+
+    def __init__(self, parameter: Parameter) -> None:
+        self.parameter = parameter
+        self.name = type(parameter.kind).__name__
+
+    def convert(self, value: Any, param: object, ctx: object) -> Any:
+        """Return `value` as the tools take it."""
+        return self.parameter.kind.check(spelled(self.parameter), value)
+
+
+def _click_parameter(parameter: Parameter) -> click.Parameter:
+    name, flag = parameter.name, spelled(parameter)
+    if parameter.positional:
+        return click.Argument([name], type=KindType(parameter), metavar=flag)
+    need = {"required": True} if parameter.required else {"default": parameter.default}
+    if isinstance(parameter.kind, Flag):
+        return click.Option([f"{flag}/--no-{flag[2:]}", name], **need)
+    return click.Option([flag, name], type=KindType(parameter), **need)
+
+
+def spelled(parameter: Parameter) -> str:
+    """Return how the command line spells a parameter: `REFERENCE`, `--search-radius`."""
+    name = parameter.name.replace("_", "-")
+    return name.upper() if parameter.positional else f"--{name}"
+
+
+def _metavar(kind: Kind) -> str:
+    if isinstance(kind, Choice):
+        return f"[{'|'.join(kind.choices)}]"
+    if isinstance(kind, Number):
+        return "INTEGER" if kind.integer else "NUMBER"
+    if isinstance(kind, PathKind):
+        return "FOLDER" if isinstance(kind, FolderOut) else "FILE"
+    return type(kind).__name__.upper()
+
+
+def _synopsis(parameter: Parameter) -> str:
+    flag = spelled(parameter)
+    if parameter.positional:
+        return flag
+    if isinstance(parameter.kind, Flag):
+        return f"{flag} / --no-{flag[2:]}"
+    return f"{flag} {_metavar(parameter.kind)}"
+
+
+def _describe(parameter: Parameter) -> str:
+    notes = []
+    if isinstance(parameter.kind, Number):
+        notes += [note for note in (parameter.kind.unit, parameter.kind.range_text) if note]
+    if isinstance(parameter.kind, Flag):
+        notes.append(f"default: {'yes' if parameter.default else 'no'}")
+    elif parameter.default is not None:
+        notes.append(f"default: {parameter.default}")
+    if parameter.required and not parameter.positional:
+        notes.append("required")
+    return f"{parameter.kind.help}  [{'; '.join(notes)}]" if notes else parameter.kind.help
+
+
+def _echo_json(values: dict[str, Any]) -> None:
+    # NaN and infinity are not JSON: better no result than one that other programs cannot read
+    click.echo(json.dumps(values, indent=2, allow_nan=False))
+
+
+@contextmanager
+def _reporter(stream: TextIO, quiet: bool) -> Iterator[Callable[[float, str], None]]:
+    """Show progress on one line of a terminal; show nothing elsewhere."""
+    if quiet or not stream.isatty():
+        yield lambda fraction, message: None
+        return
+    last = ""
+
+    def report(fraction: float, message: str) -> None:
+        nonlocal last
+        last = message or last
+        line = f"{fraction:4.0%} {last}"[: shutil.get_terminal_size().columns - 1]
+        stream.write(f"\r{line}\x1b[K")
+        stream.flush()
+
+    try:
+        yield report
+    finally:
+        stream.write("\r\x1b[K")
+        stream.flush()
