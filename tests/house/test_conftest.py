@@ -74,6 +74,14 @@ def test_missing_data_skips_and_says_so(project: Path) -> None:
     assert "2 tests skipped: no folder" in done.stdout
 
 
+def test_module_skipped_as_a_whole_is_another_matter(project: Path) -> None:
+    module = 'import pytest\npytest.skip("no such package", allow_module_level=True)\n'
+    (project / "tests/test_other.py").write_text(module, encoding="utf-8")
+    done = run(project, "tests/test_some.py", "tests/test_other.py")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "2 tests skipped: no folder" in done.stdout
+
+
 def test_missing_data_fails_in_ci(project: Path) -> None:
     done = run(project, "tests/test_some.py", CI="true")
     assert done.returncode == 1
