@@ -1,0 +1,1 @@
+"""Simulated SAR–optical pairs whose misregistration is known exactly."""

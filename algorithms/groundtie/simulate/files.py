@@ -1,0 +1,130 @@
+"""A simulated pair as files."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import rasterio
+from rasterio.errors import RasterioError
+
+from ..geometry.models import DEGREE
+from ..rasters.atomic import Outputs, writing
+from ..rasters.grid import Grid
+from .pair import SimulatedPair
+
+FloatArray = npt.NDArray[np.float64]
+
+NAMES = {
+    "reference": "reference.tif",
+    "input": "input.tif",
+    "dem": "dem.tif",
+    "truth": "truth.json",
+    "check_points": "check_points.csv",
+}
+CHECK_POINT_COLUMNS = (
+    "reference_x",
+    "reference_y",
+    "reference_col",
+    "reference_row",
+    "input_col",
+    "input_row",
+)
+
+
+def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
+    """Write a pair into a folder, which is made if need be; all files appear or none.
+
+    Returns
+    -------
+    dict
+        Paths of reference, input, dem (bare ground in metres on the reference's pixels), truth
+        (JSON, which `load_transform` reads) and check_points (CSV).
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
+    paths = {key: Path(folder) / name for key, name in NAMES.items()}
+    with writing(folder):
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    bands = [band.capitalize() for band in pair.options.optical.bands]
+    with Outputs() as outputs, writing(folder, RasterioError):
+        staged = {key: outputs.stage(path) for key, path in paths.items()}
+        _write_raster(staged["reference"], pair.reference[None], pair.reference_grid, ["Amplitude"])
+        _write_raster(staged["input"], pair.input, pair.truth.input_grid, bands)
+        terrain = pair.scene.terrain_m[pair.scene.window]
+        _write_raster(staged["dem"], terrain[None], pair.reference_grid, ["Height of ground (m)"])
+        staged["truth"].write_text(json.dumps(truth_json(pair), indent=1), encoding="utf-8")
+        _write_check_points(staged["check_points"], pair)
+    return paths
+
+
+def truth_json(pair: SimulatedPair) -> dict[str, Any]:
+    """Return the truth with all that it was drawn from.
+
+    It is the JSON of the `Transform`, plus `seed`, `sigma_px` (0: exact), `options` and, if it is
+    affine, `reference_to_input` and `map_to_input`: the 2×3 matrices that take reference pixel
+    (col, row, 1) and reference map position (x, y, 1) to input pixel (col, row).
+    """
+    values = {
+        **pair.truth.to_json(),
+        "seed": pair.options.scene.seed,
+        "sigma_px": 0.0,
+        "options": asdict(pair.options),
+    }
+    if DEGREE[pair.truth.model.kind] <= 1:
+        grid, truth = pair.reference_grid, pair.truth
+        centre = np.array(grid.centre_px)
+        values["reference_to_input"] = _matrix(lambda px: truth(grid.pixel_to_map(px)), centre)
+        values["map_to_input"] = _matrix(truth, grid.pixel_to_map(centre)[0])
+    return values
+
+
+def _matrix(
+    function: Callable[[FloatArray], FloatArray], centre: FloatArray, step: float = 1000.0
+) -> list[list[float]]:
+    """Return the 2×3 matrix of an affine function of the plane, from its values at the centre."""
+    base, along_x, along_y = function(centre + [[0, 0], [step, 0], [0, step]])
+    linear = np.column_stack([along_x - base, along_y - base]) / step
+    return np.column_stack([linear, base - linear @ centre]).tolist()
+
+
+def _write_raster(
+    path: Path, image: npt.NDArray[Any], grid: Grid, band_names: Sequence[str]
+) -> None:
+    profile = {
+        "driver": "GTiff",
+        "count": len(image),
+        "height": grid.height,
+        "width": grid.width,
+        "dtype": image.dtype,
+        "crs": grid.crs,
+        "transform": grid.transform,
+        "tiled": True,
+        "blockxsize": 256,
+        "blockysize": 256,
+        "compress": "deflate",
+        "predictor": 3 if image.dtype.kind == "f" else 2,
+        "bigtiff": "if_safer",
+    }
+    with rasterio.open(path, "w", **profile) as raster:
+        raster.write(image)
+        for band, name in enumerate(band_names, start=1):
+            raster.set_band_description(band, name)
+
+
+def _write_check_points(path: Path, pair: SimulatedPair) -> None:
+    xy = pair.reference_grid.pixel_to_map(pair.check_points_px)
+    table = np.hstack([xy, pair.check_points_px, pair.truth(xy)])
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(CHECK_POINT_COLUMNS)
+        writer.writerows([[f"{value:.6f}" for value in row] for row in table])

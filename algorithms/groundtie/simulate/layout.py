@@ -1,0 +1,252 @@
+"""Where the parcels of a scene lie: districts, streets, fields, woods, waters and buildings.
+
+Everything is drawn into one label image, later parcels over earlier ones: ground, waters, arterial
+roads (which bridge waters), buildings and trees.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from .cover import Cover, ParcelBook
+from .polygons import Point, Polygon, fitted_rectangle, main_frame, rectangle, subdivide
+
+_SUBPIXEL_BITS = 4
+
+
+@dataclass(frozen=True)
+class Use:
+    """How a district is built: street width, block and lot area, share of the lot, heights."""
+
+    street_m: float
+    block_m2: float
+    lot_m2: float
+    fill: tuple[float, float]
+    height_m: tuple[float, float]
+    trees_per_lot: float
+
+
+FARMLAND = Use(4, 12000, 0, (0, 0), (0, 0), 0)
+FOREST = Use(4, 40000, 0, (0, 0), (0, 0), 0)
+PARK = Use(4, 9000, 0, (0, 0), (0, 0), 0)
+HAMLET = Use(5, 5000, 800, (0.35, 0.55), (3, 8), 1.5)
+HOUSES = Use(7, 7000, 620, (0.48, 0.66), (4, 12), 1.2)
+DENSE = Use(13, 10000, 1600, (0.88, 0.99), (10, 60), 0.15)
+
+DENSITIES: dict[str, tuple[tuple[Use, float], ...]] = {
+    "rural": ((FARMLAND, 0.8), (FOREST, 0.18), (HAMLET, 0.02)),
+    "suburban": ((HOUSES, 0.66), (FARMLAND, 0.17), (PARK, 0.09), (FOREST, 0.08)),
+    "urban": ((DENSE, 0.92), (PARK, 0.08)),
+}
+
+CANOPY_M = (12.0, 24.0)
+
+_DISTRICT_M2 = 70000
+_ARTERIAL_M = {"rural": 7.0, "suburban": 12.0, "urban": 20.0}
+_FARMSTEAD_CHANCE = 0.5
+_LAKE_M2 = 400_000
+_TREE_KINDS = 8
+
+
+def highest_object_m(density: str) -> float:
+    """Return the greatest height that a building or a canopy of a scene can have."""
+    return max(CANOPY_M[1], *(use.height_m[1] for use, _ in DENSITIES[density]))
+
+
+class Layout:
+    """Draws the parcels of one scene.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Rows and columns of the label image.
+    px_per_m : float
+        Horizontal scale: pixels for a metre of the sizes in `Use`.
+    density : str
+        One of `DENSITIES`.
+    generator : numpy.random.Generator
+        Source of the layout.
+    book : ParcelBook
+        Receives the parcels.
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        px_per_m: float,
+        density: str,
+        generator: np.random.Generator,
+        book: ParcelBook,
+    ) -> None:
+        self.labels: npt.NDArray[np.int32] = np.zeros(shape, np.int32)
+        self._scale = px_per_m
+        self._density = density
+        self._random = generator
+        self._book = book
+        self._cover_of: list[Cover] = []
+        self._buildings: list[tuple[Polygon, float]] = []
+        self._trees: list[Point] = []
+
+    def draw(self) -> npt.NDArray[np.int32]:
+        """Draw the whole scene and return the label image, int32 (rows, columns)."""
+        self.labels[:] = self._add(Cover.GRASS)
+        height, width = self.labels.shape
+        # Streets follow the turned outline, which reaches beyond the scene on all sides.
+        half = math.hypot(height, width) / 2
+        outline = rectangle((width / 2, height / 2), (half, half), self._uniform(0, math.pi / 2))
+        arterial = _ARTERIAL_M[self._density] * self._scale
+        districts = subdivide(outline, _DISTRICT_M2 * self._scale**2, arterial, self._random)
+        for district in districts.cells:
+            if self._touches_scene(district):
+                self._draw_district(district)
+        self._draw_waters()
+        for lane in districts.lanes:
+            self._fill(lane, self._add(Cover.ROAD))
+        self._draw_buildings()
+        self._draw_trees()
+        return self.labels
+
+    def _draw_district(self, district: Polygon) -> None:
+        uses, weights = zip(*DENSITIES[self._density], strict=True)
+        use: Use = uses[int(np.searchsorted(np.cumsum(weights), self._random.random()))]
+        blocks = subdivide(
+            district, use.block_m2 * self._scale**2, use.street_m * self._scale, self._random
+        )
+        street = self._add(Cover.ROAD)
+        for lane in blocks.lanes:
+            self._fill(lane, street)
+        for block in blocks.cells:
+            if use.lot_m2 > 0:
+                self._draw_lots(block, use)
+            else:
+                self._draw_open_block(block, use)
+        if use is FARMLAND and self._random.random() < _FARMSTEAD_CHANCE:
+            self._place_farmstead(blocks.cells[0])
+
+    def _draw_open_block(self, block: Polygon, use: Use) -> None:
+        _, half, angle = main_frame(block)
+        if use is FOREST:
+            self._fill(block, self._add(Cover.FOREST, self._uniform(*CANOPY_M)))
+        elif use is PARK:
+            self._fill(block, self._add(Cover.GRASS))
+            self._scatter_trees(block, half[0] * half[1] / (120 * self._scale**2))
+        else:
+            self._fill(block, self._add(Cover.FIELD, rows_rad=angle + math.pi / 2))
+
+    def _draw_lots(self, block: Polygon, use: Use) -> None:
+        ground = Cover.PAVEMENT if use is DENSE else Cover.GRASS
+        self._fill(block, self._add(ground))
+        for lot in subdivide(block, use.lot_m2 * self._scale**2, 0.0, self._random).cells:
+            if ground is Cover.GRASS:
+                self._fill(lot, self._add(Cover.GRASS))
+            fill = (self._uniform(*use.fill), self._uniform(*use.fill))
+            footprint = fitted_rectangle(lot, fill)
+            if footprint is not None:
+                # Squared and more: many low buildings, few towers.
+                share = self._random.random() ** 2.5
+                low, high = use.height_m
+                self._buildings.append((footprint, low + (high - low) * share))
+            self._scatter_trees(lot, use.trees_per_lot)
+
+    def _place_farmstead(self, field: Polygon) -> None:
+        centre, half, angle = main_frame(field)
+        cos, sin = math.cos(angle), math.sin(angle)
+        for k in range(3):
+            u, v = (0.55 - 0.3 * k) * half[0], (0.6 - 0.2 * (k % 2)) * half[1]
+            place = (centre[0] + u * cos - v * sin, centre[1] + u * sin + v * cos)
+            size = (
+                self._uniform(6, 12) * self._scale,
+                self._uniform(4, 7) * self._scale,
+            )
+            self._buildings.append((rectangle(place, size, angle), self._uniform(3, 8)))
+            self._trees.append((place[0] + 1.4 * size[0], place[1] + 1.6 * size[1]))
+
+    def _draw_waters(self) -> None:
+        height, width = self.labels.shape
+        self._draw_river(height, width)
+        area_m2 = height * width / self._scale**2
+        for _ in range(int(self._random.poisson(area_m2 / _LAKE_M2))):
+            centre = (self._uniform(0, width), self._uniform(0, height))
+            radius = self._uniform(20, 70) * self._scale
+            self._fill(self._blob(centre, radius * 1.15), self._add(Cover.GRASS), convex=False)
+            self._fill(self._blob(centre, radius), self._add(Cover.WATER), convex=False)
+
+    def _draw_river(self, height: int, width: int) -> None:
+        angle = self._uniform(0, math.pi)
+        length = math.hypot(height, width)
+        s = np.linspace(-length / 2, length / 2, max(int(length / (8 * self._scale)), 20))
+        wave = np.zeros_like(s)
+        for wavelength, amplitude in ((900.0, 70.0), (380.0, 28.0), (170.0, 7.0)):
+            phase = self._uniform(0, 2 * math.pi)
+            wave += amplitude * np.sin(2 * math.pi * s / (wavelength * self._scale) + phase)
+        wave = wave * self._scale + self._uniform(-0.2, 0.2) * min(height, width)
+        half = self._uniform(6, 14) * self._scale * (1 + 0.25 * np.sin(s / (60 * self._scale)))
+        bank = half + 5 * self._scale
+        for cover, reach in ((Cover.GRASS, bank), (Cover.WATER, half)):
+            along = np.concatenate([s, s[::-1]])
+            across = np.concatenate([wave - reach, (wave + reach)[::-1]])
+            x = width / 2 + along * math.cos(angle) - across * math.sin(angle)
+            y = height / 2 + along * math.sin(angle) + across * math.cos(angle)
+            outline = list(zip(x.tolist(), y.tolist(), strict=True))
+            self._fill(outline, self._add(cover), convex=False)
+
+    def _blob(self, centre: Point, radius: float) -> Polygon:
+        turn = np.linspace(0, 2 * math.pi, 60, endpoint=False)
+        # The outline follows the place, so that the bank runs along the shore.
+        wobble = 0.22 * np.sin(2 * turn + centre[0]) + 0.12 * np.sin(3 * turn + centre[1])
+        reach = radius * (1 + wobble)
+        x, y = centre[0] + reach * np.cos(turn), centre[1] + 0.8 * reach * np.sin(turn)
+        return list(zip(x.tolist(), y.tolist(), strict=True))
+
+    def _draw_buildings(self) -> None:
+        keep_off = (Cover.WATER, Cover.ROAD)
+        for footprint, height_m in self._buildings:
+            if not any(self._cover_at(corner) in keep_off for corner in footprint):
+                self._fill(footprint, self._add(Cover.BUILDING, height_m))
+
+    def _draw_trees(self) -> None:
+        kinds = [self._add(Cover.FOREST, self._uniform(4, 12)) for _ in range(_TREE_KINDS)]
+        keep_off = (Cover.WATER, Cover.ROAD, Cover.BUILDING)
+        for place in self._trees:
+            kind, size = self._random.random(2).tolist()
+            radius_px = (1.5 + 2.5 * size) * self._scale
+            if radius_px >= 1 and self._cover_at(place) not in keep_off:
+                outline = self._blob(place, radius_px)
+                self._fill(outline, kinds[int(kind * _TREE_KINDS)], convex=False)
+
+    def _scatter_trees(self, polygon: Polygon, mean_count: float) -> None:
+        centre, half, angle = main_frame(polygon)
+        cos, sin = math.cos(angle), math.sin(angle)
+        for _ in range(int(self._random.poisson(mean_count))):
+            u, v = self._uniform(-0.9, 0.9) * half[0], self._uniform(-0.9, 0.9) * half[1]
+            self._trees.append((centre[0] + u * cos - v * sin, centre[1] + u * sin + v * cos))
+
+    def _add(self, cover: Cover, height_m: float = 0.0, rows_rad: float = 0.0) -> int:
+        self._cover_of.append(cover)
+        return self._book.add(cover, height_m, rows_rad)
+
+    def _touches_scene(self, polygon: Polygon) -> bool:
+        height, width = self.labels.shape
+        x, y = zip(*polygon, strict=True)
+        return min(x) < width and max(x) > 0 and min(y) < height and max(y) > 0
+
+    def _cover_at(self, point: Point) -> Cover:
+        height, width = self.labels.shape
+        column = min(max(round(point[0]), 0), width - 1)
+        row = min(max(round(point[1]), 0), height - 1)
+        return self._cover_of[self.labels[row, column]]
+
+    def _fill(self, polygon: Polygon, label: int, *, convex: bool = True) -> None:
+        corners = np.rint(np.array(polygon) * (1 << _SUBPIXEL_BITS)).astype(np.int32)
+        if convex:
+            cv2.fillConvexPoly(self.labels, corners, label, cv2.LINE_8, _SUBPIXEL_BITS)
+        else:
+            cv2.fillPoly(self.labels, [corners], label, cv2.LINE_8, _SUBPIXEL_BITS)
+
+    def _uniform(self, low: float, high: float) -> float:
+        return low + (high - low) * float(self._random.random())

@@ -1,0 +1,175 @@
+"""Misregistrations with exactly known parameters, and images that carry them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import RectBivariateSpline
+from scipy.ndimage import map_coordinates, spline_filter
+
+from ..errors import ParameterError
+from ..geometry.models import DEGREE, Frame, Model, PolynomialModel, monomials
+from ..geometry.transform import Transform
+from ..rasters.grid import Grid
+from .noise import Stream, random_stream, strips
+
+FloatImage = npt.NDArray[np.float32]
+
+# Kind of distortion -> kind of model that describes it exactly.
+DISTORTIONS = {
+    "shift": "translation",
+    "rotation": "rigid",
+    "scale": "similarity",
+    "similarity": "similarity",
+    "affine": "affine",
+    "polynomial": "polynomial3",
+}
+
+_NODE_SPACING_PX = 64
+_MIN_NODES = 8
+_SPLINE_REACH_PX = 4
+
+
+@dataclass(frozen=True)
+class DistortionOptions:
+    """How far off the input's georeferencing is.
+
+    Attributes
+    ----------
+    kind : str
+        One of `DISTORTIONS`.
+    shift_px : float
+        Length of the shift in input pixels; its direction is drawn.
+    rotation_deg : float
+        Turn of the content, counter-clockwise on the map ("rotation" and "similarity").
+    scale : float
+        Enlargement of the content ("scale" and "similarity").
+    warp_px : float
+        Largest displacement besides the shift, in input pixels ("affine" and "polynomial").
+    """
+
+    kind: str = "affine"
+    shift_px: float = 8.0
+    rotation_deg: float = 2.0
+    scale: float = 1.02
+    warp_px: float = 4.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be simulated."""
+        if self.kind not in DISTORTIONS:
+            names = ", ".join(DISTORTIONS)
+            raise ParameterError(f"distortion must be one of {names}, not {self.kind!r}")
+        if self.shift_px < 0 or self.warp_px < 0 or not 0.1 <= self.scale <= 10:
+            raise ParameterError("shift and warp must not be negative, scale must be 0.1 to 10")
+
+
+def draw_misregistration(options: DistortionOptions, grid: Grid, seed: int) -> PolynomialModel:
+    """Draw where the input claims the ground to be.
+
+    Parameters
+    ----------
+    options : DistortionOptions
+        Kind and size.
+    grid : Grid
+        Georeferencing that the input claims.
+    seed : int
+        Seed of the direction of the shift and of the warp.
+
+    Returns
+    -------
+    PolynomialModel
+        Reference map position -> claimed map position; turns and scales are about the centre.
+    """
+    generator = random_stream(seed, Stream.DISTORTION)
+    frame = Frame.around(grid.pixel_to_map(grid.outline(1)))
+    kind = DISTORTIONS[options.kind]
+    terms = (DEGREE[kind] + 1) * (DEGREE[kind] + 2) // 2
+    px = grid.pixel_size[0] / frame.scale
+    coefficients = np.zeros((terms, 2))
+    azimuth = generator.uniform(0, 2 * math.pi)
+    coefficients[0] = options.shift_px * px * np.array([math.cos(azimuth), math.sin(azimuth)])
+    if kind in ("affine", "polynomial3"):
+        coefficients[1:] = _drawn_warp(generator, terms - 1, DEGREE[kind], options.warp_px * px)
+    elif kind != "translation":
+        factor = 1.0 if options.kind == "rotation" else options.scale
+        turn = 0.0 if options.kind == "scale" else math.radians(options.rotation_deg)
+        cos, sin = factor * math.cos(turn), factor * math.sin(turn)
+        coefficients[1:] = [[cos - 1, sin], [-sin, cos - 1]]
+    return PolynomialModel(kind, frame, coefficients)
+
+
+def _drawn_warp(
+    generator: np.random.Generator, terms: int, degree: int, largest: float
+) -> npt.NDArray[np.float64]:
+    """Coefficients above the constant whose displacement is at most `largest` in the frame."""
+    drawn = generator.uniform(-1, 1, (terms, 2))
+    side = np.linspace(-1, 1, 41)
+    uv = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    displacement = monomials(uv, degree)[:, 1:] @ drawn
+    # A warp that folds the plane has no inverse; these stay far from that.
+    if largest > 0.1:
+        raise ParameterError("warp must be less than a twentieth of the input's longer side")
+    return drawn * (largest / np.hypot(*displacement.T).max())
+
+
+def needed_margin(model: Model, reference: Grid, claimed: Grid) -> int:
+    """Return how many pixels the input's ground reaches beyond the reference image."""
+    outline = Transform(model, reference.crs, claimed).inverse(claimed.outline())
+    px = reference.map_to_pixel(outline)
+    beyond = np.maximum(-px, px - [reference.width - 1, reference.height - 1])
+    return max(math.ceil(float(beyond.max())), 0) + _SPLINE_REACH_PX
+
+
+@dataclass(frozen=True)
+class SourcePositions:
+    """Where the pixels of the input lie on the pixels of the scene.
+
+    The exact inverse of the truth is taken at nodes; a bicubic spline through them returns any
+    affine map exactly and gentle polynomials to far below a thousandth of a pixel.
+    """
+
+    columns: RectBivariateSpline
+    rows: RectBivariateSpline
+    width: int
+
+    @classmethod
+    def of(cls, truth: Transform, scene_grid: Grid) -> SourcePositions:
+        """Return the positions of all pixels of the truth's input."""
+        width, height = truth.input_grid.width, truth.input_grid.height
+        node_row, node_column = _nodes(height), _nodes(width)
+        column, row = np.meshgrid(node_column, node_row)
+        px = scene_grid.map_to_pixel(truth.inverse(np.stack([column, row], axis=-1).reshape(-1, 2)))
+        return cls(
+            RectBivariateSpline(node_row, node_column, px[:, 0].reshape(column.shape)),
+            RectBivariateSpline(node_row, node_column, px[:, 1].reshape(column.shape)),
+            width,
+        )
+
+    def strip(self, start: int, stop: int) -> npt.NDArray[np.float64]:
+        """Return scene (row, column), shape (2, stop − start, width), of some rows."""
+        row, column = np.arange(start, stop), np.arange(self.width)
+        return np.stack([self.rows(row, column), self.columns(row, column)])
+
+
+def resample(image: FloatImage, positions: SourcePositions, height: int) -> FloatImage:
+    """Interpolate an image (rows, columns) at the pixels of the input by cubic B-splines."""
+    coefficients = spline_filter(image, order=3, output=np.float32, mode="mirror")
+    result = np.empty((height, positions.width), np.float32)
+    for _, start, stop in strips(height):
+        map_coordinates(
+            coefficients,
+            positions.strip(start, stop),
+            output=result[start:stop],
+            order=3,
+            mode="mirror",
+            prefilter=False,
+        )
+    return result
+
+
+def _nodes(size: int) -> npt.NDArray[np.float64]:
+    count = max(math.ceil(size / _NODE_SPACING_PX) + 1, _MIN_NODES)
+    return np.linspace(-0.5, size - 0.5, count)

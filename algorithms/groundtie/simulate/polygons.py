@@ -1,0 +1,130 @@
+"""Convex polygons that are cut into smaller ones: districts, blocks, fields and lots."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+Point = tuple[float, float]
+Polygon = list[Point]
+
+_ANGLE_JITTER_RAD = math.radians(5)
+
+
+@dataclass(frozen=True)
+class Subdivision:
+    """Cells of a subdivided polygon and the lanes that run between them."""
+
+    cells: list[Polygon]
+    lanes: list[Polygon]
+
+
+def area(polygon: Polygon) -> float:
+    """Return the area of a simple polygon."""
+    following = polygon[1:] + polygon[:1]
+    return abs(sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(polygon, following, strict=True)) / 2)
+
+
+def clip(polygon: Polygon, point: Point, normal: Point) -> Polygon:
+    """Return the part of a convex polygon that lies on the side `normal` points to."""
+    kept: Polygon = []
+    distances = [(p[0] - point[0]) * normal[0] + (p[1] - point[1]) * normal[1] for p in polygon]
+    for i, (here, d) in enumerate(zip(polygon, distances, strict=True)):
+        after, e = polygon[(i + 1) % len(polygon)], distances[(i + 1) % len(polygon)]
+        if d >= 0:
+            kept.append(here)
+        if (d < 0) != (e < 0):
+            t = d / (d - e)
+            kept.append((here[0] + t * (after[0] - here[0]), here[1] + t * (after[1] - here[1])))
+    return kept
+
+
+def contains(polygon: Polygon, point: Point) -> bool:
+    """Tell whether a point lies inside a convex polygon."""
+    signs = [
+        (b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0]) >= 0
+        for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True)
+    ]
+    return all(signs) or not any(signs)
+
+
+def rectangle(centre: Point, half: Point, angle_rad: float) -> Polygon:
+    """Return the rectangle of half side lengths `half`, turned by an angle."""
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    return [
+        (
+            centre[0] + i * half[0] * cos - j * half[1] * sin,
+            centre[1] + i * half[0] * sin + j * half[1] * cos,
+        )
+        for i, j in corners
+    ]
+
+
+def main_frame(polygon: Polygon) -> tuple[Point, Point, float]:
+    """Return the centre, the half side lengths and the angle of the box along the longest edge."""
+    edges = zip(polygon, polygon[1:] + polygon[:1], strict=True)
+    a, b = max(edges, key=lambda e: (e[1][0] - e[0][0]) ** 2 + (e[1][1] - e[0][1]) ** 2)
+    angle = math.atan2(b[1] - a[1], b[0] - a[0])
+    cos, sin = math.cos(angle), math.sin(angle)
+    along = [p[0] * cos + p[1] * sin for p in polygon]
+    across = [p[1] * cos - p[0] * sin for p in polygon]
+    u, v = (min(along) + max(along)) / 2, (min(across) + max(across)) / 2
+    half = ((max(along) - min(along)) / 2, (max(across) - min(across)) / 2)
+    return (u * cos - v * sin, u * sin + v * cos), half, angle
+
+
+def fitted_rectangle(polygon: Polygon, fill: Point) -> Polygon | None:
+    """Return a rectangle along the longest edge that fills these shares of both sides.
+
+    It is shrunk until it lies inside the polygon; None when the polygon is too pointed for that.
+    """
+    centre, half, angle = main_frame(polygon)
+    for shrink in (1.0, 0.85, 0.7, 0.55):
+        box = rectangle(centre, (half[0] * fill[0] * shrink, half[1] * fill[1] * shrink), angle)
+        if all(contains(polygon, corner) for corner in box):
+            return box
+    return None
+
+
+def subdivide(
+    polygon: Polygon, cell_area: float, lane_width: float, generator: np.random.Generator
+) -> Subdivision:
+    """Cut a convex polygon across its longer side until cells are about `cell_area` large."""
+    done = Subdivision([], [])
+    waiting = [polygon]
+    while waiting:
+        cell = waiting.pop()
+        stop, share, turn = generator.random(3).tolist()
+        if area(cell) < cell_area * (0.8 + 1.2 * stop):
+            done.cells.append(cell)
+            continue
+        first, second, lane = _split(cell, lane_width, 0.38 + 0.24 * share, 2 * turn - 1)
+        parts = [part for part in (first, second) if len(part) >= 3]
+        if len(parts) < 2:
+            done.cells.append(cell)
+            continue
+        waiting.extend(parts)
+        if lane_width > 0 and len(lane) >= 3:
+            done.lanes.append(lane)
+    return done
+
+
+def _split(
+    polygon: Polygon, gap: float, share: float, turn: float
+) -> tuple[Polygon, Polygon, Polygon]:
+    """Both sides of a cut across the longer side, and the lane between them."""
+    centre, half, angle = main_frame(polygon)
+    longer = 0 if half[0] >= half[1] else 1
+    across = angle + longer * math.pi / 2
+    offset = (2 * share - 1) * half[longer]
+    point = (centre[0] + offset * math.cos(across), centre[1] + offset * math.sin(across))
+    direction = across + turn * _ANGLE_JITTER_RAD
+    normal = (math.cos(direction), math.sin(direction))
+    opposite = (-normal[0], -normal[1])
+    far = (point[0] + normal[0] * gap / 2, point[1] + normal[1] * gap / 2)
+    near = (point[0] - normal[0] * gap / 2, point[1] - normal[1] * gap / 2)
+    lane = clip(clip(polygon, near, normal), far, opposite)
+    return clip(polygon, far, normal), clip(polygon, near, opposite), lane

@@ -1,0 +1,166 @@
+"""A piece of country with terrain, land cover and objects of known height."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import ParameterError
+from .cover import Cover, ParcelBook, ParcelTable
+from .layout import DENSITIES, Layout
+from .noise import SmoothNoise, Stream, random_stream, strips
+
+_CROWN_M = 2.2
+_COARSEST_FULL_SIZE_M = 2.5
+
+
+@dataclass(frozen=True)
+class SceneOptions:
+    """What the country looks like.
+
+    Attributes
+    ----------
+    size_px : tuple of int
+        Width and height of the scene without its margin.
+    pixel_size_m : float
+        Size of the pixels of the scene and of its SAR image.
+    density : str
+        "rural" (0–3 % built, 3–8 m high), "suburban" (up to 25 %, 4–12 m) or "urban" (about half,
+        10–60 m).
+    relief_m : float
+        Height range of the terrain where the scene is larger than its hills.
+    seed : int
+        Everything random follows from it.
+    """
+
+    size_px: tuple[int, int] = (1000, 1000)
+    pixel_size_m: float = 1.0
+    density: str = "suburban"
+    relief_m: float = 20.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be simulated."""
+        if min(self.size_px) < 16:
+            raise ParameterError(
+                f"the scene must be at least 16 px wide and high, not {self.size_px}"
+            )
+        if self.density not in DENSITIES:
+            raise ParameterError(
+                f"density must be one of {', '.join(DENSITIES)}, not {self.density!r}"
+            )
+        if not self.pixel_size_m > 0 or self.relief_m < 0:
+            raise ParameterError("pixel_size_m must be positive and relief_m not negative")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Ground truth of a scene, with a margin on all sides.
+
+    Attributes
+    ----------
+    pixel_size_m : float
+        Pixel size.
+    margin_px : int
+        Rows and columns on each side that are not part of the reference image.
+    seed : int
+        Seed of the textures that the sensors see.
+    terrain_m : float32 array (rows, columns)
+        Height of the bare ground.
+    object_m : float32 array (rows, columns)
+        Height of roof or canopy above the ground, 0 where there is neither.
+    parcel : int32 array (rows, columns)
+        Number of the parcel in `parcels`.
+    parcels : ParcelTable
+        Class and radiometry of the parcels.
+    """
+
+    pixel_size_m: float
+    margin_px: int
+    seed: int
+    terrain_m: npt.NDArray[np.float32]
+    object_m: npt.NDArray[np.float32]
+    parcel: npt.NDArray[np.int32]
+    parcels: ParcelTable
+
+    @property
+    def window(self) -> tuple[slice, slice]:
+        """Rows and columns of the reference image."""
+        rows, columns = self.terrain_m.shape
+        m = self.margin_px
+        return slice(m, rows - m), slice(m, columns - m)
+
+    def cover(self, rows: slice = slice(None)) -> npt.NDArray[np.uint8]:
+        """Return the class (`Cover`) of the pixels of some rows."""
+        return self.parcels.cover[self.parcel[rows]]
+
+
+def generate_scene(options: SceneOptions, margin_px: int = 0) -> Scene:
+    """Generate a scene.
+
+    Parameters
+    ----------
+    options : SceneOptions
+        What the country looks like.
+    margin_px : int
+        How far the country goes on beyond the wanted size.
+    """
+    width, height = (size + 2 * margin_px for size in options.size_px)
+    shape = (height, width)
+    book = ParcelBook(random_stream(options.seed, Stream.SURFACES))
+    # Fields and houses of coarse images grow with the pixel, or they would be smaller than one.
+    enlargement = max(options.pixel_size_m / _COARSEST_FULL_SIZE_M, 1.0)
+    layout = Layout(
+        shape,
+        enlargement / options.pixel_size_m,
+        options.density,
+        random_stream(options.seed, Stream.LAYOUT),
+        book,
+    )
+    parcel = layout.draw()
+    parcels = book.table()
+    return Scene(
+        pixel_size_m=options.pixel_size_m,
+        margin_px=margin_px,
+        seed=options.seed,
+        terrain_m=_terrain(options, shape),
+        object_m=_object_heights(options, parcel, parcels),
+        parcel=parcel,
+        parcels=parcels,
+    )
+
+
+def _terrain(options: SceneOptions, shape: tuple[int, int]) -> npt.NDArray[np.float32]:
+    terrain = np.zeros(shape, np.float32)
+    if options.relief_m == 0:
+        return terrain
+    # A lattice as wide as six times the relief keeps slopes below some 20 degrees.
+    hill_m = max(300.0, 6 * options.relief_m)
+    for octave, (size, share) in enumerate(((1.0, 0.9), (0.35, 0.2), (0.12, 0.04))):
+        cell_px = max(hill_m * size / options.pixel_size_m, 4.0)
+        noise = SmoothNoise.draw(
+            shape, cell_px, random_stream(options.seed, Stream.TERRAIN, octave)
+        )
+        for _, start, stop in strips(shape[0]):
+            terrain[start:stop] += noise.rows(start, stop) * (share * options.relief_m / 4)
+    return terrain
+
+
+def _object_heights(
+    options: SceneOptions, parcel: npt.NDArray[np.int32], parcels: ParcelTable
+) -> npt.NDArray[np.float32]:
+    """Roofs are flat; canopies are made of crowns."""
+    heights = np.empty(parcel.shape, np.float32)
+    cell_px = max(_CROWN_M / options.pixel_size_m, 1.0)
+    crowns = SmoothNoise.draw(
+        (parcel.shape[0], parcel.shape[1]), cell_px, random_stream(options.seed, Stream.CROWNS)
+    )
+    for _, start, stop in strips(parcel.shape[0]):
+        label = parcel[start:stop]
+        heights[start:stop] = parcels.height_m[label]
+        wood = parcels.cover[label] == Cover.FOREST
+        factor = np.clip(0.9 + 0.08 * crowns.rows(start, stop), 0.6, 1.0)
+        heights[start:stop][wood] *= factor[wood]
+    return heights
