@@ -167,16 +167,21 @@ class Layout:
             self._trees.append((place[0] + 1.4 * size[0], place[1] + 1.6 * size[1]))
 
     def _draw_waters(self) -> None:
+        """Draw all banks, then all waters, so that no bank runs through another water."""
         height, width = self.labels.shape
-        self._draw_river(height, width)
+        shores = [self._river(height, width)]
         area_m2 = height * width / self._scale**2
         for _ in range(int(self._random.poisson(area_m2 / _LAKE_M2))):
             centre = (self._uniform(0, width), self._uniform(0, height))
             radius = self._uniform(20, 70) * self._scale
-            self._fill(self._blob(centre, radius * 1.15), self._add(Cover.GRASS), convex=False)
-            self._fill(self._blob(centre, radius), self._add(Cover.WATER), convex=False)
+            shores.append((self._blob(centre, radius * 1.15), self._blob(centre, radius)))
+        for bank, _ in shores:
+            self._fill(bank, self._add(Cover.GRASS), convex=False)
+        for _, water in shores:
+            self._fill(water, self._add(Cover.WATER), convex=False)
 
-    def _draw_river(self, height: int, width: int) -> None:
+    def _river(self, height: int, width: int) -> tuple[Polygon, Polygon]:
+        """Outlines of the banks and of the water of a winding river across the scene."""
         angle = self._uniform(0, math.pi)
         length = math.hypot(height, width)
         s = np.linspace(-length / 2, length / 2, max(int(length / (8 * self._scale)), 20))
@@ -186,14 +191,15 @@ class Layout:
             wave += amplitude * np.sin(2 * math.pi * s / (wavelength * self._scale) + phase)
         wave = wave * self._scale + self._uniform(-0.2, 0.2) * min(height, width)
         half = self._uniform(6, 14) * self._scale * (1 + 0.25 * np.sin(s / (60 * self._scale)))
-        bank = half + 5 * self._scale
-        for cover, reach in ((Cover.GRASS, bank), (Cover.WATER, half)):
+
+        def outline(reach: npt.NDArray[np.float64]) -> Polygon:
             along = np.concatenate([s, s[::-1]])
             across = np.concatenate([wave - reach, (wave + reach)[::-1]])
             x = width / 2 + along * math.cos(angle) - across * math.sin(angle)
             y = height / 2 + along * math.sin(angle) + across * math.cos(angle)
-            outline = list(zip(x.tolist(), y.tolist(), strict=True))
-            self._fill(outline, self._add(cover), convex=False)
+            return list(zip(x.tolist(), y.tolist(), strict=True))
+
+        return outline(half + 5 * self._scale), outline(half)
 
     def _blob(self, centre: Point, radius: float) -> Polygon:
         turn = np.linspace(0, 2 * math.pi, 60, endpoint=False)

@@ -105,13 +105,13 @@ def _drawn_warp(
     generator: np.random.Generator, terms: int, degree: int, largest: float
 ) -> npt.NDArray[np.float64]:
     """Coefficients above the constant whose displacement is at most `largest` in the frame."""
+    # A warp that folds the plane has no inverse; these stay far from that.
+    if largest > 0.1:
+        raise ParameterError("warp must be less than a twentieth of the input's longer side")
     drawn = generator.uniform(-1, 1, (terms, 2))
     side = np.linspace(-1, 1, 41)
     uv = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     displacement = monomials(uv, degree)[:, 1:] @ drawn
-    # A warp that folds the plane has no inverse; these stay far from that.
-    if largest > 0.1:
-        raise ParameterError("warp must be less than a twentieth of the input's longer side")
     return drawn * (largest / np.hypot(*displacement.T).max())
 
 

@@ -105,14 +105,9 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
         raise ParameterError("input_pixel_size_m must be 0.25 to 16 times the scene's pixel size")
     scene_options = options.scene
     width, height = scene_options.size_px
-    reference_grid = Grid(
-        Affine.translation(*CORNER_M)
-        * Affine.scale(1, -1)
-        * Affine.scale(scene_options.pixel_size_m),
-        CRS.from_epsg(CRS_EPSG),
-        width,
-        height,
-    )
+    px_m = scene_options.pixel_size_m
+    transform = Affine.translation(*CORNER_M) * Affine.scale(px_m, -px_m)
+    reference_grid = Grid(transform, CRS.from_epsg(CRS_EPSG), width, height)
     claimed = reference_grid.scaled(options.pixel_ratio)
     model = draw_misregistration(options.distortion, claimed, scene_options.seed)
     truth = Transform(model, reference_grid.crs, claimed)

@@ -129,20 +129,18 @@ def _strip_power(
 ) -> FloatImage:
     """Expected power of some full rows of the scene, geocoded."""
     texture = random_stream(scene.seed, Stream.SAR_TEXTURE, index)
-    layers = (
-        scene.terrain_m[rows] / np.float32(scene.pixel_size_m),
-        scene.object_m[rows] / np.float32(scene.pixel_size_m),
-        _backscatter(scene, rows, patches, texture),
-        scene.cover(rows) == Cover.BUILDING,
-    )
-    flip = options.orbit == "descending"
-    terrain, objects, backscatter, building = (a[:, ::-1] if flip else a for a in layers)
+    # A look towards -columns is one towards +columns at the mirrored scene.
+    mirror = slice(None, None, -1 if options.orbit == "descending" else 1)
+    terrain = scene.terrain_m[rows, mirror] / np.float32(scene.pixel_size_m)
+    objects = scene.object_m[rows, mirror] / np.float32(scene.pixel_size_m)
+    backscatter = _backscatter(scene, rows, patches, texture)[:, mirror]
+    building = scene.cover(rows)[:, mirror] == Cover.BUILDING
     walls = random_stream(scene.seed, Stream.SAR_WALLS, index)
     storey_px = max(_STOREY_M / scene.pixel_size_m, 1.0)
     cot = options.cot_incidence
     power = _range_power(terrain, objects, backscatter, building, cot, storey_px, walls)
     power += np.float32(_NOISE_FLOOR)
-    return power[:, ::-1] if flip else power
+    return power[:, mirror]
 
 
 def _backscatter(
@@ -177,7 +175,8 @@ class _RangeLine:
         share = offset - lower
         index = row * self.bins + lower.astype(np.intp)
         count = self.rows * self.bins
-        total = np.bincount(index, weight * (1 - share), count)
+        total = np.zeros(count)
+        total += np.bincount(index, weight * (1 - share), count)
         total += np.bincount(index + 1, weight * share, count)
         return total.reshape(self.rows, self.bins)
 
@@ -211,7 +210,7 @@ def _range_power(
     share = position - lower
     flat = power.astype(np.float32).ravel()
     lower += np.arange(rows)[:, None] * line.bins
-    return flat[lower] * (1 - share) + flat[lower + 1] * share
+    return np.asarray(flat[lower] * (1 - share) + flat[lower + 1] * share, np.float32)
 
 
 def _skyline(far_end: FloatImage, cot: float) -> npt.NDArray[np.float64]:
