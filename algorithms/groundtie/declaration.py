@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 from .errors import ParameterError
-from .kinds import Kind, check_paths
+from .kinds import Kind, RasterIn, check_different, check_paths
 
 
 class ToolResult(Protocol):
@@ -61,7 +61,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Output:
-    """A number or text in a result's summary that QGIS models can go on with.
+    """A number (or `text`) in a result's summary that QGIS models can go on with.
 
     `path` names its place in the summary, with dots between the levels.
     """
@@ -69,6 +69,7 @@ class Output:
     name: str
     label: str
     path: str
+    text: bool = False
 
     def value(self, summary: Mapping[str, Any]) -> Any:
         """Return this output's value in `summary`."""
@@ -110,8 +111,11 @@ class Tool:
         ------
         ParameterError
             A value is missing, unknown, of the wrong type or out of its range.
-        SameFileError, OutputError
-            An output would overwrite another file of this call, or cannot be written.
+        SameFileError
+            Two of the rasters that the tool needs are one file, or an output would overwrite
+            another file of this call.
+        OutputError
+            An output cannot be written.
         """
         unknown = set(values) - {parameter.name for parameter in self.parameters}
         if unknown:
@@ -120,6 +124,13 @@ class Tool:
             parameter.name: parameter.check(_value(parameter, values), spell(parameter))
             for parameter in self.parameters
         }
+        check_different(
+            {
+                spell(p): checked[p.name]
+                for p in self.parameters
+                if p.required and isinstance(p.kind, RasterIn)
+            }
+        )
         check_paths([(spell(p), p.kind, checked[p.name]) for p in self.parameters])
         return checked
 
@@ -140,7 +151,7 @@ def tool(
         def checked(*args: P.args, **kwargs: P.kwargs) -> R:
             bound = signature.bind(*args, **kwargs).arguments
             progress = {key: bound.pop(key) for key in ("progress",) if key in bound}
-            return function(**declared.check(bound), **progress)  # type: ignore[arg-type]
+            return cast(Callable[..., R], function)(**declared.check(bound), **progress)
 
         declared = _declare(function, signature, checked, title, group, outputs)
         checked.__groundtie_tool__ = declared  # type: ignore[attr-defined]

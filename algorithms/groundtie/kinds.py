@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -189,6 +189,15 @@ class Band(Kind):
 
 def _is_gdal_name(value: Any) -> bool:
     return isinstance(value, str) and bool(_GDAL_NAME.match(value)) and not Path(value).exists()
+
+
+def check_different(rasters: Mapping[str, Path | str]) -> None:
+    """Raise `SameFileError` if two of these rasters, given by name, are one and the same."""
+    taken: dict[Path | str, str] = {}
+    for name, raster in rasters.items():
+        other = taken.setdefault(raster.resolve() if isinstance(raster, Path) else raster, name)
+        if other != name:
+            raise SameFileError(f"{name} is the same raster as {other}: {raster}")
 
 
 def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:

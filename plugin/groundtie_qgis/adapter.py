@@ -1,0 +1,161 @@
+"""Turns any tool's declaration into a Processing algorithm."""
+
+from __future__ import annotations
+
+import html
+import traceback
+from typing import Any
+
+from qgis.core import (
+    QgsProcessingAlgorithm,
+    QgsProcessingContext,
+    QgsProcessingException,
+    QgsProcessingFeedback,
+    QgsProcessingOutputNumber,
+    QgsProcessingOutputString,
+)
+from qgis.PyQt.QtGui import QIcon
+
+from .definitions import definition, qgis_name
+from .dependencies import complaint, rasterio_env
+from .library import FOLDER, errors, kinds, plugin_metadata, progress
+from .styling import style_when_loaded
+from .values import Reader
+
+ICON = FOLDER / "icons" / "groundtie.svg"
+
+
+class ToolAlgorithm(QgsProcessingAlgorithm):
+    """The Processing algorithm of one declared tool."""
+
+    def __init__(self, tool: Any) -> None:
+        super().__init__()
+        self._tool = tool
+
+    def createInstance(self) -> ToolAlgorithm:
+        return ToolAlgorithm(self._tool)
+
+    def name(self) -> str:
+        return str(self._tool.name)
+
+    def displayName(self) -> str:
+        return str(self._tool.title)
+
+    def group(self) -> str:
+        return str(self._tool.group)
+
+    def groupId(self) -> str:
+        return self.group().lower().replace(" ", "_")
+
+    def tags(self) -> list[str]:
+        return [tag.strip() for tag in plugin_metadata().get("tags", "").split(",") if tag]
+
+    def shortDescription(self) -> str:
+        return str(self._tool.summary)
+
+    def shortHelpString(self) -> str:
+        return help_html(self._tool)
+
+    def helpUrl(self) -> str:
+        return plugin_metadata().get("homepage", "")
+
+    def icon(self) -> QIcon:
+        return QIcon(str(ICON))
+
+    def svgIconPath(self) -> str:
+        return str(ICON)
+
+    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:
+        for parameter in self._tool.parameters:
+            self.addParameter(definition(parameter))
+        for output in self._tool.outputs:
+            made = QgsProcessingOutputString if output.text else QgsProcessingOutputNumber
+            self.addOutput(made(qgis_name(output.name), output.label))
+
+    def canExecute(self) -> tuple[bool, str]:
+        missing = complaint()
+        return not missing, missing
+
+    def checkParameterValues(
+        self, parameters: dict[str, Any], context: QgsProcessingContext
+    ) -> tuple[bool, str]:
+        # qgis_process and models do not ask canExecute
+        if missing := complaint():
+            return False, missing
+        valid, message = super().checkParameterValues(parameters, context)
+        if not valid:
+            return valid, message
+        scratch = QgsProcessingContext()  # so that a mere check has no layer loaded afterwards
+        reader = Reader(self, parameters, context, scratch, QgsProcessingFeedback())
+        try:
+            self._check(reader)
+        except errors.GroundTieError as error:
+            return False, str(error)
+        return True, ""
+
+    def processAlgorithm(
+        self,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+    ) -> dict[str, Any]:
+        if missing := complaint():
+            raise QgsProcessingException(missing)
+        try:
+            values = self._check(Reader(self, parameters, context, context, feedback))
+            with rasterio_env():
+                result = self._tool.run(**values, progress=_progress(feedback))
+        except errors.GroundTieError as error:
+            raise QgsProcessingException(str(error)) from error
+        except Exception as error:
+            feedback.pushDebugInfo(traceback.format_exc())
+            what = f"{type(error).__name__}: {error}"
+            raise QgsProcessingException(f"this is a bug in GroundTie: {what}") from error
+        for line in result.lines():
+            feedback.pushInfo(line)
+        self._style(values, context)
+        return self._results(values, result.summary())
+
+    def _check(self, reader: Reader) -> dict[str, Any]:
+        read = {parameter.name: reader.read(parameter) for parameter in self._tool.parameters}
+        return dict(self._tool.check(read, spell=lambda parameter: parameter.kind.label))
+
+    def _style(self, values: dict[str, Any], context: QgsProcessingContext) -> None:
+        for parameter in self._tool.parameters:
+            if isinstance(parameter.kind, kinds.VectorOut) and values[parameter.name]:
+                style_when_loaded(parameter.name, str(values[parameter.name]), context)
+
+    def _results(self, values: dict[str, Any], summary: dict[str, Any]) -> dict[str, Any]:
+        written = {
+            qgis_name(parameter.name): str(values[parameter.name])
+            for parameter in self._tool.parameters
+            if isinstance(parameter.kind, (kinds.OutputKind, kinds.FolderOut))
+            and values[parameter.name] is not None
+        }
+        told = {qgis_name(output.name): output.value(summary) for output in self._tool.outputs}
+        return written | {name: value for name, value in told.items() if value is not None}
+
+
+def _progress(feedback: QgsProcessingFeedback) -> Any:
+    """Return the library's progress that reports to QGIS and hears its Cancel."""
+    said = ""
+
+    def report(fraction: float, message: str) -> None:
+        nonlocal said
+        feedback.setProgress(100 * fraction)
+        if message and message != said:
+            said = message
+            feedback.pushInfo(message)
+
+    return progress.Progress(report, feedback.isCanceled)
+
+
+def help_html(tool: Any) -> str:
+    """Return the help of a tool and of its parameters as HTML."""
+    paragraphs = [tool.summary, *tool.description.split("\n\n")]
+    parts = [f"<p>{html.escape(' '.join(text.split()))}</p>" for text in paragraphs if text]
+    rows = [
+        f"<p><b>{html.escape(p.kind.label)}</b>: {html.escape(p.kind.help)}</p>"
+        for p in tool.parameters
+    ]
+    return "\n".join([*parts, "<h3>Parameters</h3>", *rows])

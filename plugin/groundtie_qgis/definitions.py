@@ -1,0 +1,156 @@
+"""Turns a declared parameter into the definition of a Processing parameter."""
+
+from __future__ import annotations
+
+import math
+from functools import singledispatch
+from typing import Any
+
+from qgis.core import (
+    QgsProcessingParameterBand,
+    QgsProcessingParameterBoolean,
+    QgsProcessingParameterDefinition,
+    QgsProcessingParameterEnum,
+    QgsProcessingParameterFile,
+    QgsProcessingParameterFileDestination,
+    QgsProcessingParameterFolderDestination,
+    QgsProcessingParameterNumber,
+    QgsProcessingParameterRasterDestination,
+    QgsProcessingParameterRasterLayer,
+    QgsProcessingParameterString,
+    QgsProcessingParameterVectorDestination,
+    QgsProcessingParameterVectorLayer,
+)
+
+from . import compat
+from .library import kinds
+
+
+def qgis_name(name: str) -> str:
+    """Return the name that a declared parameter or output has in Processing."""
+    return name.upper()
+
+
+def definition(parameter: Any) -> QgsProcessingParameterDefinition:
+    """Return the Processing definition of a declared parameter."""
+    made = _make(parameter.kind, parameter, qgis_name(parameter.name))
+    made.setHelp(parameter.kind.help)
+    if parameter.kind.advanced:
+        made.setFlags(made.flags() | compat.ADVANCED)
+    return made
+
+
+def file_filter(suffixes: tuple[str, ...]) -> str:
+    """Return the filter of a file dialog for files that end in `suffixes`."""
+    return ";;".join(f"{suffix[1:].upper()} files (*{suffix})" for suffix in suffixes)
+
+
+# In Processing, "optional" says that a value may be absent: with a default there always is one.
+def _optional(parameter: Any) -> bool:
+    return not parameter.required and parameter.default is None
+
+
+@singledispatch
+def _make(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    raise TypeError(f"no Processing parameter for {type(kind).__name__}")
+
+
+@_make.register(kinds.RasterIn)
+def _raster_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterRasterLayer(name, kind.label, optional=not parameter.required)
+
+
+@_make.register(kinds.VectorIn)
+def _vector_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterVectorLayer(
+        name, kind.label, types=[compat.ANY_VECTOR], optional=not parameter.required
+    )
+
+
+@_make.register(kinds.FileIn)
+def _file_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterFile(
+        name,
+        kind.label,
+        behavior=compat.FILE,
+        optional=not parameter.required,
+        fileFilter=file_filter(kind.suffixes),
+    )
+
+
+@_make.register(kinds.RasterOut)
+def _raster_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterRasterDestination(name, kind.label, None, *_wanted(parameter))
+
+
+@_make.register(kinds.VectorOut)
+def _vector_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterVectorDestination(
+        name, kind.label, compat.ANY_VECTOR, None, *_wanted(parameter)
+    )
+
+
+@_make.register(kinds.FileOut)
+def _file_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterFileDestination(
+        name, kind.label, file_filter(kind.suffixes), None, *_wanted(parameter)
+    )
+
+
+@_make.register(kinds.FolderOut)
+def _folder_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterFolderDestination(name, kind.label, None, *_wanted(parameter))
+
+
+def _wanted(parameter: Any) -> tuple[bool, bool]:
+    """Return a destination's `optional` and `createByDefault`."""
+    return not parameter.required, parameter.required
+
+
+@_make.register(kinds.Number)
+def _number(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    limits = {"minValue": kind.minimum, "maxValue": kind.maximum}
+    return QgsProcessingParameterNumber(
+        name,
+        f"{kind.label} [{kind.unit}]" if kind.unit else kind.label,
+        type=compat.INTEGER if kind.integer else compat.DOUBLE,
+        defaultValue=parameter.default,
+        optional=_optional(parameter),
+        **{limit: value for limit, value in limits.items() if math.isfinite(value)},
+    )
+
+
+@_make.register(kinds.Choice)
+def _choice(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterEnum(
+        name,
+        kind.label,
+        options=list(kind.choices),
+        defaultValue=parameter.default,
+        optional=_optional(parameter),
+        usesStaticStrings=True,
+    )
+
+
+@_make.register(kinds.Flag)
+def _flag(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterBoolean(name, kind.label, defaultValue=parameter.default)
+
+
+@_make.register(kinds.Text)
+def _text(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterString(
+        name, kind.label, defaultValue=parameter.default, optional=_optional(parameter)
+    )
+
+
+@_make.register(kinds.Band)
+def _band(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    # QGIS 3.22 takes a band with a default for mandatory: a band is always optional.
+    return QgsProcessingParameterBand(
+        name,
+        kind.label,
+        defaultValue=parameter.default,
+        parentLayerParameterName=qgis_name(kind.of),
+        optional=not parameter.required,
+    )

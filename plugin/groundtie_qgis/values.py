@@ -1,0 +1,104 @@
+"""Reads the values of Processing parameters as the tools take them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from qgis.core import (
+    NULL,
+    QgsProcessingAlgorithm,
+    QgsProcessingContext,
+    QgsProcessingFeedback,
+    QgsProviderRegistry,
+)
+
+from .definitions import qgis_name
+from .library import errors, kinds
+
+
+class Reader:
+    """Reads the values of one call of an algorithm.
+
+    Parameters
+    ----------
+    algorithm, parameters, context
+        As Processing hands them over.
+    outputs
+        The context to make outputs in: where it is not the call's own, nothing is loaded.
+    feedback
+        Takes the messages of layers that must be written to a file first.
+    """
+
+    def __init__(
+        self,
+        algorithm: QgsProcessingAlgorithm,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+        outputs: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+    ) -> None:
+        self._algorithm = algorithm
+        self._parameters = parameters
+        self._context = context
+        self._outputs = outputs
+        self._feedback = feedback
+
+    def read(self, parameter: Any) -> Any:
+        """Return the value of a declared parameter; None if it was not given.
+
+        Raises
+        ------
+        ParameterError
+            A layer is not one of files.
+        """
+        name, kind = qgis_name(parameter.name), parameter.kind
+        given = self._parameters.get(name)
+        if given is None or given == NULL or given == "":
+            return None
+        if isinstance(kind, kinds.RasterIn):
+            return self._raster(kind, name, given)
+        if isinstance(kind, kinds.VectorIn):
+            return self._vector(name, given)
+        read, context = self._method(kind)
+        return read(self._parameters, name, context)
+
+    def _method(self, kind: Any) -> tuple[Any, QgsProcessingContext]:
+        """Return the algorithm's method that reads values of this kind, and its context."""
+        algorithm = self._algorithm
+        if isinstance(kind, (kinds.RasterOut, kinds.VectorOut)):
+            return algorithm.parameterAsOutputLayer, self._outputs
+        if isinstance(kind, kinds.FileOut):
+            return algorithm.parameterAsFileOutput, self._outputs
+        if isinstance(kind, kinds.Flag):
+            return algorithm.parameterAsBool, self._context
+        if isinstance(kind, kinds.Choice):
+            return algorithm.parameterAsEnumString, self._context
+        if isinstance(kind, kinds.Band) or (isinstance(kind, kinds.Number) and kind.integer):
+            return algorithm.parameterAsInt, self._context
+        if isinstance(kind, kinds.Number):
+            return algorithm.parameterAsDouble, self._context
+        return algorithm.parameterAsString, self._context
+
+    def _raster(self, kind: Any, name: str, given: Any) -> Any:
+        layer = self._algorithm.parameterAsRasterLayer(self._parameters, name, self._context)
+        if layer is None:
+            return given  # the library says better than QGIS what is wrong with it
+        provider = layer.providerType()
+        if provider != "gdal":
+            raise errors.ParameterError(
+                f"{kind.label} must be a raster file, not the layer {layer.name()} of the "
+                f"provider {provider}; export it to a file first"
+            )
+        return _without_options(layer.source())
+
+    def _vector(self, name: str, given: Any) -> Any:
+        path = self._algorithm.parameterAsCompatibleSourceLayerPath(
+            self._parameters, name, self._context, ["gpkg", "geojson"], "gpkg", self._feedback
+        )
+        return path or given
+
+
+def _without_options(source: str) -> str:
+    """Return a layer's source without what QGIS hangs onto it behind bars."""
+    parts = QgsProviderRegistry.instance().decodeUri("gdal", source)
+    return str(source) if parts.get("layerName") else str(parts.get("path") or source)
