@@ -98,4 +98,4 @@ def _fit_thin_plate(
     system[:count, count:] = affine_part
     system[count:, :count] = affine_part.T
     solution = np.linalg.solve(system, np.vstack([displacement, np.zeros((3, 2))]))
-    return ThinPlateSpline(frame, uv, solution[:count], solution[count:])
+    return ThinPlateSpline("tps", frame, uv, solution[:count], solution[count:])

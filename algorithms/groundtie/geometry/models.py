@@ -6,11 +6,15 @@ claims this ground to lie. Both are in reference map units. Thesis S eq 3.27–3
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Protocol
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
+from affine import Affine
 from numpy.typing import ArrayLike, NDArray
+
+from ..rasters.grid import apply_affine
 
 FloatArray = NDArray[np.float64]
 
@@ -35,47 +39,36 @@ PARAMETERS = {
 KINDS = tuple(PARAMETERS)
 
 _INVERSE_STEPS = 20
-
-
-class Model(Protocol):
-    """What every model can do."""
-
-    @property
-    def kind(self) -> str:
-        """One of `KINDS`."""
-
-    def __call__(self, xy: ArrayLike) -> FloatArray:
-        """Return the claimed positions, shape (n, 2), of reference map positions `xy`."""
-
-    def inverse(self, xy: ArrayLike) -> FloatArray:
-        """Return the reference map positions, shape (n, 2), of claimed positions `xy`."""
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the model as values that JSON can carry."""
+_INVERSE_PRECISION = 1e-12  # of the frame
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Origin and unit of the coordinates that coefficients refer to, for well-posed numbers."""
+    """The coordinates that coefficients refer to: `to_map` takes them to the map.
 
-    origin: tuple[float, float]
-    scale: float
+    Rigid and similarity models preserve shapes in these coordinates.
+    """
+
+    to_map: Affine
 
     @classmethod
     def around(cls, xy: FloatArray) -> Frame:
         """Return the frame in which the positions `xy`, shape (n, 2), lie within ±1."""
         low, high = xy.min(axis=0), xy.max(axis=0)
         scale = float(np.max(high - low) / 2) or 1.0
-        centre = (low + high) / 2
-        return cls((float(centre[0]), float(centre[1])), scale)
+        return cls(Affine.translation(*((low + high) / 2)) * Affine.scale(scale))
+
+    def seen_from(self, affine: Affine) -> Frame:
+        """Return this frame when what was the map is a lattice that `affine` takes to the map."""
+        return Frame(affine * self.to_map)
 
     def enter(self, xy: ArrayLike) -> FloatArray:
         """Return map positions in this frame."""
-        return np.asarray((np.asarray(xy, float).reshape(-1, 2) - self.origin) / self.scale)
+        return apply_affine(~self.to_map, xy)
 
     def leave(self, uv: FloatArray) -> FloatArray:
         """Return positions of this frame on the map."""
-        return np.asarray(uv * self.scale + self.origin)
+        return apply_affine(self.to_map, uv)
 
 
 def monomials(uv: FloatArray, degree: int) -> FloatArray:
@@ -86,55 +79,103 @@ def monomials(uv: FloatArray, degree: int) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class PolynomialModel:
-    """Translation to third-degree polynomial: the displacement is a polynomial of the position.
+class Model(ABC):
+    """What all models share: a displacement that depends on the place in a frame.
 
     Parameters
     ----------
     kind
-        One of `DEGREE`'s keys; rigid and similarity are constrained polynomials of degree 1.
+        One of `KINDS`.
     frame
         What the coefficients refer to.
-    coefficients
-        Of the displacement in the frame, shape (terms, 2), in the order of `monomials`.
     """
 
     kind: str
     frame: Frame
+
+    @abstractmethod
+    def displacement(self, uv: FloatArray) -> FloatArray:
+        """Return the displacement, in the frame, of positions in the frame, both (n, 2)."""
+
+    @abstractmethod
+    def to_json(self) -> dict[str, Any]:
+        """Return the model as values that JSON can carry."""
+
+    def __call__(self, xy: ArrayLike) -> FloatArray:
+        """Return the claimed positions, shape (n, 2), of reference map positions `xy`."""
+        uv = self.frame.enter(xy)
+        return self.frame.leave(uv + self.displacement(uv))
+
+    def inverse(self, xy: ArrayLike) -> FloatArray:
+        """Return the reference map positions, shape (n, 2), of claimed positions `xy`.
+
+        By Newton's method with a numerical Jacobian.
+        """
+        target = self.frame.enter(xy)
+        uv = target - self.displacement(target)
+        step = 1e-4
+        for _ in range(_INVERSE_STEPS):
+            miss = target - uv - self.displacement(uv)
+            if np.nanmax(np.abs(miss), initial=0.0) < _INVERSE_PRECISION:
+                break
+            along_u = self._slope(uv, np.array([step, 0.0])) + [1, 0]
+            along_v = self._slope(uv, np.array([0.0, step])) + [0, 1]
+            determinant = along_u[:, 0] * along_v[:, 1] - along_v[:, 0] * along_u[:, 1]
+            du = (miss[:, 0] * along_v[:, 1] - miss[:, 1] * along_v[:, 0]) / determinant
+            dv = (miss[:, 1] * along_u[:, 0] - miss[:, 0] * along_u[:, 1]) / determinant
+            uv = uv + np.column_stack([du, dv])
+        return self.frame.leave(uv)
+
+    def on_map(self, affine: Affine) -> Self:
+        """Return this model of lattice positions as one of map positions.
+
+        `affine` takes the lattice to the map.
+        """
+        return replace(self, frame=self.frame.seen_from(affine))
+
+    def _slope(self, uv: FloatArray, step: FloatArray) -> FloatArray:
+        rise = self.displacement(uv + step) - self.displacement(uv - step)
+        return np.asarray(rise / (2 * np.abs(step).max()))
+
+
+@dataclass(frozen=True)
+class PolynomialModel(Model):
+    """Translation to third-degree polynomial: the displacement is a polynomial of the position.
+
+    Rigid and similarity models are constrained polynomials of degree 1.
+
+    Parameters
+    ----------
+    coefficients
+        Of the displacement in the frame, shape (terms, 2), in the order of `monomials`.
+    """
+
     coefficients: FloatArray
 
     @classmethod
-    def identity(cls, frame: Frame) -> PolynomialModel:
+    def identity(cls) -> PolynomialModel:
         """Return the translation by nothing."""
-        return cls("translation", frame, np.zeros((1, 2)))
+        return cls("translation", Frame(Affine.identity()), np.zeros((1, 2)))
 
-    def __call__(self, xy: ArrayLike) -> FloatArray:
-        """Return the claimed positions of reference map positions."""
-        uv = self.frame.enter(xy)
-        return self.frame.leave(uv + monomials(uv, DEGREE[self.kind]) @ self.coefficients)
-
-    def inverse(self, xy: ArrayLike) -> FloatArray:
-        """Return the reference map positions of claimed positions."""
-        return invert(self, xy)
+    def displacement(self, uv: FloatArray) -> FloatArray:
+        """Return the displacement, in the frame, of positions in the frame, both (n, 2)."""
+        return monomials(uv, DEGREE[self.kind]) @ self.coefficients
 
     def to_json(self) -> dict[str, Any]:
         """Return the model as values that JSON can carry."""
         return {
             "kind": self.kind,
-            "origin": list(self.frame.origin),
-            "scale": self.frame.scale,
+            "frame": list(self.frame.to_map)[:6],
             "coefficients": self.coefficients.tolist(),
         }
 
 
 @dataclass(frozen=True)
-class ThinPlateSpline:
+class ThinPlateSpline(Model):
     """Thin-plate spline: an affine part and bending weights at control points (Bookstein 1989).
 
     Parameters
     ----------
-    frame
-        What all else refers to.
     knots
         Control points in the frame, shape (n, 2).
     weights
@@ -143,28 +184,20 @@ class ThinPlateSpline:
         Coefficients of the displacement's affine part, shape (3, 2).
     """
 
-    frame: Frame
     knots: FloatArray
     weights: FloatArray
     affine: FloatArray
-    kind: str = "tps"
 
-    def __call__(self, xy: ArrayLike) -> FloatArray:
-        """Return the claimed positions of reference map positions."""
-        uv = self.frame.enter(xy)
+    def displacement(self, uv: FloatArray) -> FloatArray:
+        """Return the displacement, in the frame, of positions in the frame, both (n, 2)."""
         bending = thin_plate_kernel(uv, self.knots) @ self.weights
-        return self.frame.leave(uv + bending + monomials(uv, 1) @ self.affine)
-
-    def inverse(self, xy: ArrayLike) -> FloatArray:
-        """Return the reference map positions of claimed positions."""
-        return invert(self, xy)
+        return np.asarray(bending + monomials(uv, 1) @ self.affine)
 
     def to_json(self) -> dict[str, Any]:
         """Return the model as values that JSON can carry."""
         return {
             "kind": self.kind,
-            "origin": list(self.frame.origin),
-            "scale": self.frame.scale,
+            "frame": list(self.frame.to_map)[:6],
             "knots": self.knots.tolist(),
             "weights": self.weights.tolist(),
             "affine": self.affine.tolist(),
@@ -177,35 +210,17 @@ def thin_plate_kernel(uv: FloatArray, knots: FloatArray) -> FloatArray:
     return np.asarray(0.5 * squared * np.log(np.maximum(squared, 1e-300)))
 
 
-def invert(model: Model, xy: ArrayLike) -> FloatArray:
-    """Return where `model` takes to `xy`, by Newton's method with a numerical Jacobian."""
-    target = np.asarray(xy, float).reshape(-1, 2)
-    frame: Frame = model.frame  # type: ignore[attr-defined]
-    step = frame.scale * 1e-4
-    found = target - (model(target) - target)
-    for _ in range(_INVERSE_STEPS):
-        miss = target - model(found)
-        if np.nanmax(np.abs(miss), initial=0.0) < frame.scale * 1e-12:
-            break
-        along_x = (model(found + [step, 0]) - model(found - [step, 0])) / (2 * step)
-        along_y = (model(found + [0, step]) - model(found - [0, step])) / (2 * step)
-        determinant = along_x[:, 0] * along_y[:, 1] - along_y[:, 0] * along_x[:, 1]
-        dx = (miss[:, 0] * along_y[:, 1] - miss[:, 1] * along_y[:, 0]) / determinant
-        dy = (miss[:, 1] * along_x[:, 0] - miss[:, 0] * along_x[:, 1]) / determinant
-        found = found + np.column_stack([dx, dy])
-    return np.asarray(found)
-
-
 def model_from_json(values: dict[str, Any]) -> Model:
     """Return the model that `to_json` described; raises KeyError or ValueError if it cannot be."""
-    frame = Frame((float(values["origin"][0]), float(values["origin"][1])), float(values["scale"]))
-    if values["kind"] == "tps":
+    kind, frame = values["kind"], Frame(Affine(*values["frame"]))
+    if kind == "tps":
         return ThinPlateSpline(
+            kind,
             frame,
             np.asarray(values["knots"], float).reshape(-1, 2),
             np.asarray(values["weights"], float).reshape(-1, 2),
             np.asarray(values["affine"], float).reshape(3, 2),
         )
-    terms = (DEGREE[values["kind"]] + 1) * (DEGREE[values["kind"]] + 2) // 2
+    terms = (DEGREE[kind] + 1) * (DEGREE[kind] + 2) // 2
     coefficients = np.asarray(values["coefficients"], float).reshape(terms, 2)
-    return PolynomialModel(values["kind"], frame, coefficients)
+    return PolynomialModel(kind, frame, coefficients)

@@ -15,7 +15,7 @@ from rasterio.errors import CRSError
 
 from ..errors import TransformFileError
 from ..rasters.grid import Grid, reproject
-from .models import Frame, Model, PolynomialModel, model_from_json
+from .models import Model, PolynomialModel, model_from_json
 
 FloatArray = NDArray[np.float64]
 FORMAT = "groundtie-transform/1"
@@ -45,7 +45,7 @@ class Transform:
     @classmethod
     def as_claimed(cls, crs: CRS | None, input_grid: Grid) -> Transform:
         """Return the transform that believes the input's georeferencing."""
-        return cls(PolynomialModel.identity(Frame((0.0, 0.0), 1.0)), crs, input_grid)
+        return cls(PolynomialModel.identity(), crs, input_grid)
 
     def __call__(self, xy: ArrayLike) -> FloatArray:
         """Return the input pixels (col, row), centres at integers, of map positions (n, 2)."""

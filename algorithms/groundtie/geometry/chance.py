@@ -1,0 +1,52 @@
+"""How likely matches that fell anywhere would agree as well as these do (a contrario reasoning).
+
+A match that says nothing falls anywhere in its search window, and within the tolerance of a model
+with probability p = tolerance area / window area. That at least k of n such matches agree is a
+binomial tail (Moisan & Stival 2004).
+"""
+
+from __future__ import annotations
+
+import math
+
+from scipy.special import betaln
+from scipy.stats import binom
+
+
+def agreement_probability(tolerance_px: float, radius_px: int) -> float:
+    """Return the probability that a random match agrees with a model.
+
+    Parameters
+    ----------
+    tolerance_px
+        Distance within which a match agrees.
+    radius_px
+        Largest shift of the search window, a square.
+    """
+    return min(math.pi * tolerance_px**2 / (2 * radius_px + 1) ** 2, 1.0)
+
+
+def log10_chance(agreeing: int, total: int, probability: float) -> float:
+    """Return log10 of the probability that so many of `total` random matches agree, or more."""
+    if total == 0 or agreeing == 0:
+        return 0.0
+    return float(binom.logsf(agreeing - 1, total, probability) / math.log(10))
+
+
+def log10_false_alarms(agreeing: int, total: int, probability: float, sample: int) -> float:
+    """Return log10 of the expected number of random models that so many matches would agree with.
+
+    Parameters
+    ----------
+    agreeing, total
+        Matches that agree, and all matches, those that define the model included.
+    probability
+        That a random match agrees.
+    sample
+        Matches that define a model; each such subset is a model that was tried.
+    """
+    if agreeing <= sample:
+        return math.inf
+    log_subsets = -betaln(total - sample + 1, sample + 1) - math.log(total + 1)
+    chance = log10_chance(agreeing - sample, total - sample, probability)
+    return float(log_subsets / math.log(10) + chance)

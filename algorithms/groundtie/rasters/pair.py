@@ -1,0 +1,217 @@
+"""A reference and an input image on a common matching grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import GeoreferencingError, NoOverlapError, SameFileError
+from .grid import Grid, reproject
+from .patch import Patch
+from .reading import RasterSource, Window
+from .warping import coordinates
+
+FloatArray = NDArray[np.float64]
+ToPixel = Callable[[FloatArray], FloatArray]
+
+# An input whose pixels are this much smaller than the grid's is averaged before it is resampled.
+_REDUCE_FROM = 1.5
+
+# Pixel sizes nearer than this are the same.
+_SAME_SIZE = 0.02
+
+
+@dataclass(frozen=True)
+class Image:
+    """One image of a pair: the raster, the band that is matched and a mask.
+
+    Parameters
+    ----------
+    source
+        The raster.
+    band
+        Number of the band, from 1; None: the mean of all bands.
+    mask
+        A raster on the same map whose pixels tell which of the image's take part: those with 0
+        or without data do not. None: all that are valid.
+    """
+
+    source: RasterSource
+    band: int | None = None
+    mask: RasterSource | None = None
+
+    def read_onto(self, grid: Grid, to_px: ToPixel, to_mask_px: ToPixel | None = None) -> Patch:
+        """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
+        patch = _read_onto(self.source, self.band, grid, to_px)
+        if self.mask is None or to_mask_px is None:
+            return patch
+        mask = _read_onto(self.mask, 1, grid, to_mask_px)
+        return Patch(patch.values, patch.valid & mask.valid & (mask.values != 0))
+
+
+@dataclass(frozen=True)
+class ImagePair:
+    """Reference and input on a common matching grid; reads windows of both, never whole scenes.
+
+    Parameters
+    ----------
+    reference, input
+        The two images.
+    grid
+        The matching grid: the reference's lattice, with pixels as large as the coarser image's,
+        where the images overlap or may do so within the search radius.
+    overlap_px
+        Width and height, in matching pixels, of the box in which they overlap as claimed.
+    """
+
+    reference: Image
+    input: Image
+    grid: Grid
+    overlap_px: tuple[int, int]
+
+    def reference_patch(self, grid: Grid) -> Patch:
+        """Return the reference on a grid in its CRS."""
+        mask = self.reference.mask
+        to_mask = None if mask is None else _claimed_pixels(self.grid, mask.grid)
+        return self.reference.read_onto(grid, self.reference.source.grid.map_to_pixel, to_mask)
+
+    def input_patch(self, grid: Grid, to_input_px: ToPixel) -> Patch:
+        """Return the input on a grid; `to_input_px` takes map positions to input pixels."""
+        mask, own = self.input.mask, self.input.source.grid
+        if mask is None:
+            return self.input.read_onto(grid, to_input_px)
+        to_mask = _claimed_pixels(own, mask.grid)
+        return self.input.read_onto(
+            grid, to_input_px, lambda xy: to_mask(own.pixel_to_map(to_input_px(xy)))
+        )
+
+    def claimed_px(self, xy: FloatArray) -> FloatArray:
+        """Return the input pixels at reference map positions as the input claims, shape (n, 2)."""
+        return _claimed_pixels(self.grid, self.input.source.grid)(xy)
+
+
+def make_pair(
+    reference: Image,
+    input: Image,
+    matching_pixel_size_m: float | None = None,
+    search_radius_m: float | None = None,
+) -> ImagePair:
+    """Put two images on a common matching grid.
+
+    Parameters
+    ----------
+    reference, input
+        The two images.
+    matching_pixel_size_m
+        Pixel size of the matching grid; None: that of the coarser image.
+    search_radius_m
+        How far the input may lie from where it claims to be; None: as `default_radius_m`.
+
+    Raises
+    ------
+    SameFileError
+        Both are the same file.
+    GeoreferencingError
+        Only one of them is georeferenced.
+    NoOverlapError
+        They do not overlap.
+    """
+    ref, inp = reference.source, input.source
+    if Path(ref.path).resolve() == Path(inp.path).resolve():
+        raise SameFileError(f"reference and input are the same file: {ref.path}")
+    for one, other in ((ref, inp), (inp, ref)):
+        if one.grid.is_georeferenced and not other.grid.is_georeferenced:
+            raise GeoreferencingError(f"{other.path} has no georeferencing, but {one.path} has")
+        if one.grid.crs is not None and other.grid.crs is None:
+            raise GeoreferencingError(f"{other.path} has no CRS, but {one.path} has")
+    wanted = matching_pixel_size_m or _coarser_m(ref.grid, inp.grid)
+    factor = wanted / ref.grid.pixel_size_m
+    grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
+    outline = _claimed_pixels(inp.grid, ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
+    outline = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
+    overlap = _box(grid, outline, 0.0)
+    if overlap is None:
+        raise NoOverlapError(f"{ref.path} and {inp.path} do not overlap")
+    radius = search_radius_m or default_radius_m(grid)
+    reach = _box(grid, outline, radius / grid.pixel_size_m)
+    assert reach is not None
+    return ImagePair(reference, input, grid.window(*reach), (overlap.width, overlap.height))
+
+
+def default_radius_m(grid: Grid) -> float:
+    """Return the search radius for a matching grid: 100 m or 20 pixels, whichever is larger."""
+    usual = 100.0 if grid.crs is not None else 0.0
+    return max(usual, 20 * grid.pixel_size_m)
+
+
+def _coarser_m(reference: Grid, input: Grid) -> float:
+    if reference.crs is not None or not input.is_georeferenced:
+        return max(reference.pixel_size_m, input.pixel_size_m if input.is_georeferenced else 0.0)
+    return max(reference.pixel_size_m, input.pixel_size_m)
+
+
+def _claimed_pixels(source: Grid, target: Grid) -> ToPixel:
+    """Return the function from map positions of `source` to pixels of `target`."""
+    return lambda xy: target.map_to_pixel(reproject(xy, source.crs, target.crs))
+
+
+def _box(grid: Grid, outline_px: FloatArray, margin_px: float) -> Window | None:
+    """Return the pixels of a grid within the bounding box of an outline and a margin."""
+    outline_px = outline_px[np.isfinite(outline_px).all(axis=1)]
+    if len(outline_px) == 0:
+        return None
+    size = np.array([grid.width, grid.height])
+    low = np.clip(np.ceil(outline_px.min(axis=0) - margin_px), 0, size).astype(int)
+    high = np.clip(np.floor(outline_px.max(axis=0) + margin_px) + 1, 0, size).astype(int)
+    if (high - low).min() <= 0:
+        return None
+    return Window(int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1]))
+
+
+def _read_onto(source: RasterSource, band: int | None, grid: Grid, to_px: ToPixel) -> Patch:
+    """Return a raster resampled onto a grid, averaged first where its pixels are smaller."""
+    maps = coordinates(grid, to_px)
+    shape = (grid.height, grid.width)
+    finite = np.isfinite(maps[0]) & np.isfinite(maps[1])
+    inside = finite & source.grid.contains(np.stack(maps, axis=-1))
+    if not inside.any():
+        return Patch(np.zeros(shape, np.float32), np.zeros(shape, bool))
+    cols, rows = (np.where(inside, axis, np.nan) for axis in maps)
+    step = _pixels_per_step(maps, finite)
+    margin = int(np.ceil(3 * step))
+    left, top = int(np.nanmin(cols)) - margin, int(np.nanmin(rows)) - margin
+    width = int(np.nanmax(cols)) + margin + 1 - left
+    height = int(np.nanmax(rows)) + margin + 1 - top
+    window = Window(left, top, width, height)
+    out_shape = None
+    if step >= _REDUCE_FROM:
+        out_shape = (max(round(height / step), 1), max(round(width / step), 1))
+    values, valid = source.read(window, band, out_shape)
+    scale_x, scale_y = width / values.shape[1], height / values.shape[0]
+    x = ((maps[0] - left + 0.5) / scale_x - 0.5).astype(np.float32)
+    y = ((maps[1] - top + 0.5) / scale_y - 0.5).astype(np.float32)
+    near = cv2.remap(
+        valid.astype(np.uint8), x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT
+    )
+    usable = inside & (near > 0)
+    if not usable.any():
+        return Patch(np.zeros(shape, np.float32), usable)
+    low, high = values[valid].min(), values[valid].max()
+    # Cubic weights overshoot at bright targets; amplitudes must not become negative by it.
+    filled = values if valid.all() else np.where(valid, values, np.median(values[valid]))
+    image = cv2.remap(filled, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    return Patch(np.clip(image, low, high), usable)
+
+
+def _pixels_per_step(maps: tuple[NDArray[np.float32], ...], finite: NDArray[np.bool_]) -> float:
+    """Return how many source pixels a step of one grid pixel covers, on the average."""
+    if min(finite.shape) < 2:
+        return 1.0
+    (xr, xc), (yr, yc) = np.gradient(maps[0]), np.gradient(maps[1])
+    area = np.abs(xr * yc - xc * yr)[finite]
+    return float(np.sqrt(np.nanmedian(area)))

@@ -1,0 +1,1 @@
+"""Search: from a rough shift to tie points."""

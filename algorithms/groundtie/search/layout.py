@@ -1,0 +1,164 @@
+"""Where chips lie in the matching grid, and which blocks of it are held out for the verdict.
+
+The scene is divided into cells. The middle of each, a block half a cell wide, is held out: its
+pixels of the reference take no part in the rough search, the tie points of the fit, the choice of
+the model or the removal of outliers. Check chips lie inside the blocks, chips of the fit on the
+lines between them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import NoOverlapError
+from ..rasters.grid import Grid
+
+# Chips are this share of the scene's shorter side, within these limits in pixels.
+_CHIP_SHARE = 1 / 13
+_CHIP_RANGE_PX = (55, 128)
+_SMALLEST_CHIP_PX = 32
+
+# More cells than this along a side make more points than a model needs.
+_MOST_CELLS = 6
+
+# Above so many chips of the fit they are laid out half as densely.
+_MANY_CHIPS = 200
+
+
+def default_chip_px(width: int, height: int) -> int:
+    """Return the side of a chip for a scene of this size, in pixels."""
+    shorter = min(width, height)
+    usual = np.clip(shorter * _CHIP_SHARE, *_CHIP_RANGE_PX)
+    # At least two cells of two chips each must fit into small scenes.
+    return int(max(min(usual, shorter / 5), _SMALLEST_CHIP_PX))
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The cells along one side of the scene: chip, first line and pitch, in matching pixels."""
+
+    size: int
+    chip: int
+    cells: int
+
+    @property
+    def pitch(self) -> float:
+        """Distance between the lines on which chips of the fit lie."""
+        return (self.size - self.chip) / self.cells
+
+    @property
+    def first(self) -> float:
+        """Centre of the first chip."""
+        return (self.chip - 1) / 2
+
+    def held_out(self, positions: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which pixel positions lie in the held-out half of their cell."""
+        phase = ((positions - self.first) / self.pitch) % 1.0
+        inside = (positions >= self.first) & (positions <= self.first + self.cells * self.pitch)
+        return np.asarray(inside & (np.abs(phase - 0.5) < 0.25))
+
+    def lattice(self, parts: int) -> NDArray[np.float64]:
+        """Return positions that divide each cell into so many parts, lines included."""
+        return self.first + np.arange(self.cells * parts + 1) * self.pitch / parts
+
+    def check_centres(self) -> NDArray[np.float64]:
+        """Return the centres of chips inside the held-out blocks, one or two a block."""
+        middles = self.first + (np.arange(self.cells) + 0.5) * self.pitch
+        half = self.pitch / 4 - self.chip / 2
+        if half < self.chip / 2:
+            return middles
+        return np.sort(np.concatenate([middles - half, middles + half]))
+
+
+@dataclass(frozen=True)
+class ChipLayout:
+    """Chips of the fit and check chips over the matching grid.
+
+    Parameters
+    ----------
+    columns, rows
+        The cells along both sides.
+    parts
+        Into how many parts the chips of the fit divide a cell's side, 2 or 4.
+    """
+
+    columns: Axis
+    rows: Axis
+    parts: int
+
+    @property
+    def chip_px(self) -> int:
+        """Side of a chip."""
+        return self.columns.chip
+
+    @property
+    def spacing_px(self) -> float:
+        """Distance between neighbouring chips of the fit."""
+        return max(self.columns.pitch, self.rows.pitch) / self.parts
+
+    @cached_property
+    def fit_centres(self) -> NDArray[np.int_]:
+        """Centres (col, row) of the chips of the fit, shape (n, 2)."""
+        cols, rows = self.columns.lattice(self.parts), self.rows.lattice(self.parts)
+        on_line_col = np.arange(len(cols)) % self.parts == 0
+        on_line_row = np.arange(len(rows)) % self.parts == 0
+        grid_cols, grid_rows = np.meshgrid(cols, rows)
+        on_line = on_line_row[:, None] | on_line_col[None, :]
+        return np.round(np.column_stack([grid_cols[on_line], grid_rows[on_line]])).astype(int)
+
+    @cached_property
+    def check_centres(self) -> NDArray[np.int_]:
+        """Centres (col, row) of the check chips, shape (n, 2)."""
+        cols, rows = np.meshgrid(self.columns.check_centres(), self.rows.check_centres())
+        return np.round(np.column_stack([cols.ravel(), rows.ravel()])).astype(int)
+
+    def held_out(self, positions_px: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which positions (col, row), shape (n, 2), are held out of the fit."""
+        return self.columns.held_out(positions_px[:, 0]) & self.rows.held_out(positions_px[:, 1])
+
+    def held_out_mask(self, cols: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return the mask of held-out pixels at columns × rows of the matching grid."""
+        return np.asarray(self.rows.held_out(rows)[:, None] & self.columns.held_out(cols)[None, :])
+
+
+def lay_out_chips(grid: Grid, chip_px: int | None, spacing_px: float | None) -> ChipLayout:
+    """Lay chips out over a matching grid.
+
+    Parameters
+    ----------
+    grid
+        The part of the matching grid in which the images overlap.
+    chip_px
+        Side of a chip; None: by the size of the overlap.
+    spacing_px
+        Distance between chips of the fit; None: by the sizes of overlap and chip.
+
+    Raises
+    ------
+    NoOverlapError
+        The overlap is too small for a single cell of chips.
+    """
+    chip = chip_px or default_chip_px(grid.width, grid.height)
+    shorter = min(grid.width, grid.height)
+    if shorter < 3 * chip:
+        raise NoOverlapError(
+            f"the overlap is too small to match: {grid.width} × {grid.height} matching pixels "
+            f"for chips of {chip}"
+        )
+
+    def axis(size: int, parts: int) -> Axis:
+        most = max(int((size - chip) / (2 * chip)), 1)
+        wanted = _MOST_CELLS if spacing_px is None else round((size - chip) / (parts * spacing_px))
+        return Axis(size, chip, int(np.clip(wanted, 1, most)))
+
+    dense = spacing_px is not None and spacing_px <= 0.75 * chip
+    layout = ChipLayout(axis(grid.width, 4), axis(grid.height, 4), 4)
+    if (spacing_px is None and len(layout.fit_centres) > _MANY_CHIPS) or (
+        spacing_px is not None and not dense
+    ):
+        layout = ChipLayout(axis(grid.width, 2), axis(grid.height, 2), 2)
+    return layout

@@ -1,0 +1,188 @@
+"""Similarity surfaces of many chips, both ways, and the support that neighbours give each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..progress import SILENT, Progress
+from ..rasters.grid import Grid
+from ..rasters.pair import ImagePair
+from ..rasters.patch import Patch
+from ..similarity.surface import BORDER_PX, SimilaritySettings, normalise, similarity_surface
+
+FloatArray = NDArray[np.float64]
+Surfaces = NDArray[np.float32]
+ToPixel = Callable[[FloatArray], FloatArray]
+MaskOf = Callable[[Grid], NDArray[np.bool_]]
+
+# Chips with less valid area than this in either image are not matched.
+_LEAST_VALID = 0.4
+
+# Neighbours' surfaces are blurred by this before they are added: their shifts differ a little.
+_SUPPORT_BLUR_PX = 1.0
+_SUPPORT_PASSES = 2
+
+
+@dataclass(frozen=True)
+class ChipSurfaces:
+    """Similarity surfaces of chips on a grid.
+
+    Parameters
+    ----------
+    centres
+        Pixel positions (col, row) of the chips in the grid, shape (n, 2).
+    forward
+        Surfaces of reference chips in the input, shape (n, 2 r + 1, 2 r + 1).
+    backward
+        Surfaces of input chips in the reference, turned so that they should peak at the same
+        place, same shape.
+    """
+
+    centres: NDArray[np.int_]
+    forward: Surfaces
+    backward: Surfaces
+
+    @property
+    def both(self) -> Surfaces:
+        """The evidence of both directions together, in robust standard deviations."""
+        return _normalise_each(self.forward + self.backward)
+
+    @property
+    def radius(self) -> int:
+        """Largest shift."""
+        return self.forward.shape[1] // 2
+
+
+@dataclass(frozen=True)
+class ChipMatcher:
+    """Matches chips of a pair on a grid, the input resampled by what is known already.
+
+    Parameters
+    ----------
+    pair
+        The images.
+    grid
+        Grid on which chips are matched: the matching grid or a coarser level of it.
+    to_input_px
+        From map positions to input pixels, as known so far.
+    settings
+        How similarity is measured.
+    held_out
+        Returns for a piece of the grid which pixels of the reference must not be seen; None: all
+        may be.
+    """
+
+    pair: ImagePair
+    grid: Grid
+    to_input_px: ToPixel
+    settings: SimilaritySettings
+    held_out: MaskOf | None = None
+
+    def match(
+        self,
+        centres: NDArray[np.int_],
+        chip_px: int,
+        radius_px: int,
+        executor: Executor,
+        progress: Progress = SILENT,
+    ) -> ChipSurfaces:
+        """Return the surfaces of all chips that have enough valid pixels in both images.
+
+        Parameters
+        ----------
+        centres
+            Pixel positions (col, row) of the chips' centres in the grid, shape (n, 2).
+        chip_px
+            Side of the chips.
+        radius_px
+            Largest shift.
+        executor
+            Threads to work in.
+        progress
+            Is told of every chip.
+        """
+        kept: list[NDArray[np.int_]] = []
+        forward: list[NDArray[np.float32]] = []
+        backward: list[NDArray[np.float32]] = []
+
+        def one(centre: NDArray[np.int_]) -> tuple[Surfaces, Surfaces] | None:
+            progress.check()
+            return self._surfaces(centre, chip_px, radius_px)
+
+        for i, surfaces in enumerate(executor.map(one, centres)):
+            progress.update((i + 1) / len(centres))
+            if surfaces is not None:
+                kept.append(centres[i])
+                forward.append(surfaces[0])
+                backward.append(surfaces[1])
+        span = 2 * radius_px + 1
+        empty = np.zeros((0, span, span), np.float32)
+        return ChipSurfaces(
+            np.array(kept, int).reshape(-1, 2),
+            np.stack(forward) if forward else empty,
+            np.stack(backward) if backward else empty,
+        )
+
+    def _surfaces(
+        self, centre: NDArray[np.int_], chip_px: int, radius_px: int
+    ) -> tuple[Surfaces, Surfaces] | None:
+        reach = radius_px + BORDER_PX
+        corner = centre - chip_px // 2 - reach
+        piece = self.grid.window(*(int(c) for c in corner), *(chip_px + 2 * reach,) * 2)
+        reference = self.pair.reference_patch(piece)
+        if self.held_out is not None:
+            reference = reference.without(self.held_out(piece))
+        chip = reference.inner(radius_px)
+        if not _can_be_matched(chip):
+            return None
+        input = self.pair.input_patch(piece, self.to_input_px)
+        if not _can_be_matched(input.inner(radius_px)):
+            return None
+        forward = similarity_surface(chip, input, radius_px, self.settings)
+        backward = similarity_surface(
+            input.inner(radius_px), reference, radius_px, self.settings
+        )
+        return forward, backward[::-1, ::-1]
+
+
+def _can_be_matched(chip: Patch) -> bool:
+    core = chip.inner(BORDER_PX)
+    return core.valid_share >= _LEAST_VALID and not core.is_flat
+
+
+def support(surfaces: Surfaces, centres: NDArray[np.int_], reach_px: float) -> Surfaces:
+    """Add to each surface those of its neighbours, so that weak peaks that agree are found.
+
+    Neighbouring places are misregistered by nearly the same shift. Supported surfaces are no
+    longer independent of each other: a verdict must not count them.
+
+    Parameters
+    ----------
+    surfaces
+        Shape (n, 2 r + 1, 2 r + 1), in robust standard deviations.
+    centres
+        The chips' centres, shape (n, 2).
+    reach_px
+        Distance up to which chips are neighbours.
+    """
+    if len(surfaces) == 0:
+        return surfaces
+    pairs = cKDTree(centres).query_pairs(reach_px, output_type="ndarray")
+    for _ in range(_SUPPORT_PASSES):
+        blurred = np.stack([cv2.GaussianBlur(s, (0, 0), _SUPPORT_BLUR_PX) for s in surfaces])
+        total = surfaces.copy()
+        np.add.at(total, pairs[:, 0], blurred[pairs[:, 1]])
+        np.add.at(total, pairs[:, 1], blurred[pairs[:, 0]])
+        surfaces = _normalise_each(total)
+    return surfaces
+
+
+def _normalise_each(surfaces: Surfaces) -> Surfaces:
+    return np.stack([normalise(s) for s in surfaces]) if len(surfaces) else surfaces

@@ -1,0 +1,1 @@
+"""Similarity of two windows over shifts: mutual information, orientation, correlation, fusion."""

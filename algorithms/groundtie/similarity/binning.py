@@ -1,0 +1,55 @@
+"""Radiometric binning: grey values to the bins of a histogram (thesis S 3.4.3, eq 3.38)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+MASKED = np.uint8(255)
+BINNINGS = ("equal-frequency", "linear")
+
+# Quantiles are taken from at most this many pixels; their error is then far below a bin.
+_SAMPLE = 65_536
+
+
+def bin_edges(
+    values: NDArray[np.float32], valid: NDArray[np.bool_], bins: int, binning: str
+) -> NDArray[np.float32]:
+    """Return the inner edges between bins, shape (bins - 1,).
+
+    Equal-frequency edges are quantiles of the valid values; linear ones divide their range evenly.
+    """
+    sample = values[valid]
+    if sample.size > _SAMPLE:
+        sample = sample[:: -(-sample.size // _SAMPLE)]
+    if sample.size == 0:
+        return np.zeros(bins - 1, np.float32)
+    inner = np.arange(1, bins) / bins
+    if binning == "equal-frequency":
+        return np.quantile(sample, inner).astype(np.float32)
+    low, high = sample.min(), sample.max()
+    return (low + inner * (high - low)).astype(np.float32)
+
+
+def to_bins(
+    values: NDArray[np.float32],
+    valid: NDArray[np.bool_],
+    bins: int,
+    binning: str = "equal-frequency",
+) -> NDArray[np.uint8]:
+    """Return each pixel's bin, 0 to `bins` - 1, and `MASKED` where it is not valid.
+
+    Parameters
+    ----------
+    values, valid
+        Grey values and which of them count, shape (h, w).
+    bins
+        Number of bins, 2 to 255.
+    binning
+        One of `BINNINGS`.
+    """
+    edges = bin_edges(values, valid, bins, binning)
+    binned = np.searchsorted(edges, values.ravel(), side="right").astype(np.uint8)
+    binned = binned.reshape(values.shape)
+    binned[~valid] = MASKED
+    return binned

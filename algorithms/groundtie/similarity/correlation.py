@@ -1,0 +1,102 @@
+"""Correlation of a template with a search window over all shifts, by FFT, with masks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from ..rasters.patch import Patch
+
+# Below this share of the template's pixels an overlap says nothing.
+MINIMUM_OVERLAP = 0.3
+
+
+def correlate(template: NDArray[Any], search: NDArray[Any]) -> NDArray[np.float32]:
+    """Return Σ Re(conj(template) · search) at all shifts at which the template lies inside.
+
+    Parameters
+    ----------
+    template, search
+        Real or complex arrays, shapes (h, w) and (h + ny - 1, w + nx - 1).
+
+    Returns
+    -------
+    Array of shape (ny, nx), float32.
+    """
+    shape = [scipy.fft.next_fast_len(n) for n in search.shape]
+    ny, nx = (s - t + 1 for s, t in zip(search.shape, template.shape, strict=True))
+    if np.iscomplexobj(template):
+        spectrum = scipy.fft.fft2(template, shape).conj() * scipy.fft.fft2(search, shape)
+        return scipy.fft.ifft2(spectrum)[:ny, :nx].real.astype(np.float32)
+    spectrum = scipy.fft.rfft2(template, shape).conj() * scipy.fft.rfft2(search, shape)
+    return scipy.fft.irfft2(spectrum, shape)[:ny, :nx].astype(np.float32)
+
+
+def box_sums(image: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
+    """Return the sums of an image over all boxes of a size, shape (h - height + 1, …)."""
+    table = cv2.integral(image, sdepth=cv2.CV_64F)
+    sums = table[height:, width:] - table[:-height, width:] - table[height:, :-width]
+    return (sums + table[:-height, :-width]).astype(np.float32)
+
+
+def overlap_share(template: Patch, search: Patch) -> NDArray[np.float32]:
+    """Return at all shifts which share of the template's valid pixels meets valid pixels."""
+    count = np.float32(max(int(template.valid.sum()), 1))
+    if template.all_valid:
+        return box_sums(search.valid.astype(np.float32), *template.valid.shape) / count
+    both = correlate(template.valid.astype(np.float32), search.valid.astype(np.float32))
+    return both / count
+
+
+def correlate_fields(
+    template: NDArray[np.complex64],
+    search: NDArray[np.complex64],
+    template_valid: NDArray[np.bool_],
+    search_valid: NDArray[np.bool_],
+) -> NDArray[np.float32]:
+    """Return the correlation coefficient of two complex fields over shifts, -1 to 1.
+
+    The fields are zero where they are not valid; each shift is normalised by the energy of what
+    overlaps.
+    """
+    template_energy = (template.real**2 + template.imag**2).astype(np.float32)
+    search_energy = (search.real**2 + search.imag**2).astype(np.float32)
+    if template_valid.all():
+        energy = box_sums(search_energy, *template.shape)
+    else:
+        energy = correlate(template_valid.astype(np.float32), search_energy)
+    if search_valid.all():
+        energy = energy * template_energy.sum()
+    else:
+        energy = energy * correlate(template_energy, search_valid.astype(np.float32))
+    floor = 1e-6 * max(float(energy.max(initial=0)), 1e-12)
+    return np.where(
+        energy > floor, correlate(template, search) / np.sqrt(np.maximum(energy, floor)), 0
+    ).astype(np.float32)
+
+
+def correlate_grey(template: Patch, search: Patch) -> NDArray[np.float32]:
+    """Return the normalised cross-correlation of grey values over shifts (thesis S eq 3.2).
+
+    With masks, each shift is normalised by the pixels that are valid in both (Padfield 2012).
+    """
+    mean = np.float32(search.values[search.valid].mean()) if search.valid.any() else np.float32(0)
+    if template.all_valid and search.all_valid:
+        # Means are taken off first: single precision would lose small contrast on large values.
+        t = template.values - template.values.mean()
+        return cv2.matchTemplate(search.values - mean, t, cv2.TM_CCOEFF_NORMED)
+    tm, sm = (window.valid.astype(np.float32) for window in (template, search))
+    own = np.float32(template.values[template.valid].mean()) if template.valid.any() else mean
+    t, s = (template.values - own) * tm, (search.values - mean) * sm
+    count = np.maximum(correlate(tm, sm), 1)
+    sum_t, sum_s = correlate(t, sm), correlate(tm, s)
+    covariance = correlate(t, s) - sum_t * sum_s / count
+    variance_t = correlate(t * t, sm) - sum_t**2 / count
+    variance_s = correlate(tm, s * s) - sum_s**2 / count
+    product = variance_t * variance_s
+    floor = 1e-6 * max(float(product.max(initial=0)), 1e-12)
+    return np.where(product > floor, covariance / np.sqrt(np.maximum(product, floor)), 0)
