@@ -114,19 +114,22 @@ class Number(Kind):
     integer: bool = False
 
     def check(self, name: str, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            try:
-                value = float(value)
-            except (TypeError, ValueError):
-                raise ParameterError(f"{name} must be a number, not {value!r}") from None
-        if not math.isfinite(value):
+        try:
+            if isinstance(value, bool):
+                raise TypeError
+            number = float(value)
+        except (TypeError, ValueError, OverflowError):
+            raise ParameterError(f"{name} must be a number, not {value!r}") from None
+        if not math.isfinite(number):
             raise ParameterError(f"{name} must be a finite number, not {value}")
-        if not self.minimum <= value <= self.maximum:
+        if not self.minimum <= number <= self.maximum:
             bounds = f"{self.range_text} {self.unit}".rstrip()
-            raise ParameterError(f"{name} must be {bounds}, not {value:g}")
-        if self.integer and value != int(value):
-            raise ParameterError(f"{name} must be a whole number, not {value:g}")
-        return int(value) if self.integer else float(value)
+            raise ParameterError(f"{name} must be {bounds}, not {number:g}")
+        if not self.integer:
+            return number
+        if number != int(number):
+            raise ParameterError(f"{name} must be a whole number, not {number:g}")
+        return value if isinstance(value, int) else int(number)
 
     @property
     def range_text(self) -> str:

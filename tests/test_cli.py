@@ -1,0 +1,269 @@
+"""The command line, made from declarations: a toy tool, and what all tools share."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+import pytest
+import toys
+from toys import TOY
+
+from groundtie.cli import main
+from groundtie.version import __version__
+
+ROOT = Path(__file__).resolve().parents[1]
+ENVIRONMENT = {
+    **os.environ,
+    "PYTHONPATH": os.pathsep.join([str(ROOT / "algorithms"), str(ROOT / "tests")]),
+}
+
+
+@pytest.fixture(autouse=True)
+def _surroundings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    """Run in an empty folder, and undo what the command line does to its process."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CPL_LOG", os.devnull)
+    monkeypatch.setenv("OPENCV_LOG_LEVEL", "ERROR")
+    handlers = list(logging.getLogger().handlers)
+    with warnings.catch_warnings():
+        yield
+    logging.getLogger().handlers[:] = handlers
+
+
+def run(words: str) -> int:
+    return main(words.split(), tools=[TOY])
+
+
+GOOD = "toy a.tif b.tif c.tif --size 3"
+
+
+def test_a_run_prints_the_result_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(GOOD) == 0
+    assert capsys.readouterr() == ("accepted\nsize 3.0\n", "")
+    assert Path("c.tif").read_bytes() == b"done"
+
+
+def test_json_is_the_summary(capsys: pytest.CaptureFixture[str]) -> None:
+    options = "--search-radius 4 --mode work --no-careful --title words --tie-points t.gpkg"
+    assert run(f"{GOOD} {options} --folder out --regions r.gpkg --seed 9 --json") == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    values = json.loads(out)["values"]
+    assert values == {
+        "reference": "a.tif",
+        "input": "b.tif",
+        "output": "c.tif",
+        "size": 3.0,
+        "search_radius": 4.0,
+        "band": 1,
+        "careful": False,
+        "title": "words",
+        "tie_points": "t.gpkg",
+        "report": None,
+        "folder": "out",
+        "regions": "r.gpkg",
+        "transform": None,
+        "seed": 9,
+    }
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("toy a.tif b.tif --size 3", r"Missing argument 'OUTPUT' \(see groundtie toy --help\)"),
+        ("toy a.tif b.tif c.tif", r"(Missing option '--size' \(see.*\)|--size is missing)"),
+        (f"{GOOD} d.tif", r"Got unexpected extra argument \(d.tif\) \(see groundtie toy --help\)"),
+        (f"{GOOD} --speed 3", r"No such option:? '?--speed'?.* \(see groundtie toy --help\)"),
+        (f"{GOOD} --seed", r"Option '--seed' requires an argument.*"),
+        ("fly", r"No such command 'fly' \(see groundtie --help\)"),
+        (f"{GOOD} --seed 1.5", "--seed must be a whole number, not 1.5"),
+        (f"{GOOD} --size 10", "--size must be 1 to 9 px, not 10"),
+        (f"{GOOD} --search-radius -1", "--search-radius must be at least 0 m, not -1"),
+        (f"{GOOD} --mode fly", "--mode must be one of work, refuse, crash, wait, not 'fly'"),
+        (f"{GOOD} --report r.pdf", "--report must end in .html: r.pdf"),
+        ("toy a.tif a.tif c.tif --size 3", "INPUT is the same raster as REFERENCE: a.tif"),
+        ("toy a.tif b.tif a.tif --size 3", "OUTPUT is the same file as REFERENCE: a.tif"),
+        ("toy a.tif b.tif no/c.tif --size 3", "the folder of OUTPUT does not exist: .*/no"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    words: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(words) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert re.fullmatch(f"groundtie: error: {message}\n", err)
+    assert list(Path().iterdir()) == []
+
+
+def test_a_refusal_is_one_line_and_exit_code_3(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(f"{GOOD} --mode refuse") == 3
+    assert capsys.readouterr() == ("", "groundtie: error: refused: too few points agree\n")
+    assert not Path("c.tif").exists()
+
+
+def test_a_refusal_tells_its_verdict_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(f"{GOOD} --mode refuse --json") == 3
+    out, err = capsys.readouterr()
+    assert json.loads(out) == {"verdict": {"accepted": False, "reason": "too few"}}
+    assert err == "groundtie: error: refused: too few points agree\n"
+
+
+def test_a_bug_keeps_its_traceback() -> None:
+    with pytest.raises(ZeroDivisionError, match="a bug"):
+        run(f"{GOOD} --mode crash")
+
+
+def test_a_number_that_json_does_not_know_is_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(toys.ToyResult, "summary", lambda self: {"error": float("nan")})
+    with pytest.raises(ValueError, match="JSON"):
+        run(f"{GOOD} --json")
+
+
+def test_help_lists_the_tools(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("--help") == 0
+    out = capsys.readouterr().out
+    assert re.search(r"^  toy +Do what a tool does, without images\.$", out, re.MULTILINE)
+    assert run("") == 0
+    assert capsys.readouterr().out == out
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("--version") == 0
+    assert capsys.readouterr() == (f"groundtie {__version__}\n", "")
+
+
+def test_help_of_a_tool_tells_everything_of_its_parameters(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run("toy --help") == 0
+    out = capsys.readouterr().out
+    usage, arguments, options, advanced = re.split(r"(?m)^\w[\w ]*:\n", out)
+    assert usage.startswith("Usage: groundtie toy [OPTIONS] REFERENCE INPUT OUTPUT\n")
+    assert "It writes its output only at the end, as all tools do." in usage
+    assert re.search(r"REFERENCE +The raster that stays\.\n", arguments)
+    rows = re.sub(r"\s+", " ", options)
+    assert "--size NUMBER How large. [px; 1 to 9; required]" in rows
+    assert "--search-radius NUMBER How far; by default from the data. [m; at least 0]" in rows
+    assert "--mode [work|refuse|crash|wait] What it does. [default: work]" in rows
+    assert "--band BAND Which band. [default: 1]" in rows
+    assert "--careful / --no-careful Look twice. [default: yes]" in rows
+    assert "--report FILE For people." in rows
+    assert "--folder FOLDER For more files." in rows
+    assert "--json" in rows
+    assert "--quiet" in rows
+    assert "--seed" not in rows
+    assert "--seed INTEGER For chance. [at least 0; default: 7]" in re.sub(r"\s+", " ", advanced)
+
+
+def start(words: str, stderr: int = subprocess.PIPE) -> subprocess.Popen[str]:
+    """Start the toy tool in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, toys.__file__, *words.split()],
+        env=ENVIRONMENT,
+        stdout=subprocess.PIPE,
+        stderr=stderr,
+        text=True,
+    )
+
+
+def read_until(terminal: int, end: str) -> str:
+    """Read what a terminal shows up to and with `end`."""
+    shown = ""
+    while not shown.endswith(end):
+        shown += os.read(terminal, 1).decode()
+    return shown
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_cancels_in_one_line_and_leaves_nothing(number: signal.Signals) -> None:
+    primary, secondary = pty.openpty()
+    process = start(f"{GOOD} --mode wait", stderr=secondary)
+    os.close(secondary)
+    read_until(primary, "half of it\x1b[K")  # the tool is at work
+    process.send_signal(number)
+    rest = read_until(primary, "\n")
+    os.close(primary)
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    assert out == ""
+    assert rest == "\r\x1b[Kgroundtie: error: cancelled; nothing was written\r\n"
+    assert list(Path().iterdir()) == []
+
+
+def test_progress_is_for_terminals() -> None:
+    out, err = start(GOOD).communicate(timeout=60)
+    assert (out, err) == ("accepted\nsize 3.0\n", "")
+
+
+def test_quiet_shows_no_progress_on_a_terminal() -> None:
+    shown = {}
+    for option in ("", "--quiet"):
+        primary, secondary = pty.openpty()
+        assert start(f"{GOOD} {option}", stderr=secondary).wait(timeout=60) == 0
+        os.write(secondary, b".")  # so that there is something to read
+        shown[option] = read_until(primary, ".")
+        os.close(secondary)
+        os.close(primary)
+    assert shown["--quiet"] == "."
+    assert shown[""] == "\r 50% half of it\x1b[K\r100% half of it\x1b[K\r\x1b[K."
+
+
+NOISY = f"""
+import ctypes, dataclasses, logging, re, sys, warnings
+import rasterio, toys
+from groundtie.cli import main
+
+def run(**values):
+    warnings.warn("noise")
+    logging.getLogger("rasterio._env").warning("noise")
+    libraries = set(re.findall(r"/\\S+libgdal\\S+", open("/proc/self/maps").read()))
+    for library in libraries:  # as GDAL speaks in a thread of which rasterio does not know
+        ctypes.CDLL(library).CPLError(2, 1, b"noise of GDAL")
+    return toys.toy(**{{**values, "title": str(len(libraries))}})
+
+tool = dataclasses.replace(toys.TOY, run=run)
+sys.exit(main({[*GOOD.split(), "--json"]!r}, tools=[tool]))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="finds GDAL in Linux's /proc")
+def test_libraries_are_silent() -> None:
+    quiet = {k: v for k, v in ENVIRONMENT.items() if k not in ("CPL_LOG", "PYTHONWARNINGS")}
+    done = subprocess.run(
+        [sys.executable, "-c", NOISY], env=quiet, text=True, capture_output=True, check=True
+    )
+    assert json.loads(done.stdout)["values"]["title"] == "1"
+    assert done.stderr == ""
+
+
+def test_who_asks_for_warnings_gets_them() -> None:
+    loud = {**ENVIRONMENT, "PYTHONWARNINGS": "always"}
+    done = subprocess.run(
+        [sys.executable, "-c", NOISY], env=loud, text=True, capture_output=True, check=True
+    )
+    assert "UserWarning: noise" in done.stderr
+
+
+def test_python_m_groundtie() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "groundtie", "no-such-tool"],
+        env=ENVIRONMENT,
+        text=True,
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert (
+        done.stderr == "groundtie: error: No such command 'no-such-tool' (see groundtie --help)\n"
+    )

@@ -1,0 +1,135 @@
+"""Declarations: what is read from a function, and how its values are checked."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import Annotated, Any
+
+import pytest
+from toys import TOY, toy
+
+from groundtie.declaration import Output, Parameter, tool, tool_of
+from groundtie.errors import OutputError, ParameterError, SameFileError
+from groundtie.kinds import Flag, Number, RasterIn
+from groundtie.progress import Progress
+
+
+@pytest.fixture
+def needed(tmp_path: Path) -> dict[str, Any]:
+    return {
+        "reference": str(tmp_path / "a.tif"),
+        "input": str(tmp_path / "b.tif"),
+        "output": str(tmp_path / "c.tif"),
+        "size": 3,
+    }
+
+
+def test_the_declaration_is_read_from_the_function() -> None:
+    assert (TOY.name, TOY.title, TOY.group) == ("toy", "Toy tool", "Toys")
+    assert TOY.summary == "Do what a tool does, without images."
+    assert TOY.description == "It writes its output only at the end,\nas all tools do."
+    assert [output.name for output in TOY.outputs] == ["check_rmse_px", "reason"]
+
+
+def test_parameters_follow_the_signature_without_progress() -> None:
+    signature = inspect.signature(toy).parameters
+    assert [p.name for p in TOY.parameters] == [name for name in signature if name != "progress"]
+    for parameter in TOY.parameters:
+        default = signature[parameter.name].default
+        assert parameter.required == (default is inspect.Parameter.empty)
+        assert parameter.default == (None if parameter.required else default)
+
+
+def test_required_parameters_are_positional_unless_they_are_options() -> None:
+    assert [p.name for p in TOY.parameters if p.positional] == ["reference", "input", "output"]
+    assert TOY.parameter("size").required
+
+
+def test_values_are_completed_and_typed(needed: dict[str, Any]) -> None:
+    values = TOY.check({**needed, "search_radius": "12"})
+    assert list(values) == [parameter.name for parameter in TOY.parameters]
+    assert values["reference"] == Path(needed["reference"])
+    assert values["size"] == 3.0
+    assert values["search_radius"] == 12.0
+    assert values["mode"] == "work"
+    assert values["seed"] == 7
+    assert values["report"] is None
+
+
+def test_none_takes_the_default(needed: dict[str, Any]) -> None:
+    assert TOY.check({**needed, "seed": None})["seed"] == 7
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"size": None}, ParameterError, "size is missing"),
+        ({"size": 10}, ParameterError, "size must be 1 to 9 px, not 10"),
+        ({"colour": 1}, ParameterError, "toy has no parameter colour"),
+        ({"input": "{a}"}, SameFileError, "input is the same raster as reference"),
+        ({"output": "{a}"}, SameFileError, "output is the same file as reference"),
+        ({"output": "/no/such/a.tif"}, OutputError, "the folder of output does not exist"),
+    ],
+)
+def test_bad_values_are_refused(
+    needed: dict[str, Any], change: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    filled = {k: needed["reference"] if v == "{a}" else v for k, v in change.items()}
+    with pytest.raises(error, match=message):
+        TOY.check({**needed, **filled})
+
+
+def test_messages_call_parameters_as_the_caller_does(needed: dict[str, Any]) -> None:
+    with pytest.raises(ParameterError, match=r"^<Size> must be 1 to 9 px"):
+        TOY.check({**needed, "size": 0}, spell=lambda p: f"<{p.kind.label}>")
+    with pytest.raises(SameFileError, match=r"^<Input> is the same raster as <Reference>"):
+        TOY.check({**needed, "input": needed["reference"]}, spell=lambda p: f"<{p.kind.label}>")
+
+
+def test_the_python_function_checks_too(needed: dict[str, Any]) -> None:
+    with pytest.raises(ParameterError, match="seed must be at least 0, not -1"):
+        toy(**needed, seed=-1)
+    with pytest.raises(TypeError, match="size"):
+        toy("a.tif", "b.tif", "c.tif")  # type: ignore[call-arg, arg-type]
+    assert not Path(needed["output"]).exists()
+
+
+def test_the_python_function_runs_with_progress(needed: dict[str, Any]) -> None:
+    seen: list[float] = []
+    values = list(needed.values())
+    result = toy(*values, progress=Progress(lambda fraction, message: seen.append(fraction)))
+    assert seen == [0.5, 1.0]
+    assert result.values["output"] == Path(needed["output"])
+    assert result.values["size"] == 3.0
+
+
+def test_outputs_are_found_in_the_summary(needed: dict[str, Any]) -> None:
+    summary = toy(**needed).summary()
+    assert [output.value(summary) for output in TOY.outputs] == [0.25, "good"]
+    with pytest.raises(KeyError):
+        Output("x", "X", "verdict.no_such").value(summary)
+
+
+def test_a_parameter_without_a_kind_is_a_mistake_of_ours() -> None:
+    with pytest.raises(TypeError, match="wrong: parameter size has no kind"):
+
+        @tool(title="Wrong", group="Toys")
+        def wrong(size: int) -> Any:
+            """Do nothing."""
+
+
+def test_a_tool_needs_no_paragraphs_beyond_its_summary() -> None:
+    @tool(title="Short", group="Toys")
+    def short(fast: Annotated[bool, Flag(label="Fast", help="Fast.")] = False) -> Any:
+        """Do little."""
+
+    assert (tool_of(short).summary, tool_of(short).description) == ("Do little.", "")
+
+
+def test_a_missing_value_is_named() -> None:
+    raster = Parameter("input", RasterIn(label="Input", help="It."), required=True)
+    with pytest.raises(ParameterError, match=r"^INPUT is missing$"):
+        raster.check(None, "INPUT")
+    number = Parameter("n", Number(label="N", help="It."), required=False)
+    assert number.check(None, "n") is None

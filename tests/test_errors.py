@@ -1,0 +1,55 @@
+"""The tree of errors: what callers can catch, and the exit codes."""
+
+from __future__ import annotations
+
+import inspect
+
+import pytest
+
+from groundtie import errors
+from groundtie.errors import CancelledError, GroundTieError, NotRegisteredError
+
+ALL = [
+    error
+    for _, error in inspect.getmembers(errors, inspect.isclass)
+    if issubclass(error, GroundTieError)
+]
+BUILTINS = {
+    "ParameterError": ValueError,
+    "RasterOpenError": OSError,
+    "BandError": IndexError,
+    "OutputError": OSError,
+    "NoOverlapError": ValueError,
+    "SameFileError": ValueError,
+    "NotRegisteredError": RuntimeError,
+    "CancelledError": RuntimeError,
+}
+
+
+@pytest.mark.parametrize("error", ALL)
+def test_every_error_can_be_caught_as_a_builtin(error: type[GroundTieError]) -> None:
+    if error is not GroundTieError:
+        assert issubclass(error, (ValueError, OSError, IndexError, RuntimeError))
+
+
+@pytest.mark.parametrize(("name", "builtin"), BUILTINS.items())
+def test_the_builtin_is_the_one_that_a_caller_expects(name: str, builtin: type[Exception]) -> None:
+    assert issubclass(getattr(errors, name), builtin)
+
+
+@pytest.mark.parametrize("error", ALL)
+def test_the_message_is_the_text_alone(error: type[GroundTieError]) -> None:
+    # KeyError, for one, would print quotation marks around it
+    assert str(error("a.tif: no such file")) == "a.tif: no such file"
+
+
+@pytest.mark.parametrize("error", ALL)
+def test_exit_codes(error: type[GroundTieError]) -> None:
+    special = {NotRegisteredError: 3, CancelledError: 130}
+    assert error.exit_code == special.get(error, 2)
+
+
+def test_a_refusal_carries_its_verdict() -> None:
+    assert NotRegisteredError("refused").verdict is None
+    verdict = object()
+    assert NotRegisteredError("refused", verdict).verdict is verdict  # type: ignore[arg-type]

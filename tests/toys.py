@@ -1,0 +1,131 @@
+"""A small tool with a parameter of every kind, for the tests of what is made from declarations."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from groundtie.cli import main
+from groundtie.declaration import Output, Tool, tool, tool_of
+from groundtie.errors import NotRegisteredError
+from groundtie.kinds import (
+    Band,
+    Choice,
+    Distance,
+    FileIn,
+    FileOut,
+    Flag,
+    FolderOut,
+    Number,
+    RasterIn,
+    RasterOut,
+    Text,
+    VectorIn,
+    VectorOut,
+)
+from groundtie.progress import SILENT, Progress
+
+
+@dataclass(frozen=True)
+class ToyVerdict:
+    """A verdict with a summary."""
+
+    reason: str
+
+    def summary(self) -> dict[str, Any]:
+        return {"accepted": False, "reason": self.reason}
+
+
+@dataclass(frozen=True)
+class ToyResult:
+    """What the toy tool was called with."""
+
+    values: dict[str, Any]
+
+    def summary(self) -> dict[str, Any]:
+        values = {name: _plain(value) for name, value in self.values.items()}
+        return {"values": values, "verdict": {"check_rmse_px": 0.25, "reason": "good"}}
+
+    def lines(self) -> list[str]:
+        return ["accepted", f"size {self.values['size']}"]
+
+
+def _plain(value: Any) -> Any:
+    return str(value) if isinstance(value, Path) else value
+
+
+@tool(
+    title="Toy tool",
+    group="Toys",
+    outputs=(
+        Output("check_rmse_px", "Error at check points [px]", "verdict.check_rmse_px"),
+        Output("reason", "Reason", "verdict.reason", text=True),
+    ),
+)
+def toy(
+    reference: Annotated[Path, RasterIn(label="Reference", help="The raster that stays.")],
+    input: Annotated[Path, RasterIn(label="Input", help="The raster that moves.")],
+    output: Annotated[Path, RasterOut(label="Output", help="What is written.")],
+    size: Annotated[
+        float, Number(label="Size", help="How large.", unit="px", minimum=1, maximum=9, option=True)
+    ],
+    search_radius: Annotated[
+        float | None, Distance(label="Search radius", help="How far; by default from the data.")
+    ] = None,
+    mode: Annotated[
+        str,
+        Choice(label="Mode", help="What it does.", choices=("work", "refuse", "crash", "wait")),
+    ] = "work",
+    band: Annotated[int, Band(label="Band", help="Which band.", of="input")] = 1,
+    careful: Annotated[bool, Flag(label="Careful", help="Look twice.")] = True,
+    title: Annotated[str | None, Text(label="Title", help="Any words.")] = None,
+    tie_points: Annotated[
+        Path | None, VectorOut(label="Tie points", help="Points that were found.")
+    ] = None,
+    report: Annotated[
+        Path | None, FileOut(label="Report", help="For people.", suffixes=(".html",))
+    ] = None,
+    folder: Annotated[Path | None, FolderOut(label="Folder", help="For more files.")] = None,
+    regions: Annotated[
+        Path | None, VectorIn(label="Regions", help="Where to look.", advanced=True)
+    ] = None,
+    transform: Annotated[
+        Path | None,
+        FileIn(label="Transform", help="Where to begin.", suffixes=(".json",), advanced=True),
+    ] = None,
+    seed: Annotated[
+        int, Number(label="Seed", help="For chance.", integer=True, minimum=0, advanced=True)
+    ] = 7,
+    progress: Progress = SILENT,
+) -> ToyResult:
+    """Do what a tool does, without images.
+
+    It writes its output only at the end,
+    as all tools do.
+
+    Returns
+    -------
+    ToyResult
+        What it was called with.
+    """
+    values = {k: v for k, v in locals().items() if k not in ("progress", "mode")}
+    progress.update(0.5, "half of it")
+    if mode == "refuse":
+        raise NotRegisteredError("refused: too few\npoints agree", ToyVerdict("too few"))  # type: ignore[arg-type]
+    if mode == "crash":
+        raise ZeroDivisionError("a bug")
+    while mode == "wait":
+        progress.check()
+        time.sleep(0.01)
+    Path(output).write_bytes(b"done")
+    progress.update(1.0)
+    return ToyResult(values)
+
+
+TOY: Tool = tool_of(toy)
+
+if __name__ == "__main__":
+    sys.exit(main(tools=[TOY]))
