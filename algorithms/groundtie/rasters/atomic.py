@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import secrets
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -14,6 +15,8 @@ from ..errors import GroundTieError, OutputError
 
 # What GDAL and SQLite put beside a file, appended to its whole name.
 SIDECARS = (".aux.xml", ".ovr", ".msk", "-wal", "-shm", "-journal")
+
+_HIDDEN = re.compile(r"\.([^/\\]*)\.groundtie-[0-9a-f]{8}-new(\.[^/\\]*)?$")
 
 
 class Outputs:
@@ -63,6 +66,7 @@ class Outputs:
             _remove(self._staged.values())
 
     def _hidden(self, final: Path, role: str) -> str:
+        # `_HIDDEN` finds the final name in this one.
         return f".{final.stem}.groundtie-{self._token}-{role}{final.suffix}"
 
     def _commit(self) -> None:
@@ -96,7 +100,7 @@ def writing(path: str | os.PathLike[str], *others: type[Exception]) -> Iterator[
     Parameters
     ----------
     path
-        Final name of the output.
+        The output; for one that is staged the message gives its final name.
     others
         Exceptions of the library in use that mean the same as an OSError.
     """
@@ -107,7 +111,11 @@ def writing(path: str | os.PathLike[str], *others: type[Exception]) -> Iterator[
     except Exception as error:
         if not isinstance(error, (OSError, *others)):
             raise
-        raise OutputError(f"cannot write {os.fspath(path)}: {_reason(error)}") from error
+        raise OutputError(f"cannot write {_final_name(path)}: {_reason(error)}") from error
+
+
+def _final_name(path: str | os.PathLike[str]) -> str:
+    return _HIDDEN.sub(r"\1\2", os.fspath(path))
 
 
 def _reason(error: Exception) -> str:

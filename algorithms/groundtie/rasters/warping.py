@@ -97,7 +97,11 @@ def coordinates(grid: Grid, to_input_px: ToInputPx) -> FloatArray:
 
 
 def resample(
-    image: NDArray[Any], valid: Mask, px: ArrayLike, method: str
+    image: NDArray[Any],
+    valid: Mask,
+    px: ArrayLike,
+    method: str,
+    dtype: np.dtype[Any] | None = None,
 ) -> tuple[NDArray[Any], Mask]:
     """Interpolate an image at given positions.
 
@@ -115,21 +119,28 @@ def resample(
         Columns and rows of the positions, shape (2, m, n).
     method
         One of `METHODS`.
+    dtype
+        Of the result; by default the image's.
 
     Returns
     -------
     values
-        Shape (m, n), dtype of the image, rounded and clipped for integers; 0 where invalid.
+        Shape (m, n), rounded and clipped for integers; 0 where invalid.
     valid
         Shape (m, n).
     """
     px = np.asarray(px)
+    dtype = image.dtype if dtype is None else dtype
+    if method != "nearest" and valid.all() and _touches_no_border(px, image.shape, method):
+        x, y = px.astype(np.float32)
+        values = _interpolate(image.astype(working_dtype(image.dtype)), x, y, _FLAGS[method])
+        return _rounded(values, dtype), np.ones(x.shape, bool)
     cols, rows = np.rint(px[0]).astype(np.int64), np.rint(px[1]).astype(np.int64)
     inside = (cols >= 0) & (rows >= 0) & (cols < image.shape[1]) & (rows < image.shape[0])
     cols[~inside], rows[~inside] = 0, 0
     known = inside & valid[rows, cols]
     if method == "nearest":
-        return np.where(known, image[rows, cols], image.dtype.type(0)), known
+        return np.where(known, image[rows, cols], image.dtype.type(0)).astype(dtype), known
     whole = cv2.erode(
         valid.astype(np.uint8),
         np.ones((2 * _REACH[method] + 1,) * 2, np.uint8),
@@ -147,7 +158,7 @@ def resample(
         bilinear = _interpolate(filled, x, y, cv2.INTER_LINEAR)
         values[partly] = bilinear[partly] / weight[partly]
     values[~known] = 0
-    return _rounded(values, image.dtype), known
+    return _rounded(values, dtype), known
 
 
 def reduction(grid: Grid, to_input_px: ToInputPx) -> tuple[int, int]:
@@ -256,6 +267,12 @@ def _hats(nodes: NDArray[np.int_], places: NDArray[np.int_]) -> FloatArray:
     index = np.arange(len(places))
     weights[index, left], weights[index, left + 1] = 1 - share, share
     return weights
+
+
+def _touches_no_border(px: FloatArray, shape: tuple[int, ...], method: str) -> bool:
+    reach = _REACH[method]
+    last = np.array(shape[::-1])[:, None, None] - 1
+    return bool(np.all((px >= reach) & (px <= last - reach)))
 
 
 def _interpolate(image: NDArray[Any], x: FloatImage, y: FloatImage, flag: int) -> NDArray[Any]:

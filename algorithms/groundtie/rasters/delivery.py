@@ -1,0 +1,238 @@
+"""Registered rasters: resampled onto another grid, or untouched with another geotransform."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+import rasterio.windows
+from numpy.typing import NDArray
+
+from ..progress import SILENT, Progress
+from .grid import Grid
+from .reading import Mask, RasterSource, Window
+from .warping import (
+    ToInputPx,
+    coordinates,
+    inside_window,
+    lattice,
+    reduced_shape,
+    reduction,
+    resample,
+    source_window,
+)
+from .writing import BLOCK, create_like, fill_value, keep_apart
+
+_TILE = 2 * BLOCK
+
+# What a worker may hold of the result at a time; rasters with many bands are worked in groups.
+_TILE_BYTES = 32_000_000
+
+# Share of the work that is left when all pixels are written: overviews.
+_OVERVIEWS = 0.1
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class _Warp:
+    """What all tiles of one raster share."""
+
+    source: RasterSource
+    to_input_px: ToInputPx
+    target: Grid
+    method: str
+    nodata: float | None
+    factor: tuple[int, int]
+
+    def tile(self, task: tuple[Window, tuple[int, ...]]) -> tuple[NDArray[Any], Mask]:
+        """Return some bands of a tile, (bands, h, w), and the validity of the first, (h, w)."""
+        place, bands = task
+        px = coordinates(self.target.window(*place), self.to_input_px)
+        size = (self.source.grid.width, self.source.grid.height)
+        window = source_window(px, size, self.method, self.factor)
+        out = np.empty((len(bands), place.height, place.width), self.source.dtype)
+        known = np.zeros(out.shape[1:], bool)
+        if not window.width or not window.height:
+            for i, band in enumerate(bands):
+                out[i] = fill_value(self.source, self.nodata, band)
+            return out, known
+        px = inside_window(px, window, self.factor)
+        images, valid = self.source.read_bands(window, bands, reduced_shape(window, self.factor))
+        for i in reversed(range(len(bands))):
+            values, known = resample(images[i], valid[i], px, self.method, self.source.dtype)
+            fill = fill_value(self.source, self.nodata, bands[i])
+            if self.nodata is not None or bands[i] == self.source.alpha_band:
+                keep_apart(values, fill)
+            out[i] = np.where(known, values, fill)
+        return out, known
+
+
+def warp_raster(
+    source: RasterSource,
+    to_input_px: ToInputPx,
+    target: Grid,
+    path: str | os.PathLike[str],
+    resampling: str = "cubic",
+    *,
+    nodata: float | None = None,
+    workers: int = 2,
+    progress: Progress = SILENT,
+) -> None:
+    """Resample a raster onto a grid, once, from its original pixels, into a GeoTIFF.
+
+    Memory is bounded: tiles are read, resampled and written one by one. Bands, dtype, colours,
+    names and metadata are kept (see `writing.create_like`). Where there are no pixels, the result
+    has the input's nodata value; a transparent alpha band if it has one; otherwise NaN in real
+    floating-point rasters, and in all others 0 beside an internal mask. An input's mask band
+    becomes an internal mask. Rasters with a palette are always resampled by `nearest`.
+
+    Parameters
+    ----------
+    source
+        The raster.
+    to_input_px
+        Takes map positions of the target grid, shape (n, 2), to input pixels (col, row).
+    target
+        The grid of the result.
+    path
+        The GeoTIFF to write; see `atomic.Outputs.stage`.
+    resampling
+        One of `warping.METHODS`. Where the target's pixels are larger than 1.5 input pixels,
+        the mean over the area is taken first (not with `nearest`).
+    nodata
+        Another nodata value for the result.
+    workers
+        Number of threads.
+    progress
+        Told of every tile.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    RasterOpenError
+        The pixels cannot be read.
+    ParameterError
+        The pixel type cannot hold `nodata`.
+    CancelledError
+        The user cancelled.
+    """
+    method = "nearest" if source.colormap else resampling
+    nodata = _choose_nodata(source) if nodata is None else nodata
+    factor = (1, 1) if method == "nearest" else reduction(target, to_input_px)
+    warp = _Warp(source, to_input_px, target, method, nodata, factor)
+    bare = nodata is None and source.alpha_band is None
+    masked = source.has_mask_band or (bare and not _is_covered(warp))
+    groups = _band_groups(source)
+    interleave = "band" if len(groups) > 1 else None
+    tasks = [(tile, group) for tile in tiles(target) for group in groups]
+    with (
+        create_like(
+            source, target, path, nodata=nodata, interleave=interleave, workers=workers
+        ) as dataset,
+        ThreadPoolExecutor(workers) as pool,
+    ):
+        for i, (values, known) in enumerate(_in_order(pool, warp.tile, tasks, workers + 1)):
+            tile, group = tasks[i]
+            place = rasterio.windows.Window(*tile)
+            dataset.write(values, list(group), window=place)
+            if masked and group is groups[0]:
+                dataset.write_mask(known, window=place)
+            progress.update((i + 1) / len(tasks) * (1 - _OVERVIEWS))
+    progress.update(1.0)
+
+
+def write_with_geotransform(
+    source: RasterSource,
+    grid: Grid,
+    path: str | os.PathLike[str],
+    *,
+    progress: Progress = SILENT,
+) -> None:
+    """Write a raster's pixels, untouched, with another geotransform and CRS into a GeoTIFF.
+
+    Parameters
+    ----------
+    source
+        The raster.
+    grid
+        Its new grid, of the same size.
+    path
+        The GeoTIFF to write; see `atomic.Outputs.stage`.
+    progress
+        Told of every tile.
+
+    Raises
+    ------
+    OutputError, RasterOpenError, CancelledError
+        As `warp_raster`.
+    """
+    if (grid.width, grid.height) != (source.grid.width, source.grid.height):
+        raise ValueError("a new geotransform does not change the size of a raster")
+    nodata = source.bands[0].nodata
+    places = list(tiles(grid))
+    with create_like(source, grid, path, nodata=nodata) as dataset:
+        for i, tile in enumerate(places):
+            place = rasterio.windows.Window(*tile)
+            values, mask = source.read_untouched(tile)
+            dataset.write(values, window=place)
+            if source.has_mask_band:
+                dataset.write_mask(mask, window=place)
+            progress.update((i + 1) / len(places) * (1 - _OVERVIEWS))
+    progress.update(1.0)
+
+
+def tiles(grid: Grid) -> Iterator[Window]:
+    """Return the tiles that cover a grid, row by row, each made of whole blocks of the file."""
+    for row in range(0, grid.height, _TILE):
+        for col in range(0, grid.width, _TILE):
+            yield Window(col, row, min(_TILE, grid.width - col), min(_TILE, grid.height - row))
+
+
+def _choose_nodata(source: RasterSource) -> float | None:
+    declared = source.bands[source.image_bands[0] - 1].nodata
+    if declared is not None or source.alpha_band or source.has_mask_band:
+        return declared
+    return float("nan") if source.dtype.kind == "f" else None
+
+
+def _is_covered(warp: _Warp) -> bool:
+    """Tell whether every pixel of the target lies on the source."""
+    grid = warp.source.grid
+    return all(
+        lattice(warp.target.window(*tile), warp.to_input_px).lies_within(grid.width, grid.height)
+        for tile in tiles(warp.target)
+    )
+
+
+def _band_groups(source: RasterSource) -> list[tuple[int, ...]]:
+    most = max(_TILE_BYTES // (_TILE * _TILE * source.dtype.itemsize), 1)
+    numbers = range(1, source.count + 1)
+    return [tuple(numbers[i : i + most]) for i in range(0, source.count, most)]
+
+
+def _in_order(
+    pool: ThreadPoolExecutor,
+    work: Callable[[Item], Result],
+    items: Iterable[Item],
+    ahead: int,
+) -> Iterator[Result]:
+    """Work on some items at a time, `ahead` at most, and yield the results in their order."""
+    waiting: deque[Future[Result]] = deque()
+    try:
+        for item in items:
+            waiting.append(pool.submit(work, item))
+            if len(waiting) >= ahead:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        for future in waiting:
+            future.cancel()

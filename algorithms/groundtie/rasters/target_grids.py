@@ -1,0 +1,100 @@
+"""Which grid a registered raster gets, when it does not get the reference's as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+from rasterio.crs import CRS
+
+from ..errors import NoOverlapError
+from .grid import Grid
+
+FloatArray = NDArray[np.float64]
+
+# A footprint that reaches into a further row or column by less than this does not need it.
+_TOLERANCE_PX = 1e-3
+
+
+def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Grid:
+    """Return the part of a lattice, continued beyond its grid, that covers a footprint.
+
+    Parameters
+    ----------
+    lattice
+        Gives CRS, pixel size and where the pixels' borders are.
+    xy
+        Map positions in the lattice's CRS, shape (n, 2); those that are not finite are left out.
+    within
+        Cut the result to the grid of the lattice.
+
+    Raises
+    ------
+    NoOverlapError
+        Nothing is left.
+    """
+    px = lattice.map_to_pixel(xy[np.isfinite(xy).all(axis=1)])
+    if len(px) == 0:
+        raise NoOverlapError("the footprint of the image lies outside of the map's projection")
+    low = np.floor(px.min(axis=0) + 0.5 + _TOLERANCE_PX).astype(int)
+    high = np.ceil(px.max(axis=0) + 0.5 - _TOLERANCE_PX).astype(int)
+    if within:
+        size = (lattice.width, lattice.height)
+        low, high = np.clip(low, 0, size), np.clip(high, 0, size)
+    if np.any(high <= low):
+        raise NoOverlapError("the footprint of the image does not lie on the grid")
+    width, height = high - low
+    return lattice.window(int(low[0]), int(low[1]), int(width), int(height))
+
+
+def registered_grid(
+    input_grid: Grid,
+    px_to_map: Callable[[FloatArray], FloatArray],
+    crs: CRS | None,
+    pixel_size_m: float | None = None,
+) -> Grid:
+    """Return a grid for a registered raster that covers all of it.
+
+    In the input's own CRS and without another pixel size it is the input's own lattice, so that
+    the result lines up with the input's neighbours. Otherwise it is north-up, with square pixels
+    as large as the input's and pixel borders at multiples of their size.
+
+    Parameters
+    ----------
+    input_grid
+        The input's grid.
+    px_to_map
+        Takes input pixels (col, row), shape (n, 2), to map positions in `crs`.
+    crs
+        CRS of the result.
+    pixel_size_m
+        Pixel size in metres (in pixels without georeferencing).
+
+    Raises
+    ------
+    NoOverlapError
+        The raster lies outside of the domain of the CRS.
+    """
+    footprint = px_to_map(input_grid.outline())
+    if pixel_size_m is None and crs == input_grid.crs:
+        return covering_grid(input_grid, footprint)
+    col, row = input_grid.centre_px
+    corners = px_to_map(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) + [col, row])
+    centre = corners.mean(axis=0)
+    if not np.isfinite(centre).all():
+        raise NoOverlapError("the footprint of the image lies outside of the map's projection")
+    metres = np.array(Grid(Affine.translation(*centre), crs, 1, 1).metres_per_unit)
+    if pixel_size_m is None:
+        along, across = corners[2] - corners[0], corners[3] - corners[1]
+        area = abs(along[0] * across[1] - along[1] * across[0]) / 2
+        pixel_size_m = float(np.sqrt(area * metres.prod()))
+    width, height = pixel_size_m / metres
+    lattice = Grid(Affine(width, 0, 0, 0, _down(input_grid) * height, 0), crs, 1, 1)
+    return covering_grid(lattice, footprint)
+
+
+def _down(input_grid: Grid) -> int:
+    """Rows run south on maps, but as the image's own do in pixel coordinates."""
+    return -1 if input_grid.is_georeferenced else 1
