@@ -29,7 +29,7 @@ def tree(tmp_path: Path) -> Path:
     root = tmp_path / "tree"
     files = {
         "plugin/groundtie_qgis/__init__.py": "def classFactory(iface): ...\n",
-        "plugin/groundtie_qgis/icons/coregister.svg": "<svg/>",
+        "plugin/groundtie_qgis/icons/groundtie.svg": "<svg/>",
         "plugin/groundtie_qgis/__pycache__/x.cpython-311.pyc": "junk",
         "plugin/groundtie_qgis/.DS_Store": "junk",
         "plugin/groundtie_qgis/provider.py~": "junk",
@@ -83,7 +83,7 @@ def test_zip_holds_plugin_library_and_papers(tree: Path, tmp_path: Path) -> None
         "groundtie_qgis/__init__.py",
         "groundtie_qgis/groundtie/__init__.py",
         "groundtie_qgis/groundtie/quality/page.html.j2",
-        "groundtie_qgis/icons/coregister.svg",
+        "groundtie_qgis/icons/groundtie.svg",
         "groundtie_qgis/metadata.txt",
         "groundtie_qgis/requirements.txt",
     ]
