@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,13 +13,10 @@ from ..errors import GeoreferencingError, NoOverlapError, SameFileError
 from .grid import Grid, reproject
 from .patch import Patch
 from .reading import RasterSource, Window
-from .warping import coordinates
+from .warping import sample
 
 FloatArray = NDArray[np.float64]
 ToPixel = Callable[[FloatArray], FloatArray]
-
-# An input whose pixels are this much smaller than the grid's is averaged before it is resampled.
-_REDUCE_FROM = 1.5
 
 # Pixel sizes nearer than this are the same.
 _SAME_SIZE = 0.02
@@ -47,11 +43,11 @@ class Image:
 
     def read_onto(self, grid: Grid, to_px: ToPixel, to_mask_px: ToPixel | None = None) -> Patch:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
-        patch = _read_onto(self.source, self.band, grid, to_px)
-        if self.mask is None or to_mask_px is None:
-            return patch
-        mask = _read_onto(self.mask, 1, grid, to_mask_px)
-        return Patch(patch.values, patch.valid & mask.valid & (mask.values != 0))
+        values, valid = sample(self.source, grid, to_px, "cubic", self.band)
+        if self.mask is not None and to_mask_px is not None:
+            shown, known = sample(self.mask, grid, to_mask_px, "nearest", 1)
+            valid = valid & known & (shown != 0)
+        return Patch(values, valid)
 
 
 @dataclass(frozen=True)
@@ -171,47 +167,3 @@ def _box(grid: Grid, outline_px: FloatArray, margin_px: float) -> Window | None:
     if (high - low).min() <= 0:
         return None
     return Window(int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1]))
-
-
-def _read_onto(source: RasterSource, band: int | None, grid: Grid, to_px: ToPixel) -> Patch:
-    """Return a raster resampled onto a grid, averaged first where its pixels are smaller."""
-    maps = coordinates(grid, to_px)
-    shape = (grid.height, grid.width)
-    finite = np.isfinite(maps[0]) & np.isfinite(maps[1])
-    inside = finite & source.grid.contains(np.stack(maps, axis=-1))
-    if not inside.any():
-        return Patch(np.zeros(shape, np.float32), np.zeros(shape, bool))
-    cols, rows = (np.where(inside, axis, np.nan) for axis in maps)
-    step = _pixels_per_step(maps, finite)
-    margin = int(np.ceil(3 * step))
-    left, top = int(np.nanmin(cols)) - margin, int(np.nanmin(rows)) - margin
-    width = int(np.nanmax(cols)) + margin + 1 - left
-    height = int(np.nanmax(rows)) + margin + 1 - top
-    window = Window(left, top, width, height)
-    out_shape = None
-    if step >= _REDUCE_FROM:
-        out_shape = (max(round(height / step), 1), max(round(width / step), 1))
-    values, valid = source.read(window, band, out_shape)
-    scale_x, scale_y = width / values.shape[1], height / values.shape[0]
-    x = ((maps[0] - left + 0.5) / scale_x - 0.5).astype(np.float32)
-    y = ((maps[1] - top + 0.5) / scale_y - 0.5).astype(np.float32)
-    near = cv2.remap(
-        valid.astype(np.uint8), x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT
-    )
-    usable = inside & (near > 0)
-    if not usable.any():
-        return Patch(np.zeros(shape, np.float32), usable)
-    low, high = values[valid].min(), values[valid].max()
-    # Cubic weights overshoot at bright targets; amplitudes must not become negative by it.
-    filled = values if valid.all() else np.where(valid, values, np.median(values[valid]))
-    image = cv2.remap(filled, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-    return Patch(np.clip(image, low, high), usable)
-
-
-def _pixels_per_step(maps: tuple[NDArray[np.float32], ...], finite: NDArray[np.bool_]) -> float:
-    """Return how many source pixels a step of one grid pixel covers, on the average."""
-    if min(finite.shape) < 2:
-        return 1.0
-    (xr, xc), (yr, yc) = np.gradient(maps[0]), np.gradient(maps[1])
-    area = np.abs(xr * yc - xc * yr)[finite]
-    return float(np.sqrt(np.nanmedian(area)))

@@ -23,22 +23,25 @@ _REACH = 3.0
 # Share of the median that is added before the logarithm, so that dark noise is not blown up.
 _LOG_OFFSET = 0.1
 
+# More negative values than this do not come from resampling.
+_NEGATIVE_SHARE = 0.02
+
 
 def compress(window: Patch) -> NDArray[np.float32]:
     """Return grey values on a logarithmic scale, on which speckle is additive.
 
-    Values that are negative somewhere are taken to be on such a scale already (decibels).
-    Masked pixels get the median.
+    Images with negative values are taken to be on such a scale already (decibels); a few may
+    come from resampling. Masked pixels get the median.
     """
     values = window.values[window.valid]
     if values.size == 0:
         return np.zeros_like(window.values)
-    if values.min() < 0:
+    if np.mean(values < 0) > _NEGATIVE_SHARE:
         return np.where(window.valid, window.values, np.float32(np.median(values)))
     positive = values[values > 0]
     median = np.float32(np.median(positive)) if positive.size else np.float32(1)
     filled = np.where(window.valid, window.values, median)
-    return np.log(filled / median + np.float32(_LOG_OFFSET))
+    return np.log(np.maximum(filled, 0) / median + np.float32(_LOG_OFFSET))
 
 
 def orientation_field(
