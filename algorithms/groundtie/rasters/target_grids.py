@@ -80,6 +80,8 @@ def registered_grid(
     footprint = px_to_map(input_grid.outline())
     if pixel_size_m is None and crs == input_grid.crs:
         return covering_grid(input_grid, footprint)
+    if not input_grid.is_georeferenced and crs is None:
+        return covering_grid(input_grid.scaled(pixel_size_m or 1.0), footprint)
     col, row = input_grid.centre_px
     corners = px_to_map(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) + [col, row])
     centre = corners.mean(axis=0)
@@ -91,10 +93,4 @@ def registered_grid(
         area = abs(along[0] * across[1] - along[1] * across[0]) / 2
         pixel_size_m = float(np.sqrt(area * metres.prod()))
     width, height = pixel_size_m / metres
-    lattice = Grid(Affine(width, 0, 0, 0, _down(input_grid) * height, 0), crs, 1, 1)
-    return covering_grid(lattice, footprint)
-
-
-def _down(input_grid: Grid) -> int:
-    """Rows run south on maps, but as the image's own do in pixel coordinates."""
-    return -1 if input_grid.is_georeferenced else 1
+    return covering_grid(Grid(Affine(width, 0, 0, 0, -height, 0), crs, 1, 1), footprint)
