@@ -14,7 +14,15 @@ import numpy as np
 import numpy.typing as npt
 
 from .cover import Cover, ParcelBook
-from .polygons import Point, Polygon, fitted_rectangle, main_frame, rectangle, subdivide
+from .polygons import (
+    Point,
+    Polygon,
+    fitted_rectangle,
+    main_frame,
+    points_along,
+    rectangle,
+    subdivide,
+)
 
 _SUBPIXEL_BITS = 4
 
@@ -36,21 +44,22 @@ FOREST = Use(4, 40000, 0, (0, 0), (0, 0), 0)
 PARK = Use(4, 9000, 0, (0, 0), (0, 0), 0)
 HAMLET = Use(5, 5000, 800, (0.35, 0.55), (3, 8), 1.5)
 HOUSES = Use(7, 7000, 620, (0.48, 0.66), (4, 12), 1.2)
-DENSE = Use(13, 10000, 1600, (0.88, 0.99), (10, 60), 0.15)
+DENSE = Use(11, 12000, 2200, (0.92, 1.0), (10, 60), 0.15)
 
 DENSITIES: dict[str, tuple[tuple[Use, float], ...]] = {
     "rural": ((FARMLAND, 0.8), (FOREST, 0.18), (HAMLET, 0.02)),
     "suburban": ((HOUSES, 0.66), (FARMLAND, 0.17), (PARK, 0.09), (FOREST, 0.08)),
-    "urban": ((DENSE, 0.92), (PARK, 0.08)),
+    "urban": ((DENSE, 0.94), (PARK, 0.06)),
 }
 
 CANOPY_M = (12.0, 24.0)
 
 _DISTRICT_M2 = 70000
-_ARTERIAL_M = {"rural": 7.0, "suburban": 12.0, "urban": 20.0}
+_ARTERIAL_M = {"rural": 7.0, "suburban": 12.0, "urban": 18.0}
 _FARMSTEAD_CHANCE = 0.5
 _LAKE_M2 = 400_000
 _TREE_KINDS = 8
+_PROBES_PER_SIDE = 6
 
 
 def highest_object_m(density: str) -> float:
@@ -210,9 +219,9 @@ class Layout:
         return list(zip(x.tolist(), y.tolist(), strict=True))
 
     def _draw_buildings(self) -> None:
-        keep_off = (Cover.WATER, Cover.ROAD)
         for footprint, height_m in self._buildings:
-            if not any(self._cover_at(corner) in keep_off for corner in footprint):
+            outline = points_along(footprint, _PROBES_PER_SIDE)
+            if not any(self._cover_at(point) == Cover.WATER for point in outline):
                 self._fill(footprint, self._add(Cover.BUILDING, height_m))
 
     def _draw_trees(self) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 Point = tuple[float, float]
 Polygon = list[Point]
 
-_ANGLE_JITTER_RAD = math.radians(5)
+_ANGLE_JITTER_RAD = math.radians(3)
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,15 @@ def contains(polygon: Polygon, point: Point) -> bool:
     return all(signs) or not any(signs)
 
 
+def points_along(polygon: Polygon, per_side: int) -> list[Point]:
+    """Return points at even distances along each side, corners included."""
+    return [
+        (a[0] + (b[0] - a[0]) * k / per_side, a[1] + (b[1] - a[1]) * k / per_side)
+        for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True)
+        for k in range(per_side)
+    ]
+
+
 def rectangle(centre: Point, half: Point, angle_rad: float) -> Polygon:
     """Return the rectangle of half side lengths `half`, turned by an angle."""
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
@@ -82,7 +91,7 @@ def fitted_rectangle(polygon: Polygon, fill: Point) -> Polygon | None:
     It is shrunk until it lies inside the polygon; None when the polygon is too pointed for that.
     """
     centre, half, angle = main_frame(polygon)
-    for shrink in (1.0, 0.85, 0.7, 0.55):
+    for shrink in (1.0, 0.94, 0.88, 0.82, 0.7, 0.55):
         box = rectangle(centre, (half[0] * fill[0] * shrink, half[1] * fill[1] * shrink), angle)
         if all(contains(polygon, corner) for corner in box):
             return box

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import uniform_filter
+from scipy.ndimage import gaussian_filter
 
 from ..errors import ParameterError
 from .cover import Cover
@@ -25,7 +25,7 @@ FloatImage = npt.NDArray[np.float32]
 
 _SAMPLES_PER_PIXEL = 2
 _MIN_WALL_PX = 0.5
-_NORMAL_WINDOW_PX = 7
+_NORMAL_SIGMA_PX = 1.5
 _LEVEL_PX = 0.05
 
 # Standard deviation of the fine texture of each class in dB, in the order of Cover.
@@ -284,7 +284,7 @@ def _facing(
     objects: FloatImage, row: npt.NDArray[np.intp], left: npt.NDArray[np.intp]
 ) -> npt.NDArray[np.float32]:
     """Cosine between the wall's normal and the look direction, from the smoothed heights."""
-    smooth = uniform_filter(objects, _NORMAL_WINDOW_PX)
+    smooth = gaussian_filter(objects, _NORMAL_SIGMA_PX)
     down = np.gradient(smooth, axis=0)[row, left] if objects.shape[0] > 1 else np.zeros(len(row))
     along = smooth[row, left + 1] - smooth[row, left]
     return np.abs(along) / np.maximum(np.hypot(along, down), 1e-6)
