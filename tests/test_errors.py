@@ -44,6 +44,11 @@ def test_the_message_is_the_text_alone(error: type[GroundTieError]) -> None:
 
 
 @pytest.mark.parametrize("error", ALL)
+def test_a_message_fits_on_one_line(error: type[GroundTieError]) -> None:
+    assert error("GDAL said:\n  no such\tfile ").one_line() == "GDAL said: no such file"
+
+
+@pytest.mark.parametrize("error", ALL)
 def test_exit_codes(error: type[GroundTieError]) -> None:
     special = {NotRegisteredError: 3, CancelledError: 130}
     assert error.exit_code == special.get(error, 2)

@@ -52,7 +52,7 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
             number = received[0] if received else signal.SIGINT
             return _fail(str(error) or "cancelled", 128 + number)
         except GroundTieError as error:
-            return _fail(str(error), error.exit_code)
+            return _fail(error.one_line(), error.exit_code)
     return 0
 
 
@@ -63,12 +63,12 @@ def _all_tools() -> Sequence[Tool]:
 
 
 def _fail(message: str, exit_code: int) -> int:
-    click.echo("groundtie: error: " + " ".join(message.split()), err=True)
+    click.echo(f"groundtie: error: {message}", err=True)
     return exit_code
 
 
 def _usage(error: click.ClickException) -> str:
-    message = error.format_message()
+    message = " ".join(error.format_message().split())
     if isinstance(error, click.UsageError) and error.ctx is not None:
         message = f"{message.rstrip('.')} (see {error.ctx.command_path} --help)"
     return message

@@ -17,6 +17,10 @@ class GroundTieError(Exception):
 
     exit_code = 2
 
+    def one_line(self) -> str:
+        """Return the message on one line."""
+        return " ".join(str(self).split())
+
 
 class ParameterError(GroundTieError, ValueError):
     """A parameter is missing, of the wrong type or out of its range."""

@@ -90,7 +90,7 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         try:
             self._check(reader)
         except errors.GroundTieError as error:
-            return False, str(error)
+            return False, error.one_line()
         return True, ""
 
     def processAlgorithm(
@@ -106,7 +106,7 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
             with rasterio_env():
                 result = self._tool.run(**values, progress=_progress(feedback))
         except errors.GroundTieError as error:
-            raise QgsProcessingException(str(error)) from error
+            raise QgsProcessingException(error.one_line()) from error
         except Exception as error:
             feedback.pushDebugInfo(traceback.format_exc())
             what = f"{type(error).__name__}: {error}"

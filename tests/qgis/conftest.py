@@ -1,0 +1,126 @@
+"""A real QGIS with the built plugin, in this process and as `qgis_process`."""
+
+from __future__ import annotations
+
+import gc
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+ROOT = Path(__file__).resolve().parents[2]
+# Debian's qgis_process is a broken wrapper of this one (QGIS issue 57683)
+QGIS_PROCESS = shutil.which("qgis_process.bin", path="/usr/bin") or shutil.which("qgis_process")
+QgisProcess = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def unpack_plugin(folder: Path) -> Path:
+    """Build the plugin as for users, unzip it into `folder` and return that."""
+    archive = folder / "groundtie_qgis.zip"
+    command = [sys.executable, str(ROOT / "scripts" / "build_plugin.py"), str(archive)]
+    subprocess.run(command, check=True, capture_output=True)
+    with zipfile.ZipFile(archive) as plugin:
+        plugin.extractall(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def plugin_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder in which the built plugin lies."""
+    return unpack_plugin(tmp_path_factory.mktemp("plugins"))
+
+
+@pytest.fixture(scope="session")
+def toy_plugin_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a built plugin whose library has one tool more: that of tests/toys.py."""
+    folder = unpack_plugin(tmp_path_factory.mktemp("toy_plugins"))
+    library = folder / "groundtie_qgis" / "groundtie"
+    toys = (ROOT / "tests" / "toys.py").read_text(encoding="utf-8")
+    (library / "toys.py").write_text(toys.replace("from groundtie.", "from ."), encoding="utf-8")
+    with (library / "tools" / "__init__.py").open("a", encoding="utf-8") as tools:
+        tools.write("\nfrom ..toys import TOY\n\nTOOLS = (*TOOLS, TOY)\n")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def qgis_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A running QGIS application with Processing."""
+    os.environ["QGIS_CUSTOM_CONFIG_PATH"] = str(tmp_path_factory.mktemp("profile"))
+    sys.path.append("/usr/share/qgis/python/plugins")
+    from qgis.core import QgsApplication, QgsProject
+
+    app = QgsApplication([], True)
+    QgsApplication.initQgis()
+    from processing.core.Processing import Processing
+
+    Processing.initialize()
+    yield app
+    # a layer that outlives QGIS crashes it
+    QgsProject.instance().clear()
+    gc.collect()
+    Processing.deinitialize()
+    QgsApplication.exitQgis()
+
+
+@pytest.fixture(scope="session")
+def plugin(qgis_app: Any, toy_plugin_folder: Path) -> Iterator[Any]:
+    """The plugin, started as qgis_process starts it, with the toy tool."""
+    sys.path.insert(0, str(toy_plugin_folder))
+    import groundtie_qgis
+
+    plugin = groundtie_qgis.classFactory(None)
+    plugin.initProcessing()
+    yield plugin
+    plugin.unload()
+
+
+@pytest.fixture
+def provider(plugin: Any) -> Any:
+    """The plugin's registered provider."""
+    return plugin.provider
+
+
+def qgis_environment(folder: Path, plugins: Path) -> dict[str, str]:
+    """Return the environment of a `qgis_process` with a profile of its own."""
+    for name in ("profile", "runtime"):
+        (folder / name).mkdir(mode=0o700)
+    return {
+        # a virtual environment on PATH would crash it
+        "PATH": "/usr/bin:/bin",
+        "HOME": str(folder / "profile"),
+        "LC_ALL": "C.UTF-8",
+        "PYTHONWARNINGS": "ignore::DeprecationWarning",
+        "QGIS_CUSTOM_CONFIG_PATH": str(folder / "profile"),
+        "QGIS_PLUGINPATH": str(plugins),
+        "QT_QPA_PLATFORM": "offscreen",
+        "XDG_RUNTIME_DIR": str(folder / "runtime"),
+    }
+
+
+def qgis_process_in(folder: Path, plugins: Path) -> QgisProcess:
+    """Return a function that calls `qgis_process` with the plugin in `plugins` enabled."""
+    assert QGIS_PROCESS, "qgis_process is not installed: see scripts/system_packages.sh"
+    environment = qgis_environment(folder, plugins)
+
+    def call(*words: object, **more: str) -> subprocess.CompletedProcess[str]:
+        command = [QGIS_PROCESS, *map(str, words)]
+        return subprocess.run(
+            command, env={**environment, **more}, text=True, capture_output=True, timeout=300
+        )
+
+    assert call("plugins", "enable", "groundtie_qgis").returncode == 0
+    return call
+
+
+@pytest.fixture(scope="session")
+def qgis_process(tmp_path_factory: pytest.TempPathFactory, plugin_folder: Path) -> QgisProcess:
+    """Call `qgis_process` with the built plugin; keywords are environment variables."""
+    return qgis_process_in(tmp_path_factory.mktemp("qgis_process"), plugin_folder)

@@ -1,0 +1,276 @@
+"""The algorithm made from a declaration: values, checks, results and errors, with the toy tool."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rasterio
+from rasterio.transform import from_origin
+
+
+def write_raster(path: Path, bands: int = 1) -> Path:
+    grid = {"transform": from_origin(500000, 5000000, 1, 1), "crs": "EPSG:32633"}
+    with rasterio.open(path, "w", "GTiff", 20, 20, bands, dtype="uint8", **grid) as raster:
+        raster.write(np.ones((bands, 20, 20), np.uint8))
+    return path
+
+
+@pytest.fixture
+def values(tmp_path: Path) -> dict[str, Any]:
+    return {
+        "REFERENCE": str(write_raster(tmp_path / "a.tif")),
+        "INPUT": str(write_raster(tmp_path / "b.tif", bands=3)),
+        "OUTPUT": str(tmp_path / "c.tif"),
+        "SIZE": 3,
+    }
+
+
+@pytest.fixture
+def algorithm(provider: Any) -> Any:
+    return provider.algorithm("toy").create()
+
+
+def run(
+    algorithm: Any, values: dict[str, Any], feedback: Any = None
+) -> tuple[dict[str, Any], bool]:
+    from qgis.core import QgsProcessingContext, QgsProcessingFeedback
+
+    results, finished = algorithm.run(
+        values,
+        QgsProcessingContext(),
+        feedback or QgsProcessingFeedback(),
+        catchExceptions=False,
+    )
+    return dict(results), bool(finished)
+
+
+def check(algorithm: Any, values: dict[str, Any]) -> tuple[bool, str]:
+    from qgis.core import QgsProcessingContext, QgsProject
+
+    context = QgsProcessingContext()
+    context.setProject(QgsProject.instance())
+    valid, message = algorithm.checkParameterValues(values, context)
+    return bool(valid), str(message)
+
+
+def called_with(algorithm: Any, values: dict[str, Any], monkeypatch: Any) -> dict[str, Any]:
+    """Run the algorithm and return the values that its tool was called with."""
+    seen: dict[str, Any] = {}
+    tool_run = algorithm._tool.run
+
+    def note(**given: Any) -> Any:
+        seen.update(given)
+        return tool_run(**given)
+
+    monkeypatch.setitem(algorithm._tool.__dict__, "run", note)
+    assert run(algorithm, values)[1]
+    return seen
+
+
+class TestRun:
+    """Running, and what comes back."""
+
+    def test_results_are_files_and_numbers(self, algorithm: Any, values: dict[str, Any]) -> None:
+        results, finished = run(algorithm, values)
+        assert finished
+        assert results == {
+            "OUTPUT": values["OUTPUT"],
+            "CHECK_RMSE_PX": 0.25,
+            "REASON": "good",
+        }
+        assert Path(values["OUTPUT"]).read_bytes() == b"done"
+
+    def test_progress_and_lines_reach_the_log(self, algorithm: Any, values: dict[str, Any]) -> None:
+        from qgis.core import QgsProcessingFeedback
+
+        feedback = QgsProcessingFeedback()
+        run(algorithm, values, feedback)
+        assert feedback.progress() == 100
+        log = feedback.textLog()
+        assert log.count("half of it") == 1
+        assert "accepted" in log
+        assert "size 3.0" in log
+
+    def test_all_values_arrive(
+        self,
+        algorithm: Any,
+        values: dict[str, Any],
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        (tmp_path / "t.json").write_text("{}")
+        (tmp_path / "r.geojson").write_text('{"type": "FeatureCollection", "features": []}')
+        given = {
+            "SEARCH_RADIUS": 12.5,
+            "MODE": "work",
+            "BAND": 3,
+            "CAREFUL": False,
+            "TITLE": "words",
+            "TIE_POINTS": str(tmp_path / "p.gpkg"),
+            "REPORT": str(tmp_path / "r.html"),
+            "FOLDER": str(tmp_path / "more"),
+            "REGIONS": str(tmp_path / "r.geojson"),
+            "TRANSFORM": str(tmp_path / "t.json"),
+            "SEED": 11,
+        }
+        seen = called_with(algorithm, {**values, **given}, monkeypatch)
+        seen.pop("progress")
+        assert {name.upper(): _text(value) for name, value in seen.items()} == {**values, **given}
+
+    def test_what_is_not_given_takes_the_default(
+        self, algorithm: Any, values: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from qgis.core import NULL
+
+        empty = {"SEARCH_RADIUS": None, "TITLE": "", "SEED": NULL, "REPORT": None}
+        seen = called_with(algorithm, {**values, **empty}, monkeypatch)
+        assert (seen["search_radius"], seen["title"], seen["seed"]) == (None, None, 7)
+        assert (seen["band"], seen["careful"], seen["mode"]) == (1, True, "work")
+        assert seen["report"] is None
+
+    def test_layers_are_read_from_their_files(
+        self, algorithm: Any, values: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from qgis.core import QgsRasterLayer
+
+        layer = QgsRasterLayer(values["INPUT"], "layer")
+        seen = called_with(algorithm, {**values, "INPUT": layer}, monkeypatch)
+        assert seen["input"] == Path(values["INPUT"])
+
+    def test_names_of_gdal_stay_as_they_are(
+        self, algorithm: Any, values: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        name = f"GTIFF_DIR:1:{values['INPUT']}"
+        seen = called_with(algorithm, {**values, "INPUT": name}, monkeypatch)
+        assert seen["input"] == name
+
+    def test_a_temporary_output_has_a_name_of_its_own(
+        self, algorithm: Any, values: dict[str, Any]
+    ) -> None:
+        results, _ = run(algorithm, {**values, "OUTPUT": "TEMPORARY_OUTPUT"})
+        assert Path(results["OUTPUT"]).suffix == ".tif"
+        assert Path(results["OUTPUT"]).read_bytes() == b"done"
+
+    def test_it_runs_off_the_main_thread_as_in_the_desktop(
+        self, algorithm: Any, values: dict[str, Any]
+    ) -> None:
+        from qgis.core import (
+            QgsApplication,
+            QgsProcessingAlgRunnerTask,
+            QgsProcessingContext,
+            QgsProcessingFeedback,
+        )
+        from qgis.PyQt.QtCore import QEventLoop
+
+        context, feedback, loop = QgsProcessingContext(), QgsProcessingFeedback(), QEventLoop()
+        task = QgsProcessingAlgRunnerTask(algorithm, values, context, feedback)
+        done: list[Any] = []
+        task.executed.connect(lambda ok, results: (done.append((ok, dict(results))), loop.quit()))
+        QgsApplication.taskManager().addTask(task)
+        loop.exec_()
+        assert done[0][0]
+        assert done[0][1]["CHECK_RMSE_PX"] == 0.25
+
+
+class TestFailure:
+    """What ends a run without a result."""
+
+    def failure(self, algorithm: Any, values: dict[str, Any], feedback: Any = None) -> str:
+        from qgis.core import QgsProcessingException
+
+        with pytest.raises(QgsProcessingException) as caught:
+            run(algorithm, values, feedback)
+        return str(caught.value)
+
+    def test_a_refusal_is_its_reason(self, algorithm: Any, values: dict[str, Any]) -> None:
+        message = self.failure(algorithm, {**values, "MODE": "refuse"})
+        assert message == "refused: too few points agree"
+        assert not Path(values["OUTPUT"]).exists()
+
+    def test_a_bug_has_its_traceback_in_the_log(
+        self, algorithm: Any, values: dict[str, Any]
+    ) -> None:
+        from qgis.core import QgsProcessingFeedback
+
+        feedback = QgsProcessingFeedback()
+        message = self.failure(algorithm, {**values, "MODE": "crash"}, feedback)
+        assert message == "this is a bug in GroundTie: ZeroDivisionError: a bug"
+        assert "Traceback" in feedback.textLog()
+
+    def test_cancel_ends_it_and_nothing_is_written(
+        self, algorithm: Any, values: dict[str, Any]
+    ) -> None:
+        from qgis.core import QgsProcessingFeedback
+
+        feedback = QgsProcessingFeedback()
+        feedback.progressChanged.connect(lambda progress: feedback.cancel())
+        message = self.failure(algorithm, {**values, "MODE": "wait"}, feedback)
+        assert message == "cancelled; nothing was written"
+        assert not Path(values["OUTPUT"]).exists()
+
+
+class TestCheck:
+    """What is refused before the run."""
+
+    def test_good_values_pass(self, algorithm: Any, values: dict[str, Any]) -> None:
+        assert check(algorithm, values) == (True, "")
+        assert check(algorithm, {**values, "OUTPUT": "TEMPORARY_OUTPUT"}) == (True, "")
+
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            ({"INPUT": "{REFERENCE}"}, "Input is the same raster as Reference: {REFERENCE}"),
+            ({"OUTPUT": "{INPUT}"}, "Output is the same file as Input: {INPUT}"),
+            ({"OUTPUT": "/no/such/c.tif"}, "the folder of Output does not exist: /no/such"),
+            ({"REPORT": "/tmp/r.pdf"}, "Report must end in .html: /tmp/r.pdf"),
+            ({"SIZE": 10}, "Incorrect parameter value for SIZE"),
+            ({"MODE": "fly"}, "Incorrect parameter value for MODE"),
+            ({"BAND": 0}, "Band must be at least 1, not 0"),
+            ({"TIE_POINTS": "/tmp/p.shp"}, "Tie points must end in .gpkg or .geojson: /tmp/p.shp"),
+            (
+                {"INPUT": "/no/such.tif"},
+                "Could not load source layer for INPUT: /no/such.tif not found",
+            ),
+        ],
+    )
+    def test_bad_values_are_named(
+        self, algorithm: Any, values: dict[str, Any], change: dict[str, Any], message: str
+    ) -> None:
+        changed = {k: v.format(**values) if isinstance(v, str) else v for k, v in change.items()}
+        expected = message.format(**values)
+        assert check(algorithm, {**values, **changed}) == (False, expected)
+
+    def test_a_layer_that_is_no_file_is_refused(
+        self, algorithm: Any, values: dict[str, Any]
+    ) -> None:
+        from qgis.core import QgsProject, QgsRasterLayer
+
+        layer = QgsRasterLayer("type=xyz&url=http://127.0.0.1:1/{z}/{x}/{y}.png", "Map", "wms")
+        QgsProject.instance().addMapLayer(layer)
+        valid, message = check(algorithm, {**values, "REFERENCE": layer.id()})
+        QgsProject.instance().clear()
+        assert not valid
+        assert message == (
+            "Reference must be a raster file, not the layer Map of the provider wms; "
+            "export it to a file first"
+        )
+
+    def test_a_check_has_no_layer_loaded(self, algorithm: Any, values: dict[str, Any]) -> None:
+        from qgis.core import (
+            QgsProcessingContext,
+            QgsProcessingOutputLayerDefinition,
+            QgsProject,
+        )
+
+        context = QgsProcessingContext()
+        context.setProject(QgsProject.instance())
+        sink = QgsProcessingOutputLayerDefinition(values["OUTPUT"], QgsProject.instance())
+        assert algorithm.checkParameterValues({**values, "OUTPUT": sink}, context)[0]
+        assert not context.layersToLoadOnCompletion()
+
+
+def _text(value: Any) -> Any:
+    return str(value) if isinstance(value, Path) else value

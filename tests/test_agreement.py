@@ -1,0 +1,182 @@
+"""The command line and the Python function of every tool say the same as its declaration.
+
+QGIS, the third, is compared in tests/qgis/test_agreement.py.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import toys
+
+import groundtie
+from groundtie.cli import main
+from groundtie.declaration import Parameter, Tool
+from groundtie.kinds import Band, Choice, Flag, Kind, Number, OutputKind
+from groundtie.tools import TOOLS
+
+ALL = [toys.TOY, *TOOLS]
+EVERY = [pytest.param(tool, p, id=f"{tool.name}-{p.name}") for tool in ALL for p in tool.parameters]
+NUMBERS = [case for case in EVERY if isinstance(case.values[1].kind, Number)]
+CHOICES = [case for case in EVERY if isinstance(case.values[1].kind, Choice)]
+RESERVED = {"json", "quiet", "help", "progress"}
+
+
+def named(tool: Tool) -> Any:
+    return pytest.param(tool, id=tool.name)
+
+
+def option(parameter: Parameter) -> str:
+    return "--" + parameter.name.replace("_", "-")
+
+
+def help_text(tool: Tool, capsys: pytest.CaptureFixture[str]) -> str:
+    assert main([tool.name.replace("_", "-"), "--help"], tools=[tool]) == 0
+    return capsys.readouterr().out
+
+
+def entry(tool: Tool, parameter: Parameter, capsys: pytest.CaptureFixture[str]) -> str:
+    """Return the help's entry of a parameter, with its spaces made single."""
+    name = parameter.name.replace("_", "-")
+    start = name.upper() if parameter.positional else f"--{name}"
+    entries = re.split(r"\n  (?=\S)", help_text(tool, capsys))
+    found = [text for text in entries if re.match(rf"{start}(?![\w-])", text)]
+    assert len(found) == 1
+    return " ".join(found[0].partition("\n\n")[0].split())
+
+
+def call(tool: Tool, values: dict[str, str]) -> list[str]:
+    """Return the words of a call with these values and fitting ones for what is required."""
+    words = [tool.name.replace("_", "-")]
+    for parameter in tool.parameters:
+        value = values.get(parameter.name)
+        if value is None and parameter.required:
+            value = fitting(parameter.name, parameter.kind)
+        if value is not None:
+            words += [value] if parameter.positional else [option(parameter), value]
+    return words
+
+
+def fitting(name: str, kind: Kind) -> str:
+    if isinstance(kind, Number):
+        return str(kind.minimum)
+    if isinstance(kind, Choice):
+        return kind.choices[0]
+    return name + (kind.suffixes[0] if isinstance(kind, OutputKind) else ".tif")
+
+
+@pytest.mark.parametrize("tool", map(named, TOOLS))
+def test_the_package_offers_the_function(tool: Tool) -> None:
+    assert getattr(groundtie, tool.name) is tool.run
+    assert tool.run.__name__ == tool.name
+
+
+@pytest.mark.parametrize("tool", map(named, ALL))
+def test_python_has_the_same_parameters_with_the_same_defaults(tool: Tool) -> None:
+    parameters = inspect.signature(tool.run).parameters
+    declared = {
+        p.name: inspect.Parameter.empty if p.required else p.default for p in tool.parameters
+    }
+    assert {n: p.default for n, p in parameters.items() if n != "progress"} == declared
+    assert [name for name in parameters if name != "progress"] == list(declared)
+
+
+@pytest.mark.parametrize("tool", map(named, ALL))
+def test_the_declaration_is_complete(tool: Tool) -> None:
+    assert tool.title and tool.group
+    assert re.fullmatch(r"[A-Z].*\.", tool.summary)
+    assert not RESERVED & {parameter.name for parameter in tool.parameters}
+    assert sum(not parameter.kind.advanced for parameter in tool.parameters) <= 15
+    for parameter in tool.parameters:
+        assert re.fullmatch(r"[a-z][a-z0-9_]*", parameter.name)
+        assert parameter.kind.label and parameter.kind.help.endswith((".", ")"))
+        assert "\n" not in parameter.kind.help
+        assert not (parameter.required and parameter.kind.advanced)
+
+
+@pytest.mark.parametrize("tool", map(named, ALL))
+def test_labels_tell_parameters_apart(tool: Tool) -> None:
+    labels = [parameter.kind.label for parameter in tool.parameters]
+    assert len(set(labels)) == len(labels)
+
+
+@pytest.mark.parametrize(("tool", "parameter"), EVERY)
+def test_a_default_is_a_value_that_the_kind_takes(tool: Tool, parameter: Parameter) -> None:
+    if parameter.default is not None:
+        assert parameter.kind.check(parameter.name, parameter.default) == parameter.default
+    if isinstance(parameter.kind, Flag):
+        assert isinstance(parameter.default, bool)
+    if isinstance(parameter.kind, Band):
+        assert tool.parameter(parameter.kind.of)
+
+
+@pytest.mark.parametrize(("tool", "parameter"), EVERY)
+def test_the_help_of_the_command_line_tells_all(
+    tool: Tool, parameter: Parameter, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = entry(tool, parameter, capsys)
+    kind = parameter.kind
+    assert " ".join(kind.help.split()) in text
+    if isinstance(kind, Number):
+        assert all(word in text for word in (kind.unit, kind.range_text))
+    if isinstance(kind, Choice):
+        assert f"[{'|'.join(kind.choices)}]" in text.replace(" ", "").replace(option(parameter), "")
+    if isinstance(kind, Flag):
+        assert f"--no-{parameter.name.replace('_', '-')}" in text
+        assert f"default: {'yes' if parameter.default else 'no'}" in text
+    elif parameter.default is not None:
+        assert f"default: {parameter.default}" in text
+    else:
+        assert "default: " not in text
+    assert ("required" in text.partition("[")[2]) == (
+        parameter.required and not parameter.positional
+    )
+
+
+@pytest.mark.parametrize("tool", map(named, ALL))
+def test_advanced_options_come_last(tool: Tool, capsys: pytest.CaptureFixture[str]) -> None:
+    plain, _, advanced = help_text(tool, capsys).partition("\nAdvanced options:\n")
+    for parameter in tool.parameters:
+        if not parameter.positional:
+            section = advanced if parameter.kind.advanced else plain
+            assert re.search(rf"(?m)^  {option(parameter)}\b", section)
+
+
+@pytest.mark.parametrize(("tool", "parameter"), NUMBERS)
+def test_both_refuse_what_is_out_of_range(
+    tool: Tool,
+    parameter: Parameter,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    kind = parameter.kind
+    assert isinstance(kind, Number)
+    for value in (kind.minimum - 1, kind.maximum + 1):
+        if abs(value) < 1e300:
+            assert main(call(tool, {parameter.name: str(value)}), tools=[tool]) == 2
+            assert f"{option(parameter)} must be {kind.range_text}" in capsys.readouterr().err
+            required = {p.name: fitting(p.name, p.kind) for p in tool.parameters if p.required}
+            with pytest.raises(ValueError, match=f"{parameter.name} must be {kind.range_text}"):
+                tool.run(**{**required, parameter.name: value})
+
+
+@pytest.mark.parametrize(("tool", "parameter"), CHOICES)
+def test_both_refuse_what_is_no_choice(
+    tool: Tool,
+    parameter: Parameter,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(call(tool, {parameter.name: "no-such"}), tools=[tool]) == 2
+    assert f"{option(parameter)} must be one of" in capsys.readouterr().err
+    required = {p.name: fitting(p.name, p.kind) for p in tool.parameters if p.required}
+    with pytest.raises(ValueError, match=f"{parameter.name} must be one of"):
+        tool.run(**{**required, parameter.name: "no-such"})
