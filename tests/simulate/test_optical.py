@@ -85,6 +85,7 @@ class TestLean:
         moved = centroid(np.isclose(image, ROOF)) - [94.5, 79.5]
         length = height_m * math.tan(math.radians(off_nadir_deg))
         expected = -length * np.array(direction(azimuth_deg))
+        # Whole pixels: the distance is rounded, and then each of its components.
         assert moved == pytest.approx(expected, abs=0.75)
 
     def test_roof_keeps_its_size(self, make_scene: MakeScene) -> None:
@@ -141,7 +142,7 @@ class TestShadow:
         dark = image < 0.5 * GROUND
         across = dark[:, 95] if azimuth_deg in (0, 180) else dark[80]
         expected = height_m / math.tan(math.radians(elevation_deg))
-        assert across.sum() == pytest.approx(expected, abs=1.0)
+        assert across.sum() == pytest.approx(expected, abs=0.51)
 
     @pytest.mark.parametrize("azimuth_deg", [30, 155, 200, 300])
     def test_shape_in_any_direction(self, make_scene: MakeScene, azimuth_deg: float) -> None:

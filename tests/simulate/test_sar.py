@@ -220,12 +220,8 @@ class TestStrips:
 
     def test_margin_is_cut_off_but_seen_from(self, make_scene: MakeScene) -> None:
         """A building in the margin lays over into the image."""
-        box = (slice(0, 80), slice(200, 220), 30.0)
-        scene = make_scene((80, 300), (box,), margin_px=95)
-        with pytest.raises(ValueError, match="zero-size|need at least one"):
-            sar_power(scene, SarOptions(35.0)).max()
-        tall = make_scene((400, 300), ((slice(0, 400), slice(205, 220), 30.0),), margin_px=100)
-        power = sar_power(tall, SarOptions(35.0))
+        scene = make_scene((400, 300), ((slice(0, 400), slice(205, 220), 30.0),), margin_px=100)
+        power = sar_power(scene, SarOptions(35.0))
         assert power.shape == (200, 100)
         assert power[:, -20:].mean() > 10 * power[:, :40].mean()
 

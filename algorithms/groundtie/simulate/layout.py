@@ -172,7 +172,7 @@ class Layout:
                 self._uniform(6, 12) * self._scale,
                 self._uniform(4, 7) * self._scale,
             )
-            self._buildings.append((rectangle(place, size, angle), self._uniform(3, 8)))
+            self._buildings.append((rectangle(place, size, angle), self._uniform(4, 8)))
             self._trees.append((place[0] + 1.4 * size[0], place[1] + 1.6 * size[1]))
 
     def _draw_waters(self) -> None:

@@ -87,7 +87,8 @@ def draw_misregistration(options: DistortionOptions, grid: Grid, seed: int) -> P
     frame = Frame.around(grid.pixel_to_map(grid.outline(1)))
     kind = DISTORTIONS[options.kind]
     terms = (DEGREE[kind] + 1) * (DEGREE[kind] + 2) // 2
-    px = grid.pixel_size[0] / frame.scale
+    # The frame's unit is half the longer side.
+    px = 2 / max(grid.width, grid.height)
     coefficients = np.zeros((terms, 2))
     azimuth = generator.uniform(0, 2 * math.pi)
     coefficients[0] = options.shift_px * px * np.array([math.cos(azimuth), math.sin(azimuth)])

@@ -25,6 +25,7 @@ MAX_DN = 2047
 
 _DARK_DN = 60.0
 _DN_PER_REFLECTANCE = 3400.0
+_LEVEL_PX = 0.01
 _AMBIENT = 0.3
 _WALL_ALBEDO = 0.22
 _PATCHES_M = 18.0
@@ -183,7 +184,8 @@ def _in_shadow(objects: FloatImage, options: OpticalOptions) -> npt.NDArray[np.b
         shaded = np.maximum(shaded, moved)
         ceiling = np.maximum(ceiling, moved)
         distance *= 2
-    return objects < shaded - np.float32(0.05)
+    # What casts the shadow reaches half a pixel further than its centre.
+    return objects < shaded + np.float32(0.5 / options.shadow - _LEVEL_PX)
 
 
 def _from_place(image: FloatImage, columns: int, rows: int, outside: np.float32) -> FloatImage:
@@ -226,14 +228,16 @@ def _visible(
     per_px = np.float32(1 / options.lean)
     above = objects[inside].copy()
     seen = place.copy()
-    for distance in range(1, math.ceil(float(objects.max()) * options.lean) + 1):
+    # A pixel is seen if the ray passes less than half a pixel's rise above its centre.
+    farthest = round(float(objects.max()) * options.lean + 0.5)
+    for distance in range(1, farthest + 1):
         step = round(distance * east), round(distance * south)
         excess = _from_place(objects, *step, np.float32(-1))[inside] - distance * per_px
-        hit = excess >= 0
+        hit = excess >= -per_px / 2
         seen[hit] = place[hit] + step[1] * width + step[0]
         above[hit] = excess[hit]
     cover = scene.parcels.cover[scene.parcel[rows].ravel()[seen]]
-    return seen, (above >= per_px) & (cover == Cover.BUILDING)
+    return seen, (above >= per_px / 2) & (cover == Cover.BUILDING)
 
 
 def _texture(scene: Scene, rows: slice, patches: SmoothNoise, index: int) -> FloatImage:
