@@ -17,12 +17,10 @@ from qgis.core import (
 from qgis.PyQt.QtGui import QIcon
 
 from .definitions import definition, qgis_name
-from .dependencies import complaint, rasterio_env
-from .library import FOLDER, errors, kinds, plugin_metadata, progress
-from .styling import style_when_loaded
+from .dependencies import rasterio_env
+from .library import errors, kinds, plugin_metadata, progress
+from .styling import ICON, style_when_loaded
 from .values import Reader
-
-ICON = FOLDER / "icons" / "groundtie.svg"
 
 
 class ToolAlgorithm(QgsProcessingAlgorithm):
@@ -72,16 +70,9 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
             made = QgsProcessingOutputString if output.text else QgsProcessingOutputNumber
             self.addOutput(made(qgis_name(output.name), output.label))
 
-    def canExecute(self) -> tuple[bool, str]:
-        missing = complaint()
-        return not missing, missing
-
     def checkParameterValues(
         self, parameters: dict[str, Any], context: QgsProcessingContext
     ) -> tuple[bool, str]:
-        # qgis_process and models do not ask canExecute
-        if missing := complaint():
-            return False, missing
         valid, message = super().checkParameterValues(parameters, context)
         if not valid:
             return valid, message
@@ -99,8 +90,6 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
-        if missing := complaint():
-            raise QgsProcessingException(missing)
         try:
             values = self._check(Reader(self, parameters, context, context, feedback))
             with rasterio_env():

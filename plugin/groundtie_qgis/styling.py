@@ -1,4 +1,4 @@
-"""Styles the layers that QGIS loads: `styles/NAME.qml` is for the output parameter NAME."""
+"""The icon, and the styles of layers: `styles/NAME.qml` is for the output parameter NAME."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from qgis.core import (
 
 from .compat import LINE
 from .library import FOLDER
+
+ICON = FOLDER / "icons" / "groundtie.svg"
 
 
 class Styler(QgsProcessingLayerPostProcessorInterface):
