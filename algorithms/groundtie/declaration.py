@@ -141,7 +141,8 @@ def tool(
     """Declare the decorated function as a tool (see `tool_of`).
 
     Its keyword `progress` is handed through unchecked; every other parameter must be annotated
-    with a `Kind`.
+    with a `Kind`. If the function has a keyword `parameters`, it is given the checked values of
+    all parameters by name, for its report; callers do not see this keyword.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -151,9 +152,14 @@ def tool(
         def checked(*args: P.args, **kwargs: P.kwargs) -> R:
             bound = signature.bind(*args, **kwargs).arguments
             progress = {key: bound.pop(key) for key in ("progress",) if key in bound}
-            return cast(Callable[..., R], function)(**declared.check(bound), **progress)
+            values = declared.check(bound)
+            given = {"parameters": values} if "parameters" in signature.parameters else {}
+            return cast(Callable[..., R], function)(**values, **given, **progress)
 
         declared = _declare(function, signature, checked, title, group, outputs)
+        checked.__signature__ = signature.replace(  # type: ignore[attr-defined]
+            parameters=[p for p in signature.parameters.values() if p.name != "parameters"]
+        )
         checked.__groundtie_tool__ = declared  # type: ignore[attr-defined]
         return checked
 
@@ -196,7 +202,7 @@ def _parameters(function: Callable[..., Any], signature: inspect.Signature) -> l
     hints = typing.get_type_hints(function, include_extras=True)
     found = []
     for name, argument in signature.parameters.items():
-        if name == "progress":
+        if name in ("parameters", "progress"):
             continue
         kinds = [m for m in getattr(hints[name], "__metadata__", ()) if isinstance(m, Kind)]
         if len(kinds) != 1:

@@ -63,9 +63,7 @@ def choose_kind(
     best = min(mean, key=lambda kind: mean[kind])
     for kind in losses:
         difference = losses[kind] - losses[best]
-        by_fold = np.array(
-            [share[folds == f] @ difference[folds == f] for f in np.unique(folds)]
-        )
+        by_fold = np.array([share[folds == f] @ difference[folds == f] for f in np.unique(folds)])
         error = float(np.sqrt(len(by_fold)) * by_fold.std(ddof=1)) if len(by_fold) > 1 else 0.0
         if mean[kind] <= mean[best] + error:
             return CrossValidation(kind, {k: float(np.sqrt(m)) for k, m in mean.items()})

@@ -74,9 +74,7 @@ class TiePoints:
     @classmethod
     def concatenate(cls, tables: list[TiePoints]) -> TiePoints:
         """Return the rows of all tables, one after the other."""
-        return cls(
-            **{name: np.concatenate([getattr(t, name) for t in tables]) for name in _FIELDS}
-        )
+        return cls(**{name: np.concatenate([getattr(t, name) for t in tables]) for name in _FIELDS})
 
 
 _FIELDS = tuple(TiePoints.__dataclass_fields__)

@@ -86,6 +86,14 @@ class ImagePair:
             grid, to_input_px, lambda xy: to_mask(own.pixel_to_map(to_input_px(xy)))
         )
 
+    def notes(self) -> list[str]:
+        """Return what a user should know of how the images are read."""
+        return [
+            f"{image.source.path} is complex-valued: its amplitude is matched"
+            for image in (self.reference, self.input)
+            if image.source.is_complex
+        ]
+
     def claimed_px(self, xy: FloatArray) -> FloatArray:
         """Return the input pixels at reference map positions as the input claims, shape (n, 2)."""
         return _claimed_pixels(self.grid, self.input.source.grid)(xy)

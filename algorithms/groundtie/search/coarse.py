@@ -82,9 +82,7 @@ def refine_on_level(
         Is told of every chip.
     """
     chip = int(np.clip(min(level.width, level.height) / 5, *_CHIP_RANGE_PX))
-    matcher = ChipMatcher(
-        pair, level, lambda xy: pair.claimed_px(model(xy)), settings, held_out
-    )
+    matcher = ChipMatcher(pair, level, lambda xy: pair.claimed_px(model(xy)), settings, held_out)
     centres = _regular_centres(level, chip)
     surfaces = matcher.match(centres, chip, _RADIUS_PX, executor, progress)
     if len(surfaces.centres) < 4:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoOverlapError
-from ..rasters.grid import Grid
+from ..rasters.pair import ImagePair
 
 # Chips are this share of the scene's shorter side, within these limits in pixels.
 _CHIP_SHARE = 1 / 13
@@ -27,6 +27,10 @@ _MOST_CELLS = 6
 
 # Above so many chips of the fit they are laid out half as densely.
 _MANY_CHIPS = 200
+
+# A cell needs three chips a side. Nearer than this share of a chip's side, chips overlap much.
+_FEWEST_CHIPS = 3
+_OVERLAPPING = 0.75
 
 
 def default_chip_px(width: int, height: int) -> int:
@@ -120,18 +124,22 @@ class ChipLayout:
         """Tell which positions (col, row), shape (n, 2), are held out of the fit."""
         return self.columns.held_out(positions_px[:, 0]) & self.rows.held_out(positions_px[:, 1])
 
-    def held_out_mask(self, cols: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def held_out_mask(
+        self, cols: NDArray[np.float64], rows: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
         """Return the mask of held-out pixels at columns × rows of the matching grid."""
         return np.asarray(self.rows.held_out(rows)[:, None] & self.columns.held_out(cols)[None, :])
 
 
-def lay_out_chips(grid: Grid, chip_px: int | None, spacing_px: float | None) -> ChipLayout:
-    """Lay chips out over a matching grid.
+def lay_out_chips(
+    pair: ImagePair, chip_px: int | None = None, spacing_px: float | None = None
+) -> ChipLayout:
+    """Lay chips out over the matching grid of a pair.
 
     Parameters
     ----------
-    grid
-        The part of the matching grid in which the images overlap.
+    pair
+        The images.
     chip_px
         Side of a chip; None: by the size of the overlap.
     spacing_px
@@ -142,23 +150,27 @@ def lay_out_chips(grid: Grid, chip_px: int | None, spacing_px: float | None) -> 
     NoOverlapError
         The overlap is too small for a single cell of chips.
     """
-    chip = chip_px or default_chip_px(grid.width, grid.height)
-    shorter = min(grid.width, grid.height)
-    if shorter < 3 * chip:
+    chip = chip_px or default_chip_px(*pair.overlap_px)
+    width, height = pair.grid.width, pair.grid.height
+    if min(pair.overlap_px) < _FEWEST_CHIPS * chip:
         raise NoOverlapError(
-            f"the overlap is too small to match: {grid.width} × {grid.height} matching pixels "
-            f"for chips of {chip}"
+            f"{pair.input.source.path} and {pair.reference.source.path} overlap by "
+            f"{pair.overlap_px[0]} × {pair.overlap_px[1]} matching pixels, too little for chips "
+            f"of {chip}"
         )
 
-    def axis(size: int, parts: int) -> Axis:
-        most = max(int((size - chip) / (2 * chip)), 1)
-        wanted = _MOST_CELLS if spacing_px is None else round((size - chip) / (parts * spacing_px))
-        return Axis(size, chip, int(np.clip(wanted, 1, most)))
+    def layout(parts: int) -> ChipLayout:
+        axes = []
+        for size, overlap in zip((width, height), pair.overlap_px, strict=True):
+            most = max(int((size - chip) / (2 * chip)), 1)
+            if spacing_px is None:
+                cells = _MOST_CELLS * size / overlap
+            else:
+                cells = (size - chip) / (parts * spacing_px)
+            axes.append(Axis(size, chip, int(np.clip(round(cells), 1, most))))
+        return ChipLayout(axes[0], axes[1], parts)
 
-    dense = spacing_px is not None and spacing_px <= 0.75 * chip
-    layout = ChipLayout(axis(grid.width, 4), axis(grid.height, 4), 4)
-    if (spacing_px is None and len(layout.fit_centres) > _MANY_CHIPS) or (
-        spacing_px is not None and not dense
-    ):
-        layout = ChipLayout(axis(grid.width, 2), axis(grid.height, 2), 2)
-    return layout
+    dense = layout(4)
+    if spacing_px is None:
+        return dense if len(dense.fit_centres) <= _MANY_CHIPS else layout(2)
+    return dense if spacing_px <= _OVERLAPPING * chip else layout(2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..rasters.pair import ImagePair
 from ..similarity.evidence import find_peak
 from ..similarity.surface import SimilaritySettings
 from .layout import ChipLayout
-from .matching import ChipMatcher, ChipSurfaces, support
+from .matching import ChipMatcher, ChipSurfaces, Surfaces, support
 
 FloatArray = NDArray[np.float64]
 
@@ -74,6 +74,11 @@ class LocalSearch:
             self.layout.check_centres, self.check_radius_px, model, False, executor, progress
         )
         return self._points(surfaces, model, is_check=True)
+
+    def check_surfaces(self, model: Model, centres: NDArray[np.int_]) -> Surfaces:
+        """Return the surfaces of check chips, shape (n, 2 r + 1, 2 r + 1), to look at."""
+        with ThreadPoolExecutor(1) as executor:
+            return self._match(centres, self.check_radius_px, model, False, executor, SILENT).both
 
     def held_out(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a grid, of any pixel size, lie in held-out blocks."""

@@ -146,9 +146,7 @@ class ChipMatcher:
         if not _can_be_matched(input.inner(radius_px)):
             return None
         forward = similarity_surface(chip, input, radius_px, self.settings)
-        backward = similarity_surface(
-            input.inner(radius_px), reference, radius_px, self.settings
-        )
+        backward = similarity_surface(input.inner(radius_px), reference, radius_px, self.settings)
         return forward, backward[::-1, ::-1]
 
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..errors import RasterContentError
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.evidence import find_peak
 from ..similarity.surface import BORDER_PX, SimilaritySettings, similarity_surface
-from .matching import MaskOf, ToPixel
+from .matching import MaskOf
 
 # The longer side of the reduced image, in pixels, and how many candidates are kept.
 LEVEL_SIDE_PX = 512

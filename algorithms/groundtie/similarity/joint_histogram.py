@@ -143,7 +143,7 @@ def count_joint_histograms(
 
 
 def _map(executor: Executor | None, function: Callable[[int], None], count: int) -> None:
-    for _ in map(function, range(count)) if executor is None else executor.map(
-        function, range(count)
+    for _ in (
+        map(function, range(count)) if executor is None else executor.map(function, range(count))
     ):
         pass

@@ -13,12 +13,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..rasters.patch import Patch
 from .binning import to_bins
 from .correlation import MINIMUM_OVERLAP, correlate_fields, correlate_grey, overlap_share
 from .joint_histogram import JointHistogramVolume, count_joint_histograms
 from .measures import normalized_mutual_information
 from .orientation import orientation_fields
-from ..rasters.patch import Patch
 
 Surface = NDArray[np.float32]
 SIMILARITIES = ("fused", "nmi", "orientation", "ncc")

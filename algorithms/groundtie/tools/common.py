@@ -52,6 +52,18 @@ Workers = Annotated[
     ),
 ]
 
+Seed = Annotated[
+    int,
+    Number(
+        label="Seed",
+        help="Seed of random samples: the same seed gives the same result.",
+        integer=True,
+        minimum=0,
+        maximum=2**31 - 1,
+        advanced=True,
+    ),
+]
+
 
 def worker_count(workers: int | None) -> int:
     """Return the number of threads to use: as asked for, or one per processor."""

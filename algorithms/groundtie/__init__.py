@@ -1,0 +1,27 @@
+"""GroundTie registers satellite images to one another and to the ground.
+
+Tools are functions (`coregister`, `warp`, `simulate`, …) that read and write files; see
+`groundtie.tools`. `load_transform` reads the transform that a registration wrote.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from .version import __version__
+
+if TYPE_CHECKING:
+    from .geometry.transform import load_transform
+    from .tools import coregister, simulate, warp
+
+__all__ = ["__version__", "coregister", "load_transform", "simulate", "warp"]
+
+# Loaded on first use: importing groundtie must stay cheap for the command line's help and QGIS.
+_HOMES = {"load_transform": ".geometry.transform"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOMES.get(name, ".tools"), __name__), name)

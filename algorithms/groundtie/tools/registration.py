@@ -1,0 +1,335 @@
+"""What registering tools share: their steps from two rasters to a judged transform, and its files.
+
+rasters → ImagePair → rough shift → tie points → transform → verdict → output, report
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import NotRegisteredError, ParameterError, TooFewPointsError
+from ..geometry.estimation import AUTO, Estimate, estimate_transform
+from ..geometry.tie_point_files import write_tie_points
+from ..geometry.tie_points import TiePoints
+from ..geometry.transform import Transform
+from ..progress import Progress
+from ..quality.report import Report
+from ..quality.verdict import Verdict, judge, refuse
+from ..rasters.atomic import Outputs
+from ..rasters.delivery import warp_raster, write_with_geotransform
+from ..rasters.grid import Grid, reproject
+from ..rasters.pair import ImagePair
+from ..rasters.target_grids import registered_grid
+from ..search.local import LocalSearch
+from ..search.pyramid import find_coarse_model
+from ..similarity.surface import Surface
+
+# Pixels keep their places when only the geotransform changes, but for this error, in pixels.
+_UNTOUCHED_TOLERANCE_PX = 0.05
+
+# How many surfaces of the best and of the worst check points a report shows.
+_EXTREMES = 3
+
+
+@dataclass(frozen=True)
+class Registration:
+    """A judged registration.
+
+    Parameters
+    ----------
+    pair
+        The images; their rasters are open.
+    search
+        How tie points were searched for.
+    estimate
+        The transform and the points of its fit; None if there is none.
+    check
+        The check points; None without a transform.
+    verdict
+        Whether it can be trusted.
+    """
+
+    pair: ImagePair
+    search: LocalSearch
+    estimate: Estimate | None
+    check: TiePoints | None
+    verdict: Verdict
+
+    @property
+    def points(self) -> TiePoints | None:
+        """All tie points, those of the fit first."""
+        if self.estimate is None or self.check is None:
+            return None
+        return TiePoints.concatenate([self.estimate.points, self.check])
+
+    def extreme_surfaces(self) -> tuple[tuple[str, Surface], ...]:
+        """Return the similarity surfaces of the check points with the best and worst residuals."""
+        if self.check is None or self.estimate is None:
+            return ()
+        used = self.check.take(self.check.used)
+        if len(used) == 0:
+            return ()
+        order = np.hypot(*used.residual_px(self.estimate.transform).T).argsort()
+        best, worst = order[:_EXTREMES], order[_EXTREMES:][-_EXTREMES:]
+        labels = ["best check point"] * len(best) + ["worst check point"] * len(worst)
+        picked = used.take(np.concatenate([best, worst]))
+        centres = np.rint(self.pair.grid.map_to_pixel(picked.reference_xy)).astype(int)
+        surfaces = self.search.check_surfaces(self.estimate.transform.model, centres)
+        return tuple(zip(labels, surfaces, strict=True))
+
+    @property
+    def transform(self) -> Transform | None:
+        """The transform, whatever the verdict on it."""
+        return None if self.estimate is None else self.estimate.transform
+
+
+def register(
+    pair: ImagePair,
+    search: LocalSearch,
+    radius_m: float,
+    model: str,
+    max_error_px: float,
+    seed: int,
+    executor: Executor,
+    progress: Progress,
+) -> Registration:
+    """Register the input of a pair to its reference, and judge the result.
+
+    Parameters
+    ----------
+    pair
+        The images.
+    search
+        How tie points are searched for.
+    radius_m
+        How far the input may lie from where it claims to be, in metres.
+    model
+        One of `models.KINDS`, or "auto".
+    max_error_px
+        Largest error at check points, in matching pixels.
+    seed
+        Of random samples.
+    executor
+        Threads to work in.
+    progress
+        Is told of every step.
+    """
+    progress.update(0.0, "searching for the rough shift")
+    coarse = find_coarse_model(pair, search, radius_m, executor, progress.part(0.0, 0.4))
+    if coarse is None:
+        return Registration(pair, search, None, None, refuse("nothing in common was found"))
+    progress.update(0.4, "matching tie points")
+    points = search.fit_points(coarse, executor, progress.part(0.4, 0.8))
+    claimed = Transform.as_claimed(pair.grid.crs, pair.input.source.grid)
+    try:
+        estimate = estimate_transform(points, claimed, pair.grid, model, search.fit_radius_px, seed)
+    except TooFewPointsError as error:
+        return Registration(pair, search, None, None, refuse(str(error), len(points)))
+    progress.update(0.8, "checking with points that took no part")
+    check = search.check_points(estimate.transform.model, executor, progress.part(0.8, 1.0))
+    verdict = judge(estimate, check, pair.grid, max_error_px, search.check_radius_px)
+    return Registration(pair, search, estimate, check, verdict)
+
+
+@dataclass(frozen=True)
+class RegisteredOutput:
+    """How the registered raster is made.
+
+    Parameters
+    ----------
+    path
+        The GeoTIFF.
+    grid
+        "reference", "input" or "untouched" (see `OUTPUT_GRIDS`).
+    resampling
+        One of `warping.METHODS`.
+    """
+
+    path: Path
+    grid: str
+    resampling: str
+
+    def write(
+        self, registration: Registration, outputs: Outputs, workers: int, progress: Progress
+    ) -> None:
+        """Write the input as registered; it is resampled once, or not at all."""
+        transform = registration.transform
+        assert transform is not None
+        pair = registration.pair
+        source, reference = pair.input.source, pair.reference.source.grid
+        staged = outputs.stage(self.path)
+        if self.grid == "untouched":
+            moved = moved_grid(transform)
+            write_with_geotransform(source, moved, staged, progress=progress)
+            return
+        target, to_px = reference, transform.__call__
+        if self.grid == "input":
+            crs = source.grid.crs
+
+            def px_to_own_map(px: np.ndarray) -> np.ndarray:
+                return reproject(transform.inverse(px), transform.crs, crs)
+
+            def own_map_to_px(xy: np.ndarray) -> np.ndarray:
+                return transform(reproject(xy, crs, transform.crs))
+
+            target, to_px = registered_grid(source.grid, px_to_own_map, crs), own_map_to_px
+        warp_raster(
+            source, to_px, target, staged, self.resampling, workers=workers, progress=progress
+        )
+
+
+OUTPUT_GRIDS = ("reference", "input", "untouched")
+
+
+def model_for_grid(model: str, output_grid: str) -> str:
+    """Return the model that goes with an output grid; untouched pixels allow a shift only.
+
+    Raises
+    ------
+    ParameterError
+        They do not go together.
+    """
+    if output_grid != "untouched":
+        return model
+    if model not in (AUTO, "translation"):
+        raise ParameterError(f"output_grid untouched goes with model translation, not {model}")
+    return "translation"
+
+
+def moved_grid(transform: Transform) -> Grid:
+    """Return the input's grid with the geotransform that a pure shift gives it.
+
+    Raises
+    ------
+    ParameterError
+        The shift on the reference map is none in the input's own CRS.
+    """
+    grid = transform.input_grid
+    px = grid.outline(3)
+    xy = reproject(transform.inverse(px), transform.crs, grid.crs)
+    shifts = xy - grid.pixel_to_map(px)
+    dx, dy = shifts.mean(axis=0)
+    if np.abs(shifts - [dx, dy]).max() > _UNTOUCHED_TOLERANCE_PX * min(grid.pixel_size):
+        raise ParameterError(
+            "output_grid untouched is not possible: the CRS of reference and input differ too much"
+        )
+    return grid.shifted(float(dx), float(dy))
+
+
+@dataclass(frozen=True)
+class RegistrationFiles:
+    """The files beside the registered raster; None: not asked for."""
+
+    tie_points: Path | None
+    transform: Path | None
+    report: Path | None
+
+    def written(self) -> dict[str, Path]:
+        """Return what is written, by name."""
+        named = {"tie_points": self.tie_points, "transform": self.transform, "report": self.report}
+        return {name: path for name, path in named.items() if path is not None}
+
+    def write_report(self, report: Report, outputs: Outputs) -> None:
+        """Write the report and its JSON, if they were asked for."""
+        if self.report is not None:
+            numbers = outputs.stage(self.report.with_suffix(".json"))
+            report.write(outputs.stage(self.report), numbers)
+
+    def write_points(self, registration: Registration, outputs: Outputs) -> None:
+        """Write tie points and transform, if they were asked for."""
+        points, transform = registration.points, registration.transform
+        assert points is not None and transform is not None
+        if self.tie_points is not None:
+            write_tie_points(outputs.stage(self.tie_points), points, transform)
+        if self.transform is not None:
+            staged = outputs.stage(self.transform)
+            staged.write_text(json.dumps(transform.to_json(), indent=1), encoding="utf-8")
+
+
+@contextmanager
+def accepted_or_refused(
+    registration: Registration, report: Report, files: RegistrationFiles
+) -> Iterator[Outputs]:
+    """Open the outputs of a registration; a refused one writes its report and raises.
+
+    Raises
+    ------
+    NotRegisteredError
+        The registration was refused.
+    """
+    verdict = registration.verdict
+    with Outputs() as outputs:
+        files.write_report(report, outputs)
+        if verdict.accepted:
+            yield outputs
+    if not verdict.accepted:
+        paths = [
+            image.source.path for image in (registration.pair.input, registration.pair.reference)
+        ]
+        raise NotRegisteredError(
+            f"{paths[0]} was not registered to {paths[1]}: {verdict.reason}", verdict
+        )
+
+
+@dataclass(frozen=True)
+class RegistrationResult:
+    """What a registering tool returns.
+
+    Parameters
+    ----------
+    verdict
+        Whether the registration can be trusted, and its errors.
+    transform
+        Reference map position ↔ input pixel position.
+    points
+        The tie points.
+    numbers
+        The same as the report's JSON.
+    files
+        What was written, by name.
+    """
+
+    verdict: Verdict
+    transform: Transform
+    points: TiePoints
+    numbers: dict[str, Any]
+    files: dict[str, str]
+
+    @classmethod
+    def of(
+        cls, registration: Registration, numbers: dict[str, Any], files: dict[str, Path]
+    ) -> RegistrationResult:
+        """Return the result of an accepted registration."""
+        assert registration.points is not None and registration.transform is not None
+        return cls(
+            registration.verdict,
+            registration.transform,
+            registration.points,
+            numbers,
+            {name: str(path) for name, path in files.items()},
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {**self.numbers, "files": self.files}
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        v = self.verdict
+        return [
+            f"accepted: {v.reason}",
+            f"model: {self.transform.model.kind}, {v.fit_points_used} of {v.fit_points} points",
+            f"error at check points: RMSE {v.check_rmse_px:.2f} px ({v.check_rmse_m:.2f} m), "
+            f"CE90 {v.check_ce90_px:.2f} px ({v.check_ce90_m:.2f} m)",
+            f"check points that agree: {v.check_points_agreeing} of {v.check_points}; by chance "
+            f"1 in 10^{-v.log10_chance:.0f}",
+            *(f"{name}: {path}" for name, path in self.files.items()),
+        ]

@@ -1,0 +1,170 @@
+"""Simulate a SAR–optical pair whose misregistration is known exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from ..declaration import tool
+from ..kinds import Choice, Distance, FolderOut, Number
+from ..progress import SILENT, Progress
+from ..simulate.files import write_pair
+from ..simulate.layout import DENSITIES
+from ..simulate.misregistration import DISTORTIONS, DistortionOptions
+from ..simulate.pair import PairOptions, simulate_pair
+from ..simulate.sar import SarOptions
+from ..simulate.scene import SceneOptions
+from .common import Seed
+
+
+@dataclass(frozen=True)
+class SimulationResult:
+    """The files of a simulated pair, by name."""
+
+    files: dict[str, Path]
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {"files": {name: str(path) for name, path in self.files.items()}}
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        return [f"{name}: {path}" for name, path in self.files.items()]
+
+
+@tool(title="Simulate a SAR–optical pair", group="Simulation")
+def simulate(
+    folder: Annotated[
+        Path,
+        FolderOut(
+            label="Folder",
+            help="Gets reference.tif (SAR), input.tif (optical), dem.tif, truth.json and "
+            "check_points.csv.",
+        ),
+    ],
+    size: Annotated[
+        int,
+        Number(
+            label="Size",
+            help="Width and height of the scene.",
+            unit="px",
+            integer=True,
+            minimum=64,
+            maximum=20_000,
+        ),
+    ] = 1000,
+    density: Annotated[
+        str,
+        Choice(
+            label="Density",
+            help="How much of the scene is built up: rural up to 3 %, suburban up to 25 %, urban "
+            "about half, with high buildings.",
+            choices=tuple(DENSITIES),
+        ),
+    ] = "suburban",
+    distortion: Annotated[
+        str,
+        Choice(
+            label="Distortion",
+            help="What is wrong with the georeferencing of the optical image, besides its shift.",
+            choices=tuple(DISTORTIONS),
+        ),
+    ] = "affine",
+    shift: Annotated[
+        float,
+        Number(
+            label="Shift",
+            help="How far the optical image is off; the direction is drawn.",
+            unit="px",
+            minimum=0,
+            maximum=2000,
+        ),
+    ] = 8.0,
+    looks: Annotated[
+        float,
+        Number(
+            label="Looks",
+            help="Number of looks of the SAR image: fewer are noisier.",
+            minimum=1,
+            maximum=100,
+        ),
+    ] = 1.0,
+    seed: Seed = 0,
+    pixel_size: Annotated[
+        float,
+        Distance(
+            label="Pixel size", help="Pixel size of the SAR image.", minimum=0.1, advanced=True
+        ),
+    ] = 1.0,
+    input_pixel_size: Annotated[
+        float | None,
+        Distance(
+            label="Pixel size of the input",
+            help="Pixel size of the optical image; by default that of the SAR image.",
+            minimum=0.1,
+            advanced=True,
+        ),
+    ] = None,
+    relief: Annotated[
+        float,
+        Distance(label="Relief", help="Range of the terrain's heights.", advanced=True),
+    ] = 20.0,
+    incidence: Annotated[
+        float,
+        Number(
+            label="Incidence angle",
+            help="Angle between the radar's line of sight and the vertical.",
+            unit="°",
+            minimum=15,
+            maximum=60,
+            advanced=True,
+        ),
+    ] = 35.0,
+    rotation: Annotated[
+        float,
+        Number(
+            label="Rotation",
+            help="Rotation of the optical image, for distortions rotation and similarity.",
+            unit="°",
+            minimum=-30,
+            maximum=30,
+            advanced=True,
+        ),
+    ] = 2.0,
+    scale: Annotated[
+        float,
+        Number(
+            label="Scale",
+            help="Scale of the optical image, for distortions scale and similarity.",
+            minimum=0.8,
+            maximum=1.25,
+            advanced=True,
+        ),
+    ] = 1.02,
+    warp: Annotated[
+        float,
+        Number(
+            label="Warp",
+            help="Largest displacement besides the shift, for distortions affine and polynomial.",
+            unit="px",
+            minimum=0,
+            maximum=50,
+            advanced=True,
+        ),
+    ] = 4.0,
+    progress: Progress = SILENT,
+) -> SimulationResult:
+    """Simulate a SAR–optical pair whose misregistration is known exactly.
+
+    The scene has terrain, fields, roads, water and buildings. The SAR image has layover, shadow,
+    double bounce and speckle; the optical one leaning buildings, their shadows and noise. The
+    same seed gives the same pair. The file truth.json is a transform like those of coregister.
+    """
+    options = PairOptions(
+        scene=SceneOptions((size, size), pixel_size, density, relief, seed),
+        sar=SarOptions(incidence_deg=incidence, looks=looks),
+        distortion=DistortionOptions(distortion, shift, rotation, scale, warp),
+        input_pixel_size_m=input_pixel_size,
+    )
+    return SimulationResult(write_pair(simulate_pair(options, progress), folder))
