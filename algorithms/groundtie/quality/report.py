@@ -1,0 +1,259 @@
+"""The report that a person looks at: one HTML page without network, and its numbers as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import jinja2
+import numpy as np
+import rasterio
+import scipy
+
+from ..geometry.tie_points import TiePoints
+from ..geometry.transform import Transform
+from ..rasters.atomic import writing
+from ..rasters.grid import Grid
+from ..rasters.pair import ImagePair
+from ..similarity.evidence import find_peak
+from ..similarity.surface import Surface
+from ..version import __version__
+from . import figures
+from .verdict import TOLERANCE_PX, Verdict
+
+_TEMPLATES = Path(__file__).with_name("templates")
+_PAGE = "report.html.j2"
+
+# The model's correction is looked at on a lattice of so many points a side.
+_LATTICE = 9
+
+
+@dataclass(frozen=True)
+class Report:
+    """What is shown of a registration, whatever the verdict.
+
+    Parameters
+    ----------
+    title
+        Heading of the page.
+    verdict
+        Whether the registration can be trusted.
+    pair
+        The images; their rasters are open.
+    points
+        All tie points; None if the registration did not come as far.
+    transform
+        The transform, also a refused one; None if there is none.
+    surfaces
+        Labels and similarity surfaces, shape (2 r + 1, 2 r + 1), of remarkable points.
+    parameters
+        What the tool was called with.
+    seconds
+        How long it took.
+    """
+
+    title: str
+    verdict: Verdict
+    pair: ImagePair
+    points: TiePoints | None
+    transform: Transform | None
+    surfaces: tuple[tuple[str, Surface], ...]
+    parameters: dict[str, Any]
+    seconds: float
+
+    def summary(self) -> dict[str, Any]:
+        """Return the report's numbers as values that strict JSON can carry."""
+        values = {
+            "verdict": self.verdict.summary(),
+            "transform": None if self.transform is None else self.transform.to_json(),
+            "parameters": self.parameters,
+            "versions": versions(),
+            "seconds": self.seconds,
+        }
+        return {name: _plain(value) for name, value in values.items()}
+
+    def write(self, html_path: str | os.PathLike[str], json_path: str | os.PathLike[str]) -> None:
+        """Write the page and its numbers.
+
+        Raises
+        ------
+        OutputError
+            A file cannot be written.
+        """
+        summary = self.summary()
+        page = self._page(summary)
+        with writing(html_path):
+            Path(html_path).write_text(page, encoding="utf-8")
+        with writing(json_path):
+            text = json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False)
+            Path(json_path).write_text(text, encoding="utf-8")
+
+    def _page(self, summary: dict[str, Any]) -> str:
+        environment = jinja2.Environment(
+            loader=jinja2.FileSystemLoader(_TEMPLATES),
+            autoescape=True,
+            undefined=jinja2.StrictUndefined,
+            trim_blocks=True,
+            lstrip_blocks=True,
+        )
+        environment.filters.update(number=_number, percent=_percent)
+        pictures = _Pictures.of(self.pair, self.transform)
+        return environment.get_template(_PAGE).render(
+            title=self.title,
+            verdict=self.verdict,
+            reference=Path(self.pair.reference.source.path).name,
+            input=Path(self.pair.input.source.path).name,
+            grid=self.pair.grid,
+            metres=_metres_per_px(self.pair.grid),
+            model=None if self.transform is None else self.transform.model.kind,
+            correction=_Correction.of(self.transform, self.pair.grid),
+            pictures=pictures,
+            residuals=self._residual_figures(),
+            tolerance_px=TOLERANCE_PX,
+            colours={
+                "fit": figures.FIT_COLOUR,
+                "check": figures.CHECK_COLOUR,
+                "rejected": figures.REJECTED_COLOUR,
+            },
+            surfaces=[_shown_surface(label, surface) for label, surface in self.surfaces],
+            parameters=summary["parameters"],
+            versions=summary["versions"],
+            seconds=self.seconds,
+        )
+
+    def _residual_figures(self) -> dict[str, Any] | None:
+        """Return the figures that the points allow."""
+        grid, verdict = self.pair.grid, self.verdict
+        if self.points is None:
+            return None
+        if self.transform is None:
+            return {"map": figures.svg_uri(figures.point_map(self.points, grid)), "errors": False}
+        residuals = figures.Residuals.of(self.points, self.transform, grid)
+        reach = figures.error_reach_px(residuals, verdict)
+        shown = {
+            "map": figures.svg_uri(figures.residual_map(residuals, grid)),
+            "exaggeration": figures.residual_arrows(residuals, grid).exaggeration,
+            "errors": bool(residuals.check.any()),
+        }
+        if shown["errors"]:
+            histogram = figures.error_histogram(residuals, verdict, _metres_per_px(grid))
+            shown |= {
+                "histogram": figures.svg_uri(histogram),
+                "scatter": figures.svg_uri(figures.error_scatter(residuals, verdict)),
+                "measured": int(residuals.check.sum()),
+                "reach_px": reach,
+                "beyond": int((residuals.length_px[residuals.check] > reach).sum()),
+            }
+        return shown
+
+
+@dataclass(frozen=True)
+class _Pictures:
+    """Overviews of the matching grid as data URIs, and their size."""
+
+    reference: str
+    backdrop: str
+    claimed: str
+    registered: str | None
+    width: int
+    height: int
+
+    @classmethod
+    def of(cls, pair: ImagePair, transform: Transform | None) -> _Pictures:
+        grid = figures.overview_grid(pair.grid)
+        reference = figures.grey_picture(pair.reference_patch(grid))
+        claimed = figures.grey_picture(pair.input_patch(grid, pair.claimed_px))
+        registered = None
+        if transform is not None:
+            to_input_px = figures.overview_positions(transform, grid)
+            registered = figures.grey_picture(pair.input_patch(grid, to_input_px))
+        return cls(
+            figures.jpeg_uri(reference),
+            figures.jpeg_uri(figures.backdrop(reference)),
+            figures.jpeg_uri(claimed),
+            None if registered is None else figures.jpeg_uri(registered),
+            grid.width,
+            grid.height,
+        )
+
+
+@dataclass(frozen=True)
+class _Correction:
+    """How far the input was off, in matching pixels: at the centre, and at least and most."""
+
+    centre_px: float
+    least_px: float
+    most_px: float
+
+    @classmethod
+    def of(cls, transform: Transform | None, grid: Grid) -> _Correction | None:
+        if transform is None:
+            return None
+        cols, rows = np.meshgrid(
+            np.linspace(0, grid.width - 1, _LATTICE), np.linspace(0, grid.height - 1, _LATTICE)
+        )
+        px = np.column_stack([cols.ravel(), rows.ravel()])
+        moved = grid.map_to_pixel(transform.model(grid.pixel_to_map(px))) - px
+        lengths = np.hypot(*moved.T)
+        centre = float(lengths[len(lengths) // 2])
+        return cls(centre, float(lengths.min()), float(lengths.max()))
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that a result depends on."""
+    return {
+        "groundtie": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "opencv": cv2.__version__,
+        "rasterio": rasterio.__version__,
+        "gdal": rasterio.__gdal_version__,
+    }
+
+
+def _shown_surface(label: str, surface: Surface) -> dict[str, Any]:
+    peak = find_peak(surface)
+    radius = surface.shape[0] // 2
+    return {
+        "label": label,
+        "uri": figures.surface_uri(surface),
+        "radius": radius,
+        "peak": peak,
+        # Where the peak lies in a picture of (2 radius + 1)² unit squares.
+        "at": [radius + 0.5 + shift for shift in peak.shift_px],
+    }
+
+
+def _metres_per_px(grid: Grid) -> float | None:
+    return grid.pixel_size_m if grid.is_georeferenced else None
+
+
+def _number(value: float | None, digits: int = 2) -> str:
+    if value is None or not math.isfinite(value):
+        return "–"
+    # Adding 0 turns -0.0 into 0.0.
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _percent(value: float) -> str:
+    return f"{value:.0%}".replace("%", " %") if math.isfinite(value) else "–"
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON can carry it: what is not finite is None, what is no value text."""
+    if isinstance(value, dict):
+        return {str(name): _plain(part) for name, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(part) for part in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, (bool, int, str)) else str(value)
