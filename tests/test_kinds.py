@@ -113,7 +113,12 @@ def test_a_number_is_taken_exactly_within_its_range(value: float) -> None:
 
 @pytest.mark.parametrize(
     ("minimum", "maximum", "text"),
-    [(0, 1, "0 to 1"), (0, math.inf, "at least 0"), (-math.inf, 2, "at most 2")],
+    [
+        (0, 2**31 - 1, "0 to 2147483647"),
+        (0.5, 1, "0.5 to 1"),
+        (0, math.inf, "at least 0"),
+        (-math.inf, 2, "at most 2"),
+    ],
 )
 def test_the_range_in_words(minimum: float, maximum: float, text: str) -> None:
     assert Number(**TEXTS, minimum=minimum, maximum=maximum).range_text == text
@@ -168,6 +173,13 @@ class TestPaths:
         (tmp_path / "a.tif").mkdir()
         with pytest.raises(OutputError, match="output is a folder"):
             check_paths([("output", RASTER_OUT, tmp_path / "a.tif")])
+
+    def test_a_file_is_not_a_folder(self, tmp_path: Path) -> None:
+        (tmp_path / "a").touch()
+        folder = FolderOut(**TEXTS)
+        check_paths([("folder", folder, tmp_path / "new" / "folder"), ("other", folder, tmp_path)])
+        with pytest.raises(OutputError, match="folder is a file"):
+            check_paths([("folder", folder, tmp_path / "a")])
 
     def test_the_folder_of_an_output_exists(self, tmp_path: Path) -> None:
         with pytest.raises(OutputError, match="the folder of output does not exist"):

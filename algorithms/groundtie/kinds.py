@@ -124,21 +124,21 @@ class Number(Kind):
             raise ParameterError(f"{name} must be a finite number, not {value}")
         if not self.minimum <= number <= self.maximum:
             bounds = f"{self.range_text} {self.unit}".rstrip()
-            raise ParameterError(f"{name} must be {bounds}, not {number:g}")
+            raise ParameterError(f"{name} must be {bounds}, not {number:.15g}")
         if not self.integer:
             return number
         if number != int(number):
-            raise ParameterError(f"{name} must be a whole number, not {number:g}")
+            raise ParameterError(f"{name} must be a whole number, not {number:.15g}")
         return value if isinstance(value, int) else int(number)
 
     @property
     def range_text(self) -> str:
         """The range in words, without the unit; empty if any number will do."""
         if math.isfinite(self.minimum) and math.isfinite(self.maximum):
-            return f"{self.minimum:g} to {self.maximum:g}"
+            return f"{self.minimum:.15g} to {self.maximum:.15g}"
         if math.isfinite(self.minimum):
-            return f"at least {self.minimum:g}"
-        return f"at most {self.maximum:g}" if math.isfinite(self.maximum) else ""
+            return f"at least {self.minimum:.15g}"
+        return f"at most {self.maximum:.15g}" if math.isfinite(self.maximum) else ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,7 +216,7 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
     SameFileError
         An output is also an input, or is named twice.
     OutputError
-        An output's folder is missing or cannot be written to.
+        An output's folder is missing or cannot be written to, or a folder is a file.
     """
     taken: dict[Path, str] = {}
     outputs: list[tuple[str, Path]] = []
@@ -225,6 +225,8 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
             taken[value.resolve()] = name
         elif isinstance(kind, OutputKind) and value is not None:
             outputs.append((name, value))
+        elif isinstance(kind, FolderOut) and value is not None and value.is_file():
+            raise OutputError(f"{name} is a file, not a folder: {value}")
     for name, path in outputs:
         other = taken.setdefault(path.resolve(), name)
         if other != name:

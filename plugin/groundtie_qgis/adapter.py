@@ -142,9 +142,12 @@ def _progress(feedback: QgsProcessingFeedback) -> Any:
 def help_html(tool: Any) -> str:
     """Return the help of a tool and of its parameters as HTML."""
     paragraphs = [tool.summary, *tool.description.split("\n\n")]
-    parts = [f"<p>{html.escape(' '.join(text.split()))}</p>" for text in paragraphs if text]
+    parts = [f"<p>{_escaped(text)}</p>" for text in paragraphs if text]
     rows = [
-        f"<p><b>{html.escape(p.kind.label)}</b>: {html.escape(p.kind.help)}</p>"
-        for p in tool.parameters
+        f"<p><b>{_escaped(p.kind.label)}</b>: {_escaped(p.kind.help)}</p>" for p in tool.parameters
     ]
     return "\n".join([*parts, "<h3>Parameters</h3>", *rows])
+
+
+def _escaped(text: str) -> str:
+    return html.escape(" ".join(text.split()), quote=False)
