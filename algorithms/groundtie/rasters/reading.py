@@ -16,7 +16,7 @@ import rasterio
 import rasterio.windows
 from numpy.typing import NDArray
 from rasterio.enums import ColorInterp, MaskFlags
-from rasterio.errors import NotGeoreferencedWarning, RasterioError
+from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
 
 from ..errors import BandError, GeoreferencingError, RasterOpenError
 from .averaging import area_average
@@ -341,7 +341,8 @@ class _Handles:
                 dataset = self._free.pop() if self._free else None
             dataset = dataset or rasterio.open(self._path, sharing=False)
             yield dataset
-        except RasterioError as error:
+        # RasterioIOError is no RasterioError before rasterio 1.4.
+        except (RasterioError, RasterioIOError) as error:
             reason = error.__cause__ or error
             raise RasterOpenError(f"cannot read {self._path}: {reason}") from error
         with self._lock:

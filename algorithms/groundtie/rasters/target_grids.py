@@ -87,7 +87,9 @@ def registered_grid(
     centre = corners.mean(axis=0)
     if not np.isfinite(centre).all():
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")
-    metres = np.array(Grid(Affine.translation(*centre), crs, 1, 1).metres_per_unit)
+    # Its only pixel lies around the centre.
+    here = Grid(Affine.translation(*(centre - 0.5)), crs, 1, 1)
+    metres = np.array(here.metres_per_unit)
     if pixel_size_m is None:
         along, across = corners[2] - corners[0], corners[3] - corners[1]
         area = abs(along[0] * across[1] - along[1] * across[0]) / 2

@@ -11,19 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .grid import Grid
+from .kernels import REACH, interpolate
 from .reading import FloatImage, Mask, RasterSource, Window, working_dtype
 
 FloatArray = NDArray[np.float64]
 ToInputPx = Callable[[FloatArray], FloatArray]
 
-METHODS = ("nearest", "bilinear", "cubic", "lanczos")
-_FLAGS = {
-    "bilinear": cv2.INTER_LINEAR,
-    "cubic": cv2.INTER_CUBIC,
-    "lanczos": cv2.INTER_LANCZOS4,
-}
-# How far from the nearest pixel a kernel reaches.
-_REACH = {"nearest": 0, "bilinear": 1, "cubic": 2, "lanczos": 4}
+METHODS = tuple(REACH)
 
 # Interpolating between the nodes of the lattice may be wrong by this much.
 _TOLERANCE_PX = 0.01
@@ -107,7 +101,7 @@ def resample(
 
     A result is valid if the pixel nearest to it is. Where the kernel of `cubic` or `lanczos`
     would touch invalid pixels, the valid ones are interpolated bilinearly instead, so that
-    nodata never bleeds. OpenCV 4 rounds positions to 1/32 px.
+    nodata never bleeds.
 
     Parameters
     ----------
@@ -132,9 +126,8 @@ def resample(
     px = np.asarray(px)
     dtype = image.dtype if dtype is None else dtype
     if method != "nearest" and valid.all() and _touches_no_border(px, image.shape, method):
-        x, y = px.astype(np.float32)
-        values = _interpolate(image.astype(working_dtype(image.dtype)), x, y, _FLAGS[method])
-        return _rounded(values, dtype), np.ones(x.shape, bool)
+        values = interpolate(image.astype(working_dtype(image.dtype), copy=False), px, method)
+        return _rounded(values, dtype), np.ones(values.shape, bool)
     cols, rows = np.rint(px[0]).astype(np.int64), np.rint(px[1]).astype(np.int64)
     inside = (cols >= 0) & (rows >= 0) & (cols < image.shape[1]) & (rows < image.shape[0])
     cols[~inside], rows[~inside] = 0, 0
@@ -143,19 +136,16 @@ def resample(
         return np.where(known, image[rows, cols], image.dtype.type(0)).astype(dtype), known
     whole = cv2.erode(
         valid.astype(np.uint8),
-        np.ones((2 * _REACH[method] + 1,) * 2, np.uint8),
+        np.ones((2 * REACH[method] + 1,) * 2, np.uint8),
         borderType=cv2.BORDER_CONSTANT,
         borderValue=0,
     )
     partly = known & (whole[rows, cols] == 0)
-    # Far positions would overflow inside OpenCV.
-    x = np.clip(px[0], -16, image.shape[1] + 16).astype(np.float32)
-    y = np.clip(px[1], -16, image.shape[0] + 16).astype(np.float32)
     filled = np.where(valid, image, image.dtype.type(0)).astype(working_dtype(image.dtype))
-    values = _interpolate(filled, x, y, _FLAGS[method])
+    values = interpolate(filled, px, method)
     if partly.any():
-        weight = _interpolate(valid.astype(np.float32), x, y, cv2.INTER_LINEAR)
-        bilinear = _interpolate(filled, x, y, cv2.INTER_LINEAR)
+        weight = interpolate(valid.astype(filled.real.dtype), px, "bilinear")
+        bilinear = interpolate(filled, px, "bilinear")
         values[partly] = bilinear[partly] / weight[partly]
     values[~known] = 0
     return _rounded(values, dtype), known
@@ -166,8 +156,9 @@ def reduction(grid: Grid, to_input_px: ToInputPx) -> tuple[int, int]:
     col, row = grid.centre_px
     around = [[col - 0.5, row], [col + 0.5, row], [col, row - 0.5], [col, row + 0.5]]
     left, right, above, below = to_input_px(grid.pixel_to_map(around))
+    if not np.isfinite([left, right, above, below]).all():
+        return 1, 1
     span = np.hypot(right - left, below - above)
-    span = np.where(np.isfinite(span), span, 1.0)
     return max(round(float(span[0])), 1), max(round(float(span[1])), 1)
 
 
@@ -190,7 +181,7 @@ def source_window(
     """
     bounds = []
     for axis in (0, 1):
-        margin = (_REACH[method] + 1) * factor[axis]
+        margin = (REACH[method] + 1) * factor[axis]
         low = max(float(px[axis].min()) - margin, -margin)
         high = min(float(px[axis].max()) + margin, size[axis] + margin)
         first = int(np.floor(low / factor[axis])) * factor[axis]
@@ -270,17 +261,9 @@ def _hats(nodes: NDArray[np.int_], places: NDArray[np.int_]) -> FloatArray:
 
 
 def _touches_no_border(px: FloatArray, shape: tuple[int, ...], method: str) -> bool:
-    reach = _REACH[method]
+    reach = REACH[method]
     last = np.array(shape[::-1])[:, None, None] - 1
     return bool(np.all((px >= reach) & (px <= last - reach)))
-
-
-def _interpolate(image: NDArray[Any], x: FloatImage, y: FloatImage, flag: int) -> NDArray[Any]:
-    if image.dtype.kind == "c":
-        real, imaginary = (_interpolate(part, x, y, flag) for part in (image.real, image.imag))
-        return real + np.array(1j, image.dtype) * imaginary
-    image = np.ascontiguousarray(image)
-    return np.asarray(cv2.remap(image, x, y, flag, borderMode=cv2.BORDER_CONSTANT, borderValue=0))
 
 
 def _rounded(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:

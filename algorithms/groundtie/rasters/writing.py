@@ -188,9 +188,9 @@ def _add_overviews(path: str | os.PathLike[str], *, nearest: bool) -> None:
 
 def _gdal_errors() -> tuple[type[Exception], ...]:
     from rasterio._err import CPLE_BaseError
-    from rasterio.errors import RasterioError
+    from rasterio.errors import RasterioError, RasterioIOError
 
-    return RasterioError, CPLE_BaseError
+    return RasterioError, RasterioIOError, CPLE_BaseError
 
 
 def fill_value(source: RasterSource, nodata: float | None, band: int) -> Any:

@@ -1,0 +1,125 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import rasterio.transform
+from affine import Affine
+from hypothesis import given
+from hypothesis import strategies as st
+from raster_files import UTM, utm_grid
+from rasterio.crs import CRS
+
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, reproject
+
+WGS84 = CRS.from_epsg(4326)
+coordinate = st.floats(-1e5, 1e5)
+
+
+def test_pixel_centres_are_where_rasterio_puts_them() -> None:
+    grid = Grid(Affine(2, 0.3, 500, 0.1, -3, 900), UTM, 40, 30)
+    rows, cols = [0, 7, 29], [0, 11, 39]
+    expected = np.column_stack(rasterio.transform.xy(grid.transform, rows, cols))
+    np.testing.assert_allclose(grid.pixel_to_map(np.column_stack([cols, rows])), expected)
+
+
+def test_images_without_georeferencing_have_pixels_for_a_map() -> None:
+    grid = Grid(PIXEL_COORDINATES, None, 40, 30)
+    np.testing.assert_array_equal(grid.pixel_to_map([[3, 4]]), [[3, 4]])
+    assert not grid.is_georeferenced
+    assert utm_grid(40, 30).is_georeferenced
+    assert Grid(Affine.scale(2), None, 4, 4).is_georeferenced
+
+
+@given(
+    size=st.tuples(st.floats(0.1, 1000), st.floats(0.1, 1000)),
+    turn=st.floats(-180, 180),
+    origin=st.tuples(coordinate, coordinate),
+    px=st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=5),
+)
+def test_pixels_to_the_map_and_back(
+    size: tuple[float, float],
+    turn: float,
+    origin: tuple[float, float],
+    px: list[tuple[float, float]],
+) -> None:
+    transform = Affine.translation(*origin) * Affine.rotation(turn) * Affine.scale(*size)
+    grid = Grid(transform, None, 10, 10)
+    np.testing.assert_allclose(grid.map_to_pixel(grid.pixel_to_map(px)), px, atol=1e-4)
+    np.testing.assert_allclose(grid.pixel_size, size)
+    assert grid.pixel_size_m == pytest.approx(math.sqrt(size[0] * size[1]))
+
+
+@given(col=st.integers(-50, 50), row=st.integers(-50, 50))
+def test_a_window_is_the_same_lattice(col: int, row: int) -> None:
+    grid = utm_grid(40, 30)
+    part = grid.window(col, row, 5, 6)
+    np.testing.assert_allclose(part.pixel_to_map([[1, 2]]), grid.pixel_to_map([[col + 1, row + 2]]))
+    assert (part.width, part.height, part.crs) == (5, 6, UTM)
+
+
+def test_scaling_keeps_the_corner() -> None:
+    grid = utm_grid(41, 30).scaled(4)
+    np.testing.assert_allclose(
+        grid.pixel_to_map([[-0.5, -0.5]]), utm_grid(41, 30).pixel_to_map([[-0.5, -0.5]])
+    )
+    assert (grid.width, grid.height) == (10, 7)
+    assert grid.pixel_size == (40, 40)
+    assert utm_grid(3, 3).scaled(100).width == 1
+
+
+def test_shifting_is_in_map_units() -> None:
+    grid = utm_grid(4, 4)
+    moved = grid.shifted(3, -7).pixel_to_map([[1, 1]]) - grid.pixel_to_map([[1, 1]])
+    np.testing.assert_allclose(moved, [[3, -7]])
+
+
+def test_containing() -> None:
+    px = [[-0.5, -0.5], [3.5, 2.5], [-0.51, 0], [0, 2.51], [np.nan, 0], [np.inf, 0]]
+    assert utm_grid(4, 3).contains(px).tolist() == [True, True, False, False, False, False]
+
+
+def test_the_outline_runs_around_the_outer_border() -> None:
+    outline = utm_grid(40, 30).outline(4)
+    assert outline.shape == (16, 2)
+    assert outline[[0, 4, 8, 12]].tolist() == [
+        [-0.5, -0.5],
+        [39.5, -0.5],
+        [39.5, 29.5],
+        [-0.5, 29.5],
+    ]
+    on_border = np.isin(outline[:, 0], [-0.5, 39.5]) | np.isin(outline[:, 1], [-0.5, 29.5])
+    assert on_border.all()
+
+
+def test_metres_per_degree_shrink_with_the_latitude() -> None:
+    equator = Grid(Affine(0.001, 0, 9, 0, -0.001, 0.005), WGS84, 10, 10)
+    north = Grid(Affine(0.001, 0, 9, 0, -0.001, 60.005), WGS84, 10, 10)
+    assert equator.metres_per_unit[0] == pytest.approx(111_195, rel=1e-3)
+    assert north.metres_per_unit[0] == pytest.approx(0.5 * 111_195, rel=1e-3)
+    assert north.metres_per_unit[1] == pytest.approx(111_195, rel=1e-3)
+    # 111.195 m by half of it
+    assert north.pixel_size_m == pytest.approx(111.195 * math.sqrt(0.5), rel=1e-3)
+
+
+def test_feet_are_not_metres() -> None:
+    grid = Grid(Affine(10, 0, 6e6, 0, -10, 2e6), CRS.from_epsg(2227), 10, 10)
+    assert grid.pixel_size_m == pytest.approx(10 * 1200 / 3937)
+
+
+def test_reprojecting_there_and_back() -> None:
+    lonlat = np.array([[9.0, 45.0], [9.5, 46.0]])
+    xy = reproject(lonlat, WGS84, UTM)
+    # The central meridian of zone 32 is at 9°.
+    assert xy[0, 0] == pytest.approx(500_000)
+    np.testing.assert_allclose(reproject(xy, UTM, WGS84), lonlat, atol=1e-9)
+    assert reproject(lonlat, None, UTM) is lonlat
+    assert reproject(lonlat, UTM, UTM) is lonlat
+
+
+def test_no_points_at_all() -> None:
+    nothing = np.empty((0, 2))
+    assert utm_grid(4, 4).map_to_pixel(nothing).shape == (0, 2)
+    assert reproject(nothing, WGS84, UTM).shape == (0, 2)
+    assert apply_affine(Affine.identity(), nothing).shape == (0, 2)

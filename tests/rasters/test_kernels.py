@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from groundtie.rasters.kernels import REACH, interpolate
+
+KERNELS = tuple(method for method in REACH if method != "nearest")
+fraction = st.floats(0, 1, exclude_max=True)
+
+
+def impulse_response(method: str, s: float) -> np.ndarray:
+    """Weights of the pixels 0 … 20 at the position 10 + s."""
+    image = np.eye(21)
+    return interpolate(image, np.stack([np.arange(21.0)[None], np.full((1, 21), 10 + s)]), method)[
+        0
+    ]
+
+
+@given(method=st.sampled_from(KERNELS), s=fraction)
+def test_weights_sum_up_to_one(method: str, s: float) -> None:
+    assert impulse_response(method, s).sum() == pytest.approx(1, abs=1e-12)
+
+
+@given(method=st.sampled_from(KERNELS), s=fraction)
+def test_kernels_are_symmetric(method: str, s: float) -> None:
+    mirrored = interpolate(
+        np.eye(21), np.stack([np.arange(21.0)[None], np.full((1, 21), 10 - s)]), method
+    )[0]
+    np.testing.assert_allclose(impulse_response(method, s), mirrored[::-1], atol=1e-9)
+
+
+@pytest.mark.parametrize("method", KERNELS)
+def test_kernels_reach_as_far_as_they_say(method: str) -> None:
+    touched = np.flatnonzero(np.abs(impulse_response(method, 0.3)) > 1e-12)
+    assert touched.tolist() == list(range(11 - REACH[method], 11 + REACH[method]))
+
+
+@pytest.mark.parametrize("method", KERNELS)
+def test_at_pixels_there_is_nothing_between(method: str) -> None:
+    np.testing.assert_allclose(impulse_response(method, 0.0), np.eye(21)[10], atol=1e-12)
+    np.testing.assert_allclose(impulse_response(method, 1e-9), np.eye(21)[10], atol=1e-8)
+
+
+def test_the_cubic_kernel_is_keys() -> None:
+    # Keys 1981: -1/16, 9/16, 9/16, -1/16 half-way
+    expected = np.array([-1, 9, 9, -1]) / 16
+    np.testing.assert_allclose(impulse_response("cubic", 0.5)[9:13], expected)
+
+
+def test_the_lanczos_kernel_is_a_windowed_sinc() -> None:
+    t = 0.3 - np.arange(-3, 5)
+    expected = np.sinc(t) * np.sinc(t / 4)
+    np.testing.assert_allclose(impulse_response("lanczos", 0.3)[7:15], expected / expected.sum())
+
+
+@pytest.mark.parametrize("method", KERNELS)
+def test_far_outside_there_is_nothing(method: str) -> None:
+    px = np.array([[[-1e9, 1e9, 5, 5]], [[5, 5, -1e9, 1e9]]])
+    assert not interpolate(np.ones((10, 10), np.float32), px, method).any()
