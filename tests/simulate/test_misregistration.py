@@ -210,7 +210,7 @@ class TestDeliveredDistortion:
         part = slice(40, -40), slice(40, -40)
         # Differences flatten sharp edges, so that the measure errs to the larger side.
         found = _small_shift(light[part], moved[part])
-        assert found == pytest.approx(shift, rel=0.12, abs=0.001)
+        assert found == pytest.approx(shift, rel=0.12, abs=0.002)
 
 
 def _quarters(shape: tuple[int, ...]) -> list[tuple[slice, slice]]:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from groundtie.errors import CancelledError, ParameterError
 from groundtie.progress import Progress
@@ -60,6 +61,13 @@ class TestShapes:
     def test_pixel_size_of_the_scene(self) -> None:
         pair = simulate_pair(replace(SMALL, scene=replace(SMALL.scene, pixel_size_m=3.0)))
         assert pair.reference_grid.pixel_size == (3.0, 3.0)
+
+    def test_coarser_input_is_smoother_on_the_ground(self, small: SimulatedPair) -> None:
+        """Its point spread grows with its pixels: averaged, both show the same brightness."""
+        coarse = simulate_pair(replace(SMALL, input_pixel_size_m=2.0))
+        blocks = small.input.reshape(2, 100, 2, 120, 2).mean(axis=(2, 4))
+        assert coarse.input.mean() == pytest.approx(blocks.mean(), rel=0.02)
+        assert coarse.input.std() < blocks.std()
 
     def test_refuses_a_ratio_that_makes_no_sense(self) -> None:
         with pytest.raises(ParameterError, match="input_pixel_size_m"):
@@ -163,22 +171,19 @@ class TestTruth:
         xy = pair.reference_grid.pixel_to_map(pair.check_points_px)
         np.testing.assert_allclose(pair.truth.inverse(pair.truth(xy)), xy, atol=1e-6)
 
-    def test_shift_is_found_in_the_images(self) -> None:
-        """An edge seen by both: rendering twice, shifted and not, differs by the truth."""
-        still = replace(SMALL, distortion=DistortionOptions("shift", 0.0))
-        moved = replace(SMALL, distortion=DistortionOptions("shift", 4.0))
-        quiet = OpticalOptions(bands=("green",), noise_dn=0)
-        # The margin follows from the shift, and the scene from the margin: compare to the scene.
-        for options in (still, moved):
-            pair = simulate_pair(replace(options, optical=quiet))
-            wet = pair.scene.cover()[pair.scene.window] == Cover.WATER
-            rows, columns = np.nonzero(wet)
-            px = np.column_stack([columns, rows])
-            there = pair.truth(pair.reference_grid.pixel_to_map(px))
-            there = np.rint(there[pair.truth.input_grid.contains(there)]).astype(int)
-            values = pair.input[0][there[:, 1], there[:, 0]].astype(float)
-            spread = values.std() / pair.input[0].std()
-            assert spread < 0.5
+    @pytest.mark.parametrize("kind", ["shift", "polynomial"])
+    def test_takes_the_distorted_image_to_the_undistorted_one(self, kind: str) -> None:
+        quiet = replace(SMALL, optical=OpticalOptions(bands=("green",), noise_dn=0))
+        still, moved = (
+            simulate_pair(replace(quiet, distortion=DistortionOptions(kind, shift, warp_px=warp)))
+            for shift, warp in ((0.0, 0.0), (4.3, 3.0))
+        )
+        row, column = np.mgrid[30:170, 30:210]
+        px = np.stack([column, row], axis=-1).reshape(-1, 2)
+        there = moved.truth(moved.reference_grid.pixel_to_map(px))
+        seen = ndimage.map_coordinates(moved.input[0].astype(float), there[:, ::-1].T, order=5)
+        expected = still.input[0][30:170, 30:210].astype(float)
+        assert np.std(seen - expected.ravel()) < 0.02 * np.std(expected)
 
 
 class TestReproducible:
@@ -193,6 +198,12 @@ class TestReproducible:
         other = simulate_pair(replace(SMALL, scene=replace(SMALL.scene, seed=4)))
         assert not np.array_equal(small.reference, other.reference)
         assert small.truth.to_json() != other.truth.to_json()
+
+    def test_distortion_and_pixel_size_leave_the_scene_as_it_is(self, small: SimulatedPair) -> None:
+        other = simulate_pair(
+            replace(SMALL, distortion=DistortionOptions("affine", 2.0), input_pixel_size_m=2.0)
+        )
+        assert np.array_equal(small.reference, other.reference)
 
     def test_looks_change_the_speckle_and_not_the_scene(self, small: SimulatedPair) -> None:
         many = simulate_pair(replace(SMALL, sar=SarOptions(looks=16)))

@@ -11,6 +11,7 @@ from scipy import stats
 
 from groundtie.errors import ParameterError
 from groundtie.simulate import sar
+from groundtie.simulate.cover import Cover
 from groundtie.simulate.sar import (
     SarOptions,
     add_speckle,
@@ -136,6 +137,27 @@ class TestWalls:
         diamond.parcel[inside] = 1
         straight, turned = (sar_power(s, options) for s in (square, diamond))
         assert np.percentile(straight, 99.9) > 5 * np.percentile(turned, 99.9)
+
+    def test_narrow_building_has_its_corner_too(self, make_scene: MakeScene) -> None:
+        narrow = make_scene((ROWS, COLUMNS), ((slice(0, ROWS), slice(140, 142), 8.0),))
+        power = profile(narrow, SarOptions(35.0))
+        assert int(np.argmax(power)) in (139, 140)
+        assert power.max() > 3 * ROOF
+
+    def test_wall_is_even_over_its_layover(self, make_scene: MakeScene) -> None:
+        """Storeys differ from row to row; their mean over many rows does not."""
+        box = (slice(0, 250), slice(140, 142), 60.0)
+        power = profile(make_scene((250, COLUMNS), (box,)), SarOptions(35.0), slice(0, 250))
+        layover = 60 / math.tan(math.radians(35))
+        wall = power[int(140 - layover) + 4 : 136]
+        first, last = wall[: len(wall) // 2].mean(), wall[len(wall) // 2 :].mean()
+        assert first == pytest.approx(last, rel=0.1)
+
+    def test_roof_of_a_canopy_has_no_wall(self, make_scene: MakeScene) -> None:
+        wood = make_scene((ROWS, COLUMNS), ((slice(0, ROWS), slice(140, 200), 10.0),))
+        wood.parcels.cover[1] = Cover.FOREST
+        power = profile(wood, SarOptions(35.0))
+        assert power.max() < 1.5 * ROOF
 
     def test_corner_in_another_buildings_shadow_is_dark(self, make_scene: MakeScene) -> None:
         options = SarOptions(45.0)

@@ -53,7 +53,7 @@ class TestHeights:
 
     @pytest.mark.parametrize("relief_m", [20.0, 80.0])
     def test_terrain_range_and_slope(self, relief_m: float) -> None:
-        options = SceneOptions((1500, 1500), pixel_size_m=4.0, relief_m=relief_m, seed=1)
+        options = SceneOptions((750, 750), pixel_size_m=8.0, relief_m=relief_m, seed=1)
         terrain = generate_scene(options).terrain_m
         assert 0.6 * relief_m < np.ptp(terrain) < 2.2 * relief_m
         slope = np.hypot(*np.gradient(terrain, options.pixel_size_m))

@@ -31,6 +31,9 @@ from .scene import Scene, SceneOptions, generate_scene
 CRS_EPSG = 32633
 CORNER_M = (412_000.0, 5_334_000.0)
 
+# The scene depends on its outer size: in coarse steps, it stays the same when only the distortion
+# or the look changes somewhat.
+_MARGIN_STEP_PX = 64
 _CHECK_POINTS_PER_SIDE = 12
 _CHECK_POINT_TRIES = 20
 
@@ -112,7 +115,8 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
     model = draw_misregistration(options.distortion, claimed, scene_options.seed)
     truth = Transform(model, reference_grid.crs, claimed)
     progress.update(0.0, "laying out the scene")
-    margin = needed_margin(model, reference_grid, claimed) + _object_reach_px(options)
+    needed = needed_margin(model, reference_grid, claimed) + _object_reach_px(options)
+    margin = math.ceil(needed / _MARGIN_STEP_PX) * _MARGIN_STEP_PX
     scene = generate_scene(scene_options, margin)
     progress.update(0.25, "looking with the radar")
     reference = render_sar(scene, options.sar)
