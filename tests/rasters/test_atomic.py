@@ -142,7 +142,7 @@ def test_a_full_disk_is_named(tmp_path: Path) -> None:
     if not os.path.exists("/dev/full"):
         pytest.skip("this system has no /dev/full")
     with (
-        pytest.raises(OutputError, match="cannot write big.tif: the disk is full"),
+        pytest.raises(OutputError, match=r"cannot write big\.tif: the disk is full"),
         writing("big.tif"),
         open("/dev/full", "w") as file,
     ):
@@ -156,9 +156,11 @@ def test_errors_of_a_library_become_output_errors_with_the_cause() -> None:
         except FakeLibraryError as error:
             raise FakeLibraryError("write failed. See the exception before.") from error
 
-    with pytest.raises(OutputError, match=r"cannot write a\.tif: no space left in the layer"):
-        with writing("a.tif", FakeLibraryError):
-            write()
+    with (
+        pytest.raises(OutputError, match=r"cannot write a\.tif: no space left in the layer"),
+        writing("a.tif", FakeLibraryError),
+    ):
+        write()
 
 
 def test_the_message_has_the_final_name_of_a_staged_file(tmp_path: Path) -> None:

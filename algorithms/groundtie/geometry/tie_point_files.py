@@ -13,7 +13,8 @@ from typing import Any
 import fiona
 import numpy as np
 from affine import Affine
-from fiona.errors import FionaError
+from fiona._err import CPLE_BaseError
+from fiona.errors import FionaError, TransactionError
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 from rasterio.errors import CRSError
@@ -127,7 +128,15 @@ def read_tie_points(path: str | os.PathLike[str], input_grid: Grid) -> StoredTie
         raise TransformFileError(f"tie points are read from {', '.join(_READERS)}: {path}")
     try:
         return read(Path(path), input_grid)
-    except (FionaError, OSError, ValueError, KeyError, TypeError, CRSError) as error:
+    except (
+        FionaError,
+        CPLE_BaseError,
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        CRSError,
+    ) as error:
         reason = f"column {error} is missing" if isinstance(error, KeyError) else error
         raise TransformFileError(f"cannot read the tie points {path}: {reason}") from error
 
@@ -167,26 +176,31 @@ def _line(row: Row, crs: CRS | None, target: CRS | None) -> dict[str, Any]:
 def _write_gpkg(path: Path, points: TiePoints, transform: Transform) -> None:
     rows = _rows(points, transform)
     properties = dict.fromkeys(_NUMBERS, "float") | dict.fromkeys(_TEXTS, "str")
-    with fiona.open(
-        path,
-        "w",
-        driver="GPKG",
-        layer=_LAYER,
-        crs_wkt="" if transform.crs is None else transform.crs.to_wkt(),
-        schema={"geometry": "LineString", "properties": properties},
-    ) as layer:
-        layer.writerecords(
-            {
-                "type": "Feature",
-                "geometry": _line(row, transform.crs, transform.crs),
-                "properties": {name: _or_null(value) for name, value in row.items()},
-            }
-            for row in rows
-        )
-    # SQLite may meet a full disk in silence.
-    with fiona.open(path, layer=_LAYER) as layer:
-        if len(layer) != len(rows):
-            raise OSError("the file is not complete; is the disk full?")
+    records = (
+        {
+            "type": "Feature",
+            "geometry": _line(row, transform.crs, transform.crs),
+            "properties": {name: _or_null(value) for name, value in row.items()},
+        }
+        for row in rows
+    )
+    try:
+        with fiona.open(
+            path,
+            "w",
+            driver="GPKG",
+            layer=_LAYER,
+            crs_wkt="" if transform.crs is None else transform.crs.to_wkt(),
+            schema={"geometry": "LineString", "properties": properties},
+        ) as layer:
+            layer.writerecords(records)
+        # SQLite may meet a full disk in silence.
+        with fiona.open(path, layer=_LAYER) as layer:
+            complete = len(layer) == len(rows)
+    except (TransactionError, CPLE_BaseError):
+        complete = False
+    if not complete:
+        raise OSError("the file is not complete; is the disk full?")
 
 
 def _write_geojson(path: Path, points: TiePoints, transform: Transform) -> None:

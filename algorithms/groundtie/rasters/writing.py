@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 import rasterio
 from rasterio.enums import ColorInterp, Resampling
 
-from ..errors import OutputError, ParameterError
+from ..errors import ParameterError
 from .atomic import writing
 from .grid import PIXEL_COORDINATES, Grid
 from .reading import RasterSource, fits
@@ -82,29 +83,33 @@ def create_like(
         with rasterio.open(path, "w", **profile) as dataset:
             _describe(dataset, source)
             yield dataset
+        check_complete(path)
         _add_overviews(path, nearest=source.colormap is not None)
         check_complete(path)
 
 
 def check_complete(path: str | os.PathLike[str]) -> None:
     """Raise `OutputError` if a GeoTIFF lacks pixels: GDAL may meet a full disk in silence."""
-    size = Path(path).stat().st_size
-    with writing(path, *_gdal_errors()), rasterio.open(path) as dataset:
-        overviews = dataset.overviews(1)
+    with writing(path):
+        try:
+            complete = all(_block_ends(path, Path(path).stat().st_size))
+        except _gdal_errors():
+            complete = False
+        if not complete:
+            raise OSError("the file is not complete; is the disk full?")
+
+
+def _block_ends(path: str | os.PathLike[str], size: int) -> Iterator[bool]:
+    """Tell of each block, of the image and its overviews, whether it lies within the file."""
+    with rasterio.open(path) as dataset:
         bands = dataset.indexes if dataset.interleaving.value == "BAND" else [1]
-        levels = [None, *range(len(overviews))]
-        for level, factor in zip(levels, [1, *overviews], strict=True):
-            block_rows = _blocks(-(-dataset.height // factor))
-            block_cols = _blocks(-(-dataset.width // factor))
-            for band in bands:
-                for row in range(block_rows):
-                    for col in range(block_cols):
-                        end = _block_end(dataset, band, level, col, row)
-                        if end is None or end > size:
-                            raise OutputError(
-                                f"{os.fspath(path)} could not be written completely; "
-                                f"is the disk full?"
-                            )
+        factors = [1, *dataset.overviews(1)]
+        for level, factor in zip([None, *range(len(factors))], factors, strict=False):
+            rows = _blocks(-(-dataset.height // factor))
+            cols = _blocks(-(-dataset.width // factor))
+            for band, row, col in itertools.product(bands, range(rows), range(cols)):
+                end = _block_end(dataset, band, level, col, row)
+                yield end is not None and end <= size
 
 
 def _blocks(pixels: int) -> int:
@@ -180,7 +185,7 @@ def _add_overviews(path: str | os.PathLike[str], *, nearest: bool) -> None:
         factors: list[int] = []
         size = max(dataset.width, dataset.height)
         while size > BLOCK:
-            factors.append(2 ** (len(factors) + 1))
+            factors.append(2 << len(factors))
             size = -(-size // 2)
         if factors:
             dataset.build_overviews(factors, Resampling.nearest if nearest else Resampling.average)
