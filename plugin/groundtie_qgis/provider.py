@@ -39,8 +39,8 @@ class GroundTieProvider(QgsProcessingProvider):
     def name(self) -> str:
         return "GroundTie"
 
-    def longName(self) -> str:
-        return " ".join(["GroundTie", plugin_metadata().get("version", "")]).strip()
+    def versionInfo(self) -> str:
+        return plugin_metadata().get("version", "")
 
     def icon(self) -> QIcon:
         return QIcon(str(ICON))

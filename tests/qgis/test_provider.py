@@ -25,7 +25,7 @@ def test_the_provider_names_itself(provider: Any) -> None:
 
     assert provider.id() == "groundtie"
     assert provider.name() == "GroundTie"
-    assert provider.longName() == f"GroundTie {plugin_metadata()['version']}"
+    assert provider.versionInfo() == plugin_metadata()["version"]
     assert provider.warningMessage() == ""
 
 

@@ -1,0 +1,112 @@
+"""What QGIS shows of every tool, read from `qgis_process --json help`, is its declaration."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import pytest
+
+from groundtie.declaration import Parameter, Tool
+from groundtie.kinds import Band, Choice, Number, OutputKind
+from groundtie.tools import TOOLS
+
+INTEGER = 0  # of QgsProcessingParameterNumber.Type
+TYPES = {
+    "RasterIn": "raster",
+    "VectorIn": "vector",
+    "FileIn": "file",
+    "RasterOut": "rasterDestination",
+    "VectorOut": "vectorDestination",
+    "FileOut": "fileDestination",
+    "FolderOut": "folderDestination",
+    "Number": "number",
+    "Distance": "number",
+    "Choice": "enum",
+    "Flag": "boolean",
+    "Text": "string",
+    "Band": "band",
+}
+
+
+@pytest.fixture(scope="module", params=TOOLS, ids=lambda tool: tool.name)
+def told(request: pytest.FixtureRequest, qgis_process: Any) -> tuple[Tool, dict[str, Any]]:
+    """A tool and what qgis_process tells of it."""
+    called = qgis_process("--json", "help", f"groundtie:{request.param.name}")
+    assert (called.returncode, called.stderr) == (0, "")
+    return request.param, json.loads(called.stdout)
+
+
+def each(told: tuple[Tool, dict[str, Any]]) -> list[tuple[Parameter, dict[str, Any]]]:
+    tool, shown = told
+    return [(p, shown["parameters"][p.name.upper()]) for p in tool.parameters]
+
+
+def test_names(told: tuple[Tool, dict[str, Any]]) -> None:
+    tool, shown = told
+    assert set(shown["parameters"]) == {p.name.upper() for p in tool.parameters}
+    details = shown["algorithm_details"]
+    assert details["name"] == tool.title
+    assert details["group"] == tool.group
+    assert details["short_description"] == tool.summary
+    assert details["can_cancel"]
+
+
+def test_types(told: tuple[Tool, dict[str, Any]]) -> None:
+    for parameter, shown in each(told):
+        assert shown["type"]["id"] == TYPES[type(parameter.kind).__name__]
+
+
+def test_what_is_required(told: tuple[Tool, dict[str, Any]]) -> None:
+    for parameter, shown in each(told):
+        absent = not parameter.required and (
+            parameter.default is None or isinstance(parameter.kind, Band)
+        )
+        assert shown["optional"] == absent
+        if parameter.required:
+            assert shown["default_value"] is None
+
+
+def test_defaults(told: tuple[Tool, dict[str, Any]]) -> None:
+    for parameter, shown in each(told):
+        assert shown["default_value"] == parameter.default
+
+
+def test_labels_units_and_help(told: tuple[Tool, dict[str, Any]]) -> None:
+    for parameter, shown in each(told):
+        unit = getattr(parameter.kind, "unit", "")
+        assert shown["description"] == parameter.kind.label + (f" [{unit}]" if unit else "")
+        assert shown["help"] == parameter.kind.help
+
+
+def test_what_is_advanced(told: tuple[Tool, dict[str, Any]]) -> None:
+    for parameter, shown in each(told):
+        assert shown["is_advanced"] == parameter.kind.advanced
+
+
+def test_choices(told: tuple[Tool, dict[str, Any]]) -> None:
+    for parameter, shown in each(told):
+        if isinstance(parameter.kind, Choice):
+            assert list(shown["available_options"].values()) == list(parameter.kind.choices)
+            assert shown["raw_definition"]["uses_static_strings"]
+
+
+def test_ranges(told: tuple[Tool, dict[str, Any]]) -> None:
+    for parameter, shown in each(told):
+        if isinstance(parameter.kind, Number):
+            definition = shown["raw_definition"]
+            for bound, shown_bound in (("minimum", "min"), ("maximum", "max")):
+                declared, found = getattr(parameter.kind, bound), definition[shown_bound]
+                # without a bound QGIS has the largest number that its type can hold
+                assert found == declared if math.isfinite(declared) else abs(found) > 2e9
+            assert (definition["data_type"] == INTEGER) == parameter.kind.integer
+
+
+def test_outputs(told: tuple[Tool, dict[str, Any]]) -> None:
+    tool, shown = told
+    expected = {p.name.upper() for p in tool.parameters if isinstance(p.kind, OutputKind)}
+    numbers = {o.name.upper(): "outputString" if o.text else "outputNumber" for o in tool.outputs}
+    outputs = {name: output["type"] for name, output in shown["outputs"].items()}
+    assert expected <= set(outputs)
+    assert {n: t for n, t in outputs.items() if n in numbers} == numbers

@@ -1,0 +1,381 @@
+"""The real tools in a real QGIS: success, refusal, bad input, cancel, styles, models."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rasterio
+import rasterio.transform
+from scipy.ndimage import gaussian_filter
+
+from groundtie import load_transform
+
+ROOT = Path(__file__).resolve().parents[2]
+# settings that make little work of a small pair
+QUICK = ["MODEL=translation", "SIMILARITY=orientation", "SEARCH_RADIUS=12"]
+SIZE = 384
+# how far the input's georeferencing is off, in metres, which are pixels
+SHIFT = (4.0, -3.0)
+
+
+@pytest.fixture(scope="session")
+def pairs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Folders of two pairs of different places: the input is the reference's negative, moved."""
+    folders = [tmp_path_factory.mktemp("pairs") / name for name in ("here", "there")]
+    for seed, folder in enumerate(folders):
+        folder.mkdir()
+        random = np.random.Generator(np.random.PCG64(seed))
+        ground = gaussian_filter(random.normal(size=(SIZE, SIZE)), 3)
+        ground = np.clip(128 + 40 * ground / ground.std(), 1, 254)
+        noise = random.normal(0, 5, (2, SIZE, SIZE))
+        right = rasterio.transform.from_origin(500_000, 5_000_000, 1, 1)
+        moved = rasterio.Affine.translation(*SHIFT) * right
+        write(folder / "reference.tif", ground[None], right)
+        write(folder / "input.tif", 255 - ground + noise, moved)
+    return folders
+
+
+def write(path: Path, bands: np.ndarray, transform: rasterio.Affine) -> None:
+    count, height, width = bands.shape
+    profile = {"driver": "GTiff", "dtype": "uint8", "crs": "EPSG:32633", "transform": transform}
+    with rasterio.open(path, "w", count=count, height=height, width=width, **profile) as raster:
+        raster.write(np.clip(bands, 1, 254).astype("uint8"))
+
+
+def assert_registered(transform: Path) -> None:
+    """Check a transform: the place of a reference pixel is the same pixel of the input."""
+    corners = np.array([[50.0, 50.0], [50.0, 330.0], [330.0, 50.0], [200.0, 200.0]])
+    reference_xy = [500_000.5, 4_999_999.5] + corners * [1, -1]
+    np.testing.assert_allclose(load_transform(transform)(reference_xy), corners, atol=0.3)
+
+
+def words(reference: Path, input: Path, output: Path, **more: object) -> list[str]:
+    files = {"REFERENCE": reference, "INPUT": input, "OUTPUT": output, **more}
+    return [f"{name}={value}" for name, value in files.items()]
+
+
+def test_coregister(qgis_process: Any, pairs: list[Path], tmp_path: Path) -> None:
+    reference, input = pairs[0] / "reference.tif", pairs[0] / "input.tif"
+    called = qgis_process(
+        *("--json", "run", "groundtie:coregister", "--", *QUICK),
+        *words(reference, input, tmp_path / "o.tif", TIE_POINTS=tmp_path / "p.gpkg"),
+        *(f"TRANSFORM={tmp_path / 't.json'}", f"REPORT={tmp_path / 'r.html'}"),
+    )
+    assert (called.returncode, called.stderr) == (0, "")
+    results = json.loads(called.stdout)["results"]
+    numbers = json.loads((tmp_path / "r.json").read_text())
+    assert numbers["verdict"]["accepted"]
+    assert results["CHECK_RMSE_PX"] == numbers["verdict"]["check_rmse_px"]
+    assert {Path(results[n]).name for n in ("OUTPUT", "TIE_POINTS", "TRANSFORM", "REPORT")} == {
+        "o.tif",
+        "p.gpkg",
+        "t.json",
+        "r.html",
+    }
+    with rasterio.open(tmp_path / "o.tif") as made, rasterio.open(reference) as wanted:
+        assert (made.shape, made.transform, made.crs) == (
+            wanted.shape,
+            wanted.transform,
+            wanted.crs,
+        )
+        with rasterio.open(input) as given:
+            assert (made.count, made.dtypes) == (given.count, given.dtypes)
+    assert_registered(tmp_path / "t.json")
+
+
+def test_simulate(qgis_process: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "pair"
+    called = qgis_process("run", "groundtie:simulate", "--", f"FOLDER={folder}", "SIZE=128")
+    assert (called.returncode, called.stderr) == (0, "")
+    for name in ("reference.tif", "input.tif"):
+        with rasterio.open(folder / name) as raster:
+            assert raster.shape == (128, 128)
+    assert load_transform(folder / "truth.json")
+
+
+@pytest.fixture(scope="session")
+def truth(pairs: list[Path]) -> Path:
+    """The pair's tie points as the Georeferencer writes them, without error."""
+    lines = ["#CRS: EPSG:32633", "mapX,mapY,sourceX,sourceY,enable,dX,dY,residual"]
+    for x, y in ((500_050, 4_999_950), (500_300, 4_999_900), (500_200, 4_999_700)):
+        lines.append(f"{x},{y},{x + SHIFT[0]},{y + SHIFT[1]},1,0,0,0")
+    (pairs[0] / "truth.points").write_text("\n".join(lines) + "\n")
+    return pairs[0] / "truth.points"
+
+
+def test_warp_makes_what_python_makes(
+    qgis_process: Any, pairs: list[Path], truth: Path, tmp_path: Path
+) -> None:
+    import groundtie.tools
+
+    files = pairs[0] / "input.tif", tmp_path / "qgis.tif", truth
+    called = qgis_process(
+        *("run", "groundtie:warp", "--", f"INPUT={files[0]}", f"OUTPUT={files[1]}"),
+        *(f"TRANSFORM={files[2]}", f"REFERENCE={pairs[0] / 'reference.tif'}"),
+    )
+    assert (called.returncode, called.stderr) == (0, "")
+    groundtie.tools.warp(
+        files[0], tmp_path / "python.tif", truth, reference=pairs[0] / "reference.tif"
+    )
+    with rasterio.open(files[1]) as qgis, rasterio.open(tmp_path / "python.tif") as python:
+        assert qgis.profile == python.profile
+        np.testing.assert_array_equal(qgis.read(), python.read())
+        with rasterio.open(files[0]) as given:  # whole pixels of shift: the same values
+            np.testing.assert_allclose(
+                qgis.read()[:, 20:-20, 20:-20], given.read()[:, 20:-20, 20:-20], atol=1
+            )
+
+
+def test_a_refusal_is_exit_code_1_with_its_reason(
+    qgis_process: Any, pairs: list[Path], tmp_path: Path
+) -> None:
+    called = qgis_process(
+        *("run", "groundtie:coregister", "--", *QUICK, f"REPORT={tmp_path / 'r.html'}"),
+        *words(pairs[0] / "reference.tif", pairs[1] / "input.tif", tmp_path / "o.tif"),
+    )
+    assert called.returncode == 1
+    assert "was not registered to" in called.stderr
+    assert "Traceback" not in called.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["r.html", "r.json"]
+    assert not json.loads((tmp_path / "r.json").read_text())["verdict"]["accepted"]
+
+
+def truncated(folder: Path, pair: Path) -> Path:
+    whole = (pair / "input.tif").read_bytes()
+    (folder / "truncated.tif").write_bytes(whole[: len(whole) // 2])
+    return folder / "truncated.tif"
+
+
+def elsewhere(folder: Path, pair: Path) -> Path:
+    shutil.copy(pair / "input.tif", folder / "elsewhere.tif")
+    with rasterio.open(folder / "elsewhere.tif", "r+") as raster:
+        raster.transform = rasterio.Affine.translation(10_000, 0) * raster.transform
+    return folder / "elsewhere.tif"
+
+
+@pytest.mark.parametrize(
+    ("make", "more", "message"),
+    [
+        (truncated, "", "truncated.tif"),
+        (elsewhere, "", "elsewhere.tif"),
+        (lambda folder, pair: pair / "input.tif", "INPUT_BAND=9", "input.tif"),
+        (lambda folder, pair: pair / "reference.tif", "", "Input image is the same raster as"),
+        (lambda folder, pair: folder / "no.tif", "", "no.tif"),
+    ],
+    ids=["truncated", "no overlap", "no such band", "same file", "no such file"],
+)
+def test_bad_input_is_exit_code_1_and_nothing_is_written(
+    qgis_process: Any, pairs: list[Path], tmp_path: Path, make: Any, more: str, message: str
+) -> None:
+    inputs, outputs = tmp_path / "in", tmp_path / "out"
+    inputs.mkdir()
+    outputs.mkdir()
+    reference = pairs[0] / "reference.tif"
+    called = qgis_process(
+        *("run", "groundtie:coregister", "--", *QUICK, *more.split()),
+        *words(reference, make(inputs, pairs[0]), outputs / "o.tif"),
+    )
+    assert called.returncode == 1
+    assert message in called.stderr
+    assert "Traceback" not in called.stderr
+    assert "bug" not in called.stderr
+    assert list(outputs.iterdir()) == []
+
+
+def test_cancel_leaves_nothing(provider: Any, pairs: list[Path], tmp_path: Path) -> None:
+    from qgis.core import QgsProcessingContext, QgsProcessingException, QgsProcessingFeedback
+
+    for stop_at in (0, 50, 75):
+        feedback = QgsProcessingFeedback()
+
+        def cancel(progress: float, stop_at: int = stop_at, feedback: Any = feedback) -> None:
+            if progress >= stop_at:
+                feedback.cancel()
+
+        feedback.progressChanged.connect(cancel)
+        values = {
+            "REFERENCE": str(pairs[0] / "reference.tif"),
+            "INPUT": str(pairs[0] / "input.tif"),
+            "OUTPUT": str(tmp_path / "o.tif"),
+            "TIE_POINTS": str(tmp_path / "p.gpkg"),
+            "REPORT": str(tmp_path / "r.html"),
+            **dict(word.split("=") for word in QUICK),
+        }
+        algorithm = provider.algorithm("coregister").create()
+        with pytest.raises(QgsProcessingException, match="cancelled; nothing was written"):
+            algorithm.run(values, QgsProcessingContext(), feedback, catchExceptions=False)
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_tie_points_are_styled_when_they_are_loaded(
+    provider: Any, pairs: list[Path], tmp_path: Path
+) -> None:
+    from qgis.core import (
+        QgsProcessingContext,
+        QgsProcessingFeedback,
+        QgsProcessingOutputLayerDefinition,
+        QgsProject,
+        QgsVectorLayer,
+    )
+
+    context, feedback, project = QgsProcessingContext(), QgsProcessingFeedback(), QgsProject()
+    context.setProject(project)
+    sink = QgsProcessingOutputLayerDefinition(str(tmp_path / "p.gpkg"), project)
+    values = {
+        "REFERENCE": str(pairs[0] / "reference.tif"),
+        "INPUT": str(pairs[0] / "input.tif"),
+        "OUTPUT": str(tmp_path / "o.tif"),
+        "TIE_POINTS": sink,
+        **dict(word.split("=") for word in QUICK),
+    }
+    results, finished = provider.algorithm("coregister").run(values, context, feedback)
+    assert finished, feedback.textLog()
+    assert list(context.layersToLoadOnCompletion()) == [results["TIE_POINTS"]]
+    # as the desktop does when the algorithm has ended
+    layer = QgsVectorLayer(results["TIE_POINTS"], "tie points")
+    assert layer.isValid() and layer.featureCount() > 5
+    details = context.layerToLoadOnCompletionDetails(results["TIE_POINTS"])
+    details.postProcessor().postProcessLayer(layer, context, feedback)
+    renderer = layer.renderer()
+    assert renderer.type() == "RuleRenderer"
+    # every field that the style asks for is there
+    names = {field.name() for field in layer.fields()}
+    assert renderer.usedAttributes(layer_context(layer)) <= names
+    assert {"role", "state", "residual_px", "score"} <= names
+    assert {feature["role"] for feature in layer.getFeatures()} == {"fit", "check"}
+
+
+def layer_context(layer: Any) -> Any:
+    from qgis.core import QgsRenderContext
+
+    context = QgsRenderContext()
+    context.expressionContext().setFields(layer.fields())
+    return context
+
+
+def test_results_are_what_the_outputs_promise(
+    provider: Any, pairs: list[Path], truth: Path, tmp_path: Path
+) -> None:
+    from qgis.core import QgsProcessingContext, QgsProcessingFeedback
+
+    values = {
+        "coregister": {"REFERENCE": "reference.tif", **dict(word.split("=") for word in QUICK)},
+        "warp": {"TRANSFORM": truth.name},
+    }
+    for name, more in values.items():
+        algorithm = provider.algorithm(name).create()
+        files = {k: str(pairs[0] / v) if "." in v else v for k, v in more.items()}
+        files |= {"INPUT": str(pairs[0] / "input.tif"), "OUTPUT": str(tmp_path / f"{name}.tif")}
+        results, finished = algorithm.run(files, QgsProcessingContext(), QgsProcessingFeedback())
+        assert finished
+        for output in algorithm.outputDefinitions():
+            types = {"outputNumber": (int, float), "outputString": str}.get(output.type())
+            if types is not None:
+                assert isinstance(results[output.name()], types), output.name()
+
+
+def register_then_warp() -> Any:
+    """Return a model that registers an image and warps another one by the same transform."""
+    from qgis.core import (
+        QgsProcessingModelAlgorithm,
+        QgsProcessingModelChildAlgorithm,
+        QgsProcessingModelChildParameterSource,
+        QgsProcessingModelOutput,
+        QgsProcessingModelParameter,
+        QgsProcessingParameterRasterLayer,
+    )
+
+    source = QgsProcessingModelChildParameterSource
+    model = QgsProcessingModelAlgorithm("Register and warp", "Registration")
+    model.setName("register_and_warp")
+    for name in ("reference", "input", "other"):
+        model.addModelParameter(
+            QgsProcessingParameterRasterLayer(name, name), QgsProcessingModelParameter(name)
+        )
+    register = QgsProcessingModelChildAlgorithm("groundtie:coregister")
+    register.setChildId("register")
+    register.addParameterSources("REFERENCE", [source.fromModelParameter("reference")])
+    register.addParameterSources("INPUT", [source.fromModelParameter("input")])
+    for name, value in (word.split("=") for word in QUICK):
+        register.addParameterSources(name, [source.fromStaticValue(value)])
+    warp = QgsProcessingModelChildAlgorithm("groundtie:warp")
+    warp.setChildId("warp")
+    warp.addParameterSources("INPUT", [source.fromModelParameter("other")])
+    warp.addParameterSources("REFERENCE", [source.fromModelParameter("reference")])
+    warp.addParameterSources("TRANSFORM", [source.fromChildOutput("register", "TRANSFORM")])
+    for child, name in ((register, "Registered"), (warp, "Warped")):
+        for definition in child.algorithm().parameterDefinitions():
+            # as the designer does; a model does not take defaults by itself
+            if definition.defaultValue() is not None and definition.name() not in given(child):
+                default = source.fromStaticValue(definition.defaultValue())
+                child.addParameterSources(definition.name(), [default])
+        output = QgsProcessingModelOutput(name)
+        output.setChildOutputName("OUTPUT")
+        output.setDescription(name)
+        child.setModelOutputs({name: output})
+        model.addChildAlgorithm(child)
+    return model
+
+
+def given(child: Any) -> set[str]:
+    return set(child.parameterSources())
+
+
+def test_a_model_chains_the_tools(
+    provider: Any, qgis_process: Any, pairs: list[Path], tmp_path: Path
+) -> None:
+    model = register_then_warp()
+    valid, problems = model.validate()
+    assert valid, problems
+    assert model.toFile(str(tmp_path / "model.model3"))
+    input = pairs[0] / "input.tif"
+    called = qgis_process(
+        *("run", tmp_path / "model.model3", "--", f"reference={pairs[0] / 'reference.tif'}"),
+        *(f"input={input}", f"other={input}"),
+        *(f"register:Registered={tmp_path / 'a.tif'}", f"warp:Warped={tmp_path / 'b.tif'}"),
+    )
+    assert (called.returncode, called.stderr) == (0, "")
+    # the same image by the same transform onto the same grid
+    with rasterio.open(tmp_path / "a.tif") as one, rasterio.open(tmp_path / "b.tif") as other:
+        assert one.profile == other.profile
+        np.testing.assert_array_equal(one.read(), other.read())
+
+
+def wheels() -> Path | None:
+    """Return the site-packages of .venv, with PyPI's wheels, if this Python can load them."""
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    folder = ROOT / ".venv" / "lib" / version / "site-packages"
+    return folder if (folder / "rasterio" / "proj_data").is_dir() else None
+
+
+@pytest.mark.parametrize("packages", ["the system's", "PyPI's"])
+def test_the_proj_of_qgis_does_no_harm(
+    qgis_process: Any, pairs: list[Path], tmp_path: Path, packages: str
+) -> None:
+    """As QGIS on Windows has it: PROJ_LIB leads to data that a rasterio wheel cannot read."""
+    more = {"PROJ_LIB": "/usr/share/proj", "PROJ_DATA": "/usr/share/proj"}
+    if packages == "PyPI's":
+        folder = wheels()
+        if folder is None:
+            pytest.skip("no .venv of this Python version with a rasterio wheel: make install")
+        more["PYTHONPATH"] = str(folder)
+    called = qgis_process(
+        *("run", "groundtie:coregister", "--", *QUICK, f"TRANSFORM={tmp_path / 't.json'}"),
+        *words(pairs[0] / "reference.tif", pairs[0] / "input.tif", tmp_path / "o.tif"),
+        **more,
+    )
+    assert called.returncode == 0, called.stderr
+    assert_registered(tmp_path / "t.json")
+    with rasterio.open(tmp_path / "o.tif") as made:
+        assert made.crs.to_epsg() == 32633
+
+
+def test_this_process_was_not_changed() -> None:
+    assert "PROJ_LIB" not in os.environ
