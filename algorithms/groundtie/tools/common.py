@@ -6,7 +6,6 @@ import os
 from pathlib import Path
 from typing import Annotated
 
-from ..geometry.models import KINDS
 from ..kinds import Choice, Number, RasterIn, RasterOut
 from ..rasters.warping import METHODS
 
@@ -19,14 +18,6 @@ Output = Annotated[
     RasterOut(
         label="Registered image",
         help="GeoTIFF with the input's bands, data type, nodata value, colours and metadata.",
-    ),
-]
-Model = Annotated[
-    str,
-    Choice(
-        label="Model",
-        help="Which distortions the transform can take up, from a shift to a thin-plate spline.",
-        choices=KINDS,
     ),
 ]
 Resampling = Annotated[

@@ -7,22 +7,24 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+from affine import Affine
 from numpy.typing import NDArray
 
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import GeoreferencingError, NoOverlapError, ParameterError, TransformFileError
 from ..geometry.fitting import fit_model
+from ..geometry.models import KINDS, Model
 from ..geometry.tie_point_files import StoredTiePoints, read_tie_points
 from ..geometry.transform import Transform, load_transform
-from ..kinds import Distance, FileIn, RasterIn
+from ..kinds import Choice, Distance, FileIn, RasterIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import Grid, apply_affine, reproject
 from ..rasters.reading import RasterSource, open_raster
 from ..rasters.target_grids import covering_grid, registered_grid
-from .common import Input, Model, Output, Resampling, Workers, worker_count
+from .common import Input, Output, Resampling, Workers, worker_count
 
 FloatArray = NDArray[np.float64]
 
@@ -129,7 +131,14 @@ def warp(
             minimum=1e-6,
         ),
     ] = None,
-    model: Model = "affine",
+    model: Annotated[
+        str,
+        Choice(
+            label="Model",
+            help="What is fitted to tie points; a stored transform has a model already.",
+            choices=KINDS,
+        ),
+    ] = "affine",
     resampling: Resampling = "cubic",
     workers: Workers = None,
     progress: Progress = SILENT,
@@ -167,13 +176,22 @@ def _load(path: Path, model: str, source: RasterSource) -> tuple[Transform, TieP
     points = read_tie_points(path, source.grid)
     if points.crs is None and source.grid.crs is not None:
         raise TransformFileError(f"{path} does not tell the CRS of its map positions")
-    as_claimed = Transform.as_claimed(points.crs, source.grid)
-    claimed = as_claimed.claimed_xy(points.input_px)
-    taken = points.used & ~points.is_check
-    found = Transform(
-        fit_model(model, points.reference_xy[taken], claimed[taken]), points.crs, source.grid
-    )
+    found = Transform(_fit(points, model, source.grid), points.crs, source.grid)
     return found, _assess(found, points)
+
+
+def _fit(points: StoredTiePoints, kind: str, input_grid: Grid) -> Model:
+    """Fit a model in metres, so that rigid ones preserve shapes also on maps in degrees."""
+    claimed = Transform.as_claimed(points.crs, input_grid).claimed_xy(points.input_px)
+    taken = points.used & ~points.is_check
+    centre = points.reference_xy[taken].mean(axis=0) if taken.any() else np.zeros(2)
+    here = Grid(Affine.translation(*(centre - 0.5)), points.crs, 1, 1)
+    width, height = here.metres_per_unit
+    metres = Affine(1 / width, 0, centre[0], 0, 1 / height, centre[1])
+    xy, claimed_xy = (
+        apply_affine(~metres, positions[taken]) for positions in (points.reference_xy, claimed)
+    )
+    return fit_model(kind, xy, claimed_xy).on_map(metres)
 
 
 def _assess(found: Transform, points: StoredTiePoints) -> TiePointFit:
