@@ -112,18 +112,13 @@ class Model(ABC):
         By Newton's method with a numerical Jacobian.
         """
         target = self.frame.enter(xy)
-        uv = target - self.displacement(target)
-        step = 1e-4
+        # Start from the frame's origin: inputs without georeferencing claim positions far from it.
+        uv = self._newton_step(np.zeros_like(target), target)
         for _ in range(_INVERSE_STEPS):
             miss = target - uv - self.displacement(uv)
             if np.nanmax(np.abs(miss), initial=0.0) < _INVERSE_PRECISION:
                 break
-            along_u = self._slope(uv, np.array([step, 0.0])) + [1, 0]
-            along_v = self._slope(uv, np.array([0.0, step])) + [0, 1]
-            determinant = along_u[:, 0] * along_v[:, 1] - along_v[:, 0] * along_u[:, 1]
-            du = (miss[:, 0] * along_v[:, 1] - miss[:, 1] * along_v[:, 0]) / determinant
-            dv = (miss[:, 1] * along_u[:, 0] - miss[:, 0] * along_u[:, 1]) / determinant
-            uv = uv + np.column_stack([du, dv])
+            uv = self._newton_step(uv, target)
         return self.frame.leave(uv)
 
     def on_map(self, affine: Affine) -> Self:
@@ -132,6 +127,16 @@ class Model(ABC):
         `affine` takes the lattice to the map.
         """
         return replace(self, frame=self.frame.seen_from(affine))
+
+    def _newton_step(self, uv: FloatArray, target: FloatArray) -> FloatArray:
+        step = 1e-4
+        miss = target - uv - self.displacement(uv)
+        along_u = self._slope(uv, np.array([step, 0.0])) + [1, 0]
+        along_v = self._slope(uv, np.array([0.0, step])) + [0, 1]
+        determinant = along_u[:, 0] * along_v[:, 1] - along_v[:, 0] * along_u[:, 1]
+        du = (miss[:, 0] * along_v[:, 1] - miss[:, 1] * along_v[:, 0]) / determinant
+        dv = (miss[:, 1] * along_u[:, 0] - miss[:, 0] * along_u[:, 1]) / determinant
+        return uv + np.column_stack([du, dv])
 
     def _slope(self, uv: FloatArray, step: FloatArray) -> FloatArray:
         rise = self.displacement(uv + step) - self.displacement(uv - step)

@@ -19,6 +19,11 @@ _SAMPLES = 600
 _MIXTURE_STEPS = 40
 _FIT_STEPS = 15
 
+# Right matches are first thought to scatter by this, in pixels; starting wide would take a second
+# cluster of wrong matches, as layover makes, for the tail of the right ones.
+_FIRST_SIGMA = 1.0
+_FOLDS = 5
+
 # A linear part this far from the identity is no misregistration of georeferenced images.
 _LARGEST_DISTORTION = 0.25
 
@@ -63,7 +68,7 @@ def fit_mixture(
     """
     squared = (residuals**2).sum(axis=1)
     lowest, highest = sigma_range
-    variance, share = highest**2, 0.5
+    variance, share = min(max(_FIRST_SIGMA, lowest), highest) ** 2, 0.5
     probability = np.full(len(residuals), share)
     for _ in range(_MIXTURE_STEPS):
         right = share * np.exp(-squared / (2 * variance)) / (2 * np.pi * variance)
@@ -191,3 +196,14 @@ def _sampled_models(
         coefficients[~well_posed] = 0.0
     plausible = np.abs(coefficients[:, 1:]).max(axis=(1, 2)) < _LARGEST_DISTORTION
     return np.asarray(coefficients[plausible] if plausible.any() else coefficients * 0)
+
+
+def block_folds(px: FloatArray) -> NDArray[np.int_]:
+    """Return fold numbers, shape (n,), such that neighbours share one, for cross-validation.
+
+    The extent is cut into blocks; each row and each column of blocks holds every fold once.
+    """
+    low, high = px.min(axis=0), px.max(axis=0)
+    unit = (px - low) / np.maximum(high - low, 1e-12)
+    block = np.minimum((unit * _FOLDS).astype(int), _FOLDS - 1)
+    return np.asarray((block[:, 0] + 2 * block[:, 1]) % _FOLDS)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from ..geometry.chance import agreement_probability, log10_chance
-from ..geometry.estimation import Estimate, prediction_spread_px
+from ..geometry.estimation import Estimate
 from ..geometry.robust import fit_mixture
 from ..geometry.tie_points import TiePoints
 from ..rasters.grid import FloatArray, Grid
@@ -21,8 +21,10 @@ TOLERANCE_PX = 2.0
 # Chance agreement must be less likely than this (log10).
 LARGEST_LOG10_CHANCE = -3.0
 
-# Standard deviation that right check points may turn out to have, in matching pixels.
-_SIGMA_RANGE_PX = (0.1, 6.0)
+# Standard deviation that right check points may turn out to have: at least so many pixels, and
+# at most so many times what the largest error allows, so that errors above it are still seen.
+_SMALLEST_SIGMA_PX = 0.1
+_SIGMA_BEYOND = 1.5
 
 # Fewer right check points than this measure nothing.
 _FEWEST_CHECK_POINTS = 3
@@ -123,9 +125,10 @@ def judge(
     if chance > LARGEST_LOG10_CHANCE or agreeing < _FEWEST_CHECK_POINTS:
         why = f"{agreeing} of {len(check)} check points agree, as they may by chance"
         return Verdict(False, why, *counts, log10_chance=chance)
-    sigma = fit_mixture(residuals, (2 * radius_px + 1) ** 2, _SIGMA_RANGE_PX).sigma
+    sigmas = _SMALLEST_SIGMA_PX, _SIGMA_BEYOND * max_error_px / math.sqrt(2)
+    sigma = fit_mixture(residuals, (2 * radius_px + 1) ** 2, sigmas).sigma
     lattice = _lattice(grid)
-    spread = float(np.sqrt(np.mean(prediction_spread_px(estimate, grid, lattice) ** 2)))
+    spread = float(np.sqrt(np.mean(estimate.spread_px(lattice) ** 2)))
     rmse, ce90 = sigma * math.sqrt(2), sigma * _CE90
     reason = "check points confirm the registration"
     accepted = True

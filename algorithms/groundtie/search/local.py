@@ -1,4 +1,4 @@
-"""Tie points on the chips of a layout."""
+"""Tie points on the chips of a layout, and the model that their surfaces agree on."""
 
 from __future__ import annotations
 
@@ -6,22 +6,36 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from affine import Affine
 from numpy.typing import NDArray
 
-from ..geometry.models import Model
+from ..errors import TooFewPointsError
+from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate
+from ..geometry.models import DEGREE, Model
+from ..geometry.robust import find_consensus, fit_mixture
 from ..geometry.tie_points import USED, TiePoints
+from ..geometry.transform import Transform
 from ..progress import SILENT, Progress
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, apply_affine
 from ..rasters.pair import ImagePair
-from ..similarity.evidence import find_peak
+from ..similarity.evidence import Evidence, find_peak, find_peak_near
 from ..similarity.surface import SimilaritySettings
+from .alignment import align, choose_alignment
 from .layout import ChipLayout
 from .matching import ChipMatcher, ChipSurfaces, Surfaces, support
 
 FloatArray = NDArray[np.float64]
+AUTO = "auto"
 
 # Neighbours within this many spacings support each other.
 _SUPPORT_SPACINGS = 1.5
+
+# Chips agree with a first model of degree 1 within this, in pixels; local distortion beyond it is
+# left to the alignment.
+_CONSENSUS_PX = 3.0
+
+# A tie point of the fit is the peak within this distance from the aligned model.
+_NEAR_PX = 3
 
 
 @dataclass(frozen=True)
@@ -49,22 +63,57 @@ class LocalSearch:
     check_radius_px: int = 16
     two_way_px: float = 2.0
 
-    def fit_points(
-        self, model: Model, executor: Executor, progress: Progress = SILENT
-    ) -> TiePoints:
-        """Match the chips of the fit; they see nothing of the reference's held-out blocks."""
+    def estimate(
+        self, coarse: Model, kind: str, seed: int, executor: Executor, progress: Progress = SILENT
+    ) -> Estimate:
+        """Match the chips of the fit, which see nothing of held-out blocks, and fit a model.
+
+        Parameters
+        ----------
+        coarse
+            The misregistration on the map, a model of degree 1; it may be wrong by
+            `fit_radius_px`.
+        kind
+            One of `models.KINDS`, or "auto" for the simplest polynomial that the chips justify.
+        seed
+            Of random samples.
+        executor
+            Threads to work in.
+        progress
+            Is told of every chip.
+
+        Raises
+        ------
+        TooFewPointsError
+            Too few chips could be matched for the model.
+        """
         surfaces = self._match(
-            self.layout.fit_centres, self.fit_radius_px, model, True, executor, progress
+            self.layout.fit_centres, self.fit_radius_px, coarse, True, executor, progress
         )
-        reach = _SUPPORT_SPACINGS * self.layout.spacing_px
-        supported = ChipSurfaces(
-            surfaces.centres,
-            support(surfaces.forward, surfaces.centres, reach),
-            support(surfaces.backward, surfaces.centres, reach),
+        centres, both = surfaces.centres, surfaces.both
+        if len(centres) < 4:
+            raise TooFewPointsError(f"only {len(centres)} chips could be matched")
+        prior = self._prior(coarse)
+        supported = support(both, centres, _SUPPORT_SPACINGS * self.layout.spacing_px)
+        px = centres.astype(float)
+        shifts = np.array([find_peak(surface).shift_px for surface in supported])
+        first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
+        start = find_consensus(
+            px, apply_affine(prior, px + shifts), _CONSENSUS_PX, first_kind, seed
         )
-        points = self._points(supported, model, is_check=False)
-        two_way = f"two-way error above {self.two_way_px:g} px"
-        return points.reject(points.two_way_error_px > self.two_way_px, two_way)
+        if kind in (AUTO, "tps"):
+            aligned = choose_alignment(centres, both, prior, start)
+        else:
+            aligned = align(kind, centres, both, prior, start)
+        expected = apply_affine(~prior, aligned.model(px)) - px
+        points = self._points(surfaces, coarse, expected)
+        model, fold_models = aligned.model, aligned.fold_models
+        as_claimed = Transform.as_claimed(self.pair.grid.crs, self.pair.input.source.grid)
+        if kind == "tps":
+            model, fold_models = fit_thin_plate(points, as_claimed, self.pair.grid, model, _NEAR_PX)
+        on_map = model.on_map(self.pair.grid.transform * Affine.translation(0.5, 0.5))
+        transform = Transform(on_map, as_claimed.crs, as_claimed.input_grid)
+        return Estimate(transform, self._agreeing(points, transform), fold_models)
 
     def check_points(
         self, model: Model, executor: Executor, progress: Progress = SILENT
@@ -73,7 +122,7 @@ class LocalSearch:
         surfaces = self._match(
             self.layout.check_centres, self.check_radius_px, model, False, executor, progress
         )
-        return self._points(surfaces, model, is_check=True)
+        return self._points(surfaces, model, None)
 
     def check_surfaces(self, model: Model, centres: NDArray[np.int_]) -> Surfaces:
         """Return the surfaces of check chips, shape (n, 2 r + 1, 2 r + 1), to look at."""
@@ -110,21 +159,54 @@ class LocalSearch:
         )
         return matcher.match(centres, self.layout.chip_px, radius_px, executor, progress)
 
-    def _points(self, surfaces: ChipSurfaces, model: Model, *, is_check: bool) -> TiePoints:
+    def _prior(self, coarse: Model) -> Affine:
+        """Return a model of degree 1 on the map as an affine transform of the grid's pixels."""
         grid = self.pair.grid
-        count = len(surfaces.centres)
-        peaks = [find_peak(surface) for surface in surfaces.both]
+        origin, right, down = grid.map_to_pixel(coarse(grid.pixel_to_map([[0, 0], [1, 0], [0, 1]])))
+        along, across = right - origin, down - origin
+        return Affine(along[0], across[0], origin[0], along[1], across[1], origin[1])
+
+    def _points(
+        self, surfaces: ChipSurfaces, model: Model, expected_px: FloatArray | None
+    ) -> TiePoints:
+        """Return the surfaces' peaks: near the expected shifts, or anywhere for check points."""
+
+        def peaks(of: Surfaces) -> list[Evidence]:
+            if expected_px is None:
+                return [find_peak(surface) for surface in of]
+            pairs = zip(of, expected_px, strict=True)
+            return [find_peak_near(surface, shift, _NEAR_PX) for surface, shift in pairs]
+
+        def shifts(of: Surfaces) -> FloatArray:
+            return np.array([peak.shift_px for peak in peaks(of)]).reshape(-1, 2)
+
+        grid = self.pair.grid
+        found = peaks(surfaces.both)
         centres = surfaces.centres.astype(float)
-        shifts = np.array([peak.shift_px for peak in peaks]).reshape(-1, 2)
-        there = np.array([find_peak(s).shift_px for s in surfaces.forward]).reshape(-1, 2)
-        back = np.array([find_peak(s).shift_px for s in surfaces.backward]).reshape(-1, 2)
+        there = centres + np.array([peak.shift_px for peak in found]).reshape(-1, 2)
+        two_way = np.hypot(*(shifts(surfaces.forward) - shifts(surfaces.backward)).T)
         points = TiePoints(
             reference_xy=grid.pixel_to_map(centres),
-            input_px=self.pair.claimed_px(model(grid.pixel_to_map(centres + shifts))),
-            score=np.array([peak.height for peak in peaks]),
-            covariance_px2=np.array([p.covariance_px2 for p in peaks]).reshape(-1, 2, 2),
-            two_way_error_px=np.hypot(*(there - back).T),
-            is_check=np.full(count, is_check),
-            state=np.full(count, USED),
+            input_px=self.pair.claimed_px(model(grid.pixel_to_map(there))),
+            score=np.array([peak.height for peak in found]),
+            covariance_px2=np.array([p.covariance_px2 for p in found]).reshape(-1, 2, 2),
+            two_way_error_px=two_way,
+            is_check=np.full(len(found), expected_px is None),
+            state=np.full(len(found), USED),
         )
-        return points.reject(np.array([peak.at_border for peak in peaks], bool), "no peak inside")
+        points = points.reject(np.array([peak.at_border for peak in found], bool), "no peak")
+        if expected_px is None:
+            return points
+        limit = f"two-way error above {self.two_way_px:g} px"
+        return points.reject(points.two_way_error_px > self.two_way_px, limit)
+
+    def _agreeing(self, points: TiePoints, transform: Transform) -> TiePoints:
+        """Reject the points of the fit that more likely fell by chance than near the model."""
+        grid = self.pair.grid
+        used = points.used
+        claimed = grid.map_to_pixel(transform.claimed_xy(points.input_px[used]))
+        predicted = grid.map_to_pixel(transform.model(points.reference_xy[used]))
+        mixture = fit_mixture(claimed - predicted, (2 * _NEAR_PX + 1) ** 2, SIGMA_RANGE_PX)
+        wrong = np.zeros(len(points), bool)
+        wrong[used] = ~mixture.right
+        return points.reject(wrong, "disagrees with the model")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .surface import Surface
 
@@ -13,9 +13,6 @@ from .surface import Surface
 # coefficients of 1, x, y, x², xy, y², in rows.
 _Y, _X = (axis.ravel().astype(float) for axis in np.mgrid[-1:2, -1:2])
 _PARABOLOID = np.linalg.pinv(np.column_stack([np.ones(9), _X, _Y, _X**2, _X * _Y, _Y**2]))
-
-# Peaks nearer than this to the first one belong to it.
-_SAME_PEAK_PX = 3
 
 
 @dataclass(frozen=True)
@@ -28,8 +25,6 @@ class Evidence:
         Sub-pixel shift of the peak (x along columns, y along rows).
     height
         Height of the peak in robust standard deviations of the surface.
-    second_ratio
-        Height of the second peak divided by this height.
     covariance_px2
         Covariance of the shift, shape (2, 2), x before y.
     at_border
@@ -38,7 +33,6 @@ class Evidence:
 
     shift_px: tuple[float, float]
     height: float
-    second_ratio: float
     covariance_px2: NDArray[np.float64]
     at_border: bool
 
@@ -53,24 +47,41 @@ def find_peak(surface: Surface) -> Evidence:
     radius = surface.shape[0] // 2
     row, col = (int(i) for i in np.unravel_index(surface.argmax(), surface.shape))
     height = float(surface[row, col])
-    second = _second_height(surface, row, col)
-    ratio = second / height if height > 0 else 1.0
-    at_border = not (0 < row < surface.shape[0] - 1 and 0 < col < surface.shape[1] - 1)
     wide = np.eye(2) * (radius + 1) ** 2 / 3.0
+    whole = (float(col - radius), float(row - radius))
+    at_border = not (0 < row < surface.shape[0] - 1 and 0 < col < surface.shape[1] - 1)
     if at_border or height <= 0:
-        return Evidence((col - radius, row - radius), height, ratio, wide, True)
+        return Evidence(whole, height, wide, True)
     patch = surface[row - 1 : row + 2, col - 1 : col + 2].ravel().astype(float)
     _, bx, by, axx, axy, ayy = _PARABOLOID @ patch
     hessian = np.array([[2 * axx, axy], [axy, 2 * ayy]])
     if np.linalg.det(hessian) <= 0 or axx >= 0:
-        return Evidence((col - radius, row - radius), height, ratio, wide, False)
-    offset = np.clip(-np.linalg.solve(hessian, [bx, by]), -1, 1)
-    shift = (float(col - radius + offset[0]), float(row - radius + offset[1]))
-    return Evidence(shift, height, ratio, np.linalg.inv(-hessian) / height, False)
+        return Evidence(whole, height, wide, False)
+    dx, dy = np.clip(-np.linalg.solve(hessian, [bx, by]), -1, 1)
+    shift = (whole[0] + float(dx), whole[1] + float(dy))
+    return Evidence(shift, height, np.linalg.inv(-hessian) / height, False)
 
 
-def _second_height(surface: Surface, row: int, col: int) -> float:
-    rest = surface.copy()
-    near = (max(row - _SAME_PEAK_PX, 0), max(col - _SAME_PEAK_PX, 0))
-    rest[near[0] : row + _SAME_PEAK_PX + 1, near[1] : col + _SAME_PEAK_PX + 1] = -np.inf
-    return float(rest.max(initial=0.0))
+def find_peak_near(surface: Surface, expected_px: ArrayLike, within_px: int) -> Evidence:
+    """Return the evidence of the highest peak near an expected shift.
+
+    Parameters
+    ----------
+    surface
+        Shape (2 r + 1, 2 r + 1).
+    expected_px
+        The shift (x, y).
+    within_px
+        How far the peak may lie from it along each axis; it counts as `at_border` if it does not
+        lie inside, or if this area reaches beyond the surface.
+    """
+    radius = surface.shape[0] // 2
+    col, row = (int(round(float(e))) for e in np.asarray(expected_px))
+    reach = radius - within_px
+    middle_col, middle_row = (min(max(c, -reach), reach) for c in (col, row))
+    top, left = middle_row + radius - within_px, middle_col + radius - within_px
+    span = 2 * within_px + 1
+    found = find_peak(surface[top : top + span, left : left + span])
+    beyond = (middle_col, middle_row) != (col, row)
+    shift = (found.shift_px[0] + middle_col, found.shift_px[1] + middle_row)
+    return replace(found, shift_px=shift, at_border=found.at_border or beyond)

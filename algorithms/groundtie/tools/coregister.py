@@ -12,7 +12,6 @@ from typing import Annotated, Any
 
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
-from ..geometry.estimation import AUTO
 from ..geometry.models import KINDS
 from ..kinds import Band, Choice, Distance, FileOut, Number, RasterIn, VectorOut
 from ..progress import SILENT, Progress
@@ -20,7 +19,7 @@ from ..quality.report import Report
 from ..rasters.pair import Image, default_radius_m, make_pair
 from ..rasters.reading import RasterSource, open_raster
 from ..search.layout import lay_out_chips
-from ..search.local import LocalSearch
+from ..search.local import AUTO, LocalSearch
 from ..similarity.binning import BINNINGS
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
 from .common import Input, Output, Reference, Resampling, Seed, Workers, worker_count

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import NotRegisteredError, ParameterError, TooFewPointsError
-from ..geometry.estimation import AUTO, Estimate, estimate_transform
+from ..geometry.estimation import Estimate
 from ..geometry.tie_point_files import write_tie_points
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
@@ -28,7 +28,7 @@ from ..rasters.delivery import warp_raster, write_with_geotransform
 from ..rasters.grid import Grid, reproject
 from ..rasters.pair import ImagePair
 from ..rasters.target_grids import registered_grid
-from ..search.local import LocalSearch
+from ..search.local import AUTO, LocalSearch
 from ..search.pyramid import find_coarse_model
 from ..similarity.surface import Surface
 
@@ -127,12 +127,10 @@ def register(
     if coarse is None:
         return Registration(pair, search, None, None, refuse("nothing in common was found"))
     progress.update(0.4, "matching tie points")
-    points = search.fit_points(coarse, executor, progress.part(0.4, 0.8))
-    claimed = Transform.as_claimed(pair.grid.crs, pair.input.source.grid)
     try:
-        estimate = estimate_transform(points, claimed, pair.grid, model, search.fit_radius_px, seed)
+        estimate = search.estimate(coarse, model, seed, executor, progress.part(0.4, 0.8))
     except TooFewPointsError as error:
-        return Registration(pair, search, None, None, refuse(str(error), len(points)))
+        return Registration(pair, search, None, None, refuse(str(error)))
     progress.update(0.8, "checking with points that took no part")
     check = search.check_points(estimate.transform.model, executor, progress.part(0.8, 1.0))
     verdict = judge(estimate, check, pair.grid, max_error_px, search.check_radius_px)

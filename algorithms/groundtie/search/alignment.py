@@ -1,0 +1,226 @@
+"""Fitting a model directly to the similarity surfaces of all chips.
+
+Picking a peak for each chip throws away what weak surfaces know, and what draws single chips, as
+layover does, draws their peaks. Summed along a model, surfaces agree on the ground: the model
+with the largest sum of similarities is sought.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+from scipy.ndimage import spline_filter
+from scipy.optimize import minimize
+
+from ..geometry.models import DEGREE, PARAMETERS, Frame, Model, PolynomialModel, monomials
+from ..geometry.robust import block_folds
+from .matching import Surfaces
+
+FloatArray = NDArray[np.float64]
+
+# Surfaces are blurred by these, one after the other, so that the fit is caught from afar.
+_BLURS_PX = (2.0, 1.0, 0.0)
+
+# From simple to flexible, those that "auto" chooses from; see `choose_alignment`.
+CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3")
+
+# Chips for each parameter below which a model is not considered.
+_CHIPS_PER_PARAMETER = 2
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """A model that was fitted to surfaces.
+
+    Parameters
+    ----------
+    model
+        From pixel positions of the matching grid to where the input claims them to be, in pixels
+        of the same grid.
+    fold_models
+        The same fitted without one block of chips after the other, to tell how the model varies.
+    left_out_score
+        Mean similarity at chips that were left out of the fit, for the models compared.
+    """
+
+    model: Model
+    fold_models: tuple[Model, ...]
+    left_out_score: dict[str, float]
+
+
+@dataclass(frozen=True)
+class _Field:
+    """Surfaces that can be looked up anywhere: B-spline coefficients of blurred surfaces.
+
+    `px` are the chips' centres, (n, 2); `to_shift` takes claimed pixel positions to places on
+    the resampled input, whose distance from the centre is the shift.
+    """
+
+    px: FloatArray
+    coefficients: FloatArray
+    to_shift: Affine
+
+    def take(self, which: NDArray[np.bool_]) -> _Field:
+        return _Field(self.px[which], self.coefficients[which], self.to_shift)
+
+    def scores(self, claimed: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return similarity, (n,), at claimed positions, and its gradient to these, (n, 2)."""
+        t = self.to_shift
+        linear = np.array([[t.a, t.b], [t.d, t.e]])
+        shift = claimed @ linear.T + [t.c, t.f] - self.px
+        radius = self.coefficients.shape[1] // 2
+        # Beyond the window a surface says nothing and pulls nowhere.
+        place = np.clip(shift + radius, 1.0, 2 * radius - 1.001)
+        inside = np.all(place == shift + radius, axis=1)
+        whole = np.floor(place).astype(int)
+        (wx, dx), (wy, dy) = (_cubic_weights(place[:, k] - whole[:, k]) for k in (0, 1))
+        taps = np.arange(-1, 3)
+        rows, cols = whole[:, 1, None] + taps, whole[:, 0, None] + taps
+        patch = self.coefficients[
+            np.arange(len(place))[:, None, None], rows[:, :, None], cols[:, None, :]
+        ]
+        value = np.einsum("nij,ni,nj->n", patch, wy, wx)
+        along_x = np.einsum("nij,ni,nj->n", patch, wy, dx)
+        along_y = np.einsum("nij,ni,nj->n", patch, dy, wx)
+        slope = np.where(inside[:, None], np.column_stack([along_x, along_y]), 0.0)
+        return np.where(inside, value, 0.0), slope @ linear
+
+
+def align(
+    kind: str, px: NDArray[np.int_], surfaces: Surfaces, prior: Affine, start: Model
+) -> Alignment:
+    """Fit a polynomial model to surfaces.
+
+    Parameters
+    ----------
+    kind
+        One of `models.DEGREE`.
+    px
+        The chips' centres in the matching grid, shape (n, 2).
+    surfaces
+        Their similarity, unsupported by neighbours, shape (n, 2 r + 1, 2 r + 1).
+    prior
+        From grid pixels to claimed grid pixels: what the input was resampled by for matching.
+    start
+        A model to start from, from grid pixels to claimed grid pixels.
+    """
+    fields = [_field(px, surfaces, prior, blur) for blur in _BLURS_PX]
+    frame = Frame.around(px.astype(float))
+    parameters = _starting(kind, frame, fields[0].px, start)
+    for field in fields:
+        parameters = _maximise(kind, frame, field, parameters)
+    folds = block_folds(fields[0].px)
+    sharp = fields[-1]
+    models, score = [], 0.0
+    for fold in np.unique(folds):
+        left = folds == fold
+        found = _model(kind, frame, _maximise(kind, frame, sharp.take(~left), parameters))
+        models.append(found)
+        score += float(sharp.take(left).scores(found(sharp.px[left]))[0].sum())
+    return Alignment(_model(kind, frame, parameters), tuple(models), {kind: score / len(px)})
+
+
+def choose_alignment(
+    px: NDArray[np.int_], surfaces: Surfaces, prior: Affine, start: Model
+) -> Alignment:
+    """Fit the simplest polynomial model that the surfaces justify.
+
+    A more flexible model is taken only if it raises the similarity at blocks of chips that were
+    left out of its fit by more than the standard error of the rise. Parameters as `align`.
+    """
+    sharp = _field(px, surfaces, prior, 0.0)
+    folds = block_folds(sharp.px)
+    chosen: Alignment | None = None
+    scores: dict[str, float] = {}
+    kept = np.zeros(0)
+    for kind in CANDIDATES:
+        if len(px) < _CHIPS_PER_PARAMETER * PARAMETERS[kind]:
+            break
+        tried = align(kind, px, surfaces, prior, chosen.model if chosen else start)
+        scores |= tried.left_out_score
+        left_out = _left_out_scores(sharp, folds, tried)
+        rise = left_out - kept if chosen else left_out
+        error = float(rise.std(ddof=1) * np.sqrt(len(rise))) if len(rise) > 1 else 0.0
+        if chosen is None or rise.sum() > error:
+            chosen, kept = tried, left_out
+    assert chosen is not None
+    return Alignment(chosen.model, chosen.fold_models, scores)
+
+
+def _left_out_scores(field: _Field, folds: NDArray[np.int_], alignment: Alignment) -> FloatArray:
+    """Return the sum of the similarity over each fold that its model has not seen."""
+    sums = []
+    for fold, model in zip(np.unique(folds), alignment.fold_models, strict=True):
+        part = field.take(folds == fold)
+        sums.append(part.scores(model(part.px))[0].sum())
+    return np.array(sums)
+
+
+def _field(px: NDArray[np.int_], surfaces: Surfaces, prior: Affine, blur_px: float) -> _Field:
+    blurred = (cv2.GaussianBlur(s, (0, 0), blur_px) if blur_px else s for s in surfaces)
+    coefficients = np.stack([spline_filter(s.astype(float), order=3) for s in blurred])
+    return _Field(px.astype(float), coefficients, ~prior)
+
+
+def _cubic_weights(t: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the cubic B-spline's four weights and their derivatives at offsets `t`, (n, 4)."""
+    weights = [(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3]
+    slopes = [-3 * (1 - t) ** 2, 9 * t**2 - 12 * t, -9 * t**2 + 6 * t + 3, 3 * t**2]
+    return np.column_stack(weights) / 6, np.column_stack(slopes) / 6
+
+
+def _maximise(kind: str, frame: Frame, field: _Field, start: FloatArray) -> FloatArray:
+    design = monomials(frame.enter(field.px), DEGREE[kind])
+    scale = frame.to_map.a
+
+    def cost(parameters: FloatArray) -> tuple[float, FloatArray]:
+        coefficients, jacobian = _coefficients(kind, parameters)
+        claimed = field.px + scale * (design @ coefficients)
+        value, slope = field.scores(claimed)
+        gradient = (scale * design.T @ slope).ravel()
+        return -float(value.sum()), -(gradient @ jacobian)
+
+    found = minimize(cost, start, jac=True, method="L-BFGS-B")
+    return np.asarray(found.x)
+
+
+def _coefficients(kind: str, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a model's coefficients, (terms, 2), and their derivatives, (2 terms, parameters)."""
+    if kind == "rigid":
+        x, y, angle = parameters
+        cosine, sine = np.cos(angle), np.sin(angle)
+        jacobian = np.zeros((6, 3))
+        jacobian[0, 0] = jacobian[1, 1] = 1
+        jacobian[2:, 2] = [-sine, cosine, -cosine, -sine]
+        return np.array([[x, y], [cosine - 1, sine], [-sine, cosine - 1]]), jacobian
+    if kind == "similarity":
+        x, y, growth, turn = parameters
+        jacobian = np.zeros((6, 4))
+        jacobian[0, 0] = jacobian[1, 1] = 1
+        jacobian[2:, 2] = [1, 0, 0, 1]
+        jacobian[2:, 3] = [0, 1, -1, 0]
+        return np.array([[x, y], [growth, turn], [-turn, growth]]), jacobian
+    return parameters.reshape(-1, 2), np.eye(len(parameters))
+
+
+def _starting(kind: str, frame: Frame, px: FloatArray, start: Model) -> FloatArray:
+    """Return the parameters of the model of a kind that is nearest to another model."""
+    target = (start(px) - px) / frame.to_map.a
+    design = monomials(frame.enter(px), DEGREE[kind])
+    coefficients = np.linalg.lstsq(design, target, rcond=None)[0]
+    if kind not in ("rigid", "similarity"):
+        return np.asarray(coefficients.ravel())
+    growth = (coefficients[1, 0] + coefficients[2, 1]) / 2
+    turn = (coefficients[1, 1] - coefficients[2, 0]) / 2
+    shift = list(coefficients[0])
+    if kind == "rigid":
+        return np.array([*shift, np.arctan2(turn, 1 + growth)])
+    return np.array([*shift, growth, turn])
+
+
+def _model(kind: str, frame: Frame, parameters: FloatArray) -> Model:
+    return PolynomialModel(kind, frame, _coefficients(kind, parameters)[0])
