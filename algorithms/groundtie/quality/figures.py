@@ -1,4 +1,4 @@
-"""The figures of a report: overviews, residuals on the map, errors and similarity surfaces.
+"""The figures of a report: residuals on the map, and errors at check points.
 
 matplotlib takes half a second to import, so only the functions that draw with it import it. They
 use its `Figure` alone, never pyplot, whose state is global: QGIS runs tools in threads.
@@ -6,23 +6,18 @@ use its `Figure` alone, never pyplot, whose state is global: QGIS runs tools in 
 
 from __future__ import annotations
 
-import base64
 import io
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline
 
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid
-from ..rasters.patch import Patch
-from ..similarity.surface import Surface
+from .pictures import data_uri
 from .verdict import TOLERANCE_PX, Verdict
 
 if TYPE_CHECKING:
@@ -30,27 +25,15 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Picture = NDArray[np.uint8]
-ToPixel = Callable[[FloatArray], FloatArray]
-
-# Longer side of the overviews, and of the faint one under the residuals.
-OVERVIEW_PX = 900
-BACKDROP_PX = 600
-
-# Three overviews and a backdrop of this size in base64, and some figures, stay below 2 MB.
-LARGEST_JPEG_BYTES = 330_000
 
 # Told apart by people with any colour vision (Okabe & Ito 2008).
 FIT_COLOUR = "#0072b2"
 CHECK_COLOUR = "#d55e00"
 REJECTED_COLOUR = "#7a7a7a"
 
-_JPEG_QUALITIES = (85, 75, 60, 45, 30, 15)
-_NO_DATA_GREY = 226
-_BACKDROP_STRENGTH = 0.4
-
-# A side of the lattice on which an overview follows a transform.
-_NODES = 33
+# The typical residual is that of so many check points at least, and no smaller than this.
+_FEWEST = 3
+_SMALLEST_PX = 0.01
 
 _ROUND_NUMBERS = (1.0, 2.0, 5.0)
 
@@ -134,9 +117,12 @@ def residual_arrows(residuals: Residuals, grid: Grid) -> Arrows:
     """Exaggerate residuals by a round factor so that the typical one is well visible."""
     side = max(grid.width, grid.height)
     # A flexible model leaves next to nothing at the points of its own fit.
-    believed = residuals.agreeing if residuals.agreeing.any() else residuals.used
-    typical = float(np.median(residuals.length_px[believed])) if believed.any() else 0.0
-    factor = max(_round_down(0.04 * side / typical), 1.0) if typical > 0 else 1.0
+    held_out = residuals.agreeing.sum() >= _FEWEST
+    believed = residuals.agreeing if held_out else residuals.used
+    factor = 1.0
+    if believed.any():
+        typical = max(float(np.median(residuals.length_px[believed])), _SMALLEST_PX)
+        factor = max(_round_down(0.04 * side / typical), 1.0)
     return Arrows(
         residuals.position_px,
         residuals.residual_px * factor,
@@ -167,74 +153,11 @@ def rayleigh_counts(at_px: FloatArray, width_px: float, verdict: Verdict) -> Flo
     return np.asarray(density * width_px * verdict.check_points_agreeing / share_agreeing)
 
 
-def overview_grid(grid: Grid, longest_px: int = OVERVIEW_PX) -> Grid:
-    """Return a grid with larger pixels, if need be, so that no side is longer than this."""
-    factor = max(grid.width, grid.height) / longest_px
-    return grid.scaled(factor) if factor > 1 else grid
-
-
-def overview_positions(to_input_px: ToPixel, grid: Grid) -> ToPixel:
-    """Return a fast stand-in for a transform, good to a fraction of an overview's pixel.
-
-    A spline with hundreds of knots would take longer than all the rest of the report.
-    """
-    cols, rows = (np.linspace(-0.5, side - 0.5, _NODES) for side in (grid.width, grid.height))
-    nodes = np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2)
-    px = to_input_px(grid.pixel_to_map(nodes))
-    if not np.isfinite(px).all():
-        return to_input_px
-    splines = [
-        RectBivariateSpline(rows, cols, axis.reshape(_NODES, _NODES), s=0) for axis in px.T
-    ]
-
-    def positions(xy: FloatArray) -> FloatArray:
-        at = grid.map_to_pixel(xy)
-        return np.column_stack([spline.ev(at[:, 1], at[:, 0]) for spline in splines])
-
-    return positions
-
-
-def grey_picture(patch: Patch) -> Picture:
-    """Stretch the grey values between the 2nd and 98th percentile; no data becomes light grey."""
-    picture = np.full(patch.values.shape, _NO_DATA_GREY, np.uint8)
-    values = patch.values[patch.valid]
-    if values.size:
-        low, high = np.percentile(values, (2, 98))
-        if low == high:
-            low, high = low - 0.5, high + 0.5
-        picture[patch.valid] = np.clip((values - low) / (high - low) * 255, 0, 255)
-    return picture
-
-
-def backdrop(picture: Picture) -> Picture:
-    """Return a picture small and faint enough to draw on."""
-    factor = min(BACKDROP_PX / max(picture.shape), 1.0)
-    size = [max(round(side * factor), 1) for side in picture.shape[::-1]]
-    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-    return np.asarray(255 - (255 - small.astype(np.float32)) * _BACKDROP_STRENGTH, np.uint8)
-
-
-def jpeg_uri(picture: Picture) -> str:
-    """Return a grey picture as a data URI, in the best quality that is not too large."""
-    for quality in _JPEG_QUALITIES:
-        data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
-        if len(data) <= LARGEST_JPEG_BYTES:
-            break
-    return _data_uri("image/jpeg", data)
-
-
-def surface_uri(surface: Surface) -> str:
-    """Return a similarity surface as the data URI of a PNG, one pixel a shift."""
-    levels = cv2.normalize(surface, None, 0, 255, cv2.NORM_MINMAX, cv2.CV_8U)
-    colours = cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS)
-    return _data_uri("image/png", cv2.imencode(".png", colours)[1].tobytes())
-
-
 def svg_uri(figure: Figure) -> str:
     """Return a figure as the data URI of an SVG without background."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
-    return _data_uri("image/svg+xml", buffer.getvalue())
+    return data_uri("image/svg+xml", buffer.getvalue())
 
 
 def residual_map(residuals: Residuals, grid: Grid) -> Figure:
@@ -273,7 +196,7 @@ def error_histogram(residuals: Residuals, verdict: Verdict, metres_per_px: float
 
     `metres_per_px` adds a scale in metres; None: there are no metres.
     """
-    axes = _figure(4.6, 3.6).add_subplot()
+    axes = _plot_axes(4.8)
     reach = error_reach_px(residuals, verdict)
     edges = np.linspace(0, reach, 13)
     lengths = residuals.length_px[residuals.check]
@@ -284,7 +207,7 @@ def error_histogram(residuals: Residuals, verdict: Verdict, metres_per_px: float
         axes.plot(at, expected, color="black", lw=1.5, label="Rayleigh curve of the RMSE")
         axes.axvline(verdict.check_ce90_px, color=FIT_COLOUR, ls="--", lw=1.5, label="CE90")
         axes.set_ylim(top=1.35 * axes.get_ylim()[1])
-        axes.legend(frameon=False, fontsize=8, loc="upper right")
+        axes.legend(edgecolor="white", framealpha=1, fontsize=8, loc="upper right")
     axes.set(xlim=(0, reach), xlabel="error (px)", ylabel="check points")
     axes.yaxis.get_major_locator().set_params(integer=True)
     if metres_per_px is not None:
@@ -299,7 +222,7 @@ def error_scatter(residuals: Residuals, verdict: Verdict) -> Figure:
     """Draw the check points' residuals around zero and the circle that holds 90 % of them."""
     from matplotlib.patches import Circle
 
-    axes = _figure(3.9, 3.6).add_subplot()
+    axes = _plot_axes(3.9)
     reach = error_reach_px(residuals, verdict)
     shown = residuals.check & (residuals.length_px <= reach)
     axes.axhline(0, color="#bbbbbb", lw=0.8, zorder=0)
@@ -315,10 +238,13 @@ def error_scatter(residuals: Residuals, verdict: Verdict) -> Figure:
     return axes.figure
 
 
-def _figure(width_in: float, height_in: float) -> Figure:
+def _plot_axes(width_in: float) -> Any:
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width_in, height_in), layout="constrained")
+    figure = Figure(figsize=(width_in, 3.7))
+    # Fixed margins: a layout engine would draw everything twice.
+    figure.subplots_adjust(left=0.65 / width_in, right=1 - 0.15 / width_in, bottom=0.14, top=0.86)
+    return figure.add_subplot()
 
 
 def _map_axes(grid: Grid) -> Any:
@@ -373,7 +299,3 @@ def _round_down(value: float) -> float:
     """Return the largest of 1, 2, 5, 10, 20, … (0.1, 0.2, …) that is not above a value."""
     decade = 10.0 ** math.floor(math.log10(value))
     return float(max(n for n in _ROUND_NUMBERS if n * decade <= value * (1 + 1e-9)) * decade)
-
-
-def _data_uri(kind: str, data: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"

@@ -24,7 +24,7 @@ from ..rasters.pair import ImagePair
 from ..similarity.evidence import find_peak
 from ..similarity.surface import Surface
 from ..version import __version__
-from . import figures
+from . import figures, pictures
 from .verdict import TOLERANCE_PX, Verdict
 
 _TEMPLATES = Path(__file__).with_name("templates")
@@ -103,17 +103,18 @@ class Report:
             lstrip_blocks=True,
         )
         environment.filters.update(number=_number, percent=_percent)
-        pictures = _Pictures.of(self.pair, self.transform)
+        environment.tests["finite"] = math.isfinite
         return environment.get_template(_PAGE).render(
             title=self.title,
             verdict=self.verdict,
             reference=Path(self.pair.reference.source.path).name,
             input=Path(self.pair.input.source.path).name,
             grid=self.pair.grid,
+            notes=self.pair.notes(),
             metres=_metres_per_px(self.pair.grid),
             model=None if self.transform is None else self.transform.model.kind,
             correction=_Correction.of(self.transform, self.pair.grid),
-            pictures=pictures,
+            pictures=_Pictures.of(self.pair, self.transform),
             residuals=self._residual_figures(),
             tolerance_px=TOLERANCE_PX,
             colours={
@@ -166,18 +167,18 @@ class _Pictures:
 
     @classmethod
     def of(cls, pair: ImagePair, transform: Transform | None) -> _Pictures:
-        grid = figures.overview_grid(pair.grid)
-        reference = figures.grey_picture(pair.reference_patch(grid))
-        claimed = figures.grey_picture(pair.input_patch(grid, pair.claimed_px))
+        grid = pictures.overview_grid(pair.grid)
+        reference = pictures.grey_picture(pair.reference_patch(grid))
+        claimed = pictures.grey_picture(pair.input_patch(grid, pair.claimed_px))
         registered = None
         if transform is not None:
-            to_input_px = figures.overview_positions(transform, grid)
-            registered = figures.grey_picture(pair.input_patch(grid, to_input_px))
+            to_input_px = pictures.overview_positions(transform, grid)
+            registered = pictures.grey_picture(pair.input_patch(grid, to_input_px))
         return cls(
-            figures.jpeg_uri(reference),
-            figures.jpeg_uri(figures.backdrop(reference)),
-            figures.jpeg_uri(claimed),
-            None if registered is None else figures.jpeg_uri(registered),
+            pictures.jpeg_uri(reference),
+            pictures.jpeg_uri(pictures.backdrop(reference)),
+            pictures.jpeg_uri(claimed),
+            None if registered is None else pictures.jpeg_uri(registered),
             grid.width,
             grid.height,
         )
@@ -223,7 +224,7 @@ def _shown_surface(label: str, surface: Surface) -> dict[str, Any]:
     radius = surface.shape[0] // 2
     return {
         "label": label,
-        "uri": figures.surface_uri(surface),
+        "uri": pictures.surface_uri(surface),
         "radius": radius,
         "peak": peak,
         # Where the peak lies in a picture of (2 radius + 1)² unit squares.
