@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import numpy as np
+from raster_files import UTM, utm_grid
+
+from groundtie.geometry.tie_points import TiePoints
+from groundtie.geometry.transform import Transform
+
+GRID = utm_grid(100, 100)
+AS_CLAIMED = Transform.as_claimed(UTM, GRID)
+
+
+def some_points(count: int = 5) -> TiePoints:
+    rng = np.random.default_rng(0)
+    px = rng.uniform(0, 99, (count, 2))
+    return TiePoints(
+        reference_xy=GRID.pixel_to_map(px) + [10, 0],
+        input_px=px,
+        score=np.arange(count, dtype=float),
+        covariance_px2=np.tile(np.eye(2), (count, 1, 1)),
+        two_way_error_px=np.zeros(count),
+        is_check=np.arange(count) % 2 == 0,
+        state=np.array(["used"] * count),
+    )
+
+
+def test_residuals_are_what_was_measured_minus_what_is_predicted() -> None:
+    # The map position is 10 m east of where the input claims it, so the prediction is 1 px on.
+    np.testing.assert_allclose(some_points().residual_px(AS_CLAIMED), [[-1, 0]] * 5, atol=1e-6)
+
+
+def test_rejecting_keeps_the_first_reason() -> None:
+    points = some_points().reject(np.array([1, 0, 0, 1, 0], bool), "too far")
+    points = points.reject(np.array([1, 1, 0, 0, 0], bool), "a much longer reason than before")
+    assert points.state.tolist() == [
+        "rejected: too far",
+        "rejected: a much longer reason than before",
+        "used",
+        "rejected: too far",
+        "used",
+    ]
+    assert points.used.tolist() == [False, False, True, False, True]
+
+
+def test_roles() -> None:
+    assert some_points(3).role.tolist() == ["check", "fit", "check"]
+
+
+def test_taking_and_joining_rows() -> None:
+    points = some_points()
+    joined = TiePoints.concatenate([points.take(points.is_check), points.take(~points.is_check)])
+    assert joined.score.tolist() == [0, 2, 4, 1, 3]
+    assert len(joined) == 5
+    assert joined.covariance_px2.shape == (5, 2, 2)
+    longer = points.reject(points.is_check, "a reason")
+    assert TiePoints.concatenate([points, longer]).state[5] == "rejected: a reason"
+
+
+def test_no_points_at_all() -> None:
+    none = some_points().take(np.zeros(5, bool))
+    assert len(none) == 0
+    assert none.residual_px(AS_CLAIMED).shape == (0, 2)
+    assert none.reject(np.zeros(0, bool), "reason").used.shape == (0,)

@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from affine import Affine
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from raster_files import UTM, utm_grid
+from rasterio.crs import CRS
+
+from groundtie.errors import TransformFileError
+from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.models import KINDS
+from groundtie.geometry.transform import Transform, load_transform
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
+
+GRID = utm_grid(400, 300)
+DEGREES = Grid(Affine(1e-4, 0, 9.0, 0, -1e-4, 45.15), CRS.from_epsg(4326), 400, 300)
+PLAIN = Grid(PIXEL_COORDINATES, None, 400, 300)
+
+
+def misregistered(kind: str, crs: CRS | None, grid: Grid) -> Transform:
+    rng = np.random.default_rng(0)
+    px = rng.uniform(0, 300, (40, 2))
+    claimed = Transform.as_claimed(crs, grid).claimed_xy(px)
+    centre, size = claimed.mean(axis=0), np.ptp(claimed, axis=0).max()
+    shift = 0.02 * size * np.sin((claimed - centre) / size + [0.3, 1.0])
+    return Transform(fit_model(kind, claimed - shift, claimed), crs, grid)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("crs", "grid"), [(UTM, GRID), (UTM, DEGREES), (None, PLAIN)])
+@settings(max_examples=10, deadline=None)
+@given(px=st.lists(st.tuples(st.floats(0, 400), st.floats(0, 300)), min_size=1, max_size=5))
+def test_pixels_to_the_map_and_back(
+    kind: str, crs: CRS | None, grid: Grid, px: list[tuple[float, float]]
+) -> None:
+    transform = misregistered(kind, crs, grid)
+    np.testing.assert_allclose(transform(transform.inverse(px)), px, atol=1e-4)
+
+
+def test_a_shift_moves_the_pixels_by_it() -> None:
+    """Ground at x that the input claims to be at x + (20, -30) m is 2 columns and 3 rows on."""
+    xy = GRID.pixel_to_map([[10, 10], [50, 70], [200, 30]])
+    transform = Transform(fit_model("translation", xy, xy + [20, -30]), UTM, GRID)
+    np.testing.assert_allclose(transform(xy), [[12, 13], [52, 73], [202, 33]], atol=1e-6)
+
+
+def test_as_claimed_believes_the_georeferencing() -> None:
+    transform = Transform.as_claimed(UTM, DEGREES)
+    px = np.array([[0.0, 0.0], [399.0, 299.0]])
+    lonlat = DEGREES.pixel_to_map(px)
+    np.testing.assert_allclose(transform(reproject(lonlat, DEGREES.crs, UTM)), px, atol=1e-4)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("crs", "grid"), [(UTM, GRID), (UTM, DEGREES), (None, PLAIN)])
+def test_to_a_file_and_back(tmp_path: Path, kind: str, crs: CRS | None, grid: Grid) -> None:
+    transform = misregistered(kind, crs, grid)
+    path = tmp_path / "transform.json"
+    path.write_text(json.dumps(transform.to_json()))
+    again = load_transform(path)
+    assert again.crs == crs
+    assert again.input_grid == grid
+    xy = transform.inverse([[5, 6], [300, 200]])
+    np.testing.assert_array_equal(again(xy), transform(xy))
+    assert load_transform(str(path)).model.kind == kind
+
+
+def damaged(**changes: object) -> str:
+    return json.dumps(Transform.as_claimed(UTM, GRID).to_json() | changes)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[]",
+        "{}",
+        "null",
+        damaged(format="groundtie-transform/99"),
+        damaged(model={"kind": "affine"}),
+        damaged(model=None),
+        damaged(crs="EPSG:no"),
+        damaged(input={"crs": None, "geotransform": [1, 2], "width": 3, "height": 4}),
+        "\xff\xfe",
+    ],
+)
+def test_other_files_are_refused_by_name(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "bad.json"
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(TransformFileError, match=r"bad\.json"):
+        load_transform(path)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(TransformFileError, match=r"missing\.json"):
+        load_transform(tmp_path / "missing.json")
