@@ -263,6 +263,7 @@ def test_the_file_is_tiled_compressed_and_has_overviews(tmp_path: Path) -> None:
     assert sorted(os.listdir(tmp_path)) == ["a.tif", "out.tif"]
 
 
+@pytest.mark.filterwarnings("ignore::rasterio.errors.NotGeoreferencedWarning")
 def test_pixel_coordinates_stay_without_georeferencing(tmp_path: Path) -> None:
     plain = Grid(PIXEL_COORDINATES, None, 90, 70)
     path = write_raster(tmp_path / "a.tif", IMAGE)
@@ -334,6 +335,15 @@ def test_a_missing_folder(tmp_path: Path) -> None:
     source = open_raster(write_raster(tmp_path / "a.tif", IMAGE, GRID))
     with pytest.raises(OutputError, match="missing"):
         warp_raster(source, GRID.map_to_pixel, GRID, tmp_path / "missing" / "out.tif")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is forbidden to root")
+def test_a_folder_that_cannot_be_written_to(tmp_path: Path) -> None:
+    source = open_raster(write_raster(tmp_path / "a.tif", IMAGE, GRID))
+    folder = tmp_path / "locked"
+    folder.mkdir(mode=0o500)
+    with pytest.raises(OutputError, match="locked"):
+        warp_raster(source, GRID.map_to_pixel, GRID, folder / "out.tif")
 
 
 @pytest.mark.parametrize("dtype", ["uint8", "uint16", "int32", "float32", "complex64"])

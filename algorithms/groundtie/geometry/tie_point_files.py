@@ -197,7 +197,7 @@ def _write_gpkg(path: Path, points: TiePoints, transform: Transform) -> None:
         # SQLite may meet a full disk in silence.
         with fiona.open(path, layer=_LAYER) as layer:
             complete = len(layer) == len(rows)
-    except (TransactionError, CPLE_BaseError):
+    except (TransactionError, CPLE_BaseError, RuntimeError):
         complete = False
     if not complete:
         raise OSError("the file is not complete; is the disk full?")
