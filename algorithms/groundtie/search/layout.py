@@ -112,13 +112,18 @@ class ChipLayout:
         on_line_row = np.arange(len(rows)) % self.parts == 0
         grid_cols, grid_rows = np.meshgrid(cols, rows)
         on_line = on_line_row[:, None] | on_line_col[None, :]
-        return np.round(np.column_stack([grid_cols[on_line], grid_rows[on_line]])).astype(int)
+        return self._whole(np.column_stack([grid_cols[on_line], grid_rows[on_line]]))
 
     @cached_property
     def check_centres(self) -> NDArray[np.int_]:
         """Centres (col, row) of the check chips, shape (n, 2)."""
         cols, rows = np.meshgrid(self.columns.check_centres(), self.rows.check_centres())
-        return np.round(np.column_stack([cols.ravel(), rows.ravel()])).astype(int)
+        return self._whole(np.column_stack([cols.ravel(), rows.ravel()]))
+
+    def _whole(self, centres: NDArray[np.float64]) -> NDArray[np.int_]:
+        """Return the middle pixels of the chips whose pixels lie best around centres."""
+        corners = np.round(centres - (self.chip_px - 1) / 2).astype(int)
+        return np.asarray(corners + self.chip_px // 2)
 
     def held_out(self, positions_px: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which positions (col, row), shape (n, 2), are held out of the fit."""

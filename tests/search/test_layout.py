@@ -1,0 +1,158 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from raster_files import utm_grid, write_raster
+
+from groundtie.errors import NoOverlapError
+from groundtie.rasters.pair import Image, ImagePair
+from groundtie.rasters.reading import RasterSource, open_raster
+from groundtie.search.layout import Axis, ChipLayout, default_chip_px, lay_out_chips
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> RasterSource:
+    path = tmp_path_factory.mktemp("layout") / "any.tif"
+    return open_raster(write_raster(path, np.ones((4, 4), np.uint8), utm_grid(4, 4)))
+
+
+def laid_out(
+    source: RasterSource,
+    size: tuple[int, int],
+    chip: int | None = None,
+    spacing: float | None = None,
+    overlap: tuple[int, int] | None = None,
+) -> ChipLayout:
+    pair = ImagePair(Image(source), Image(source), utm_grid(*size), overlap or size)
+    return lay_out_chips(pair, chip, spacing)
+
+
+def pixels_of(centres: np.ndarray, layout: ChipLayout, size: tuple[int, int]) -> np.ndarray:
+    """Return the mask of the pixels that lie in any of the chips."""
+    mask = np.zeros(size[::-1], bool)
+    for col, row in centres - layout.chip_px // 2:
+        mask[row : row + layout.chip_px, col : col + layout.chip_px] = True
+    return mask
+
+
+def held_out_of(layout: ChipLayout, size: tuple[int, int]) -> np.ndarray:
+    return layout.held_out_mask(np.arange(size[0], dtype=float), np.arange(size[1], dtype=float))
+
+
+SIZES = st.tuples(st.integers(200, 900), st.integers(200, 900))
+CHIPS = st.one_of(st.none(), st.integers(16, 66))
+SPACINGS = st.one_of(st.none(), st.floats(5, 200))
+
+
+@settings(max_examples=100, deadline=None)
+@given(size=SIZES, chip=CHIPS, spacing=SPACINGS)
+def test_check_chips_share_no_pixel_with_the_fit_nor_leave_the_grid(
+    source: RasterSource, size: tuple[int, int], chip: int | None, spacing: float | None
+) -> None:
+    layout = laid_out(source, size, chip, spacing)
+    assert layout.chip_px == (chip or default_chip_px(*size))
+    for centres in (layout.fit_centres, layout.check_centres):
+        corners = centres - layout.chip_px // 2
+        assert corners.min() >= 0
+        assert (corners <= np.array(size) - layout.chip_px).all()
+    fit = pixels_of(layout.fit_centres, layout, size)
+    check = pixels_of(layout.check_centres, layout, size)
+    held_out = held_out_of(layout, size)
+    assert not (fit & held_out).any()
+    assert not (fit & check).any()
+    # Just the outermost pixels of a check chip may lie on the border of its block.
+    assert (check & ~held_out).sum() <= 4 * layout.chip_px * len(layout.check_centres)
+    assert held_out[tuple(layout.check_centres.T[::-1])].all()
+
+
+@settings(max_examples=50, deadline=None)
+@given(size=SIZES, chip=CHIPS, spacing=SPACINGS)
+def test_a_quarter_of_the_scene_is_held_out_and_chips_of_the_fit_hold_the_model(
+    source: RasterSource, size: tuple[int, int], chip: int | None, spacing: float | None
+) -> None:
+    """Half of each side of every cell is held out; chips of the fit reach into every corner."""
+    layout = laid_out(source, size, chip, spacing)
+    cells = np.array([layout.columns.cells, layout.rows.cells])
+    inner = np.array(size) - layout.chip_px
+    expected = inner.prod() / 4
+    # Each side of a block is right to a pixel.
+    slack = (inner / 2 + cells).prod() - expected
+    assert abs(held_out_of(layout, size).sum() - expected) <= slack
+    corners = layout.fit_centres - layout.chip_px // 2
+    assert corners.min(axis=0).tolist() == [0, 0]
+    assert corners.max(axis=0).tolist() == list(inner)
+    assert len(np.unique(layout.fit_centres, axis=0)) == len(layout.fit_centres)
+    assert len(np.unique(layout.check_centres, axis=0)) == len(layout.check_centres)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    size=SIZES,
+    px=st.lists(st.tuples(st.floats(-20, 920), st.floats(-20, 920)), min_size=1, max_size=20),
+)
+def test_positions_and_masks_agree_on_what_is_held_out(
+    source: RasterSource, size: tuple[int, int], px: list[tuple[float, float]]
+) -> None:
+    layout = laid_out(source, size)
+    positions = np.array(px)
+    mask = layout.held_out_mask(positions[:, 0], positions[:, 1])
+    np.testing.assert_array_equal(mask.diagonal(), layout.held_out(positions))
+
+
+def test_the_middle_half_of_each_cell_is_held_out() -> None:
+    """A side of 110 px with chips of 10 and 2 cells: lines at 4.5, 54.5 and 104.5."""
+    axis = Axis(size=110, chip=10, cells=2)
+    held_out = axis.held_out(np.arange(110.0))
+    expected = np.zeros(110, bool)
+    expected[18:42] = expected[68:92] = True
+    np.testing.assert_array_equal(held_out, expected)
+    np.testing.assert_allclose(axis.lattice(2), [4.5, 29.5, 54.5, 79.5, 104.5])
+    # Half a cell is 25 px wide: two chips of 10 fit, flush with its borders.
+    np.testing.assert_allclose(axis.check_centres(), [22, 37, 72, 87])
+    one_each = Axis(size=110, chip=20, cells=2)
+    np.testing.assert_allclose(one_each.check_centres(), [32, 77])
+
+
+@pytest.mark.parametrize(
+    ("size", "chip"),
+    [((100, 100), 32), ((160, 2000), 32), ((500, 400), 55), ((1000, 1000), 76), ((9e4, 8e4), 128)],
+)
+def test_chips_grow_with_the_scene(size: tuple[int, int], chip: int) -> None:
+    assert default_chip_px(*size) == chip
+
+
+def test_large_scenes_do_not_get_more_cells(source: RasterSource) -> None:
+    layout = laid_out(source, (20_000, 10_000))
+    assert (layout.columns.cells, layout.rows.cells) == (6, 6)
+    assert 50 <= len(layout.check_centres) <= 144
+    assert len(layout.fit_centres) <= 200
+
+
+def test_cells_are_counted_over_the_overlap_not_over_the_search_margin(
+    source: RasterSource,
+) -> None:
+    """Where the overlap is a half of the grid, the grid has twice as many cells."""
+    layout = laid_out(source, (20_000, 20_000), overlap=(10_000, 20_000))
+    assert (layout.columns.cells, layout.rows.cells) == (12, 6)
+
+
+@pytest.mark.parametrize("spacing", [20.0, 40.0, 90.0])
+def test_chips_of_the_fit_are_as_far_apart_as_asked_for(
+    source: RasterSource, spacing: float
+) -> None:
+    layout = laid_out(source, (1400, 1100), chip=32, spacing=spacing)
+    assert layout.spacing_px == pytest.approx(spacing, rel=0.15)
+    along_first_row = np.sort(layout.fit_centres[layout.fit_centres[:, 1] == 16][:, 0])
+    assert np.diff(along_first_row).mean() == pytest.approx(spacing, rel=0.15)
+
+
+@pytest.mark.parametrize(("size", "chip"), [((95, 95), None), ((500, 95), None), ((280, 400), 100)])
+def test_too_small_an_overlap_is_refused(
+    source: RasterSource, size: tuple[int, int], chip: int | None
+) -> None:
+    with pytest.raises(NoOverlapError, match=rf"any\.tif.*{size[0]} × {size[1]} matching pixels"):
+        laid_out(source, size, chip)
+    smallest = laid_out(source, (96, 96))
+    assert len(smallest.check_centres) >= 1

@@ -1,0 +1,94 @@
+"""Pairs of images of one texture, opposite in contrast, with an exactly known misregistration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from raster_files import utm_grid, write_raster
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from groundtie.geometry.models import Frame, Model, PolynomialModel
+from groundtie.geometry.transform import Transform
+from groundtie.rasters.grid import Grid
+from groundtie.rasters.pair import Image, ImagePair, make_pair
+from groundtie.rasters.reading import open_raster
+
+FloatArray = NDArray[np.float64]
+
+# The texture goes on beyond the reference by this, in reference pixels.
+_MARGIN_PX = 40
+
+
+def texture(height: int, width: int, seed: int = 0) -> FloatArray:
+    """Return a random texture of fine and coarse detail, mean 0 and standard deviation 1."""
+    rng = np.random.default_rng(seed)
+    total = np.zeros((height, width))
+    for sigma in (1.5, 6.0):
+        layer = gaussian_filter(rng.normal(size=(height, width)), sigma)
+        total += layer / layer.std()
+    return total / total.std()
+
+
+def shift_on_map(dx: float, dy: float) -> Model:
+    """Return the misregistration of a shift, in map units."""
+    return PolynomialModel("translation", Frame.around(np.zeros((1, 2))), np.array([[dx, dy]]))
+
+
+@dataclass(frozen=True)
+class TexturedPair:
+    """Files of a pair, what the reference shows, and the truth between them."""
+
+    reference: Path
+    input: Path
+    reference_values: NDArray[np.uint16]
+    truth: Transform
+
+    @property
+    def grid(self) -> Grid:
+        """The reference's grid."""
+        return utm_grid(*self.reference_values.shape[::-1])
+
+    @contextmanager
+    def opened(self) -> Iterator[ImagePair]:
+        with open_raster(self.reference) as reference, open_raster(self.input) as input:
+            yield make_pair(Image(reference), Image(input))
+
+
+def write_textured_pair(
+    folder: Path,
+    size: tuple[int, int],
+    model: Model,
+    *,
+    input_pixel_ratio: float = 1.0,
+    noise: float = 0.3,
+    seed: int = 0,
+    input_seed: int | None = None,
+) -> TexturedPair:
+    """Write a pair of which `model` is the misregistration, in metres; reference pixels are 10 m.
+
+    `input_seed` makes the input show another place.
+    """
+    width, height = size
+    grid = utm_grid(width, height)
+    truth = Transform(model, grid.crs, grid.scaled(input_pixel_ratio))
+    rng = np.random.default_rng(seed + 1000)
+    canvas = texture(height + 2 * _MARGIN_PX, width + 2 * _MARGIN_PX, seed)
+    shown = canvas[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX]
+    reference = 1000 + 200 * (shown + noise * rng.normal(size=shown.shape))
+    if input_seed is not None:
+        canvas = texture(*canvas.shape, input_seed)
+    own = truth.input_grid
+    px = np.stack(np.meshgrid(np.arange(own.width), np.arange(own.height)), -1).reshape(-1, 2)
+    ground = grid.map_to_pixel(truth.inverse(px)) + _MARGIN_PX
+    seen = map_coordinates(canvas, ground[:, ::-1].T, mode="nearest").reshape(own.height, own.width)
+    input = 2000 - 300 * (seen + noise * rng.normal(size=seen.shape))
+    paths = folder / "reference.tif", folder / "input.tif"
+    values = [np.clip(image, 1, 65_535).astype(np.uint16) for image in (reference, input)]
+    for path, image, place in zip(paths, values, (grid, own), strict=True):
+        write_raster(path, image, place)
+    return TexturedPair(*paths, values[0], truth)
