@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any
 
 import pytest
@@ -12,7 +14,7 @@ from toys import TOY, toy
 from groundtie.declaration import Output, Parameter, tool, tool_of
 from groundtie.errors import OutputError, ParameterError, SameFileError
 from groundtie.kinds import Flag, Number, RasterIn
-from groundtie.progress import Progress
+from groundtie.progress import SILENT, Progress
 
 
 @pytest.fixture
@@ -125,6 +127,27 @@ def test_a_tool_needs_no_paragraphs_beyond_its_summary() -> None:
         """Do little."""
 
     assert (tool_of(short).summary, tool_of(short).description) == ("Do little.", "")
+
+
+def test_a_tool_may_ask_for_all_its_values_at_once() -> None:
+    seen: dict[str, Any] = {}
+
+    @tool(title="Curious", group="Toys")
+    def curious(
+        fast: Annotated[bool, Flag(label="Fast", help="Fast.")] = False,
+        size: Annotated[float, Number(label="Size", help="Size.")] = 2,
+        progress: Progress = SILENT,
+        parameters: Mapping[str, Any] = MappingProxyType({}),
+    ) -> Any:
+        """Tell its values."""
+        seen.update(parameters)
+
+    curious(size=3)
+    assert seen == {"fast": False, "size": 3.0}
+    assert [p.name for p in tool_of(curious).parameters] == ["fast", "size"]
+    assert list(inspect.signature(curious).parameters) == ["fast", "size", "progress"]
+    with pytest.raises(ParameterError, match="curious has no parameter parameters"):
+        curious(parameters={"fast": True})
 
 
 def test_a_missing_value_is_named() -> None:

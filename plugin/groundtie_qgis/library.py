@@ -5,6 +5,8 @@ from __future__ import annotations
 import configparser
 import importlib
 import importlib.util
+import re
+import warnings
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
@@ -29,7 +31,8 @@ def library_name() -> str:
         installed = metadata.version("groundtie")
     except metadata.PackageNotFoundError:
         return BUNDLED
-    return "groundtie" if installed == plugin_metadata()["version"] else BUNDLED
+    same = installed == plugin_metadata()["version"]
+    return "groundtie" if same and importlib.util.find_spec("groundtie") else BUNDLED
 
 
 def library_module(name: str) -> ModuleType:
@@ -39,6 +42,8 @@ def library_module(name: str) -> ModuleType:
 
 def all_tools() -> tuple[Any, ...]:
     """Return the declarations of all tools."""
+    # what dependencies say to the library's developers is nothing for QGIS's log
+    warnings.filterwarnings("ignore", module=rf"{re.escape(library_name())}\b")
     return tuple(library_module("tools").TOOLS)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 from qgis.core import (
@@ -11,6 +10,7 @@ from qgis.core import (
     QgsProcessingLayerPostProcessorInterface,
     QgsVectorLayer,
 )
+from qgis.PyQt import sip
 
 from .compat import LINE
 from .library import FOLDER
@@ -38,13 +38,14 @@ class Styler(QgsProcessingLayerPostProcessorInterface):
             feedback.pushWarning(f"the layer {layer.name()} is not styled: {message}")
 
 
-# QGIS does not own a post-processor: the cache keeps it until QGIS calls it.
-_styler = functools.cache(Styler)
+# The context deletes the post-processor at its end; until then its Python half must be kept.
+_kept: list[Styler] = []
 
 
 def style_when_loaded(name: str, path: str, context: QgsProcessingContext) -> None:
     """Have the layer of output parameter `name`, written to `path`, styled if it is loaded."""
     style = FOLDER / "styles" / f"{name}.qml"
     if style.exists() and context.willLoadLayerOnCompletion(path):
-        details = context.layerToLoadOnCompletionDetails(path)
-        details.setPostProcessor(_styler(str(style)))
+        styler = Styler(str(style))
+        _kept[:] = [kept for kept in _kept if not sip.isdeleted(kept)] + [styler]
+        context.layerToLoadOnCompletionDetails(path).setPostProcessor(styler)

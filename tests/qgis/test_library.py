@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+import warnings
 from importlib import metadata
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,6 +35,30 @@ def test_an_installed_library_of_the_same_version_wins(
 
     monkeypatch.setattr(metadata, "version", version)
     assert library.library_name() == expected
+
+
+def test_what_is_installed_but_cannot_be_found_does_not_win(
+    plugin: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from groundtie_qgis import library
+
+    def find_spec(name: str) -> object:
+        return object() if name == library.BUNDLED else None
+
+    monkeypatch.setattr(metadata, "version", lambda name: library.plugin_metadata()["version"])
+    monkeypatch.setattr(library.importlib.util, "find_spec", find_spec)
+    assert library.library_name() == library.BUNDLED
+
+
+def test_warnings_meant_for_developers_stay_out_of_the_log(plugin: Any) -> None:
+    from groundtie_qgis import library
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.resetwarnings()
+        library.all_tools()
+        for module in (f"{library.library_name()}.rasters.grid", "groundtie_qgis.adapter"):
+            warnings.warn_explicit("old", DeprecationWarning, "file.py", 1, module=module)
+    assert len(caught) == 1
 
 
 def test_a_source_tree_has_the_library_elsewhere(

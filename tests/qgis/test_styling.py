@@ -162,3 +162,30 @@ def test_only_layers_to_be_loaded_get_a_post_processor(
     style_when_loaded(name, path, context)
     processor = context.layerToLoadOnCompletionDetails(path).postProcessor() if wanted else None
     assert (processor is not None) == styled
+
+
+def test_every_run_has_a_post_processor_of_its_own(plugin: Any, tmp_path: Path) -> None:
+    from groundtie_qgis import styling
+    from qgis.core import QgsProcessingContext, QgsProject
+
+    path = str(tmp_path / "points.gpkg")
+
+    def context_with_style() -> Any:
+        context = QgsProcessingContext()
+        details = QgsProcessingContext.LayerDetails("points", QgsProject.instance(), "points")
+        context.addLayerToLoadOnCompletion(path, details)
+        styling.style_when_loaded("tie_points", path, context)
+        return context
+
+    first = context_with_style()
+    del first  # QGIS deletes the post-processor with its context
+    second, third = context_with_style(), context_with_style()
+    processors = [
+        context.layerToLoadOnCompletionDetails(path).postProcessor() for context in (second, third)
+    ]
+    assert processors == styling._kept[-2:]
+    assert processors[0] is not processors[1]
+    del second, third, processors
+    kept = context_with_style()
+    assert len(styling._kept) == 1
+    del kept

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -42,9 +43,11 @@ def pairs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return folders
 
 
-def write(path: Path, bands: np.ndarray, transform: rasterio.Affine) -> None:
+def write(path: Path, bands: np.ndarray, transform: rasterio.Affine | None) -> None:
     count, height, width = bands.shape
-    profile = {"driver": "GTiff", "dtype": "uint8", "crs": "EPSG:32633", "transform": transform}
+    profile = {"driver": "GTiff", "dtype": "uint8"}
+    if transform is not None:
+        profile |= {"crs": "EPSG:32633", "transform": transform}
     with rasterio.open(path, "w", count=count, height=height, width=width, **profile) as raster:
         raster.write(np.clip(bands, 1, 254).astype("uint8"))
 
@@ -131,6 +134,24 @@ def test_warp_makes_what_python_makes(
             np.testing.assert_allclose(
                 qgis.read()[:, 20:-20, 20:-20], given.read()[:, 20:-20, 20:-20], atol=1
             )
+
+
+def test_images_without_georeferencing(
+    qgis_process: Any, pairs: list[Path], tmp_path: Path
+) -> None:
+    for name in ("reference", "input"):
+        with rasterio.open(pairs[0] / f"{name}.tif") as raster:
+            bands = raster.read()
+        write(tmp_path / f"{name}.tif", bands, None)
+    called = qgis_process(
+        *("run", "groundtie:coregister", "--", *QUICK, f"TRANSFORM={tmp_path / 't.json'}"),
+        *words(tmp_path / "reference.tif", tmp_path / "input.tif", tmp_path / "o.tif"),
+    )
+    assert called.returncode == 0
+    assert "Warning" not in called.stderr  # QGIS itself does complain of such layers
+    # pixel coordinates stand for the map: the same place is the same pixel
+    px = np.array([[50.0, 60.0], [300.0, 200.0]])
+    np.testing.assert_allclose(load_transform(tmp_path / "t.json")(px), px, atol=0.3)
 
 
 def test_a_refusal_is_exit_code_1_with_its_reason(
@@ -348,34 +369,71 @@ def test_a_model_chains_the_tools(
         np.testing.assert_array_equal(one.read(), other.read())
 
 
-def wheels() -> Path | None:
-    """Return the site-packages of .venv, with PyPI's wheels, if this Python can load them."""
-    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
-    folder = ROOT / ".venv" / "lib" / version / "site-packages"
-    return folder if (folder / "rasterio" / "proj_data").is_dir() else None
+PROJ_OF_QGIS = {"PROJ_LIB": "/usr/share/proj", "PROJ_DATA": "/usr/share/proj"}
 
 
-@pytest.mark.parametrize("packages", ["the system's", "PyPI's"])
 def test_the_proj_of_qgis_does_no_harm(
-    qgis_process: Any, pairs: list[Path], tmp_path: Path, packages: str
+    qgis_process: Any, pairs: list[Path], tmp_path: Path
 ) -> None:
-    """As QGIS on Windows has it: PROJ_LIB leads to data that a rasterio wheel cannot read."""
-    more = {"PROJ_LIB": "/usr/share/proj", "PROJ_DATA": "/usr/share/proj"}
-    if packages == "PyPI's":
-        folder = wheels()
-        if folder is None:
-            pytest.skip("no .venv of this Python version with a rasterio wheel: make install")
-        more["PYTHONPATH"] = str(folder)
     called = qgis_process(
         *("run", "groundtie:coregister", "--", *QUICK, f"TRANSFORM={tmp_path / 't.json'}"),
         *words(pairs[0] / "reference.tif", pairs[0] / "input.tif", tmp_path / "o.tif"),
-        **more,
+        **PROJ_OF_QGIS,
     )
-    assert called.returncode == 0, called.stderr
+    assert (called.returncode, called.stderr) == (0, "")
     assert_registered(tmp_path / "t.json")
     with rasterio.open(tmp_path / "o.tif") as made:
         assert made.crs.to_epsg() == 32633
 
 
-def test_this_process_was_not_changed() -> None:
-    assert "PROJ_LIB" not in os.environ
+# The simulator looks its CRS up by number, for which PROJ needs its data.
+IN_A_THREAD = """
+import os, sys
+sys.path[:0] = [{plugins!r}]
+from qgis.core import *
+from qgis.PyQt.QtCore import QEventLoop
+app = QgsApplication([], False)
+QgsApplication.initQgis()
+import groundtie_qgis
+plugin = groundtie_qgis.classFactory(None)
+plugin.initProcessing()
+context, feedback, loop, done = QgsProcessingContext(), QgsProcessingFeedback(), QEventLoop(), []
+algorithm = plugin.provider.algorithm("simulate").create()
+task = QgsProcessingAlgRunnerTask(algorithm, {values!r}, context, feedback)
+task.executed.connect(lambda ok, results: (done.append(ok), loop.quit()))
+QgsApplication.taskManager().addTask(task)
+loop.exec_()
+import rasterio
+number = QgsCoordinateReferenceSystem("EPSG:32633").postgisSrid()
+print(done, os.environ["PROJ_LIB"], number, os.path.dirname(rasterio.__file__))
+print(feedback.textLog())
+sys.stdout.flush()
+os._exit(0)
+"""
+
+
+def test_a_wheel_of_rasterio_gets_along_with_the_proj_of_qgis(
+    plugin_folder: Path, tmp_path: Path
+) -> None:
+    """As on Windows: PROJ_LIB leads to data that the PROJ in the wheel cannot read.
+
+    Not by qgis_process: on Linux its GDAL takes the place of the one in the wheel.
+    """
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    packages = ROOT / ".venv" / "lib" / version / "site-packages"
+    if not (packages / "rasterio" / "proj_data").is_dir():
+        pytest.skip("no .venv of this Python version with a rasterio wheel: see make install")
+    values = {"FOLDER": str(tmp_path / "pair"), "SIZE": 128}
+    script = IN_A_THREAD.format(plugins=str(plugin_folder), values=values)
+    called = subprocess.run(
+        [sys.executable, "-c", script],
+        env={**os.environ, **PROJ_OF_QGIS, "PYTHONPATH": str(packages)},
+        text=True,
+        capture_output=True,
+        check=True,
+        timeout=300,
+    )
+    expected = f"[True] /usr/share/proj 32633 {packages / 'rasterio'}"
+    assert called.stdout.splitlines()[0] == expected, called.stdout
+    with rasterio.open(tmp_path / "pair" / "reference.tif") as made:
+        assert made.crs.to_epsg() == 32633
