@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 
-from scipy.special import betaln
-from scipy.stats import binom
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln, logsumexp, xlog1py, xlogy
 
 
 def agreement_probability(tolerance_px: float, radius_px: int) -> float:
@@ -30,7 +31,9 @@ def log10_chance(agreeing: int, total: int, probability: float) -> float:
     """Return log10 of the probability that so many of `total` random matches agree, or more."""
     if total == 0 or agreeing == 0:
         return 0.0
-    return float(binom.logsf(agreeing - 1, total, probability) / math.log(10))
+    count = np.arange(agreeing, total + 1)
+    terms = _log_binomial(total, count) + xlogy(count, probability)
+    return float(logsumexp(terms + xlog1py(total - count, -probability)) / math.log(10))
 
 
 def log10_false_alarms(agreeing: int, total: int, probability: float, sample: int) -> float:
@@ -47,6 +50,10 @@ def log10_false_alarms(agreeing: int, total: int, probability: float, sample: in
     """
     if agreeing <= sample:
         return math.inf
-    log_subsets = -betaln(total - sample + 1, sample + 1) - math.log(total + 1)
+    log_subsets = float(_log_binomial(total, np.array(sample)))
     chance = log10_chance(agreeing - sample, total - sample, probability)
     return float(log_subsets / math.log(10) + chance)
+
+
+def _log_binomial(total: int, count: NDArray[np.int_]) -> NDArray[np.float64]:
+    return np.asarray(gammaln(total + 1) - gammaln(count + 1) - gammaln(total - count + 1))

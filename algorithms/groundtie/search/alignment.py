@@ -7,13 +7,13 @@ with the largest sum of similarities is sought.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
-from scipy.ndimage import spline_filter
+from scipy.ndimage import spline_filter1d
 from scipy.optimize import minimize
 
 from ..geometry.models import DEGREE, PARAMETERS, Frame, Model, PolynomialModel, monomials
@@ -23,7 +23,11 @@ from .matching import Surfaces
 FloatArray = NDArray[np.float64]
 
 # Surfaces are blurred by these, one after the other, so that the fit is caught from afar.
-_BLURS_PX = (2.0, 1.0, 0.0)
+_BLURS_PX = (1.5, 0.0)
+
+# The fit has arrived when the sum of similarities rises by less than this per pixel.
+_SLOPE_PER_PX = 0.1
+_STEPS = 60
 
 # From simple to flexible, those that "auto" chooses from; see `choose_alignment`.
 CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3")
@@ -108,20 +112,7 @@ def align(
     start
         A model to start from, from grid pixels to claimed grid pixels.
     """
-    fields = [_field(px, surfaces, prior, blur) for blur in _BLURS_PX]
-    frame = Frame.around(px.astype(float))
-    parameters = _starting(kind, frame, fields[0].px, start)
-    for field in fields:
-        parameters = _maximise(kind, frame, field, parameters)
-    folds = block_folds(fields[0].px)
-    sharp = fields[-1]
-    models, score = [], 0.0
-    for fold in np.unique(folds):
-        left = folds == fold
-        found = _model(kind, frame, _maximise(kind, frame, sharp.take(~left), parameters))
-        models.append(found)
-        score += float(sharp.take(left).scores(found(sharp.px[left]))[0].sum())
-    return Alignment(_model(kind, frame, parameters), tuple(models), {kind: score / len(px)})
+    return _align(kind, _fields(px, surfaces, prior), start)
 
 
 def choose_alignment(
@@ -132,27 +123,42 @@ def choose_alignment(
     A more flexible model is taken only if it raises the similarity at blocks of chips that were
     left out of its fit by more than the standard error of the rise. Parameters as `align`.
     """
-    sharp = _field(px, surfaces, prior, 0.0)
-    folds = block_folds(sharp.px)
-    chosen: Alignment | None = None
-    scores: dict[str, float] = {}
-    kept = np.zeros(0)
-    for kind in CANDIDATES:
+    fields = _fields(px, surfaces, prior)
+    chosen = _align(CANDIDATES[0], fields, start)
+    kept = _left_out_scores(fields[-1], chosen)
+    scores = chosen.left_out_score
+    for kind in CANDIDATES[1:]:
         if len(px) < _CHIPS_PER_PARAMETER * PARAMETERS[kind]:
             break
-        tried = align(kind, px, surfaces, prior, chosen.model if chosen else start)
-        scores |= tried.left_out_score
-        left_out = _left_out_scores(sharp, folds, tried)
-        rise = left_out - kept if chosen else left_out
+        tried = _align(kind, fields, start)
+        scores = scores | tried.left_out_score
+        left_out = _left_out_scores(fields[-1], tried)
+        rise = left_out - kept
         error = float(rise.std(ddof=1) * np.sqrt(len(rise))) if len(rise) > 1 else 0.0
-        if chosen is None or rise.sum() > error:
+        if rise.sum() > error:
             chosen, kept = tried, left_out
-    assert chosen is not None
     return Alignment(chosen.model, chosen.fold_models, scores)
 
 
-def _left_out_scores(field: _Field, folds: NDArray[np.int_], alignment: Alignment) -> FloatArray:
+def _align(kind: str, fields: list[_Field], start: Model) -> Alignment:
+    sharp = fields[-1]
+    frame = Frame.around(sharp.px)
+    parameters = _starting(kind, frame, sharp.px, start)
+    for field in fields:
+        parameters = _maximise(kind, frame, field, parameters)
+    folds = block_folds(sharp.px)
+    models = tuple(
+        _model(kind, frame, _maximise(kind, frame, sharp.take(folds != fold), parameters))
+        for fold in np.unique(folds)
+    )
+    found = Alignment(_model(kind, frame, parameters), models, {})
+    mean = float(_left_out_scores(sharp, found).sum()) / len(sharp.px)
+    return replace(found, left_out_score={kind: mean})
+
+
+def _left_out_scores(field: _Field, alignment: Alignment) -> FloatArray:
     """Return the sum of the similarity over each fold that its model has not seen."""
+    folds = block_folds(field.px)
     sums = []
     for fold, model in zip(np.unique(folds), alignment.fold_models, strict=True):
         part = field.take(folds == fold)
@@ -160,10 +166,16 @@ def _left_out_scores(field: _Field, folds: NDArray[np.int_], alignment: Alignmen
     return np.array(sums)
 
 
-def _field(px: NDArray[np.int_], surfaces: Surfaces, prior: Affine, blur_px: float) -> _Field:
-    blurred = (cv2.GaussianBlur(s, (0, 0), blur_px) if blur_px else s for s in surfaces)
-    coefficients = np.stack([spline_filter(s.astype(float), order=3) for s in blurred])
-    return _Field(px.astype(float), coefficients, ~prior)
+def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Affine) -> list[_Field]:
+    """Return the surfaces to look up, from the most to the least blurred."""
+    fields = []
+    for blur in _BLURS_PX:
+        blurred = (cv2.GaussianBlur(s, (0, 0), blur) if blur else s for s in surfaces)
+        coefficients = np.stack(list(blurred)).astype(np.float64)
+        for axis in (1, 2):
+            coefficients = spline_filter1d(coefficients, order=3, axis=axis)
+        fields.append(_Field(px.astype(float), coefficients, ~prior))
+    return fields
 
 
 def _cubic_weights(t: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -178,14 +190,15 @@ def _maximise(kind: str, frame: Frame, field: _Field, start: FloatArray) -> Floa
     scale = frame.to_map.a
 
     def cost(parameters: FloatArray) -> tuple[float, FloatArray]:
-        coefficients, jacobian = _coefficients(kind, parameters)
+        # Parameters count in pixels here, so that steps and gradients are of one size.
+        coefficients, jacobian = _coefficients(kind, parameters / scale)
         claimed = field.px + scale * (design @ coefficients)
         value, slope = field.scores(claimed)
-        gradient = (scale * design.T @ slope).ravel()
-        return -float(value.sum()), -(gradient @ jacobian)
+        return -float(value.sum()), -((design.T @ slope).ravel() @ jacobian)
 
-    found = minimize(cost, start, jac=True, method="L-BFGS-B")
-    return np.asarray(found.x)
+    options = {"gtol": _SLOPE_PER_PX, "maxiter": _STEPS}
+    found = minimize(cost, start * scale, jac=True, method="BFGS", options=options)
+    return np.asarray(found.x) / scale
 
 
 def _coefficients(kind: str, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:

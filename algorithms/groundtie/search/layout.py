@@ -59,15 +59,15 @@ class Axis:
         """Centre of the first chip."""
         return (self.chip - 1) / 2
 
-    def held_out(self, positions: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which pixel positions lie in the held-out half of their cell."""
+    def held_out(self, positions: NDArray[np.float64], reach_px: float = 0.0) -> NDArray[np.bool_]:
+        """Tell which pixel positions lie in the held-out half of their cell, or within reach."""
         phase = ((positions - self.first) / self.pitch) % 1.0
         inside = (positions >= self.first) & (positions <= self.first + self.cells * self.pitch)
-        return np.asarray(inside & (np.abs(phase - 0.5) < 0.25))
+        return np.asarray(inside & (np.abs(phase - 0.5) < 0.25 + reach_px / self.pitch))
 
     def lattice(self, parts: int) -> NDArray[np.float64]:
         """Return positions that divide each cell into so many parts, lines included."""
-        return self.first + np.arange(self.cells * parts + 1) * self.pitch / parts
+        return np.asarray(self.first + np.arange(self.cells * parts + 1) * self.pitch / parts)
 
     def check_centres(self) -> NDArray[np.float64]:
         """Return the centres of chips inside the held-out blocks, one or two a block."""
@@ -130,10 +130,15 @@ class ChipLayout:
         return self.columns.held_out(positions_px[:, 0]) & self.rows.held_out(positions_px[:, 1])
 
     def held_out_mask(
-        self, cols: NDArray[np.float64], rows: NDArray[np.float64]
+        self, cols: NDArray[np.float64], rows: NDArray[np.float64], reach_px: float = 0.0
     ) -> NDArray[np.bool_]:
-        """Return the mask of held-out pixels at columns × rows of the matching grid."""
-        return np.asarray(self.rows.held_out(rows)[:, None] & self.columns.held_out(cols)[None, :])
+        """Return the mask of what is held out at columns × rows of the matching grid.
+
+        Whoever stands for more than its position, as interpolated pixels do, is held out, too,
+        if it reaches a held-out block: it lies within `reach_px`.
+        """
+        held_out_rows = self.rows.held_out(rows, reach_px)
+        return np.asarray(held_out_rows[:, None] & self.columns.held_out(cols, reach_px)[None, :])
 
 
 def lay_out_chips(

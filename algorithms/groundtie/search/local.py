@@ -17,6 +17,7 @@ from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..progress import SILENT, Progress
 from ..rasters.grid import Grid, apply_affine
+from ..rasters.kernels import REACH
 from ..rasters.pair import ImagePair
 from ..similarity.evidence import Evidence, find_peak, find_peak_near
 from ..similarity.surface import SimilaritySettings
@@ -60,7 +61,7 @@ class LocalSearch:
     layout: ChipLayout
     settings: SimilaritySettings
     fit_radius_px: int = 8
-    check_radius_px: int = 16
+    check_radius_px: int = 12
     two_way_px: float = 2.0
 
     def estimate(
@@ -130,7 +131,7 @@ class LocalSearch:
             return self._match(centres, self.check_radius_px, model, False, executor, SILENT).both
 
     def held_out(self, piece: Grid) -> NDArray[np.bool_]:
-        """Return which pixels of a grid, of any pixel size, lie in held-out blocks."""
+        """Return which pixels of a grid, of any pixel size, see something of held-out blocks."""
         cols = np.arange(piece.width, dtype=float)
         rows = np.arange(piece.height, dtype=float)
         along_cols = piece.pixel_to_map(np.column_stack([cols, np.zeros_like(cols)]))
@@ -139,7 +140,18 @@ class LocalSearch:
         return self.layout.held_out_mask(
             self.pair.grid.map_to_pixel(along_cols)[:, 0],
             self.pair.grid.map_to_pixel(along_rows)[:, 1],
+            self._reach_px(piece),
         )
+
+    def _reach_px(self, piece: Grid) -> float:
+        """Return how far off a piece's pixel sees of the reference, in matching pixels."""
+        own = self.pair.reference.source.grid
+        size, matching, piece_size = (g.pixel_size[0] for g in (own, self.pair.grid, piece))
+        if np.allclose([matching / size, piece_size / size], 1.0):
+            return 0.0  # the reference's own pixels
+        # Larger pixels are interpolated between means of the reference's: see `warping.sample`.
+        averaged = max(round(piece_size / size), 1)
+        return (REACH["cubic"] + 0.5) * averaged * size / matching
 
     def _match(
         self,

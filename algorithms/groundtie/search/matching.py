@@ -15,7 +15,7 @@ from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
-from ..similarity.surface import BORDER_PX, SimilaritySettings, normalise, similarity_surface
+from ..similarity.surface import BORDER_PX, SimilaritySettings, describe, normalise, similarity_surface
 
 FloatArray = NDArray[np.float64]
 Surfaces = NDArray[np.float32]
@@ -134,19 +134,21 @@ class ChipMatcher:
         self, centre: NDArray[np.int_], chip_px: int, radius_px: int
     ) -> tuple[Surfaces, Surfaces] | None:
         reach = radius_px + BORDER_PX
+        side = chip_px + 2 * reach
         corner = centre - chip_px // 2 - reach
-        piece = self.grid.window(*(int(c) for c in corner), *(chip_px + 2 * reach,) * 2)
+        piece = self.grid.window(int(corner[0]), int(corner[1]), side, side)
         reference = self.pair.reference_patch(piece)
         if self.held_out is not None:
             reference = reference.without(self.held_out(piece))
-        chip = reference.inner(radius_px)
-        if not _can_be_matched(chip):
+        if not _can_be_matched(reference.inner(radius_px)):
             return None
         input = self.pair.input_patch(piece, self.to_input_px)
         if not _can_be_matched(input.inner(radius_px)):
             return None
-        forward = similarity_surface(chip, input, radius_px, self.settings)
-        backward = similarity_surface(input.inner(radius_px), reference, radius_px, self.settings)
+        there = describe(reference, chip_px**2, self.settings)
+        here = describe(input, chip_px**2, self.settings)
+        forward = similarity_surface(there.inner(radius_px), here, radius_px, self.settings)
+        backward = similarity_surface(here.inner(radius_px), there, radius_px, self.settings)
         return forward, backward[::-1, ::-1]
 
 

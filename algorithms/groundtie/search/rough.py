@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..errors import RasterContentError
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.evidence import find_peak
-from ..similarity.surface import BORDER_PX, SimilaritySettings, similarity_surface
+from ..similarity.surface import BORDER_PX, SimilaritySettings, describe, similarity_surface
 from .matching import MaskOf
 
 # The longer side of the reduced image, in pixels, and how many candidates are kept.
@@ -19,6 +19,9 @@ CANDIDATES = 6
 
 # Candidates nearer than this are the same, in pixels of the level.
 _SAME_PX = 4
+
+# Few bins keep the count over a large search window quick, and are enough for whole scenes.
+_BINS = 10
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,15 @@ def rough_candidates(
     for image, patch in ((pair.reference, reference), (pair.input, input)):
         _require_content(image.source.path, patch)
     reference = reference.without(held_out(template))
-    surface = similarity_surface(reference, input, radius_px, settings, executor)
+    if settings.bins is None:
+        settings = replace(settings, bins=_BINS)
+    surface = similarity_surface(
+        describe(reference, level.width * level.height, settings),
+        describe(input, level.width * level.height, settings),
+        radius_px,
+        settings,
+        executor,
+    )
     found = []
     for _ in range(CANDIDATES):
         peak = find_peak(surface)

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
@@ -26,10 +27,22 @@ from .binning import MASKED
 FloatArray = NDArray[np.float32]
 ORDERS = (2, 3, 4, 5, 6, 7)
 
+# Templates of so many pixels or fewer are counted a row of shifts at a time.
+_CODED_PIXELS = 20_000
+
+# Seconds, measured: to count a pixel, to call OpenCV, and for each element and halving of an FFT.
+_PIXEL_COST, _CALL_COST, _SPECTRAL_COST = 0.5e-9, 6e-6, 0.8e-9
+_WORKERS = 2
+
 
 def support(order: int) -> int:
     """Return how far beyond a shift the kernel of this order reaches, in whole pixels."""
     return (order + 1) // 2
+
+
+def reach(order: int) -> int:
+    """Return how far the kernel of this order reaches at integer shifts, in whole pixels."""
+    return (order - 1) // 2
 
 
 def kernel(order: int, offset: float) -> NDArray[np.float64]:
@@ -37,10 +50,10 @@ def kernel(order: int, offset: float) -> NDArray[np.float64]:
 
     `offset` is within ±0.5. Order n is degree n - 1: 2 is linear (PVI), 4 is cubic.
     """
-    reach = support(order)
+    far = support(order)
     knots = np.arange(order + 1) - order / 2
     spline = BSpline.basis_element(knots, extrapolate=False)
-    return np.nan_to_num(spline(np.arange(-reach, reach + 1) - offset))
+    return np.nan_to_num(spline(np.arange(-far, far + 1) - offset))
 
 
 @dataclass(frozen=True)
@@ -66,36 +79,35 @@ class JointHistogramVolume:
 
     def histograms(self, order: int) -> FloatArray:
         """Return the GPVE histograms at the integer shifts -radius … radius, float32."""
-        weights = kernel(order, 0.0).astype(np.float32)
-        weights = weights[weights > 0]
-        reach = (len(weights) - 1) // 2
-        self._require(reach)
-        inner = slice(self.margin - reach, self.counts.shape[0] - self.margin + reach)
-        smoothed = self.counts[inner, inner]
-        return _convolve(_convolve(smoothed, weights, 0), weights, 1)
+        near, far = reach(order), support(order)
+        self._require(near)
+        weights = kernel(order, 0.0).astype(np.float32)[far - near : far + near + 1]
+        first = self.margin - near
+        inner = slice(first, self.counts.shape[0] - first)
+        return _convolve(_convolve(self.counts[inner, inner], weights, 0), weights, 1)
 
     def at(self, shift: tuple[float, float], order: int) -> NDArray[np.float64]:
         """Return the GPVE histogram at one shift (rows, columns), shape (bins, bins)."""
-        self._require(support(order))
+        far = support(order)
+        self._require(far)
         centre = self.counts.shape[0] // 2
-        reach = support(order)
         whole = [round(s) for s in shift]
         weights = [kernel(order, s - w) for s, w in zip(shift, whole, strict=True)]
-        rows, cols = (slice(centre + w - reach, centre + w + reach + 1) for w in whole)
+        rows, cols = (slice(centre + w - far, centre + w + far + 1) for w in whole)
         return np.einsum("p,q,pqab->ab", *weights, self.counts[rows, cols].astype(np.float64))
 
-    def _require(self, reach: int) -> None:
-        if reach > self.margin:
-            raise ValueError(f"the volume's margin of {self.margin} is below the kernel's {reach}")
+    def _require(self, needed: int) -> None:
+        if needed > self.margin:
+            raise ValueError(f"the volume's margin of {self.margin} is below the kernel's {needed}")
 
 
 def _convolve(volume: FloatArray, weights: FloatArray, axis: int) -> FloatArray:
-    """Correlate along an axis with a short kernel; the axis loses the kernel's ends."""
+    """Correlate along axis 0 or 1 with a short kernel; the axis loses the kernel's ends."""
     count = volume.shape[axis] - len(weights) + 1
-    parts = (np.take(volume, range(k, k + count), axis) * w for k, w in enumerate(weights))
-    total = next(parts)
-    for part in parts:
-        total += part
+    total = np.zeros((), np.float32)
+    for k, weight in enumerate(weights):
+        part = volume[k : k + count] if axis == 0 else volume[:, k : k + count]
+        total = total + part * weight
     return total
 
 
@@ -125,25 +137,82 @@ def count_joint_histograms(
     span = search.shape[0] - height + 1
     masked = bool((template == MASKED).any() or (search == MASKED).any())
     # Masked pixels go to one extra bin that is dropped; OpenCV's own mask is much slower.
-    sizes = [count + masked for count in bins]
-    if masked:
-        template = np.minimum(template, bins[0]).astype(np.uint8)
-        search = np.minimum(search, bins[1]).astype(np.uint8)
-    counts = np.empty((span, span, *bins), np.float32)
-    ranges = [0, sizes[0], 0, sizes[1]]
+    sizes = (bins[0] + masked, bins[1] + masked)
+    template = np.minimum(template, bins[0]).astype(np.uint8)
+    search = np.minimum(search, bins[1]).astype(np.uint8)
+    if _spectral_cost(search.size, bins) < _direct_cost(template.size, span):
+        counts = _count_spectrally(template, search, bins)
+    else:
+        coded = template.size <= _CODED_PIXELS and sizes[0] * sizes[1] <= 256 and span <= 256
+        count_row = _row_counter(template, search, sizes, coded)
+        counts = np.empty((span, span, *bins), np.float32)
 
-    def count_row(dy: int) -> None:
-        for dx in range(span):
-            window = search[dy : dy + height, dx : dx + width]
-            histogram = cv2.calcHist([template, window], [0, 1], None, sizes, ranges)
-            counts[dy, dx] = histogram[: bins[0], : bins[1]]
+        def store(dy: int) -> None:
+            counts[dy] = count_row(dy)[:, : bins[0], : bins[1]]
 
-    _map(executor, count_row, span)
+        _map(executor, store, span)
     return JointHistogramVolume(counts, radius)
 
 
+def _row_counter(
+    template: NDArray[np.uint8], search: NDArray[np.uint8], sizes: tuple[int, int], coded: bool
+) -> Callable[[int], FloatArray]:
+    """Return the function that counts all shifts of one row, shape (shifts, *sizes)."""
+    height, width = template.shape
+    span = search.shape[1] - width + 1
+    ranges = [0, sizes[0], 0, sizes[1]]
+
+    def one_by_one(dy: int) -> FloatArray:
+        rows = np.empty((span, *sizes), np.float32)
+        for dx in range(span):
+            window = search[dy : dy + height, dx : dx + width]
+            rows[dx] = cv2.calcHist([template, window], [0, 1], None, list(sizes), ranges)
+        return rows
+
+    if not coded:
+        return one_by_one
+    # Small windows: a call would cost more than its counting. Template and search bin share a
+    # byte, and all shifts of a row are counted by one call against the number of the shift.
+    windows = np.lib.stride_tricks.sliding_window_view(search, (height, width))
+    shape = (span * height, width)
+    codes = np.broadcast_to(template * np.uint8(sizes[1]), (span, height, width)).reshape(shape)
+    shifts = np.repeat(np.arange(span, dtype=np.uint8), height * width).reshape(shape)
+    cells = sizes[0] * sizes[1]
+
+    def all_at_once(dy: int) -> FloatArray:
+        pairs = cv2.add(codes, windows[dy].reshape(shape))
+        counted = cv2.calcHist([shifts, pairs], [0, 1], None, [span, cells], [0, span, 0, cells])
+        return counted.reshape(span, *sizes)
+
+    return all_at_once
+
+
+def _direct_cost(pixels: int, span: int) -> float:
+    return span * span * (pixels * _PIXEL_COST + _CALL_COST)
+
+
+def _spectral_cost(pixels: int, bins: tuple[int, int]) -> float:
+    return bins[0] * bins[1] * pixels * np.log2(pixels) * _SPECTRAL_COST
+
+
+def _count_spectrally(
+    template: NDArray[np.uint8], search: NDArray[np.uint8], bins: tuple[int, int]
+) -> FloatArray:
+    """Count all shifts at once by correlating the planes of all bins with each other."""
+    shape = [scipy.fft.next_fast_len(n, real=True) for n in search.shape]
+    ny, nx = (s - t + 1 for s, t in zip(search.shape, template.shape, strict=True))
+    counts = np.empty((ny, nx, *bins), np.float32)
+    planes = np.stack([search == k for k in range(bins[1])]).astype(np.float32)
+    spectra = scipy.fft.rfft2(planes, shape, workers=_WORKERS)
+    for k in range(bins[0]):
+        own = scipy.fft.rfft2((template == k).astype(np.float32), shape)
+        found = scipy.fft.irfft2(spectra * own.conj(), shape, workers=_WORKERS)
+        counts[:, :, k] = found[:, :ny, :nx].transpose(1, 2, 0)
+    # Counts are whole numbers; what is left over is rounding.
+    return np.maximum(np.rint(counts), 0)
+
+
 def _map(executor: Executor | None, function: Callable[[int], None], count: int) -> None:
-    for _ in (
-        map(function, range(count)) if executor is None else executor.map(function, range(count))
-    ):
+    run = map if executor is None else executor.map
+    for _ in run(function, range(count)):
         pass

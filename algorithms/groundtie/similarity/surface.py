@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch
 from .binning import to_bins
 from .correlation import MINIMUM_OVERLAP, correlate_fields, correlate_grey, overlap_share
-from .joint_histogram import JointHistogramVolume, count_joint_histograms
+from .joint_histogram import count_joint_histograms, reach
 from .measures import normalized_mutual_information
 from .orientation import orientation_fields
 
@@ -29,6 +29,9 @@ BORDER_PX = 8
 
 # A surface's slow trend, which says nothing of a peak, is its Gaussian mean of this width.
 TREND_PX = 5.0
+
+# A surface that varies by less than this holds nothing but rounding.
+_FLAT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -60,11 +63,17 @@ class SimilaritySettings:
 
 def normalise(surface: Surface) -> Surface:
     """Return a surface in robust standard deviations from its median (median and MAD)."""
-    median = np.median(surface)
-    spread = 1.4826 * np.median(np.abs(surface - median))
-    if spread <= 1e-9:
+    centred = surface - _median(surface)
+    spread = 1.4826 * _median(np.abs(centred))
+    if spread <= _FLAT:
         return np.zeros_like(surface)
-    return ((surface - median) / spread).astype(np.float32)
+    return (centred / np.float32(spread)).astype(np.float32)
+
+
+def _median(values: Surface) -> np.float32:
+    # Surfaces have an odd number of values; numpy's own median takes ten times as long for them.
+    middle = values.size // 2
+    return np.float32(np.partition(values, middle, axis=None)[middle])
 
 
 def detrend(surface: Surface, width_px: float = TREND_PX) -> Surface:
@@ -72,54 +81,97 @@ def detrend(surface: Surface, width_px: float = TREND_PX) -> Surface:
     return normalise(surface - cv2.GaussianBlur(surface, (0, 0), width_px))
 
 
-def joint_histograms(
-    template: Patch,
-    search: Patch,
-    radius: int,
-    settings: SimilaritySettings,
-    executor: Executor | None = None,
-) -> JointHistogramVolume:
-    """Return the joint-histogram volume of two windows that have `BORDER_PX` around the chip."""
-    margin = settings.gpve_order // 2 + 1
-    chip = template.inner(BORDER_PX)
-    around = search.inner(BORDER_PX - margin)
-    bins = settings.bins_for(chip.values.size)
-    return count_joint_histograms(
-        to_bins(chip.values, chip.valid, bins, settings.binning),
-        to_bins(around.values, around.valid, bins, settings.binning),
-        (bins, bins),
-        radius,
-        executor,
-    )
+@dataclass(frozen=True)
+class Features:
+    """What similarity is measured on, made once for an image window.
+
+    Parameters
+    ----------
+    patch
+        The window without `BORDER_PX` on each side.
+    bins
+        Bins, with `margin` pixels around the patch; None if not needed.
+    bin_count
+        Number of bins.
+    margin
+        Pixels that `bins` has on each side beyond the patch, for the histogram's kernel.
+    fields
+        Orientation fields at all scales, of the patch's size; empty if not needed.
+    """
+
+    patch: Patch
+    bins: NDArray[np.uint8] | None
+    bin_count: int
+    margin: int
+    fields: tuple[NDArray[np.complex64], ...]
+
+    def inner(self, border: int) -> Features:
+        """Return the features of the window without a border on each side."""
+        inside = slice(border, -border or None)
+        return Features(
+            self.patch.inner(border),
+            None if self.bins is None else self.bins[inside, inside],
+            self.bin_count,
+            self.margin,
+            tuple(field[inside, inside] for field in self.fields),
+        )
+
+    @property
+    def own_bins(self) -> NDArray[np.uint8]:
+        """The bins of the patch alone."""
+        assert self.bins is not None
+        inside = slice(self.margin, -self.margin or None)
+        return self.bins[inside, inside]
+
+
+def describe(window: Patch, chip_pixels: int, settings: SimilaritySettings) -> Features:
+    """Make what similarity needs of an image window.
+
+    Parameters
+    ----------
+    window
+        The window, with `BORDER_PX` on each side.
+    chip_pixels
+        Number of pixels of the template that will be matched.
+    settings
+        How similarity is measured.
+    """
+    inner = slice(BORDER_PX, -BORDER_PX)
+    bin_count = settings.bins_for(chip_pixels)
+    margin = reach(settings.gpve_order)
+    bins, fields = None, ()
+    if settings.similarity in ("fused", "nmi"):
+        around = window.inner(BORDER_PX - margin)
+        bins = to_bins(around.values, around.valid, bin_count, settings.binning)
+    if settings.similarity in ("fused", "orientation"):
+        fields = tuple(field[inner, inner] for field in orientation_fields(window))
+    return Features(window.inner(BORDER_PX), bins, bin_count, margin, fields)
 
 
 def nmi_surface(
-    template: Patch,
-    search: Patch,
+    template: Features,
+    search: Features,
     radius: int,
-    settings: SimilaritySettings,
+    gpve_order: int,
     executor: Executor | None = None,
 ) -> Surface:
     """Return normalised mutual information over shifts, shape (2 radius + 1, 2 radius + 1)."""
-    volume = joint_histograms(template, search, radius, settings, executor)
-    histograms = volume.histograms(settings.gpve_order)
-    return normalized_mutual_information(histograms).astype(np.float32)
+    assert search.bins is not None
+    counts = (template.bin_count, search.bin_count)
+    volume = count_joint_histograms(template.own_bins, search.bins, counts, radius, executor)
+    return normalized_mutual_information(volume.histograms(gpve_order)).astype(np.float32)
 
 
-def orientation_surface(template: Patch, search: Patch) -> Surface:
+def orientation_surface(template: Features, search: Features) -> Surface:
     """Return the sum of the normalised orientation correlations of all scales over shifts."""
-    inner = slice(BORDER_PX, -BORDER_PX)
-    valid = template.valid[inner, inner], search.valid[inner, inner]
-    surfaces = [
-        detrend(correlate_fields(t[inner, inner], s[inner, inner], *valid))
-        for t, s in zip(orientation_fields(template), orientation_fields(search), strict=True)
-    ]
-    return normalise(np.sum(surfaces, axis=0))
+    valid = template.patch.valid, search.patch.valid
+    pairs = zip(template.fields, search.fields, strict=True)
+    return normalise(np.sum([detrend(correlate_fields(t, s, *valid)) for t, s in pairs], axis=0))
 
 
 def similarity_surface(
-    template: Patch,
-    search: Patch,
+    template: Features,
+    search: Features,
     radius: int,
     settings: SimilaritySettings,
     executor: Executor | None = None,
@@ -129,9 +181,9 @@ def similarity_surface(
     Parameters
     ----------
     template
-        Chip with `BORDER_PX` around it, shape (h + 2 border, w + 2 border).
+        Features of the chip, shape (h, w).
     search
-        Patch with the same centre, larger by `radius` on each side.
+        Features of a window with the same centre, larger by `radius` on each side.
     radius
         Largest shift, in pixels.
     settings
@@ -147,12 +199,14 @@ def similarity_surface(
     """
     parts = []
     if settings.similarity in ("fused", "nmi"):
-        parts.append(detrend(nmi_surface(template, search, radius, settings, executor)))
+        nmi = nmi_surface(template, search, radius, settings.gpve_order, executor)
+        parts.append(detrend(nmi))
     if settings.similarity in ("fused", "orientation"):
         parts.append(orientation_surface(template, search))
     if settings.similarity == "ncc":
-        grey = correlate_grey(template.inner(BORDER_PX), search.inner(BORDER_PX))
-        parts.append(detrend(grey))
+        parts.append(detrend(correlate_grey(template.patch, search.patch)))
     surface = normalise(np.sum(parts, axis=0))
-    overlap = overlap_share(template.inner(BORDER_PX), search.inner(BORDER_PX))
+    if template.patch.all_valid and search.patch.all_valid:
+        return surface
+    overlap = overlap_share(template.patch, search.patch)
     return np.where(overlap >= MINIMUM_OVERLAP, surface, 0).astype(np.float32)
