@@ -1,0 +1,1 @@
+"""Benchmarks: accuracy on real and simulated pairs, speed against peers; see README.md."""

@@ -1,0 +1,147 @@
+"""One registration by the public function `coregister`, judged and timed."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import rasterio
+
+import groundtie
+from groundtie.errors import NotRegisteredError
+from groundtie.rasters.grid import Grid
+
+from .accuracy import FloatArray, Truth, classify
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two georeferenced images and what is known of them.
+
+    Parameters
+    ----------
+    reference, input
+        The files.
+    truth
+        The best that is known: check points where there are some, else the lattice. None: the
+        images do not show the same place, and every registration is wrong.
+    lattice
+        The truth all over the reference; the same as `truth` where there are no check points.
+    sigma_px
+        How far the truth can be believed, in reference pixels.
+    """
+
+    reference: Path
+    input: Path
+    truth: Truth | None = None
+    lattice: Truth | None = None
+    sigma_px: float = 0.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one registration.
+
+    Parameters
+    ----------
+    name, group
+        Which case, and with which others it is counted.
+    verdict, lattice_verdict
+        One of `accuracy.VERDICTS`, by the errors of the same name.
+    error_px, lattice_error_px
+        Errors against `Pair.truth` and `Pair.lattice`; NaN for refused registrations.
+    sigma_px
+        How far the truth can be believed.
+    seconds
+        Wall-clock time of the call.
+    claimed_rmse_px
+        Error that the tool itself claims.
+    model, reason
+        What the tool chose and said.
+    """
+
+    name: str
+    group: str
+    verdict: str
+    lattice_verdict: str
+    error_px: float
+    lattice_error_px: float
+    sigma_px: float
+    seconds: float
+    claimed_rmse_px: float
+    model: str
+    reason: str
+
+    def record(self) -> dict[str, Any]:
+        """Return the outcome as values that JSON can carry."""
+        return {
+            key: None if isinstance(value, float) and not math.isfinite(value) else value
+            for key, value in asdict(self).items()
+        }
+
+    def line(self) -> str:
+        """Return the outcome as a line of text."""
+        error = "" if math.isnan(self.error_px) else f" {self.error_px:.2f} px ({self.model})"
+        return f"{self.name}: {self.verdict}{error} in {self.seconds:.1f} s; {self.reason}"
+
+
+def attempt(
+    name: str, group: str, pair: Pair, workers: int | None = None, **parameters: Any
+) -> Outcome:
+    """Register a pair and compare with its truth; `parameters` are those of `coregister`."""
+    with tempfile.TemporaryDirectory() as folder:
+        started = time.perf_counter()
+        try:
+            result = groundtie.coregister(
+                pair.reference,
+                pair.input,
+                Path(folder) / "registered.tif",
+                workers=workers,
+                **parameters,
+            )
+        except NotRegisteredError as refusal:
+            seconds = time.perf_counter() - started
+            reason = str(refusal) if refusal.verdict is None else refusal.verdict.reason
+            return refused(name, group, pair.sigma_px, seconds, reason)
+        seconds = time.perf_counter() - started
+    with rasterio.open(pair.reference) as source:
+        grid = Grid(source.transform, source.crs, source.width, source.height)
+
+    def found(px: FloatArray) -> FloatArray:
+        return result.transform(grid.pixel_to_map(px))
+
+    errors = [
+        math.inf if truth is None else truth.error_px(found) for truth in (pair.truth, pair.lattice)
+    ]
+    return Outcome(
+        name,
+        group,
+        classify(True, errors[0], pair.sigma_px),
+        classify(True, errors[1], pair.sigma_px),
+        errors[0],
+        errors[1],
+        pair.sigma_px,
+        seconds,
+        result.verdict.check_rmse_px,
+        result.transform.model.kind,
+        result.verdict.reason,
+    )
+
+
+def refused(name: str, group: str, sigma_px: float, seconds: float, reason: str) -> Outcome:
+    """Return the outcome of a refused registration."""
+    verdict = classify(False, math.nan, sigma_px)
+    unknown = math.nan
+    return Outcome(
+        name, group, verdict, verdict, unknown, unknown, sigma_px, seconds, unknown, "", reason
+    )
+
+
+def count(outcomes: Iterable[Outcome], verdict: str, on_lattice: bool = False) -> int:
+    """Return how many outcomes have a verdict, by the one error or the other."""
+    return sum((o.lattice_verdict if on_lattice else o.verdict) == verdict for o in outcomes)

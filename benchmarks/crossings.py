@@ -1,0 +1,165 @@
+"""What must be refused: images of different places, and images replaced by speckle."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rasterio
+from affine import Affine
+from numpy.typing import NDArray
+
+from .accuracy import REFUSED
+from .attempt import Outcome, Pair, attempt, count
+from .cases import (
+    REFERENCE_TRANSFORM,
+    SAR_OPTICAL,
+    RealCase,
+    draw_shift,
+    image_size,
+    read_cases,
+    read_image,
+    search_radius_m,
+    write_case,
+    write_image,
+)
+from .real import LARGEST_SHIFT_PX
+from .suites import Goal, Settings, SuiteResult, Table, run_cases
+
+CROSSING = "another place"
+SPECKLE = {"reference": "reference is speckle", "input": "input is speckle"}
+
+SAR_REFERENCES = (SAR_OPTICAL, "sar-sar")
+
+_AT_LEAST = 200
+_QUICK_STEP = 60
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """The reference of one place with the input of another, at the same claimed place."""
+
+    reference: RealCase
+    input: RealCase
+
+    def run(self, workers: int | None) -> Outcome:
+        """Register what cannot be registered."""
+        with tempfile.TemporaryDirectory() as folder:
+            pair = write_crossing(self.reference, self.input, Path(folder))
+            name = f"{self.reference.name} × {self.input.name}"
+            return _attempt(name, CROSSING, pair, workers)
+
+
+@dataclass(frozen=True)
+class Speckled:
+    """A pair with one image (a key of `SPECKLE`) replaced by speckle."""
+
+    case: RealCase
+    replaced: str
+
+    def run(self, workers: int | None) -> Outcome:
+        """Register what cannot be registered."""
+        with tempfile.TemporaryDirectory() as folder:
+            shift = draw_shift(self.case, LARGEST_SHIFT_PX, 0)
+            pair = write_speckled(self.case, shift, self.replaced, Path(folder))
+            group = SPECKLE[self.replaced]
+            return _attempt(f"{self.case.name}, {group}", group, pair, workers)
+
+
+def _attempt(name: str, group: str, pair: Pair, workers: int | None) -> Outcome:
+    return attempt(name, group, pair, workers, search_radius=search_radius_m(LARGEST_SHIFT_PX))
+
+
+def write_crossing(reference: RealCase, input: RealCase, folder: Path) -> Pair:
+    """Write two images with the same centre and the same pixel size."""
+    size, other = np.array(image_size(reference.reference)), np.array(image_size(input.input))
+    claimed = REFERENCE_TRANSFORM * Affine.translation(*((size - other) / 2))
+    return Pair(
+        write_image(read_image(reference.reference), REFERENCE_TRANSFORM, folder / "reference.tif"),
+        write_image(read_image(input.input), claimed, folder / "input.tif"),
+    )
+
+
+def write_speckled(
+    case: RealCase, shift_px: tuple[float, float], replaced: str, folder: Path
+) -> Pair:
+    """Write a pair as `write_case` does, with speckle in place of one image."""
+    pair = write_case(case, shift_px, folder)
+    path = {"reference": pair.reference, "input": pair.input}[replaced]
+    with rasterio.open(path) as source:
+        image, transform = source.read(), source.transform
+    write_image(speckle(image, np.random.default_rng(len(case.name))), transform, path)
+    return Pair(pair.reference, pair.input)
+
+
+def speckle(image: NDArray[Any], generator: np.random.Generator) -> NDArray[Any]:
+    """Return single-look speckle, the same in all bands, of an image's shape, type and contrast."""
+    amplitude = generator.rayleigh(size=image.shape[1:])
+    standard = (amplitude - amplitude.mean()) / amplitude.std()
+    values = image.mean() + image.std() * np.broadcast_to(standard, image.shape)
+    if image.dtype.kind in "iu":
+        limits = np.iinfo(image.dtype)
+        values = np.clip(np.rint(values), limits.min, limits.max)
+    return values.astype(image.dtype)
+
+
+def crossings(cases: Sequence[RealCase]) -> list[Crossing]:
+    """Return every SAR reference with the input of every other place."""
+    sar = [case for case in cases if case.kind in SAR_REFERENCES]
+    return [Crossing(a, b) for a in sar for b in cases if a.place != b.place]
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite."""
+    cases = read_cases(settings.data)
+    speckled = [Speckled(case, replaced) for case in cases for replaced in SPECKLE]
+    impossible: list[Crossing | Speckled] = [*crossings(cases), *speckled]
+    if settings.quick:
+        impossible = impossible[::_QUICK_STEP]
+    outcomes = run_cases(impossible, settings.jobs)
+    return SuiteResult(
+        "Images that do not belong together",
+        goals(outcomes),
+        (counts(outcomes), accepted(outcomes)),
+        [outcome.record() for outcome in outcomes],
+    )
+
+
+def goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
+    """Return the suite's goal and what was found."""
+    wrong = len(outcomes) - count(outcomes, REFUSED)
+    enough = wrong > 0 or len(outcomes) >= _AT_LEAST
+    return (
+        Goal(
+            "Accepted",
+            f"0 of at least {_AT_LEAST}",
+            f"{wrong} of {len(outcomes)}",
+            wrong == 0 if enough else None,
+        ),
+    )
+
+
+def counts(outcomes: Sequence[Outcome]) -> Table:
+    """Return how many were accepted, by what does not belong together."""
+    groups = [[o for o in outcomes if o.group == group] for group in (CROSSING, *SPECKLE.values())]
+    rows = [
+        [
+            group[0].group,
+            str(len(group)),
+            str(len(group) - count(group, REFUSED)),
+            f"{np.median([o.seconds for o in group]):.1f}",
+        ]
+        for group in groups
+        if group
+    ]
+    return Table("By what is wrong", ("images", "pairs", "accepted", "median s"), rows)
+
+
+def accepted(outcomes: Sequence[Outcome]) -> Table:
+    """Return what should have been refused."""
+    rows = [[o.name, o.model, f"{o.claimed_rmse_px:.2f}"] for o in outcomes if o.verdict != REFUSED]
+    return Table("Accepted", ("images", "model", "claimed RMSE (px)"), rows)

@@ -1,0 +1,86 @@
+"""Run the benchmarks: accuracy on real and simulated pairs, speed against peers."""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import importlib
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+SUITES = ("real", "crossings", "simulated", "large_shift")
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Return the options of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--only", type=_suite_names, default=SUITES, help=f"suites, of {','.join(SUITES)}"
+    )
+    parser.add_argument("--quick", action="store_true", help="a few cases of each suite")
+    parser.add_argument("--seeds", type=int, default=20, help="simulated pairs of each kind")
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        default=1,
+        help="processes for the accuracy suites, with one thread each; 1: all threads in one",
+    )
+    parser.add_argument("--results", type=Path, default=HERE / "results", help="folder of results")
+    return parser.parse_args(arguments)
+
+
+def _suite_names(text: str) -> tuple[str, ...]:
+    names = tuple(text.split(","))
+    for name in names:
+        if name not in SUITES:
+            raise argparse.ArgumentTypeError(f"no suite {name!r}; there are {', '.join(SUITES)}")
+    return names
+
+
+def about(options: argparse.Namespace) -> dict[str, Any]:
+    """Return what the figures depend on besides the cases."""
+    commit = subprocess.run(
+        ["git", "describe", "--always", "--dirty"],
+        cwd=HERE,
+        capture_output=True,
+        text=True,
+        check=False,  # without git, the commit is unknown
+    )
+    return {
+        "date": datetime.date.today().isoformat(),
+        "commit": commit.stdout.strip() or "unknown",
+        "quick": "yes: not all cases" if options.quick else "no",
+        "jobs": options.jobs,
+        "processors": os.cpu_count(),
+        **{package: version(package) for package in ("numpy", "scipy", "opencv-python-headless")},
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run suites and print and write their results."""
+    from benchmarks.cases import data_folder
+    from benchmarks.suites import Settings
+    from benchmarks.tables import suite_markdown, write_result
+
+    options = parse(arguments)
+    settings = Settings(options.quick, options.seeds, options.jobs, data_folder(), HERE / ".cache")
+    for name in options.only:
+        print(f"== {name}", flush=True)
+        suite = importlib.import_module(f"benchmarks.{name}")
+        result = suite.run(settings)
+        paths = write_result(name, result, about(options), options.results)
+        print(suite_markdown(result, about(options)))
+        print(f"Written: {', '.join(map(str, paths))}", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    # Run as a file, Python looks for modules beside it; the benchmarks are a package.
+    sys.path[0] = str(HERE.parent)
+    raise SystemExit(main())

@@ -1,0 +1,116 @@
+"""What all suites share: settings, running many cases, and what a suite gives back."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+
+from .attempt import Outcome
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How much is run, and how.
+
+    Parameters
+    ----------
+    quick
+        A few cases of each suite only: to see that it works, not to judge.
+    seeds
+        Number of simulated pairs of each kind.
+    jobs
+        Number of processes. One: cases run in this process, each on all processors. More: each
+        case has one thread.
+    data
+        Folder of the real image pairs.
+    cache
+        Folder of simulated pairs, which take long to make.
+    """
+
+    quick: bool
+    seeds: int
+    jobs: int
+    data: Path
+    cache: Path
+
+
+class Case(Protocol):
+    """A case that a pool of processes can run; it must be possible to pickle it."""
+
+    def run(self, workers: int | None) -> Outcome:
+        """Register, judge and time; `workers` threads."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A goal and what was found.
+
+    Parameters
+    ----------
+    what, wanted, found
+        Text for people.
+    reached
+        Whether the goal is reached; None: reported only, or not enough was run to tell.
+    """
+
+    what: str
+    wanted: str
+    found: str
+    reached: bool | None
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of text."""
+
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True)
+class SuiteResult:
+    """What a suite found: goals, tables for people, records for programs, notes."""
+
+    title: str
+    goals: Sequence[Goal]
+    tables: Sequence[Table]
+    records: Sequence[dict[str, Any]]
+    notes: Sequence[str] = field(default_factory=tuple)
+
+
+def run_cases(
+    cases: Sequence[Case], jobs: int, report: Callable[[str], None] = print
+) -> list[Outcome]:
+    """Run cases and return their outcomes in the same order; `report` gets a line for each."""
+    outcomes: list[Outcome | None] = [None] * len(cases)
+
+    def done(index: int, outcome: Outcome) -> None:
+        outcomes[index] = outcome
+        finished = sum(o is not None for o in outcomes)
+        report(f"[{finished}/{len(cases)}] {outcome.line()}")
+
+    if jobs == 1:
+        for index, case in enumerate(cases):
+            done(index, case.run(None))
+        return [o for o in outcomes if o is not None]
+    # Not forked: OpenCV's and GDAL's threads do not survive a fork.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, context, _one_thread_each) as pool:
+        futures = {pool.submit(case.run, 1): index for index, case in enumerate(cases)}
+        try:
+            for future in as_completed(futures):
+                done(futures[future], future.result())
+        finally:
+            pool.shutdown(cancel_futures=True)
+    return [o for o in outcomes if o is not None]
+
+
+def _one_thread_each() -> None:
+    cv2.setNumThreads(1)
