@@ -112,7 +112,7 @@ def _number(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefin
     limits = {"minValue": kind.minimum, "maxValue": kind.maximum}
     return QgsProcessingParameterNumber(
         name,
-        f"{kind.label} [{kind.unit}]" if kind.unit else kind.label,
+        f"{kind.label} ({kind.unit})" if kind.unit else kind.label,
         type=compat.INTEGER if kind.integer else compat.DOUBLE,
         defaultValue=parameter.default,
         optional=_optional(parameter),

@@ -76,7 +76,7 @@ def test_defaults(told: tuple[Tool, dict[str, Any]]) -> None:
 def test_labels_units_and_help(told: tuple[Tool, dict[str, Any]]) -> None:
     for parameter, shown in each(told):
         unit = getattr(parameter.kind, "unit", "")
-        assert shown["description"] == parameter.kind.label + (f" [{unit}]" if unit else "")
+        assert shown["description"] == parameter.kind.label + (f" ({unit})" if unit else "")
         assert shown["help"] == parameter.kind.help
 
 

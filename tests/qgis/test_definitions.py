@@ -61,8 +61,8 @@ def test_defaults(definitions: dict[str, Any]) -> None:
 
 
 def test_labels_carry_units_and_helps_are_filled_in(definitions: dict[str, Any]) -> None:
-    assert definitions["SIZE"].description() == "Size [px]"
-    assert definitions["SEARCH_RADIUS"].description() == "Search radius [m]"
+    assert definitions["SIZE"].description() == "Size (px)"
+    assert definitions["SEARCH_RADIUS"].description() == "Search radius (m)"
     assert definitions["MODE"].description() == "Mode"
     assert definitions["SIZE"].help() == "How large."
     assert all(d.help() for d in definitions.values())

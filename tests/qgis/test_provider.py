@@ -55,7 +55,7 @@ def test_help_is_filled_in(provider: Any) -> None:
         help_html = algorithm.shortHelpString()
         for definition in algorithm.parameterDefinitions():
             assert definition.help()
-            label = definition.description().partition(" [")[0]
+            label = definition.description().partition(" (")[0]
             assert f"<b>{label}</b>: " in help_html
 
 
