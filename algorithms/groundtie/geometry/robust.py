@@ -193,7 +193,9 @@ def _sampled_models(
         well_posed = np.abs(np.linalg.det(design)) > 0.05
         design[~well_posed] = np.eye(3)
         coefficients = np.linalg.solve(design, displacement[picks])
+        # Three places on a line tell a shift only.
         coefficients[~well_posed] = 0.0
+        coefficients[~well_posed, 0] = displacement[picks[~well_posed, 0]]
     plausible = np.abs(coefficients[:, 1:]).max(axis=(1, 2)) < _LARGEST_DISTORTION
     return np.asarray(coefficients[plausible] if plausible.any() else coefficients * 0)
 
