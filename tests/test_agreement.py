@@ -8,7 +8,6 @@ from __future__ import annotations
 import inspect
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 import toys
@@ -20,14 +19,12 @@ from groundtie.kinds import Band, Choice, Flag, Kind, Number, OutputKind
 from groundtie.tools import TOOLS
 
 ALL = [toys.TOY, *TOOLS]
+each_tool = pytest.mark.parametrize("tool", ALL, ids=lambda tool: tool.name)
+each_real_tool = pytest.mark.parametrize("tool", TOOLS, ids=lambda tool: tool.name)
 EVERY = [pytest.param(tool, p, id=f"{tool.name}-{p.name}") for tool in ALL for p in tool.parameters]
 NUMBERS = [case for case in EVERY if isinstance(case.values[1].kind, Number)]
 CHOICES = [case for case in EVERY if isinstance(case.values[1].kind, Choice)]
-RESERVED = {"json", "quiet", "help", "progress"}
-
-
-def named(tool: Tool) -> Any:
-    return pytest.param(tool, id=tool.name)
+RESERVED = {"json", "quiet", "help", "progress", "parameters"}
 
 
 def option(parameter: Parameter) -> str:
@@ -73,13 +70,13 @@ def fitting(name: str, kind: Kind) -> str:
     return name + (kind.suffixes[0] if isinstance(kind, OutputKind) else ".tif")
 
 
-@pytest.mark.parametrize("tool", map(named, TOOLS))
+@each_real_tool
 def test_the_package_offers_the_function(tool: Tool) -> None:
     assert getattr(groundtie, tool.name) is tool.run
     assert tool.run.__name__ == tool.name
 
 
-@pytest.mark.parametrize("tool", map(named, ALL))
+@each_tool
 def test_python_has_the_same_parameters_with_the_same_defaults(tool: Tool) -> None:
     parameters = inspect.signature(tool.run).parameters
     declared = {
@@ -89,7 +86,7 @@ def test_python_has_the_same_parameters_with_the_same_defaults(tool: Tool) -> No
     assert [name for name in parameters if name != "progress"] == list(declared)
 
 
-@pytest.mark.parametrize("tool", map(named, ALL))
+@each_tool
 def test_the_declaration_is_complete(tool: Tool) -> None:
     assert tool.title and tool.group
     assert re.fullmatch(r"[A-Z].*\.", tool.summary)
@@ -101,12 +98,12 @@ def test_the_declaration_is_complete(tool: Tool) -> None:
         assert not (parameter.required and parameter.kind.advanced)
 
 
-@pytest.mark.parametrize("tool", map(named, TOOLS))
+@each_real_tool
 def test_a_tool_shows_at_most_ten_parameters_to_begin_with(tool: Tool) -> None:
     assert sum(not parameter.kind.advanced for parameter in tool.parameters) <= 10
 
 
-@pytest.mark.parametrize("tool", map(named, ALL))
+@each_tool
 def test_labels_tell_parameters_apart(tool: Tool) -> None:
     labels = [parameter.kind.label for parameter in tool.parameters]
     assert len(set(labels)) == len(labels)
@@ -144,7 +141,7 @@ def test_the_help_of_the_command_line_tells_all(
     assert ("required" in notes) == (parameter.required and not parameter.positional)
 
 
-@pytest.mark.parametrize("tool", map(named, ALL))
+@each_tool
 def test_advanced_options_come_last(tool: Tool, capsys: pytest.CaptureFixture[str]) -> None:
     plain, _, advanced = help_text(tool, capsys).partition("\nAdvanced options:\n")
     for parameter in tool.parameters:

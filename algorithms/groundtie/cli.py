@@ -6,6 +6,7 @@ Standard output carries the result alone. An error is one line on standard error
 
 from __future__ import annotations
 
+import functools
 import json
 import logging
 import os
@@ -44,7 +45,8 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
     _silence_libraries()
     with _signals() as received:
         try:
-            command = _group(_all_tools() if tools is None else tools)
+            group = ToolGroup(_all_tools if tools is None else lambda: tools)
+            command = click.version_option(__version__, message="%(prog)s %(version)s")(group)
             command.main(args, prog_name="groundtie", standalone_mode=False, obj=received)
         except click.ClickException as error:
             return _fail(_usage(error), error.exit_code)
@@ -108,16 +110,30 @@ def _signals() -> Iterator[list[int]]:
             signal.signal(number, handler)
 
 
-def _group(tools: Sequence[Tool]) -> click.Group:
-    group = click.Group(
-        "groundtie",
-        help="Register satellite images to one another and to the ground.",
-        commands={command.name: command for command in map(ToolCommand, tools)},  # type: ignore[misc]
-        invoke_without_command=True,
-        callback=_help_without_command,
-        context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    )
-    return click.version_option(__version__, message="%(prog)s %(version)s")(group)
+class ToolGroup(click.Group):
+    """The command `groundtie`; it loads the tools when one of them or their list is needed."""
+
+    def __init__(self, load: Callable[[], Sequence[Tool]]) -> None:
+        super().__init__(
+            "groundtie",
+            help="Register satellite images to one another and to the ground.",
+            invoke_without_command=True,
+            callback=_help_without_command,
+            context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+        )
+        self._load = load
+
+    @functools.cached_property
+    def _tools(self) -> dict[str, ToolCommand]:
+        return {str(command.name): command for command in map(ToolCommand, self._load())}
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the tools in the order in which they are declared."""
+        return list(self._tools)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return the command of a tool; None if there is no such tool."""
+        return self._tools.get(cmd_name)
 
 
 @click.pass_context

@@ -13,50 +13,28 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio
-import rasterio.transform
-from scipy.ndimage import gaussian_filter
+from noise_pairs import ORIGIN, POINTS, true_input_px, write_pair, write_raster
 
 from groundtie import load_transform
 
 ROOT = Path(__file__).resolve().parents[2]
 # settings that make little work of a small pair
 QUICK = ["MODEL=translation", "SIMILARITY=orientation", "SEARCH_RADIUS=12"]
-SIZE = 384
-# how far the input's georeferencing is off, in metres, which are pixels
-SHIFT = (4.0, -3.0)
 
 
 @pytest.fixture(scope="session")
 def pairs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Folders of two pairs of different places: the input is the reference's negative, moved."""
-    folders = [tmp_path_factory.mktemp("pairs") / name for name in ("here", "there")]
+    """Folders of two pairs of different places."""
+    folders = [tmp_path_factory.mktemp(name) for name in ("here", "there")]
     for seed, folder in enumerate(folders):
-        folder.mkdir()
-        random = np.random.Generator(np.random.PCG64(seed))
-        ground = gaussian_filter(random.normal(size=(SIZE, SIZE)), 3)
-        ground = np.clip(128 + 40 * ground / ground.std(), 1, 254)
-        noise = random.normal(0, 5, (2, SIZE, SIZE))
-        right = rasterio.transform.from_origin(500_000, 5_000_000, 1, 1)
-        moved = rasterio.Affine.translation(*SHIFT) * right
-        write(folder / "reference.tif", ground[None], right)
-        write(folder / "input.tif", 255 - ground + noise, moved)
+        write_pair(folder, seed)
     return folders
 
 
-def write(path: Path, bands: np.ndarray, transform: rasterio.Affine | None) -> None:
-    count, height, width = bands.shape
-    profile = {"driver": "GTiff", "dtype": "uint8"}
-    if transform is not None:
-        profile |= {"crs": "EPSG:32633", "transform": transform}
-    with rasterio.open(path, "w", count=count, height=height, width=width, **profile) as raster:
-        raster.write(np.clip(bands, 1, 254).astype("uint8"))
-
-
 def assert_registered(transform: Path) -> None:
-    """Check a transform: the place of a reference pixel is the same pixel of the input."""
-    corners = np.array([[50.0, 50.0], [50.0, 330.0], [330.0, 50.0], [200.0, 200.0]])
-    reference_xy = [500_000.5, 4_999_999.5] + corners * [1, -1]
-    np.testing.assert_allclose(load_transform(transform)(reference_xy), corners, atol=0.3)
+    reference_xy = ORIGIN + np.array([[50, -50], [50, -330], [330, -50], [200, -200]])
+    found = load_transform(transform)(reference_xy)
+    np.testing.assert_allclose(found, true_input_px(reference_xy), atol=0.3)
 
 
 def words(reference: Path, input: Path, output: Path, **more: object) -> list[str]:
@@ -105,11 +83,8 @@ def test_simulate(qgis_process: Any, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="session")
 def truth(pairs: list[Path]) -> Path:
-    """The pair's tie points as the Georeferencer writes them, without error."""
-    lines = ["#CRS: EPSG:32633", "mapX,mapY,sourceX,sourceY,enable,dX,dY,residual"]
-    for x, y in ((500_050, 4_999_950), (500_300, 4_999_900), (500_200, 4_999_700)):
-        lines.append(f"{x},{y},{x + SHIFT[0]},{y + SHIFT[1]},1,0,0,0")
-    (pairs[0] / "truth.points").write_text("\n".join(lines) + "\n")
+    """A file of the first pair's tie points without error."""
+    (pairs[0] / "truth.points").write_text(POINTS)
     return pairs[0] / "truth.points"
 
 
@@ -142,7 +117,7 @@ def test_images_without_georeferencing(
     for name in ("reference", "input"):
         with rasterio.open(pairs[0] / f"{name}.tif") as raster:
             bands = raster.read()
-        write(tmp_path / f"{name}.tif", bands, None)
+        write_raster(tmp_path / f"{name}.tif", bands, None)
     called = qgis_process(
         *("run", "groundtie:coregister", "--", *QUICK, f"TRANSFORM={tmp_path / 't.json'}"),
         *words(tmp_path / "reference.tif", tmp_path / "input.tif", tmp_path / "o.tif"),
