@@ -7,7 +7,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.optimize import check_grad
 
 from groundtie.geometry.fitting import fit_model
-from groundtie.geometry.models import DEGREE, PARAMETERS, Frame, Model
+from groundtie.geometry.models import DEGREE, Frame, Model
 from groundtie.rasters.grid import apply_affine
 from groundtie.search.alignment import (
     CANDIDATES,
@@ -23,11 +23,11 @@ RADIUS = 8
 SPAN = 2 * RADIUS + 1
 SIZE = np.array([600.0, 500.0])
 PEAK_SIGMA = 1.4
-PEAK_HEIGHT = 8.0
+PEAK_HEIGHT = 12.0
 
 
 def centres() -> np.ndarray:
-    cols, rows = np.meshgrid(np.linspace(30, 570, 13), np.linspace(30, 470, 11))
+    cols, rows = np.meshgrid(np.linspace(30, 570, 15), np.linspace(30, 470, 13))
     return np.round(np.column_stack([cols.ravel(), rows.ravel()])).astype(int)
 
 
@@ -77,17 +77,6 @@ def error_px(model: Model, kind: str) -> float:
     return float(np.sqrt(((model(px) - distortion(kind, px)) ** 2).sum(axis=1).mean()))
 
 
-def expected_error_px(kind: str, chips: int, wrong: float = 0.4) -> float:
-    """What is left after averaging: the more parameters, the more of each chip's scatter.
-
-    A right chip's position scatters by its peak's width over its height along each axis; the
-    background of the wrong ones pulls as much, but they hold nothing.
-    """
-    right = (1 - wrong) * chips
-    share = PARAMETERS[kind] / 2 / right * (chips / right)
-    return float(np.sqrt(2 * share) * PEAK_SIGMA / PEAK_HEIGHT)
-
-
 PRIORS = [Affine.identity(), Affine(1.003, 0.002, 1.0, -0.001, 0.998, -0.5)]
 
 
@@ -97,7 +86,7 @@ def test_the_model_behind_the_surfaces_is_found(kind: str, prior: Affine) -> Non
     px = centres()
     found = align(kind, px, surfaces_of(kind, px, prior, seed=0), prior, identity())
     assert found.model.kind == kind
-    assert error_px(found.model, kind) < 2 * expected_error_px(kind, len(px))
+    assert error_px(found.model, kind) < 0.1
     assert set(found.left_out_score) == {kind}
     assert len(found.fold_models) == 5
     for model in found.fold_models:
@@ -110,7 +99,7 @@ def test_the_simplest_model_that_fits_is_chosen(kind: str, seed: int) -> None:
     px = centres()
     chosen = choose_alignment(px, surfaces_of(kind, px, PRIORS[1], seed), PRIORS[1], identity())
     assert chosen.model.kind == kind
-    assert error_px(chosen.model, kind) < 2 * expected_error_px(kind, len(px))
+    assert error_px(chosen.model, kind) < 0.1
     assert set(chosen.left_out_score) == set(CANDIDATES)
 
 
@@ -124,7 +113,7 @@ def test_left_out_similarity_is_that_of_the_peaks() -> None:
 
 
 def test_few_chips_take_no_model_of_many_parameters() -> None:
-    px = centres()[::20]
+    px = centres()[::25]
     assert len(px) == 8
     prior = Affine.identity()
     chosen = choose_alignment(px, surfaces_of("translation", px, prior, 0, 0), prior, identity())

@@ -86,9 +86,10 @@ class Verdict:
         return float(10.0**self.log10_chance)
 
     def summary(self) -> dict[str, Any]:
-        """Return the verdict as values that JSON can carry; what is unknown is None."""
+        """Return the verdict as values that JSON can carry; what is not finite is None."""
         values = asdict(self) | {"points": self.points, "chance": self.chance}
-        return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in values.items()}
+        unknown = {k for k, v in values.items() if isinstance(v, float) and not math.isfinite(v)}
+        return {k: None if k in unknown else v for k, v in values.items()}
 
 
 def refuse(reason: str, fit_points: int = 0) -> Verdict:

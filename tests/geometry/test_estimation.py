@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from raster_files import UTM, utm_grid
+
+from groundtie.errors import TooFewPointsError
+from groundtie.geometry.estimation import Estimate, fit_thin_plate
+from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.models import Frame, Model, PolynomialModel
+from groundtie.geometry.robust import block_folds
+from groundtie.geometry.tie_points import TiePoints
+from groundtie.geometry.transform import Transform
+
+GRID = utm_grid(800, 600)
+AS_CLAIMED = Transform.as_claimed(UTM, GRID)
+IDENTITY = PolynomialModel.identity()
+
+
+def lattice(columns: int = 13, rows: int = 11) -> np.ndarray:
+    cols, lines = np.meshgrid(np.linspace(30, 770, columns), np.linspace(30, 570, rows))
+    return np.column_stack([cols.ravel(), lines.ravel()])
+
+
+def bent(px: np.ndarray) -> np.ndarray:
+    u, v = ((px - [400, 300]) / 400).T
+    return px + 2 * np.column_stack([np.sin(2 * u), np.cos(2 * v) * u])
+
+
+def tie_points(px: np.ndarray, claimed_px: np.ndarray, variance: float = 0.05) -> TiePoints:
+    count = len(px)
+    return TiePoints(
+        reference_xy=GRID.pixel_to_map(px),
+        input_px=claimed_px,
+        score=np.full(count, 8.0),
+        covariance_px2=np.tile(variance * np.eye(2), (count, 1, 1)),
+        two_way_error_px=np.zeros(count),
+        is_check=np.zeros(count, bool),
+        state=np.full(count, "used"),
+    )
+
+
+def spread_of(models: list[Model], at: np.ndarray) -> np.ndarray:
+    none = tie_points(np.zeros((0, 2)), np.zeros((0, 2)))
+    return Estimate(AS_CLAIMED, none, tuple(models)).spread_px(at)
+
+
+@pytest.mark.parametrize("kind", ["translation", "affine", "polynomial2"])
+def test_the_spread_is_how_much_estimates_vary(kind: str) -> None:
+    """The jackknife's mean over many drawn data sets is the scatter of their predictions."""
+    px, rng, sigma = lattice(), np.random.default_rng(0), 0.5
+    folds = block_folds(px)
+    at = lattice(5, 4)
+    told, predictions = [], []
+    for _ in range(60):
+        claimed = px + sigma * rng.normal(size=px.shape)
+        predictions.append(fit_model(kind, px, claimed)(at))
+        left_out = [fit_model(kind, px[folds != f], claimed[folds != f]) for f in range(5)]
+        told.append(spread_of(left_out, at) ** 2)
+    actual = np.var(predictions, axis=0).sum(axis=1)
+    assert np.sqrt(np.mean(told)) == pytest.approx(np.sqrt(actual.mean()), rel=0.25)
+
+
+def test_the_spread_of_a_mean_by_hand() -> None:
+    """Five shifts by 0 … 4 px along x: the jackknife variance is (n - 1)/n Σ (θ - mean)²."""
+    shifts = [np.array([[float(k), 0.0]]) for k in range(5)]
+    models: list[Model] = [
+        PolynomialModel("translation", Frame.around(np.zeros((1, 2))), s) for s in shifts
+    ]
+    np.testing.assert_allclose(spread_of(models, np.zeros((3, 2))), np.sqrt(4 / 5 * 10))
+
+
+def test_the_spread_grows_away_from_the_points() -> None:
+    px = lattice() * 0.2
+    rng = np.random.default_rng(1)
+    claimed = px + 0.3 * rng.normal(size=px.shape)
+    folds = block_folds(px)
+    models = [fit_model("affine", px[folds != f], claimed[folds != f]) for f in range(5)]
+    near, far = spread_of(models, np.array([[80.0, 60.0], [780.0, 580.0]]))
+    assert far > 5 * near
+
+
+def test_a_single_model_tells_nothing_of_its_spread() -> None:
+    assert np.isinf(spread_of([IDENTITY], np.zeros((2, 2)))).all()
+
+
+def test_the_spline_follows_local_distortion_past_wrong_matches() -> None:
+    rng = np.random.default_rng(0)
+    px = lattice(17, 13)
+    claimed = bent(px) + 0.2 * rng.normal(size=px.shape)
+    wrong = rng.random(len(px)) < 0.15
+    claimed[wrong] += rng.choice([-3, 3], (wrong.sum(), 2))
+    points = tie_points(px, claimed)
+    start = fit_model("polynomial3", px, bent(px))
+    model, folds = fit_thin_plate(points, AS_CLAIMED, GRID, start, 3)
+    at = lattice(9, 7)
+    error = np.hypot(*(model(at) - bent(at)).T)
+    assert model.kind == "tps"
+    assert np.sqrt((error**2).mean()) < 0.3
+    assert len(folds) == 5
+    for other in folds:
+        assert 0 < np.abs(other(at) - model(at)).max() < 3
+
+
+def test_rejected_points_take_no_part_in_the_spline() -> None:
+    px = lattice()
+    claimed = bent(px)
+    which = np.arange(len(px)) % 5 == 0
+    spoiled = claimed + np.where(which[:, None], 2.0, 0.0)
+    rejected = tie_points(px, spoiled).reject(which, "two-way error")
+    model, _ = fit_thin_plate(rejected, AS_CLAIMED, GRID, IDENTITY, 3)
+    clean, _ = fit_thin_plate(
+        tie_points(px[~which], claimed[~which]), AS_CLAIMED, GRID, IDENTITY, 3
+    )
+    np.testing.assert_allclose(model(px), clean(px), atol=1e-6)
+
+
+@pytest.mark.parametrize("count", [0, 3])
+def test_too_few_points_for_a_spline(count: int) -> None:
+    px = lattice()[:count]
+    with pytest.raises(TooFewPointsError, match=rf"only {count} points"):
+        fit_thin_plate(tie_points(px, px), AS_CLAIMED, GRID, IDENTITY, 3)
