@@ -115,12 +115,20 @@ def test_the_middle_half_of_each_cell_is_held_out() -> None:
     np.testing.assert_allclose(one_each.check_centres(), [32, 77])
 
 
-@pytest.mark.parametrize(
-    ("size", "chip"),
-    [((100, 100), 32), ((160, 2000), 32), ((500, 400), 55), ((1000, 1000), 76), ((9e4, 8e4), 128)],
-)
-def test_chips_grow_with_the_scene(size: tuple[int, int], chip: int) -> None:
-    assert default_chip_px(*size) == chip
+def test_chips_grow_with_the_scene_within_limits() -> None:
+    sides = [100, 150, 200, 300, 500, 800, 1200, 2000, 10_000]
+    chips = [default_chip_px(side, 2 * side) for side in sides]
+    assert chips == sorted(chips)
+    assert (chips[0], chips[-1]) == (32, 128)
+    assert chips == [default_chip_px(2 * side, side) for side in sides]
+
+
+@pytest.mark.parametrize("side", [200, 260, 400, 600, 1000])
+def test_small_scenes_have_cells_enough(source: RasterSource, side: int) -> None:
+    layout = laid_out(source, (side, side))
+    assert layout.columns.cells >= 2
+    assert len(layout.check_centres) >= 4
+    assert len(layout.fit_centres) >= 20
 
 
 def test_large_scenes_do_not_get_more_cells(source: RasterSource) -> None:
