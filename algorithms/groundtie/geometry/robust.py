@@ -66,6 +66,8 @@ def fit_mixture(
     sigma_range
         Smallest and largest standard deviation of right matches.
     """
+    if len(residuals) == 0:
+        return Mixture(np.zeros(0), sigma_range[1])
     squared = (residuals**2).sum(axis=1)
     lowest, highest = sigma_range
     variance, share = min(max(_FIRST_SIGMA, lowest), highest) ** 2, 0.5

@@ -26,14 +26,20 @@ FloatArray = NDArray[np.float64]
 _BLURS_PX = (1.5, 0.0)
 
 # The fit has arrived when the sum of similarities rises by less than this per pixel.
-_SLOPE_PER_PX = 0.1
+_SLOPE_PER_PX = 0.01
 _STEPS = 60
+
+# The background alone reaches about this many robust standard deviations.
+_LEAST_HEIGHT = 3.0
 
 # From simple to flexible, those that "auto" chooses from; see `choose_alignment`.
 CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3")
 
 # Chips for each parameter below which a model is not considered.
 _CHIPS_PER_PARAMETER = 2
+
+# A more flexible model must raise the similarity by so many standard errors.
+_STANDARD_ERRORS = 2.0
 
 
 @dataclass(frozen=True)
@@ -121,7 +127,7 @@ def choose_alignment(
     """Fit the simplest polynomial model that the surfaces justify.
 
     A more flexible model is taken only if it raises the similarity at blocks of chips that were
-    left out of its fit by more than the standard error of the rise. Parameters as `align`.
+    left out of its fit by more than twice the rise's standard error. Parameters as `align`.
     """
     fields = _fields(px, surfaces, prior)
     chosen = _align(CANDIDATES[0], fields, start)
@@ -135,7 +141,7 @@ def choose_alignment(
         left_out = _left_out_scores(fields[-1], tried)
         rise = left_out - kept
         error = float(rise.std(ddof=1) * np.sqrt(len(rise))) if len(rise) > 1 else 0.0
-        if rise.sum() > error:
+        if rise.sum() > _STANDARD_ERRORS * error:
             chosen, kept = tried, left_out
     return Alignment(chosen.model, chosen.fold_models, scores)
 
@@ -167,7 +173,13 @@ def _left_out_scores(field: _Field, alignment: Alignment) -> FloatArray:
 
 
 def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Affine) -> list[_Field]:
-    """Return the surfaces to look up, from the most to the least blurred."""
+    """Return the surfaces to look up, from the most to the least blurred.
+
+    Each is divided by its height, so that every chip counts the same: the highest peaks are those
+    of buildings, which lay over and lean.
+    """
+    heights = np.maximum(surfaces.max(axis=(1, 2), keepdims=True), _LEAST_HEIGHT)
+    surfaces = surfaces / heights
     fields = []
     for blur in _BLURS_PX:
         blurred = (cv2.GaussianBlur(s, (0, 0), blur) if blur else s for s in surfaces)

@@ -20,6 +20,10 @@ from ..rasters.pair import ImagePair
 # Chips are this share of the scene's shorter side, within these limits in pixels.
 _CHIP_SHARE = 1 / 13
 _CHIP_RANGE_PX = (55, 128)
+
+# Small scenes get smaller chips, so that there are four cells a side, or at least three.
+_FOUR_CELLS, _THREE_CELLS = 9, 7
+_SMALL_CHIP_PX = 40
 _SMALLEST_CHIP_PX = 32
 
 # More cells than this along a side make more points than a model needs.
@@ -36,9 +40,8 @@ _OVERLAPPING = 0.75
 def default_chip_px(width: int, height: int) -> int:
     """Return the side of a chip for a scene of this size, in pixels."""
     shorter = min(width, height)
-    usual = np.clip(shorter * _CHIP_SHARE, *_CHIP_RANGE_PX)
-    # At least two cells of two chips each must fit into small scenes.
-    return int(max(min(usual, shorter / 5), _SMALLEST_CHIP_PX))
+    usual = min(float(np.clip(shorter * _CHIP_SHARE, *_CHIP_RANGE_PX)), shorter / _FOUR_CELLS)
+    return int(max(usual, min(_SMALL_CHIP_PX, shorter / _THREE_CELLS), _SMALLEST_CHIP_PX))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
 from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate
-from ..geometry.models import DEGREE, Model
+from ..geometry.models import DEGREE, PARAMETERS, Model
 from ..geometry.robust import find_consensus, fit_mixture
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
@@ -114,7 +114,12 @@ class LocalSearch:
             model, fold_models = fit_thin_plate(points, as_claimed, self.pair.grid, model, _NEAR_PX)
         on_map = model.on_map(self.pair.grid.transform * Affine.translation(0.5, 0.5))
         transform = Transform(on_map, as_claimed.crs, as_claimed.input_grid)
-        return Estimate(transform, self._agreeing(points, transform), fold_models)
+        agreeing = self._agreeing(points, transform)
+        if 2 * agreeing.used.sum() < PARAMETERS[transform.model.kind]:
+            raise TooFewPointsError(
+                f"only {agreeing.used.sum()} of {len(points)} points agree with a model"
+            )
+        return Estimate(transform, agreeing, fold_models)
 
     def check_points(
         self, model: Model, executor: Executor, progress: Progress = SILENT

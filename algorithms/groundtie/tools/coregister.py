@@ -41,7 +41,7 @@ from .registration import (
         ResultOutput("CHECK_RMSE_PX", "Error at check points (px)", "verdict.check_rmse_px"),
         ResultOutput("CHECK_CE90_M", "CE90 at check points (m)", "verdict.check_ce90_m"),
         ResultOutput("POINTS", "Number of tie points", "verdict.points"),
-        ResultOutput("REASON", "Reason of the verdict", "verdict.reason"),
+        ResultOutput("REASON", "Reason of the verdict", "verdict.reason", text=True),
     ),
 )
 def coregister(

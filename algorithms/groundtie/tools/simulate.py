@@ -9,12 +9,12 @@ from typing import Annotated, Any
 from ..declaration import tool
 from ..kinds import Choice, Distance, FolderOut, Number
 from ..progress import SILENT, Progress
-from ..simulate.files import write_pair
-from ..simulate.layout import DENSITIES
-from ..simulate.misregistration import DISTORTIONS, DistortionOptions
-from ..simulate.pair import PairOptions, simulate_pair
-from ..simulate.sar import SarOptions
-from ..simulate.scene import SceneOptions
+from ..simulation.files import write_pair
+from ..simulation.layout import DENSITIES
+from ..simulation.misregistration import DISTORTIONS, DistortionOptions
+from ..simulation.pair import PairOptions, simulate_pair
+from ..simulation.sar import SarOptions
+from ..simulation.scene import SceneOptions
 from .common import Seed
 
 
