@@ -21,7 +21,8 @@ CORRECT = "correct"
 INACCURATE = "inaccurate"
 SILENTLY_WRONG = "silently wrong"
 REFUSED = "refused"
-VERDICTS = (CORRECT, INACCURATE, SILENTLY_WRONG, REFUSED)
+CRASHED = "crashed"
+VERDICTS = (CORRECT, INACCURATE, REFUSED, SILENTLY_WRONG, CRASHED)
 
 _LATTICE = 21
 
@@ -82,7 +83,7 @@ def classify(accepted: bool, error_px: float, sigma_px: float) -> str:
     Returns
     -------
     str
-        One of `VERDICTS`.
+        One of `VERDICTS`, but not `CRASHED`.
     """
     if not accepted:
         return REFUSED

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 import time
+import traceback
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,9 +15,10 @@ import rasterio
 
 import groundtie
 from groundtie.errors import NotRegisteredError
+from groundtie.geometry.transform import Transform
 from groundtie.rasters.grid import Grid
 
-from .accuracy import FloatArray, Truth, classify
+from .accuracy import CRASHED, REFUSED, FloatArray, Mapping, Truth, classify
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ class Outcome:
 
     def line(self) -> str:
         """Return the outcome as a line of text."""
-        error = "" if math.isnan(self.error_px) else f" {self.error_px:.2f} px ({self.model})"
+        error = "" if not self.model else f" {self.error_px:.2f} px ({self.model})"
         return f"{self.name}: {self.verdict}{error} in {self.seconds:.1f} s; {self.reason}"
 
 
@@ -107,14 +109,14 @@ def attempt(
         except NotRegisteredError as refusal:
             seconds = time.perf_counter() - started
             reason = str(refusal) if refusal.verdict is None else refusal.verdict.reason
-            return refused(name, group, pair.sigma_px, seconds, reason)
+            return unregistered(REFUSED, name, group, pair.sigma_px, seconds, reason)
+        except Exception as error:
+            # A finding like any other: it is counted, and `run.py` exits with 1.
+            traceback.print_exc()
+            seconds = time.perf_counter() - started
+            return unregistered(CRASHED, name, group, pair.sigma_px, seconds, repr(error))
         seconds = time.perf_counter() - started
-    with rasterio.open(pair.reference) as source:
-        grid = Grid(source.transform, source.crs, source.width, source.height)
-
-    def found(px: FloatArray) -> FloatArray:
-        return result.transform(grid.pixel_to_map(px))
-
+    found = on_pixels(result.transform, pair.reference)
     errors = [
         math.inf if truth is None else truth.error_px(found) for truth in (pair.truth, pair.lattice)
     ]
@@ -133,13 +135,30 @@ def attempt(
     )
 
 
-def refused(name: str, group: str, sigma_px: float, seconds: float, reason: str) -> Outcome:
-    """Return the outcome of a refused registration."""
-    verdict = classify(False, math.nan, sigma_px)
+def on_pixels(transform: Transform, reference: Path) -> Mapping:
+    """Return the function from reference pixels to input pixels of a transform."""
+    with rasterio.open(reference) as source:
+        grid = Grid(source.transform, source.crs, source.width, source.height)
+
+    def mapping(px: FloatArray) -> FloatArray:
+        return transform(grid.pixel_to_map(px))
+
+    return mapping
+
+
+def unregistered(
+    verdict: str, name: str, group: str, sigma_px: float, seconds: float, reason: str
+) -> Outcome:
+    """Return the outcome of a registration that was refused or crashed."""
     unknown = math.nan
     return Outcome(
         name, group, verdict, verdict, unknown, unknown, sigma_px, seconds, unknown, "", reason
     )
+
+
+def accepted(outcomes: Iterable[Outcome]) -> list[Outcome]:
+    """Return the outcomes of the registrations that the tool accepted."""
+    return [outcome for outcome in outcomes if outcome.verdict not in (REFUSED, CRASHED)]
 
 
 def count(outcomes: Iterable[Outcome], verdict: str, on_lattice: bool = False) -> int:

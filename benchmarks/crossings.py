@@ -13,8 +13,7 @@ import rasterio
 from affine import Affine
 from numpy.typing import NDArray
 
-from .accuracy import REFUSED
-from .attempt import Outcome, Pair, attempt, count
+from .attempt import Outcome, Pair, accepted, attempt
 from .cases import (
     REFERENCE_TRANSFORM,
     SAR_OPTICAL,
@@ -124,14 +123,14 @@ def run(settings: Settings) -> SuiteResult:
     return SuiteResult(
         "Images that do not belong together",
         goals(outcomes),
-        (counts(outcomes), accepted(outcomes)),
+        (counts(outcomes), what_was_accepted(outcomes)),
         [outcome.record() for outcome in outcomes],
     )
 
 
 def goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
     """Return the suite's goal and what was found."""
-    wrong = len(outcomes) - count(outcomes, REFUSED)
+    wrong = len(accepted(outcomes))
     enough = wrong > 0 or len(outcomes) >= _AT_LEAST
     return (
         Goal(
@@ -150,7 +149,7 @@ def counts(outcomes: Sequence[Outcome]) -> Table:
         [
             group[0].group,
             str(len(group)),
-            str(len(group) - count(group, REFUSED)),
+            str(len(accepted(group))),
             f"{np.median([o.seconds for o in group]):.1f}",
         ]
         for group in groups
@@ -159,7 +158,7 @@ def counts(outcomes: Sequence[Outcome]) -> Table:
     return Table("By what is wrong", ("images", "pairs", "accepted", "median s"), rows)
 
 
-def accepted(outcomes: Sequence[Outcome]) -> Table:
+def what_was_accepted(outcomes: Sequence[Outcome]) -> Table:
     """Return what should have been refused."""
-    rows = [[o.name, o.model, f"{o.claimed_rmse_px:.2f}"] for o in outcomes if o.verdict != REFUSED]
+    rows = [[o.name, o.model, f"{o.claimed_rmse_px:.2f}"] for o in accepted(outcomes)]
     return Table("Accepted", ("images", "model", "claimed RMSE (px)"), rows)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
-SUITES = ("real", "crossings", "simulated", "large_shift")
+SUITES = ("real", "crossings", "simulated", "large_shift", "speed")
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -63,21 +63,26 @@ def about(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run suites and print and write their results."""
+    """Run suites, print and write their results; return 1 if the tool crashed, else 0."""
+    from benchmarks.accuracy import CRASHED
     from benchmarks.cases import data_folder
     from benchmarks.suites import Settings
     from benchmarks.tables import suite_markdown, write_result
 
     options = parse(arguments)
     settings = Settings(options.quick, options.seeds, options.jobs, data_folder(), HERE / ".cache")
+    crashed = 0
     for name in options.only:
         print(f"== {name}", flush=True)
         suite = importlib.import_module(f"benchmarks.{name}")
         result = suite.run(settings)
+        crashed += sum(record.get("verdict") == CRASHED for record in result.records)
         paths = write_result(name, result, about(options), options.results)
         print(suite_markdown(result, about(options)))
         print(f"Written: {', '.join(map(str, paths))}", flush=True)
-    return 0
+    if crashed:
+        print(f"{crashed} registrations crashed.", file=sys.stderr)
+    return 1 if crashed else 0
 
 
 if __name__ == "__main__":

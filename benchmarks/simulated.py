@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .accuracy import CORRECT, REFUSED, SILENTLY_WRONG
-from .attempt import Outcome, attempt, count
+from .accuracy import CORRECT, SILENTLY_WRONG
+from .attempt import Outcome, accepted, attempt, count
 from .simulations import Simulation
 from .suites import Goal, Settings, SuiteResult, run_cases
 from .tables import accuracy_table
@@ -58,7 +58,7 @@ def run(settings: Settings) -> SuiteResult:
 def goals(density: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
     """Return the goals for one density and what was found."""
     correct, wrong = count(outcomes, CORRECT), count(outcomes, SILENTLY_WRONG)
-    errors = [o.error_px for o in outcomes if o.verdict != REFUSED]
+    errors = [outcome.error_px for outcome in accepted(outcomes)]
     median = float(np.median(errors)) if errors else float("nan")
     largest = _MEDIAN_ERROR_PX[density]
     title = density.capitalize()

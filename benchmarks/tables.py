@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from .accuracy import CORRECT, INACCURATE, REFUSED, SILENTLY_WRONG
-from .attempt import Outcome, count
+from .accuracy import CORRECT, SILENTLY_WRONG, VERDICTS
+from .attempt import Outcome, accepted, count
 from .suites import Goal, SuiteResult, Table
 
 _REACHED = {True: "yes", False: "**no**", None: "–"}
@@ -23,10 +23,7 @@ def accuracy_table(title: str, groups: Mapping[str, Sequence[Outcome]]) -> Table
         "pairs",
         "σ of truth (px)",
         "runs",
-        "correct",
-        "inaccurate",
-        "refused",
-        "silently wrong",
+        *VERDICTS,
         "median error (px)",
         "largest (px)",
         "on the lattice: correct",
@@ -39,13 +36,13 @@ def accuracy_table(title: str, groups: Mapping[str, Sequence[Outcome]]) -> Table
 
 def _accuracy_row(name: str, outcomes: Sequence[Outcome]) -> list[str]:
     sigmas = sorted({outcome.sigma_px for outcome in outcomes})
-    errors = [o.error_px for o in outcomes if o.verdict != REFUSED]
-    lattice_errors = [o.lattice_error_px for o in outcomes if o.verdict != REFUSED]
+    errors = [o.error_px for o in accepted(outcomes)]
+    lattice_errors = [o.lattice_error_px for o in accepted(outcomes)]
     return [
         name,
         "–".join(f"{sigma:g}" for sigma in dict.fromkeys((sigmas[0], sigmas[-1]))),
         str(len(outcomes)),
-        *(str(count(outcomes, v)) for v in (CORRECT, INACCURATE, REFUSED, SILENTLY_WRONG)),
+        *(str(count(outcomes, verdict)) for verdict in VERDICTS),
         f"{np.median(errors):.2f}" if errors else "–",
         f"{max(errors):.2f}" if errors else "–",
         str(count(outcomes, CORRECT, on_lattice=True)),

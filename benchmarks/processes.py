@@ -1,0 +1,64 @@
+"""Whole processes, timed: what a user waits for, imports and written output included."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import groundtie
+
+# Stands in a command for a file that is written and thrown away.
+OUTPUT = "{output}"
+
+_MEASURE = Path(__file__).with_name("measure.py")
+_PACKAGE = Path(groundtie.__file__).parents[1]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Time and memory of a process, and what it printed."""
+
+    seconds: float
+    processor_seconds: float
+    peak_bytes: int
+    exit_code: int
+    output: str
+
+
+def measure(command: Sequence[str]) -> Measured:
+    """Run a command once, with a new file in place of `OUTPUT`.
+
+    Raises
+    ------
+    RuntimeError
+        The command failed; a registration that was refused (exit code 3) did not.
+    """
+    paths = [str(_PACKAGE), *filter(None, [os.environ.get("PYTHONPATH")])]
+    with tempfile.TemporaryDirectory() as folder:
+        result, output = Path(folder) / "measured.json", str(Path(folder) / "output.tif")
+        words = [output if word == OUTPUT else word for word in command]
+        done = subprocess.run(
+            [sys.executable, "-I", "-S", _MEASURE, result, *words],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        measured = Measured(**json.loads(result.read_text()), output=done.stdout)
+    if measured.exit_code not in (0, 3):
+        raise RuntimeError(f"{' '.join(command)} failed:\n{done.stderr}")
+    return measured
+
+
+def measure_often(command: Sequence[str], times: int) -> Measured:
+    """Run a command several times and return the run of the median time."""
+    runs = sorted((measure(command) for _ in range(times)), key=lambda run: run.seconds)
+    return runs[int(np.floor((len(runs) - 1) / 2))]

@@ -1,0 +1,269 @@
+"""Speed and memory, with peers in the same run."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import rasterio
+from numpy.typing import NDArray
+
+from groundtie.geometry.transform import Transform
+from groundtie.rasters.patch import Patch
+from groundtie.similarity.surface import BORDER_PX, SimilaritySettings, describe, nmi_surface
+
+from .attempt import Pair, on_pixels
+from .processes import OUTPUT, Measured, measure, measure_often
+from .simulations import Simulation
+from .suites import Goal, Settings, SuiteResult, Table
+
+PEERS = Path(__file__).parent / "peers"
+ENVIRONMENTS = Path(__file__).parent / ".peers"
+NOT_INSTALLED = "not installed"
+OWN = "GroundTie"
+SIMPLEITK_METRIC = "SimpleITK Mattes metric"
+SIMPLEITK_AFFINE = "SimpleITK affine"
+AROSICS_LOCAL = "AROSICS local"
+
+# The surface that is compared.
+RADIUS_PX = 20
+WINDOW_PX = 1000
+BINS = 64
+THREADS = 2
+SURFACE = f"NMI surface, {2 * RADIUS_PX + 1}×{2 * RADIUS_PX + 1} shifts"
+_SAMPLE = 200
+_TIMES = 3
+_WANTED_RATIO = 60.0
+
+_LARGEST_SHIFT_PX = 20
+LARGEST_PX = 10_000
+SECONDS = {2000: 6.0, LARGEST_PX: 60.0}
+PEAK_BYTES = 1.5e9
+_SEED = 1
+
+
+@dataclass(frozen=True)
+class Record:
+    """One measurement of one program."""
+
+    what: str
+    program: str
+    seconds: float
+    peak_bytes: int | None = None
+    note: str = ""
+
+
+def peer_python(name: str) -> Path | None:
+    """Return the Python of a peer's environment, None if it is not installed."""
+    folder = ENVIRONMENTS / name
+    return folder / "bin" / "python" if (folder / ".installed").exists() else None
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite."""
+    times = 1 if settings.quick else _TIMES
+    surfaces = time_surfaces(settings, times)
+    affine = time_affine(settings, times)
+    sizes = () if settings.quick else tuple(SECONDS)
+    large = [time_size(settings, size, times if size < LARGEST_PX else 1) for size in sizes]
+    records = [*surfaces, *affine, *large]
+    goals = [surface_goal(surfaces), *affine_goals(affine)]
+    goals += [
+        goal for size, record in zip(sizes, large, strict=True) for goal in size_goals(size, record)
+    ]
+    return SuiteResult(
+        "Speed and memory",
+        goals,
+        (measurements(records),),
+        [asdict(record) for record in records],
+        (
+            f"Surface: {2 * RADIUS_PX + 1}×{2 * RADIUS_PX + 1} shifts of a {WINDOW_PX}×{WINDOW_PX} "
+            f"px window, {BINS} bins, {THREADS} threads, from grey values to similarities; "
+            f"SimpleITK's metric is evaluated at {_SAMPLE} of the shifts and scaled up. "
+            "Registrations: whole processes, start, imports and written output included, median "
+            f"of {times}.",
+        ),
+    )
+
+
+def simulated(settings: Settings, size: int) -> Pair:
+    """Return a simulated pair; it is made in a process that ends and frees its memory."""
+    simulation = Simulation(size, "suburban", _SEED)
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        return pool.submit(simulation.pair, settings.cache).result()
+
+
+def time_surfaces(settings: Settings, times: int) -> list[Record]:
+    """Time the surface of one window, here and with SimpleITK's metric."""
+    pair = simulated(settings, WINDOW_PX + 200)
+    template = read_window(pair.reference, WINDOW_PX + 2 * BORDER_PX)
+    search = read_window(pair.input, WINDOW_PX + 2 * BORDER_PX + 2 * RADIUS_PX)
+    own = min(_own_surface_seconds(template, search) for _ in range(times))
+    python = peer_python("simpleitk")
+    if python is None:
+        return [Record(SURFACE, OWN, own)]
+    inner = slice(BORDER_PX, -BORDER_PX)
+    with tempfile.TemporaryDirectory() as folder:
+        windows = Path(folder) / "windows.npz"
+        np.savez(
+            windows,
+            template=template[inner, inner],
+            search=search[inner, inner],
+            shifts=sample_shifts(_SAMPLE),
+        )
+        script = str(PEERS / "simpleitk_surface.py")
+        run = measure([str(python), script, str(windows), str(BINS), str(THREADS)])
+    found = json.loads(run.output)
+    shifts = (2 * RADIUS_PX + 1) ** 2
+    seconds = found["seconds"] * shifts / found["evaluations"]
+    note = f"{found['evaluations']} shifts in {found['seconds']:.2f} s, scaled up"
+    return [Record(SURFACE, OWN, own), Record(SURFACE, SIMPLEITK_METRIC, seconds, note=note)]
+
+
+def sample_shifts(number: int) -> NDArray[np.float64]:
+    """Return shifts (columns, rows) drawn from those of the surface, shape (number, 2)."""
+    side = np.arange(-RADIUS_PX, RADIUS_PX + 1.0)
+    shifts = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    return np.random.default_rng(0).permutation(shifts)[:number]
+
+
+def read_window(path: Path, size: int) -> NDArray[np.float32]:
+    """Return the mean of all bands of a raster's central square."""
+    with rasterio.open(path) as source:
+        col, row = (source.width - size) // 2, (source.height - size) // 2
+        window = rasterio.windows.Window(col, row, size, size)
+        return source.read(window=window).mean(axis=0, dtype=np.float32)
+
+
+def _own_surface_seconds(template: NDArray[np.float32], search: NDArray[np.float32]) -> float:
+    settings = SimilaritySettings("nmi", bins=BINS, gpve_order=4)
+    patches = [Patch(image, np.ones(image.shape, bool)) for image in (template, search)]
+    with ThreadPoolExecutor(THREADS) as executor:
+        started = time.perf_counter()
+        features = [describe(patch, WINDOW_PX**2, settings) for patch in patches]
+        nmi_surface(*features, RADIUS_PX, settings.gpve_order, executor)
+        return time.perf_counter() - started
+
+
+def time_affine(settings: Settings, times: int) -> list[Record]:
+    """Time affine registrations of the same pair."""
+    pair = simulated(settings, WINDOW_PX)
+    files = [str(pair.reference), str(pair.input), OUTPUT]
+    commands = {"GroundTie": [*own_command(pair), "--model", "affine"]}
+    for program, environment, script, more in (
+        (SIMPLEITK_AFFINE, "simpleitk", "simpleitk_affine.py", []),
+        (AROSICS_LOCAL, "arosics", "arosics_local.py", [str(_LARGEST_SHIFT_PX)]),
+    ):
+        python = peer_python(environment)
+        if python is not None:
+            commands[program] = [str(python), str(PEERS / script), *files, *more]
+    what = f"affine, {WINDOW_PX}×{WINDOW_PX} px"
+    return [
+        record_of(what, program, measure_often(command, times), pair)
+        for program, command in commands.items()
+    ]
+
+
+def time_size(settings: Settings, size: int, times: int) -> Record:
+    """Time a registration of images of some size with default parameters."""
+    pair = simulated(settings, size)
+    measured = measure_often(own_command(pair), times)
+    return record_of(size_name(size), OWN, measured, pair)
+
+
+def size_name(size: int) -> str:
+    """Return what `time_size` measures."""
+    return f"default model, {size}×{size} px"
+
+
+def own_command(pair: Pair) -> list[str]:
+    """Return the command that registers a pair and prints its result as JSON."""
+    files = [str(pair.reference), str(pair.input), OUTPUT]
+    return [sys.executable, "-m", "groundtie", "coregister", *files, "--json", "--quiet"]
+
+
+def record_of(what: str, program: str, measured: Measured, pair: Pair) -> Record:
+    """Return the record of a registration, with what it found."""
+    note = describe_found(program, measured.output, pair)
+    return Record(what, program, measured.seconds, measured.peak_bytes, note)
+
+
+def describe_found(program: str, output: str, pair: Pair) -> str:
+    """Return in words what a program's JSON, its last line of output or all of it, says."""
+    assert pair.truth is not None
+    if program == OWN:
+        values = json.loads(output)
+        if not values["verdict"]["accepted"]:
+            return "refused"
+        transform = Transform.from_json(values["transform"])
+        return f"error {pair.truth.error_px(on_pixels(transform, pair.reference)):.2f} px"
+    found = json.loads(output.strip().splitlines()[-1])
+    if program == AROSICS_LOCAL:
+        return f"{found['tie_points']} tie points of {found['of']} kept"
+    matrix = np.array(found)
+    error = pair.truth.error_px(lambda px: px @ matrix[:, :2].T + matrix[:, 2])
+    return f"error {error:.2f} px"
+
+
+def surface_goal(records: Sequence[Record]) -> Goal:
+    """Return the goal for the surface and what was found."""
+    seconds = {record.program: record.seconds for record in records}
+    what, wanted = "Surface against SimpleITK's metric", f"at least {_WANTED_RATIO:g} times faster"
+    if SIMPLEITK_METRIC not in seconds:
+        return Goal(what, wanted, f"{seconds[OWN]:.2f} s; SimpleITK {NOT_INSTALLED}", None)
+    ratio = seconds[SIMPLEITK_METRIC] / seconds[OWN]
+    found = f"{ratio:.0f} times ({seconds[OWN]:.2f} s against {seconds[SIMPLEITK_METRIC]:.0f} s)"
+    return Goal(what, wanted, found, ratio >= _WANTED_RATIO)
+
+
+def affine_goals(records: Sequence[Record]) -> list[Goal]:
+    """Return the goals for affine registrations and what was found."""
+    seconds = {record.program: record.seconds for record in records}
+    goals = []
+    for peer in (SIMPLEITK_AFFINE, AROSICS_LOCAL):
+        own = f"{seconds[OWN]:.1f} s"
+        faster, found = None, f"{own}; {peer} {NOT_INSTALLED}"
+        if peer in seconds:
+            faster, found = seconds[OWN] < seconds[peer], f"{own} against {seconds[peer]:.1f} s"
+        goals.append(Goal(f"Affine against {peer}", "faster", found, faster))
+    return goals
+
+
+def size_goals(size: int, record: Record) -> list[Goal]:
+    """Return the goals for images of some size and what was found."""
+    limit = SECONDS[size]
+    fast = Goal(
+        record.what, f"at most {limit:g} s", f"{record.seconds:.1f} s", record.seconds <= limit
+    )
+    if size < LARGEST_PX or record.peak_bytes is None:
+        return [fast]
+    peak = f"{record.peak_bytes / 1e9:.2f} GB"
+    limit_gb = f"at most {PEAK_BYTES / 1e9:g} GB"
+    return [fast, Goal("Its peak memory", limit_gb, peak, record.peak_bytes <= PEAK_BYTES)]
+
+
+def measurements(records: Sequence[Record]) -> Table:
+    """Return all measurements, with the peers that are not there."""
+    rows = [
+        [
+            record.what,
+            record.program,
+            f"{record.seconds:.2f}",
+            "–" if record.peak_bytes is None else f"{record.peak_bytes / 1e6:.0f}",
+            record.note,
+        ]
+        for record in records
+    ]
+    there = {record.program for record in records}
+    for peer in (SIMPLEITK_METRIC, SIMPLEITK_AFFINE, AROSICS_LOCAL):
+        if peer not in there:
+            rows.append(["", peer, NOT_INSTALLED, "–", "see make_peers_env.sh"])
+    return Table("Measured", ("what", "program", "s", "peak MB", "found"), rows)
