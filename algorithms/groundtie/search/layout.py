@@ -1,6 +1,6 @@
 """Where chips lie in the matching grid, and which blocks of it are held out for the verdict.
 
-The scene is divided into cells. The middle of each, a block half a cell wide, is held out: its
+The scene is divided into cells. The middle of each, a block of 60 % of its side, is held out: its
 pixels of the reference take no part in the rough search, the tie points of the fit, the choice of
 the model or the removal of outliers. Check chips lie inside the blocks, chips of the fit on the
 lines between them.
@@ -17,36 +17,36 @@ from numpy.typing import NDArray
 from ..errors import NoOverlapError
 from ..rasters.pair import ImagePair
 
-# Chips are this share of the scene's shorter side, within these limits in pixels.
-_CHIP_SHARE = 1 / 13
-_CHIP_RANGE_PX = (55, 128)
+# Share of a cell's side that is held out. Check chips stand alone, so they get the larger part;
+# chips of the fit share the rest of the cell and support each other.
+_HELD_OUT = 0.6
 
-# Small scenes get smaller chips, so that there are four cells a side, or at least three.
-_FOUR_CELLS, _THREE_CELLS = 9, 7
-_SMALL_CHIP_PX = 40
-_SMALLEST_CHIP_PX = 32
+# Cells are about this large in small scenes, and there are no more of them in large ones.
+_CELL_PX = 125
+_FEWEST_CELLS, _MOST_CELLS = 3, 6
 
-# More cells than this along a side make more points than a model needs.
-_MOST_CELLS = 6
+# Sides of chips, in pixels.
+_CHIP_RANGE_PX = (24, 128)
+_LARGEST_CHECK_CHIP_PX = 160
 
 # Above so many chips of the fit they are laid out half as densely.
 _MANY_CHIPS = 200
 
-# A cell needs three chips a side. Nearer than this share of a chip's side, chips overlap much.
-_FEWEST_CHIPS = 3
+# Nearer than this share of a chip's side, chips overlap much.
 _OVERLAPPING = 0.75
 
 
 def default_chip_px(width: int, height: int) -> int:
-    """Return the side of a chip for a scene of this size, in pixels."""
+    """Return the side of a chip of the fit for a scene of this size, in pixels."""
     shorter = min(width, height)
-    usual = min(float(np.clip(shorter * _CHIP_SHARE, *_CHIP_RANGE_PX)), shorter / _FOUR_CELLS)
-    return int(max(usual, min(_SMALL_CHIP_PX, shorter / _THREE_CELLS), _SMALLEST_CHIP_PX))
+    cells = int(np.clip(shorter // _CELL_PX, _FEWEST_CELLS, _MOST_CELLS))
+    between = 1 - _HELD_OUT
+    return int(np.clip(between * shorter / (cells + between), *_CHIP_RANGE_PX))
 
 
 @dataclass(frozen=True)
 class Axis:
-    """The cells along one side of the scene: chip, first line and pitch, in matching pixels."""
+    """The cells along one side of the scene: its size and the chips', in matching pixels."""
 
     size: int
     chip: int
@@ -62,22 +62,27 @@ class Axis:
         """Centre of the first chip."""
         return (self.chip - 1) / 2
 
+    @property
+    def block(self) -> float:
+        """Side of the held-out block in the middle of each cell."""
+        return _HELD_OUT * self.pitch
+
     def held_out(self, positions: NDArray[np.float64], reach_px: float = 0.0) -> NDArray[np.bool_]:
-        """Tell which pixel positions lie in the held-out half of their cell, or within reach."""
+        """Tell which pixel positions lie in the held-out part of their cell, or within reach."""
         phase = ((positions - self.first) / self.pitch) % 1.0
         inside = (positions >= self.first) & (positions <= self.first + self.cells * self.pitch)
-        return np.asarray(inside & (np.abs(phase - 0.5) < 0.25 + reach_px / self.pitch))
+        return np.asarray(inside & (np.abs(phase - 0.5) < _HELD_OUT / 2 + reach_px / self.pitch))
 
     def lattice(self, parts: int) -> NDArray[np.float64]:
         """Return positions that divide each cell into so many parts, lines included."""
         return np.asarray(self.first + np.arange(self.cells * parts + 1) * self.pitch / parts)
 
-    def check_centres(self) -> NDArray[np.float64]:
+    def check_centres(self, check_chip: int) -> NDArray[np.float64]:
         """Return the centres of chips inside the held-out blocks, one or two a block."""
         middles = self.first + (np.arange(self.cells) + 0.5) * self.pitch
-        half = self.pitch / 4 - self.chip / 2
-        if half < self.chip / 2:
+        if self.block < 2 * check_chip:
             return middles
+        half = (self.block - check_chip) / 2
         return np.sort(np.concatenate([middles - half, middles + half]))
 
 
@@ -99,8 +104,15 @@ class ChipLayout:
 
     @property
     def chip_px(self) -> int:
-        """Side of a chip."""
+        """Side of a chip of the fit."""
         return self.columns.chip
+
+    @property
+    def check_chip_px(self) -> int:
+        """Side of a check chip."""
+        # Rounding a centre moves a chip by half a pixel; it must stay inside its block.
+        largest = int(min(self.columns.block, self.rows.block)) - 2
+        return min(largest, _LARGEST_CHECK_CHIP_PX)
 
     @property
     def spacing_px(self) -> float:
@@ -115,18 +127,17 @@ class ChipLayout:
         on_line_row = np.arange(len(rows)) % self.parts == 0
         grid_cols, grid_rows = np.meshgrid(cols, rows)
         on_line = on_line_row[:, None] | on_line_col[None, :]
-        return self._whole(np.column_stack([grid_cols[on_line], grid_rows[on_line]]))
+        on_lines = np.column_stack([grid_cols[on_line], grid_rows[on_line]])
+        return _middle_pixels(on_lines, self.chip_px)
 
     @cached_property
     def check_centres(self) -> NDArray[np.int_]:
         """Centres (col, row) of the check chips, shape (n, 2)."""
-        cols, rows = np.meshgrid(self.columns.check_centres(), self.rows.check_centres())
-        return self._whole(np.column_stack([cols.ravel(), rows.ravel()]))
-
-    def _whole(self, centres: NDArray[np.float64]) -> NDArray[np.int_]:
-        """Return the middle pixels of the chips whose pixels lie best around centres."""
-        corners = np.round(centres - (self.chip_px - 1) / 2).astype(int)
-        return np.asarray(corners + self.chip_px // 2)
+        cols, rows = np.meshgrid(
+            *(axis.check_centres(self.check_chip_px) for axis in (self.columns, self.rows))
+        )
+        centres = np.column_stack([cols.ravel(), rows.ravel()])
+        return _middle_pixels(centres, self.check_chip_px)
 
     def held_out(self, positions_px: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which positions (col, row), shape (n, 2), are held out of the fit."""
@@ -142,6 +153,12 @@ class ChipLayout:
         """
         held_out_rows = self.rows.held_out(rows, reach_px)
         return np.asarray(held_out_rows[:, None] & self.columns.held_out(cols, reach_px)[None, :])
+
+
+def _middle_pixels(centres: NDArray[np.float64], chip_px: int) -> NDArray[np.int_]:
+    """Return the middle pixels of the chips whose pixels lie best around centres."""
+    corners = np.round(centres - (chip_px - 1) / 2).astype(int)
+    return np.asarray(corners + chip_px // 2)
 
 
 def lay_out_chips(
@@ -164,8 +181,8 @@ def lay_out_chips(
         The overlap is too small for a single cell of chips.
     """
     chip = chip_px or default_chip_px(*pair.overlap_px)
-    width, height = pair.grid.width, pair.grid.height
-    if min(pair.overlap_px) < _FEWEST_CHIPS * chip:
+    smallest_pitch = chip / (1 - _HELD_OUT)
+    if min(pair.overlap_px) < chip + 2 * smallest_pitch:
         raise NoOverlapError(
             f"{pair.input.source.path} and {pair.reference.source.path} overlap by "
             f"{pair.overlap_px[0]} × {pair.overlap_px[1]} matching pixels, too little for chips "
@@ -174,8 +191,9 @@ def lay_out_chips(
 
     def layout(parts: int) -> ChipLayout:
         axes = []
-        for size, overlap in zip((width, height), pair.overlap_px, strict=True):
-            most = max(int((size - chip) / (2 * chip)), 1)
+        sizes = (pair.grid.width, pair.grid.height)
+        for size, overlap in zip(sizes, pair.overlap_px, strict=True):
+            most = max(int((size - chip) / smallest_pitch + 1e-6), 1)
             if spacing_px is None:
                 cells = _MOST_CELLS * size / overlap
             else:

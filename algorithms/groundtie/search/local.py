@@ -174,7 +174,8 @@ class LocalSearch:
             self.settings,
             self.held_out if blind else None,
         )
-        return matcher.match(centres, self.layout.chip_px, radius_px, executor, progress)
+        chip_px = self.layout.chip_px if blind else self.layout.check_chip_px
+        return matcher.match(centres, chip_px, radius_px, executor, progress)
 
     def _prior(self, coarse: Model) -> Affine:
         """Return a model of degree 1 on the map as an affine transform of the grid's pixels."""

@@ -15,7 +15,13 @@ from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
-from ..similarity.surface import BORDER_PX, SimilaritySettings, describe, normalise, similarity_surface
+from ..similarity.surface import (
+    BORDER_PX,
+    SimilaritySettings,
+    describe,
+    normalise,
+    similarity_surface,
+)
 
 FloatArray = NDArray[np.float64]
 Surfaces = NDArray[np.float32]
