@@ -23,6 +23,10 @@ _REACH = 3.0
 # Share of the median that is added before the logarithm, so that dark noise is not blown up.
 _LOG_OFFSET = 0.1
 
+# Gradients below this share of the largest value are rounding: where nothing varies, they would
+# all point the same way.
+_ROUNDING = 1e-5
+
 # More negative values than this do not come from resampling.
 _NEGATIVE_SHARE = 0.02
 
@@ -65,7 +69,8 @@ def orientation_field(
     gx = cv2.sepFilter2D(compressed, cv2.CV_32F, slope, smooth, borderType=border)
     gy = cv2.sepFilter2D(compressed, cv2.CV_32F, smooth, slope, borderType=border)
     size = cv2.magnitude(gx, gy)
-    usable = _erode(valid, scale_px)
+    rounding = np.float32(_ROUNDING * np.abs(compressed).max(initial=0))
+    usable = _erode(valid, scale_px) & (size > rounding)
     typical = np.float32(np.median(size[usable])) if usable.any() else np.float32(1)
     weight = np.where(usable, 1 / ((size + typical) * np.maximum(size, 1e-12)), 0)
     field = np.empty(size.shape, np.complex64)

@@ -1,0 +1,194 @@
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter, median_filter
+from textured_pairs import texture
+
+from groundtie.rasters.patch import Patch
+from groundtie.similarity.surface import (
+    BORDER_PX,
+    SIMILARITIES,
+    SimilaritySettings,
+    describe,
+    detrend,
+    normalise,
+    similarity_surface,
+)
+
+CHIP, RADIUS = 48, 7
+SPAN = 2 * RADIUS + 1
+SIDE = CHIP + 2 * BORDER_PX
+
+
+def patches(
+    shift: tuple[int, int] = (0, 0), seed: int = 0, noise: float = 0.2
+) -> tuple[Patch, Patch]:
+    """Return a template and a search window whose content lies `shift` (x, y) further."""
+    rng = np.random.default_rng(seed)
+    scene = texture(SIDE + 4 * RADIUS, SIDE + 4 * RADIUS, seed)
+    x, y = shift
+    start = 2 * RADIUS
+    own = scene[start : start + SIDE, start : start + SIDE]
+    reach = start - RADIUS
+    other = scene[
+        reach - y : reach - y + SIDE + 2 * RADIUS, reach - x : reach - x + SIDE + 2 * RADIUS
+    ]
+    template = 500 + 100 * (own + noise * rng.normal(size=own.shape))
+    search = 2000 + 300 * (other + noise * rng.normal(size=other.shape))
+    return whole(template), whole(search)
+
+
+def whole(values: np.ndarray) -> Patch:
+    return Patch(values.astype(np.float32), np.ones(values.shape, bool))
+
+
+def inverted(patch: Patch) -> Patch:
+    return Patch(np.float32(4000) - patch.values, patch.valid)
+
+
+def surface_of(template: Patch, search: Patch, settings: SimilaritySettings) -> np.ndarray:
+    features = [describe(patch, CHIP**2, settings) for patch in (template, search)]
+    return similarity_surface(features[0], features[1], RADIUS, settings)
+
+
+def peak_of(surface: np.ndarray) -> tuple[int, int]:
+    row, col = np.unravel_index(surface.argmax(), surface.shape)
+    return int(col) - RADIUS, int(row) - RADIUS
+
+
+@pytest.mark.parametrize("similarity", SIMILARITIES)
+@pytest.mark.parametrize("shift", [(0, 0), (3, -5), (-6, 1)])
+def test_the_peak_is_where_the_content_lies_further_right_and_down(
+    similarity: str, shift: tuple[int, int]
+) -> None:
+    template, search = patches(shift)
+    surface = surface_of(template, search, SimilaritySettings(similarity))
+    assert surface.shape == (SPAN, SPAN)
+    assert surface.dtype == np.float32
+    assert peak_of(surface) == shift
+    assert surface.max() > 6
+
+
+@pytest.mark.parametrize("similarity", ["fused", "nmi", "orientation"])
+def test_inverted_contrast_is_as_similar(similarity: str) -> None:
+    template, search = patches((2, 3))
+    settings = SimilaritySettings(similarity)
+    surface = surface_of(template, inverted(search), settings)
+    assert peak_of(surface) == (2, 3)
+    assert surface.max() > 0.7 * surface_of(template, search, settings).max()
+
+
+def test_correlation_of_grey_values_finds_no_inverted_contrast() -> None:
+    template, search = patches((2, 3))
+    surface = surface_of(template, inverted(search), SimilaritySettings("ncc"))
+    assert peak_of(surface) != (2, 3)
+
+
+@pytest.mark.parametrize("similarity", SIMILARITIES)
+def test_the_way_back_peaks_at_the_opposite_shift(similarity: str) -> None:
+    settings = SimilaritySettings(similarity)
+    scene = texture(SIDE + 2 * RADIUS, SIDE + 2 * RADIUS)
+    here, there = whole(500 + 100 * scene), whole(300 * np.roll(scene, (-2, 4), (0, 1)))
+    assert peak_of(surface_of(here.inner(RADIUS), there, settings)) == (4, -2)
+    assert peak_of(surface_of(there.inner(RADIUS), here, settings)) == (-4, 2)
+
+
+@pytest.mark.parametrize("similarity", SIMILARITIES)
+def test_surfaces_of_different_places_are_background(similarity: str) -> None:
+    template, _ = patches(seed=1)
+    _, search = patches(seed=2)
+    assert surface_of(template, search, SimilaritySettings(similarity)).max() < 6
+
+
+@pytest.mark.parametrize("similarity", SIMILARITIES)
+@pytest.mark.parametrize("which", ["template", "search"])
+def test_masked_pixels_say_nothing(similarity: str, which: str) -> None:
+    """What masked pixels hold does not matter; the rest still finds the peak."""
+    settings = SimilaritySettings(similarity)
+    pair = dict(zip(("template", "search"), patches((3, -2)), strict=True))
+    valid = np.ones(pair[which].valid.shape, bool)
+    valid[: SIDE // 2, 20:] = False
+    found = []
+    for junk in (0.0, 9e4):
+        values = np.where(valid, pair[which].values, np.float32(junk))
+        found.append(surface_of(**(pair | {which: Patch(values, valid)}), settings=settings))
+    np.testing.assert_array_equal(found[0], found[1])
+    assert peak_of(found[0]) == (3, -2)
+
+
+@pytest.mark.parametrize("similarity", SIMILARITIES)
+def test_shifts_with_little_overlap_are_background(similarity: str) -> None:
+    template, search = patches((0, 0))
+    valid = np.zeros(search.valid.shape, bool)
+    valid[:, : BORDER_PX + RADIUS + 20] = True
+    surface = surface_of(template, Patch(search.values, valid), SimilaritySettings(similarity))
+    assert np.isfinite(surface).all()
+    # At shift x, 20 - x of 48 columns overlap: less than 30 % from x = 6 on.
+    assert not surface[:, RADIUS + 6 :].any()
+    assert surface[:, : RADIUS + 5].any()
+
+
+@pytest.mark.parametrize("similarity", SIMILARITIES)
+def test_windows_without_content_are_finite(similarity: str) -> None:
+    template, search = patches()
+    settings = SimilaritySettings(similarity)
+    constant = Patch(np.full_like(search.values, 7), search.valid)
+    nothing = Patch(search.values, np.zeros_like(search.valid))
+    for other in (constant, nothing):
+        assert np.isfinite(surface_of(template, other, settings)).all()
+    half = np.where(np.arange(SIDE) < 0.7 * SIDE, np.float32(0), template.values)
+    surface = surface_of(Patch(half, template.valid), search, settings)
+    assert np.isfinite(surface).all()
+
+
+@pytest.mark.parametrize("order", range(2, 8))
+@pytest.mark.parametrize("binning", ["linear", "equal-frequency"])
+def test_every_order_and_binning_finds_the_peak(order: int, binning: str) -> None:
+    template, search = patches((-2, 4))
+    settings = SimilaritySettings("nmi", None, binning, order)
+    assert peak_of(surface_of(template, inverted(search), settings)) == (-2, 4)
+
+
+def test_threads_change_nothing() -> None:
+    settings = SimilaritySettings("fused")
+    features = [describe(patch, CHIP**2, settings) for patch in patches((1, 1))]
+    with ThreadPoolExecutor(2) as executor:
+        threaded = similarity_surface(features[0], features[1], RADIUS, settings, executor)
+    alone = similarity_surface(features[0], features[1], RADIUS, settings)
+    np.testing.assert_array_equal(threaded, alone)
+
+
+def test_normalised_surfaces_count_in_robust_standard_deviations() -> None:
+    rng = np.random.default_rng(0)
+    surface = (40 + 3 * rng.normal(size=(101, 101))).astype(np.float32)
+    surface[:2] += 500
+    found = normalise(surface)
+    assert np.median(found) == pytest.approx(0, abs=1e-5)
+    assert found[2:].std() == pytest.approx(1, rel=0.05)
+    np.testing.assert_allclose(normalise(7 * surface + 3), found, atol=1e-3)
+    assert not normalise(np.full((9, 9), 5, np.float32)).any()
+
+
+def test_the_trend_goes_and_the_peak_stays() -> None:
+    rng = np.random.default_rng(0)
+    y, x = np.mgrid[-20:21, -20:21]
+    peak = 8 * np.exp(-((x - 3) ** 2 + (y + 4) ** 2) / 4)
+    slope = 0.3 * x + 0.02 * y**2
+    surface = (peak + slope + rng.normal(size=x.shape)).astype(np.float32)
+    found = detrend(surface)
+    assert np.unravel_index(found.argmax(), found.shape) == (16, 23)
+    # What is left inside follows no slope.
+    smooth = median_filter(found, 9)[8:-8, 8:-8]
+    assert np.abs(smooth).max() < 2
+    assert np.ptp(gaussian_filter(surface, 5.0)[8:-8, 8:-8]) > 6
+
+
+def test_more_pixels_get_more_bins() -> None:
+    settings = SimilaritySettings()
+    assert settings.bins_for(61**2) == 10
+    assert settings.bins_for(20**2) == 8
+    assert settings.bins_for(1000**2) == 32
+    assert SimilaritySettings(bins=77).bins_for(61**2) == 77
