@@ -51,7 +51,7 @@ def common_px(case: RealCase) -> float:
     corners = np.array([[0, 0], [columns, 0], [0, rows], [columns, rows]]) - 0.5
     seen = (corners - offset) @ np.linalg.inv(linear).T
     size = np.array(image_size(case.reference))
-    low, high = np.clip(seen.min(axis=0), 0, size), np.clip(seen.max(axis=0), 0, size)
+    low, high = (np.clip(end, -0.5, size - 0.5) for end in (seen.min(axis=0), seen.max(axis=0)))
     return float((high - low).min())
 
 

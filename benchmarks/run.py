@@ -9,8 +9,8 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
@@ -58,24 +58,29 @@ def about(options: argparse.Namespace) -> dict[str, Any]:
         "quick": "yes: not all cases" if options.quick else "no",
         "jobs": options.jobs,
         "processors": os.cpu_count(),
-        **{package: version(package) for package in ("numpy", "scipy", "opencv-python-headless")},
+        **{name: importlib.import_module(name).__version__ for name in ("numpy", "scipy", "cv2")},
     }
+
+
+def load_suite(name: str) -> ModuleType:
+    """Return the module of a suite."""
+    return importlib.import_module(f"benchmarks.{name}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run suites, print and write their results; return 1 if the tool crashed, else 0."""
+    options = parse(arguments)
+    # Not before: help is for those, too, who have not installed anything yet.
     from benchmarks.accuracy import CRASHED
     from benchmarks.cases import data_folder
     from benchmarks.suites import Settings
     from benchmarks.tables import suite_markdown, write_result
 
-    options = parse(arguments)
     settings = Settings(options.quick, options.seeds, options.jobs, data_folder(), HERE / ".cache")
     crashed = 0
     for name in options.only:
         print(f"== {name}", flush=True)
-        suite = importlib.import_module(f"benchmarks.{name}")
-        result = suite.run(settings)
+        result = load_suite(name).run(settings)
         crashed += sum(record.get("verdict") == CRASHED for record in result.records)
         paths = write_result(name, result, about(options), options.results)
         print(suite_markdown(result, about(options)))
