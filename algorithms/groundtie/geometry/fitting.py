@@ -97,5 +97,6 @@ def _fit_thin_plate(
     system[:count, :count] = thin_plate_kernel(uv, uv) + np.diag(stiffness)
     system[:count, count:] = affine_part
     system[count:, :count] = affine_part.T
-    solution = np.linalg.solve(system, np.vstack([displacement, np.zeros((3, 2))]))
+    target = np.vstack([displacement, np.zeros((3, 2))])
+    solution: FloatArray = np.asarray(np.linalg.solve(system, target), np.float64)
     return ThinPlateSpline("tps", frame, uv, solution[:count], solution[count:])

@@ -194,7 +194,7 @@ def _sampled_models(
         design = np.stack([monomials(sample, 1) for sample in uv[picks].swapaxes(0, 1)], axis=1)
         well_posed = np.abs(np.linalg.det(design)) > 0.05
         design[~well_posed] = np.eye(3)
-        coefficients = np.linalg.solve(design, displacement[picks])
+        coefficients = np.asarray(np.linalg.solve(design, displacement[picks]), np.float64)
         # Three places on a line tell a shift only.
         coefficients[~well_posed] = 0.0
         coefficients[~well_posed, 0] = displacement[picks[~well_posed, 0]]

@@ -79,7 +79,7 @@ class Axis:
 
     def check_centres(self, check_chip: int) -> NDArray[np.float64]:
         """Return the centres of chips inside the held-out blocks, one or two a block."""
-        middles = self.first + (np.arange(self.cells) + 0.5) * self.pitch
+        middles = np.asarray(self.first + (np.arange(self.cells) + 0.5) * self.pitch)
         if self.block < 2 * check_chip:
             return middles
         half = (self.block - check_chip) / 2

@@ -88,7 +88,8 @@ def correlate_grey(template: Patch, search: Patch) -> NDArray[np.float32]:
     if template.all_valid and search.all_valid:
         # Means are taken off first: single precision would lose small contrast on large values.
         t = template.values - template.values.mean()
-        return cv2.matchTemplate(search.values - mean, t, cv2.TM_CCOEFF_NORMED)
+        found = cv2.matchTemplate(search.values - mean, t, cv2.TM_CCOEFF_NORMED)
+        return np.asarray(found, np.float32)
     tm, sm = (window.valid.astype(np.float32) for window in (template, search))
     own = np.float32(template.values[template.valid].mean()) if template.valid.any() else mean
     t, s = (template.values - own) * tm, (search.values - mean) * sm

@@ -76,7 +76,7 @@ def find_peak_near(surface: Surface, expected_px: ArrayLike, within_px: int) -> 
         lie inside, or if this area reaches beyond the surface.
     """
     radius = surface.shape[0] // 2
-    col, row = (int(round(float(e))) for e in np.asarray(expected_px))
+    col, row = (round(float(e)) for e in np.asarray(expected_px))
     reach = radius - within_px
     middle_col, middle_row = (min(max(c, -reach), reach) for c in (col, row))
     top, left = middle_row + radius - within_px, middle_col + radius - within_px

@@ -133,8 +133,7 @@ def count_joint_histograms(
     executor
         Threads to count in; by default the calling one alone.
     """
-    height, width = template.shape
-    span = search.shape[0] - height + 1
+    span = search.shape[0] - template.shape[0] + 1
     masked = bool((template == MASKED).any() or (search == MASKED).any())
     # Masked pixels go to one extra bin that is dropped; OpenCV's own mask is much slower.
     sizes = (bins[0] + masked, bins[1] + masked)
@@ -208,8 +207,9 @@ def _count_spectrally(
         own = scipy.fft.rfft2((template == k).astype(np.float32), shape)
         found = scipy.fft.irfft2(spectra * own.conj(), shape, workers=_WORKERS)
         counts[:, :, k] = found[:, :ny, :nx].transpose(1, 2, 0)
-    # Counts are whole numbers; what is left over is rounding.
-    return np.maximum(np.rint(counts), 0)
+    # Counts are whole numbers; what is left over is rounding, and so is the sign of zero.
+    np.rint(counts, out=counts)
+    return np.abs(counts, out=counts)
 
 
 def _map(executor: Executor | None, function: Callable[[int], None], count: int) -> None:

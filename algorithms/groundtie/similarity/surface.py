@@ -139,7 +139,8 @@ def describe(window: Patch, chip_pixels: int, settings: SimilaritySettings) -> F
     inner = slice(BORDER_PX, -BORDER_PX)
     bin_count = settings.bins_for(chip_pixels)
     margin = reach(settings.gpve_order)
-    bins, fields = None, ()
+    bins: NDArray[np.uint8] | None = None
+    fields: tuple[NDArray[np.complex64], ...] = ()
     if settings.similarity in ("fused", "nmi"):
         around = window.inner(BORDER_PX - margin)
         bins = to_bins(around.values, around.valid, bin_count, settings.binning)

@@ -23,13 +23,11 @@ from ..search.local import AUTO, LocalSearch
 from ..similarity.binning import BINNINGS
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
 from .common import Input, Output, Reference, Resampling, Seed, Workers, worker_count
+from .registered_output import OUTPUT_GRIDS, RegisteredOutput, model_for_grid
 from .registration import (
-    OUTPUT_GRIDS,
-    RegisteredOutput,
     RegistrationFiles,
     RegistrationResult,
     accepted_or_refused,
-    model_for_grid,
     register,
 )
 
@@ -289,9 +287,10 @@ def coregister(
             seconds=time.perf_counter() - started,
         )
         with accepted_or_refused(result, page, files) as outputs:
-            files.write_points(result, outputs)
+            points, found = result.accepted()
+            files.write_points(points, found, outputs)
             progress.update(0.7, "writing the registered image")
             RegisteredOutput(output, output_grid, resampling).write(
-                result, outputs, threads, progress.part(0.7, 1.0)
+                pair, found, outputs, threads, progress.part(0.7, 1.0)
             )
     return RegistrationResult.of(result, page.summary(), {"output": output, **files.written()})

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import NotRegisteredError, ParameterError, TooFewPointsError
+from ..errors import NotRegisteredError, TooFewPointsError
 from ..geometry.estimation import Estimate
 from ..geometry.tie_point_files import write_tie_points
 from ..geometry.tie_points import TiePoints
@@ -24,16 +24,10 @@ from ..progress import Progress
 from ..quality.report import Report
 from ..quality.verdict import Verdict, judge, refuse
 from ..rasters.atomic import Outputs
-from ..rasters.delivery import warp_raster, write_with_geotransform
-from ..rasters.grid import Grid, reproject
 from ..rasters.pair import ImagePair
-from ..rasters.target_grids import registered_grid
-from ..search.local import AUTO, LocalSearch
+from ..search.local import LocalSearch
 from ..search.pyramid import find_coarse_model
 from ..similarity.surface import Surface
-
-# Pixels keep their places when only the geotransform changes, but for this error, in pixels.
-_UNTOUCHED_TOLERANCE_PX = 0.05
 
 # How many surfaces of the best and of the worst check points a report shows.
 _EXTREMES = 3
@@ -69,6 +63,12 @@ class Registration:
         if self.estimate is None or self.check is None:
             return None
         return TiePoints.concatenate([self.estimate.points, self.check])
+
+    def accepted(self) -> tuple[TiePoints, Transform]:
+        """Return points and transform of a registration that was accepted, so that has both."""
+        points, transform = self.points, self.transform
+        assert self.verdict.accepted and points is not None and transform is not None
+        return points, transform
 
     def extreme_surfaces(self) -> tuple[tuple[str, Surface], ...]:
         """Return the similarity surfaces of the check points with the best and worst residuals."""
@@ -138,91 +138,6 @@ def register(
 
 
 @dataclass(frozen=True)
-class RegisteredOutput:
-    """How the registered raster is made.
-
-    Parameters
-    ----------
-    path
-        The GeoTIFF.
-    grid
-        "reference", "input" or "untouched" (see `OUTPUT_GRIDS`).
-    resampling
-        One of `warping.METHODS`.
-    """
-
-    path: Path
-    grid: str
-    resampling: str
-
-    def write(
-        self, registration: Registration, outputs: Outputs, workers: int, progress: Progress
-    ) -> None:
-        """Write the input as registered; it is resampled once, or not at all."""
-        transform = registration.transform
-        assert transform is not None
-        pair = registration.pair
-        source, reference = pair.input.source, pair.reference.source.grid
-        staged = outputs.stage(self.path)
-        if self.grid == "untouched":
-            moved = moved_grid(transform)
-            write_with_geotransform(source, moved, staged, progress=progress)
-            return
-        target, to_px = reference, transform.__call__
-        if self.grid == "input":
-            crs = source.grid.crs
-
-            def px_to_own_map(px: np.ndarray) -> np.ndarray:
-                return reproject(transform.inverse(px), transform.crs, crs)
-
-            def own_map_to_px(xy: np.ndarray) -> np.ndarray:
-                return transform(reproject(xy, crs, transform.crs))
-
-            target, to_px = registered_grid(source.grid, px_to_own_map, crs), own_map_to_px
-        warp_raster(
-            source, to_px, target, staged, self.resampling, workers=workers, progress=progress
-        )
-
-
-OUTPUT_GRIDS = ("reference", "input", "untouched")
-
-
-def model_for_grid(model: str, output_grid: str) -> str:
-    """Return the model that goes with an output grid; untouched pixels allow a shift only.
-
-    Raises
-    ------
-    ParameterError
-        They do not go together.
-    """
-    if output_grid != "untouched":
-        return model
-    if model not in (AUTO, "translation"):
-        raise ParameterError(f"output_grid untouched goes with model translation, not {model}")
-    return "translation"
-
-
-def moved_grid(transform: Transform) -> Grid:
-    """Return the input's grid with the geotransform that a pure shift gives it.
-
-    Raises
-    ------
-    ParameterError
-        The shift on the reference map is none in the input's own CRS.
-    """
-    grid = transform.input_grid
-    px = grid.outline(3)
-    xy = reproject(transform.inverse(px), transform.crs, grid.crs)
-    shifts = xy - grid.pixel_to_map(px)
-    dx, dy = shifts.mean(axis=0)
-    if np.abs(shifts - [dx, dy]).max() > _UNTOUCHED_TOLERANCE_PX * min(grid.pixel_size):
-        raise ParameterError(
-            "output_grid untouched is not possible: the CRS of reference and input differ too much"
-        )
-    return grid.shifted(float(dx), float(dy))
-
-
-@dataclass(frozen=True)
 class RegistrationFiles:
     """The files beside the registered raster; None: not asked for."""
 
@@ -241,10 +156,8 @@ class RegistrationFiles:
             numbers = outputs.stage(self.report.with_suffix(".json"))
             report.write(outputs.stage(self.report), numbers)
 
-    def write_points(self, registration: Registration, outputs: Outputs) -> None:
+    def write_points(self, points: TiePoints, transform: Transform, outputs: Outputs) -> None:
         """Write tie points and transform, if they were asked for."""
-        points, transform = registration.points, registration.transform
-        assert points is not None and transform is not None
         if self.tie_points is not None:
             write_tie_points(outputs.stage(self.tie_points), points, transform)
         if self.transform is not None:
@@ -306,11 +219,11 @@ class RegistrationResult:
         cls, registration: Registration, numbers: dict[str, Any], files: dict[str, Path]
     ) -> RegistrationResult:
         """Return the result of an accepted registration."""
-        assert registration.points is not None and registration.transform is not None
+        points, transform = registration.accepted()
         return cls(
             registration.verdict,
-            registration.transform,
-            registration.points,
+            transform,
+            points,
             numbers,
             {name: str(path) for name, path in files.items()},
         )
