@@ -23,7 +23,7 @@ from ..geometry.transform import Transform
 from ..progress import Progress
 from ..quality.report import Report
 from ..quality.verdict import Verdict, judge, refuse
-from ..rasters.atomic import Outputs
+from ..rasters.atomic import Outputs, writing
 from ..rasters.pair import ImagePair
 from ..search.local import LocalSearch
 from ..search.pyramid import find_coarse_model
@@ -162,7 +162,8 @@ class RegistrationFiles:
             write_tie_points(outputs.stage(self.tie_points), points, transform)
         if self.transform is not None:
             staged = outputs.stage(self.transform)
-            staged.write_text(json.dumps(transform.to_json(), indent=1), encoding="utf-8")
+            with writing(staged):
+                staged.write_text(json.dumps(transform.to_json(), indent=1), encoding="utf-8")
 
 
 @contextmanager
