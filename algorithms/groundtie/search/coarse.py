@@ -26,7 +26,7 @@ FloatArray = NDArray[np.float64]
 # Chips, search radius and agreement at every level of the pyramid, in pixels of the level.
 _RADIUS_PX = 12
 _TOLERANCE_PX = 2.0
-_CHIPS_PER_SIDE = 8
+_CHIPS_PER_SIDE = 7
 _CHIP_RANGE_PX = (48, 80)
 
 # Simple models are preferred unless the data speak for others: each has its number of
@@ -84,14 +84,13 @@ def refine_on_level(
     chip = int(np.clip(min(level.width, level.height) / 5, *_CHIP_RANGE_PX))
     matcher = ChipMatcher(pair, level, lambda xy: pair.claimed_px(model(xy)), settings, held_out)
     centres = _regular_centres(level, chip)
-    surfaces = matcher.match(centres, chip, _RADIUS_PX, executor, progress)
-    if len(surfaces.centres) < 4:
+    centres, surfaces = matcher.match_forward(centres, chip, _RADIUS_PX, executor, progress)
+    if len(centres) < 4:
         return CoarseModel(model, np.inf)
     step = (np.array([level.width, level.height]) - chip) / (_CHIPS_PER_SIDE - 1)
-    both = surfaces.both
-    supported = support(both, surfaces.centres, 1.5 * float(step.max()))
-    own = _peaks(both)
-    px = surfaces.centres.astype(float)
+    supported = support(surfaces, centres, 1.5 * float(step.max()))
+    own = _peaks(surfaces)
+    px = centres.astype(float)
     best = CoarseModel(model, np.inf)
     probability = agreement_probability(_TOLERANCE_PX, _RADIUS_PX)
     found = px + _peaks(supported)

@@ -99,7 +99,7 @@ class ChipMatcher:
         executor: Executor,
         progress: Progress = SILENT,
     ) -> ChipSurfaces:
-        """Return the surfaces of all chips that have enough valid pixels in both images.
+        """Return the surfaces, both ways, of all chips that have enough valid pixels.
 
         Parameters
         ----------
@@ -114,31 +114,54 @@ class ChipMatcher:
         progress
             Is told of every chip.
         """
-        kept: list[NDArray[np.int_]] = []
-        forward: list[NDArray[np.float32]] = []
-        backward: list[NDArray[np.float32]] = []
+        kept, found = self._run(centres, chip_px, radius_px, executor, progress, both_ways=True)
+        return ChipSurfaces(kept, found[:, 0], found[:, 1])
 
-        def one(centre: NDArray[np.int_]) -> tuple[Surfaces, Surfaces] | None:
+    def match_forward(
+        self,
+        centres: NDArray[np.int_],
+        chip_px: int,
+        radius_px: int,
+        executor: Executor,
+        progress: Progress = SILENT,
+    ) -> tuple[NDArray[np.int_], Surfaces]:
+        """Return the centres that could be matched and their surfaces, one way, at half the cost.
+
+        Parameters as `match`.
+        """
+        kept, found = self._run(centres, chip_px, radius_px, executor, progress, both_ways=False)
+        return kept, found[:, 0]
+
+    def _run(
+        self,
+        centres: NDArray[np.int_],
+        chip_px: int,
+        radius_px: int,
+        executor: Executor,
+        progress: Progress,
+        *,
+        both_ways: bool,
+    ) -> tuple[NDArray[np.int_], Surfaces]:
+        """Return the centres that could be matched and surfaces (n, ways, 2 r + 1, 2 r + 1)."""
+        kept: list[NDArray[np.int_]] = []
+        found: list[Surfaces] = []
+
+        def one(centre: NDArray[np.int_]) -> Surfaces | None:
             progress.check()
-            return self._surfaces(centre, chip_px, radius_px)
+            return self._surfaces(centre, chip_px, radius_px, both_ways)
 
         for i, surfaces in enumerate(executor.map(one, centres)):
             progress.update((i + 1) / len(centres))
             if surfaces is not None:
                 kept.append(centres[i])
-                forward.append(surfaces[0])
-                backward.append(surfaces[1])
+                found.append(surfaces)
         span = 2 * radius_px + 1
-        empty = np.zeros((0, span, span), np.float32)
-        return ChipSurfaces(
-            np.array(kept, int).reshape(-1, 2),
-            np.stack(forward) if forward else empty,
-            np.stack(backward) if backward else empty,
-        )
+        none = np.zeros((0, 1 + both_ways, span, span), np.float32)
+        return np.array(kept, int).reshape(-1, 2), np.stack(found) if found else none
 
     def _surfaces(
-        self, centre: NDArray[np.int_], chip_px: int, radius_px: int
-    ) -> tuple[Surfaces, Surfaces] | None:
+        self, centre: NDArray[np.int_], chip_px: int, radius_px: int, both_ways: bool
+    ) -> Surfaces | None:
         reach = radius_px + BORDER_PX
         side = chip_px + 2 * reach
         corner = centre - chip_px // 2 - reach
@@ -154,8 +177,10 @@ class ChipMatcher:
         there = describe(reference, chip_px**2, self.settings)
         here = describe(input, chip_px**2, self.settings)
         forward = similarity_surface(there.inner(radius_px), here, radius_px, self.settings)
+        if not both_ways:
+            return forward[None]
         backward = similarity_surface(here.inner(radius_px), there, radius_px, self.settings)
-        return forward, backward[::-1, ::-1]
+        return np.stack([forward, backward[::-1, ::-1]])
 
 
 def _can_be_matched(chip: Patch) -> bool:

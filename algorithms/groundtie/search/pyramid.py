@@ -17,6 +17,10 @@ from .rough import level_factor, rough_candidates
 # A candidate that random matches would hardly ever support (log10) needs no rival.
 _CERTAIN = -6.0
 
+# Above so many expected false alarms (log10) nothing was found. Local matches may still tell
+# more than large chips did, and the verdict judges what comes of them.
+_HOPELESS = 0.0
+
 # Each level is finer by this; the last before the tie points is not coarser than this either.
 _STEP = 4.0
 
@@ -54,7 +58,7 @@ def find_coarse_model(
             best = found
         if best.log10_false_alarms < _CERTAIN:
             break
-    if best is None or not np.isfinite(best.log10_false_alarms):
+    if best is None or best.log10_false_alarms > _HOPELESS:
         return None
     while factor > _STEP:
         factor /= _STEP

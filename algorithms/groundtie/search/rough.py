@@ -15,7 +15,10 @@ from .matching import MaskOf
 
 # The longer side of the reduced image, in pixels, and how many candidates are kept.
 LEVEL_SIDE_PX = 512
-CANDIDATES = 6
+CANDIDATES = 4
+
+# Candidates lower than this share of the best are not worth their cost.
+_LOW = 0.4
 
 # Candidates nearer than this are the same, in pixels of the level.
 _SAME_PX = 4
@@ -90,7 +93,7 @@ def rough_candidates(
     found = []
     for _ in range(CANDIDATES):
         peak = find_peak(surface)
-        if peak.height <= 0:
+        if peak.height <= (found[0].height * _LOW if found else 0.0):
             break
         x, y = peak.shift_px
         dx, dy = level.pixel_to_map([[x, y]])[0] - level.pixel_to_map([[0, 0]])[0]
