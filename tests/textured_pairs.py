@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import rasterio
 from numpy.typing import NDArray
 from raster_files import utm_grid, write_raster
 from scipy.ndimage import gaussian_filter, map_coordinates
@@ -65,17 +67,19 @@ def write_textured_pair(
     model: Model,
     *,
     input_pixel_ratio: float = 1.0,
+    input_grid: Grid | None = None,
     noise: float = 0.3,
     seed: int = 0,
     input_seed: int | None = None,
 ) -> TexturedPair:
     """Write a pair of which `model` is the misregistration, in metres; reference pixels are 10 m.
 
-    `input_seed` makes the input show another place.
+    The input claims `input_grid`, by default that of the reference in pixels `input_pixel_ratio`
+    as large; `input_seed` makes it show another place.
     """
     width, height = size
     grid = utm_grid(width, height)
-    truth = Transform(model, grid.crs, grid.scaled(input_pixel_ratio))
+    truth = Transform(model, grid.crs, input_grid or grid.scaled(input_pixel_ratio))
     rng = np.random.default_rng(seed + 1000)
     canvas = texture(height + 2 * _MARGIN_PX, width + 2 * _MARGIN_PX, seed)
     shown = canvas[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX]
@@ -92,3 +96,51 @@ def write_textured_pair(
     for path, image, place in zip(paths, values, (grid, own), strict=True):
         write_raster(path, image, place)
     return TexturedPair(*paths, values[0], truth)
+
+
+def rms(errors: FloatArray) -> float:
+    """Return the root mean square length of vectors, shape (n, 2)."""
+    return float(np.sqrt((errors**2).sum(axis=1).mean()))
+
+
+def everywhere(grid: Grid, inset: int = 25) -> FloatArray:
+    """Return map positions on a lattice over a grid, shape (64, 2)."""
+    cols = np.linspace(inset, grid.width - 1 - inset, 8)
+    rows = np.linspace(inset, grid.height - 1 - inset, 8)
+    return grid.pixel_to_map(np.stack(np.meshgrid(cols, rows), -1).reshape(-1, 2))
+
+
+def error_px(transform: Transform, pair: TexturedPair) -> float:
+    """Return the root mean square error of a transform over the reference, in input pixels."""
+    xy = everywhere(pair.grid)
+    return rms(transform(xy) - pair.truth(xy))
+
+
+def pixels(path: Path) -> NDArray[Any]:
+    """Return all bands of a raster, shape (bands, h, w)."""
+    with rasterio.open(path) as raster:
+        return raster.read()
+
+
+def listing(folder: Path) -> dict[str, tuple[int, int]]:
+    """Return all files of a folder with size and time of their last change."""
+    return {
+        str(path.relative_to(folder)): (path.stat().st_size, path.stat().st_mtime_ns)
+        for path in sorted(folder.rglob("*"))
+    }
+
+
+def rewritten(pair: TexturedPair, folder: Path, **changed: Any) -> TexturedPair:
+    """Write changed images: `reference` and `input` take the pixels and return others.
+
+    They return values, or values and options for `write_raster`, among which `grid`.
+    """
+    paths = {}
+    for name in ("reference", "input"):
+        with rasterio.open(getattr(pair, name)) as raster:
+            values = raster.read(1)
+            grid = Grid(raster.transform, raster.crs, raster.width, raster.height)
+        new = changed.get(name, lambda values: values)(values)
+        values, more = new if isinstance(new, tuple) else (new, {})
+        paths[name] = write_raster(folder / f"{name}.tif", values, **{"grid": grid, **more})
+    return replace(pair, **paths)

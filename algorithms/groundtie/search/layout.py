@@ -26,8 +26,8 @@ _CELL_PX = 125
 _FEWEST_CELLS, _MOST_CELLS = 3, 6
 
 # Sides of chips, in pixels.
-_CHIP_RANGE_PX = (24, 128)
-_LARGEST_CHECK_CHIP_PX = 160
+_CHIP_RANGE_PX = (24, 80)
+_LARGEST_CHECK_CHIP_PX = 112
 
 # Above so many chips of the fit they are laid out half as densely.
 _MANY_CHIPS = 200
