@@ -85,9 +85,9 @@ def run(settings: Settings) -> SuiteResult:
         (measurements(records),),
         [asdict(record) for record in records],
         (
-            f"Surface: {WINDOW_PX}×{WINDOW_PX} px window, {BINS} bins, {THREADS} threads, from grey "
-            "values to similarities; SimpleITK's metric is evaluated by its exhaustive optimiser, "
-            f"at every {PEER_STEP_PX}rd shift each way, and scaled up. "
+            f"Surface: {WINDOW_PX}×{WINDOW_PX} px window, {BINS} bins, {THREADS} threads, from "
+            "grey values to similarities; SimpleITK's metric is evaluated by its exhaustive "
+            f"optimiser, at every {PEER_STEP_PX}rd shift each way, and scaled up. "
             "Registrations: whole processes, start, imports and written output included, median "
             f"of {times}.",
         ),
