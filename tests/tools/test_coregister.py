@@ -159,12 +159,8 @@ def test_untouched_pixels_get_a_shifted_geotransform(
     truth = load_transform(pair.folder / "truth.json")
     with rasterio.open(done.output) as out, rasterio.open(pair.input) as before:
         assert out.crs == before.crs
-        assert out.transform.almost_equals(
-            rasterio.Affine.translation(
-                out.transform.c - before.transform.c, out.transform.f - before.transform.f
-            )
-            @ before.transform
-        )
+        for name in "abde":
+            assert getattr(out.transform, name) == getattr(before.transform, name)
         corner = truth.inverse([[0.0, 0.0]])[0]
         assert np.hypot(*(np.array(out.xy(0, 0)) - corner)) < 0.7
 

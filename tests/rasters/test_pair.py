@@ -1,0 +1,308 @@
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from affine import Affine
+from raster_files import UTM, utm_grid, wave_image, waves, write_raster
+from rasterio.crs import CRS
+from rasterio.enums import ColorInterp
+from scipy.ndimage import binary_erosion
+
+from groundtie.errors import BandError, GeoreferencingError, NoOverlapError, SameFileError
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
+from groundtie.rasters.pair import Image, ImagePair, default_radius_m, make_pair
+from groundtie.rasters.patch import Patch
+from groundtie.rasters.reading import RasterSource, open_raster
+
+LENGTH_M = 700.0
+GRID = utm_grid(120, 100)
+GEOGRAPHIC = CRS.from_epsg(4326)
+NEXT_ZONE = CRS.from_epsg(32633)
+
+
+class Files:
+    """Writes rasters and opens them."""
+
+    def __init__(self, folder: Path, stack: ExitStack) -> None:
+        self.folder, self.stack, self.count = folder, stack, 0
+
+    def open(self, values: np.ndarray, grid: Grid | None = GRID, **more: Any) -> RasterSource:
+        self.count += 1
+        path = write_raster(self.folder / f"image{self.count}.tif", values, grid, **more)
+        return self.stack.enter_context(open_raster(path))
+
+    def image(self, grid: Grid = GRID, **more: Any) -> Image:
+        """Return an image of waves as its grid says, in UTM."""
+        cols, rows = np.meshgrid(np.arange(grid.width), np.arange(grid.height))
+        xy = grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
+        xy = xy if grid.crs is None else reproject(xy, grid.crs, UTM)
+        values = waves(xy, LENGTH_M).reshape(grid.height, grid.width).astype(np.float32)
+        return Image(self.open(values, grid if grid.is_georeferenced else None, **more))
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Any:
+    with ExitStack() as stack:
+        yield Files(tmp_path, stack)
+
+
+def covering(crs: CRS, size: float) -> Grid:
+    outline = reproject(GRID.pixel_to_map(GRID.outline()), UTM, crs)
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    width, height = np.ceil((high - low) / size).astype(int)
+    return Grid(Affine(size, 0, low[0], 0, -size, high[1]), crs, int(width), int(height))
+
+
+def both(pair: ImagePair) -> tuple[Patch, Patch]:
+    return pair.reference_patch(pair.grid), pair.input_patch(pair.grid, pair.claimed_px)
+
+
+def interior(reference: Patch, input: Patch) -> np.ndarray:
+    """Tell which pixels both show, without those at a border, where interpolation is coarser."""
+    return binary_erosion(reference.valid & input.valid, iterations=2, border_value=1)
+
+
+def assert_both_show_the_same(pair: ImagePair, share: float = 0.9, tolerance: float = 1.0) -> None:
+    """Read on the matching grid, images of the same field are the same."""
+    reference, input = both(pair)
+    assert reference.values.shape == (pair.grid.height, pair.grid.width)
+    common = interior(reference, input)
+    assert common.mean() > share
+    expected = wave_image(pair.grid, LENGTH_M)
+    for patch in (reference, input):
+        np.testing.assert_allclose(patch.values[common], expected[common], atol=tolerance)
+
+
+def test_images_on_one_grid(files: Files) -> None:
+    pair = make_pair(files.image(), files.image())
+    assert pair.grid == GRID
+    assert pair.overlap_px == (120, 100)
+    assert_both_show_the_same(pair, 0.99, 1e-3)
+    assert pair.notes() == []
+
+
+@pytest.mark.parametrize(
+    "grid",
+    [
+        covering(GEOGRAPHIC, 10 / 111_195),
+        covering(NEXT_ZONE, 10.0),
+        utm_grid(60, 50, 20.0),
+        utm_grid(240, 200, 5.0),
+        Grid(GRID.transform * Affine.rotation(20), UTM, 150, 120),
+    ],
+    ids=["degrees", "next zone", "coarser", "finer", "rotated"],
+)
+@pytest.mark.parametrize("other_way", [False, True])
+def test_images_on_different_grids(files: Files, grid: Grid, other_way: bool) -> None:
+    images = files.image(), files.image(grid)
+    pair = make_pair(*(images[::-1] if other_way else images))
+    assert pair.grid.crs == (grid.crs if other_way else UTM)
+    coarser = max(image.source.grid.pixel_size_m for image in images)
+    assert pair.grid.pixel_size_m == pytest.approx(coarser, rel=0.03)
+    if pair.grid.crs == UTM:
+        assert_both_show_the_same(pair, 0.5 if grid.transform.b else 0.9)
+    else:
+        reference, input = both(pair)
+        common = interior(reference, input)
+        assert common.mean() > 0.8
+        np.testing.assert_allclose(reference.values[common], input.values[common], atol=1.0)
+
+
+def test_the_grid_is_cut_to_what_may_overlap_and_keeps_the_references_lattice(
+    files: Files,
+) -> None:
+    """The input covers columns 30-89 and rows 20-69; the search reaches 15 px further."""
+    part = GRID.window(30, 20, 60, 50)
+    pair = make_pair(files.image(), files.image(part), search_radius_m=150.0)
+    assert pair.overlap_px == (60, 50)
+    assert pair.grid == GRID.window(15, 5, 90, 80)
+    # By default the search reaches 200 m, beyond the reference's border.
+    assert make_pair(files.image(), files.image(part)).grid == GRID.window(10, 0, 100, 90)
+
+
+def test_a_pixel_size_that_is_asked_for(files: Files) -> None:
+    pair = make_pair(files.image(), files.image(), matching_pixel_size_m=25.0)
+    assert pair.grid.pixel_size_m == pytest.approx(25)
+    assert (pair.grid.width, pair.grid.height) == (48, 40)
+    assert pair.overlap_px == (48, 40)
+    finer = make_pair(files.image(), files.image(), matching_pixel_size_m=5.0)
+    assert finer.overlap_px == (240, 200)
+    assert_both_show_the_same(finer, 0.9, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("grid", "radius"),
+    [
+        (utm_grid(9, 9, 1.0), 100.0),
+        (utm_grid(9, 9, 10.0), 200.0),
+        (Grid(PIXEL_COORDINATES, None, 9, 9), 20.0),
+    ],
+)
+def test_the_default_search_radius(grid: Grid, radius: float) -> None:
+    assert default_radius_m(grid) == pytest.approx(radius)
+
+
+def test_images_without_georeferencing_are_matched_in_pixels(files: Files) -> None:
+    plain = Grid(PIXEL_COORDINATES, None, 120, 100)
+    values = wave_image(GRID, LENGTH_M).astype(np.float32)
+    pair = make_pair(Image(files.open(values, None)), Image(files.open(values[5:, 7:], None)))
+    assert pair.grid == plain.window(0, 0, 120, 100)
+    assert pair.overlap_px == (113, 95)
+    np.testing.assert_allclose(pair.claimed_px(np.array([[3.0, 4.0]])), [[3, 4]])
+    reference, input = both(pair)
+    np.testing.assert_array_equal(reference.values, values)
+    np.testing.assert_array_equal(input.values[:95, :113], values[5:, 7:])
+    assert not input.valid[96:].any()
+
+
+def test_local_coordinates_without_crs(files: Files) -> None:
+    local = Grid(GRID.transform, None, 120, 100)
+    values = wave_image(GRID, LENGTH_M).astype(np.float32)
+    pair = make_pair(Image(files.open(values, local)), Image(files.open(values, local)))
+    assert pair.grid == local
+
+
+@pytest.mark.parametrize(
+    ("grid", "text"),
+    [
+        (None, "has no georeferencing"),
+        (Grid(GRID.transform, None, 120, 100), "has no CRS"),
+    ],
+)
+@pytest.mark.parametrize("other_way", [False, True])
+def test_georeferencing_of_one_only_is_an_error(
+    files: Files, grid: Grid | None, text: str, other_way: bool
+) -> None:
+    values = np.ones((100, 120), np.uint8)
+    images = Image(files.open(values)), Image(files.open(values, grid))
+    with pytest.raises(GeoreferencingError, match=rf"image2\.tif {text}, but .*image1\.tif has"):
+        make_pair(*(images[::-1] if other_way else images))
+
+
+@pytest.mark.parametrize(
+    "grid",
+    [
+        GRID.shifted(1e5, 0),
+        GRID.shifted(0, 1000.0),
+        covering(GEOGRAPHIC, 1e-4).shifted(90, -80),
+        covering(NEXT_ZONE, 10.0).shifted(0, 5e5),
+    ],
+)
+def test_images_that_do_not_overlap(files: Files, grid: Grid) -> None:
+    with pytest.raises(NoOverlapError, match=r"image1\.tif and .*image2\.tif do not overlap"):
+        make_pair(files.image(), files.image(grid))
+
+
+def test_the_same_file_under_two_names(files: Files, tmp_path: Path) -> None:
+    image = files.image()
+    (tmp_path / "link.tif").symlink_to(image.source.path)
+    for name in (image.source.path, str(tmp_path / "link.tif"), str(tmp_path / "." / "image1.tif")):
+        with open_raster(name) as again, pytest.raises(SameFileError, match="same file"):
+            make_pair(image, Image(again))
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "int16", "float32", "float64"])
+def test_data_types(files: Files, dtype: str) -> None:
+    values = wave_image(GRID, LENGTH_M)
+    pair = make_pair(files.image(), Image(files.open(values.astype(dtype))))
+    assert_both_show_the_same(pair, 0.9, 1.1)
+
+
+def test_complex_images_are_read_as_amplitudes_and_said_to_be(files: Files) -> None:
+    values = wave_image(GRID, LENGTH_M)
+    turned = values * np.exp(1j * np.random.default_rng(0).uniform(0, 6, values.shape))
+    pair = make_pair(Image(files.open(turned.astype(np.complex64))), files.image())
+    assert_both_show_the_same(pair, 0.9, 1e-2)
+    (note,) = pair.notes()
+    assert "image1.tif" in note
+    assert "amplitude" in note
+
+
+def test_bands(files: Files) -> None:
+    values = wave_image(GRID, LENGTH_M)
+    source = files.open(np.stack([values - 40, values, values + 10]).astype(np.float32))
+    for band, offset in ((None, -10), (1, -40), (3, 10)):
+        pair = make_pair(files.image(), Image(source, band))
+        _, input = both(pair)
+        np.testing.assert_allclose(input.values, values + offset, atol=1e-3)
+    with pytest.raises(BandError, match="no band 4"):
+        both(make_pair(files.image(), Image(source, 4)))
+
+
+def holed(values: np.ndarray, hole: float) -> np.ndarray:
+    values = values.copy()
+    values[20:40, 30:60] = hole
+    return values
+
+
+def invalid_variants(files: Files) -> dict[str, RasterSource]:
+    values = wave_image(GRID, LENGTH_M).astype(np.float32)
+    shown = np.ones(values.shape, np.float32)
+    gray_alpha = [ColorInterp.gray, ColorInterp.alpha]
+    return {
+        "nodata": files.open(holed(values, -9999), nodata=-9999),
+        "NaN": files.open(holed(values, np.nan)),
+        "infinity": files.open(holed(values, np.inf)),
+        "alpha": files.open(np.stack([values, holed(shown, 0)]), colorinterp=gray_alpha),
+        "mask band": files.open(values, mask=holed(shown, 0) > 0),
+    }
+
+
+@pytest.mark.parametrize("kind", ["nodata", "NaN", "infinity", "alpha", "mask band"])
+@pytest.mark.parametrize("which", ["reference", "input"])
+def test_invalid_pixels_take_no_part(files: Files, kind: str, which: str) -> None:
+    source = invalid_variants(files)[kind]
+    images = {"reference": files.image(), "input": files.image()} | {which: Image(source)}
+    patch = dict(zip(("reference", "input"), both(make_pair(**images)), strict=True))[which]
+    hole = np.zeros(patch.valid.shape, bool)
+    hole[20:40, 30:60] = True
+    np.testing.assert_array_equal(patch.valid, ~hole)
+    expected = wave_image(GRID, LENGTH_M)
+    np.testing.assert_allclose(patch.values[~hole], expected[~hole], atol=1e-3)
+    assert np.isfinite(patch.values).all()
+
+
+@pytest.mark.parametrize("which", ["reference", "input"])
+@pytest.mark.parametrize(
+    "grid", [GRID, utm_grid(60, 50, 20.0), covering(NEXT_ZONE, 10.0)], ids=["own", "coarse", "crs"]
+)
+def test_mask_rasters_lie_on_the_map(files: Files, which: str, grid: Grid) -> None:
+    """A mask of any grid hides the ground at x below 500 400 m, wherever the pixels are."""
+    cols, rows = np.meshgrid(np.arange(grid.width), np.arange(grid.height))
+    xy = grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
+    easting = reproject(xy, grid.crs, UTM)[:, 0].reshape(grid.height, grid.width)
+    mask = files.open((easting > 500_400).astype(np.uint8), grid)
+    images = {"reference": files.image(), "input": files.image()}
+    images[which] = Image(images[which].source, None, mask)
+    patch = dict(zip(("reference", "input"), both(make_pair(**images)), strict=True))[which]
+    # Nearest neighbours: to half a pixel of the mask, and where it covers the image.
+    assert not patch.valid[:, :38].any()
+    assert patch.valid[3:-3, 42:-3].all()
+
+
+def test_a_mask_goes_with_the_input_where_it_is_moved(files: Files) -> None:
+    hidden = np.ones((100, 120), np.uint8)
+    hidden[:, :40] = 0
+    pair = make_pair(
+        files.image(), Image(files.image().source, None, files.open(hidden, nodata=255))
+    )
+    patch = pair.input_patch(pair.grid, lambda xy: pair.claimed_px(xy) + [10, 0])
+    assert not patch.valid[:, :30].any()
+    assert patch.valid[:, 31:109].all()
+
+
+def test_patches_of_windows_are_parts_of_the_whole(files: Files) -> None:
+    pair = make_pair(files.image(), files.image(covering(NEXT_ZONE, 10.0)))
+    piece = pair.grid.window(30, 20, 41, 37)
+    for part, whole in zip(
+        (pair.reference_patch(piece), pair.input_patch(piece, pair.claimed_px)),
+        both(pair),
+        strict=True,
+    ):
+        np.testing.assert_allclose(part.values, whole.values[20:57, 30:71], atol=0.2)
+    beyond = pair.reference_patch(pair.grid.window(-10, -10, 20, 20))
+    assert beyond.valid.sum() == 100
