@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..rasters.grid import Grid
 from .transform import Transform
 
 FloatArray = NDArray[np.float64]
@@ -60,6 +61,11 @@ class TiePoints:
     def residual_px(self, transform: Transform) -> FloatArray:
         """Return `input_px` minus where `transform` puts the points, in input pixels, (n, 2)."""
         return np.asarray(self.input_px - transform(self.reference_xy))
+
+    def residual_on(self, grid: Grid, transform: Transform) -> FloatArray:
+        """Return claimed minus predicted positions in pixels of a grid on the map, (n, 2)."""
+        claimed = grid.map_to_pixel(transform.claimed_xy(self.input_px))
+        return claimed - grid.map_to_pixel(transform.model(self.reference_xy))
 
     def reject(self, which: NDArray[np.bool_], reason: str) -> TiePoints:
         """Return the table in which the points `which` that were used are so no longer."""

@@ -62,9 +62,7 @@ class Residuals:
     @classmethod
     def of(cls, points: TiePoints, transform: Transform, grid: Grid) -> Residuals:
         """Measure the residuals of points in pixels of the matching grid."""
-        claimed = transform.claimed_xy(points.input_px)
-        predicted = transform.model(points.reference_xy)
-        residual = grid.map_to_pixel(claimed) - grid.map_to_pixel(predicted)
+        residual = points.residual_on(grid, transform)
         return cls(
             grid.map_to_pixel(points.reference_xy),
             residual,

@@ -116,9 +116,7 @@ def judge(
         Radius of the search for check points.
     """
     counted = check.take(check.used)
-    claimed = estimate.transform.claimed_xy(counted.input_px)
-    predicted = estimate.transform.model(counted.reference_xy)
-    residuals = grid.map_to_pixel(claimed) - grid.map_to_pixel(predicted)
+    residuals = counted.residual_on(grid, estimate.transform)
     agreeing = int((np.hypot(*residuals.T) <= TOLERANCE_PX).sum())
     # Matches without a peak inside their window count as such that do not agree.
     chance = log10_chance(agreeing, len(check), agreement_probability(TOLERANCE_PX, radius_px))

@@ -220,11 +220,9 @@ class LocalSearch:
 
     def _agreeing(self, points: TiePoints, transform: Transform) -> TiePoints:
         """Reject the points of the fit that more likely fell by chance than near the model."""
-        grid = self.pair.grid
         used = points.used
-        claimed = grid.map_to_pixel(transform.claimed_xy(points.input_px[used]))
-        predicted = grid.map_to_pixel(transform.model(points.reference_xy[used]))
-        mixture = fit_mixture(claimed - predicted, (2 * _NEAR_PX + 1) ** 2, SIGMA_RANGE_PX)
+        residuals = points.take(used).residual_on(self.pair.grid, transform)
+        mixture = fit_mixture(residuals, (2 * _NEAR_PX + 1) ** 2, SIGMA_RANGE_PX)
         wrong = np.zeros(len(points), bool)
         wrong[used] = ~mixture.right
         return points.reject(wrong, "disagrees with the model")

@@ -24,7 +24,7 @@ _LOW = 0.4
 _SAME_PX = 4
 
 # Few bins keep the count over a large search window quick, and are enough for whole scenes.
-_BINS = 10
+_BINS = 8
 
 
 @dataclass(frozen=True)
