@@ -90,7 +90,7 @@ def rough_candidates(
         settings,
         executor,
     )
-    found = []
+    found: list[Candidate] = []
     for _ in range(CANDIDATES):
         peak = find_peak(surface)
         if peak.height <= (found[0].height * _LOW if found else 0.0):

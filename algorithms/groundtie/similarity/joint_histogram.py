@@ -209,7 +209,8 @@ def _count_spectrally(
         counts[:, :, k] = found[:, :ny, :nx].transpose(1, 2, 0)
     # Counts are whole numbers; what is left over is rounding, and so is the sign of zero.
     np.rint(counts, out=counts)
-    return np.abs(counts, out=counts)
+    np.abs(counts, out=counts)
+    return counts
 
 
 def _map(executor: Executor | None, function: Callable[[int], None], count: int) -> None:
