@@ -181,7 +181,7 @@ def _row_counter(
     def all_at_once(dy: int) -> FloatArray:
         pairs = cv2.add(codes, windows[dy].reshape(shape))
         counted = cv2.calcHist([shifts, pairs], [0, 1], None, [span, cells], [0, span, 0, cells])
-        return counted.reshape(span, *sizes)
+        return np.asarray(counted, np.float32).reshape(span, *sizes)
 
     return all_at_once
 
