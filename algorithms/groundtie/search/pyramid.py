@@ -10,6 +10,7 @@ from ..geometry.models import Model
 from ..progress import Progress
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
+from ..similarity.correlation import MINIMUM_OVERLAP
 from .coarse import CoarseModel, refine_on_level, shift_model
 from .local import LocalSearch
 from .rough import level_factor, rough_candidates
@@ -47,6 +48,8 @@ def find_coarse_model(
     level = pair.grid if factor == 1 else pair.grid.scaled(factor)
     # The true place may lie a pixel of the level further than the whole pixels say.
     radius_px = int(np.ceil(radius_m / level.pixel_size_m)) + 1
+    # Farther off too little of the images overlaps.
+    radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.width, level.height)))
     candidates = rough_candidates(
         pair, level, radius_px, search.settings, search.held_out, executor
     )
