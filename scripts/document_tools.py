@@ -1,0 +1,157 @@
+"""Write the tables of parameters into the tools' pages in docs/, from the tools' declarations."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from groundtie.cli import spelled
+from groundtie.declaration import Parameter, Tool
+from groundtie.kinds import (
+    Band,
+    Choice,
+    FileIn,
+    Flag,
+    FolderOut,
+    Kind,
+    Number,
+    OutputKind,
+    RasterIn,
+    Text,
+    VectorIn,
+)
+from groundtie.tools import TOOLS
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+BEGIN = "<!-- parameters: begin, made by scripts/document_tools.py -->"
+END = "<!-- parameters: end -->"
+
+
+def page_of(tool: Tool, folder: Path) -> Path:
+    """Return the page of a tool."""
+    return folder / f"{tool.name.replace('_', '-')}.md"
+
+
+def document(tools: Sequence[Tool], folder: Path) -> list[Path]:
+    """Bring the tables on the pages of some tools up to date.
+
+    Parameters
+    ----------
+    tools
+        The tools; each has its page in the folder.
+    folder
+        Folder of the pages.
+
+    Returns
+    -------
+    list of Path
+        The pages that were changed.
+
+    Raises
+    ------
+    FileNotFoundError
+        A tool has no page.
+    ValueError
+        A page does not have the place of the tables marked once.
+    """
+    changed = []
+    for tool in tools:
+        path = page_of(tool, folder)
+        page = path.read_text(encoding="utf-8")
+        updated = with_tables(page, tables(tool), path.name)
+        if updated != page:
+            path.write_text(updated, encoding="utf-8")
+            changed.append(path)
+    return changed
+
+
+def with_tables(page: str, text: str, name: str) -> str:
+    """Return a page with `text` between the marks; `name` is the page's in the error message."""
+    before, begin, rest = page.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end or BEGIN in after or END in before + after:
+        raise ValueError(f"{name} must hold once, and in this order: {BEGIN} {END}")
+    return f"{before}{BEGIN}\n\n{text}\n\n{END}{after}"
+
+
+def tables(tool: Tool) -> str:
+    """Return the tables of a tool's parameters and of the numbers that it gives to QGIS."""
+    plain = [p for p in tool.parameters if not p.kind.advanced]
+    advanced = [p for p in tool.parameters if p.kind.advanced]
+    parts = [
+        _parameter_table("Parameters", plain),
+        _parameter_table("Advanced parameters", advanced),
+    ]
+    if tool.outputs:
+        rows = [(f"`{output.name}`", output.label, f"`{output.path}`") for output in tool.outputs]
+        heading = "Numbers for QGIS models"
+        parts.append(_table(heading, ("in QGIS", "meaning", "place in the JSON"), rows))
+    return "\n\n".join(part for part in parts if part)
+
+
+def _parameter_table(title: str, parameters: Iterable[Parameter]) -> str:
+    rows = [
+        (
+            f"`{spelled(parameter)}`",
+            parameter.kind.label,
+            parameter.kind.help,
+            values(parameter.kind),
+            default(parameter),
+        )
+        for parameter in parameters
+    ]
+    return _table(title, ("command line", "in QGIS", "meaning", "values", "default"), rows)
+
+
+def _table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    if not rows:
+        return ""
+    lines = [header, ["---"] * len(header), *rows]
+    cells = [" | ".join(cell.replace("|", "\\|") for cell in line) for line in lines]
+    return "\n".join([f"### {title}", "", *(f"| {line} |" for line in cells)])
+
+
+def values(kind: Kind) -> str:
+    """Say which values a parameter of this kind takes."""
+    if isinstance(kind, Number):
+        what = "whole number" if kind.integer else "number"
+        bounds = f"{kind.range_text} {kind.unit}".strip()
+        return f"{what}, {bounds}" if bounds else what
+    if isinstance(kind, Choice):
+        return ", ".join(f"`{choice}`" for choice in kind.choices)
+    if isinstance(kind, (FileIn, OutputKind)):
+        return "file: " + ", ".join(f"`{suffix}`" for suffix in kind.suffixes)
+    words: dict[type[Kind], str] = {
+        Band: "band number, from 1",
+        Flag: "yes or no",
+        FolderOut: "folder",
+        RasterIn: "raster",
+        Text: "text",
+        VectorIn: "vector layer",
+    }
+    return words[type(kind)]
+
+
+def default(parameter: Parameter) -> str:
+    """Say which value a parameter has if none is given."""
+    if parameter.required:
+        return "required"
+    if isinstance(parameter.kind, Flag):
+        return "yes" if parameter.default else "no"
+    if parameter.default is None:
+        return "–"
+    plain = f"{parameter.default:g}" if isinstance(parameter.default, float) else parameter.default
+    return f"`{plain}`"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--docs", type=Path, default=DOCS, help="folder of the pages")
+    for path in document(TOOLS, parser.parse_args().docs):
+        print(path)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
