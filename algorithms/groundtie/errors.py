@@ -62,6 +62,10 @@ class TooFewPointsError(GroundTieError, ValueError):
     """There are fewer tie points than the model needs."""
 
 
+class NothingFoundError(GroundTieError, ValueError):
+    """No place was found, or more than one, at which the images match."""
+
+
 class CancelledError(GroundTieError, RuntimeError):
     """The user cancelled the work."""
 

@@ -6,17 +6,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeoreferencingError, NoOverlapError, SameFileError
 from .grid import Grid, reproject
 from .patch import Patch
-from .reading import RasterSource, Window
+from .reading import FloatImage, Mask, RasterSource, Window
 from .warping import sample
 
 FloatArray = NDArray[np.float64]
 ToPixel = Callable[[FloatArray], FloatArray]
+
+# Areas of zeros from this side on hold no data; interpolation reaches this far (side) around them.
+_EMPTY_PX = 9
+_EMPTY_MARGIN_PX = 5
 
 # Pixel sizes nearer than this are the same.
 _SAME_SIZE = 0.02
@@ -44,6 +49,8 @@ class Image:
     def read_onto(self, grid: Grid, to_px: ToPixel, to_mask_px: ToPixel | None = None) -> Patch:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
         values, valid = sample(self.source, grid, to_px, "cubic", self.band)
+        if not self.source.says_what_is_valid:
+            valid = valid & ~_empty_areas(values)
         if self.mask is not None and to_mask_px is not None:
             shown, known = sample(self.mask, grid, to_mask_px, "nearest", 1)
             valid = valid & known & (shown != 0)
@@ -145,6 +152,19 @@ def make_pair(
     reach = _box(grid, outline, radius / grid.pixel_size_m)
     assert reach is not None
     return ImagePair(reference, input, grid.window(*reach), (overlap.width, overlap.height))
+
+
+def _empty_areas(values: FloatImage) -> Mask:
+    """Tell the pixels of areas that are 0 throughout, and their margin.
+
+    Many rasters fill what they do not cover with 0 and do not say so. The borders of such areas
+    would be the strongest edges of the image, and the same in images of different places.
+    """
+    zero = (values == 0).astype(np.uint8)
+    if not zero.any():
+        return zero > 0
+    areas = cv2.morphologyEx(zero, cv2.MORPH_OPEN, np.ones((_EMPTY_PX, _EMPTY_PX), np.uint8))
+    return cv2.dilate(areas, np.ones((_EMPTY_MARGIN_PX,) * 2, np.uint8)) > 0
 
 
 def default_radius_m(grid: Grid) -> float:

@@ -128,6 +128,12 @@ class RasterSource:
         return kinds.index(ColorInterp.alpha) + 1 if ColorInterp.alpha in kinds else None
 
     @property
+    def says_what_is_valid(self) -> bool:
+        """Whether nodata values, a mask or an alpha band tell which pixels are valid."""
+        declared = any(band.nodata is not None for band in self.bands)
+        return declared or self.has_mask_band or self.alpha_band is not None
+
+    @property
     def image_bands(self) -> tuple[int, ...]:
         """Numbers, from 1, of the bands that are not alpha."""
         return tuple(i for i in range(1, self.count + 1) if i != self.alpha_band)

@@ -6,6 +6,7 @@ from concurrent.futures import Executor
 
 import numpy as np
 
+from ..errors import NothingFoundError
 from ..geometry.models import Model
 from ..progress import Progress
 from ..rasters.grid import Grid
@@ -18,6 +19,12 @@ from .rough import level_factor, rough_candidates
 # A candidate that random matches would hardly ever support (log10) needs no rival.
 _CERTAIN = -6.0
 
+# Repetitive places match more than once. A candidate nearly as high as the best is looked at, and
+# is a rival if chips support it with at least half the evidence (log10).
+_RIVAL_HEIGHT = 0.8
+_RIVAL_EVIDENCE = 0.5
+_SAME_PLACE_PX = 5.0
+
 # Above so many expected false alarms (log10) nothing was found. Local matches may still tell
 # more than large chips did, and the verdict judges what comes of them.
 _HOPELESS = 0.0
@@ -28,8 +35,8 @@ _STEP = 4.0
 
 def find_coarse_model(
     pair: ImagePair, search: LocalSearch, radius_m: float, executor: Executor, progress: Progress
-) -> Model | None:
-    """Return a model of degree 1 on the map, or None if no candidate is better than chance.
+) -> Model:
+    """Return a model of degree 1 on the map, from which tie points can be searched for.
 
     Parameters
     ----------
@@ -43,6 +50,11 @@ def find_coarse_model(
         Threads to work in.
     progress
         Is told of every step.
+
+    Raises
+    ------
+    NothingFoundError
+        No candidate is better than chance, or another place matches about as well.
     """
     factor = level_factor(pair.grid)
     level = pair.grid if factor == 1 else pair.grid.scaled(factor)
@@ -54,21 +66,37 @@ def find_coarse_model(
         pair, level, radius_px, search.settings, search.held_out, executor
     )
     progress.update(0.3)
-    best: CoarseModel | None = None
+    tried: list[CoarseModel] = []
     for candidate in candidates:
-        found = _refine(pair, level, shift_model(candidate), search, executor, progress)
-        if best is None or found.log10_false_alarms < best.log10_false_alarms:
-            best = found
-        if best.log10_false_alarms < _CERTAIN:
+        certain = tried and min(_alarms(model) for model in tried) < _CERTAIN
+        if certain and candidate.height < _RIVAL_HEIGHT * candidates[0].height:
             break
-    if best is None or best.log10_false_alarms > _HOPELESS:
-        return None
+        tried.append(_refine(pair, level, shift_model(candidate), search, executor, progress))
+    if not tried or min(map(_alarms, tried)) > _HOPELESS:
+        raise NothingFoundError("nothing in common was found")
+    best = min(tried, key=_alarms)
+    _require_no_rival(best, tried, level)
     while factor > _STEP:
         factor /= _STEP
         finer = _refine(pair, pair.grid.scaled(factor), best.model, search, executor, progress)
         if finer.log10_false_alarms < 0:
             best = finer
     return best.model
+
+
+def _alarms(model: CoarseModel) -> float:
+    return model.log10_false_alarms
+
+
+def _require_no_rival(best: CoarseModel, tried: list[CoarseModel], level: Grid) -> None:
+    centre = level.pixel_to_map([level.centre_px])
+    for other in tried:
+        apart = level.map_to_pixel(other.model(centre)) - level.map_to_pixel(best.model(centre))
+        distance_px = float(np.hypot(*apart[0]))
+        evident = _alarms(other) < min(_RIVAL_EVIDENCE * _alarms(best), _HOPELESS)
+        if distance_px > _SAME_PLACE_PX and evident:
+            distance = distance_px * level.pixel_size_m
+            raise NothingFoundError(f"two places match about as well, {distance:.0f} m apart")
 
 
 def _refine(

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import NotRegisteredError, TooFewPointsError
+from ..errors import NothingFoundError, NotRegisteredError, TooFewPointsError
 from ..geometry.estimation import Estimate
 from ..geometry.tie_point_files import write_tie_points
 from ..geometry.tie_points import TiePoints
@@ -123,13 +123,11 @@ def register(
         Is told of every step.
     """
     progress.update(0.0, "searching for the rough shift")
-    coarse = find_coarse_model(pair, search, radius_m, executor, progress.part(0.0, 0.4))
-    if coarse is None:
-        return Registration(pair, search, None, None, refuse("nothing in common was found"))
-    progress.update(0.4, "matching tie points")
     try:
+        coarse = find_coarse_model(pair, search, radius_m, executor, progress.part(0.0, 0.4))
+        progress.update(0.4, "matching tie points")
         estimate = search.estimate(coarse, model, seed, executor, progress.part(0.4, 0.8))
-    except TooFewPointsError as error:
+    except (NothingFoundError, TooFewPointsError) as error:
         return Registration(pair, search, None, None, refuse(str(error)))
     progress.update(0.8, "checking with points that took no part")
     check = search.check_points(estimate.transform.model, executor, progress.part(0.8, 1.0))
