@@ -12,7 +12,6 @@ import pytest
 from raster_files import full_disk, utm_grid
 from textured_pairs import (
     TexturedPair,
-    error_px,
     listing,
     rewritten,
     texture,
@@ -116,16 +115,13 @@ def test_an_error_limit_below_what_is_possible_is_refused(
     assert not (tmp_path / "out.tif").exists()
 
 
-def test_impossible_demands_on_tie_points_end_in_a_verdict(
+def test_impossible_demands_on_tie_points_are_refused(
     textured: TexturedPair, tmp_path: Path
 ) -> None:
-    """No match back meets its start exactly: the points are rejected, not the tool's sanity."""
-    try:
-        result = registered(textured, tmp_path, two_way_error=0.0)
-    except NotRegisteredError:
-        return
-    assert result.verdict.fit_points_used <= 2
-    assert error_px(result.transform, textured) < 0.3
+    """No match back meets its start exactly."""
+    with pytest.raises(NotRegisteredError, match="points agree"):
+        registered(textured, tmp_path, two_way_error=0.0)
+    assert listing(tmp_path) == {}
 
 
 def far_away(values: np.ndarray) -> tuple[np.ndarray, dict[str, Any]]:

@@ -68,7 +68,8 @@ def orientation_field(
     border = cv2.BORDER_REFLECT
     gx = cv2.sepFilter2D(compressed, cv2.CV_32F, slope, smooth, borderType=border)
     gy = cv2.sepFilter2D(compressed, cv2.CV_32F, smooth, slope, borderType=border)
-    size = cv2.magnitude(gx, gy)
+    # Not cv2.magnitude, whose last digits depend on where arrays lie in memory.
+    size = np.sqrt(gx * gx + gy * gy)
     rounding = np.float32(_ROUNDING * np.abs(compressed).max(initial=0))
     usable = _erode(valid, scale_px) & (size > rounding)
     typical = np.float32(np.median(size[usable])) if usable.any() else np.float32(1)
