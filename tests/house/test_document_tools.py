@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from toys import TOY
 
+from groundtie import errors
 from groundtie.cli import spelled
 from groundtie.declaration import Parameter, Tool
 from groundtie.kinds import (
@@ -28,6 +29,7 @@ from groundtie.kinds import (
     VectorIn,
     VectorOut,
 )
+from groundtie.quality.verdict import refuse
 from groundtie.tools import TOOLS
 from scripts import document_tools
 
@@ -199,3 +201,20 @@ def test_the_index_links_every_page() -> None:
     index = (DOCS / "index.md").read_text(encoding="utf-8")
     pages = {path.name for path in DOCS.glob("*.md")} - {"index.md"}
     assert {name for name in pages if f"({name})" not in index} == set()
+
+
+def test_the_page_on_python_names_every_error_and_its_builtin() -> None:
+    page = (DOCS / "python.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `(\w+Error)` \| `(\w+)` \|", page, re.MULTILINE))
+    classes = {
+        name: found.__bases__[1].__name__
+        for name, found in vars(errors).items()
+        if isinstance(found, type) and len(found.__bases__) == 2
+    }
+    assert rows == classes
+
+
+def test_the_page_on_reports_names_every_number_of_the_verdict() -> None:
+    page = (DOCS / "report.md").read_text(encoding="utf-8")
+    _, _, keys = page.partition("## The JSON")
+    assert {key for key in refuse("no reason").summary() if f"`{key}`" not in keys} == set()
