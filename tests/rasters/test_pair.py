@@ -306,3 +306,25 @@ def test_patches_of_windows_are_parts_of_the_whole(files: Files) -> None:
         np.testing.assert_allclose(part.values, whole.values[20:57, 30:71], atol=0.2)
     beyond = pair.reference_patch(pair.grid.window(-10, -10, 20, 20))
     assert beyond.valid.sum() == 100
+
+
+def test_undeclared_areas_of_zeros_take_no_part_and_single_zeros_do(files: Files) -> None:
+    values = wave_image(GRID, LENGTH_M).astype(np.float32)
+    values[:, :40] = 0
+    values[60, 80] = 0
+    source = files.open(values)
+    patch = make_pair(Image(source), files.image()).reference_patch(GRID)
+    assert not patch.valid[:, :42].any()
+    assert patch.valid[:, 43:].all()
+    # A nodata value says that zeros are data.
+    declared = files.open(values, nodata=-1)
+    assert make_pair(Image(declared), files.image()).reference_patch(GRID).all_valid
+
+
+def test_a_narrow_border_of_zeros_is_empty_and_the_images_own_border_is_not(files: Files) -> None:
+    values = wave_image(GRID, LENGTH_M).astype(np.float32)
+    values[:4] = 0
+    pair = make_pair(Image(files.open(values)), files.image())
+    around = pair.reference_patch(GRID.window(-10, -10, 140, 120))
+    assert not around.valid[10:16, 10:130].any()
+    assert around.valid[17:110, 10:130].all()

@@ -50,7 +50,7 @@ class Image:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
         values, valid = sample(self.source, grid, to_px, "cubic", self.band)
         if not self.source.says_what_is_valid:
-            valid = valid & ~_empty_areas(values)
+            valid = valid & ~_empty_areas(values, valid)
         if self.mask is not None and to_mask_px is not None:
             shown, known = sample(self.mask, grid, to_mask_px, "nearest", 1)
             valid = valid & known & (shown != 0)
@@ -154,8 +154,10 @@ def make_pair(
     return ImagePair(reference, input, grid.window(*reach), (overlap.width, overlap.height))
 
 
-def _empty_areas(values: FloatImage) -> Mask:
+def _empty_areas(values: FloatImage, valid: Mask) -> Mask:
     """Tell the pixels of areas that are 0 throughout, and their margin.
+
+    What is invalid is 0, too, so that narrow borders are found, but has no margin of its own.
 
     Many rasters fill what they do not cover with 0 and do not say so. The borders of such areas
     would be the strongest edges of the image, and the same in images of different places.
@@ -164,6 +166,7 @@ def _empty_areas(values: FloatImage) -> Mask:
     if not zero.any():
         return zero > 0
     areas = cv2.morphologyEx(zero, cv2.MORPH_OPEN, np.ones((_EMPTY_PX, _EMPTY_PX), np.uint8))
+    areas[~valid] = 0
     return cv2.dilate(areas, np.ones((_EMPTY_MARGIN_PX,) * 2, np.uint8)) > 0
 
 
