@@ -99,7 +99,7 @@ def test_ce90_holds_ninety_percent_of_the_errors() -> None:
 def test_random_points_are_refused(seed: int) -> None:
     verdict = judged(check_points(fallen(72, seed)))
     assert not verdict.accepted
-    assert "by chance" in verdict.reason
+    assert "of 72 check points agree" in verdict.reason
     assert math.isnan(verdict.check_rmse_px)
     assert 0.001 < verdict.chance <= 1
 
@@ -124,7 +124,8 @@ def test_points_in_one_corner_do_not_hold_the_rest() -> None:
     estimate = estimated(fit_points(within=(0.15, 0.15), sigma=0.5), "polynomial2")
     verdict = judged(check_points(scatter(72, 0.3)), estimate)
     assert not verdict.accepted
-    assert verdict.spread_px > 3 or "by chance" in verdict.reason
+    # Either it varies too much over the overlap, or check points far from the corner disagree.
+    assert "do not hold the model" in verdict.reason or "check points agree" in verdict.reason
 
 
 def test_a_shift_of_points_in_one_corner_is_accepted_and_the_rest_said_to_be_extrapolated() -> None:

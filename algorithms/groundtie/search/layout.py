@@ -71,7 +71,9 @@ class Axis:
         """Tell which pixel positions lie in the held-out part of their cell, or within reach."""
         phase = ((positions - self.first) / self.pitch) % 1.0
         inside = (positions >= self.first) & (positions <= self.first + self.cells * self.pitch)
-        return np.asarray(inside & (np.abs(phase - 0.5) < _HELD_OUT / 2 + reach_px / self.pitch))
+        # A chip of the fit may end exactly at the block, whatever the last digit says.
+        half = _HELD_OUT / 2 + reach_px / self.pitch - 1e-9
+        return np.asarray(inside & (np.abs(phase - 0.5) < half))
 
     def lattice(self, parts: int) -> NDArray[np.float64]:
         """Return positions that divide each cell into so many parts, lines included."""
@@ -80,9 +82,10 @@ class Axis:
     def check_centres(self, check_chip: int) -> NDArray[np.float64]:
         """Return the centres of chips inside the held-out blocks, one or two a block."""
         middles = np.asarray(self.first + (np.arange(self.cells) + 0.5) * self.pitch)
-        if self.block < 2 * check_chip:
+        # Rounding a centre moves a chip by half a pixel; it must stay inside its block.
+        half = (self.block - check_chip) / 2 - 1
+        if half < check_chip / 2:
             return middles
-        half = (self.block - check_chip) / 2
         return np.sort(np.concatenate([middles - half, middles + half]))
 
 
