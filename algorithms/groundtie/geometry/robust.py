@@ -22,7 +22,7 @@ _FIT_STEPS = 15
 # Right matches are first thought to scatter by this, in pixels; starting wide would take a second
 # cluster of wrong matches, as layover makes, for the tail of the right ones.
 _FIRST_SIGMA = 1.0
-_FOLDS = 5
+FOLDS = 5
 
 # A linear part this far from the identity is no misregistration of georeferenced images.
 _LARGEST_DISTORTION = 0.25
@@ -202,12 +202,20 @@ def _sampled_models(
     return np.asarray(coefficients[plausible] if plausible.any() else coefficients * 0)
 
 
-def block_folds(px: FloatArray) -> NDArray[np.int_]:
-    """Return fold numbers, shape (n,), such that neighbours share one, for cross-validation.
+def blocks_of(px: FloatArray) -> NDArray[np.int_]:
+    """Return the column and row of the block that each point lies in, shape (n, 2).
 
-    The extent is cut into blocks; each row and each column of blocks holds every fold once.
+    The points' extent is cut into as many blocks a side as there are folds.
     """
     low, high = px.min(axis=0), px.max(axis=0)
     unit = (px - low) / np.maximum(high - low, 1e-12)
-    block = np.minimum((unit * _FOLDS).astype(int), _FOLDS - 1)
-    return np.asarray((block[:, 0] + 2 * block[:, 1]) % _FOLDS)
+    return np.minimum((unit * FOLDS).astype(int), FOLDS - 1)
+
+
+def block_folds(px: FloatArray) -> NDArray[np.int_]:
+    """Return fold numbers, shape (n,), such that neighbours share one, for cross-validation.
+
+    Each row and each column of blocks holds every fold once.
+    """
+    block = blocks_of(px)
+    return np.asarray((block[:, 0] + 2 * block[:, 1]) % FOLDS)

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.estimation import Estimate
-from ..geometry.robust import fit_mixture
+from ..geometry.robust import distances, find_consensus, fit_mixture
 from ..geometry.tie_points import TiePoints
 from ..rasters.grid import FloatArray, Grid
 
@@ -26,8 +26,16 @@ LARGEST_LOG10_CHANCE = -3.0
 _SMALLEST_SIGMA_PX = 0.1
 _SIGMA_BEYOND = 1.5
 
-# Fewer right check points than this measure nothing.
+# Fewer check points that agree measure nothing: at least so many, and this share of all. In dense
+# cities roofs that lay over agree with each other at some places, more often than by chance.
 _FEWEST_CHECK_POINTS = 3
+_SMALLEST_SHARE = 0.25
+
+# Check points that agree on another transform within this distance make it a rival, if they are
+# more by so many and by this factor.
+_RIVAL_TOLERANCE_PX = 3.0
+_RIVAL_POINTS = 3
+_RIVAL_SHARE = 1.25
 
 # 90 % of a circular normal distribution lies within this many standard deviations of an axis.
 _CE90 = math.sqrt(-2 * math.log(0.1))
@@ -124,6 +132,13 @@ def judge(
     if chance > LARGEST_LOG10_CHANCE or agreeing < _FEWEST_CHECK_POINTS:
         why = f"{agreeing} of {len(check)} check points agree, as they may by chance"
         return Verdict(False, why, *counts, log10_chance=chance)
+    if agreeing < _SMALLEST_SHARE * len(check):
+        why = f"only {agreeing} of {len(check)} check points agree"
+        return Verdict(False, why, *counts, log10_chance=chance)
+    on_another = _agreeing_on_another(grid.map_to_pixel(counted.reference_xy), residuals)
+    if on_another:
+        why = f"{on_another} of {len(check)} check points agree on another transform"
+        return Verdict(False, why, *counts, log10_chance=chance)
     sigmas = _SMALLEST_SIGMA_PX, _SIGMA_BEYOND * max_error_px / math.sqrt(2)
     sigma = fit_mixture(residuals, (2 * radius_px + 1) ** 2, sigmas).sigma
     lattice = _lattice(grid)
@@ -150,6 +165,19 @@ def judge(
         spread,
         _extrapolated_share(grid.map_to_pixel(used.reference_xy), grid),
     )
+
+
+def _agreeing_on_another(px: FloatArray, residuals: FloatArray) -> int:
+    """Return how many check points agree on another transform, if clearly more than on this one.
+
+    A model that is right in one part of the scene and wrong in another has check points that
+    agree, and others that agree on what it should be.
+    """
+    own = int((np.hypot(*residuals.T) <= _RIVAL_TOLERANCE_PX).sum())
+    rival = find_consensus(px, px + residuals, _RIVAL_TOLERANCE_PX)
+    others = int((distances(rival, px, px + residuals) <= _RIVAL_TOLERANCE_PX).sum())
+    # Three points always agree on an affine model, and one or two more may by chance.
+    return others if others >= max(own + _RIVAL_POINTS, _RIVAL_SHARE * own) else 0
 
 
 def _lattice(grid: Grid) -> FloatArray:

@@ -17,7 +17,7 @@ from scipy.ndimage import spline_filter1d
 from scipy.optimize import minimize
 
 from ..geometry.models import DEGREE, PARAMETERS, Frame, Model, PolynomialModel, monomials
-from ..geometry.robust import block_folds
+from ..geometry.robust import FOLDS, block_folds, blocks_of
 from .matching import Surfaces
 
 FloatArray = NDArray[np.float64]
@@ -38,8 +38,14 @@ CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3
 # Chips for each parameter below which a model is not considered.
 _CHIPS_PER_PARAMETER = 2
 
-# A more flexible model must raise the similarity by so many standard errors.
-_STANDARD_ERRORS = 2.0
+# A more flexible model must raise the similarity by so many standard errors: rotation, scale and
+# shear of a georeferenced image are common, bending is not, and extrapolates badly.
+_STANDARD_ERRORS = {
+    "similarity": 1.0,
+    "affine": 1.0,
+    "polynomial2": 2.0,
+    "polynomial3": 2.0,
+}
 
 
 @dataclass(frozen=True)
@@ -126,8 +132,8 @@ def choose_alignment(
 ) -> Alignment:
     """Fit the simplest polynomial model that the surfaces justify.
 
-    A more flexible model is taken only if it raises the similarity at blocks of chips that were
-    left out of its fit by more than twice the rise's standard error. Parameters as `align`.
+    A more flexible model is taken only if it raises the similarity at chips that were left out
+    of its fit by more standard errors than `_STANDARD_ERRORS` asks for. Parameters as `align`.
     """
     fields = _fields(px, surfaces, prior)
     chosen = _align(CANDIDATES[0], fields, start)
@@ -139,9 +145,7 @@ def choose_alignment(
         tried = _align(kind, fields, start)
         scores = scores | tried.left_out_score
         left_out = _left_out_scores(fields[-1], tried)
-        rise = left_out - kept
-        error = float(rise.std(ddof=1) * np.sqrt(len(rise))) if len(rise) > 1 else 0.0
-        if rise.sum() > _STANDARD_ERRORS * error:
+        if _standard_errors(left_out - kept, fields[-1].px) > _STANDARD_ERRORS[kind]:
             chosen, kept = tried, left_out
     return Alignment(chosen.model, chosen.fold_models, scores)
 
@@ -163,13 +167,21 @@ def _align(kind: str, fields: list[_Field], start: Model) -> Alignment:
 
 
 def _left_out_scores(field: _Field, alignment: Alignment) -> FloatArray:
-    """Return the sum of the similarity over each fold that its model has not seen."""
+    """Return the similarity of each chip by a model that has not seen it, shape (n,)."""
     folds = block_folds(field.px)
-    sums = []
+    scores = np.zeros(len(folds))
     for fold, model in zip(np.unique(folds), alignment.fold_models, strict=True):
         part = field.take(folds == fold)
-        sums.append(part.scores(model(part.px))[0].sum())
-    return np.array(sums)
+        scores[folds == fold] = part.scores(model(part.px))[0]
+    return scores
+
+
+def _standard_errors(rise: FloatArray, px: FloatArray) -> float:
+    """Return a rise in its standard errors; neighbours rise together, so it counts by blocks."""
+    block = blocks_of(px) @ [1, FOLDS]
+    sums = np.array([rise[block == b].sum() for b in np.unique(block)])
+    error = sums.std(ddof=1) * np.sqrt(len(sums)) if len(sums) > 1 else np.inf
+    return float(sums.sum() / max(error, 1e-12))
 
 
 def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Affine) -> list[_Field]:

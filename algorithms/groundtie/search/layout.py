@@ -21,8 +21,8 @@ from ..rasters.pair import ImagePair
 # chips of the fit share the rest of the cell and support each other.
 _HELD_OUT = 0.6
 
-# Cells are about this large in small scenes, and there are no more of them in large ones.
-_CELL_PX = 125
+# Cells along a scene's shorter side: so many, and one more for each of these pixels.
+_FIRST_CELLS, _CELL_PX = 2.2, 300
 _FEWEST_CELLS, _MOST_CELLS = 3, 6
 
 # Sides of chips, in pixels.
@@ -39,7 +39,7 @@ _OVERLAPPING = 0.75
 def default_chip_px(width: int, height: int) -> int:
     """Return the side of a chip of the fit for a scene of this size, in pixels."""
     shorter = min(width, height)
-    cells = int(np.clip(shorter // _CELL_PX, _FEWEST_CELLS, _MOST_CELLS))
+    cells = int(np.clip(_FIRST_CELLS + shorter / _CELL_PX, _FEWEST_CELLS, _MOST_CELLS))
     between = 1 - _HELD_OUT
     return int(np.clip(between * shorter / (cells + between), *_CHIP_RANGE_PX))
 
