@@ -1,4 +1,4 @@
-"""GroundTie registers satellite images to one another and to the ground.
+"""GroundTie registers satellite images to one another, above all SAR and optical ones.
 
 Tools are functions (`coregister`, `warp`, `simulate`, …) that read and write files; see
 `groundtie.tools`. `load_transform` reads the transform that a registration wrote.

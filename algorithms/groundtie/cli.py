@@ -116,7 +116,7 @@ class ToolGroup(click.Group):
     def __init__(self, load: Callable[[], Sequence[Tool]]) -> None:
         super().__init__(
             "groundtie",
-            help="Register satellite images to one another and to the ground.",
+            help="Register satellite images to one another.",
             invoke_without_command=True,
             callback=_help_without_command,
             context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},

@@ -54,9 +54,11 @@ def test_to_a_file_and_back(tmp_path: Path, suffix: str, crs: CRS | None, grid: 
     assert found.crs == crs
     np.testing.assert_allclose(found.reference_xy, points.reference_xy, rtol=1e-12)
     np.testing.assert_allclose(found.input_px, points.input_px, atol=1e-4)
-    np.testing.assert_array_equal(found.used, points.used)
-    # The Georeferencer knows no check points.
-    is_check = np.zeros(12, bool) if suffix == ".points" else points.is_check
+    # The Georeferencer knows no check points; it must not fit to them.
+    georeferencer = suffix == ".points"
+    used = points.used & ~points.is_check if georeferencer else points.used
+    is_check = np.zeros(12, bool) if georeferencer else points.is_check
+    np.testing.assert_array_equal(found.used, used)
     np.testing.assert_array_equal(found.is_check, is_check)
 
 
@@ -174,7 +176,9 @@ def test_what_we_write_for_the_georeferencer(tmp_path: Path) -> None:
     assert lines[0].startswith("#CRS: PROJCS[")
     assert lines[1] == "mapX,mapY,sourceX,sourceY,enable,dX,dY,residual"
     numbers = [float(number) for number in lines[2].split(",")]
-    col, row = points.input_px[0]
+    enabled = [str(int(used)) for used in points.used & ~points.is_check]
+    assert [line.split(",")[4] for line in lines[2:14]] == enabled
+    assert {"0", "1"} == set(enabled)
     assert numbers[2:5] == pytest.approx([col + 0.5, -(row + 0.5), 1])
     assert [line.split(",")[4] for line in lines[2:5]] == ["1", "0", "1"]
 

@@ -148,7 +148,7 @@ def test_old_pythons_make_no_venv(machine: Machine) -> None:
     machine.add("python3", '[ "$1" != -c ]')
     done = machine.run("scripts/make_venv.sh", "folder")
     assert done.returncode == 1
-    assert "no Python >= 3.10" in done.stderr.splitlines()[-1]
+    assert "no Python >= 3.11" in done.stderr.splitlines()[-1]
 
 
 @pytest.mark.parametrize(

@@ -229,8 +229,10 @@ def _write_points(path: Path, points: TiePoints, transform: Transform) -> None:
     lines = [] if transform.crs is None else [f"#CRS: {transform.crs.to_wkt()}"]
     lines.append("mapX,mapY,sourceX,sourceY,enable,dX,dY,residual")
     # Its rows are negative: so are its residuals along them.
+    # The Georeferencer knows no check points: it would fit to every point that is enabled.
+    fitted = points.used & ~points.is_check
     for xy, source, used, (dx, dy) in zip(
-        points.reference_xy, source_xy, points.used, residual, strict=True
+        points.reference_xy, source_xy, fitted, residual, strict=True
     ):
         numbers = [*xy, *source, int(used), dx, -dy, np.hypot(dx, dy)]
         lines.append(",".join(f"{number:.17g}" for number in numbers))

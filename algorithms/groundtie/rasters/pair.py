@@ -148,7 +148,7 @@ def make_pair(
     overlap = _box(grid, outline, 0.0)
     if overlap is None:
         raise NoOverlapError(f"{ref.path} and {inp.path} do not overlap")
-    radius = search_radius_m or default_radius_m(grid)
+    radius = default_radius_m(grid) if search_radius_m is None else search_radius_m
     reach = _box(grid, outline, radius / grid.pixel_size_m)
     assert reach is not None
     return ImagePair(reference, input, grid.window(*reach), (overlap.width, overlap.height))

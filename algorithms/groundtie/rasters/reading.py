@@ -412,6 +412,5 @@ def _refuse_sensor_geometry(name: str, dataset: Any) -> None:
     located_by = "RPCs" if dataset.rpcs else "ground control points" if dataset.gcps[0] else ""
     if located_by:
         raise GeoreferencingError(
-            f"{name} is located by {located_by} only; orthorectify it first "
-            f"(groundtie orthorectify, or gdalwarp)"
+            f"{name} is located by {located_by} only; orthorectify it first (gdalwarp -rpc or -tps)"
         )
