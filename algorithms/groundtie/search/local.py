@@ -21,7 +21,7 @@ from ..rasters.kernels import REACH
 from ..rasters.pair import ImagePair
 from ..similarity.evidence import Evidence, find_peak, find_peak_near
 from ..similarity.surface import SimilaritySettings
-from .alignment import align, choose_alignment
+from .alignment import Alignment, align, choose_alignment
 from .layout import ChipLayout
 from .matching import ChipMatcher, ChipSurfaces, Surfaces, support
 
@@ -34,6 +34,9 @@ _SUPPORT_SPACINGS = 1.5
 # Chips agree with a first model of degree 1 within this, in pixels; local distortion beyond it is
 # left to the alignment.
 _CONSENSUS_PX = 3.0
+
+# If a tenth of the chips is expected to be shifted by more than this, they are matched again.
+_FAR_PX = 2.5
 
 # A tie point of the fit is the peak within this distance from the aligned model.
 _NEAR_PX = 3
@@ -88,6 +91,31 @@ class LocalSearch:
         TooFewPointsError
             Too few chips could be matched for the model.
         """
+        surfaces, aligned, expected = self._align(coarse, kind, seed, executor, progress)
+        if DEGREE[aligned.model.kind] <= 1 and _lies_far(expected):
+            # Chips near the border of their search windows saw too little: look again, from here.
+            coarse = self._on_map(aligned.model)
+            surfaces, aligned, expected = self._align(coarse, kind, seed, executor, progress)
+        points = self._points(surfaces, coarse, expected)
+        model, fold_models = aligned.model, aligned.fold_models
+        as_claimed = Transform.as_claimed(self.pair.grid.crs, self.pair.input.source.grid)
+        if kind == "tps":
+            model, fold_models = fit_thin_plate(points, as_claimed, self.pair.grid, model, _NEAR_PX)
+        transform = Transform(self._on_map(model), as_claimed.crs, as_claimed.input_grid)
+        agreeing = self._agreeing(points, transform)
+        if 2 * agreeing.used.sum() < PARAMETERS[transform.model.kind]:
+            raise TooFewPointsError(
+                f"only {agreeing.used.sum()} of {len(points)} points agree with a model"
+            )
+        return Estimate(transform, agreeing, fold_models)
+
+    def _align(
+        self, coarse: Model, kind: str, seed: int, executor: Executor, progress: Progress
+    ) -> tuple[ChipSurfaces, Alignment, FloatArray]:
+        """Match the chips of the fit around a model, and align a better one with their surfaces.
+
+        Returns the surfaces, the alignment and the shifts that it expects of the chips, (n, 2).
+        """
         surfaces = self._match(
             self.layout.fit_centres, self.fit_radius_px, coarse, True, executor, progress
         )
@@ -99,27 +127,16 @@ class LocalSearch:
         px = centres.astype(float)
         shifts = np.array([find_peak(surface).shift_px for surface in supported])
         first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
-        start = find_consensus(
-            px, apply_affine(prior, px + shifts), _CONSENSUS_PX, first_kind, seed
-        )
+        claimed = apply_affine(prior, px + shifts)
+        start = find_consensus(px, claimed, _CONSENSUS_PX, first_kind, seed)
         if kind in (AUTO, "tps"):
             aligned = choose_alignment(centres, both, prior, start)
         else:
             aligned = align(kind, centres, both, prior, start)
-        expected = apply_affine(~prior, aligned.model(px)) - px
-        points = self._points(surfaces, coarse, expected)
-        model, fold_models = aligned.model, aligned.fold_models
-        as_claimed = Transform.as_claimed(self.pair.grid.crs, self.pair.input.source.grid)
-        if kind == "tps":
-            model, fold_models = fit_thin_plate(points, as_claimed, self.pair.grid, model, _NEAR_PX)
-        on_map = model.on_map(self.pair.grid.transform * Affine.translation(0.5, 0.5))
-        transform = Transform(on_map, as_claimed.crs, as_claimed.input_grid)
-        agreeing = self._agreeing(points, transform)
-        if 2 * agreeing.used.sum() < PARAMETERS[transform.model.kind]:
-            raise TooFewPointsError(
-                f"only {agreeing.used.sum()} of {len(points)} points agree with a model"
-            )
-        return Estimate(transform, agreeing, fold_models)
+        return surfaces, aligned, apply_affine(~prior, aligned.model(px)) - px
+
+    def _on_map(self, model: Model) -> Model:
+        return model.on_map(self.pair.grid.transform * Affine.translation(0.5, 0.5))
 
     def check_points(
         self, model: Model, executor: Executor, progress: Progress = SILENT
@@ -226,3 +243,7 @@ class LocalSearch:
         wrong = np.zeros(len(points), bool)
         wrong[used] = ~mixture.right
         return points.reject(wrong, "disagrees with the model")
+
+
+def _lies_far(shifts_px: FloatArray) -> bool:
+    return bool(np.quantile(np.hypot(*shifts_px.T), 0.9) > _FAR_PX)
