@@ -302,8 +302,8 @@ def test_the_summary_is_for_programs(tmp_path: Path) -> None:
     assert summary["width"] == result.grid.width
     assert summary["crs"] == "EPSG:32632"
     assert summary["model"] == "affine"
-    # The Georeferencer knows no check points.
-    assert summary["tie_points"]["points"] == 29
+    # Of 30 points, six are check points and one is rejected: none of these is enabled.
+    assert summary["tie_points"]["points"] == 23
     for output in tool_of(warp).outputs:
         assert output.value(summary) is not None
     assert any("EPSG:32632" in line for line in result.lines())
