@@ -29,5 +29,5 @@ if [ $# -gt 0 ]; then
     exit
 fi
 env -i "${environment[@]}" /usr/bin/python3 -m pytest --ignore=tests/qgis
-# A process of its own: the plugin's copy of the package must be the first that is imported.
+# A process of its own: a crash of QGIS must not take the other results with it.
 env -i "${environment[@]}" /usr/bin/python3 -m pytest tests/qgis

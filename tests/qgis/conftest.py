@@ -9,6 +9,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Callable, Iterator
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -72,14 +73,23 @@ def qgis_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 
 @pytest.fixture(scope="session")
 def plugin(qgis_app: Any, toy_plugin_folder: Path) -> Iterator[Any]:
-    """The plugin, started as qgis_process starts it, with the toy tool."""
-    sys.path.insert(0, str(toy_plugin_folder))
-    import groundtie_qgis
+    """The plugin, started as qgis_process starts it, with the toy tool.
 
-    plugin = groundtie_qgis.classFactory(None)
-    plugin.initProcessing()
-    yield plugin
-    plugin.unload()
+    Nothing of the package is installed, so that the plugin takes its own copy, which has the toy.
+    """
+    sys.path.insert(0, str(toy_plugin_folder))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(metadata, "version", _nothing_installed)
+        import groundtie_qgis
+
+        plugin = groundtie_qgis.classFactory(None)
+        plugin.initProcessing()
+        yield plugin
+        plugin.unload()
+
+
+def _nothing_installed(name: str) -> str:
+    raise metadata.PackageNotFoundError(name)
 
 
 @pytest.fixture
