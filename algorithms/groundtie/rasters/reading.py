@@ -28,6 +28,11 @@ warnings.filterwarnings("ignore", category=NotGeoreferencedWarning)
 # Pixels that a reduced read holds at a time.
 _STRIP_PIXELS = 4_000_000
 
+# GDAL keeps what it has read up to a twentieth of the machine's memory, unless it is told less.
+# Chips are read again and again; what is written is not.
+_READING_CACHE_BYTES = 400_000_000
+CACHE_BYTES = 96_000_000
+
 FloatImage = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
@@ -313,6 +318,11 @@ def open_raster(
             tags={ns: dataset.tags(ns=ns or None) for ns in ("", *dataset.tag_namespaces())},
             _handles=handles,
         )
+
+
+def bounded_cache() -> Any:
+    """Return the environment in which GDAL keeps a bounded amount of what it has read."""
+    return rasterio.Env(GDAL_CACHEMAX=_READING_CACHE_BYTES)
 
 
 def working_dtype(dtype: np.dtype[Any]) -> np.dtype[Any]:

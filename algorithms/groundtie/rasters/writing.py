@@ -16,12 +16,9 @@ from rasterio.enums import ColorInterp, Resampling
 from ..errors import ParameterError
 from .atomic import writing
 from .grid import PIXEL_COORDINATES, Grid
-from .reading import RasterSource, fits
+from .reading import CACHE_BYTES, RasterSource, fits
 
 BLOCK = 512
-
-# GDAL keeps blocks in memory up to 5 % of the machine's, unless it is told otherwise.
-_CACHE_BYTES = 96_000_000
 
 # Metadata that belong to the file, or locate the pixels, of the input only.
 _OWN_DOMAINS = ("IMAGE_STRUCTURE", "DERIVED_SUBDATASETS", "SUBDATASETS", "RPC", "GEOLOCATION")
@@ -76,7 +73,7 @@ def create_like(
     # A mask inside the file, not beside it.
     options = {
         "GDAL_TIFF_INTERNAL_MASK": True,
-        "GDAL_CACHEMAX": _CACHE_BYTES,
+        "GDAL_CACHEMAX": CACHE_BYTES,
         "GDAL_NUM_THREADS": workers,
     }
     with writing(path, *_gdal_errors()), rasterio.Env(**options):

@@ -17,7 +17,7 @@ from ..kinds import Band, Choice, Distance, FileOut, Number, RasterIn, VectorOut
 from ..progress import SILENT, Progress
 from ..quality.report import Report
 from ..rasters.pair import Image, default_radius_m, make_pair
-from ..rasters.reading import RasterSource, open_raster
+from ..rasters.reading import RasterSource, bounded_cache, open_raster
 from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
 from ..similarity.binning import BINNINGS
@@ -251,6 +251,7 @@ def coregister(
     kind = model_for_grid(model, output_grid)
     settings = SimilaritySettings(similarity, bins, binning, gpve_order)
     with ExitStack() as stack:
+        stack.enter_context(bounded_cache())
 
         def opened(path: Path) -> RasterSource:
             return stack.enter_context(open_raster(path))
