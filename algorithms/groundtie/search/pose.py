@@ -1,0 +1,111 @@
+"""Rotation, scale and shift between two images: what is searched for, and what a search returns."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+
+from ..rasters.patch import Patch
+from ..similarity.surface import SimilaritySettings
+
+
+@dataclass(frozen=True)
+class Pose:
+    """How an image lies against another: rotated and scaled about its centre, then shifted.
+
+    A point that lies (x, y) pixels right of and below the reference's centre lies at
+    scale · R (x, y) + shift right of and below the input's centre.
+
+    Parameters
+    ----------
+    rotation_deg
+        By how much the input's content is turned against the reference's, counter-clockwise as
+        seen on the screen.
+    scale
+        How many input pixels a reference pixel is long.
+    shift_px
+        (right, down), in input pixels.
+    """
+
+    rotation_deg: float = 0.0
+    scale: float = 1.0
+    shift_px: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def linear(self) -> NDArray[np.float64]:
+        """Matrix of rotation and scale in (right, down), shape (2, 2)."""
+        cosine, sine = np.cos(np.radians(self.rotation_deg)), np.sin(np.radians(self.rotation_deg))
+        return self.scale * np.array([[cosine, sine], [-sine, cosine]])
+
+    def between(self, reference: tuple[int, int], input: tuple[int, int]) -> Affine:
+        """Return the affine transform from reference to input pixels of arrays of these shapes.
+
+        Pixel centres are at integers.
+        """
+        (a, b), (d, e) = self.linear
+        centres = [
+            np.array([(shape[1] - 1) / 2, (shape[0] - 1) / 2]) for shape in (reference, input)
+        ]
+        c, f = centres[1] + self.shift_px - self.linear @ centres[0]
+        return Affine(a, b, float(c), d, e, float(f))
+
+
+@dataclass(frozen=True)
+class PoseLimits:
+    """Within which limits a pose is searched for.
+
+    Parameters
+    ----------
+    radius_px
+        Largest shift along rows and columns, in input pixels.
+    rotation_deg
+        Largest rotation either way; 0: none, 180: any.
+    scale
+        Smallest and largest scale.
+    """
+
+    radius_px: float
+    rotation_deg: float = 0.0
+    scale: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class PoseFound:
+    """A candidate of a search.
+
+    Parameters
+    ----------
+    pose
+        Where the input lies.
+    height
+        How far the evidence stands out, in robust standard deviations of its background.
+    evaluations
+        How often similarity was evaluated until it was found; 0 if the search does not count.
+    """
+
+    pose: Pose
+    height: float
+    evaluations: int = 0
+
+
+class PoseSearch(Protocol):
+    """A way to find the pose of an input window in a reference window.
+
+    Windows may differ in size; their centres are compared. Returns candidates, best first; none
+    if the windows have nothing to compare.
+    """
+
+    def __call__(
+        self,
+        reference: Patch,
+        input: Patch,
+        limits: PoseLimits,
+        settings: SimilaritySettings,
+        executor: Executor | None = None,
+    ) -> list[PoseFound]:
+        """Search within limits."""
