@@ -18,8 +18,9 @@ from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..similarity.evidence import find_peak
 from ..similarity.surface import SimilaritySettings
-from .matching import ChipMatcher, MaskOf, support
+from .matching import ChipMatcher, MaskOf
 from .rough import Candidate
+from .support import support
 
 FloatArray = NDArray[np.float64]
 

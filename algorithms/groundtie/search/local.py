@@ -23,7 +23,8 @@ from ..similarity.evidence import Evidence, find_peak, find_peak_near
 from ..similarity.surface import SimilaritySettings
 from .alignment import Alignment, align, choose_alignment
 from .layout import ChipLayout
-from .matching import ChipMatcher, ChipSurfaces, Surfaces, support
+from .matching import ChipMatcher, ChipSurfaces
+from .support import Surfaces, support
 
 FloatArray = NDArray[np.float64]
 AUTO = "auto"

@@ -1,4 +1,4 @@
-"""Similarity surfaces of many chips, both ways, and the support that neighbours give each other."""
+"""Similarity surfaces of many chips, both ways."""
 
 from __future__ import annotations
 
@@ -6,10 +6,8 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
@@ -19,21 +17,16 @@ from ..similarity.surface import (
     BORDER_PX,
     SimilaritySettings,
     describe,
-    normalise,
     similarity_surface,
 )
+from .support import Surfaces, normalise_each
 
 FloatArray = NDArray[np.float64]
-Surfaces = NDArray[np.float32]
 ToPixel = Callable[[FloatArray], FloatArray]
 MaskOf = Callable[[Grid], NDArray[np.bool_]]
 
 # Chips with less valid area than this in either image are not matched.
 _LEAST_VALID = 0.4
-
-# Neighbours' surfaces are blurred by this before they are added: their shifts differ a little.
-_SUPPORT_BLUR_PX = 1.0
-_SUPPORT_PASSES = 2
 
 
 @dataclass(frozen=True)
@@ -58,7 +51,7 @@ class ChipSurfaces:
     @property
     def both(self) -> Surfaces:
         """The evidence of both directions together, in robust standard deviations."""
-        return _normalise_each(self.forward + self.backward)
+        return normalise_each(self.forward + self.backward)
 
     @property
     def radius(self) -> int:
@@ -186,34 +179,3 @@ class ChipMatcher:
 def _can_be_matched(chip: Patch) -> bool:
     core = chip.inner(BORDER_PX)
     return core.valid_share >= _LEAST_VALID and not core.is_flat
-
-
-def support(surfaces: Surfaces, centres: NDArray[np.int_], reach_px: float) -> Surfaces:
-    """Add to each surface those of its neighbours, so that weak peaks that agree are found.
-
-    Neighbouring places are misregistered by nearly the same shift. Supported surfaces are no
-    longer independent of each other: a verdict must not count them.
-
-    Parameters
-    ----------
-    surfaces
-        Shape (n, 2 r + 1, 2 r + 1), in robust standard deviations.
-    centres
-        The chips' centres, shape (n, 2).
-    reach_px
-        Distance up to which chips are neighbours.
-    """
-    if len(surfaces) == 0:
-        return surfaces
-    pairs = cKDTree(centres).query_pairs(reach_px, output_type="ndarray")
-    for _ in range(_SUPPORT_PASSES):
-        blurred = np.stack([cv2.GaussianBlur(s, (0, 0), _SUPPORT_BLUR_PX) for s in surfaces])
-        total = surfaces.copy()
-        np.add.at(total, pairs[:, 0], blurred[pairs[:, 1]])
-        np.add.at(total, pairs[:, 1], blurred[pairs[:, 0]])
-        surfaces = _normalise_each(total)
-    return surfaces
-
-
-def _normalise_each(surfaces: Surfaces) -> Surfaces:
-    return np.stack([normalise(s) for s in surfaces]) if len(surfaces) else surfaces
