@@ -19,7 +19,7 @@ TURNED = (
     Affine.translation(5.3, 4.8) * Affine.rotation(17) * Affine.scale(1.2),
     Affine(0.8, 0.3, 3.112, -0.2, 1.1, 6.433),
     # Half of the template falls outside.
-    Affine.translation(18.5, 3.25) * Affine.rotation(-30),
+    Affine.translation(18.6, 3.25) * Affine.rotation(-30),
     Affine.translation(-6.4, -4.9),
 )
 
