@@ -1,43 +1,157 @@
-"""Measures of similarity on joint histograms (thesis S 3.3)."""
+"""Measures of similarity on joint histograms (thesis S 3.3, 2.3.1).
+
+Every measure takes joint histograms of counts or weights, shape (…, bins A, bins B), or one
+histogram as a sparse matrix, and returns values of shape (…). Where there is nothing to share,
+without any pixel or with a constant image, it has the value of independent images.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, TypeAlias
 
 import numpy as np
+import scipy.sparse
 from numpy.typing import NDArray
 
-Measure = Callable[[NDArray[np.floating]], NDArray[np.floating]]
+Values = NDArray[np.floating]
+Histograms: TypeAlias = Any  # an array, or a sparse matrix of scipy
+Measure = Callable[[Histograms], Values]
+
+# What entropies below this hold is rounding.
+_NOTHING = 1e-9
 
 
-def _entropy(histograms: NDArray[np.floating], axes: tuple[int, ...]) -> NDArray[np.floating]:
-    """Return Shannon entropies in nats of histograms that need not be normalised."""
-    total = histograms.sum(axis=axes)
-    plogp = (histograms * np.log(np.maximum(histograms, 1e-12))).sum(axis=axes)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.log(total) - plogp / total)
+def mutual_information(histograms: Histograms) -> Values:
+    """Return Shannon's H(A) + H(B) - H(A, B) in nats (thesis S eq 3.19)."""
+    a, b, ab = map(_entropy, _tables(histograms))
+    return np.asarray(a + b - ab)
 
 
-def _entropies(
-    histograms: NDArray[np.floating],
-) -> tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]]:
-    """Return H(A), H(B) and H(A, B) of joint histograms, shape (…, bins A, bins B)."""
-    return (
-        _entropy(histograms.sum(axis=-1), (-1,)),
-        _entropy(histograms.sum(axis=-2), (-1,)),
-        _entropy(histograms, (-2, -1)),
-    )
+def normalized_mutual_information(histograms: Histograms) -> Values:
+    """Return Studholme's (H(A) + H(B)) / H(A, B), between 1 and 2 (thesis S eq 3.21)."""
+    a, b, ab = map(_entropy, _tables(histograms))
+    informative = ab > _NOTHING
+    return np.where(informative, (a + b) / np.where(informative, ab, 1.0), 1.0)
 
 
-def normalized_mutual_information(histograms: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return Studholme's (H(A) + H(B)) / H(A, B), between 1 and 2 (thesis S eq 3.21).
+def renyi_mutual_information(alpha: float) -> Measure:
+    """Return the measure R(A) + R(B) - R(A, B) with Rényi's entropy (thesis S eq 3.15, 3.16).
 
     Parameters
     ----------
-    histograms
-        Joint histograms, shape (…, bins A, bins B); counts or weights. Without any pixel, or
-        where both images are constant, there is nothing shared: the measure is 1.
+    alpha
+        Order of the entropy, any real number; 1 is Shannon's, as the limit. Other than Shannon's,
+        the measure may be negative.
     """
-    a, b, ab = _entropies(histograms)
-    informative = np.isfinite(ab) & (ab > 1e-9)
-    return np.where(informative, (a + b) / np.where(informative, ab, 1.0), 1.0)
+    if alpha == 1:
+        return mutual_information
+
+    def measure(histograms: Histograms) -> Values:
+        a, b, ab = (_log_power_sum(table, alpha) for table in _tables(histograms))
+        return np.asarray((a + b - ab) / (1 - alpha))
+
+    return measure
+
+
+def tsallis_mutual_information(q: float) -> Measure:
+    """Return the measure S(A) + S(B) + (1 - q) S(A) S(B) - S(A, B) (thesis S eq 3.17, 3.18).
+
+    The cross term makes it 0 for independent images, as Tsallis' entropy is not additive. With
+    S = (Σ p^q - 1) / (1 - q) all of it is (Σ p_A^q Σ p_B^q - Σ p_AB^q) / (1 - q).
+
+    Parameters
+    ----------
+    q
+        Index of the entropy, any real number; 1 is Shannon's, as the limit.
+    """
+    if q == 1:
+        return mutual_information
+
+    def measure(histograms: Histograms) -> Values:
+        a, b, ab = (np.exp(_log_power_sum(table, q)) for table in _tables(histograms))
+        return np.asarray((a * b - ab) / (1 - q))
+
+    return measure
+
+
+def cluster_reward(histograms: Histograms) -> Values:
+    """Return the index of the cluster reward algorithm, 0 (independent) to 1 (one to one).
+
+    (Φ / F - F / N²) / (1 - F / N²) with Φ the sum of the squared joint counts, F² the product of
+    the sums of the squared marginal counts and N the number of pixels: Inglada & Giros 2004,
+    doi:10.1109/TGRS.2004.835294.
+    """
+    a, b, ab = (np.square(_shares(table)).sum(axis=-1) for table in _tables(histograms))
+    chance = np.sqrt(a * b)
+    informative = (chance > 0) & (chance < 1 - _NOTHING)
+    chance = np.where(informative, chance, 0.5)
+    return np.where(informative, (ab / chance - chance) / (1 - chance), 0.0)
+
+
+def correlation_ratio(histograms: Histograms) -> Values:
+    """Return which share of B's variance a function of A explains, 0 to 1.
+
+    Roche et al. 1998, doi:10.1007/BFb0056301. The grey value of a bin is its number. For A as a
+    function of B transpose the histogram.
+    """
+    a, b, _ = _tables(histograms)
+    levels = np.arange(b.shape[-1], dtype=float)
+    sums = histograms @ levels
+    total = _at_least(a.sum(axis=-1))
+    mean = (sums.sum(axis=-1) / total)[..., None]
+    explained = ((sums - mean * a) ** 2 / _at_least(a)).sum(axis=-1) / total
+    variance = (b * (levels - mean) ** 2).sum(axis=-1) / total
+    informative = variance > _NOTHING
+    return np.where(informative, explained / np.where(informative, variance, 1.0), 0.0)
+
+
+def _tables(histograms: Histograms) -> tuple[Values, Values, Values]:
+    """Return the histograms of A and of B and all cells of the joint one, along the last axis."""
+    if scipy.sparse.issparse(histograms):
+        a, b = (np.asarray(histograms.sum(axis=axis)).ravel() for axis in (1, 0))
+        return a, b, histograms.tocsr().data
+    joint = np.asarray(histograms)
+    return joint.sum(axis=-1), joint.sum(axis=-2), joint.reshape(*joint.shape[:-2], -1)
+
+
+def _at_least(counts: Values) -> Values:
+    """Return counts to divide by: a bin without pixels has a numerator of 0 as well."""
+    return np.where(counts > 0, counts, 1.0)
+
+
+def _shares(table: Values) -> Values:
+    return table / _at_least(table.sum(axis=-1))[..., None]
+
+
+def _entropy(table: Values) -> Values:
+    """Return Shannon's entropy in nats along the last axis; the table need not be normalised."""
+    total = _at_least(table.sum(axis=-1))
+    plogp = (table * np.log(np.maximum(table, 1e-12))).sum(axis=-1)
+    return np.asarray(np.log(total) - plogp / total)
+
+
+def _log_power_sum(table: Values, power: float) -> Values:
+    """Return ln Σ p^power over the occupied cells; 0 for an empty table, as for a constant."""
+    shares = _shares(table.astype(float))
+    occupied = shares > 0
+    exponents = np.where(occupied, power * np.log(np.where(occupied, shares, 1.0)), -np.inf)
+    # Relative to the largest term, which a high power alone would round to 0.
+    largest = exponents.max(axis=-1, keepdims=True, initial=-np.inf)
+    largest = np.where(np.isfinite(largest), largest, 0.0)
+    total = np.exp(exponents - largest).sum(axis=-1)
+    return np.log(np.where(total > 0, total, 1.0)) + largest[..., 0]
+
+
+# Names for those who choose, with the usual orders of the parametrised ones.
+MEASURES: Mapping[str, Measure] = MappingProxyType(
+    {
+        "mi": mutual_information,
+        "nmi": normalized_mutual_information,
+        "renyi": renyi_mutual_information(2.0),
+        "tsallis": tsallis_mutual_information(2.0),
+        "cluster-reward": cluster_reward,
+        "correlation-ratio": correlation_ratio,
+    }
+)
