@@ -13,9 +13,9 @@ from .version import __version__
 
 if TYPE_CHECKING:
     from .geometry.transform import load_transform
-    from .tools import coregister, simulate, warp
+    from .tools import assess, coregister, simulate, warp
 
-__all__ = ["__version__", "coregister", "load_transform", "simulate", "warp"]
+__all__ = ["__version__", "assess", "coregister", "load_transform", "simulate", "warp"]
 
 # Loaded on first use: importing groundtie must stay cheap for the command line's help and QGIS.
 _HOMES = {"load_transform": ".geometry.transform"}

@@ -25,10 +25,26 @@ from ..similarity.evidence import find_peak
 from ..similarity.surface import Surface
 from ..version import __version__
 from . import figures, pictures
+from .accuracy import Assessment
+from .comparison import Comparison
 from .verdict import TOLERANCE_PX, Verdict
 
 _TEMPLATES = Path(__file__).with_name("templates")
-_PAGE = "report.html.j2"
+
+_COLOURS = {
+    "fit": figures.FIT_COLOUR,
+    "check": figures.CHECK_COLOUR,
+    "rejected": figures.REJECTED_COLOUR,
+}
+
+# What an assessment's parts are called.
+PART_LABELS = {
+    "control_points": "control points",
+    "test_points": "test points",
+    "check_points": "check points",
+    "two_way": "two-way consistency",
+    "three_way": "three-way consistency",
+}
 
 # The model's correction is looked at on a lattice of so many points a side.
 _LATTICE = 9
@@ -87,41 +103,22 @@ class Report:
             A file cannot be written.
         """
         summary = self.summary()
-        page = self._page(summary)
-        with writing(html_path):
-            Path(html_path).write_text(page, encoding="utf-8")
-        with writing(json_path):
-            text = json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False)
-            Path(json_path).write_text(text, encoding="utf-8")
+        _write(html_path, self._page(summary), json_path, summary)
 
     def _page(self, summary: dict[str, Any]) -> str:
-        environment = jinja2.Environment(
-            loader=jinja2.FileSystemLoader(_TEMPLATES),
-            autoescape=True,
-            undefined=jinja2.StrictUndefined,
-            trim_blocks=True,
-            lstrip_blocks=True,
-        )
-        environment.filters.update(number=_number, percent=_percent)
-        environment.tests["finite"] = math.isfinite
-        return environment.get_template(_PAGE).render(
+        return _rendered(
+            "report.html.j2",
             title=self.title,
             verdict=self.verdict,
-            reference=Path(self.pair.reference.source.path).name,
-            input=Path(self.pair.input.source.path).name,
             grid=self.pair.grid,
             notes=self.pair.notes(),
             metres=_metres_per_px(self.pair.grid),
             model=None if self.transform is None else self.transform.model.kind,
             correction=_Correction.of(self.transform, self.pair.grid),
-            pictures=_Pictures.of(self.pair, self.transform),
+            pictures=Comparison.of(self.pair, self.transform),
             residuals=self._residual_figures(),
             tolerance_px=TOLERANCE_PX,
-            colours={
-                "fit": figures.FIT_COLOUR,
-                "check": figures.CHECK_COLOUR,
-                "rejected": figures.REJECTED_COLOUR,
-            },
+            colours=_COLOURS,
             surfaces=[_shown_surface(label, surface) for label, surface in self.surfaces],
             parameters=summary["parameters"],
             versions=summary["versions"],
@@ -155,33 +152,95 @@ class Report:
 
 
 @dataclass(frozen=True)
-class _Pictures:
-    """Overviews of the matching grid as data URIs, and their size."""
+class AssessmentReport:
+    """What is shown of how good a registration is that was made before.
 
-    reference: str
-    backdrop: str
-    claimed: str
-    registered: str | None
-    width: int
-    height: int
+    Parameters
+    ----------
+    title
+        Heading of the page.
+    assessment
+        All that was measured.
+    verdict
+        Whether the registration can be trusted; None if no largest error was asked for.
+    transform
+        What was measured.
+    comparison
+        The images; None if they were not given.
+    parameters
+        What the tool was called with.
+    seconds
+        How long it took.
+    """
 
-    @classmethod
-    def of(cls, pair: ImagePair, transform: Transform | None) -> _Pictures:
-        grid = pictures.overview_grid(pair.grid)
-        reference = pictures.grey_picture(pair.reference_patch(grid))
-        claimed = pictures.grey_picture(pair.input_patch(grid, pair.claimed_px))
-        registered = None
-        if transform is not None:
-            to_input_px = pictures.overview_positions(transform, grid)
-            registered = pictures.grey_picture(pair.input_patch(grid, to_input_px))
-        return cls(
-            pictures.jpeg_uri(reference),
-            pictures.jpeg_uri(pictures.backdrop(reference)),
-            pictures.jpeg_uri(claimed),
-            None if registered is None else pictures.jpeg_uri(registered),
-            grid.width,
-            grid.height,
+    title: str
+    assessment: Assessment
+    verdict: Verdict | None
+    transform: Transform
+    comparison: Comparison | None
+    parameters: dict[str, Any]
+    seconds: float
+
+    def summary(self) -> dict[str, Any]:
+        """Return the report's numbers as values that strict JSON can carry."""
+        values = {
+            "verdict": None if self.verdict is None else self.verdict.summary(),
+            **self.assessment.summary(),
+            "transform": self.transform.to_json(),
+            "parameters": self.parameters,
+            "versions": versions(),
+            "seconds": self.seconds,
+        }
+        return {name: _plain(value) for name, value in values.items()}
+
+    def write(self, html_path: str | os.PathLike[str], json_path: str | os.PathLike[str]) -> None:
+        """Write the page and its numbers.
+
+        Raises
+        ------
+        OutputError
+            A file cannot be written.
+        """
+        summary = self.summary()
+        parts = {name: errors for name, errors in self.assessment.parts().items() if len(errors)}
+        page = _rendered(
+            "assessment.html.j2",
+            title=self.title,
+            verdict=self.verdict,
+            parts=parts,
+            labels=PART_LABELS,
+            metres=any(errors.error_m is not None for errors in parts.values()),
+            model=self.transform.model.kind,
+            pictures=self.comparison,
+            map=self._error_map(),
+            colours=_COLOURS,
+            tolerance_px=TOLERANCE_PX,
+            parameters=summary["parameters"],
+            versions=summary["versions"],
+            seconds=self.seconds,
         )
+        _write(html_path, page, json_path, summary)
+
+    def _error_map(self) -> dict[str, Any] | None:
+        """Return the figure of the errors at all points, over the input."""
+        held_out = (self.assessment.test_points, self.assessment.check_points)
+        every = [(self.assessment.control_points, False), *((errors, True) for errors in held_out)]
+        # A wrong match is shown: as a check point that disagrees.
+        residuals = figures.Residuals(
+            np.concatenate([errors.input_px for errors, _ in every]),
+            np.concatenate([errors.error_px for errors, _ in every]),
+            np.concatenate([np.full(len(errors), check) for errors, check in every]),
+            np.concatenate([errors.placed for errors, _ in every]),
+        )
+        if not residuals.used.any():
+            return None
+        grid = self.transform.input_grid
+        return {
+            "uri": figures.svg_uri(figures.residual_map(residuals, grid)),
+            "exaggeration": figures.residual_arrows(residuals, grid).exaggeration,
+            "width": grid.width,
+            "height": grid.height,
+        }
 
 
 @dataclass(frozen=True)
@@ -217,6 +276,32 @@ def versions() -> dict[str, str]:
         "rasterio": rasterio.__version__,
         "gdal": rasterio.__gdal_version__,
     }
+
+
+def _rendered(template: str, **values: Any) -> str:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(number=_number, percent=_percent)
+    environment.tests["finite"] = math.isfinite
+    return environment.get_template(template).render(**values)
+
+
+def _write(
+    html_path: str | os.PathLike[str],
+    page: str,
+    json_path: str | os.PathLike[str],
+    summary: dict[str, Any],
+) -> None:
+    with writing(html_path):
+        Path(html_path).write_text(page, encoding="utf-8")
+    with writing(json_path):
+        text = json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False)
+        Path(json_path).write_text(text, encoding="utf-8")
 
 
 def _shown_surface(label: str, surface: Surface) -> dict[str, Any]:
