@@ -103,7 +103,7 @@ def test_a_level_corrects_a_model_that_is_off(
     files = write_textured_pair(tmp_path, (260, 240), turned((70, -45), degrees, growth))
     with files.opened() as pair:
         start = shift_on_map(40.0, -20.0)
-        found = refine_on_level(pair, pair.grid, start, SETTINGS, nothing_held_out, executor)
+        found = refine_on_level(pair, pair.grid, start, 12, SETTINGS, nothing_held_out, executor)
     assert found.log10_false_alarms < -6
     assert error_m(found.model, files) < 10  # a pixel
 
@@ -115,20 +115,20 @@ def test_a_correction_comes_before_the_model_that_is_known(
     files = write_textured_pair(tmp_path, (260, 240), turned((70, -45), 4.0))
     with files.opened() as pair:
         start = turned((20, 10), 3.0)
-        found = refine_on_level(pair, pair.grid, start, SETTINGS, nothing_held_out, executor)
+        found = refine_on_level(pair, pair.grid, start, 12, SETTINGS, nothing_held_out, executor)
     assert error_m(found.model, files) < 10
 
 
 def test_two_places_have_nothing_in_common(other_place: TexturedPair, executor: Executor) -> None:
     with other_place.opened() as pair:
         start = shift_on_map(0, 0)
-        found = refine_on_level(pair, pair.grid, start, SETTINGS, nothing_held_out, executor)
+        found = refine_on_level(pair, pair.grid, start, 12, SETTINGS, nothing_held_out, executor)
         assert found.log10_false_alarms > -2
 
 
 def test_too_few_chips_tell_nothing(pair: ImagePair, executor: Executor) -> None:
     start = shift_on_map(5000.0, 0.0)
-    found = refine_on_level(pair, pair.grid, start, SETTINGS, nothing_held_out, executor)
+    found = refine_on_level(pair, pair.grid, start, 12, SETTINGS, nothing_held_out, executor)
     assert found.log10_false_alarms == np.inf
     assert found.model is start
 

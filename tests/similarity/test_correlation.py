@@ -60,7 +60,7 @@ def test_fields_against_their_definition(masked: bool) -> None:
         both = template_valid & windows_of(search_valid)[dy, dx]
         t, s = template[both].astype(complex), windows_of(search)[dy, dx][both].astype(complex)
         expected[dy, dx] = np.vdot(t, s).real / (np.linalg.norm(t) * np.linalg.norm(s))
-    found = correlate_fields(template, search, template_valid, search_valid)
+    found = correlate_fields(template[None], search[None], template_valid, search_valid)[0]
     np.testing.assert_allclose(found, expected, atol=1e-5)
     assert np.abs(found).max() <= 1
 
@@ -68,7 +68,7 @@ def test_fields_against_their_definition(masked: bool) -> None:
 def test_a_field_agrees_with_itself_alone() -> None:
     template, search, template_valid, search_valid = fields(False)
     search[RADIUS + 2 : RADIUS + 2 + SHAPE[0], RADIUS - 1 : RADIUS - 1 + SHAPE[1]] = template
-    found = correlate_fields(template, search, template_valid, search_valid)
+    found = correlate_fields(template[None], search[None], template_valid, search_valid)[0]
     assert np.unravel_index(found.argmax(), found.shape) == (RADIUS + 2, RADIUS - 1)
     assert found.max() == pytest.approx(1, abs=1e-5)
 

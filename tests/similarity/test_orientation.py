@@ -10,8 +10,8 @@ from groundtie.rasters.patch import Patch
 from groundtie.similarity.orientation import (
     SCALES_PX,
     compress,
-    orientation_field,
     orientation_fields,
+    squared_gradients,
 )
 
 SHAPE = (90, 100)
@@ -24,7 +24,7 @@ def everywhere(values: np.ndarray) -> Patch:
 
 def field_of(values: np.ndarray, scale: float = 1.5) -> np.ndarray:
     patch = everywhere(values)
-    return orientation_field(patch.values, patch.valid, scale)
+    return squared_gradients(patch.values, patch.valid, (scale,))[0]
 
 
 @pytest.mark.parametrize("scale", SCALES_PX)
@@ -93,7 +93,7 @@ def test_masked_pixels_leave_no_edges(scale: float) -> None:
     valid = np.ones(SHAPE, bool)
     valid[40:60, 30:50] = False
     dug = np.where(valid, image, -50).astype(np.float32)
-    masked = orientation_field(dug, valid, scale)
+    masked = squared_gradients(dug, valid, (scale,))[0]
     reach = int(np.ceil(3 * scale))
     around = cv2.dilate((~valid).astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0
     assert not masked[around].any()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from textured_pairs import TexturedPair, error_px, listing
 
-from groundtie.errors import NotRegisteredError, OutputError
+from groundtie.errors import NotRegisteredError, OutputError, SameFileError
 from groundtie.geometry.transform import load_transform
 from groundtie.progress import SILENT
 from groundtie.quality.report import Report
@@ -147,15 +147,10 @@ def test_what_fails_later_leaves_no_report_either(
     assert listing(tmp_path) == {}
 
 
-def test_the_report_and_the_transform_cannot_share_a_name(
-    registration: Registration, tmp_path: Path
-) -> None:
-    """A report's numbers are put beside it as JSON."""
-    files = RegistrationFiles(None, tmp_path / "r.json", tmp_path / "r.html")
-    with pytest.raises(OutputError, match="named twice"), Outputs() as outputs:
-        files.write_report(report_of(registration), outputs)
-        files.write_points(*registration.accepted(), outputs)
-    assert listing(tmp_path) == {}
+def test_the_report_and_the_transform_cannot_share_a_name() -> None:
+    """A report's numbers are put beside it as JSON; nothing is computed before this is found."""
+    with pytest.raises(SameFileError, match=r"report's numbers: .*r\.json"):
+        RegistrationFiles(None, Path("r.json"), Path("r.html"))
 
 
 def test_a_result_is_lines_for_people_and_json_for_programs(registration: Registration) -> None:

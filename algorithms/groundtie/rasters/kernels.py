@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 Weights = Callable[[NDArray[Any]], list[NDArray[Any]]]
 
-# Rows that are worked at a time: what they need stays in the processor's cache.
-_ROWS = 64
+# Pixels that are worked at a time: what they need stays in the processor's cache.
+_BLOCK_PIXELS = 1 << 14
 
 
 def _bilinear(s: NDArray[Any]) -> list[NDArray[Any]]:
@@ -84,8 +84,9 @@ def interpolate(image: NDArray[Any], px: NDArray[np.float64], method: str) -> ND
     padded = np.pad(image, ((reach, reach + 1), (reach, reach + 1)))
     width, flat = padded.shape[1], padded.ravel()
     out = np.empty(px.shape[1:], image.dtype)
-    for first in range(0, len(out), _ROWS):
-        rows = slice(first, first + _ROWS)
+    lines = max(_BLOCK_PIXELS // max(out.shape[1], 1), 1)
+    for first in range(0, len(out), lines):
+        rows = slice(first, first + lines)
         x = np.clip(px[0, rows], -1, image.shape[1])
         y = np.clip(px[1, rows], -1, image.shape[0])
         left, top = np.floor(x), np.floor(y)

@@ -125,6 +125,8 @@ def resample(
     """
     px = np.asarray(px)
     dtype = image.dtype if dtype is None else dtype
+    if np.array_equal(px, np.rint(px)):
+        method = "nearest"  # on pixels, every kernel gives the pixel
     if method != "nearest" and valid.all() and _touches_no_border(px, image.shape, method):
         values = interpolate(image.astype(working_dtype(image.dtype), copy=False), px, method)
         return _rounded(values, dtype), np.ones(values.shape, bool)
@@ -133,7 +135,7 @@ def resample(
     cols[~inside], rows[~inside] = 0, 0
     known = inside & valid[rows, cols]
     if method == "nearest":
-        return np.where(known, image[rows, cols], image.dtype.type(0)).astype(dtype), known
+        return _rounded(np.where(known, image[rows, cols], image.dtype.type(0)), dtype), known
     whole = cv2.erode(
         valid.astype(np.uint8),
         np.ones((2 * REACH[method] + 1,) * 2, np.uint8),
@@ -267,7 +269,7 @@ def _touches_no_border(px: FloatArray, shape: tuple[int, ...], method: str) -> b
 
 
 def _rounded(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
-    if dtype.kind in "fc":
+    if dtype.kind in "fc" or values.dtype == dtype:
         return values.astype(dtype, copy=False)
     limits = np.iinfo(dtype)
     return np.clip(np.rint(values), limits.min, limits.max).astype(dtype)

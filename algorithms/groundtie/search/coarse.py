@@ -24,10 +24,9 @@ from .support import support
 
 FloatArray = NDArray[np.float64]
 
-# Chips, search radius and agreement at every level of the pyramid, in pixels of the level.
-_RADIUS_PX = 12
+# Chips and agreement at every level of the pyramid, in pixels of the level.
 _TOLERANCE_PX = 2.0
-_CHIPS_PER_SIDE = 7
+_CHIPS_PER_SIDE = 5
 _CHIP_RANGE_PX = (48, 80)
 
 # Simple models are preferred unless the data speak for others: each has its number of
@@ -58,6 +57,7 @@ def refine_on_level(
     pair: ImagePair,
     level: Grid,
     model: Model,
+    radius_px: int,
     settings: SimilaritySettings,
     held_out: MaskOf,
     executor: Executor,
@@ -72,7 +72,9 @@ def refine_on_level(
     level
         The matching grid at reduced resolution.
     model
-        The misregistration on the map as known so far; it may be wrong by 12 pixels of the level.
+        The misregistration on the map as known so far.
+    radius_px
+        How far it may be wrong, in pixels of the level.
     settings
         How similarity is measured.
     held_out
@@ -85,7 +87,7 @@ def refine_on_level(
     chip = int(np.clip(min(level.width, level.height) / 5, *_CHIP_RANGE_PX))
     matcher = ChipMatcher(pair, level, lambda xy: pair.claimed_px(model(xy)), settings, held_out)
     centres = _regular_centres(level, chip)
-    centres, surfaces = matcher.match_forward(centres, chip, _RADIUS_PX, executor, progress)
+    centres, surfaces = matcher.match_forward(centres, chip, radius_px, executor, progress)
     if len(centres) < 4:
         return CoarseModel(model, np.inf)
     step = (np.array([level.width, level.height]) - chip) / (_CHIPS_PER_SIDE - 1)
@@ -93,7 +95,7 @@ def refine_on_level(
     own = _peaks(surfaces)
     px = centres.astype(float)
     best = CoarseModel(model, np.inf)
-    probability = agreement_probability(_TOLERANCE_PX, _RADIUS_PX)
+    probability = agreement_probability(_TOLERANCE_PX, radius_px)
     found = px + _peaks(supported)
     for kind, sample in _SAMPLE_OF.items():
         fitted = find_consensus(px, found, _TOLERANCE_PX, kind)

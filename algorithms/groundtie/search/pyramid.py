@@ -29,7 +29,12 @@ _SAME_PLACE_PX = 5.0
 # more than large chips did, and the verdict judges what comes of them.
 _HOPELESS = 0.0
 
-# Each level is finer by this; the last before the tie points is not coarser than this either.
+# How far chips are searched around a candidate, in pixels of the level; around a finer level's
+# model, as far as a level's model may be wrong, and the distortion that it does not know of.
+_RADIUS_PX = 12
+_LEVEL_ERROR_PX, _DISTORTION_PX = 2.0, 4
+
+# Each level is finer than the one before by this at most; the last is the matching grid itself.
 _STEP = 4.0
 
 
@@ -66,21 +71,31 @@ def find_coarse_model(
         pair, level, radius_px, search.settings, search.held_out, executor
     )
     progress.update(0.3)
+
+    def refine(level: Grid, model: Model, radius_px: int) -> CoarseModel:
+        progress.check()
+        return refine_on_level(
+            pair, level, model, radius_px, search.settings, search.held_out, executor
+        )
+
     tried: list[CoarseModel] = []
     for candidate in candidates:
         certain = tried and min(_alarms(model) for model in tried) < _CERTAIN
         if certain and candidate.height < _RIVAL_HEIGHT * candidates[0].height:
             break
-        tried.append(_refine(pair, level, shift_model(candidate), search, executor, progress))
+        tried.append(refine(level, shift_model(candidate), _RADIUS_PX))
     if not tried or min(map(_alarms, tried)) > _HOPELESS:
         raise NothingFoundError("nothing in common was found")
     best = min(tried, key=_alarms)
     _require_no_rival(best, tried, level)
-    while factor > _STEP:
-        factor /= _STEP
-        finer = _refine(pair, pair.grid.scaled(factor), best.model, search, executor, progress)
+    while factor > 1:
+        finer_factor = max(factor / _STEP, 1.0)
+        finer_level = pair.grid if finer_factor == 1 else pair.grid.scaled(finer_factor)
+        radius = int(np.ceil(_LEVEL_ERROR_PX * factor / finer_factor)) + _DISTORTION_PX
+        finer = refine(finer_level, best.model, radius)
         if finer.log10_false_alarms < 0:
             best = finer
+        factor = finer_factor
     return best.model
 
 
@@ -97,15 +112,3 @@ def _require_no_rival(best: CoarseModel, tried: list[CoarseModel], level: Grid) 
         if distance_px > _SAME_PLACE_PX and evident:
             distance = distance_px * level.pixel_size_m
             raise NothingFoundError(f"two places match about as well, {distance:.0f} m apart")
-
-
-def _refine(
-    pair: ImagePair,
-    level: Grid,
-    model: Model,
-    search: LocalSearch,
-    executor: Executor,
-    progress: Progress,
-) -> CoarseModel:
-    progress.check()
-    return refine_on_level(pair, level, model, search.settings, search.held_out, executor)

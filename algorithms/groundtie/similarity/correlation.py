@@ -21,19 +21,19 @@ def correlate(template: NDArray[Any], search: NDArray[Any]) -> NDArray[np.float3
     Parameters
     ----------
     template, search
-        Real or complex arrays, shapes (h, w) and (h + ny - 1, w + nx - 1).
+        Real or complex arrays, shapes (…, h, w) and (…, h + ny - 1, w + nx - 1).
 
     Returns
     -------
-    Array of shape (ny, nx), float32.
+    Array of shape (…, ny, nx), float32.
     """
-    shape = [scipy.fft.next_fast_len(n) for n in search.shape]
-    ny, nx = (s - t + 1 for s, t in zip(search.shape, template.shape, strict=True))
+    shape = [scipy.fft.next_fast_len(n) for n in search.shape[-2:]]
+    ny, nx = (s - t + 1 for s, t in zip(search.shape[-2:], template.shape[-2:], strict=True))
     if np.iscomplexobj(template):
         spectrum = scipy.fft.fft2(template, shape).conj() * scipy.fft.fft2(search, shape)
-        return scipy.fft.ifft2(spectrum)[:ny, :nx].real.astype(np.float32)
+        return scipy.fft.ifft2(spectrum)[..., :ny, :nx].real.astype(np.float32)
     spectrum = scipy.fft.rfft2(template, shape).conj() * scipy.fft.rfft2(search, shape)
-    return scipy.fft.irfft2(spectrum, shape)[:ny, :nx].astype(np.float32)
+    return scipy.fft.irfft2(spectrum, shape)[..., :ny, :nx].astype(np.float32)
 
 
 def box_sums(image: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
@@ -58,25 +58,34 @@ def correlate_fields(
     template_valid: NDArray[np.bool_],
     search_valid: NDArray[np.bool_],
 ) -> NDArray[np.float32]:
-    """Return the correlation coefficient of two complex fields over shifts, -1 to 1.
+    """Return the correlation coefficients of complex fields over shifts, -1 to 1.
 
-    The fields are zero where they are not valid; each shift is normalised by the energy of what
-    overlaps.
+    Parameters
+    ----------
+    template, search
+        Fields that are zero where they are not valid, shapes (n, h, w) and
+        (n, h + ny - 1, w + nx - 1). Each shift is normalised by the energy of what overlaps.
+    template_valid, search_valid
+        What is valid, shapes (h, w) and (h + ny - 1, w + nx - 1).
+
+    Returns
+    -------
+    Array of shape (n, ny, nx), float32.
     """
-    template_energy = (template.real**2 + template.imag**2).astype(np.float32)
-    search_energy = (search.real**2 + search.imag**2).astype(np.float32)
+    template_energy = template.real**2 + template.imag**2
+    search_energy = search.real**2 + search.imag**2
     if template_valid.all():
-        energy = box_sums(search_energy, *template.shape)
+        energy = np.stack([box_sums(e, *template_valid.shape) for e in search_energy])
     else:
         energy = correlate(template_valid.astype(np.float32), search_energy)
     if search_valid.all():
-        energy = energy * template_energy.sum()
+        energy = energy * template_energy.sum(axis=(1, 2), keepdims=True)
     else:
         energy = energy * correlate(template_energy, search_valid.astype(np.float32))
-    floor = 1e-6 * max(float(energy.max(initial=0)), 1e-12)
-    return np.where(
-        energy > floor, correlate(template, search) / np.sqrt(np.maximum(energy, floor)), 0
-    ).astype(np.float32)
+    highest = energy.max(axis=(1, 2), keepdims=True, initial=0)
+    floor = np.float32(1e-6) * np.maximum(highest, np.float32(1e-12))
+    found = correlate(template, search) / np.sqrt(np.maximum(energy, floor))
+    return np.where(energy > floor, found, 0).astype(np.float32)
 
 
 def correlate_grey(template: Patch, search: Patch) -> NDArray[np.float32]:

@@ -12,6 +12,7 @@ from the volume without touching a pixel again.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -20,7 +21,6 @@ import cv2
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 
 from .binning import MASKED
 
@@ -51,9 +51,12 @@ def kernel(order: int, offset: float) -> NDArray[np.float64]:
     `offset` is within ±0.5. Order n is degree n - 1: 2 is linear (PVI), 4 is cubic.
     """
     far = support(order)
-    knots = np.arange(order + 1) - order / 2
-    spline = BSpline.basis_element(knots, extrapolate=False)
-    return np.nan_to_num(spline(np.arange(-far, far + 1) - offset))
+    x = np.arange(-far, far + 1)[:, None] - offset
+    # Schoenberg's sum of truncated powers: one-sided differences of x^(n - 1) / (n - 1)!
+    knots = np.arange(order + 1)
+    signed = [(-1) ** k * math.comb(order, k) for k in range(order + 1)]
+    powers = np.maximum(order / 2 - np.abs(x) - knots, 0.0) ** (order - 1)
+    return np.asarray(powers @ signed / math.factorial(order - 1))
 
 
 @dataclass(frozen=True)

@@ -96,14 +96,14 @@ class Features:
     margin
         Pixels that `bins` has on each side beyond the patch, for the histogram's kernel.
     fields
-        Orientation fields at all scales, of the patch's size; empty if not needed.
+        Orientation fields at all scales, shape (scales, h, w); None if not needed.
     """
 
     patch: Patch
     bins: NDArray[np.uint8] | None
     bin_count: int
     margin: int
-    fields: tuple[NDArray[np.complex64], ...]
+    fields: NDArray[np.complex64] | None
 
     def inner(self, border: int) -> Features:
         """Return the features of the window without a border on each side."""
@@ -113,7 +113,7 @@ class Features:
             None if self.bins is None else self.bins[inside, inside],
             self.bin_count,
             self.margin,
-            tuple(field[inside, inside] for field in self.fields),
+            None if self.fields is None else self.fields[:, inside, inside],
         )
 
     @property
@@ -140,12 +140,12 @@ def describe(window: Patch, chip_pixels: int, settings: SimilaritySettings) -> F
     bin_count = settings.bins_for(chip_pixels)
     margin = reach(settings.gpve_order)
     bins: NDArray[np.uint8] | None = None
-    fields: tuple[NDArray[np.complex64], ...] = ()
+    fields: NDArray[np.complex64] | None = None
     if settings.similarity in ("fused", "nmi"):
         around = window.inner(BORDER_PX - margin)
         bins = to_bins(around.values, around.valid, bin_count, settings.binning)
     if settings.similarity in ("fused", "orientation"):
-        fields = tuple(field[inner, inner] for field in orientation_fields(window))
+        fields = orientation_fields(window)[:, inner, inner]
     return Features(window.inner(BORDER_PX), bins, bin_count, margin, fields)
 
 
@@ -165,9 +165,10 @@ def nmi_surface(
 
 def orientation_surface(template: Features, search: Features) -> Surface:
     """Return the sum of the normalised orientation correlations of all scales over shifts."""
+    assert template.fields is not None and search.fields is not None
     valid = template.patch.valid, search.patch.valid
-    pairs = zip(template.fields, search.fields, strict=True)
-    return normalise(np.sum([detrend(correlate_fields(t, s, *valid)) for t, s in pairs], axis=0))
+    surfaces = correlate_fields(template.fields, search.fields, *valid)
+    return normalise(np.sum([detrend(surface) for surface in surfaces], axis=0))
 
 
 def similarity_surface(

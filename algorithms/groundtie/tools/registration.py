@@ -15,9 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import NothingFoundError, NotRegisteredError, TooFewPointsError
+from ..errors import NothingFoundError, NotRegisteredError, SameFileError, TooFewPointsError
 from ..geometry.estimation import Estimate
-from ..geometry.tie_point_files import write_tie_points
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..progress import Progress
@@ -137,11 +136,28 @@ def register(
 
 @dataclass(frozen=True)
 class RegistrationFiles:
-    """The files beside the registered raster; None: not asked for."""
+    """The files beside the registered raster; None: not asked for.
+
+    Raises
+    ------
+    SameFileError
+        The transform would be written where the report's numbers go.
+    """
 
     tie_points: Path | None
     transform: Path | None
     report: Path | None
+
+    def __post_init__(self) -> None:
+        if self.numbers is not None and self.numbers == self.transform:
+            raise SameFileError(
+                f"the transform would be written over the report's numbers: {self.numbers}"
+            )
+
+    @property
+    def numbers(self) -> Path | None:
+        """Where the report's numbers go: beside it, as JSON."""
+        return None if self.report is None else self.report.with_suffix(".json")
 
     def written(self) -> dict[str, Path]:
         """Return what is written, by name."""
@@ -150,13 +166,14 @@ class RegistrationFiles:
 
     def write_report(self, report: Report, outputs: Outputs) -> None:
         """Write the report and its JSON, if they were asked for."""
-        if self.report is not None:
-            numbers = outputs.stage(self.report.with_suffix(".json"))
-            report.write(outputs.stage(self.report), numbers)
+        if self.report is not None and self.numbers is not None:
+            report.write(outputs.stage(self.report), outputs.stage(self.numbers))
 
     def write_points(self, points: TiePoints, transform: Transform, outputs: Outputs) -> None:
         """Write tie points and transform, if they were asked for."""
         if self.tie_points is not None:
+            from ..geometry.tie_point_files import write_tie_points
+
             write_tie_points(outputs.stage(self.tie_points), points, transform)
         if self.transform is not None:
             staged = outputs.stage(self.transform)
