@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ from typing import Any
 import numpy as np
 from affine import Affine
 from numpy.typing import ArrayLike, NDArray
+from rasterio._err import CPLE_BaseError
 
 from ..errors import GeoreferencingError, TooFewPointsError, TransformFileError
 from ..geometry.robust import fit_mixture
@@ -311,7 +314,7 @@ def read_points(path: Path, transform: Transform) -> StoredTiePoints:
     TooFewPointsError
         It holds no points but rejected ones.
     GeoreferencingError
-        Only one of the file and the transform has a CRS.
+        Only one of the file and the transform has a CRS, or a position lies outside of it.
     """
     simple = _read_simple_table(path, transform) if path.suffix.lower() == ".csv" else None
     points = simple or read_tie_points(path, transform.input_grid)
@@ -321,8 +324,20 @@ def read_points(path: Path, transform: Transform) -> StoredTiePoints:
         raise TransformFileError(f"{path} holds positions that are not finite")
     if (points.crs is None) != (transform.crs is None):
         raise GeoreferencingError(f"only one of {path} and the transform has a CRS")
-    xy = reproject(points.reference_xy, points.crs, transform.crs)
+    with _projecting(path):
+        xy = reproject(points.reference_xy, points.crs, transform.crs)
     return replace(points, reference_xy=xy, crs=transform.crs)
+
+
+@contextmanager
+def _projecting(path: Path) -> Iterator[None]:
+    """Say which file holds positions that no projection can take, such as latitudes above 90°."""
+    try:
+        yield
+    except CPLE_BaseError as error:
+        raise GeoreferencingError(
+            f"{path} holds positions outside of a map's projection: {error}"
+        ) from error
 
 
 def measure_tie_points(
@@ -333,12 +348,10 @@ def measure_tie_points(
     Control points have the role "fit", test points the role "check". Raises as `read_points`.
     """
     points = read_points(path, transform)
-
-    def errors(which: NDArray[np.bool_]) -> PointErrors:
-        return PointErrors.of(transform, points.reference_xy[which], points.input_px[which])
-
-    test = errors(points.used & points.is_check)
-    return errors(points.used & ~points.is_check), test.of_right_matches(max_error_px)
+    with _projecting(path):
+        test = _errors(transform, points, points.used & points.is_check)
+        control = _errors(transform, points, points.used & ~points.is_check)
+    return control, test.of_right_matches(max_error_px)
 
 
 def measure_check_points(path: Path, transform: Transform) -> PointErrors:
@@ -348,7 +361,13 @@ def measure_check_points(path: Path, transform: Transform) -> PointErrors:
     """
     points = read_points(path, transform)
     which = points.used & points.is_check
-    which = which if which.any() else points.used
+    with _projecting(path):
+        return _errors(transform, points, which if which.any() else points.used)
+
+
+def _errors(transform: Transform, points: StoredTiePoints, which: NDArray[np.bool_]) -> PointErrors:
+    if not which.any():
+        return PointErrors.none()
     return PointErrors.of(transform, points.reference_xy[which], points.input_px[which])
 
 
