@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 import pytest
 from affine import Affine
 
+from groundtie.errors import ParameterError
+from groundtie.rasters.patch import Patch
 from groundtie.similarity import histogramming
-from groundtie.similarity.binning import MASKED
-from groundtie.similarity.histogramming import joint_histogram_under
+from groundtie.similarity.binning import BINNINGS, MASKED, bin_edges, to_bins
+from groundtie.similarity.histogramming import (
+    MASKED_LEVEL,
+    joint_histogram_under,
+    sparse_joint_histogram_under,
+    to_levels,
+    two_step_histogram,
+)
 from groundtie.similarity.joint_histogram import ORDERS, count_joint_histograms
+from groundtie.similarity.measures import MEASURES, normalized_mutual_information
 
 BINS = (5, 6)
 SHAPE, SIZE = (9, 11), (24, 27)
@@ -147,3 +157,194 @@ def test_large_templates_are_repeatable() -> None:
     np.testing.assert_array_equal(runs[0], runs[1])
     assert (runs[0] != runs[2]).any()
     assert runs[0].sum() == int(runs[0].sum())
+
+
+def wide(bins: np.ndarray) -> np.ndarray:
+    return np.where(bins == MASKED, MASKED_LEVEL, bins).astype(np.uint16)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4, 7])
+def test_sparse_histograms_and_levels_of_16_bits(order: int) -> None:
+    template, image = windows(masked=True)
+    for to_image in TURNED:
+        expected = joint_histogram_under(template, image, to_image, BINS, order)
+        levels = wide(template), wide(image)
+        dense = joint_histogram_under(*levels, to_image, BINS, order)
+        np.testing.assert_array_equal(dense, expected)
+        sparse = sparse_joint_histogram_under(*levels, to_image, BINS, order)
+        np.testing.assert_allclose(sparse.toarray(), expected, atol=1e-12)
+
+
+def grey_pair(size: int = 40) -> tuple[Patch, Patch]:
+    """Two related images of 11 bits with a few masked pixels."""
+    rng = np.random.default_rng(9)
+    first = rng.integers(0, 2048, (size, size)).astype(np.float32)
+    second = np.rint(first / 2 + 300 * rng.random((size, size))).astype(np.float32)
+    valid = rng.random((2, size, size)) > 0.05
+    return Patch(first, valid[0]), Patch(second, valid[1])
+
+
+def test_all_grey_values_are_levels() -> None:
+    first, _ = grey_pair()
+    levels, count = to_levels(first)
+    occurring = np.unique(first.values[first.valid])
+    assert count == len(occurring)
+    np.testing.assert_array_equal(occurring[levels[first.valid]], first.values[first.valid])
+    assert (levels[~first.valid] == MASKED_LEVEL).all()
+    nothing, count = to_levels(Patch(first.values, np.zeros_like(first.valid)))
+    assert count == 1 and (nothing == MASKED_LEVEL).all()
+
+
+@pytest.mark.parametrize("binning", BINNINGS)
+@pytest.mark.parametrize("bins", [8, 32, 254, 256, 1000])
+def test_levels_are_the_bins_of_any_number(bins: int, binning: str) -> None:
+    first, _ = grey_pair(100)
+    levels, count = to_levels(first, bins, binning)
+    assert count == bins
+    counted = np.bincount(levels[first.valid], minlength=bins)
+    if bins <= 254:
+        narrow = to_bins(first.values, first.valid, bins, binning)
+        np.testing.assert_array_equal(levels, wide(narrow))
+    # Evenly distributed grey values: both binnings give bins of about the same contents.
+    expected = first.valid.sum() / bins
+    assert np.abs(counted - expected).max() < 5 * np.sqrt(expected) + 2
+
+
+def test_measures_of_all_grey_values_are_those_of_a_full_table() -> None:
+    first, second = grey_pair()
+    a, count_a = to_levels(first)
+    b, count_b = to_levels(second)
+    sparse = sparse_joint_histogram_under(a, b, Affine.identity(), (count_a, count_b), 1)
+    both = first.valid & second.valid
+    table = np.zeros((count_a, count_b))
+    np.add.at(table, (a[both], b[both]), 1)
+    for measure in MEASURES.values():
+        assert float(measure(sparse)) == pytest.approx(float(measure(table)), abs=1e-9)
+
+
+def test_too_many_grey_values() -> None:
+    values = np.arange(300 * 300, dtype=np.float32).reshape(300, 300)
+    with pytest.raises(ParameterError, match="more than 65535 grey values"):
+        to_levels(Patch(values, np.ones(values.shape, bool)))
+
+
+def interpolated(image: Patch, x: float, y: float, edges: np.ndarray) -> int | None:
+    """The bin of the bilinear value at a place among valid pixels; None elsewhere."""
+    left, top = math.floor(x), math.floor(y)
+    if not (0 <= left < image.values.shape[1] - 1 and 0 <= top < image.values.shape[0] - 1):
+        return None
+    around = slice(top, top + 2), slice(left, left + 2)
+    if not image.valid[around].all():
+        return None
+    weights = np.outer([1 - (y - top), y - top], [1 - (x - left), x - left])
+    return int(np.sum(edges <= float(np.sum(weights * image.values[around]))))
+
+
+def test_two_steps_bilinear() -> None:
+    template, _ = windows(masked=True)
+    image, _ = grey_pair()
+    image = Patch(image.values, np.ones_like(image.valid))
+    edges = bin_edges(image.values, image.valid, 6, "linear")
+    to_image = Affine.translation(9.3, 7.8) * Affine.rotation(17)
+    expected = np.zeros(BINS)
+    for (row, col), own in np.ndenumerate(template):
+        x = to_image.a * col + to_image.b * row + to_image.c
+        y = to_image.d * col + to_image.e * row + to_image.f
+        found = interpolated(image, x, y, edges)
+        assert found is not None
+        if own != MASKED:
+            expected[own, found] += 1
+    counted = two_step_histogram(template, image, to_image, edges, BINS[0], "bilinear")
+    np.testing.assert_array_equal(counted, expected)
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "bilinear", "cubic"])
+def test_two_steps_with_masks_and_outside(interpolation: str) -> None:
+    """Who takes part is decided by the nearest pixel, and on pixels all interpolations agree."""
+    template, _ = windows(masked=True)
+    image, _ = grey_pair()
+    edges = bin_edges(image.values, image.valid, 6, "equal-frequency")
+    bins = to_bins(image.values, image.valid, 6)
+    for to_image in (*TURNED, Affine.translation(4, 9), Affine.translation(1e7, 0)):
+        near = joint_histogram_under(template, bins, to_image, BINS, 1)
+        found = two_step_histogram(template, image, to_image, edges, BINS[0], interpolation)
+        np.testing.assert_array_equal(found.sum(axis=1), near.sum(axis=1))
+        whole = to_image.a == 1 and to_image.c == int(to_image.c)
+        if interpolation == "nearest" or whole:
+            np.testing.assert_array_equal(found, near)
+
+
+# Shifts by eighths of a pixel: a component of period 1 px runs four times through them.
+SHIFTS = np.arange(-2, 2, 1 / 8)
+
+
+def noisy_pair(seed: int, margin: int = 6) -> tuple[Patch, Patch]:
+    """A template of radar-like and an image of opposite, optical-like grey values, larger."""
+    rng = np.random.default_rng(seed)
+    size = 64 + 2 * margin
+    scene = cv2.GaussianBlur(rng.normal(size=(size, size)), (0, 0), 1.5)
+    scene /= scene.std()
+    first, second = scene + 0.7 * rng.normal(size=(2, size, size))
+    inner = slice(margin, -margin)
+    return (
+        Patch(np.exp(first / 2)[inner, inner].astype(np.float32), np.ones((64, 64), bool)),
+        Patch(-second.astype(np.float32), np.ones((size, size), bool)),
+    )
+
+
+def artefact(estimator: str | int, seed: int) -> complex:
+    """Amplitude of period 1 px in the profile of NMI, over that of the peak itself.
+
+    A window in the shape of a Hann bell keeps the peak, whose periods are longer, apart.
+    """
+    template, image = noisy_pair(seed)
+    counts = (32, 32)
+    own = to_bins(template.values, template.valid, 32, "linear")
+    bins = to_bins(image.values, image.valid, 32, "linear")
+    edges = bin_edges(image.values, image.valid, 32, "linear")
+    profile = []
+    for shift in SHIFTS:
+        to_image = Affine.translation(6 + shift, 6)
+        if isinstance(estimator, int):
+            table = joint_histogram_under(own, bins, to_image, counts, estimator)
+        else:
+            table = two_step_histogram(own, image, to_image, edges, 32, estimator)
+        profile.append(float(normalized_mutual_information(table)))
+    # The first shift becomes phase 0, a whole shift, as are all multiples of the period.
+    bell = np.hanning(len(SHIFTS) + 1)[:-1]
+    spectrum = np.fft.rfft((np.array(profile) - np.mean(profile)) * bell)
+    return complex(spectrum[4] / np.sqrt(np.sum(np.abs(spectrum[1:4]) ** 2)))
+
+
+@pytest.fixture(scope="module")
+def artefacts() -> dict[str | int, np.ndarray]:
+    estimators: tuple[str | int, ...] = ("bilinear", "cubic", 2, 3, 4, 5, 6, 7)
+    return {e: np.array([artefact(e, seed) for seed in range(5)]) for e in estimators}
+
+
+@pytest.mark.parametrize("estimator", ["bilinear", "cubic", 2])
+def test_interpolation_artefacts(
+    estimator: str | int, artefacts: dict[str | int, np.ndarray]
+) -> None:
+    """S fig 3.6 and 3.7: the profile swings with the pixels, by a tenth of the peak and more.
+
+    Two steps have their maxima between pixels, where interpolation takes off noise; PVI has them
+    on pixels, where it does not spread.
+    """
+    found = artefacts[estimator]
+    assert (np.abs(found) > 0.1).all()
+    assert ((found.real > 0) == (estimator == 2)).all()
+
+
+@pytest.mark.parametrize("order", [4, 5, 6, 7])
+def test_no_artefacts_from_order_4_on(order: int, artefacts: dict[str | int, np.ndarray]) -> None:
+    """S fig 3.10: less than a fiftieth of the peak, and less than a hundredth of the energy."""
+    found = np.abs(artefacts[order])
+    assert (found < 0.02).all()
+    for estimator in ("bilinear", "cubic", 2):
+        assert (found**2 < np.abs(artefacts[estimator]) ** 2 / 100).all()
+
+
+def test_artefacts_fall_with_the_order(artefacts: dict[str | int, np.ndarray]) -> None:
+    means = [np.abs(artefacts[order]).mean() for order in (2, 3, 4, 5)]
+    assert means == sorted(means, reverse=True)
