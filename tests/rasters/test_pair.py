@@ -321,6 +321,20 @@ def test_undeclared_areas_of_zeros_take_no_part_and_single_zeros_do(files: Files
     assert make_pair(Image(declared), files.image()).reference_patch(GRID).all_valid
 
 
+def test_what_is_hidden_tells_nothing_of_empty_areas_either(files: Files) -> None:
+    values = wave_image(GRID, LENGTH_M).astype(np.float32)
+    hidden = np.zeros(values.shape, bool)
+    hidden[20:60, 30:80] = True
+    emptied = np.where(hidden, 0, values).astype(np.float32)
+    seen, blind = (
+        make_pair(Image(files.open(image)), files.image()).reference_patch(GRID, hidden)
+        for image in (values, emptied)
+    )
+    np.testing.assert_array_equal(seen.valid, ~hidden)
+    np.testing.assert_array_equal(blind.valid, seen.valid)
+    np.testing.assert_array_equal(blind.values, seen.values)
+
+
 def test_a_narrow_border_of_zeros_is_empty_and_the_images_own_border_is_not(files: Files) -> None:
     values = wave_image(GRID, LENGTH_M).astype(np.float32)
     values[:4] = 0

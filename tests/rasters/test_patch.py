@@ -37,11 +37,3 @@ def test_the_inner_part_loses_a_border_on_each_side(border: int) -> None:
     assert inner.values.shape == (5 - 2 * border, 6 - 2 * border)
     np.testing.assert_array_equal(inner.valid, inner.values > 9)
     assert inner.values[0, 0] == VALUES[border, border]
-
-
-def test_further_pixels_are_masked_in_a_copy() -> None:
-    before = patch(VALUES > 3)
-    after = before.without(VALUES > 20)
-    np.testing.assert_array_equal(after.valid, (VALUES > 3) & (VALUES <= 20))
-    assert before.valid[-1, -1]
-    np.testing.assert_array_equal(after.values, VALUES)

@@ -15,7 +15,6 @@ from groundtie.geometry.transform import load_transform
 from groundtie.progress import SILENT
 from groundtie.quality.report import Report
 from groundtie.quality.verdict import refuse
-from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.pair import ImagePair
 from groundtie.search.layout import lay_out_chips
 from groundtie.search.local import LocalSearch

@@ -46,9 +46,18 @@ class Image:
     band: int | None = None
     mask: RasterSource | None = None
 
-    def read_onto(self, grid: Grid, to_px: ToPixel, to_mask_px: ToPixel | None = None) -> Patch:
+    def read_onto(
+        self,
+        grid: Grid,
+        to_px: ToPixel,
+        to_mask_px: ToPixel | None = None,
+        hidden: Mask | None = None,
+    ) -> Patch:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
         values, valid = sample(self.source, grid, to_px, "cubic", self.band)
+        if hidden is not None:
+            # Before anything is told from the values: nothing may be told from these.
+            values, valid = np.where(hidden, np.float32(0), values), valid & ~hidden
         if not self.source.says_what_is_valid:
             valid = valid & ~_empty_areas(values, valid)
         if self.mask is not None and to_mask_px is not None:
@@ -77,11 +86,12 @@ class ImagePair:
     grid: Grid
     overlap_px: tuple[int, int]
 
-    def reference_patch(self, grid: Grid) -> Patch:
-        """Return the reference on a grid in its CRS."""
+    def reference_patch(self, grid: Grid, hidden: Mask | None = None) -> Patch:
+        """Return the reference on a grid in its CRS, masked where it is to be hidden."""
         mask = self.reference.mask
         to_mask = None if mask is None else _claimed_pixels(self.grid, mask.grid)
-        return self.reference.read_onto(grid, self.reference.source.grid.map_to_pixel, to_mask)
+        to_px = self.reference.source.grid.map_to_pixel
+        return self.reference.read_onto(grid, to_px, to_mask, hidden)
 
     def input_patch(self, grid: Grid, to_input_px: ToPixel) -> Patch:
         """Return the input on a grid; `to_input_px` takes map positions to input pixels."""

@@ -35,7 +35,3 @@ class Patch:
         """Return this patch without a border on each side."""
         inside = slice(border, -border or None)
         return Patch(self.values[inside, inside], self.valid[inside, inside])
-
-    def without(self, masked: NDArray[np.bool_]) -> Patch:
-        """Return this patch with further pixels masked."""
-        return Patch(self.values, self.valid & ~masked)

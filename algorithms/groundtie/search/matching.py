@@ -159,9 +159,8 @@ class ChipMatcher:
         side = chip_px + 2 * reach
         corner = centre - chip_px // 2 - reach
         piece = self.grid.window(int(corner[0]), int(corner[1]), side, side)
-        reference = self.pair.reference_patch(piece)
-        if self.held_out is not None:
-            reference = reference.without(self.held_out(piece))
+        hidden = None if self.held_out is None else self.held_out(piece)
+        reference = self.pair.reference_patch(piece, hidden)
         if not _can_be_matched(reference.inner(radius_px)):
             return None
         input = self.pair.input_patch(piece, self.to_input_px)

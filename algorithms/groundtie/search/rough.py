@@ -76,11 +76,10 @@ def rough_candidates(
     )
     reach = radius_px + BORDER_PX
     search = level.window(-reach, -reach, level.width + 2 * reach, level.height + 2 * reach)
-    reference = pair.reference_patch(template)
+    reference = pair.reference_patch(template, held_out(template))
     input = pair.input_patch(search, pair.claimed_px)
     for image, patch in ((pair.reference, reference), (pair.input, input)):
         _require_content(image.source.path, patch)
-    reference = reference.without(held_out(template))
     if settings.bins is None:
         settings = replace(settings, bins=_BINS)
     surface = similarity_surface(
