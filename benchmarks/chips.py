@@ -1,0 +1,125 @@
+"""How many chips of a pair each similarity matches."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundtie.rasters.grid import Grid
+from groundtie.search.matching import ChipMatcher
+from groundtie.similarity.evidence import find_peak
+from groundtie.similarity.surface import BORDER_PX, SIMILARITIES, SimilaritySettings
+
+from .offsets import OffsetPair, Scene, open_offset
+
+# The true peak lies away from the centre of the surface, which a method might prefer.
+OFFSETS_PX = (2.0, 6.0)
+CHIPS_PX = (61, 101, 201)
+RADIUS_PX = 12
+LIMITS_PX = (1.5, 3.0)
+SPACING_PX = 30
+
+
+@dataclass(frozen=True)
+class ChipShare:
+    """How many chips of a pair one similarity matched.
+
+    Parameters
+    ----------
+    name, group
+        The pair.
+    similarity, chip_px
+        What was matched, how.
+    chips
+        Number of chips.
+    shares
+        Share of them within each of `LIMITS_PX` of the truth; empty without chips.
+    milliseconds
+        Time a chip, reading included.
+    """
+
+    name: str
+    group: str
+    similarity: str
+    chip_px: int
+    chips: int
+    shares: tuple[float, ...]
+    milliseconds: float
+
+
+@dataclass(frozen=True)
+class ChipShares:
+    """What all similarities reached on the chips of one pair."""
+
+    records: tuple[ChipShare, ...]
+
+    def line(self) -> str:
+        """Return the shares of the smallest chips as a line of text."""
+        first = [record for record in self.records if record.chip_px == CHIPS_PX[0]]
+        shares = (f"{r.similarity} {r.shares[-1]:.0%}" for r in first if r.shares)
+        return f"{first[0].name}, {first[0].chips} chips: {', '.join(shares)}"
+
+
+@dataclass(frozen=True)
+class ChipCase:
+    """All similarities on the chips of one pair."""
+
+    scene: Scene
+    most_chips: int
+
+    def run(self, workers: int | None) -> ChipShares:
+        """Match the chips and compare with the truth."""
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            ThreadPoolExecutor(workers or os.cpu_count()) as executor,
+            open_offset(self.scene.pair(Path(folder)), self.scene.offset_px(OFFSETS_PX)) as pair,
+        ):
+            records = [
+                self.share(pair, similarity, chip_px, executor)
+                for chip_px in CHIPS_PX
+                for similarity in SIMILARITIES
+            ]
+        return ChipShares(tuple(records))
+
+    def share(
+        self, pair: OffsetPair, similarity: str, chip_px: int, executor: ThreadPoolExecutor
+    ) -> ChipShare:
+        """Return how many chips of a size one similarity matched."""
+        grid = pair.images.grid
+        matcher = ChipMatcher(
+            pair.images, grid, pair.to_input_px, SimilaritySettings(similarity=similarity)
+        )
+        centres = chip_centres(grid, chip_px, self.most_chips)
+        started = time.perf_counter()
+        _, surfaces = matcher.match_forward(centres, chip_px, RADIUS_PX, executor)
+        seconds = time.perf_counter() - started
+        count = len(surfaces)
+        errors = [math.dist(find_peak(s).shift_px, pair.offset_px) for s in surfaces]
+        shares = tuple(float(np.mean(np.array(errors) <= limit)) for limit in LIMITS_PX)
+        return ChipShare(
+            self.scene.name,
+            self.scene.group,
+            similarity,
+            chip_px,
+            count,
+            shares if count else (),
+            1e3 * seconds / max(count, 1),
+        )
+
+
+def chip_centres(grid: Grid, chip_px: int, most: int) -> NDArray[np.int_]:
+    """Return centres (col, row) of chips every `SPACING_PX`, evenly thinned to at most `most`."""
+    margin = chip_px // 2 + RADIUS_PX + BORDER_PX
+    sides = [np.arange(margin, size - margin, SPACING_PX) for size in (grid.width, grid.height)]
+    centres = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
+    if len(centres) <= most:
+        return centres
+    return centres[np.linspace(0, len(centres) - 1, most).round().astype(int)]
