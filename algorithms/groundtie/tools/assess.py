@@ -269,10 +269,10 @@ class _Files:
     transform: Path | None
     tie_points: Path | None
     check_points: Path | None
-    back: Path | None
-    onward: Path | None
-    closing: Path | None
-    direct: Path | None
+    back_transform: Path | None
+    onward_transform: Path | None
+    closing_transform: Path | None
+    direct_transform: Path | None
 
     @property
     def is_claimed(self) -> bool:
@@ -307,11 +307,14 @@ class _Files:
             check = measure_check_points(self.check_points, found)
             measured = replace(measured, check_points=check)
         subject = Leg(str(self.transform or self.tie_points), found)
-        if self.back is not None:
-            measured = replace(measured, two_way=consistency(subject, [_leg(self.back)]))
-        if self.onward is not None:
-            last = _leg(self.closing or self.direct, reverse=self.closing is None)
-            way = [_leg(self.onward), last]
+        if self.back_transform is not None:
+            measured = replace(measured, two_way=consistency(subject, [_leg(self.back_transform)]))
+        if self.onward_transform is not None:
+            last = _leg(
+                self.closing_transform or self.direct_transform,
+                reverse=self.closing_transform is None,
+            )
+            way = [_leg(self.onward_transform), last]
             measured = replace(measured, three_way=consistency(subject, way))
         return measured
 
@@ -337,17 +340,24 @@ def _check_call(
     report: Path | None,
 ) -> None:
     """Raise if the parameters do not go together."""
-    ways = (files.closing is not None) + (files.direct is not None)
-    if ways > 1 or ways != (files.onward is not None):
+    ways = (files.closing_transform is not None) + (files.direct_transform is not None)
+    if ways > 1 or ways != (files.onward_transform is not None):
         raise ParameterError(
             "three-way consistency needs onward_transform and either closing_transform or "
             "direct_transform"
         )
-    if files.is_claimed and (files.back is not None or files.onward is not None):
+    if files.is_claimed and (
+        files.back_transform is not None or files.onward_transform is not None
+    ):
         raise ParameterError("consistency needs a transform or tie points")
     by_points = files.tie_points is not None or files.check_points is not None
     by_eye = reference is not None and input is not None and report is not None
-    if not (by_points or by_eye or files.back is not None or files.onward is not None):
+    if not (
+        by_points
+        or by_eye
+        or files.back_transform is not None
+        or files.onward_transform is not None
+    ):
         raise ParameterError(
             "there is nothing to judge by: give check_points, tie_points, back_transform, or "
             "reference, input and report"

@@ -1,0 +1,612 @@
+"""The tool `assess` from files to numbers, verdict, report and exit code."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from affine import Affine
+from html_pages import Page, picture_of
+from raster_files import UTM, full_disk, utm_grid, wave_image, write_raster
+from rasterio.crs import CRS
+from textured_pairs import TexturedPair, listing
+
+from groundtie import load_transform
+from groundtie.cli import main
+from groundtie.declaration import tool_of
+from groundtie.errors import (
+    CancelledError,
+    GeoreferencingError,
+    GroundTieError,
+    NoOverlapError,
+    NotRegisteredError,
+    OutputError,
+    ParameterError,
+    RasterOpenError,
+    SameFileError,
+    TooFewPointsError,
+    TransformFileError,
+)
+from groundtie.geometry.models import Frame, PolynomialModel
+from groundtie.geometry.tie_point_files import write_tie_points
+from groundtie.geometry.tie_points import TiePoints
+from groundtie.geometry.transform import Transform
+from groundtie.progress import Progress
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
+from groundtie.tools.assess import assess
+from groundtie.tools.coregister import coregister
+
+# The reference has pixels of 10 m, the input of 5 m.
+REFERENCE, INPUT = utm_grid(160, 120), utm_grid(320, 240, 5.0)
+SHIFT_M = np.array([70.0, -40.0])
+
+
+def shifted(shift: Any, grid: Grid = INPUT, crs: CRS | None = UTM) -> Transform:
+    """Return the transform of an input that claims to lie off by map units."""
+    model = PolynomialModel("translation", Frame(Affine.identity()), np.array([shift], float))
+    return Transform(model, crs, grid)
+
+
+def stored(path: Path, transform: Transform) -> Path:
+    path.write_text(json.dumps(transform.to_json()), encoding="utf-8")
+    return path
+
+
+def table(path: Path, xy: np.ndarray, px: np.ndarray) -> Path:
+    lines = ["reference_x,reference_y,input_col,input_row"]
+    lines += [",".join(repr(value) for value in row) for row in np.hstack([xy, px]).tolist()]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def tie_points(path: Path, transform: Transform, fit_px: Any, check_px: Any) -> Path:
+    """Write 30 tie points with these errors at those of the fit and at those held out, 10."""
+    is_check = np.arange(30) % 3 == 0
+    px = np.random.default_rng(0).uniform([10, 10], [300, 220], (30, 2))
+    points = TiePoints(
+        reference_xy=transform.inverse(px),
+        input_px=px + np.where(is_check[:, None], check_px, fit_px),
+        score=np.ones(30),
+        covariance_px2=np.tile(np.eye(2), (30, 1, 1)),
+        two_way_error_px=np.zeros(30),
+        is_check=is_check,
+        state=np.full(30, "used"),
+    )
+    write_tie_points(path, points, transform)
+    return path
+
+
+@dataclass(frozen=True)
+class Files:
+    """A registration that is exact, and evidence on it with known errors."""
+
+    folder: Path
+
+    def path(self, name: str) -> Path:
+        return self.folder / name
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Files:
+    """Write the registration A → B and its evidence.
+
+    Check points are off by (0.3, −0.4) input pixels; the transform back by (6, 8) m.
+    """
+    folder = tmp_path / "in"
+    folder.mkdir()
+    truth = shifted(SHIFT_M)
+    stored(folder / "t.json", truth)
+    stored(folder / "back.json", shifted(-SHIFT_M + [6, 8], REFERENCE))
+    xy = REFERENCE.pixel_to_map(np.random.default_rng(1).uniform([20, 20], [140, 100], (25, 2)))
+    table(folder / "check.csv", xy, truth(xy) + [0.3, -0.4])
+    tie_points(folder / "points.gpkg", truth, [1.0, 0.0], [0.0, 0.5])
+    length = 400.0
+    write_raster(
+        folder / "reference.tif", wave_image(REFERENCE, length).astype(np.float32), REFERENCE
+    )
+    moved = wave_image(INPUT.shifted(*-SHIFT_M), length).astype(np.float32)
+    write_raster(folder / "input.tif", moved, INPUT)
+    return Files(folder)
+
+
+def words(**options: Any) -> list[str]:
+    """Return the words of a call on the command line."""
+    named = ((f"--{name.replace('_', '-')}", str(value)) for name, value in options.items())
+    return ["assess", *(word for pair in named for word in pair)]
+
+
+class TestEvidence:
+    def test_check_points(self, files: Files) -> None:
+        result = assess(files.path("t.json"), check_points=files.path("check.csv"))
+        found = result.assessment.check_points
+        assert len(found) == 25
+        assert found.in_pixels.rmse == pytest.approx(0.5, abs=1e-6)
+        assert found.in_pixels.bias == pytest.approx((0.3, -0.4), abs=1e-6)
+        assert found.in_metres.rmse == pytest.approx(2.5, abs=1e-5)
+        assert found.in_metres.bias == pytest.approx((1.5, 2.0), abs=1e-5)
+        assert result.verdict is None
+        assert result.summary()["verdict"] is None
+        assert result.files == {}
+
+    def test_known_normal_errors_have_the_ce90_of_theory(self, files: Files) -> None:
+        """An error that is drawn from a normal distribution of 2 px: CE90 is 4.29 px."""
+        count = 1005
+        random = np.random.default_rng(5)
+        radius = 2 * np.sqrt(-2 * np.log(1 - (np.arange(count) + 0.5) / count))
+        angle = random.uniform(0, 2 * np.pi, count)
+        xy = REFERENCE.pixel_to_map(random.uniform([20, 20], [140, 100], (count, 2)))
+        error = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+        points = table(files.path("p.csv"), xy, shifted(SHIFT_M)(xy) + error)
+        found = assess(files.path("t.json"), check_points=points).assessment.check_points
+        assert found.in_pixels.ce90 == pytest.approx(2 * 2.1460, rel=1e-4)
+        assert found.in_pixels.rmse == pytest.approx(2 * math.sqrt(2), rel=1e-3)
+        assert found.in_metres.ce90 == pytest.approx(10 * 2.1460, rel=1e-4)
+
+    def test_control_and_test_points(self, files: Files) -> None:
+        result = assess(files.path("t.json"), files.path("points.gpkg"))
+        control, test = result.assessment.control_points, result.assessment.test_points
+        assert (len(control), len(test)) == (20, 10)
+        assert control.in_pixels.bias == pytest.approx((1, 0), abs=1e-6)
+        assert test.in_pixels.bias == pytest.approx((0, 0.5), abs=1e-6)
+
+    def test_without_a_transform_one_is_fitted(self, files: Files) -> None:
+        """The fit takes up what all control points have in common; the test points show it."""
+        result = assess(
+            tie_points=files.path("points.gpkg"),
+            input=files.path("input.tif"),
+            model="translation",
+        )
+        assert result.transform.model.kind == "translation"
+        assert result.assessment.control_points.in_pixels.rmse == pytest.approx(0, abs=1e-6)
+        assert result.assessment.test_points.in_pixels.bias == pytest.approx((-1, 0.5), abs=1e-6)
+        fitted = assess(tie_points=files.path("points.gpkg"), input=files.path("input.tif"))
+        assert fitted.transform.model.kind == "affine"
+
+    def test_the_georeferencing_of_an_image_that_any_program_registered(
+        self, files: Files, tmp_path: Path
+    ) -> None:
+        """The input as it is lies off by all of its misregistration."""
+        result = assess(input=files.path("input.tif"), check_points=files.path("check.csv"))
+        found = result.assessment.check_points
+        expected = SHIFT_M / [5, -5] + [0.3, -0.4]
+        assert found.in_pixels.bias == pytest.approx(tuple(expected), abs=1e-6)
+        values = wave_image(INPUT, 400.0).astype(np.float32)
+        right = write_raster(tmp_path / "right.tif", values, INPUT.shifted(*-SHIFT_M))
+        result = assess(input=right, check_points=files.path("check.csv"), max_error=1.0)
+        assert result.verdict is not None and result.verdict.accepted
+        assert result.assessment.check_points.in_pixels.rmse == pytest.approx(0.5, abs=1e-6)
+
+    def test_a_raster_of_other_pixels_is_measured_in_its_own(
+        self, files: Files, tmp_path: Path
+    ) -> None:
+        """The same scene in pixels of 20 m: tie points find their place by the map."""
+        coarse = utm_grid(80, 60, 20.0)
+        raster = write_raster(tmp_path / "c.tif", np.ones((60, 80), np.float32), coarse)
+        result = assess(files.path("t.json"), files.path("points.gpkg"), input=raster)
+        assert result.assessment.control_points.in_pixels.rmse == pytest.approx(0.25, abs=1e-6)
+        assert result.assessment.control_points.in_metres.rmse == pytest.approx(5, abs=1e-5)
+
+    def test_two_way_consistency_is_the_shift_that_was_put_in(self, files: Files) -> None:
+        result = assess(files.path("t.json"), back_transform=files.path("back.json"))
+        found = result.assessment.two_way
+        assert found.in_pixels.rmse == found.in_pixels.mean == pytest.approx(2, abs=1e-6)
+        assert found.in_metres.rmse == pytest.approx(10, abs=1e-5)
+        assert found.in_pixels.std == pytest.approx((0, 0), abs=1e-6)
+
+    @pytest.mark.parametrize("last", ["closing_transform", "direct_transform"])
+    def test_three_way_consistency(self, files: Files, tmp_path: Path, last: str) -> None:
+        """Around the triangle (3, −4) m are left."""
+        third = utm_grid(200, 160, 8.0)
+        onward = np.array([-20.0, 15.0])
+        whole = SHIFT_M + onward + [3, -4]
+        steps = {
+            "onward_transform": shifted(onward, third),
+            "closing_transform": shifted(-whole, REFERENCE),
+            "direct_transform": shifted(whole, third),
+        }
+        paths = {name: stored(tmp_path / f"{name}.json", t) for name, t in steps.items()}
+        result = assess(
+            files.path("t.json"),
+            onward_transform=paths["onward_transform"],
+            **{last: paths[last]},
+        )
+        found = result.assessment.three_way
+        assert found.in_metres.rmse == pytest.approx(5, abs=1e-5)
+        assert found.in_pixels.rmse == pytest.approx(1, abs=1e-6)
+        assert len(result.assessment.two_way) == 0
+
+    def test_images_without_georeferencing(self, tmp_path: Path) -> None:
+        plain = Grid(PIXEL_COORDINATES, None, 90, 80)
+        transform = shifted([4, -3], plain, None)
+        xy = np.random.default_rng(0).uniform(10, 70, (8, 2))
+        result = assess(
+            stored(tmp_path / "t.json", transform),
+            check_points=table(tmp_path / "p.csv", xy, transform(xy) + [0.0, 2.0]),
+            back_transform=stored(tmp_path / "b.json", shifted([-4, 2], plain, None)),
+        )
+        assert result.assessment.check_points.in_pixels.rmse == pytest.approx(2)
+        assert result.assessment.two_way.in_pixels.rmse == pytest.approx(1)
+        assert result.assessment.check_points.error_m is None
+        assert all(" m)" not in line for line in result.lines())
+
+
+class TestVerdict:
+    def test_accepted(self, files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+        options = {"transform": files.path("t.json"), "check_points": files.path("check.csv")}
+        assert main(words(**options, max_error=0.6)) == 0
+        out = capsys.readouterr().out
+        assert out.startswith("accepted: check points confirm the registration\n")
+        assert "check points: 25 of 25 points, RMSE 0.50 px (2.50 m)" in out
+        assert "bias +0.30, -0.40 px" in out
+
+    def test_refused(
+        self, files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        """Exit code 3 and one line; the report is written, as that of coregister."""
+        options = {"transform": files.path("t.json"), "check_points": files.path("check.csv")}
+        report = tmp_path / "r.html"
+        assert main([*words(**options, max_error=0.4, report=report), "--json"]) == 3
+        captured = capsys.readouterr()
+        assert captured.err.count("\n") == 1
+        assert "t.json is refused: error at check points is 0.50 px, above 0.4 px" in captured.err
+        verdict = json.loads(captured.out)["verdict"]
+        assert verdict["accepted"] is False
+        assert verdict["check_rmse_px"] == pytest.approx(0.5)
+        assert verdict["chance"] is None
+        numbers = json.loads(report.with_suffix(".json").read_text(encoding="utf-8"))
+        assert numbers["verdict"] == verdict
+        assert Page(report.read_text(encoding="utf-8")).all("h2")[0].text == "Refused"
+
+    def test_a_refusal_in_python(self, files: Files) -> None:
+        with pytest.raises(NotRegisteredError, match=r"above 0\.4 px") as error:
+            assess(files.path("t.json"), check_points=files.path("check.csv"), max_error=0.4)
+        assert error.value.verdict is not None
+        assert error.value.verdict.check_points == 25
+
+    def test_inconsistency_refuses_what_points_accept(self, files: Files) -> None:
+        evidence = {
+            "check_points": files.path("check.csv"),
+            "back_transform": files.path("back.json"),
+        }
+        assert assess(files.path("t.json"), **evidence, max_error=2.1).verdict is not None
+        with pytest.raises(NotRegisteredError, match=r"two-way inconsistency is 2\.00 px"):
+            assess(files.path("t.json"), **evidence, max_error=1.9)
+
+    def test_test_points_are_judged_where_there_are_no_others(self, files: Files) -> None:
+        """Residuals of the fit are 1 px, held-out points are off by 0.5 px."""
+        calls = {"transform": files.path("t.json"), "tie_points": files.path("points.gpkg")}
+        result = assess(**calls, max_error=0.6)
+        assert result.verdict is not None
+        assert result.verdict.check_rmse_px == pytest.approx(0.5)
+        with pytest.raises(NotRegisteredError, match=r"error at test points is 0\.50 px"):
+            assess(**calls, max_error=0.45)
+
+    def test_the_fit_alone_is_no_ground(self, files: Files, tmp_path: Path) -> None:
+        fitted = tmp_path / "fit.csv"
+        xy = REFERENCE.pixel_to_map(np.random.default_rng(1).uniform(20, 100, (9, 2)))
+        table(fitted, xy, shifted(SHIFT_M)(xy))
+        assert assess(files.path("t.json"), fitted).assessment.control_points.in_pixels.rmse < 1e-6
+        with pytest.raises(TooFewPointsError, match="no points took no part in the fit"):
+            assess(files.path("t.json"), fitted, max_error=3.0)
+
+
+class TestReport:
+    def test_swipe_and_checkerboard_of_the_two_rasters(self, files: Files, tmp_path: Path) -> None:
+        result = assess(
+            files.path("t.json"),
+            files.path("points.gpkg"),
+            files.path("check.csv"),
+            reference=files.path("reference.tif"),
+            input=files.path("input.tif"),
+            max_error=3.0,
+            report=tmp_path / "r.html",
+        )
+        assert result.files == {"report": str(tmp_path / "r.html")}
+        page = Page((tmp_path / "r.html").read_text(encoding="utf-8"))
+        assert page.all("h2")[0].text == "Accepted"
+        modes = [
+            e.attributes["value"] for e in page.all("input") if e.attributes.get("name") == "mode"
+        ]
+        assert modes == ["swipe", "checker", "blink"]
+        pictures = [
+            picture_of(str(e.attributes["src"]), "image/jpeg").astype(float)[10:-10, 10:-10]
+            for e in page.all("img")[:3]
+        ]
+        likeness = [np.corrcoef(p.ravel(), pictures[0].ravel())[0, 1] for p in pictures[1:]]
+        assert likeness[0] < 0.9 < 0.99 < likeness[1]
+        numbers = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
+        assert {**numbers, "files": result.files} == result.summary()
+        assert numbers["check_points"]["rmse_px"] == pytest.approx(0.5)
+        assert numbers["parameters"]["check_points"] == str(files.path("check.csv"))
+
+    def test_two_images_and_no_number(self, files: Files, tmp_path: Path) -> None:
+        """To look at an image that claims to be registered is evidence, too."""
+        result = assess(
+            reference=files.path("reference.tif"),
+            input=files.path("input.tif"),
+            report=tmp_path / "r.html",
+        )
+        page = Page((tmp_path / "r.html").read_text(encoding="utf-8"))
+        assert page.all("title")[0].text == "Measured: Assessment of input.tif"
+        assert not [e for e in page.all("input") if e.attributes.get("name") == "state"]
+        assert result.lines() == [f"report: {tmp_path / 'r.html'}"]
+
+    def test_numbers_only(self, files: Files, tmp_path: Path) -> None:
+        assess(
+            files.path("t.json"),
+            back_transform=files.path("back.json"),
+            report=tmp_path / "r.html",
+        )
+        assert sorted(os.listdir(tmp_path)) == ["in", "r.html", "r.json"]
+        page = Page((tmp_path / "r.html").read_text(encoding="utf-8"))
+        assert not page.all("img")
+        assert "Two-way consistency (RMSE)" in page.numbers
+
+    def test_the_summary_has_what_the_outputs_promise(self, files: Files) -> None:
+        result = assess(
+            files.path("t.json"), files.path("points.gpkg"), files.path("check.csv"),
+            files.path("back.json"),
+        )  # fmt: skip
+        summary = json.loads(json.dumps(result.summary(), allow_nan=False))
+        values = {output.name: output.value(summary) for output in tool_of(assess).outputs}
+        # Nothing was measured three-way.
+        assert values.pop("THREE_WAY_RMSE_PX") is None
+        assert values == pytest.approx(
+            {
+                "CHECK_RMSE_PX": 0.5,
+                "CHECK_CE90_M": 2.5,
+                "TEST_RMSE_PX": 0.5,
+                "CONTROL_RMSE_PX": 1.0,
+                "TWO_WAY_RMSE_PX": 2.0,
+            },
+            abs=1e-5,
+        )
+
+
+class TestBadCalls:
+    """One clear line, exit code 2 where it is an error, and nothing left behind."""
+
+    CALLS: tuple[tuple[type[GroundTieError], str, dict[str, str]], ...] = (
+        (ParameterError, "there is nothing to judge by", {}),
+        (ParameterError, "there is nothing to judge by", {"transform": "t.json"}),
+        (ParameterError, "there is nothing to judge by", {"transform": "t.json", "max_error": "3"}),
+        (
+            ParameterError,
+            "there is nothing to judge by",
+            {"reference": "reference.tif", "input": "input.tif"},
+        ),
+        (ParameterError, "give a transform, or the input", {"tie_points": "points.gpkg"}),
+        (ParameterError, "give a transform, or the input", {"check_points": "check.csv"}),
+        (
+            ParameterError,
+            "max_error needs points",
+            {"transform": "t.json", "back_transform": "back.json", "max_error": "3"},
+        ),
+        (
+            ParameterError,
+            "consistency needs a transform",
+            {"input": "input.tif", "back_transform": "back.json"},
+        ),
+        *(
+            (ParameterError, "three-way consistency needs", {"transform": "t.json", **more})
+            for more in (
+                {"onward_transform": "back.json"},
+                {"closing_transform": "back.json"},
+                {"direct_transform": "back.json"},
+                {
+                    "onward_transform": "back.json",
+                    "closing_transform": "t.json",
+                    "direct_transform": "t.json",
+                },
+            )
+        ),
+        (
+            TransformFileError,
+            "missing.json",
+            {"transform": "missing.json", "check_points": "check.csv"},
+        ),
+        (
+            TransformFileError,
+            "cannot read the transform",
+            {"transform": "points.gpkg", "check_points": "check.csv"},
+        ),
+        (
+            TransformFileError,
+            "check.csv",
+            {"transform": "t.json", "back_transform": "check.csv"},
+        ),
+        (
+            TransformFileError,
+            "missing.csv",
+            {"transform": "t.json", "check_points": "missing.csv"},
+        ),
+        (
+            TransformFileError,
+            "tie points are read from",
+            {"transform": "t.json", "tie_points": "input.tif"},
+        ),
+        (
+            RasterOpenError,
+            "missing.tif",
+            {"transform": "t.json", "check_points": "check.csv", "input": "missing.tif"},
+        ),
+        (
+            SameFileError,
+            "input is the same raster as reference",
+            {"check_points": "check.csv", "reference": "input.tif", "input": "input.tif"},
+        ),
+        (
+            ParameterError,
+            "must be 0.1 to 100",
+            {"transform": "t.json", "check_points": "check.csv", "max_error": "0"},
+        ),
+    )
+
+    @pytest.mark.parametrize(("error", "message", "options"), CALLS)
+    def test_one_line_and_nothing_written(
+        self,
+        files: Files,
+        tmp_path: Path,
+        capsys: pytest.CaptureFixture[str],
+        error: type[GroundTieError],
+        message: str,
+        options: dict[str, str],
+    ) -> None:
+        """Also with a report, where that is not what makes the call complete."""
+        before = listing(tmp_path)
+        values = {
+            name: value if name == "max_error" else files.path(value)
+            for name, value in options.items()
+        }
+        with pytest.raises(error, match=message):
+            assess(**values)
+        assert main(words(**values)) == 2
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        assert captured.err.startswith("groundtie: error: ")
+        assert captured.err.count("\n") == 1
+        assert listing(tmp_path) == before
+
+    def test_a_failure_with_a_report_leaves_none(self, files: Files, tmp_path: Path) -> None:
+        before = listing(tmp_path)
+        calls: list[tuple[type[GroundTieError], dict[str, Any]]] = [
+            (TransformFileError, {"check_points": files.path("missing.csv")}),
+            (TooFewPointsError, {"tie_points": self.empty(files)}),
+            (OutputError, {"check_points": files.path("check.csv"),
+                           "report": tmp_path / "none" / "r.html"}),
+            (ParameterError, {"check_points": files.path("check.csv"),
+                              "report": tmp_path / "r.pdf"}),
+        ]  # fmt: skip
+        before = listing(tmp_path)
+        for error, change in calls:
+            with pytest.raises(error):
+                assess(
+                    **{"transform": files.path("t.json"), "report": tmp_path / "r.html"} | change
+                )
+        assert listing(tmp_path) == before
+
+    def empty(self, files: Files) -> Path:
+        return table(files.path("empty.csv"), np.zeros((0, 2)), np.zeros((0, 2)))
+
+    def test_the_report_never_overwrites_an_input(self, files: Files, tmp_path: Path) -> None:
+        """The numbers beside t.html would be t.json, which is the transform."""
+        before = listing(tmp_path)
+        with pytest.raises(SameFileError, match="transform would be overwritten"):
+            assess(
+                files.path("t.json"),
+                check_points=files.path("check.csv"),
+                report=files.path("t.html"),
+            )
+        with pytest.raises(SameFileError, match="back_transform would be overwritten"):
+            assess(
+                files.path("t.json"),
+                back_transform=files.path("back.json"),
+                report=files.path("back.html"),
+            )
+        assert listing(tmp_path) == before
+
+    def test_transforms_of_another_place(self, files: Files, tmp_path: Path) -> None:
+        far = stored(tmp_path / "far.json", shifted([0, 0], REFERENCE.window(5000, 0, 90, 90)))
+        with pytest.raises(NoOverlapError, match=r"t\.json, .*far\.json"):
+            assess(files.path("t.json"), back_transform=far)
+        raster = write_raster(
+            tmp_path / "far.tif", np.ones((9, 9), np.uint8), REFERENCE.window(5000, 0, 9, 9)
+        )
+        with pytest.raises(NoOverlapError, match=r"far\.tif does not lie"):
+            assess(files.path("t.json"), check_points=files.path("check.csv"), input=raster)
+        with pytest.raises(NoOverlapError, match=r"as registered, misses .*far\.tif"):
+            assess(
+                files.path("t.json"),
+                reference=raster,
+                input=files.path("input.tif"),
+                report=tmp_path / "r.html",
+            )
+
+    @pytest.mark.filterwarnings("ignore::rasterio.errors.NotGeoreferencedWarning")
+    def test_only_one_has_a_crs(self, files: Files, tmp_path: Path) -> None:
+        plain = write_raster(tmp_path / "plain.tif", np.ones((240, 320), np.uint8))
+        with pytest.raises(GeoreferencingError, match="only one of"):
+            assess(
+                input=plain,
+                reference=files.path("reference.tif"),
+                check_points=files.path("check.csv"),
+            )
+
+    def test_cancelling_leaves_nothing(self, files: Files, tmp_path: Path) -> None:
+        before = listing(tmp_path)
+        with pytest.raises(CancelledError):
+            assess(
+                files.path("t.json"),
+                check_points=files.path("check.csv"),
+                report=tmp_path / "r.html",
+                progress=Progress(is_cancelled=lambda: True),
+            )
+        assert listing(tmp_path) == before
+
+    def test_a_full_disk_keeps_the_old_report(self, files: Files, tmp_path: Path) -> None:
+        (tmp_path / "r.html").write_text("old")
+        before = listing(tmp_path)
+        with full_disk(4096), pytest.raises(OutputError, match=r"cannot write .*r\.html"):
+            assess(
+                files.path("t.json"),
+                check_points=files.path("check.csv"),
+                report=tmp_path / "r.html",
+            )
+        assert listing(tmp_path) == before
+
+
+class TestWithOtherTools:
+    def test_what_coregister_wrote_is_judged_as_coregister_did(
+        self, simulated: Callable[[str], Any], tmp_path: Path
+    ) -> None:
+        """The same held-out matches; right ones count in full here, by their probability there."""
+        pair = simulated("affine")
+        made = {"tie_points": tmp_path / "p.gpkg", "transform": tmp_path / "t.json"}
+        registered = coregister(
+            pair.reference, pair.input, tmp_path / "out.tif",
+            similarity="orientation", workers=2, **made,
+        )  # fmt: skip
+        result = assess(**made, max_error=3.0)
+        assert result.verdict is not None
+        ours, theirs = result.verdict, registered.verdict
+        assert ours.check_points == theirs.check_points
+        assert 0 < ours.check_points_agreeing < ours.check_points
+        assert ours.check_rmse_px == pytest.approx(theirs.check_rmse_px, rel=0.1)
+
+    def test_the_error_at_true_points_is_that_of_the_transform(
+        self, textured: TexturedPair, tmp_path: Path
+    ) -> None:
+        made = tmp_path / "t.json"
+        registered = coregister(
+            textured.reference, textured.input, tmp_path / "out.tif",
+            similarity="orientation", workers=2, transform=made,
+        )  # fmt: skip
+        xy = textured.grid.pixel_to_map(
+            np.random.default_rng(0).uniform([30, 30], [200, 190], (50, 2))
+        )
+        truth = table(tmp_path / "truth.csv", xy, textured.truth(xy))
+        measured = assess(made, check_points=truth).assessment.check_points
+        error = np.hypot(*(registered.transform(xy) - textured.truth(xy)).T)
+        assert measured.in_pixels.rmse == pytest.approx(np.sqrt((error**2).mean()), abs=1e-5)
+
+    def test_the_check_points_of_simulate(
+        self, simulated: Callable[[str], Any], tmp_path: Path
+    ) -> None:
+        pair = simulated("affine")
+        truth = pair.folder / "truth.json"
+        result = assess(truth, check_points=pair.folder / "check_points.csv", max_error=0.1)
+        # The table has six digits.
+        assert result.assessment.check_points.in_pixels.largest < 1e-5
+        unregistered = assess(
+            input=pair.input, check_points=pair.folder / "check_points.csv"
+        ).assessment.check_points
+        exact = load_transform(truth)
+        claimed = Transform.as_claimed(exact.crs, exact.input_grid)
+        assert unregistered.in_pixels.rmse == pytest.approx(pair.error_px(claimed), rel=1e-4)
