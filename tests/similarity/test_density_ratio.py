@@ -1,13 +1,18 @@
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from groundtie.progress import Progress
+from groundtie.rasters.patch import Patch
 from groundtie.similarity.density_ratio import (
     WIDTHS,
     choose_width,
     fit_density_ratio,
+    information_surface,
     maximum_likelihood_mutual_information,
     normal_scores,
 )
@@ -146,6 +151,48 @@ def test_cross_validation_prefers_what_generalises() -> None:
         chosen.append(choose_width(x, y, centres))
     assert chosen[0] == WIDTHS[-1]
     assert chosen[0] > chosen[1] > chosen[2]
+
+
+def shifted_pair(radius: int = 4) -> tuple[Patch, Patch]:
+    """A template, and an image in which it lies 2 px up and 3 px to the right, of falling grey."""
+    rng = np.random.default_rng(11)
+    size = 30 + 2 * radius
+    scene = rng.normal(size=(size, size))
+    inner = slice(radius, -radius)
+    image = np.exp(-np.roll(scene, (-2, 3), (0, 1)) + 0.3 * rng.normal(size=(size, size)))
+    valid = np.ones((2, size, size), bool)
+    valid[1, 20:, :5] = False
+    return (
+        Patch(scene[inner, inner].astype(np.float32), valid[0][inner, inner]),
+        Patch(image.astype(np.float32), valid[1]),
+    )
+
+
+def test_a_surface() -> None:
+    template, search = shifted_pair()
+    told: list[float] = []
+    progress = Progress(lambda done, message: told.append(done))
+    with ThreadPoolExecutor(2) as executor:
+        found = information_surface(template, search, 300, 0, executor, progress)
+        again = information_surface(template, search, 300, 0, executor)
+    np.testing.assert_array_equal(found, again)
+    assert found.shape == (9, 9)
+    assert np.unravel_index(found.argmax(), found.shape) == (4 - 2, 4 + 3)
+    # The correlation is that of a signal of 1 and noise of 0.3.
+    rho_squared = 1 / 1.09
+    expected = -np.log(1 - rho_squared) / 2
+    assert found.max() == pytest.approx(expected, rel=0.2)
+    # All other pixels are independent.
+    assert np.sort(found.ravel())[-2] < 0.2
+    assert told == sorted(told) and told[-1] == 1
+
+
+def test_a_surface_of_a_template_without_pixels() -> None:
+    template, search = shifted_pair()
+    with ThreadPoolExecutor(1) as executor:
+        nothing = Patch(template.values, np.zeros_like(template.valid))
+        found = information_surface(nothing, search, 300, 0, executor)
+    assert not found.any()
 
 
 def test_normal_scores() -> None:

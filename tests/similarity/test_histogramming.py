@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import cv2
 import numpy as np
@@ -10,17 +11,19 @@ import pytest
 from affine import Affine
 
 from groundtie.errors import ParameterError
+from groundtie.progress import Progress
 from groundtie.rasters.patch import Patch
 from groundtie.similarity import histogramming
 from groundtie.similarity.binning import BINNINGS, MASKED, bin_edges, to_bins
 from groundtie.similarity.histogramming import (
     MASKED_LEVEL,
     joint_histogram_under,
+    measure_surface,
     sparse_joint_histogram_under,
     to_levels,
     two_step_histogram,
 )
-from groundtie.similarity.joint_histogram import ORDERS, count_joint_histograms
+from groundtie.similarity.joint_histogram import ORDERS, count_joint_histograms, reach
 from groundtie.similarity.measures import MEASURES, normalized_mutual_information
 
 BINS = (5, 6)
@@ -272,6 +275,65 @@ def test_two_steps_with_masks_and_outside(interpolation: str) -> None:
         whole = to_image.a == 1 and to_image.c == int(to_image.c)
         if interpolation == "nearest" or whole:
             np.testing.assert_array_equal(found, near)
+
+
+@pytest.mark.parametrize("order", [2, 4, 7])
+@pytest.mark.parametrize("masked", [False, True])
+def test_surfaces_of_any_measure(monkeypatch: pytest.MonkeyPatch, order: int, masked: bool) -> None:
+    """From the volume, shift by shift and from the definition."""
+    radius, margin = 2, reach(order)
+    side = [n + 2 * (radius + margin) for n in SHAPE]
+    template, search = windows(masked, size=(side[0], side[1]))
+    measure = MEASURES["tsallis"]
+    with ThreadPoolExecutor(2) as executor:
+        whole = measure_surface(template, search, BINS, measure, order, executor)
+        levels = wide(template), wide(search)
+        same = measure_surface(*levels, BINS, measure, order, executor)
+        monkeypatch.setattr(histogramming, "_MOST_VOLUME_BYTES", 0)
+        one_by_one = measure_surface(*levels, BINS, measure, order, executor)
+    np.testing.assert_array_equal(same, whole)
+    np.testing.assert_allclose(one_by_one, whole, atol=1e-6)
+    for dy, dx in ((-2, -2), (0, 1), (2, -1)):
+        to_search = Affine.translation(radius + margin + dx, radius + margin + dy)
+        expected = measure(gpve(template, search, to_search, order))
+        assert whole[dy + radius, dx + radius] == pytest.approx(float(expected), abs=1e-6)
+
+
+def test_surfaces_of_more_bins_than_a_byte_numbers() -> None:
+    first, second = grey_pair(30)
+    own, own_count = to_levels(Patch(first.values[4:-4, 4:-4], first.valid[4:-4, 4:-4]))
+    other, other_count = to_levels(second)
+    counts = own_count, other_count
+    told: list[float] = []
+    with ThreadPoolExecutor(2) as executor:
+        found = measure_surface(
+            own,
+            other,
+            counts,
+            normalized_mutual_information,
+            4,
+            executor,
+            Progress(lambda done, message: told.append(done)),
+        )
+    assert max(counts) > 255 and found.shape == (7, 7)
+    assert told == sorted(told) and told[-1] == 1
+    expected = gpve_table(own, other, (4, 4), counts)
+    assert found[3, 3] == pytest.approx(float(normalized_mutual_information(expected)), abs=1e-6)
+
+
+def gpve_table(
+    own: np.ndarray, other: np.ndarray, corner: tuple[int, int], counts: tuple[int, int]
+) -> np.ndarray:
+    """The cubic spline at a whole shift: weights 1/6, 2/3 and 1/6 along both axes."""
+    table = np.zeros(counts)
+    height, width = own.shape
+    for dy, dx in np.ndindex(3, 3):
+        top, left = corner[0] + dy - 1, corner[1] + dx - 1
+        seen = other[top : top + height, left : left + width]
+        both = (own != MASKED_LEVEL) & (seen != MASKED_LEVEL)
+        weight = (2 / 3 if dy == 1 else 1 / 6) * (2 / 3 if dx == 1 else 1 / 6)
+        np.add.at(table, (own[both], seen[both]), weight)
+    return table
 
 
 # Shifts by eighths of a pixel: a component of period 1 px runs four times through them.

@@ -9,7 +9,9 @@ maximum likelihood density ratio estimation", JMLR W&CP 4, 5–20.
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -17,15 +19,23 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 from scipy.stats import norm, rankdata
 
+from ..progress import SILENT, Progress
+from ..rasters.patch import Patch
+from .binning import to_bins
+from .joint_histogram import count_joint_histograms
+from .measures import mutual_information
+
 FloatArray = NDArray[np.float64]
 
 # Kernel widths to choose from, in standard deviations of the grey values' normal scores.
 WIDTHS = (0.15, 0.22, 0.32, 0.47, 0.68, 1.0, 1.5)
 _FOLDS = 3
 
-# How near the likelihood of a fit is to its maximum, in nats a pixel; to compare widths, less will
-# do.
+# How near the likelihood of a fit is to its maximum, in nats a pixel; to compare widths or shifts,
+# less will do.
 TOLERANCE, _ROUGH = 1e-5, 1e-3
+# Of surfaces: kernels at every shift, and bins of the histograms that tell the likeliest shift.
+_SURFACE_KERNELS, _ROUGH_BINS = 100, 16
 _FIRST_STEPS, _LAST_STEPS = 30, 60
 
 # Added to the Hessian, whose diagonal is about 1: kernels that overlap make it singular.
@@ -89,7 +99,12 @@ def fit_density_ratio(
 
 
 def choose_width(x: FloatArray, y: FloatArray, centres: FloatArray, seed: int = 0) -> float:
-    """Return the width of `WIDTHS` under which pairs that took no part in a fit are likeliest."""
+    """Return the width of `WIDTHS` under which pairs that took no part in a fit are likeliest.
+
+    Too few pairs to hold some out take the widest, which assumes the least.
+    """
+    if x.size < 2 * _FOLDS:
+        return WIDTHS[-1]
     fold = np.random.default_rng(seed).permutation(x.size) % _FOLDS
     likelihoods = np.zeros(len(WIDTHS))
     for k in range(_FOLDS):
@@ -117,6 +132,7 @@ def maximum_likelihood_mutual_information(
     sample: int = 2000,
     kernels: int = 200,
     seed: int = 0,
+    tolerance: float = TOLERANCE,
 ) -> float:
     """Return the mutual information of pairs of grey values in nats.
 
@@ -133,6 +149,8 @@ def maximum_likelihood_mutual_information(
         Most kernels that are used.
     seed
         Of the sample and of the cross-validation.
+    tolerance
+        By how much the result may fall short of the most likely one.
     """
     a, b = np.asarray(a).ravel(), np.asarray(b).ravel()
     if a.size < 2:
@@ -142,7 +160,79 @@ def maximum_likelihood_mutual_information(
     centres = np.column_stack([x, y])[:kernels]
     if width is None:
         width = choose_width(x, y, centres, seed)
-    return float(_log(fit_density_ratio(x, y, centres, width)(x, y)).mean())
+    ratio = fit_density_ratio(x, y, centres, width, tolerance=tolerance)
+    return float(_log(ratio(x, y)).mean())
+
+
+def information_surface(
+    template: Patch,
+    search: Patch,
+    sample: int,
+    seed: int,
+    executor: Executor,
+    progress: Progress = SILENT,
+) -> NDArray[np.float32]:
+    """Return the mutual information of a sample of a template's pixels over all whole shifts.
+
+    The width of the kernels is chosen once, at the shift at which a histogram tells the most
+    information, and is then the same for all.
+
+    Parameters
+    ----------
+    template
+        Shape (h, w).
+    search
+        A window with the same centre, larger by the radius on each side.
+    sample
+        Most pixels that are used; they are the same at all shifts.
+    seed
+        Of the sample and of the cross-validation.
+    executor
+        Threads to work in.
+    progress
+        Is told of every row.
+
+    Returns
+    -------
+    Array of shape (2 radius + 1, 2 radius + 1).
+    """
+    drawn = np.random.default_rng(seed).permutation(np.flatnonzero(template.valid))[:sample]
+    rows, cols = np.divmod(drawn, template.values.shape[1])
+    span = search.values.shape[0] - template.values.shape[0] + 1
+
+    def pairs(dy: int, dx: int) -> tuple[NDArray[Any], NDArray[Any]]:
+        there = rows + dy, cols + dx
+        seen = search.valid[there]
+        return template.values[rows, cols][seen], search.values[there][seen]
+
+    best = _most_informative_shift(template, search)
+    x, y = map(normal_scores, pairs(*best))
+    width = choose_width(x, y, np.column_stack([x, y])[:_SURFACE_KERNELS], seed)
+
+    def row(dy: int) -> list[float]:
+        progress.check()
+        return [
+            maximum_likelihood_mutual_information(
+                *pairs(dy, dx), width, sample, _SURFACE_KERNELS, seed, _ROUGH
+            )
+            for dx in range(span)
+        ]
+
+    found = []
+    for values in executor.map(row, range(span)):
+        found.append(values)
+        progress.update(len(found) / span)
+    return np.array(found, np.float32)
+
+
+def _most_informative_shift(template: Patch, search: Patch) -> tuple[int, int]:
+    """Return the shift (rows, columns), from 0, of the highest mutual information of histograms."""
+    own, other = (to_bins(p.values, p.valid, _ROUGH_BINS) for p in (template, search))
+    radius = (search.values.shape[0] - template.values.shape[0]) // 2
+    counts = count_joint_histograms(own, other, (_ROUGH_BINS,) * 2, radius).counts
+    information = mutual_information(counts)
+    dy, dx = np.unravel_index(information.argmax(), information.shape)
+    return int(dy), int(dx)
 
 
 def _kernels(

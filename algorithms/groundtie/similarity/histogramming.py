@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator
+from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
@@ -23,9 +24,12 @@ from affine import Affine
 from numpy.typing import NDArray
 
 from ..errors import ParameterError
+from ..progress import SILENT, Progress
 from ..rasters.patch import Patch
 from ..rasters.warping import resample
-from .binning import bin_edges
+from .binning import MASKED, bin_edges
+from .joint_histogram import count_joint_histograms, reach
+from .measures import Measure
 
 FloatArray = NDArray[np.float64]
 Bins = NDArray[np.uint8] | NDArray[np.uint16]
@@ -35,6 +39,9 @@ MASKED_LEVEL = np.uint16(65_535)
 
 # Up to so many template pixels every weight is summed up; beyond, that takes too long for a search.
 _EXACT_PIXELS = 20_000
+
+# Histograms of all shifts take no more memory than this together, else each is counted by itself.
+_MOST_VOLUME_BYTES = 150_000_000
 
 
 def to_levels(
@@ -183,6 +190,64 @@ def two_step_histogram(
     return np.bincount(pairs, minlength=shape[0] * shape[1]).reshape(shape).astype(float)
 
 
+def measure_surface(
+    template: Bins,
+    search: Bins,
+    counts: tuple[int, int],
+    measure: Measure,
+    order: int,
+    executor: Executor,
+    progress: Progress = SILENT,
+) -> NDArray[np.float32]:
+    """Return a measure of the joint histogram over all whole shifts.
+
+    Parameters
+    ----------
+    template
+        Bins or grey levels as for `joint_histogram_under`, shape (h, w).
+    search
+        The same of a window with the same centre that is larger on each side by the radius and
+        by `joint_histogram.reach` of the order.
+    counts
+        Number of bins of template and search window.
+    measure
+        What is measured, see `measures`.
+    order
+        Order of the B-spline, 2 to 7.
+    executor
+        Threads to count in.
+    progress
+        Is told of every row.
+
+    Returns
+    -------
+    Array of shape (2 radius + 1, 2 radius + 1).
+    """
+    margin = reach(order)
+    span = search.shape[0] - template.shape[0] - 2 * margin + 1
+
+    def one_by_one(dy: int) -> FloatArray:
+        progress.check()
+        shifts = [Affine.translation(margin + dx, margin + dy) for dx in range(span)]
+        tables = (
+            sparse_joint_histogram_under(template, search, shift, counts, order) for shift in shifts
+        )
+        return np.array([measure(table) for table in tables])
+
+    volume_bytes = 4 * (span + 2 * margin) ** 2 * counts[0] * counts[1]
+    if max(counts) <= MASKED and volume_bytes <= _MOST_VOLUME_BYTES:
+        own, other = (np.minimum(bins, MASKED).astype(np.uint8) for bins in (template, search))
+        volume = count_joint_histograms(own, other, counts, span // 2, executor)
+        rows = executor.map(measure, volume.histograms(order))
+    else:
+        rows = executor.map(one_by_one, range(span))
+    found = []
+    for row in rows:
+        found.append(row)
+        progress.update(len(found) / span)
+    return np.array(found, np.float32)
+
+
 def _places(
     template: Bins, to_image: Affine, sample: NDArray[np.int_] | None
 ) -> tuple[Bins, FloatArray, FloatArray]:
@@ -214,7 +279,10 @@ def _contributions(
     for row, weight_y in zip(rows, along_y, strict=True):
         start = row * stride
         for col, weight_x in zip(cols, along_x, strict=True):
-            yield codes + padded[start + col], None if order == 1 else weight_y * weight_x
+            weights = None if order == 1 else weight_y * weight_x
+            # Under whole shifts, pixels at the ends of even orders' kernels weigh nothing.
+            if weights is None or weights.any():
+                yield codes + padded[start + col], weights
 
 
 def _neighbours(position: FloatArray, size: int, order: int) -> tuple[NDArray[np.intp], FloatArray]:
