@@ -149,9 +149,9 @@ def own_error_px(output: str, pair: Pair) -> float | None:
 
 
 def error_px(output: str, pair: Pair) -> float | None:
-    """Return the error of the matrix in a peer's last line of output, None if it has none."""
+    """Return the error of the matrix in a peer's last line of output, None if there is none."""
     found = json.loads(output.strip().splitlines()[-1])
-    if found is None:
+    if found is None or not np.isfinite(found).all():
         return None
     assert pair.truth is not None
     matrix = np.array(found, float)

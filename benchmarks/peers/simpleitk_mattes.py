@@ -11,7 +11,7 @@ from images import read
 from matrices import tell, threads
 from simpleitk_affine import BINS, matrix
 
-SHRINK = {"translation": (8, 4, 2), "affine": (2, 1)}
+SHRINK = {"translation": (4, 2, 1), "affine": (2, 1)}
 STEP_PX = 2.0
 SMALLEST_STEP_PX = 0.01
 ITERATIONS = 200
