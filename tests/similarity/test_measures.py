@@ -121,9 +121,8 @@ def test_tsallis_by_hand(q: float, expected: float) -> None:
 def test_cluster_reward_and_correlation_ratio_by_hand() -> None:
     chance = np.sqrt(10 / 16 * 1 / 2)
     assert cluster_reward(SMALL) == pytest.approx((3 / 8 / chance - chance) / (1 - chance))
-    # B is 1 for a third of A's first bin and all of its second: means 1/3 and 1 around 1/2.
-    explained = 3 / 4 * (1 / 6) ** 2 + 1 / 4 * (1 / 2) ** 2
-    assert correlation_ratio(SMALL) == pytest.approx(explained / (1 / 4))
+    # A is 1 nowhere in B's first bin and in half of its second: means 0 and 1/2 around 1/4.
+    assert correlation_ratio(SMALL) == pytest.approx((1 / 4) ** 2 / (3 / 16))
 
 
 @pytest.mark.parametrize("alpha", [60.0, 400.0])
@@ -163,10 +162,10 @@ def test_gaussian_pairs_in_closed_form(rho: float) -> None:
 
 
 def test_the_correlation_ratio_knows_functions_of_any_shape() -> None:
-    """B is a parabola of A, then A is no function of B."""
-    a = np.arange(9)
-    table = np.zeros((9, 17))
-    table[a, (a - 4) ** 2] = 1
+    """A is a parabola of B, then B is no function of A."""
+    b = np.arange(9)
+    table = np.zeros((17, 9))
+    table[(b - 4) ** 2, b] = 1
     assert correlation_ratio(table) == pytest.approx(1.0)
     assert correlation_ratio(table.T) == pytest.approx(0.0, abs=1e-12)
 

@@ -91,18 +91,19 @@ def cluster_reward(histograms: Histograms) -> Values:
 
 
 def correlation_ratio(histograms: Histograms) -> Values:
-    """Return which share of B's variance a function of A explains, 0 to 1.
+    """Return which share of A's variance a function of B explains, 0 to 1.
 
-    Roche et al. 1998, doi:10.1007/BFb0056301. The grey value of a bin is its number. For A as a
-    function of B transpose the histogram.
+    Roche et al. 1998, doi:10.1007/BFb0056301. The grey value of a bin is its number. A should be
+    the template: its variance is the same at all shifts. For the other way round transpose the
+    histogram.
     """
     a, b, _ = _tables(histograms)
-    levels = np.arange(b.shape[-1], dtype=float)
-    sums = histograms @ levels
+    levels = np.arange(a.shape[-1], dtype=float)
+    sums = levels @ histograms
     total = _at_least(a.sum(axis=-1))
     mean = (sums.sum(axis=-1) / total)[..., None]
-    explained = ((sums - mean * a) ** 2 / _at_least(a)).sum(axis=-1) / total
-    variance = (b * (levels - mean) ** 2).sum(axis=-1) / total
+    explained = ((sums - mean * b) ** 2 / _at_least(b)).sum(axis=-1) / total
+    variance = (a * (levels - mean) ** 2).sum(axis=-1) / total
     informative = variance > _NOTHING
     return np.where(informative, explained / np.where(informative, variance, 1.0), 0.0)
 
