@@ -21,7 +21,7 @@ from groundtie.kinds import (
     Text,
     VectorIn,
 )
-from groundtie.tools import TOOLS
+from groundtie.tools import load_tools
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 BEGIN = "<!-- parameters: begin, made by scripts/document_tools.py -->"
@@ -148,7 +148,7 @@ def default(parameter: Parameter) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--docs", type=Path, default=DOCS, help="folder of the pages")
-    for path in document(TOOLS, parser.parse_args().docs):
+    for path in document(load_tools(), parser.parse_args().docs):
         print(path)
     return 0
 

@@ -16,8 +16,9 @@ import groundtie
 from groundtie.cli import main
 from groundtie.declaration import Parameter, Tool
 from groundtie.kinds import Band, Choice, Flag, Kind, Number, OutputKind
-from groundtie.tools import TOOLS
+from groundtie.tools import load_tools
 
+TOOLS = load_tools()
 ALL = [toys.TOY, *TOOLS]
 each_tool = pytest.mark.parametrize("tool", ALL, ids=lambda tool: tool.name)
 each_real_tool = pytest.mark.parametrize("tool", TOOLS, ids=lambda tool: tool.name)

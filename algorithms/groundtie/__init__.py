@@ -13,9 +13,21 @@ from .version import __version__
 
 if TYPE_CHECKING:
     from .geometry.transform import load_transform
-    from .tools import assess, coregister, simulate, warp
+    from .tools.assess import assess
+    from .tools.coregister import coregister
+    from .tools.similarity_surface import similarity_surface
+    from .tools.simulate import simulate
+    from .tools.warp import warp
 
-__all__ = ["__version__", "assess", "coregister", "load_transform", "simulate", "warp"]
+__all__ = [
+    "__version__",
+    "assess",
+    "coregister",
+    "load_transform",
+    "similarity_surface",
+    "simulate",
+    "warp",
+]
 
 # Loaded on first use: importing groundtie must stay cheap for the command line's help and QGIS.
 _HOMES = {"load_transform": ".geometry.transform"}
@@ -24,4 +36,5 @@ _HOMES = {"load_transform": ".geometry.transform"}
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_HOMES.get(name, ".tools"), __name__), name)
+    home = _HOMES.get(name, f".tools.{name}")
+    return getattr(importlib.import_module(home, __name__), name)

@@ -6,7 +6,6 @@ Standard output carries the result alone. An error is one line on standard error
 
 from __future__ import annotations
 
-import functools
 import json
 import logging
 import os
@@ -45,7 +44,7 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
     _silence_libraries()
     with _signals() as received:
         try:
-            group = ToolGroup(_all_tools if tools is None else lambda: tools)
+            group = _all_tools() if tools is None else _these_tools(tools)
             command = click.version_option(__version__, message="%(prog)s %(version)s")(group)
             command.main(args, prog_name="groundtie", standalone_mode=False, obj=received)
         except click.ClickException as error:
@@ -58,10 +57,15 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
     return 0
 
 
-def _all_tools() -> Sequence[Tool]:
-    from .tools import TOOLS  # heavy
+def _all_tools() -> ToolGroup:
+    from .tools import NAMES, load_tool
 
-    return TOOLS
+    return ToolGroup(NAMES, load_tool)
+
+
+def _these_tools(tools: Sequence[Tool]) -> ToolGroup:
+    by_name = {tool.name: tool for tool in tools}
+    return ToolGroup(tuple(by_name), by_name.__getitem__)
 
 
 def _fail(message: str, exit_code: int) -> int:
@@ -111,9 +115,9 @@ def _signals() -> Iterator[list[int]]:
 
 
 class ToolGroup(click.Group):
-    """The command `groundtie`; it loads the tools when one of them or their list is needed."""
+    """The command `groundtie`; a tool is loaded, with all that it imports, when it is needed."""
 
-    def __init__(self, load: Callable[[], Sequence[Tool]]) -> None:
+    def __init__(self, names: Sequence[str], load: Callable[[str], Tool]) -> None:
         super().__init__(
             "groundtie",
             help="Register satellite images to one another.",
@@ -121,19 +125,21 @@ class ToolGroup(click.Group):
             callback=_help_without_command,
             context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
         )
+        self._names = {_command_name(name): name for name in names}
         self._load = load
-
-    @functools.cached_property
-    def _tools(self) -> dict[str, ToolCommand]:
-        return {str(command.name): command for command in map(ToolCommand, self._load())}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of the tools in the order in which they are declared."""
-        return list(self._tools)
+        return list(self._names)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return the command of a tool; None if there is no such tool."""
-        return self._tools.get(cmd_name)
+        name = self._names.get(cmd_name)
+        return None if name is None else ToolCommand(self._load(name))
+
+
+def _command_name(tool: str) -> str:
+    return tool.replace("_", "-")
 
 
 @click.pass_context
@@ -148,7 +154,7 @@ class ToolCommand(click.Command):
     def __init__(self, tool: Tool) -> None:
         self.tool = tool
         super().__init__(
-            tool.name.replace("_", "-"),
+            _command_name(tool.name),
             help=f"{tool.summary}\n\n{tool.description}",
             short_help=tool.summary,
             params=[_click_parameter(parameter) for parameter in tool.parameters],

@@ -44,7 +44,7 @@ def all_tools() -> tuple[Any, ...]:
     """Return the declarations of all tools."""
     # what dependencies say to the library's developers is nothing for QGIS's log
     warnings.filterwarnings("ignore", module=rf"{re.escape(library_name())}\b")
-    return tuple(library_module("tools").TOOLS)
+    return tuple(library_module("tools").load_tools())
 
 
 # The light modules, which need no package beyond Python's own.

@@ -30,9 +30,10 @@ from groundtie.kinds import (
     VectorOut,
 )
 from groundtie.quality.verdict import refuse
-from groundtie.tools import TOOLS
+from groundtie.tools import load_tools
 from scripts import document_tools
 
+TOOLS = load_tools()
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 TEXTS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.glob("*.md"))]

@@ -39,6 +39,17 @@ def plugin_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return unpack_plugin(tmp_path_factory.mktemp("plugins"))
 
 
+_ONE_MORE = """
+from ..toys import TOY
+
+_load_shipped = load_tools
+
+
+def load_tools():
+    return (*_load_shipped(), TOY)
+"""
+
+
 @pytest.fixture(scope="session")
 def toy_plugin_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a built plugin whose library has one tool more: that of tests/toys.py."""
@@ -47,7 +58,7 @@ def toy_plugin_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     toys = (ROOT / "tests" / "toys.py").read_text(encoding="utf-8")
     (library / "toys.py").write_text(toys.replace("from groundtie.", "from ."), encoding="utf-8")
     with (library / "tools" / "__init__.py").open("a", encoding="utf-8") as tools:
-        tools.write("\nfrom ..toys import TOY\n\nTOOLS = (*TOOLS, TOY)\n")
+        tools.write(_ONE_MORE)
     return folder
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from groundtie.declaration import Parameter, Tool
 from groundtie.kinds import Band, Choice, Number, OutputKind
-from groundtie.tools import TOOLS
+from groundtie.tools import load_tools
 
 INTEGER = 0  # of QgsProcessingParameterNumber.Type
 TYPES = {
@@ -30,7 +30,7 @@ TYPES = {
 }
 
 
-@pytest.fixture(scope="module", params=TOOLS, ids=lambda tool: tool.name)
+@pytest.fixture(scope="module", params=load_tools(), ids=lambda tool: tool.name)
 def told(request: pytest.FixtureRequest, qgis_process: Any) -> tuple[Tool, dict[str, Any]]:
     """A tool and what qgis_process tells of it."""
     called = qgis_process("--json", "help", f"groundtie:{request.param.name}")

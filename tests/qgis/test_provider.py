@@ -9,7 +9,9 @@ from typing import Any
 
 import pytest
 
-TOOLS = {"coregister", "warp", "simulate"}
+from groundtie.tools import NAMES
+
+TOOLS = set(NAMES)
 
 
 def test_the_provider_offers_every_tool(provider: Any) -> None:

@@ -10,11 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import fiona
 import numpy as np
 from affine import Affine
-from fiona._err import CPLE_BaseError
-from fiona.errors import FionaError, TransactionError
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 from rasterio.errors import CRSError
@@ -102,7 +99,7 @@ def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform:
     write = _WRITERS.get(Path(path).suffix.lower())
     if write is None:
         raise OutputError(f"tie points are written as {', '.join(_WRITERS)}: {path}")
-    with writing(path, FionaError):
+    with writing(path):
         write(Path(path), points, transform)
 
 
@@ -129,8 +126,6 @@ def read_tie_points(path: str | os.PathLike[str], input_grid: Grid) -> StoredTie
     try:
         return read(Path(path), input_grid)
     except (
-        FionaError,
-        CPLE_BaseError,
         OSError,
         ValueError,
         KeyError,
@@ -174,6 +169,8 @@ def _line(row: Row, crs: CRS | None, target: CRS | None) -> dict[str, Any]:
 
 
 def _write_gpkg(path: Path, points: TiePoints, transform: Transform) -> None:
+    from .geopackage import write_layer  # heavy
+
     rows = _rows(points, transform)
     properties = dict.fromkeys(_NUMBERS, "float") | dict.fromkeys(_TEXTS, "str")
     records = (
@@ -184,23 +181,7 @@ def _write_gpkg(path: Path, points: TiePoints, transform: Transform) -> None:
         }
         for row in rows
     )
-    try:
-        with fiona.open(
-            path,
-            "w",
-            driver="GPKG",
-            layer=_LAYER,
-            crs_wkt="" if transform.crs is None else transform.crs.to_wkt(),
-            schema={"geometry": "LineString", "properties": properties},
-        ) as layer:
-            layer.writerecords(records)
-        # SQLite may meet a full disk in silence.
-        with fiona.open(path, layer=_LAYER) as layer:
-            complete = len(layer) == len(rows)
-    except (TransactionError, CPLE_BaseError, RuntimeError):
-        complete = False
-    if not complete:
-        raise OSError("the file is not complete; is the disk full?")
+    write_layer(path, _LAYER, records, len(rows), properties, transform.crs)
 
 
 def _write_geojson(path: Path, points: TiePoints, transform: Transform) -> None:
@@ -240,9 +221,9 @@ def _write_points(path: Path, points: TiePoints, transform: Transform) -> None:
 
 
 def _read_gpkg(path: Path, input_grid: Grid) -> StoredTiePoints:
-    with fiona.open(path) as layer:
-        crs = CRS.from_wkt(layer.crs_wkt) if layer.crs_wkt else None
-        rows = [dict(feature["properties"]) for feature in layer]
+    from .geopackage import read_layer  # heavy
+
+    rows, crs = read_layer(path)
     return _from_rows(rows, input_grid, crs)
 
 

@@ -8,7 +8,6 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline
 
 from ..rasters.grid import Grid
 from ..rasters.patch import Patch
@@ -44,6 +43,8 @@ def overview_positions(to_input_px: ToPixel, grid: Grid) -> ToPixel:
 
     A spline with hundreds of knots would take longer than all the rest of the report.
     """
+    from scipy.interpolate import RectBivariateSpline
+
     cols, rows = (np.linspace(-0.5, side - 0.5, _NODES) for side in (grid.width, grid.height))
     nodes = np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2)
     px = to_input_px(grid.pixel_to_map(nodes))

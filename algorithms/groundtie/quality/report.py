@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import jinja2
 import numpy as np
 import rasterio
 import scipy
@@ -279,6 +278,8 @@ def versions() -> dict[str, str]:
 
 
 def _rendered(template: str, **values: Any) -> str:
+    import jinja2
+
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_TEMPLATES),
         autoescape=True,

@@ -23,6 +23,9 @@ METHODS = tuple(REACH)
 _TOLERANCE_PX = 0.01
 _FIRST_STEP = 64
 
+# Positions nearer than this to pixels lie on them: map coordinates have no more digits.
+_ON_PIXELS = 1e-6
+
 # Stands for positions that are not finite: outside of every image.
 _NOWHERE = -1e9
 
@@ -45,7 +48,7 @@ class Lattice:
 
     def at(self, rows: NDArray[np.int_], cols: NDArray[np.int_]) -> FloatArray:
         """Return the input positions, shape (2, rows, cols), at other rows and columns."""
-        return np.asarray(_hats(self.rows, rows) @ self.px @ _hats(self.cols, cols).T)
+        return _between(_between(self.px, self.rows, rows, 1), self.cols, cols, 2)
 
     def lies_within(self, width: int, height: int) -> bool:
         """Tell whether all positions, also between nodes, lie on pixels of an image."""
@@ -125,8 +128,8 @@ def resample(
     """
     px = np.asarray(px)
     dtype = image.dtype if dtype is None else dtype
-    if np.array_equal(px, np.rint(px)):
-        method = "nearest"  # on pixels, every kernel gives the pixel
+    if np.abs(px - np.rint(px)).max(initial=0) < _ON_PIXELS:
+        method = "nearest"  # every kernel gives the pixel itself
     if method != "nearest" and valid.all() and _touches_no_border(px, image.shape, method):
         values = interpolate(image.astype(working_dtype(image.dtype), copy=False), px, method)
         return _rounded(values, dtype), np.ones(values.shape, bool)
@@ -250,16 +253,18 @@ def _evaluate(grid: Grid, to_input_px: ToInputPx, step: int) -> Lattice:
     return Lattice(rows, cols, px.T.reshape(2, len(rows), len(cols)))
 
 
-def _hats(nodes: NDArray[np.int_], places: NDArray[np.int_]) -> FloatArray:
-    """Return the weights of linear interpolation, shape (places, nodes)."""
-    weights = np.zeros((len(places), len(nodes)))
+def _between(
+    values: FloatArray, nodes: NDArray[np.int_], places: NDArray[np.int_], axis: int
+) -> FloatArray:
+    """Interpolate linearly along an axis, from values at rising nodes to those at places."""
     if len(nodes) == 1:
-        return weights + 1.0
+        return np.repeat(values, len(places), axis)
     left = np.clip(np.searchsorted(nodes, places, side="right") - 1, 0, len(nodes) - 2)
     share = (places - nodes[left]) / (nodes[left + 1] - nodes[left])
-    index = np.arange(len(places))
-    weights[index, left], weights[index, left + 1] = 1 - share, share
-    return weights
+    low, high = values.take(left, axis), values.take(left + 1, axis)
+    return np.asarray(
+        low + np.expand_dims(share, tuple(range(1, values.ndim - axis))) * (high - low)
+    )
 
 
 def _touches_no_border(px: FloatArray, shape: tuple[int, ...], method: str) -> bool:

@@ -26,7 +26,7 @@ FloatArray = NDArray[np.float64]
 
 # Chips and agreement at every level of the pyramid, in pixels of the level.
 _TOLERANCE_PX = 2.0
-_CHIPS_PER_SIDE = 5
+_CHIPS_PER_SIDE = 7
 _CHIP_RANGE_PX = (48, 80)
 
 # Simple models are preferred unless the data speak for others: each has its number of

@@ -1,11 +1,20 @@
-"""What users run: one file a tool, each with its declaration and the steps in order."""
+"""What users run: one module a tool, with its declaration and the steps in order."""
 
 from __future__ import annotations
 
-from ..declaration import tool_of
-from .assess import assess
-from .coregister import coregister
-from .simulate import simulate
-from .warp import warp
+import importlib
 
-TOOLS = tuple(tool_of(function) for function in (coregister, warp, assess, simulate))
+from ..declaration import Tool, tool_of
+
+# In the order in which they are offered; a tool's function has the name of its module.
+NAMES = ("coregister", "warp", "assess", "similarity_surface", "simulate")
+
+
+def load_tool(name: str) -> Tool:
+    """Return the declaration of a tool; of all the tools' modules, its own alone is imported."""
+    return tool_of(getattr(importlib.import_module(f".{name}", __name__), name))
+
+
+def load_tools() -> tuple[Tool, ...]:
+    """Return the declarations of all tools."""
+    return tuple(map(load_tool, NAMES))

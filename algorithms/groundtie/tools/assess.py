@@ -29,7 +29,7 @@ from ..quality.report import PART_LABELS, AssessmentReport
 from ..quality.verdict import Verdict
 from ..rasters.atomic import Outputs
 from ..rasters.reading import RasterSource, bounded_cache, open_raster
-from .warp import _load, _transform_of
+from .stored_transform import load_stored, transform_of
 
 _TABLES = (".gpkg", ".geojson", ".csv", ".points")
 
@@ -285,13 +285,13 @@ class _Files:
         """Return the transform that is judged."""
         if self.transform is not None:
             found = load_transform(self.transform)
-            return found if input is None else _transform_of(found, input, self.transform)
+            return found if input is None else transform_of(found, input, self.transform)
         if input is None:
             raise ParameterError(
                 "give a transform, or the input image, which tells where its pixels claim to be"
             )
         if self.tie_points is not None:
-            return _load(self.tie_points, model, input)[0]
+            return load_stored(self.tie_points, model, input)[0]
         crs = input.grid.crs if reference is None else reference.grid.crs
         if (crs is None) != (input.grid.crs is None):
             raise GeoreferencingError(f"only one of {input.path} and the reference has a CRS")

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import NothingFoundError, NotRegisteredError, SameFileError, TooFewPointsError
 from ..geometry.estimation import Estimate
+from ..geometry.tie_point_files import write_tie_points
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..progress import Progress
@@ -172,8 +173,6 @@ class RegistrationFiles:
     def write_points(self, points: TiePoints, transform: Transform, outputs: Outputs) -> None:
         """Write tie points and transform, if they were asked for."""
         if self.tie_points is not None:
-            from ..geometry.tie_point_files import write_tie_points
-
             write_tie_points(outputs.stage(self.tie_points), points, transform)
         if self.transform is not None:
             staged = outputs.stage(self.transform)

@@ -1,0 +1,75 @@
+"""Layers of lines in a GeoPackage. Importing this is slow: it loads fiona."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import fiona
+from fiona._err import CPLE_BaseError
+from fiona.errors import FionaError, TransactionError
+from rasterio.crs import CRS
+
+
+def write_layer(
+    path: Path,
+    name: str,
+    records: Iterable[dict[str, Any]],
+    count: int,
+    properties: dict[str, str],
+    crs: CRS | None,
+) -> None:
+    """Write features with lines as geometries.
+
+    Parameters
+    ----------
+    path, name
+        The file, and the layer's name.
+    records, count
+        The features as GeoJSON has them, and how many there are.
+    properties
+        Types of the properties, by name.
+    crs
+        Of the geometries; None: unknown.
+
+    Raises
+    ------
+    OSError
+        Not everything could be written.
+    """
+    try:
+        with fiona.open(
+            path,
+            "w",
+            driver="GPKG",
+            layer=name,
+            crs_wkt="" if crs is None else crs.to_wkt(),
+            schema={"geometry": "LineString", "properties": properties},
+        ) as layer:
+            layer.writerecords(records)
+        # SQLite may meet a full disk in silence.
+        with fiona.open(path, layer=name) as layer:
+            complete = len(layer) == count
+    except (TransactionError, CPLE_BaseError, RuntimeError):
+        complete = False
+    except FionaError as error:
+        raise OSError(str(error)) from error
+    if not complete:
+        raise OSError("the file is not complete; is the disk full?")
+
+
+def read_layer(path: Path) -> tuple[list[dict[str, Any]], CRS | None]:
+    """Return the properties of all features of the first layer, and its CRS.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    """
+    try:
+        with fiona.open(path) as layer:
+            crs = CRS.from_wkt(layer.crs_wkt) if layer.crs_wkt else None
+            return [dict(feature["properties"]) for feature in layer], crs
+    except (FionaError, CPLE_BaseError) as error:
+        raise OSError(str(error)) from error
