@@ -97,20 +97,22 @@ class ChipCase:
         matcher = ChipMatcher(
             pair.images, grid, pair.to_input_px, SimilaritySettings(similarity=similarity)
         )
-        centres = chip_centres(grid, chip_px, self.most_chips)
+        # Larger chips take longer, and overlap more.
+        most = self.most_chips * CHIPS_PX[0] // chip_px
+        centres = chip_centres(grid, chip_px, most)
         started = time.perf_counter()
         _, surfaces = matcher.match_forward(centres, chip_px, RADIUS_PX, executor)
         seconds = time.perf_counter() - started
         count = len(surfaces)
-        errors = [math.dist(find_peak(s).shift_px, pair.offset_px) for s in surfaces]
-        shares = tuple(float(np.mean(np.array(errors) <= limit)) for limit in LIMITS_PX)
+        errors = np.array([math.dist(find_peak(s).shift_px, pair.offset_px) for s in surfaces])
+        within = (float(np.mean(errors <= limit)) for limit in LIMITS_PX)
         return ChipShare(
             self.scene.name,
             self.scene.group,
             similarity,
             chip_px,
             count,
-            shares if count else (),
+            tuple(within) if count else (),
             1e3 * seconds / max(count, 1),
         )
 

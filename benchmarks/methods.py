@@ -75,7 +75,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 _NOTES = (
-    f"Chips: at most {_MOST_CHIPS} a pair, every {SPACING_PX} px, ± {RADIUS_PX} px search, no "
+    f"Chips: at most {_MOST_CHIPS} a pair (of larger ones, fewer), every {SPACING_PX} px, ± {RADIUS_PX} px search, no "
     "support from neighbours. The input is resampled by the affine truth and moved by "
     f"{OFFSETS_PX[0]:g} to {OFFSETS_PX[1]:g} px each way; chance alone brings "
     f"{np.pi * LIMITS_PX[-1] ** 2 / (2 * RADIUS_PX + 1) ** 2:.1%} within {LIMITS_PX[-1]:g} px.",
