@@ -1,0 +1,334 @@
+"""The pose by stepping over rotation and scale, with all shifts at once (thesis P 3.2.2).
+
+Coarse to fine: every rotation and scale is tried on small images; the best candidates are tried
+again in finer steps on larger ones, and compared with one another on the way. Similarity is the
+correlation of squared orientation fields, which is quick over all shifts, and right between SAR
+and optical images.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rasters.patch import Patch
+from ..similarity.surface import SimilaritySettings, Surface
+from .pose import Pose, PoseFound, PoseLimits
+from .rotation_fields import Template
+from .rotation_levels import Level, in_threads, parabola
+
+FloatArray = NDArray[np.float64]
+
+# Side of the small images on which all is tried, in pixels: the geometric mean of both images'.
+_COARSE_SIDE_PX = 96
+
+# Images larger than this tell nothing more.
+_FINE_SIDE_PX = 384
+
+# A step of rotation moves what lies a quarter of the side off the centre by this, in pixels. A
+# step of scale moves it by a quarter more, as fields are less sensitive to that.
+_STEP_PX = 1.7
+_SCALE_STEP = 1.25
+
+# How many candidates are tried again on each finer level.
+_KEPT = (32, 8, 4)
+
+# How far a candidate may be off on the next finer level, in its pixels; even.
+_NEAR_PX = 4
+
+# How often the steps are halved on the finest level, and how many of them are taken at most.
+_HALVINGS = 3
+_CLIMBS = 3
+
+# Poses are the same if they move the reference's corners by less than this share of its side.
+_SAME_SHARE = 0.06
+
+# Least share of the smaller image's side that overlaps.
+_LEAST_OVERLAP = 0.3
+
+# Radius of the surface that tells how high chance is, in pixels of the finest level; even.
+_BACKGROUND_PX = 32
+
+
+@dataclass(frozen=True)
+class Scan:
+    """How well the input matches at every rotation and scale, on small images.
+
+    Parameters
+    ----------
+    rotations_deg, scales
+        The steps, rising, shapes (r,) and (s,).
+    heights
+        The best of all shifts, in standard deviations of chance, shape (s, r).
+    found
+        The best candidates, best first; their height is that of `heights`.
+    """
+
+    rotations_deg: FloatArray
+    scales: FloatArray
+    heights: FloatArray
+    found: tuple[PoseFound, ...]
+
+
+def rotation_steps(
+    reference: Patch,
+    input: Patch,
+    limits: PoseLimits,
+    settings: SimilaritySettings,
+    executor: Executor | None = None,
+) -> list[PoseFound]:
+    """Search by stepping over rotation and scale; a `PoseSearch`.
+
+    Parameters
+    ----------
+    reference, input
+        The windows.
+    limits
+        What is searched.
+    settings
+        Not used: similarity is the correlation of squared orientation fields.
+    executor
+        Threads to work in.
+
+    Returns
+    -------
+    Different candidates, best first. Their heights are compared at the same pixel size, so that
+    the ratio of the first two tells how unlikely a mistake is.
+    """
+    if reference.is_flat or input.is_flat:
+        return []
+    return _Search(reference, input, limits, executor).run()
+
+
+def scan(
+    reference: Patch, input: Patch, limits: PoseLimits, executor: Executor | None = None
+) -> Scan:
+    """Try all rotations and scales within limits on small images."""
+    return _Search(reference, input, limits, executor).scan()
+
+
+def shift_surface(reference: Patch, input: Patch, pose: Pose) -> tuple[Surface, float]:
+    """Return how well images match around a pose, and the surface's pixel in reference pixels.
+
+    The surface has the shape (2 r + 1, 2 r + 1); its values are robust standard deviations.
+    """
+    search = _Search(reference, input, PoseLimits(0.0, 0.0, (pose.scale, pose.scale)), None)
+    level = search.level(search.fine_px, [pose.scale])
+    surface = level.surface(Template(level.reference, _BACKGROUND_PX), pose)
+    return surface / np.float32(_spread(surface)), level.pixel_px
+
+
+def moved_px(one: Pose, other: Pose, shape: tuple[int, int]) -> float:
+    """Return how far two poses put the corners of a reference apart, in reference pixels (RMS)."""
+    rows, cols = shape
+    corners = np.array([[x, y] for x in (-cols / 2, cols / 2) for y in (-rows / 2, rows / 2)])
+    apart = corners @ (one.linear - other.linear).T + np.subtract(one.shift_px, other.shift_px)
+    return float(np.sqrt((apart**2).sum(axis=1).mean()) / one.scale)
+
+
+@dataclass(frozen=True)
+class _Search:
+    reference: Patch
+    input: Patch
+    limits: PoseLimits
+    executor: Executor | None
+
+    @cached_property
+    def side_px(self) -> float:
+        """Geometric mean of the images' longer sides, in reference pixels."""
+        own, other = (max(patch.values.shape) for patch in (self.reference, self.input))
+        return float(np.sqrt(own * other / np.sqrt(np.prod(self.limits.scale))))
+
+    @property
+    def coarse_px(self) -> float:
+        """Pixel size of the small images, in reference pixels."""
+        return max(self.side_px / _COARSE_SIDE_PX, 1.0)
+
+    @property
+    def fine_px(self) -> float:
+        """Pixel size of the largest images, in reference pixels."""
+        return max(self.side_px / _FINE_SIDE_PX, 1.0)
+
+    @property
+    def whole_circle(self) -> bool:
+        return self.limits.rotation_deg >= 180
+
+    @property
+    def steps(self) -> tuple[float, float]:
+        """Steps of rotation (degrees) and of log2 of the scale on the small images."""
+        angle = _STEP_PX * self.coarse_px / (self.side_px / 4)
+        return float(np.degrees(angle)), _SCALE_STEP * angle / float(np.log(2))
+
+    def run(self) -> list[PoseFound]:
+        scanned = self.scan()
+        found: Sequence[PoseFound] = scanned.found
+        count = scanned.heights.size
+        rotation, scale = self.steps
+        pixel_px = self.coarse_px
+        for kept in _KEPT:
+            if not found:
+                return []
+            pixel_px = max(pixel_px / 2, self.fine_px)
+            rotation, scale = rotation / 2, scale / 2
+            level = self.level(pixel_px, [candidate.pose.scale for candidate in found[:kept]])
+            climber = _Climber(level, rotation, scale, self.limits)
+            climbed = list(in_threads(self.executor, climber.climb, found[:kept]))
+            count += sum(candidate.evaluations for candidate in climbed)
+            found = self.distinct(climbed)
+            if pixel_px == self.fine_px:
+                break
+        best = climber.climb_finely(found[0])
+        count += best.evaluations
+        chance = _spread(level.surface(Template(level.reference, _BACKGROUND_PX), best.pose))
+        return [
+            PoseFound(candidate.pose, candidate.height / chance, count)
+            for candidate in (best, *found[1:])
+        ]
+
+    def scan(self) -> Scan:
+        rotations, scales = self.rotations_deg(), self.scales()
+        level = self.level(self.coarse_px, scales)
+        # A search that has few steps finds several candidates at each.
+        peaks = max(2 * _KEPT[0] // (len(rotations) * len(scales)), 1)
+
+        def at_scale(scale: float) -> list[list[PoseFound]]:
+            template = Template(level.reference, self.radius(level, scale))
+            poses = [Pose(float(rotation), scale) for rotation in rotations]
+            surfaces = self.surfaces(level, template, poses)
+            allowed = self.limits.radius_px
+            pairs = zip(surfaces, poses, strict=True)
+            return [level.peaks(surface, pose, allowed, peaks) for surface, pose in pairs]
+
+        rows = list(in_threads(self.executor, at_scale, [float(scale) for scale in scales]))
+        heights = np.array([[found[0].height for found in row] for row in rows])
+        tops = np.argwhere(_is_local_maximum(heights, self.whole_circle))
+        found = [one for i, j in tops for one in rows[i][j] if one.height > 0]
+        return Scan(rotations, scales, heights, tuple(_best_first(found)))
+
+    def surfaces(self, level: Level, template: Template, poses: Sequence[Pose]) -> list[Surface]:
+        """Return the surfaces of all rotations at one scale."""
+        if not self.whole_circle:
+            return [level.surface(template, pose) for pose in poses]
+        field = level.input(poses[0].scale)
+        pairs = [template.surfaces_both_ways(field, pose) for pose in poses[: len(poses) // 2]]
+        return [one for one, _ in pairs] + [other for _, other in pairs]
+
+    def level(self, pixel_px: float, scales: Iterable[float]) -> Level:
+        return Level.of(self.reference, self.input, pixel_px, scales, self.executor)
+
+    def rotations_deg(self) -> FloatArray:
+        step = self.steps[0]
+        if self.whole_circle:
+            half = int(np.ceil(180 / step))
+            return np.asarray(180 / half * np.arange(-half, half))
+        largest = self.limits.rotation_deg
+        return np.linspace(-largest, largest, int(np.ceil(2 * largest / step - 1e-9)) + 1)
+
+    def scales(self) -> FloatArray:
+        low, high = np.log2(self.limits.scale)
+        count = int(np.ceil((high - low) / self.steps[1] - 1e-9)) + 1
+        return np.asarray(np.exp2(np.linspace(low, high, count)))
+
+    def radius(self, level: Level, scale: float) -> int:
+        """Return the radius in pixels of a level that covers all shifts at a scale; even."""
+        own, other = max(self.reference.values.shape), max(self.input.values.shape) / scale
+        useful = (own + other) / 2 - _LEAST_OVERLAP * min(own, other)
+        # The limits are along the input's rows and columns, which may lie across.
+        turn = np.radians(min(self.limits.rotation_deg, 45.0))
+        wanted = self.limits.radius_px / scale * (np.cos(turn) + np.sin(turn))
+        return 2 * int(np.ceil(min(wanted, useful) / level.pixel_px / 2))
+
+    def distinct(self, candidates: Iterable[PoseFound]) -> list[PoseFound]:
+        """Return candidates, best first, without those nearly the same as a better one."""
+        kept: list[PoseFound] = []
+        least = _SAME_SHARE * self.side_px
+        shape = self.reference.values.shape[0], self.reference.values.shape[1]
+        for candidate in _best_first(candidates):
+            if all(moved_px(candidate.pose, other.pose, shape) > least for other in kept):
+                kept.append(candidate)
+        return kept
+
+
+@dataclass(frozen=True)
+class _Climber:
+    """Looks for better poses nearby: steps of rotation (degrees) and of log2 of the scale."""
+
+    level: Level
+    rotation: float
+    scale: float
+    limits: PoseLimits
+
+    @cached_property
+    def template(self) -> Template:
+        return Template(self.level.reference, _NEAR_PX)
+
+    def climb(self, start: PoseFound) -> PoseFound:
+        """Return the best of a candidate and its neighbours, tried on this level."""
+        tried = self.around(start.pose)
+        return replace(max(tried.values(), key=_height), evaluations=len(tried))
+
+    def climb_finely(self, start: PoseFound) -> PoseFound:
+        """Return the best pose near a candidate of this level, between the steps."""
+        best, count, climber = start, 0, self
+        for _ in range(_HALVINGS):
+            climber = replace(climber, rotation=climber.rotation / 2, scale=climber.scale / 2)
+            for _ in range(_CLIMBS):
+                tried = climber.around(best.pose)
+                count += len(tried)
+                centre, best = tried[0, 0], max(tried.values(), key=_height)
+                if best is centre:
+                    break
+        turn, grow = (
+            parabola([tried[-i, -j].height, best.height, tried[i, j].height])[0]
+            if best is centre and {(i, j), (-i, -j)} <= tried.keys()
+            else 0.0
+            for i, j in ((1, 0), (0, 1))
+        )
+        between = climber.level.best(climber.template, climber.step(best.pose, turn, grow))
+        return replace(max(best, between, key=_height), evaluations=count + 1)
+
+    def around(self, pose: Pose) -> dict[tuple[int, int], PoseFound]:
+        """Return the matches at a pose and its neighbours within the limits, by steps."""
+        poses = {(i, j): self.step(pose, i, j) for i, j in product((0, -1, 1), repeat=2)}
+        return {
+            steps: self.level.best(self.template, near)
+            for steps, near in poses.items()
+            if steps == (0, 0) or self.is_allowed(near)
+        }
+
+    def step(self, pose: Pose, rotation: float, scale: float) -> Pose:
+        turned = (pose.rotation_deg + rotation * self.rotation + 180) % 360 - 180
+        return replace(pose, rotation_deg=turned, scale=pose.scale * 2 ** (scale * self.scale))
+
+    def is_allowed(self, pose: Pose) -> bool:
+        low, high = self.limits.scale
+        return abs(pose.rotation_deg) <= self.limits.rotation_deg and low <= pose.scale <= high
+
+
+def _is_local_maximum(heights: FloatArray, circular: bool) -> NDArray[np.bool_]:
+    """Tell which heights, shape (scales, rotations), no neighbour exceeds."""
+    sides = {"mode": "wrap"} if circular else {"constant_values": -np.inf}
+    around = np.pad(heights, ((1, 1), (0, 0)), constant_values=-np.inf)
+    around = np.pad(around, ((0, 0), (1, 1)), **sides)
+    rows, cols = heights.shape
+    shifted = [around[i : i + rows, j : j + cols] for i, j in product(range(3), repeat=2)]
+    return np.asarray(heights >= np.max(shifted, axis=0))
+
+
+def _spread(surface: Surface) -> float:
+    """Return the robust standard deviation of a surface."""
+    return max(1.4826 * float(np.median(np.abs(surface - np.median(surface)))), 1e-9)
+
+
+def _height(found: PoseFound) -> float:
+    return found.height
+
+
+def _best_first(found: Iterable[PoseFound]) -> list[PoseFound]:
+    return sorted(found, key=_height, reverse=True)
