@@ -75,9 +75,9 @@ def run(settings: Settings) -> SuiteResult:
 
 
 _NOTES = (
-    f"Chips: at most {_MOST_CHIPS} a pair (of larger ones, fewer), every {SPACING_PX} px, ± {RADIUS_PX} px search, no "
-    "support from neighbours. The input is resampled by the affine truth and moved by "
-    f"{OFFSETS_PX[0]:g} to {OFFSETS_PX[1]:g} px each way; chance alone brings "
+    f"Chips: at most {_MOST_CHIPS} a pair (fewer of larger ones), every {SPACING_PX} px, "
+    f"± {RADIUS_PX} px search, no support from neighbours. The input is resampled by the affine "
+    f"truth and moved by {OFFSETS_PX[0]:g} to {OFFSETS_PX[1]:g} px each way; chance alone brings "
     f"{np.pi * LIMITS_PX[-1] ** 2 / (2 * RADIUS_PX + 1) ** 2:.1%} within {LIMITS_PX[-1]:g} px.",
     f"Registrations: from starts that are wrong by {SHIFTS_PX[0]:g} to {SHIFTS_PX[1]:g} px each "
     f"way, whole processes, at most {TIME_LIMIT_S:g} s. A program that says it found nothing, "
