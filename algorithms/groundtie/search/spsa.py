@@ -39,8 +39,10 @@ Measure = Callable[[FloatArray], float]
 # Spall's exponents: the least that still converge.
 ALPHA, GAMMA = 0.602, 0.101
 
-# A climb ends after so many evaluations without a better place (thesis S 4.4.1).
+# A climb ends after so many evaluations without a change (thesis S 4.4.1): without more than what
+# the usual slope rises in so many pixels.
 PATIENCE = 40
+_CHANGE_PX = 0.05
 
 # Ends of climbs that are the same place, in pixels: at the latest perturbation they cannot be
 # told apart.
@@ -74,7 +76,7 @@ class Gains:
         return self.look_px / (k + 1) ** GAMMA
 
 
-DISCRETE, DISCRETE_EFFORT = Gains(step_px=4.0), Effort(agreeing=6)
+DISCRETE, DISCRETE_EFFORT = Gains(), Effort(agreeing=4)
 CONTINUOUS = Gains(look_px=1.0)
 
 
@@ -95,7 +97,7 @@ class _Slopes:
 
     @property
     def usual(self) -> float:
-        return float(np.sqrt(self._squares / self.steps))
+        return float(np.sqrt(self._squares / max(self.steps, 1)))
 
     def newton(self, gradient: FloatArray, step_px: float) -> FloatArray:
         """Return the uphill step of second order; where nothing is curved, that of first order.
@@ -123,7 +125,7 @@ def climb_first_order(
         slopes.add(slope)
         return gains.step(k) * slope / (slopes.usual or 1.0) * signs
 
-    return _climb(similarity, space, start, uphill)
+    return _climb(similarity, space, start, rng, uphill)
 
 
 def climb_second_order(
@@ -145,31 +147,40 @@ def climb_second_order(
             return np.zeros(at.size)
         return gains.step(k) / gains.step_px * slopes.newton(slope * signs, gains.step_px)
 
-    return _climb(similarity, space, start, uphill)
+    return _climb(similarity, space, start, rng, uphill)
 
 
 def _climb(
     similarity: Counted,
     space: PoseSpace,
     start: Place,
+    rng: np.random.Generator,
     uphill: Callable[[Measure, FloatArray, _Slopes], FloatArray],
 ) -> Place:
-    """Step uphill until `PATIENCE` evaluations have found nothing better than the best place."""
-    best, waited = start, 0
+    """Step uphill until `PATIENCE` evaluations have changed the best value by next to nothing."""
+    best, mark, waited = start, similarity(start), 0
+    slopes = _Slopes(len(start))
+
+    def settle(values: FloatArray) -> Place:
+        if space.origin is None:
+            return space.settle(values)
+        # Up or down by chance: steps are as long in all dimensions, and plain rounding would
+        # never leave the squares of one colour of the chessboard.
+        return space.settle(values + rng.uniform(-0.5, 0.5, values.size))
 
     def look(values: FloatArray) -> float:
-        nonlocal best, waited
-        place = space.settle(values)
+        nonlocal best, mark, waited
+        place = settle(values)
         value = similarity(place)
+        best = max(best, place, key=similarity)
         waited += 1
-        if value > similarity(best):
-            best, waited = place, 0
+        if value > mark + _CHANGE_PX * slopes.usual:
+            mark, waited = value, 0
         return value
 
-    slopes = _Slopes(len(start))
     at = np.array(start)
     while waited < PATIENCE:
-        at = np.array(space.settle(at + uphill(look, at, slopes)))
+        at = np.array(settle(at + uphill(look, at, slopes)))
         look(at)
     return best
 
