@@ -18,6 +18,7 @@ from groundtie.rasters.pair import ImagePair
 from groundtie.search.layout import lay_out_chips
 from groundtie.search.local import LocalSearch
 from groundtie.search.pyramid import find_coarse_model
+from groundtie.search.rough import RoughSearch
 from groundtie.similarity.surface import SimilaritySettings
 
 
@@ -28,7 +29,7 @@ def search_of(pair: ImagePair, similarity: str) -> LocalSearch:
 def registered(files: TexturedPair, kind: str, similarity: str) -> tuple[Estimate, TiePoints]:
     with files.opened() as pair, ThreadPoolExecutor(2) as executor:
         search = search_of(pair, similarity)
-        coarse = find_coarse_model(pair, search, 200.0, executor, SILENT)
+        coarse = find_coarse_model(pair, search, RoughSearch(200.0), executor, SILENT)
         assert coarse is not None
         estimate = search.estimate(coarse, kind, 0, executor)
         return estimate, search.check_points(estimate.transform.model, executor)

@@ -22,11 +22,17 @@ from groundtie.progress import SILENT, Progress
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.search.coarse import refine_on_level, shift_model
+from groundtie.search.coarse import refine_on_level
 from groundtie.search.layout import lay_out_chips
 from groundtie.search.local import LocalSearch
 from groundtie.search.pyramid import find_coarse_model
-from groundtie.search.rough import Candidate, level_factor, rough_candidates
+from groundtie.search.rough import (
+    Candidate,
+    RoughSearch,
+    level_factor,
+    rough_candidates,
+    shift_model,
+)
 from groundtie.similarity.surface import SimilaritySettings
 
 SETTINGS = SimilaritySettings("orientation")
@@ -38,6 +44,10 @@ def nothing_held_out(piece: Grid) -> np.ndarray:
 
 def search_of(pair: ImagePair) -> LocalSearch:
     return LocalSearch(pair, lay_out_chips(pair), SETTINGS)
+
+
+def shift_m(candidate: Candidate) -> tuple[float, ...]:
+    return tuple(candidate.model([[0.0, 0.0]])[0])
 
 
 def error_m(model: Model, files: TexturedPair) -> float:
@@ -60,10 +70,12 @@ def test_levels_are_no_larger_than_512_pixels() -> None:
 
 
 def test_the_best_candidate_is_the_shift(pair: ImagePair, executor: Executor) -> None:
-    found = rough_candidates(pair, pair.grid, 15, SETTINGS, nothing_held_out, executor)
-    assert (found[0].dx, found[0].dy) == pytest.approx((70, -45), abs=2)
+    found = rough_candidates(
+        pair, pair.grid, RoughSearch(140.0), SETTINGS, nothing_held_out, executor
+    )
+    assert shift_m(found[0]) == pytest.approx((70, -45), abs=2)
     assert [c.height for c in found] == sorted((c.height for c in found), reverse=True)
-    places = np.array([[c.dx, c.dy] for c in found])
+    places = np.array([shift_m(c) for c in found])
     gaps = np.abs(places[:, None] - places[None]).max(axis=2)[np.triu_indices(len(found), 1)]
     # Candidates are at least four pixels apart, but for their sub-pixel parts.
     assert (gaps > 30).all()
@@ -73,8 +85,8 @@ def test_candidates_on_a_coarser_level_are_in_map_units(
     pair: ImagePair, executor: Executor
 ) -> None:
     level = pair.grid.scaled(2)
-    found = rough_candidates(pair, level, 8, SETTINGS, nothing_held_out, executor)
-    assert (found[0].dx, found[0].dy) == pytest.approx((70, -45), abs=6)
+    found = rough_candidates(pair, level, RoughSearch(140.0), SETTINGS, nothing_held_out, executor)
+    assert shift_m(found[0]) == pytest.approx((70, -45), abs=6)
 
 
 @pytest.mark.parametrize("which", ["reference", "input"])
@@ -88,11 +100,13 @@ def test_images_without_content_are_named(
     with open_raster(paths["reference"]) as reference, open_raster(paths["input"]) as input:
         pair = make_pair(Image(reference), Image(input))
         with pytest.raises(RasterContentError, match=rf"empty\.tif.*{text}"):
-            rough_candidates(pair, pair.grid, 5, SETTINGS, nothing_held_out, executor)
+            rough_candidates(
+                pair, pair.grid, RoughSearch(40.0), SETTINGS, nothing_held_out, executor
+            )
 
 
 def test_the_model_of_a_candidate_is_its_shift() -> None:
-    model = shift_model(Candidate(30.0, -20.0, 9.0))
+    model = shift_model(30.0, -20.0)
     np.testing.assert_allclose(model([[500_000.0, 4e6]]), [[500_030, 4e6 - 20]])
 
 
@@ -139,7 +153,7 @@ def test_from_the_rough_shift_to_a_model(
 ) -> None:
     files = write_textured_pair(tmp_path, size, shift_on_map(-90.0, 110.0))
     with files.opened() as pair:
-        model = find_coarse_model(pair, search_of(pair), 200.0, executor, SILENT)
+        model = find_coarse_model(pair, search_of(pair), RoughSearch(200.0), executor, SILENT)
     assert model is not None
     assert error_m(model, files) < 10
 
@@ -148,7 +162,7 @@ def test_a_radius_larger_than_the_scene_is_no_more_work_than_the_scene(
     textured: TexturedPair, pair: ImagePair, executor: Executor
 ) -> None:
     """A thousand kilometres: beyond the scene's size nothing is left to compare."""
-    model = find_coarse_model(pair, search_of(pair), 1e6, executor, SILENT)
+    model = find_coarse_model(pair, search_of(pair), RoughSearch(1e6), executor, SILENT)
     assert model is not None
     assert error_m(model, textured) < 10
 
@@ -156,4 +170,4 @@ def test_a_radius_larger_than_the_scene_is_no_more_work_than_the_scene(
 def test_cancelling(pair: ImagePair, executor: Executor) -> None:
     progress = Progress(is_cancelled=lambda: True)
     with pytest.raises(CancelledError):
-        find_coarse_model(pair, search_of(pair), 200.0, executor, progress)
+        find_coarse_model(pair, search_of(pair), RoughSearch(200.0), executor, progress)

@@ -17,6 +17,7 @@ from groundtie.rasters.reading import open_raster
 from groundtie.search.layout import lay_out_chips
 from groundtie.search.local import LocalSearch
 from groundtie.search.pyramid import find_coarse_model
+from groundtie.search.rough import RoughSearch
 from groundtie.similarity.surface import SimilaritySettings
 
 PERIOD_PX = 40
@@ -38,7 +39,7 @@ def coarse_shift_px(folder: Path, values: np.ndarray, radius_m: float) -> np.nda
     ):
         pair = make_pair(Image(one), Image(other))
         search = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("orientation"))
-        model = find_coarse_model(pair, search, radius_m, executor, SILENT)
+        model = find_coarse_model(pair, search, RoughSearch(radius_m), executor, SILENT)
         centre = grid.pixel_to_map([grid.centre_px])
         return (grid.map_to_pixel(model(centre)) - [grid.centre_px])[0]
 

@@ -18,6 +18,7 @@ from groundtie.quality.verdict import refuse
 from groundtie.rasters.pair import ImagePair
 from groundtie.search.layout import lay_out_chips
 from groundtie.search.local import LocalSearch
+from groundtie.search.rough import RoughSearch
 from groundtie.similarity.surface import SimilaritySettings
 from groundtie.tools.registration import (
     Registration,
@@ -38,7 +39,7 @@ def pair(textured: TexturedPair) -> Iterator[ImagePair]:
 def registration(pair: ImagePair) -> Registration:
     search = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("orientation"))
     with ThreadPoolExecutor(2) as executor:
-        return register(pair, search, 200.0, "auto", 3.0, 0, executor, SILENT)
+        return register(pair, search, RoughSearch(200.0), "auto", 3.0, 0, executor, SILENT)
 
 
 def report_of(registration: Registration) -> Report:

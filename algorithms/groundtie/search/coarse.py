@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..geometry.chance import agreement_probability, log10_false_alarms
 from ..geometry.fitting import fit_model
-from ..geometry.models import Frame, Model, PolynomialModel
+from ..geometry.models import Model
 from ..geometry.robust import distances, find_consensus
 from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
@@ -19,7 +19,6 @@ from ..rasters.pair import ImagePair
 from ..similarity.evidence import find_peak
 from ..similarity.surface import SimilaritySettings
 from .matching import ChipMatcher, MaskOf
-from .rough import Candidate
 from .support import support
 
 FloatArray = NDArray[np.float64]
@@ -44,13 +43,6 @@ class CoarseModel:
 
     model: Model
     log10_false_alarms: float
-
-
-def shift_model(candidate: Candidate) -> Model:
-    """Return the translation of a rough candidate as a model."""
-    return PolynomialModel(
-        "translation", Frame(Affine.identity()), np.array([[candidate.dx, candidate.dy]])
-    )
 
 
 def refine_on_level(

@@ -11,10 +11,9 @@ from ..geometry.models import Model
 from ..progress import Progress
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
-from ..similarity.correlation import MINIMUM_OVERLAP
-from .coarse import CoarseModel, refine_on_level, shift_model
+from .coarse import CoarseModel, refine_on_level
 from .local import LocalSearch
-from .rough import level_factor, rough_candidates
+from .rough import RoughSearch, level_factor, rough_candidates
 
 # A candidate that random matches would hardly ever support (log10) needs no rival.
 _CERTAIN = -6.0
@@ -39,7 +38,7 @@ _STEP = 4.0
 
 
 def find_coarse_model(
-    pair: ImagePair, search: LocalSearch, radius_m: float, executor: Executor, progress: Progress
+    pair: ImagePair, search: LocalSearch, rough: RoughSearch, executor: Executor, progress: Progress
 ) -> Model:
     """Return a model of degree 1 on the map, from which tie points can be searched for.
 
@@ -49,8 +48,8 @@ def find_coarse_model(
         The images.
     search
         Gives the similarity and what is held out.
-    radius_m
-        How far the input may lie from where it claims to be, in metres.
+    rough
+        How far the input may lie from where it claims to be, and how it is searched for.
     executor
         Threads to work in.
     progress
@@ -63,13 +62,7 @@ def find_coarse_model(
     """
     factor = level_factor(pair.grid)
     level = pair.grid if factor == 1 else pair.grid.scaled(factor)
-    # The true place may lie a pixel of the level further than the whole pixels say.
-    radius_px = int(np.ceil(radius_m / level.pixel_size_m)) + 1
-    # Farther off too little of the images overlaps.
-    radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.width, level.height)))
-    candidates = rough_candidates(
-        pair, level, radius_px, search.settings, search.held_out, executor
-    )
+    candidates = rough_candidates(pair, level, rough, search.settings, search.held_out, executor)
     progress.update(0.3)
 
     def refine(level: Grid, model: Model, radius_px: int) -> CoarseModel:
@@ -83,7 +76,7 @@ def find_coarse_model(
         certain = tried and min(_alarms(model) for model in tried) < _CERTAIN
         if certain and candidate.height < _RIVAL_HEIGHT * candidates[0].height:
             break
-        tried.append(refine(level, shift_model(candidate), _RADIUS_PX))
+        tried.append(refine(level, candidate.model, _RADIUS_PX))
     if not tried or min(map(_alarms, tried)) > _HOPELESS:
         raise NothingFoundError("nothing in common was found")
     best = min(tried, key=_alarms)

@@ -1,17 +1,23 @@
-"""The rough shift: candidates from one exhaustive search over a reduced image."""
+"""The rough shift or pose: candidates from one search over a reduced image."""
 
 from __future__ import annotations
 
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
+import numpy as np
+from affine import Affine
+
 from ..errors import RasterContentError
+from ..geometry.models import Frame, Model, PolynomialModel
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
+from ..similarity.correlation import MINIMUM_OVERLAP
 from ..similarity.evidence import find_peak
 from ..similarity.surface import BORDER_PX, SimilaritySettings, describe, similarity_surface
 from .matching import MaskOf
+from .pose import Pose, PoseLimits, PoseSearch
 
 # The longer side of the reduced image, in pixels, and how many candidates are kept.
 LEVEL_SIDE_PX = 512
@@ -28,12 +34,38 @@ _BINS = 8
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """A shift of the map at which the images may match: map units, and the peak's height."""
+class RoughSearch:
+    """How far the input may lie from where it claims to be, and how it is searched for.
 
-    dx: float
-    dy: float
+    Parameters
+    ----------
+    radius_m
+        Largest shift, in metres.
+    rotation_deg
+        Largest rotation, either way.
+    scale
+        Smallest and largest scale of the input against what it claims.
+    poses
+        What searches for rotation, scale and shift; None: shifts alone, each of them.
+    """
+
+    radius_m: float
+    rotation_deg: float = 0.0
+    scale: tuple[float, float] = (1.0, 1.0)
+    poses: PoseSearch | None = None
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model of degree 1 on the map by which the images may match, and its peak's height."""
+
+    model: Model
     height: float
+
+
+def shift_model(dx: float, dy: float) -> Model:
+    """Return a translation in map units as a model."""
+    return PolynomialModel("translation", Frame(Affine.identity()), np.array([[dx, dy]]))
 
 
 def level_factor(grid: Grid) -> float:
@@ -44,12 +76,12 @@ def level_factor(grid: Grid) -> float:
 def rough_candidates(
     pair: ImagePair,
     level: Grid,
-    radius_px: int,
+    rough: RoughSearch,
     settings: SimilaritySettings,
     held_out: MaskOf,
     executor: Executor,
 ) -> list[Candidate]:
-    """Return the best shifts, best first, within a radius.
+    """Return the best shifts or poses, best first, within the limits of a search.
 
     Parameters
     ----------
@@ -57,31 +89,46 @@ def rough_candidates(
         The images.
     level
         The matching grid at reduced resolution.
-    radius_px
-        Largest shift, in pixels of the level.
+    rough
+        What is searched for, and how.
     settings
         How similarity is measured.
     held_out
         Returns for a piece of the grid which pixels of the reference must not be seen.
     executor
-        Threads to count histograms in.
+        Threads to work in.
 
     Raises
     ------
     RasterContentError
         One of the images is constant or has no valid pixel where they overlap.
     """
-    template = level.window(
-        -BORDER_PX, -BORDER_PX, level.width + 2 * BORDER_PX, level.height + 2 * BORDER_PX
-    )
-    reach = radius_px + BORDER_PX
-    search = level.window(-reach, -reach, level.width + 2 * reach, level.height + 2 * reach)
-    reference = pair.reference_patch(template, held_out(template))
-    input = pair.input_patch(search, pair.claimed_px)
-    for image, patch in ((pair.reference, reference), (pair.input, input)):
-        _require_content(image.source.path, patch)
+    # The true place may lie a pixel of the level further than the whole pixels say.
+    radius_px = int(np.ceil(rough.radius_m / level.pixel_size_m)) + 1
+    # Farther off too little of the images overlaps.
+    radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.width, level.height)))
     if settings.bins is None:
         settings = replace(settings, bins=_BINS)
+    if rough.poses is None:
+        return _shifts(pair, level, radius_px, settings, held_out, executor)
+    reach = radius_px + _reach_of_poses(level, rough)
+    reference, input = _patches(pair, level, 0, reach, held_out)
+    limits = PoseLimits(radius_px, rough.rotation_deg, rough.scale)
+    found = rough.poses(reference, input, limits, settings, executor)[:CANDIDATES]
+    shapes = reference.values.shape, input.values.shape
+    return [Candidate(_pose_model(level, one.pose, shapes, reach), one.height) for one in found]
+
+
+def _shifts(
+    pair: ImagePair,
+    level: Grid,
+    radius_px: int,
+    settings: SimilaritySettings,
+    held_out: MaskOf,
+    executor: Executor,
+) -> list[Candidate]:
+    """Search all shifts, and return the highest peaks of their similarity."""
+    reference, input = _patches(pair, level, BORDER_PX, radius_px + BORDER_PX, held_out)
     surface = similarity_surface(
         describe(reference, level.width * level.height, settings),
         describe(input, level.width * level.height, settings),
@@ -96,12 +143,46 @@ def rough_candidates(
             break
         x, y = peak.shift_px
         dx, dy = level.pixel_to_map([[x, y]])[0] - level.pixel_to_map([[0, 0]])[0]
-        found.append(Candidate(float(dx), float(dy), peak.height))
+        found.append(Candidate(shift_model(float(dx), float(dy)), peak.height))
         row, col = round(y) + radius_px, round(x) + radius_px
         surface[
             max(row - _SAME_PX, 0) : row + _SAME_PX + 1, max(col - _SAME_PX, 0) : col + _SAME_PX + 1
         ] = 0.0
     return found
+
+
+def _patches(
+    pair: ImagePair, level: Grid, border: int, reach: int, held_out: MaskOf
+) -> tuple[Patch, Patch]:
+    """Return the reference with a border around the level, and the input with a wider one."""
+    template, search = (
+        level.window(-more, -more, level.width + 2 * more, level.height + 2 * more)
+        for more in (border, reach)
+    )
+    reference = pair.reference_patch(template, held_out(template))
+    input = pair.input_patch(search, pair.claimed_px)
+    for image, patch in ((pair.reference, reference), (pair.input, input)):
+        _require_content(image.source.path, patch)
+    return reference, input
+
+
+def _reach_of_poses(level: Grid, rough: RoughSearch) -> int:
+    """Return how far beyond the level a turned or larger image of it reaches, in pixels."""
+    if rough.rotation_deg == 0 and rough.scale == (1.0, 1.0):
+        return 0
+    farthest = rough.scale[1] * np.hypot(level.width, level.height)
+    return max(int(np.ceil((farthest - min(level.width, level.height)) / 2)), 0)
+
+
+def _pose_model(
+    level: Grid, pose: Pose, shapes: tuple[tuple[int, ...], tuple[int, ...]], reach: int
+) -> Model:
+    """Return a pose between windows, the input's wider by `reach`, as a model on the map."""
+    (height, width), (rows, cols) = shapes
+    a, b, c, d, e, f, *_ = pose.between((height, width), (rows, cols))
+    coefficients = np.array([[c - reach, f - reach], [a - 1, d], [b, e - 1]])
+    centres = level.transform * Affine.translation(0.5, 0.5)
+    return PolynomialModel("affine", Frame(Affine.identity()), coefficients).on_map(centres)
 
 
 def _require_content(path: str, patch: Patch) -> None:

@@ -20,6 +20,7 @@ from ..rasters.pair import Image, default_radius_m, make_pair
 from ..rasters.reading import RasterSource, bounded_cache, open_raster
 from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
+from ..search.rough import RoughSearch
 from ..similarity.binning import BINNINGS
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
 from .common import Input, Output, Reference, Resampling, Seed, Workers, worker_count
@@ -271,11 +272,18 @@ def coregister(
         search = LocalSearch(
             pair, lay_out_chips(pair, chip_size, spacing_px), settings, two_way_px=two_way_error
         )
-        radius_m = default_radius_m(pair.grid) if search_radius is None else search_radius
+        rough = RoughSearch(default_radius_m(pair.grid) if search_radius is None else search_radius)
         threads = worker_count(workers)
         with ThreadPoolExecutor(threads) as executor:
             result = register(
-                pair, search, radius_m, kind, max_error, seed, executor, progress.part(0.0, 0.7)
+                pair,
+                search,
+                RoughSearch(radius_m),
+                kind,
+                max_error,
+                seed,
+                executor,
+                progress.part(0.0, 0.7),
             )
         page = Report(
             title=f"{Path(input).name} registered to {Path(reference).name}",

@@ -27,6 +27,7 @@ from ..rasters.atomic import Outputs, writing
 from ..rasters.pair import ImagePair
 from ..search.local import LocalSearch
 from ..search.pyramid import find_coarse_model
+from ..search.rough import RoughSearch
 from ..similarity.surface import Surface
 
 # How many surfaces of the best and of the worst check points a report shows.
@@ -94,7 +95,7 @@ class Registration:
 def register(
     pair: ImagePair,
     search: LocalSearch,
-    radius_m: float,
+    rough: RoughSearch,
     model: str,
     max_error_px: float,
     seed: int,
@@ -109,8 +110,8 @@ def register(
         The images.
     search
         How tie points are searched for.
-    radius_m
-        How far the input may lie from where it claims to be, in metres.
+    rough
+        How far the input may lie from where it claims to be, and how it is searched for.
     model
         One of `models.KINDS`, or "auto".
     max_error_px
@@ -124,7 +125,7 @@ def register(
     """
     progress.update(0.0, "searching for the rough shift")
     try:
-        coarse = find_coarse_model(pair, search, radius_m, executor, progress.part(0.0, 0.4))
+        coarse = find_coarse_model(pair, search, rough, executor, progress.part(0.0, 0.4))
         progress.update(0.4, "matching tie points")
         estimate = search.estimate(coarse, model, seed, executor, progress.part(0.4, 0.8))
     except (NothingFoundError, TooFewPointsError) as error:
