@@ -36,6 +36,7 @@ Peak = tuple[int, int]
 RADIUS_PX = 20
 
 # Thesis S table 3.2, without its 256th bin: bins are bytes, and one value stands for "masked".
+BINS_RADIUS_PX = 10
 BIN_COUNTS = (8, 16, 32, 64, 128, 255)
 WANTED_BINS = 32
 BINNINGS = ("linear", "equal-frequency")
@@ -155,7 +156,8 @@ def run(settings: Settings) -> SuiteResult:
         (bins_table(bins), masks_table(masks), climbs_table(climbs)),
         [*bins, *masks, *climbs, counting],
         (
-            f"Peaks are the highest of {(2 * RADIUS_PX + 1) ** 2} whole shifts (right, down); "
+            f"Peaks are the highest of all whole shifts (right, down) of ± {BINS_RADIUS_PX} px for "
+            f"bins and ± {RADIUS_PX} px for masks, as in thesis S tables 3.2 and 4.2; "
             "(0, 0) is the truth, which is known to σ. Climbs: one window a pair, whose centre is "
             f"up to {_OFF_CENTRE_PX} px off the truth, seeds drawn evenly from ± {RADIUS_PX} px. "
             "They must reach the peak of the exhaustive search in that window, exactly if "
@@ -177,7 +179,7 @@ def _told(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def measure_bins(pair: Aligned) -> list[dict[str, Any]]:
     """Return the peaks of one pair for all numbers of bins, binnings and kernels."""
-    margin = RADIUS_PX + max(reach(order) for order in ORDERS)
+    margin = BINS_RADIUS_PX + max(reach(order) for order in ORDERS)
     records = []
     for binning in BINNINGS:
         for count in BIN_COUNTS:

@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from affine import Affine
 from scipy.ndimage import affine_transform, gaussian_filter
 
 from groundtie.errors import ParameterError
@@ -29,8 +28,8 @@ from groundtie.search.spsa import (
 from groundtie.similarity.surface import SimilaritySettings
 
 Place = tuple[float, ...]
-NMI = SimilaritySettings("nmi", gpve_order=2)
-LITTLE = Effort(restarts=5, agreeing=2)
+NMI = SimilaritySettings("nmi")
+LITTLE = Effort(restarts=15)
 ORDERS = [climb_first_order, climb_second_order]
 TOP = (6.0, -9.0)
 
@@ -158,9 +157,9 @@ def posed(pose: Pose, side: int = 64, margin: int = 20) -> tuple[Patch, Patch]:
     ground = texture(side + 80)
     inner = slice(40, 40 + side)
     size = side + 2 * margin
-    to_ground = Affine.translation(40, 40) * ~pose.between((side, side), (size, size))
-    matrix = np.array([[to_ground.e, to_ground.d], [to_ground.b, to_ground.a]])
-    moved = affine_transform(ground, matrix, (to_ground.f, to_ground.c), (size, size), order=3)
+    t = ~pose.between((side, side), (size, size))
+    matrix = np.array([[t.e, t.d], [t.b, t.a]])
+    moved = affine_transform(ground, matrix, (t.f + 40, t.c + 40), (size, size), order=3)
     noise = np.random.default_rng(9).normal(0, 0.1, moved.shape)
     return patch(ground[inner, inner]), patch(noise - moved)
 
@@ -203,9 +202,10 @@ def test_windows_of_unlike_parity() -> None:
 
 def test_the_seed_decides() -> None:
     windows = posed(Pose(shift_px=(4.0, 3.0)), side=40)
+    effort = Effort(restarts=3, agreeing=2)
     for search in (spsa, spsa_second_order, discrete_spsa):
         run = partial(search, *windows, PoseLimits(8), NMI)
-        one, same, other = (run(effort=replace(LITTLE, seed=seed)) for seed in (3, 3, 4))
+        one, same, other = (run(effort=replace(effort, seed=seed)) for seed in (3, 3, 4))
         assert one == same
         assert one != other
 
