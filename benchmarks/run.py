@@ -14,7 +14,16 @@ from types import ModuleType
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
-SUITES = ("real", "crossings", "simulated", "large_shift", "rotated_pairs", "speed", "methods", "peaks")
+SUITES = (
+    "real",
+    "crossings",
+    "simulated",
+    "large_shift",
+    "rotated_pairs",
+    "speed",
+    "methods",
+    "peaks",
+)
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
