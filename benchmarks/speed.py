@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.patch import Patch
-from groundtie.similarity.surface import BORDER_PX, SimilaritySettings, describe, nmi_surface
+from groundtie.similarity.surface import BORDER_PX, SimilaritySettings, describe, histogram_surface
 
 from .attempt import Pair, on_pixels
 from .processes import OUTPUT, Measured, measure, measure_often
@@ -142,7 +142,7 @@ def _own_surface_seconds(template: NDArray[np.float32], search: NDArray[np.float
     with ThreadPoolExecutor(THREADS) as executor:
         started = time.perf_counter()
         features = [describe(patch, WINDOW_PX**2, settings) for patch in patches]
-        nmi_surface(*features, RADIUS_PX, settings.gpve_order, executor)
+        histogram_surface(*features, RADIUS_PX, settings, executor)
         return time.perf_counter() - started
 
 

@@ -17,11 +17,11 @@ from ..rasters.patch import Patch
 from .binning import to_bins
 from .correlation import MINIMUM_OVERLAP, correlate_fields, correlate_grey, overlap_share
 from .joint_histogram import count_joint_histograms, reach
-from .measures import normalized_mutual_information
+from .measures import MEASURES
 from .orientation import orientation_fields
 
 Surface = NDArray[np.float32]
-SIMILARITIES = ("fused", "nmi", "orientation", "ncc")
+SIMILARITIES = ("fused", "nmi", "orientation", "ncc", *(m for m in MEASURES if m != "nmi"))
 
 # Pixels that windows have beyond the chip on each side: what the widest gradient filter and the
 # widest histogram kernel reach.
@@ -41,7 +41,8 @@ class SimilaritySettings:
     Parameters
     ----------
     similarity
-        One of `SIMILARITIES`; "fused" adds up orientation and NMI.
+        One of `SIMILARITIES`: "fused" adds up orientation and NMI, "orientation" correlates
+        squared gradients, "ncc" grey values; the others are measures on joint histograms.
     bins
         Number of bins; None: chosen by the window's size.
     binning
@@ -54,6 +55,13 @@ class SimilaritySettings:
     bins: int | None = None
     binning: str = "equal-frequency"
     gpve_order: int = 4
+
+    @property
+    def measure(self) -> str | None:
+        """Name of the measure on joint histograms, None if there is no need of one."""
+        if self.similarity == "fused":
+            return "nmi"
+        return self.similarity if self.similarity in MEASURES else None
 
     def bins_for(self, pixels: int) -> int:
         """Return the number of bins for a template of so many pixels."""
@@ -141,7 +149,7 @@ def describe(window: Patch, chip_pixels: int, settings: SimilaritySettings) -> F
     margin = reach(settings.gpve_order)
     bins: NDArray[np.uint8] | None = None
     fields: NDArray[np.complex64] | None = None
-    if settings.similarity in ("fused", "nmi"):
+    if settings.measure is not None:
         around = window.inner(BORDER_PX - margin)
         bins = to_bins(around.values, around.valid, bin_count, settings.binning)
     if settings.similarity in ("fused", "orientation"):
@@ -149,18 +157,18 @@ def describe(window: Patch, chip_pixels: int, settings: SimilaritySettings) -> F
     return Features(window.inner(BORDER_PX), bins, bin_count, margin, fields)
 
 
-def nmi_surface(
+def histogram_surface(
     template: Features,
     search: Features,
     radius: int,
-    gpve_order: int,
+    settings: SimilaritySettings,
     executor: Executor | None = None,
 ) -> Surface:
-    """Return normalised mutual information over shifts, shape (2 radius + 1, 2 radius + 1)."""
-    assert search.bins is not None
+    """Return the measure on joint histograms over shifts, shape (2 radius + 1, 2 radius + 1)."""
+    assert search.bins is not None and settings.measure is not None
     counts = (template.bin_count, search.bin_count)
     volume = count_joint_histograms(template.own_bins, search.bins, counts, radius, executor)
-    return normalized_mutual_information(volume.histograms(gpve_order)).astype(np.float32)
+    return MEASURES[settings.measure](volume.histograms(settings.gpve_order)).astype(np.float32)
 
 
 def orientation_surface(template: Features, search: Features) -> Surface:
@@ -200,9 +208,8 @@ def similarity_surface(
     overlap get 0, the background's value.
     """
     parts = []
-    if settings.similarity in ("fused", "nmi"):
-        nmi = nmi_surface(template, search, radius, settings.gpve_order, executor)
-        parts.append(detrend(nmi))
+    if settings.measure is not None:
+        parts.append(detrend(histogram_surface(template, search, radius, settings, executor)))
     if settings.similarity in ("fused", "orientation"):
         parts.append(orientation_surface(template, search))
     if settings.similarity == "ncc":

@@ -60,8 +60,10 @@ def coregister(
         Choice(
             label="Similarity",
             help="What tells that two windows show the same place: mutual information (nmi), the "
-            "orientation of edges, both together (fused), or correlation of grey values (ncc), "
-            "which is for images of the same kind only.",
+            "orientation of edges, both together (fused), correlation of grey values (ncc), which "
+            "is for images of the same kind only, or another measure on joint histograms: "
+            "Shannon's (mi), Rényi's or Tsallis's information of order 2, cluster reward, "
+            "correlation ratio.",
             choices=SIMILARITIES,
         ),
     ] = "fused",
@@ -278,7 +280,7 @@ def coregister(
             result = register(
                 pair,
                 search,
-                RoughSearch(radius_m),
+                rough,
                 kind,
                 max_error,
                 seed,

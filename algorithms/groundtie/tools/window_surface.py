@@ -34,7 +34,7 @@ from ..similarity.measures import (
 from ..similarity.surface import BORDER_PX, SIMILARITIES, SimilaritySettings, Surface
 
 GREY_VALUES = "grey-values"
-CHOICES = (*SIMILARITIES, *(name for name in MEASURES if name not in SIMILARITIES), "mlmi")
+CHOICES = (*SIMILARITIES, "mlmi")
 
 # A second peak lies further away from the first than this along columns or rows.
 _PEAK_PX = 2
@@ -151,7 +151,7 @@ class SurfaceSettings:
         radius = window.radius_px
         template = reference.inner(radius + BORDER_PX)
         search = input.inner(BORDER_PX)
-        if self.similarity in SIMILARITIES and self.similarity not in ("nmi", "ncc"):
+        if self.similarity in ("fused", "orientation"):
             values, evidence = self._by_orientation(reference, input, window, executor)
         else:
             if self.similarity == "ncc":
