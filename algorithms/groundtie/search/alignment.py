@@ -7,6 +7,7 @@ with the largest sum of similarities is sought.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import cv2
@@ -21,6 +22,7 @@ from ..geometry.robust import FOLDS, block_folds, blocks_of
 from .matching import Surfaces
 
 FloatArray = NDArray[np.float64]
+Positions = Callable[[FloatArray], FloatArray]
 
 # Surfaces are blurred by these, one after the other, so that the fit is caught from afar.
 _BLURS_PX = (1.5, 0.0)
@@ -107,7 +109,7 @@ class _Field:
 
 
 def align(
-    kind: str, px: NDArray[np.int_], surfaces: Surfaces, prior: Affine, start: Model
+    kind: str, px: NDArray[np.int_], surfaces: Surfaces, prior: Affine, start: Positions
 ) -> Alignment:
     """Fit a polynomial model to surfaces.
 
@@ -122,13 +124,13 @@ def align(
     prior
         From grid pixels to claimed grid pixels: what the input was resampled by for matching.
     start
-        A model to start from, from grid pixels to claimed grid pixels.
+        What to start from: takes grid pixels, (n, 2), to claimed grid pixels.
     """
     return _align(kind, _fields(px, surfaces, prior), start)
 
 
 def choose_alignment(
-    px: NDArray[np.int_], surfaces: Surfaces, prior: Affine, start: Model
+    px: NDArray[np.int_], surfaces: Surfaces, prior: Affine, start: Positions
 ) -> Alignment:
     """Fit the simplest polynomial model that the surfaces justify.
 
@@ -150,7 +152,7 @@ def choose_alignment(
     return Alignment(chosen.model, chosen.fold_models, scores)
 
 
-def _align(kind: str, fields: list[_Field], start: Model) -> Alignment:
+def _align(kind: str, fields: list[_Field], start: Positions) -> Alignment:
     sharp = fields[-1]
     frame = Frame.around(sharp.px)
     parameters = _starting(kind, frame, sharp.px, start)
@@ -244,7 +246,7 @@ def _coefficients(kind: str, parameters: FloatArray) -> tuple[FloatArray, FloatA
     return parameters.reshape(-1, 2), np.eye(len(parameters))
 
 
-def _starting(kind: str, frame: Frame, px: FloatArray, start: Model) -> FloatArray:
+def _starting(kind: str, frame: Frame, px: FloatArray, start: Positions) -> FloatArray:
     """Return the parameters of the model of a kind that is nearest to another model."""
     target = (start(px) - px) / frame.to_map.a
     design = monomials(frame.enter(px), DEGREE[kind])

@@ -128,8 +128,11 @@ class LocalSearch:
         px = centres.astype(float)
         shifts = np.array([find_peak(surface).shift_px for surface in supported])
         first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
-        claimed = apply_affine(prior, px + shifts)
-        start = find_consensus(px, claimed, _CONSENSUS_PX, first_kind, seed)
+        residual = find_consensus(px, px + shifts, _CONSENSUS_PX, first_kind, seed)
+
+        def start(at: FloatArray) -> FloatArray:
+            return apply_affine(prior, residual(at))
+
         if kind in (AUTO, "tps"):
             aligned = choose_alignment(centres, both, prior, start)
         else:

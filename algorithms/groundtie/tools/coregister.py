@@ -20,6 +20,8 @@ from ..rasters.pair import Image, default_radius_m, make_pair
 from ..rasters.reading import RasterSource, bounded_cache, open_raster
 from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
+from ..search.pose import PoseSearch
+from ..search.pose_searches import DEFAULT_SEARCH, SEARCHES
 from ..search.rough import RoughSearch
 from ..similarity.binning import BINNINGS
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
@@ -112,6 +114,37 @@ def coregister(
             suffixes=(".html",),
         ),
     ] = None,
+    search: Annotated[
+        str,
+        Choice(
+            label="Rough search",
+            help="What finds the rough position on a reduced image. By default all shifts are "
+            "tried, and rotation-steps where a rotation or scale is searched for.",
+            choices=(AUTO, *SEARCHES),
+            advanced=True,
+        ),
+    ] = AUTO,
+    search_rotation: Annotated[
+        float,
+        Number(
+            label="Largest rotation",
+            help="How far the input may be turned, either way, against where it claims to lie.",
+            unit="°",
+            minimum=0,
+            maximum=180,
+            advanced=True,
+        ),
+    ] = 0.0,
+    search_scale: Annotated[
+        float,
+        Number(
+            label="Largest scale",
+            help="By which factor the input may be larger or smaller than it claims.",
+            minimum=1,
+            maximum=4,
+            advanced=True,
+        ),
+    ] = 1.0,
     reference_band: Annotated[
         int | None,
         Band(
@@ -271,15 +304,20 @@ def coregister(
         for note in pair.notes():
             progress.update(0.0, note)
         spacing_px = None if spacing is None else spacing / pair.grid.pixel_size_m
-        search = LocalSearch(
+        local = LocalSearch(
             pair, lay_out_chips(pair, chip_size, spacing_px), settings, two_way_px=two_way_error
         )
-        rough = RoughSearch(default_radius_m(pair.grid) if search_radius is None else search_radius)
+        rough = RoughSearch(
+            default_radius_m(pair.grid) if search_radius is None else search_radius,
+            search_rotation,
+            (1 / search_scale, search_scale),
+            _pose_search(search, search_rotation > 0 or search_scale > 1),
+        )
         threads = worker_count(workers)
         with ThreadPoolExecutor(threads) as executor:
             result = register(
                 pair,
-                search,
+                local,
                 rough,
                 kind,
                 max_error,
@@ -305,3 +343,10 @@ def coregister(
                 pair, found, outputs, threads, progress.part(0.7, 1.0)
             )
     return RegistrationResult.of(result, page.summary(), {"output": output, **files.written()})
+
+
+def _pose_search(name: str, beyond_shifts: bool) -> PoseSearch | None:
+    """Return the search of a name; None: all shifts are tried."""
+    if name == AUTO:
+        return SEARCHES[DEFAULT_SEARCH] if beyond_shifts else None
+    return SEARCHES[name]
