@@ -20,6 +20,7 @@ SUITES = (
     "simulated",
     "large_shift",
     "rotated_pairs",
+    "rotation",
     "speed",
     "methods",
     "peaks",

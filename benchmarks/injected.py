@@ -1,0 +1,108 @@
+"""Windows of one image in a known pose: cut out of it, once turned, scaled and shifted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from groundtie.rasters.kernels import interpolate
+from groundtie.rasters.patch import Patch
+from groundtie.search.pose import Pose
+
+Image = NDArray[np.float32]
+
+# What becomes of the corners of the input that the reference's window does not fill: the input
+# shows more of the ground; they are black and masked; they are black and nobody knows (thesis P).
+WHOLE = "whole"
+MASKED = "black corners, masked"
+BLACK = "black corners"
+CORNERS = (WHOLE, MASKED, BLACK)
+
+
+@dataclass(frozen=True)
+class Injection:
+    """A pose that is put between two windows of an image, and what spoils them.
+
+    Parameters
+    ----------
+    pose
+        How the input lies against the reference.
+    corners
+        One of `CORNERS`.
+    noise_variance
+        Variance of Gaussian noise that is added to both, grey values being 0 to 1.
+    seed
+        Of the noise.
+    """
+
+    pose: Pose
+    corners: str = WHOLE
+    noise_variance: float = 0.0
+    seed: int = 0
+
+    def windows(self, image: Image, shape: tuple[int, int]) -> tuple[Patch, Patch]:
+        """Return reference and input; the reference is the middle of the image, not resampled.
+
+        Parameters
+        ----------
+        image
+            Grey values 0 to 1, shape (h, w).
+        shape
+            Rows and columns of the reference; the input has `scale` times as many.
+        """
+        top, left = ((n - m) // 2 for n, m in zip(image.shape, shape, strict=True))
+        reference = image[top : top + shape[0], left : left + shape[1]]
+        size = [max(round(side * self.pose.scale), 1) for side in shape]
+        on_image = ~self.pose.between(shape, (size[0], size[1]))
+        rows, cols = np.indices(size, float)
+        px = np.stack(
+            [
+                on_image.a * cols + on_image.b * rows + on_image.c + left,
+                on_image.d * cols + on_image.e * rows + on_image.f + top,
+            ]
+        )
+        finest = self.pose.scale
+        if finest < 1:
+            # What the input's larger pixels cannot show.
+            image = gaussian_filter(image, 0.5 * np.sqrt(1 / finest**2 - 1))
+        low, high = (0, 0), image.shape[::-1]
+        if self.corners != WHOLE:
+            low, high = (left, top), (left + shape[1], top + shape[0])
+        inside = np.logical_and.reduce(
+            [(a >= first) & (a <= last - 1) for a, first, last in zip(px, low, high, strict=True)]
+        )
+        input = np.where(inside, interpolate(image, px, "lanczos"), np.float32(0))
+        random = np.random.default_rng(self.seed)
+        known = np.ones_like(inside) if self.corners == BLACK else inside
+        return (
+            Patch(self._spoilt(reference, random), np.ones(shape, bool)),
+            Patch(np.where(inside, self._spoilt(input, random), np.float32(0)), known),
+        )
+
+    def _spoilt(self, image: Image, random: np.random.Generator) -> Image:
+        noise = random.normal(0, np.sqrt(self.noise_variance), image.shape)
+        return np.clip(image + noise, 0, 1).astype(np.float32)
+
+
+def unit_range(bands: NDArray[np.generic]) -> Image:
+    """Return the mean of bands, shape (bands, h, w), from 0 to 1; extremes are cut off."""
+    grey = bands.astype(np.float32).mean(axis=0)
+    low, high = np.percentile(grey, (0.1, 99.9))
+    return np.clip((grey - low) / (high - low), 0, 1).astype(np.float32)
+
+
+def pose_errors(found: Pose, truth: Pose, shape: Sequence[int]) -> tuple[float, float]:
+    """Return the error of the rotation in degrees, and the root mean square one in pixels.
+
+    The latter is over a whole reference of a shape, in its pixels.
+    """
+    turned = abs((found.rotation_deg - truth.rotation_deg + 180) % 360 - 180)
+    sides = [np.linspace(-0.5, 0.5, 21) * n for n in shape[::-1]]
+    px = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
+    shift = np.subtract(found.shift_px, truth.shift_px)
+    off = px @ (found.linear - truth.linear).T + shift
+    return turned, float(np.sqrt((off**2).sum(axis=1).mean())) / truth.scale
