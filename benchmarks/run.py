@@ -24,6 +24,7 @@ SUITES = (
     "speed",
     "methods",
     "peaks",
+    "fusion",
 )
 
 
