@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .geometry.transform import load_transform
     from .tools.assess import assess
     from .tools.coregister import coregister
+    from .tools.estimate_rotation import estimate_rotation
     from .tools.similarity_surface import similarity_surface
     from .tools.simulate import simulate
     from .tools.warp import warp
@@ -23,6 +24,7 @@ __all__ = [
     "__version__",
     "assess",
     "coregister",
+    "estimate_rotation",
     "load_transform",
     "similarity_surface",
     "simulate",

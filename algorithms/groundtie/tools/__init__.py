@@ -7,7 +7,14 @@ import importlib
 from ..declaration import Tool, tool_of
 
 # In the order in which they are offered; a tool's function has the name of its module.
-NAMES = ("coregister", "warp", "assess", "similarity_surface", "simulate")
+NAMES = (
+    "coregister",
+    "estimate_rotation",
+    "warp",
+    "assess",
+    "similarity_surface",
+    "simulate",
+)
 
 
 def load_tool(name: str) -> Tool:

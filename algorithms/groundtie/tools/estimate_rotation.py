@@ -1,0 +1,284 @@
+"""Rotation, scale and shift between two rasters, from no more than rough limits."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from ..declaration import Output as ResultOutput
+from ..declaration import tool
+from ..errors import NotRegisteredError, ParameterError
+from ..geometry.transform import Transform
+from ..kinds import Band, Choice, Distance, FileOut, Number
+from ..progress import SILENT, Progress
+from ..quality.verdict import refuse
+from ..rasters.atomic import Outputs, writing
+from ..rasters.pair import Image
+from ..rasters.reading import bounded_cache, open_raster
+from ..search.pose import Pose
+from ..search.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
+from ..search.rotation_verdict import PoseVerdict, judge_pose
+from ..search.rotation_windows import PoseWindows, read_windows
+from ..similarity.surface import SIMILARITIES, SimilaritySettings
+from .common import Input, Reference, Workers, worker_count
+from .rotation_picture import draw_evidence
+
+_AUTO = "auto"
+
+
+@dataclass(frozen=True)
+class RotationResult:
+    """What `estimate_rotation` found.
+
+    Parameters
+    ----------
+    verdict
+        Whether it can be trusted.
+    pose
+        Rotation and scale; the shift is in pixels of the windows.
+    right, down
+        How far the input's content lies off, in metres (in input pixels without
+        georeferencing).
+    unit
+        "m" or "px".
+    transform
+        Reference map position ↔ input pixel position.
+    search
+        How it was found.
+    files
+        What was written, by name.
+    """
+
+    verdict: PoseVerdict
+    pose: Pose
+    right: float
+    down: float
+    unit: str
+    transform: Transform
+    search: str
+    files: dict[str, str]
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {
+            "rotation_deg": self.pose.rotation_deg,
+            "scale": self.pose.scale,
+            "shift": {"right": self.right, "down": self.down, "unit": self.unit},
+            "verdict": self.verdict.summary(),
+            "search": self.search,
+            "transform": self.transform.to_json(),
+            "files": self.files,
+        }
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        return [
+            f"rotation: {self.pose.rotation_deg:+.2f}° (counter-clockwise)",
+            f"scale: {self.pose.scale:.4f}",
+            f"shift: {self.right:+.2f} {self.unit} right, {self.down:+.2f} {self.unit} down",
+            f"accepted: {self.verdict.reason}; height {self.verdict.height:.1f}, "
+            f"{self.verdict.rival_ratio:.2f} times that of the best elsewhere",
+            *(f"{name}: {path}" for name, path in self.files.items()),
+        ]
+
+
+@tool(
+    title="Estimate rotation and scale",
+    group="Registration",
+    outputs=(
+        ResultOutput("ROTATION", "Rotation (°)", "rotation_deg"),
+        ResultOutput("SCALE", "Scale", "scale"),
+        ResultOutput("RIGHT", "Shift to the right", "shift.right"),
+        ResultOutput("DOWN", "Shift downwards", "shift.down"),
+        ResultOutput("HEIGHT", "Height over chance", "verdict.height"),
+        ResultOutput(
+            "RIVAL_RATIO", "Height over that of the best elsewhere", "verdict.rival_ratio"
+        ),
+    ),
+)
+def estimate_rotation(
+    reference: Reference,
+    input: Input,
+    search: Annotated[
+        str,
+        Choice(
+            label="Search",
+            help="How the pose is searched for: rotation-steps tries everything and is the only "
+            "one that is meant for SAR with optical images; fourier-mellin finds any rotation "
+            "and scale, radon rotations, phase-correlation shifts alone; the others climb "
+            "mutual information from where the input claims to lie.",
+            choices=tuple(SEARCHES),
+        ),
+    ] = DEFAULT_SEARCH,
+    largest_rotation: Annotated[
+        float,
+        Number(
+            label="Largest rotation",
+            help="Largest rotation either way; 180 allows any.",
+            unit="°",
+            minimum=0,
+            maximum=180,
+        ),
+    ] = 180.0,
+    smallest_scale: Annotated[
+        float,
+        Number(
+            label="Smallest scale",
+            help="Least length of a reference's pixel in pixels of the input; of georeferenced "
+            "images, compared with what they claim.",
+            minimum=0.25,
+            maximum=4,
+        ),
+    ] = 0.5,
+    largest_scale: Annotated[
+        float,
+        Number(
+            label="Largest scale",
+            help="See the smallest scale.",
+            minimum=0.25,
+            maximum=4,
+        ),
+    ] = 2.0,
+    search_radius: Annotated[
+        float | None,
+        Distance(
+            label="Search radius",
+            help="How far the input may lie from where it claims to be, along rows and columns; "
+            "without georeferencing, how far the images' centres are apart, in input pixels. By "
+            "default a quarter of the input's longer side.",
+        ),
+    ] = None,
+    transform: Annotated[
+        Path | None,
+        FileOut(
+            label="Transform",
+            help="The transform, for the tool warp or a script.",
+            suffixes=(".json",),
+        ),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        FileOut(
+            label="Picture",
+            help="What speaks for the pose, to look at; it is drawn for a refused one, too.",
+            suffixes=(".png",),
+        ),
+    ] = None,
+    similarity: Annotated[
+        str,
+        Choice(
+            label="Similarity",
+            help="What is compared; auto takes what fits the search: mutual information where "
+            "it climbs, else the orientation of edges. The search rotation-steps always takes "
+            "the latter.",
+            choices=(_AUTO, *SIMILARITIES),
+            advanced=True,
+        ),
+    ] = _AUTO,
+    reference_band: Annotated[
+        int | None,
+        Band(
+            label="Band of the reference",
+            help="The band that is compared; by default the mean of all bands.",
+            of="reference",
+            advanced=True,
+        ),
+    ] = None,
+    input_band: Annotated[
+        int | None,
+        Band(
+            label="Band of the input",
+            help="The band that is compared; by default the mean of all bands.",
+            of="input",
+            advanced=True,
+        ),
+    ] = None,
+    workers: Workers = None,
+    progress: Progress = SILENT,
+) -> RotationResult:
+    """Estimate rotation, scale and shift between two rasters of the same place.
+
+    Nothing needs to be known but limits. Images with georeferencing are compared as they claim to
+    lie: what is found is by how much the input is rotated, scaled and shifted against that.
+    Images without it are compared pixel by pixel, from centre to centre. Large images are reduced
+    to some 500 pixels, so that what is found is a start for a registration, not its end.
+
+    Whatever the search, its pose is accepted only if an exhaustive search over all rotations
+    finds it, too, and nothing nearly as good elsewhere.
+    """
+    if smallest_scale > largest_scale:
+        raise ParameterError("the smallest scale is larger than the largest")
+    settings = SimilaritySettings(_similarity(search, similarity))
+    scales = smallest_scale, largest_scale
+    with ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        images = [
+            Image(stack.enter_context(open_raster(path)), band)
+            for path, band in ((reference, reference_band), (input, input_band))
+        ]
+        progress.update(0.0, "reading")
+        windows = read_windows(images[0], images[1], scales, search_radius)
+    with ThreadPoolExecutor(worker_count(workers)) as executor:
+        progress.update(0.1, "searching")
+        pair = windows.reference, windows.input
+        limits = windows.limits(largest_rotation, scales)
+        found = SEARCHES[search](*pair, limits, settings, executor)
+        progress.update(0.5, "judging")
+        exhaustive = search == DEFAULT_SEARCH
+        verdict = judge_pose(*pair, limits, found, exhaustive, executor)
+        pose = found[0].pose if found else None
+        progress.update(0.8, "writing")
+        with Outputs() as outputs:
+            if picture is not None:
+                word = "accepted" if verdict.accepted else "refused"
+                title = f"{word}: {verdict.reason}"
+                draw_evidence(outputs.stage(picture), *pair, limits, pose, title, executor)
+            if verdict.accepted and pose is not None:
+                result = _result(windows, pose, verdict, search, transform, picture)
+                _write_transform(outputs, transform, result.transform)
+                return result
+    raise NotRegisteredError(
+        f"no rotation of {input} against {reference} was found: {verdict.reason}",
+        refuse(verdict.reason),
+    )
+
+
+def _similarity(search: str, wanted: str) -> str:
+    if wanted == _AUTO:
+        return "nmi" if search in HISTOGRAM_SEARCHES else "orientation"
+    if search in HISTOGRAM_SEARCHES and wanted != "nmi":
+        raise ParameterError(f"the search {search} needs the similarity nmi")
+    return wanted
+
+
+def _result(
+    windows: PoseWindows,
+    pose: Pose,
+    verdict: PoseVerdict,
+    search: str,
+    transform: Path | None,
+    picture: Path | None,
+) -> RotationResult:
+    right, down = (float(shift) * windows.pixel_m for shift in pose.shift_px)
+    files = {"transform": transform, "picture": picture}
+    return RotationResult(
+        verdict,
+        pose,
+        right,
+        down,
+        "m" if windows.is_georeferenced else "px",
+        windows.transform(pose),
+        search,
+        {name: str(path) for name, path in files.items() if path is not None},
+    )
+
+
+def _write_transform(outputs: Outputs, path: Path | None, transform: Transform) -> None:
+    if path is not None:
+        staged = outputs.stage(path)
+        with writing(staged):
+            staged.write_text(json.dumps(transform.to_json(), indent=1), encoding="utf-8")
