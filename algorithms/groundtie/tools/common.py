@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Annotated
 
-from ..kinds import Choice, Number, RasterIn, RasterOut
+from ..kinds import Band, Choice, Distance, FileOut, Number, RasterIn, RasterOut
 from ..rasters.warping import METHODS
 
 Reference = Annotated[
@@ -52,6 +52,71 @@ Seed = Annotated[
         minimum=0,
         maximum=2**31 - 1,
         advanced=True,
+    ),
+]
+
+ReferenceBand = Annotated[
+    int | None,
+    Band(
+        label="Band of the reference",
+        help="The band that is matched; by default the mean of all bands.",
+        of="reference",
+        advanced=True,
+    ),
+]
+InputBand = Annotated[
+    int | None,
+    Band(
+        label="Band of the input",
+        help="The band that is matched; by default the mean of all bands. A registered image "
+        "has all bands.",
+        of="input",
+        advanced=True,
+    ),
+]
+ReferenceMask = Annotated[
+    Path | None,
+    RasterIn(
+        label="Mask of the reference",
+        help="Where this raster is 0 or has no data, the reference takes no part.",
+        advanced=True,
+    ),
+]
+InputMask = Annotated[
+    Path | None,
+    RasterIn(
+        label="Mask of the input",
+        help="Where this raster is 0 or has no data, the input takes no part.",
+        advanced=True,
+    ),
+]
+MatchingPixelSize = Annotated[
+    float | None,
+    Distance(
+        label="Pixel size for matching",
+        help="Pixel size at which the images are compared; by default that of the coarser image.",
+        minimum=1e-6,
+        advanced=True,
+    ),
+]
+GpveOrder = Annotated[
+    int,
+    Number(
+        label="Order of the histogram's spline",
+        help="Order of the B-spline by which pixels enter the joint histogram: 2 is partial "
+        "volume interpolation, 4 the cubic spline; 4 and more are free of artefacts.",
+        integer=True,
+        minimum=2,
+        maximum=7,
+        advanced=True,
+    ),
+]
+TransformOut = Annotated[
+    Path | None,
+    FileOut(
+        label="Transform",
+        help="The transform, for the tool warp or a script.",
+        suffixes=(".json",),
     ),
 ]
 

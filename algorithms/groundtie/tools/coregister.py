@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..geometry.models import KINDS
-from ..kinds import Band, Choice, Distance, FileOut, Number, RasterIn, VectorOut
+from ..kinds import Choice, Distance, FileOut, Number, VectorOut
 from ..progress import SILENT, Progress
 from ..quality.report import Report
 from ..rasters.pair import Image, default_radius_m, make_pair
@@ -25,7 +25,22 @@ from ..search.pose_searches import DEFAULT_SEARCH, SEARCHES
 from ..search.rough import RoughSearch
 from ..similarity.binning import BINNINGS
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
-from .common import Input, Output, Reference, Resampling, Seed, Workers, worker_count
+from .common import (
+    GpveOrder,
+    Input,
+    InputBand,
+    InputMask,
+    MatchingPixelSize,
+    Output,
+    Reference,
+    ReferenceBand,
+    ReferenceMask,
+    Resampling,
+    Seed,
+    TransformOut,
+    Workers,
+    worker_count,
+)
 from .registered_output import OUTPUT_GRIDS, RegisteredOutput, model_for_grid
 from .registration import (
     RegistrationFiles,
@@ -97,14 +112,7 @@ def coregister(
             suffixes=(".gpkg", ".geojson", ".csv", ".points"),
         ),
     ] = None,
-    transform: Annotated[
-        Path | None,
-        FileOut(
-            label="Transform",
-            help="The transform, for the tool warp or a script.",
-            suffixes=(".json",),
-        ),
-    ] = None,
+    transform: TransformOut = None,
     report: Annotated[
         Path | None,
         FileOut(
@@ -145,51 +153,11 @@ def coregister(
             advanced=True,
         ),
     ] = 1.0,
-    reference_band: Annotated[
-        int | None,
-        Band(
-            label="Band of the reference",
-            help="The band that is matched; by default the mean of all bands.",
-            of="reference",
-            advanced=True,
-        ),
-    ] = None,
-    input_band: Annotated[
-        int | None,
-        Band(
-            label="Band of the input",
-            help="The band that is matched; by default the mean of all bands. The registered "
-            "image has all bands.",
-            of="input",
-            advanced=True,
-        ),
-    ] = None,
-    reference_mask: Annotated[
-        Path | None,
-        RasterIn(
-            label="Mask of the reference",
-            help="Where this raster is 0 or has no data, the reference takes no part.",
-            advanced=True,
-        ),
-    ] = None,
-    input_mask: Annotated[
-        Path | None,
-        RasterIn(
-            label="Mask of the input",
-            help="Where this raster is 0 or has no data, the input takes no part.",
-            advanced=True,
-        ),
-    ] = None,
-    matching_pixel_size: Annotated[
-        float | None,
-        Distance(
-            label="Pixel size for matching",
-            help="Pixel size at which the images are compared; by default that of the coarser "
-            "image.",
-            minimum=1e-6,
-            advanced=True,
-        ),
-    ] = None,
+    reference_band: ReferenceBand = None,
+    input_band: InputBand = None,
+    reference_mask: ReferenceMask = None,
+    input_mask: InputMask = None,
+    matching_pixel_size: MatchingPixelSize = None,
     chip_size: Annotated[
         int | None,
         Number(
@@ -233,18 +201,7 @@ def coregister(
             advanced=True,
         ),
     ] = "equal-frequency",
-    gpve_order: Annotated[
-        int,
-        Number(
-            label="Order of the histogram's spline",
-            help="Order of the B-spline by which pixels enter the joint histogram: 2 is partial "
-            "volume interpolation, 4 the cubic spline; 4 and more are free of artefacts.",
-            integer=True,
-            minimum=2,
-            maximum=7,
-            advanced=True,
-        ),
-    ] = 4,
+    gpve_order: GpveOrder = 4,
     two_way_error: Annotated[
         float,
         Number(

@@ -13,7 +13,7 @@ from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import NotRegisteredError, ParameterError
 from ..geometry.transform import Transform
-from ..kinds import Band, Choice, Distance, FileOut, Number
+from ..kinds import Choice, Distance, FileOut, Number
 from ..progress import SILENT, Progress
 from ..quality.verdict import refuse
 from ..rasters.atomic import Outputs, writing
@@ -24,7 +24,7 @@ from ..search.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
 from ..search.rotation_verdict import PoseVerdict, judge_pose
 from ..search.rotation_windows import PoseWindows, read_windows
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
-from .common import Input, Reference, Workers, worker_count
+from .common import Input, InputBand, Reference, ReferenceBand, TransformOut, Workers, worker_count
 from .rotation_picture import draw_evidence
 
 _AUTO = "auto"
@@ -152,14 +152,7 @@ def estimate_rotation(
             "default a quarter of the input's longer side.",
         ),
     ] = None,
-    transform: Annotated[
-        Path | None,
-        FileOut(
-            label="Transform",
-            help="The transform, for the tool warp or a script.",
-            suffixes=(".json",),
-        ),
-    ] = None,
+    transform: TransformOut = None,
     picture: Annotated[
         Path | None,
         FileOut(
@@ -179,24 +172,8 @@ def estimate_rotation(
             advanced=True,
         ),
     ] = _AUTO,
-    reference_band: Annotated[
-        int | None,
-        Band(
-            label="Band of the reference",
-            help="The band that is compared; by default the mean of all bands.",
-            of="reference",
-            advanced=True,
-        ),
-    ] = None,
-    input_band: Annotated[
-        int | None,
-        Band(
-            label="Band of the input",
-            help="The band that is compared; by default the mean of all bands.",
-            of="input",
-            advanced=True,
-        ),
-    ] = None,
+    reference_band: ReferenceBand = None,
+    input_band: InputBand = None,
     workers: Workers = None,
     progress: Progress = SILENT,
 ) -> RotationResult:

@@ -18,7 +18,7 @@ from rasterio.errors import RasterioError
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import NoOverlapError, ParameterError
-from ..kinds import Band, Choice, Distance, FileOut, Number, RasterIn, RasterOut
+from ..kinds import Choice, Distance, FileOut, Number, RasterOut
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, writing
 from ..rasters.grid import Grid
@@ -28,7 +28,19 @@ from ..rasters.writing import BLOCK, check_complete
 from ..similarity.binning import BINNINGS
 from ..similarity.evidence import Evidence, find_peak
 from ..similarity.surface import Surface
-from .common import Input, Reference, Seed, Workers, worker_count
+from .common import (
+    GpveOrder,
+    Input,
+    InputBand,
+    InputMask,
+    MatchingPixelSize,
+    Reference,
+    ReferenceBand,
+    ReferenceMask,
+    Seed,
+    Workers,
+    worker_count,
+)
 from .window_surface import CHOICES, GREY_VALUES, SurfaceSettings, Window, second_peak
 
 _DEFAULT_RADIUS_PX, _LARGEST_RADIUS_PX = 20, 100
@@ -244,18 +256,7 @@ def similarity_surface(
             advanced=True,
         ),
     ] = "equal-frequency",
-    gpve_order: Annotated[
-        int,
-        Number(
-            label="Order of the histogram's spline",
-            help="Order of the B-spline by which pixels enter the joint histogram: 2 is partial "
-            "volume interpolation, 4 the cubic spline; 4 and more are free of artefacts.",
-            integer=True,
-            minimum=2,
-            maximum=7,
-            advanced=True,
-        ),
-    ] = 4,
+    gpve_order: GpveOrder = 4,
     sample: Annotated[
         int,
         Number(
@@ -267,50 +268,11 @@ def similarity_surface(
             advanced=True,
         ),
     ] = 1000,
-    reference_band: Annotated[
-        int | None,
-        Band(
-            label="Band of the reference",
-            help="The band that is matched; by default the mean of all bands.",
-            of="reference",
-            advanced=True,
-        ),
-    ] = None,
-    input_band: Annotated[
-        int | None,
-        Band(
-            label="Band of the input",
-            help="The band that is matched; by default the mean of all bands.",
-            of="input",
-            advanced=True,
-        ),
-    ] = None,
-    reference_mask: Annotated[
-        Path | None,
-        RasterIn(
-            label="Mask of the reference",
-            help="Where this raster is 0 or has no data, the reference takes no part.",
-            advanced=True,
-        ),
-    ] = None,
-    input_mask: Annotated[
-        Path | None,
-        RasterIn(
-            label="Mask of the input",
-            help="Where this raster is 0 or has no data, the input takes no part.",
-            advanced=True,
-        ),
-    ] = None,
-    matching_pixel_size: Annotated[
-        float | None,
-        Distance(
-            label="Pixel size for matching",
-            help="Pixel size at which the images are compared; by default that of the coarser "
-            "image.",
-            minimum=1e-6,
-            advanced=True,
-        ),
-    ] = None,
+    reference_band: ReferenceBand = None,
+    input_band: InputBand = None,
+    reference_mask: ReferenceMask = None,
+    input_mask: InputMask = None,
+    matching_pixel_size: MatchingPixelSize = None,
     workers: Workers = None,
     seed: Seed = 0,
     progress: Progress = SILENT,
