@@ -40,7 +40,7 @@ from .windows import (
 )
 
 # The rotation is found on images reduced to about this length, in pixels.
-_SIDE_PX = 256
+_SIDE_PX = 192
 
 # Frequencies of the projections that are compared, in cycles per pixel.
 _RANGE = (0.02, 0.4)
