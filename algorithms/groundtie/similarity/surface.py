@@ -30,6 +30,10 @@ BORDER_PX = 8
 # A surface's slow trend, which says nothing of a peak, is its Gaussian mean of this width.
 TREND_PX = 5.0
 
+# What mutual information counts beside orientation, 1, in the fused similarity. Measured on real
+# SAR pairs (share of 61 px chips within 3 px): 1: 75.6 %, 0.75: 76.4 %, 0.5: 76.1 %.
+_HISTOGRAM_WEIGHT = np.float32(0.75)
+
 # A surface that varies by less than this holds nothing but rounding.
 _FLAT = 1e-9
 
@@ -209,7 +213,8 @@ def similarity_surface(
     """
     parts = []
     if settings.measure is not None:
-        parts.append(detrend(histogram_surface(template, search, radius, settings, executor)))
+        measured = histogram_surface(template, search, radius, settings, executor)
+        parts.append(detrend(measured) * _HISTOGRAM_WEIGHT)
     if settings.similarity in ("fused", "orientation"):
         parts.append(orientation_surface(template, search))
     if settings.similarity == "ncc":
