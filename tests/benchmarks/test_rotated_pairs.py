@@ -89,6 +89,15 @@ def test_no_case_is_crossed_with_itself(data: Path) -> None:
     assert all(Path(f"{name}.tif") != input for name, input in pairs)
 
 
+def test_cases_of_one_place_are_not_crossed(data: Path) -> None:
+    case = rotated_cases(data)[0]
+    names = ("oi-rotated/80", "oi-rotated/100", "other", "another")
+    few = [RealCase(name, KIND, case.reference, Path(name), 2.0, case.matrix) for name in names]
+    pairs = {(one.case.name, str(one.input)) for one in crossed(few)}
+    assert ("oi-rotated/80", "oi-rotated/100") not in pairs
+    assert ("oi-rotated/100", "other") in pairs
+
+
 class TestGoals:
     def test_all_found_in_time(self) -> None:
         found = goals(KIND, [outcome(CORRECT), outcome(CORRECT, 2.9)])
