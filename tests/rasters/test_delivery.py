@@ -241,7 +241,7 @@ def test_tiles_leave_no_seams(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_many_bands_are_worked_in_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(delivery, "_TILE_BYTES", 2 * 1024 * 1024 * 2)
+    monkeypatch.setattr(delivery, "_TILE_BYTES", 2 * delivery.BLOCK**2 * 2)
     bands = np.stack([IMAGE + i for i in range(7)])
     path = write_raster(tmp_path / "a.tif", bands, GRID, interleave="pixel")
     with rasterio.open(warped(path, GRID.window(-5, 0, 95, 70))) as dataset:

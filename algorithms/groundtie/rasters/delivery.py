@@ -28,7 +28,8 @@ from .warping import (
 )
 from .writing import BLOCK, create_like, fill_value, keep_apart
 
-_TILE = 2 * BLOCK
+# Tiles are blocks of the file, small enough for those of a small raster to be worked side by side.
+_TILE = BLOCK
 
 # What a worker may hold of the result at a time; rasters with many bands are worked in groups.
 _TILE_BYTES = 32_000_000

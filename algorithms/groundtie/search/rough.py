@@ -112,7 +112,7 @@ def rough_candidates(
     if rough.poses is None:
         return _shifts(pair, level, radius_px, settings, held_out, executor)
     reach = radius_px + _reach_of_poses(level, rough)
-    reference, input = _patches(pair, level, 0, reach, held_out)
+    reference, input = _patches(pair, level, 0, reach, held_out, executor)
     limits = PoseLimits(radius_px, rough.rotation_deg, rough.scale)
     found = rough.poses(reference, input, limits, settings, executor)[:CANDIDATES]
     shapes = reference.values.shape, input.values.shape
@@ -128,7 +128,8 @@ def _shifts(
     executor: Executor,
 ) -> list[Candidate]:
     """Search all shifts, and return the highest peaks of their similarity."""
-    reference, input = _patches(pair, level, BORDER_PX, radius_px + BORDER_PX, held_out)
+    reach = radius_px + BORDER_PX
+    reference, input = _patches(pair, level, BORDER_PX, reach, held_out, executor)
     surface = similarity_surface(
         describe(reference, level.width * level.height, settings),
         describe(input, level.width * level.height, settings),
@@ -152,15 +153,16 @@ def _shifts(
 
 
 def _patches(
-    pair: ImagePair, level: Grid, border: int, reach: int, held_out: MaskOf
+    pair: ImagePair, level: Grid, border: int, reach: int, held_out: MaskOf, executor: Executor
 ) -> tuple[Patch, Patch]:
     """Return the reference with a border around the level, and the input with a wider one."""
     template, search = (
         level.window(-more, -more, level.width + 2 * more, level.height + 2 * more)
         for more in (border, reach)
     )
-    reference = pair.reference_patch(template, held_out(template))
+    reading = executor.submit(pair.reference_patch, template, held_out(template))
     input = pair.input_patch(search, pair.claimed_px)
+    reference = reading.result()
     for image, patch in ((pair.reference, reference), (pair.input, input)):
         _require_content(image.source.path, patch)
     return reference, input
