@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import groundtie
+from groundtie.errors import GroundTieError
 
 # What the demonstration promises: the default limit that `coregister` sets on itself.
 MAX_ERROR_PX = 3.0
@@ -44,10 +45,8 @@ def errors_against_truth_px(transform: Mapping, check_points: Path) -> np.ndarra
 
 
 def describe_verdict(numbers: dict) -> str:
-    """Say in one line what the report's JSON says."""
+    """Say in one line what the report's JSON says of a registration that was accepted."""
     verdict = numbers["verdict"]
-    if not verdict["accepted"]:
-        return f"refused: {verdict['reason']}"
     return (
         f"accepted: {verdict['points']} tie points, held-out RMSE "
         f"{verdict['check_rmse_px']:.2f} px, CE90 {verdict['check_ce90_m']:.2f} m"
@@ -91,7 +90,11 @@ def run(folder: Path) -> float:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="where the results go")
-    rmse_px = run(parser.parse_args().folder)
+    try:
+        rmse_px = run(parser.parse_args().folder)
+    except GroundTieError as error:
+        print(f"The demonstration failed: {error.one_line()}")
+        return error.exit_code
     # Not `>`: an error that is not a number is no success.
     if not rmse_px <= MAX_ERROR_PX:
         print(f"The registration was accepted but is off by more than {MAX_ERROR_PX} px.")

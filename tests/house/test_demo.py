@@ -88,17 +88,15 @@ def test_accepted_but_wrong_is_a_failure(
     assert demo.main() == 1
 
 
-def test_a_refusal_is_no_success(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_refusal_is_said_in_one_line_and_is_no_success(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     fake_tools(monkeypatch, 0.0, VERDICT)
 
     def refuse(*_: Any, **__: Any) -> None:
         raise groundtie.errors.NotRegisteredError("no common content")
 
     monkeypatch.setattr(groundtie, "coregister", refuse)
-    with pytest.raises(groundtie.errors.NotRegisteredError):
-        demo.run(tmp_path / "demo")
-
-
-def test_refused_verdict_gives_its_reason() -> None:
-    numbers = {"verdict": {"accepted": False, "reason": "too few points"}}
-    assert demo.describe_verdict(numbers) == "refused: too few points"
+    monkeypatch.setattr("sys.argv", ["demo.py", str(tmp_path / "demo")])
+    assert demo.main() == 3
+    assert "The demonstration failed: no common content\n" in capsys.readouterr().out
