@@ -91,7 +91,7 @@ def truth(pairs: list[Path]) -> Path:
 def test_warp_makes_what_python_makes(
     qgis_process: Any, pairs: list[Path], truth: Path, tmp_path: Path
 ) -> None:
-    import groundtie.tools
+    import groundtie
 
     files = pairs[0] / "input.tif", tmp_path / "qgis.tif", truth
     called = qgis_process(
@@ -99,7 +99,7 @@ def test_warp_makes_what_python_makes(
         *(f"TRANSFORM={files[2]}", f"REFERENCE={pairs[0] / 'reference.tif'}"),
     )
     assert (called.returncode, called.stderr) == (0, "")
-    groundtie.tools.warp(
+    groundtie.warp(
         files[0], tmp_path / "python.tif", truth, reference=pairs[0] / "reference.tif"
     )
     with rasterio.open(files[1]) as qgis, rasterio.open(tmp_path / "python.tif") as python:
