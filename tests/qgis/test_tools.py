@@ -99,9 +99,7 @@ def test_warp_makes_what_python_makes(
         *(f"TRANSFORM={files[2]}", f"REFERENCE={pairs[0] / 'reference.tif'}"),
     )
     assert (called.returncode, called.stderr) == (0, "")
-    groundtie.warp(
-        files[0], tmp_path / "python.tif", truth, reference=pairs[0] / "reference.tif"
-    )
+    groundtie.warp(files[0], tmp_path / "python.tif", truth, reference=pairs[0] / "reference.tif")
     with rasterio.open(files[1]) as qgis, rasterio.open(tmp_path / "python.tif") as python:
         assert qgis.profile == python.profile
         np.testing.assert_array_equal(qgis.read(), python.read())
