@@ -1,0 +1,1 @@
+"""Sensor models: rational polynomial coefficients, heights, and their refinement."""

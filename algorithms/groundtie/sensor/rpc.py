@@ -1,0 +1,256 @@
+"""Rational polynomial coefficients (RPC): ground position ↔ image position.
+
+An image position is a ratio of two cubic polynomials of longitude, latitude and height above the
+ellipsoid (STDI-0002 volume 1, appendix E: RPC00B). Lines and samples count from the centre of the
+first pixel, which lies at 0: they are the (col, row) of arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .polynomials import TERMS, derivative, fill_terms, in_blocks
+
+FloatArray = NDArray[np.float64]
+
+# The inverse has arrived when it misses the image position by less, in pixels.
+_PRECISION_PX = 1e-7
+_STEPS = 12
+
+# Beyond this multiple of their scales ground positions are none of the image's.
+VALID_RANGE = 1.5
+
+# Nodes a side, along the ground and along height, of the lattice that the inverse starts from.
+_START_NODES = (9, 9, 5)
+
+
+@dataclass(frozen=True)
+class RPC:
+    """A rational polynomial model of a sensor.
+
+    Parameters
+    ----------
+    offset, scale
+        Of longitude (degrees), latitude (degrees) and height (metres above the ellipsoid).
+    image_offset, image_scale
+        Of column (sample) and row (line), in pixels; the first pixel's centre is at (0, 0).
+    sample_numerator, sample_denominator, line_numerator, line_denominator
+        The twenty coefficients of each polynomial, in the order of RPC00B.
+    error_bias_m, error_random_m
+        Root mean square errors that the supplier states, metres; None: not stated.
+    """
+
+    offset: tuple[float, float, float]
+    scale: tuple[float, float, float]
+    image_offset: tuple[float, float]
+    image_scale: tuple[float, float]
+    sample_numerator: tuple[float, ...]
+    sample_denominator: tuple[float, ...]
+    line_numerator: tuple[float, ...]
+    line_denominator: tuple[float, ...]
+    error_bias_m: float | None = None
+    error_random_m: float | None = None
+
+    def __post_init__(self) -> None:
+        if any(len(row) != TERMS for row in self._polynomials):
+            raise ValueError("an RPC polynomial has 20 coefficients")
+        numbers = np.concatenate([self.offset, self.image_offset, *self._polynomials])
+        scales = np.array([*self.scale, *self.image_scale])
+        if not np.isfinite(numbers).all() or not np.isfinite(scales).all() or not scales.all():
+            raise ValueError("the RPCs hold numbers that are not finite, or scales of 0")
+
+    @property
+    def _polynomials(self) -> Sequence[tuple[float, ...]]:
+        return (
+            self.sample_numerator,
+            self.line_numerator,
+            self.sample_denominator,
+            self.line_denominator,
+        )
+
+    @cached_property
+    def _coefficients(self) -> FloatArray:
+        """Numerators, then denominators, of column and row, shape (4, 20)."""
+        return np.array(self._polynomials)
+
+    @cached_property
+    def _derivatives(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Coefficients, (4, 10) each, of the derivatives by longitude, latitude and height."""
+        return (
+            derivative(self._coefficients, 0),
+            derivative(self._coefficients, 1),
+            derivative(self._coefficients, 2),
+        )
+
+    def project(self, lon_lat: ArrayLike, height_m: ArrayLike, workers: int = 1) -> FloatArray:
+        """Return the image positions (col, row), shape (n, 2), of ground positions.
+
+        Parameters
+        ----------
+        lon_lat
+            Longitude and latitude in degrees (WGS 84), shape (n, 2).
+        height_m
+            Height above the ellipsoid, shape (n,) or one for all.
+        workers
+            Number of threads.
+        """
+        lon_lat = np.asarray(lon_lat, float)
+        height = np.broadcast_to(np.asarray(height_m, float), len(lon_lat))
+        px = np.empty((len(lon_lat), 2))
+
+        def work(part: slice, terms: FloatArray) -> None:
+            fill_terms(self._normalised(lon_lat[part], height[part]), terms)
+            px[part] = self._image_position(self._coefficients @ terms)
+
+        in_blocks(work, len(px), workers)
+        return px
+
+    def derivatives(self, lon_lat: ArrayLike, height_m: ArrayLike) -> FloatArray:
+        """Return the derivatives of image positions by ground positions, shape (n, 2, 3).
+
+        Rows are column and row, columns longitude and latitude (px per degree) and height (px per
+        metre). Parameters as `project`.
+        """
+        lon_lat = np.asarray(lon_lat, float)
+        height = np.broadcast_to(np.asarray(height_m, float), len(lon_lat))
+        slopes = np.empty((len(lon_lat), 2, 3))
+
+        def work(part: slice, terms: FloatArray) -> None:
+            fill_terms(self._normalised(lon_lat[part], height[part]), terms)
+            values = self._coefficients @ terms
+            for axis, coefficients in enumerate(self._derivatives):
+                slope = _quotient_slope(values, coefficients @ terms[: coefficients.shape[1]])
+                slopes[part, :, axis] = (slope / self.scale[axis]).T * self.image_scale
+
+        in_blocks(work, len(slopes), 1)
+        return slopes
+
+    def localise(self, px: ArrayLike, height_m: ArrayLike, workers: int = 1) -> FloatArray:
+        """Return longitude and latitude, shape (n, 2), of image positions at given heights.
+
+        By Newton's method with the analytic Jacobian, to 1e-7 px; NaN where it finds nothing.
+
+        Parameters
+        ----------
+        px
+            Image positions (col, row), shape (n, 2).
+        height_m
+            Height above the ellipsoid, shape (n,) or one for all.
+        workers
+            Number of threads.
+        """
+        px = np.asarray(px, float)
+        height = np.broadcast_to(np.asarray(height_m, float), len(px))
+        found = np.empty((len(px), 2))
+        start = self._start
+
+        def work(part: slice, terms: FloatArray) -> None:
+            target = ((px[part] - self.image_offset) / self.image_scale).T
+            lph = np.empty_like(terms[:3])
+            lph[2] = (height[part] - self.offset[2]) / self.scale[2]
+            lph[:2] = start(target, lph[2], terms)
+            with np.errstate(all="ignore"):
+                self._newton(lph, target, terms)
+            found[part] = lph[:2].T * self.scale[:2] + self.offset[:2]
+
+        in_blocks(work, len(px), workers)
+        return found
+
+    def is_valid(self, lon_lat: ArrayLike, height_m: ArrayLike) -> NDArray[np.bool_]:
+        """Tell which ground positions lie where the coefficients may be used, shape (n,).
+
+        That is within 1.5 times the scales around the offsets: farther off, the polynomials may
+        lead positions of other places back into the image. Parameters as `project`.
+        """
+        lon_lat = np.asarray(lon_lat, float)
+        height = np.broadcast_to(np.asarray(height_m, float), len(lon_lat))
+        inside = np.abs(self._normalised(lon_lat, height)) <= VALID_RANGE
+        return np.asarray(inside.all(axis=0))
+
+    def shifted(self, shift_px: ArrayLike) -> RPC:
+        """Return the RPCs whose image positions are moved by a shift (col, row): exact."""
+        dx, dy = np.asarray(shift_px, float).tolist()
+        return replace(self, image_offset=(self.image_offset[0] + dx, self.image_offset[1] + dy))
+
+    def _normalised(self, lon_lat: FloatArray, height: FloatArray) -> FloatArray:
+        """Return normalised longitude, latitude and height, shape (3, n)."""
+        lph = np.empty((3, len(lon_lat)))
+        for axis, values in enumerate((lon_lat[:, 0], lon_lat[:, 1], height)):
+            np.subtract(values, self.offset[axis], out=lph[axis])
+            lph[axis] *= 1 / self.scale[axis]
+        return lph
+
+    def _image_position(self, values: FloatArray) -> FloatArray:
+        with np.errstate(all="ignore"):
+            ratio = values[:2] / values[2:]
+        return np.asarray(ratio.T * self.image_scale + self.image_offset)
+
+    def _newton(self, lph: FloatArray, target: FloatArray, terms: FloatArray) -> None:
+        """Move normalised positions, (3, n), in place until they project to targets, (2, n)."""
+        size = np.abs(np.array(self.image_scale))[:, None]
+        slopes = np.concatenate(self._derivatives[:2])
+        for _ in range(_STEPS):
+            fill_terms(lph, terms)
+            values = self._coefficients @ terms
+            miss = target - values[:2] / values[2:]
+            if np.nanmax(np.abs(miss) * size, initial=0.0) < _PRECISION_PX:
+                break
+            by_l, by_p = np.split(slopes @ terms[: slopes.shape[1]], 2)
+            by_l, by_p = _quotient_slope(values, by_l), _quotient_slope(values, by_p)
+            determinant = by_l[0] * by_p[1] - by_p[0] * by_l[1]
+            lph[0] += (miss[0] * by_p[1] - miss[1] * by_p[0]) / determinant
+            lph[1] += (miss[1] * by_l[0] - miss[0] * by_l[1]) / determinant
+        lost = ~np.all(np.abs(miss) * size < _PRECISION_PX, axis=0)
+        lph[:2, lost] = np.nan
+
+    @cached_property
+    def _start(self) -> _Start:
+        return _Start.of(self)
+
+
+@dataclass(frozen=True)
+class _Start:
+    """Cubic polynomials from image position and height to longitude and latitude, normalised.
+
+    They are fitted over the whole range of the RPCs, and right to a few pixels: from there,
+    Newton's method needs one step.
+    """
+
+    low: FloatArray
+    span: FloatArray
+    coefficients: FloatArray
+
+    @classmethod
+    def of(cls, rpc: RPC) -> _Start:
+        """Fit the polynomials to a lattice on the ground."""
+        axes = [np.linspace(-1, 1, nodes) for nodes in _START_NODES]
+        lph = np.stack(np.meshgrid(*axes, indexing="ij")).reshape(3, -1)
+        terms = np.empty((TERMS, lph.shape[1]))
+        fill_terms(lph, terms)
+        values = rpc._coefficients @ terms
+        image = values[:2] / values[2:]
+        low, high = image.min(axis=1, keepdims=True), image.max(axis=1, keepdims=True)
+        fill_terms(np.vstack([_unit(image, low, high - low), lph[2]]), terms)
+        coefficients = np.linalg.lstsq(terms.T, lph[:2].T, rcond=None)[0].T
+        return cls(low, high - low, np.ascontiguousarray(coefficients))
+
+    def __call__(self, target: FloatArray, height: FloatArray, terms: FloatArray) -> FloatArray:
+        """Return normalised longitude and latitude, (2, n), near those of image positions."""
+        fill_terms(np.vstack([_unit(target, self.low, self.span), height]), terms)
+        return self.coefficients @ terms
+
+
+def _unit(image: FloatArray, low: FloatArray, span: FloatArray) -> FloatArray:
+    return np.asarray(2 * (image - low) / span - 1)
+
+
+def _quotient_slope(values: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Return the derivatives, (2, n), of ratios from values and derivatives, (4, n) each."""
+    with np.errstate(all="ignore"):
+        ratio = values[:2] / values[2:]
+        return np.asarray((slopes[:2] - ratio * slopes[2:]) / values[2:])

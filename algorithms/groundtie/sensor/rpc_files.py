@@ -1,0 +1,183 @@
+"""RPCs in files: GeoTIFF tags, `_RPC.TXT`, `.RPB`, and the RPC XML of DIMAP 2 (Pléiades, SPOT).
+
+All are taken to the names of GDAL's metadata domain first (see `rpc_tags`).
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from pathlib import Path
+
+from ..errors import GeoreferencingError, OutputError
+from ..rasters.atomic import writing
+from ..rasters.reading import RasterSource
+from .rpc import RPC
+from .rpc_tags import rpc_from_tags, rpc_to_tags
+
+Tags = dict[str, str]
+
+# Names in .RPB files, and those in GDAL's domain.
+_RPB_NAMES = {
+    "errBias": "ERR_BIAS",
+    "errRand": "ERR_RAND",
+    "lineOffset": "LINE_OFF",
+    "sampOffset": "SAMP_OFF",
+    "latOffset": "LAT_OFF",
+    "longOffset": "LONG_OFF",
+    "heightOffset": "HEIGHT_OFF",
+    "lineScale": "LINE_SCALE",
+    "sampScale": "SAMP_SCALE",
+    "latScale": "LAT_SCALE",
+    "longScale": "LONG_SCALE",
+    "heightScale": "HEIGHT_SCALE",
+    "lineNumCoef": "LINE_NUM_COEFF",
+    "lineDenCoef": "LINE_DEN_COEFF",
+    "sampNumCoef": "SAMP_NUM_COEFF",
+    "sampDenCoef": "SAMP_DEN_COEFF",
+}
+
+_UNITS = {
+    "LINE": "pixels",
+    "SAMP": "pixels",
+    "LAT": "degrees",
+    "LONG": "degrees",
+    "HEIGHT": "meters",
+}
+
+# DIMAP counts lines and samples from 1.
+_DIMAP_FIRST = 1
+
+
+def rpc_of(source: RasterSource, path: str | os.PathLike[str] | None = None) -> RPC:
+    """Return the RPCs of an open raster.
+
+    Parameters
+    ----------
+    source
+        The raster; GDAL has found RPCs in its tags, or in files beside it.
+    path
+        A file with other RPCs to use in their place.
+
+    Raises
+    ------
+    GeoreferencingError
+        There are none, or they cannot be understood.
+    """
+    if path is not None:
+        return read_rpc(path)
+    tags = source.tags.get("RPC")
+    if not tags:
+        raise GeoreferencingError(
+            f"{source.path} has no RPCs; give the file that holds them (_RPC.TXT, .RPB, RPC .XML)"
+        )
+    return rpc_from_tags(tags, source.path)
+
+
+def read_rpc(path: str | os.PathLike[str]) -> RPC:
+    """Read RPCs from a `_RPC.TXT`, `.RPB` or DIMAP RPC XML file.
+
+    Raises
+    ------
+    GeoreferencingError
+        The file cannot be read, or holds no RPCs.
+    """
+    name = os.fspath(path)
+    parse = _READERS.get(Path(name).suffix.lower())
+    if parse is None:
+        raise GeoreferencingError(f"RPCs are read from {', '.join(_READERS)}: {name}")
+    try:
+        tags = parse(Path(name).read_text(encoding="utf-8-sig"))
+    except (OSError, UnicodeDecodeError, ElementTree.ParseError, ValueError) as error:
+        raise GeoreferencingError(f"cannot read the RPCs {name}: {error}") from error
+    return rpc_from_tags(tags, name)
+
+
+def write_rpc(path: str | os.PathLike[str], rpc: RPC) -> None:
+    """Write RPCs as text in the format that the suffix of `path` tells, `.txt` or `.rpb`.
+
+    GDAL finds them as `IMAGE_RPC.TXT` or `IMAGE.RPB` beside `IMAGE.TIF`.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written, or its suffix is not known.
+    """
+    write = _WRITERS.get(Path(path).suffix.lower())
+    if write is None:
+        raise OutputError(f"RPCs are written as {', '.join(_WRITERS)}: {path}")
+    with writing(path):
+        Path(path).write_text(write(rpc_to_tags(rpc)), encoding="utf-8", newline="\n")
+
+
+def _read_text(text: str) -> Tags:
+    """Read `_RPC.TXT`: a name, a colon, a number and its unit on each line."""
+    tags: Tags = {}
+    for line in text.splitlines():
+        key, colon, value = line.partition(":")
+        if colon and value.split():
+            tags[key.strip().upper()] = value.split()[0]
+    return _joined(tags)
+
+
+def _write_text(tags: Tags) -> str:
+    lines = []
+    for key, value in tags.items():
+        if key.endswith("COEFF"):
+            lines += [f"{key}_{i}: {word}" for i, word in enumerate(value.split(), start=1)]
+        else:
+            unit = _UNITS.get(key.partition("_")[0], "meters")
+            lines.append(f"{key}: {value} {unit}")
+    return "\n".join(lines) + "\n"
+
+
+def _read_rpb(text: str) -> Tags:
+    """Read `.RPB`: statements with an equals sign, lists in brackets, in a group IMAGE."""
+    kind = re.search(r'SpecId\s*=\s*"?(\w+)', text, re.IGNORECASE)
+    if kind and kind[1].upper() != "RPC00B":
+        raise ValueError(f"coefficients of kind {kind[1]} are not supported, only RPC00B")
+    found = re.findall(r"(\w+)\s*=\s*(\([^)]*\)|[^;\n]*)", text)
+    return {_RPB_NAMES[key]: value.strip("() \r;") for key, value in found if key in _RPB_NAMES}
+
+
+def _write_rpb(tags: Tags) -> str:
+    lines = ['satId = "????";', 'bandId = "?";', 'SpecId = "RPC00B";', "BEGIN_GROUP = IMAGE"]
+    for name, key in _RPB_NAMES.items():
+        value = tags[key]
+        if key.endswith("COEFF"):
+            value = "(\n" + ",\n".join(f"\t\t\t{word}" for word in value.split()) + ")"
+        lines.append(f"\t{name} = {value};")
+    return "\n".join([*lines, "END_GROUP = IMAGE", "END;"]) + "\n"
+
+
+def _read_dimap(text: str) -> Tags:
+    """Read DIMAP 2: there, the inverse model leads from the ground to the image."""
+    root = ElementTree.fromstring(text)
+    model, validity = root.find(".//Global_RFM/Inverse_Model"), root.find(".//RFM_Validity")
+    if model is None or validity is None:
+        raise ValueError("it holds no RPCs of DIMAP 2 (Global_RFM)")
+    tags = _joined({e.tag: (e.text or "").strip() for part in (model, validity) for e in part})
+    for key in ("LINE_OFF", "SAMP_OFF"):
+        if key in tags:
+            tags[key] = f"{float(tags[key]) - _DIMAP_FIRST:.17g}"
+    return tags
+
+
+def _joined(tags: Tags) -> Tags:
+    """Join the twenty coefficients of a polynomial, each under a name of its own."""
+    joined = {key: value for key, value in tags.items() if "COEFF" not in key}
+    for key in ("LINE_NUM_COEFF", "LINE_DEN_COEFF", "SAMP_NUM_COEFF", "SAMP_DEN_COEFF"):
+        words = [tags[f"{key}_{i}"] for i in range(1, 21) if f"{key}_{i}" in tags]
+        if words:
+            joined[key] = " ".join(words)
+    return joined
+
+
+_READERS: dict[str, Callable[[str], Tags]] = {
+    ".txt": _read_text,
+    ".rpb": _read_rpb,
+    ".xml": _read_dimap,
+}
+_WRITERS: dict[str, Callable[[Tags], str]] = {".txt": _write_text, ".rpb": _write_rpb}

@@ -1,0 +1,130 @@
+"""Fitting RPCs to positions on the ground and in the image."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import TooFewPointsError
+from .polynomials import TERMS, fill_terms
+from .rpc import RPC
+
+FloatArray = NDArray[np.float64]
+
+# Unknowns of a ratio: two polynomials, less the denominator's first coefficient, which is 1.
+_UNKNOWNS = 2 * TERMS - 1
+
+# Coefficients that the ground positions hardly determine are kept small: a perspective image, for
+# one, leaves many of them open. Of the size of an exact fit's rounding errors.
+_RIDGE = 1e-9
+
+# The denominator weighs the residuals; it is known better after each fit.
+_FITS = 4
+
+
+@dataclass(frozen=True)
+class RPCFit:
+    """Fitted RPCs, and how far they miss: the largest and the RMS residual, in pixels."""
+
+    rpc: RPC
+    largest_residual_px: float
+    rmse_px: float
+
+
+def fit_rpc(lon_lat: ArrayLike, height_m: ArrayLike, px: ArrayLike, **stated: Any) -> RPCFit:
+    """Fit RPCs to pairs of ground and image positions by regularised least squares.
+
+    The equations are linearised by multiplying with the denominator, and weighted by what the fit
+    before found it to be (Tao & Hu 2001, doi:10.1016/S0924-2716(01)00033-3).
+
+    Parameters
+    ----------
+    lon_lat
+        Longitude and latitude in degrees, shape (n, 2); usually a lattice over the scene at
+        several heights (see `ground_lattice`).
+    height_m
+        Height above the ellipsoid, shape (n,).
+    px
+        Image positions (col, row), shape (n, 2).
+    stated
+        Further fields of `RPC`, as its errors.
+
+    Raises
+    ------
+    TooFewPointsError
+        Fewer pairs than a ratio of polynomials has coefficients.
+    """
+    ground = np.column_stack([np.asarray(lon_lat, float), np.asarray(height_m, float)])
+    px = np.asarray(px, float)
+    if len(ground) < _UNKNOWNS:
+        raise TooFewPointsError(f"RPCs need at least {_UNKNOWNS} positions, not {len(ground)}")
+    offset, scale = _frame(ground)
+    image_offset, image_scale = _frame(px)
+    terms = np.empty((TERMS, len(ground)))
+    fill_terms(((ground - offset) / scale).T, terms)
+    target = ((px - image_offset) / image_scale).T
+    (sample_num, sample_den), (line_num, line_den) = (_fit_ratio(terms.T, y) for y in target)
+    rpc = RPC(
+        tuple(offset.tolist()),
+        tuple(scale.tolist()),
+        tuple(image_offset.tolist()),
+        tuple(image_scale.tolist()),
+        sample_num,
+        sample_den,
+        line_num,
+        line_den,
+        **stated,
+    )
+    miss = np.hypot(*(rpc.project(ground[:, :2], ground[:, 2]) - px).T)
+    return RPCFit(rpc, float(miss.max()), float(np.sqrt(np.mean(miss**2))))
+
+
+def ground_lattice(
+    rpc: RPC, size: tuple[int, int], heights_m: ArrayLike, nodes: int = 21
+) -> tuple[FloatArray, FloatArray]:
+    """Return ground positions seen all over an image at several heights.
+
+    Parameters
+    ----------
+    rpc
+        The image's model.
+    size
+        Width and height of the image in pixels; the lattice reaches to its corners.
+    heights_m
+        Heights above the ellipsoid.
+    nodes
+        Nodes along each side of the image.
+
+    Returns
+    -------
+    lon_lat, height_m
+        Shapes (n, 2) and (n,).
+    """
+    along = [np.linspace(-0.5, side - 0.5, nodes) for side in size]
+    cols, rows, heights = np.meshgrid(*along, np.asarray(heights_m, float))
+    px = np.column_stack([cols.ravel(), rows.ravel()])
+    return rpc.localise(px, heights.ravel()), heights.ravel()
+
+
+def _frame(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    low, high = values.min(axis=0), values.max(axis=0)
+    return (low + high) / 2, np.where(high > low, (high - low) / 2, 1.0)
+
+
+def _fit_ratio(
+    terms: FloatArray, target: FloatArray
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return numerator and denominator, 20 coefficients each, of the ratio nearest to a target."""
+    design = np.hstack([terms, -target[:, None] * terms[:, 1:]])
+    ridge = _RIDGE * np.sqrt(len(terms)) * np.eye(_UNKNOWNS)
+    weight = np.ones(len(terms))
+    for _ in range(_FITS):
+        system = np.vstack([design * weight[:, None], ridge])
+        known = np.concatenate([target * weight, np.zeros(_UNKNOWNS)])
+        found = np.linalg.lstsq(system, known, rcond=None)[0]
+        denominator = np.concatenate([[1.0], found[TERMS:]])
+        weight = 1 / (terms @ denominator)
+    return tuple(found[:TERMS].tolist()), tuple(denominator.tolist())

@@ -1,0 +1,85 @@
+"""RPCs as GDAL's metadata domain RPC: what GeoTIFF tags and all other files become in GDAL.
+
+https://gdal.org/en/stable/development/rfc/rfc22_rpc.html
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ..errors import GeoreferencingError
+from .polynomials import TERMS
+from .rpc import RPC
+
+
+def rpc_from_tags(tags: Mapping[str, str], name: str) -> RPC:
+    """Return the RPCs that tags hold.
+
+    Parameters
+    ----------
+    tags
+        GDAL's metadata domain RPC.
+    name
+        Of the file, for errors.
+
+    Raises
+    ------
+    GeoreferencingError
+        Something is missing or is no number.
+    """
+
+    def number(key: str) -> float:
+        return float(tags[key].split()[0])  # a unit may follow
+
+    def error_m(key: str) -> float | None:
+        # GDAL writes -1 for what is not known.
+        return None if not tags.get(key) or number(key) < 0 else number(key)
+
+    try:
+        return RPC(
+            (number("LONG_OFF"), number("LAT_OFF"), number("HEIGHT_OFF")),
+            (number("LONG_SCALE"), number("LAT_SCALE"), number("HEIGHT_SCALE")),
+            (number("SAMP_OFF"), number("LINE_OFF")),
+            (number("SAMP_SCALE"), number("LINE_SCALE")),
+            _coefficients(tags, "SAMP_NUM_COEFF"),
+            _coefficients(tags, "SAMP_DEN_COEFF"),
+            _coefficients(tags, "LINE_NUM_COEFF"),
+            _coefficients(tags, "LINE_DEN_COEFF"),
+            error_m("ERR_BIAS"),
+            error_m("ERR_RAND"),
+        )
+    except KeyError as error:
+        raise GeoreferencingError(f"the RPCs of {name} lack {error.args[0]}") from error
+    except (ValueError, IndexError) as error:
+        raise GeoreferencingError(f"the RPCs of {name} cannot be understood: {error}") from error
+
+
+def rpc_to_tags(rpc: RPC) -> dict[str, str]:
+    """Return RPCs as GDAL's metadata domain RPC, with all digits."""
+    longitude, latitude, height = zip(rpc.offset, rpc.scale, strict=True)
+    sample, line = zip(rpc.image_offset, rpc.image_scale, strict=True)
+    named = {"LINE": line, "SAMP": sample, "LAT": latitude, "LONG": longitude, "HEIGHT": height}
+    polynomials = {
+        "LINE_NUM_COEFF": rpc.line_numerator,
+        "LINE_DEN_COEFF": rpc.line_denominator,
+        "SAMP_NUM_COEFF": rpc.sample_numerator,
+        "SAMP_DEN_COEFF": rpc.sample_denominator,
+    }
+    errors = {"ERR_BIAS": rpc.error_bias_m, "ERR_RAND": rpc.error_random_m}
+    return (
+        {name: _text(-1.0 if error is None else error) for name, error in errors.items()}
+        | {f"{name}_OFF": _text(offset) for name, (offset, _) in named.items()}
+        | {f"{name}_SCALE": _text(scale) for name, (_, scale) in named.items()}
+        | {name: " ".join(map(_text, row)) for name, row in polynomials.items()}
+    )
+
+
+def _coefficients(tags: Mapping[str, str], key: str) -> tuple[float, ...]:
+    values = tuple(float(word) for word in tags[key].replace(",", " ").split())
+    if len(values) != TERMS:
+        raise ValueError(f"{key} has {len(values)} coefficients, not {TERMS}")
+    return values
+
+
+def _text(number: float) -> str:
+    return f"{number:.17g}"

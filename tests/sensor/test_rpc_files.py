@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from rpc_models import DIMAP, REAL, camera_rpc, rasterio_project, real_tags, to_rasterio
+
+from groundtie.errors import GeoreferencingError, OutputError
+from groundtie.rasters.reading import open_raster
+from groundtie.sensor.rpc import RPC
+from groundtie.sensor.rpc_files import read_rpc, rpc_of, write_rpc
+from groundtie.sensor.rpc_tags import rpc_from_tags, rpc_to_tags
+
+CAMERA = replace(camera_rpc(), error_bias_m=2.5, error_random_m=0.25)
+
+
+def write_image(path: Path, rpc: RPC | None = None) -> Path:
+    profile = {"driver": "GTiff", "width": 60, "height": 50, "count": 1, "dtype": "uint8"}
+    with rasterio.open(path, "w", **profile) as dataset:
+        dataset.write(np.ones((1, 50, 60), np.uint8))
+        if rpc is not None:
+            dataset.rpcs = to_rasterio(rpc)
+    return path
+
+
+def flat(rpc: RPC) -> np.ndarray:
+    return np.concatenate(
+        [np.atleast_1d(np.array(value, float)) for value in vars(rpc).values() if value is not None]
+    )
+
+
+def assert_same(found: RPC, expected: RPC) -> None:
+    # GDAL hands 15 digits on.
+    np.testing.assert_allclose(flat(found), flat(expected), rtol=1e-14, atol=0)
+
+
+@pytest.mark.parametrize("name", ["image_RPC.TXT", "image.RPB"])
+def test_files_hold_every_digit_and_gdal_reads_them(tmp_path: Path, name: str) -> None:
+    write_rpc(tmp_path / name, CAMERA)
+    assert read_rpc(tmp_path / name) == CAMERA
+    with open_raster(write_image(tmp_path / "image.tif"), allow_sensor_geometry=True) as source:
+        assert_same(rpc_of(source), CAMERA)
+
+
+def test_tags_of_an_image_are_read(tmp_path: Path) -> None:
+    path = write_image(tmp_path / "image.tif", CAMERA)
+    with open_raster(path, allow_sensor_geometry=True) as source:
+        assert_same(rpc_of(source), CAMERA)
+
+
+def test_a_file_replaces_the_tags(tmp_path: Path) -> None:
+    path = write_image(tmp_path / "image.tif", CAMERA)
+    write_rpc(tmp_path / "other_rpc.txt", CAMERA.shifted((5, 6)))
+    with open_raster(path, allow_sensor_geometry=True) as source:
+        assert rpc_of(source, tmp_path / "other_rpc.txt") == CAMERA.shifted((5, 6))
+
+
+def test_errors_that_are_not_known_stay_so(tmp_path: Path) -> None:
+    unknown = replace(CAMERA, error_bias_m=None, error_random_m=None)
+    assert rpc_from_tags(rpc_to_tags(unknown), "x") == unknown
+    write_rpc(tmp_path / "a.RPB", unknown)
+    assert read_rpc(tmp_path / "a.RPB") == unknown
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_tags_are_gdals(real_data: Path, name: str) -> None:
+    with rasterio.open(real_data / name) as dataset:
+        expected = dataset.rpcs
+    rpc = rpc_from_tags(real_tags(real_data / name), name)
+    ground = np.random.default_rng(0).uniform(-1, 1, (100, 3)) * rpc.scale + rpc.offset
+    at_gdal = rasterio_project(expected, ground[:, :2], ground[:, 2])
+    assert np.abs(rpc.project(ground[:, :2], ground[:, 2]) - at_gdal).max() < 1e-6
+
+
+def test_dimap_agrees_with_the_physical_model(real_data: Path) -> None:
+    """The grid counts from the first pixel's corner; its nodes are 0.5 beyond pixel 4000."""
+    rpc = read_rpc(real_data / DIMAP)
+    name = "rpc-ventoux/GRID_PHR1B_P_201308051042194_SEN_690908101-001.tif"
+    with rasterio.open(real_data / name) as dataset:
+        positions, t = dataset.read(), dataset.transform
+        heights = [float(dataset.tags(ns="GTiff")[f"LG_ALTITUDE_B{k}"]) for k in range(10)]
+    rows, cols = np.indices(positions.shape[1:])
+    px = np.column_stack([(t.c + t.a * cols).ravel(), (t.f + t.e * rows).ravel()]) - 0.5
+    for k in range(0, 10, 2):
+        lon_lat = positions[k : k + 2].reshape(2, -1).T
+        # The supplier states that the RPCs miss the model by 0.002 px.
+        assert np.abs(rpc.project(lon_lat, heights[k]) - px).max() < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "reason"),
+    [
+        ("a.txt", "LINE_OFF: 5 pixels\n", "lack"),
+        ("a.txt", "", "lack"),
+        ("a.rpb", 'SpecId = "RPC00A";', "RPC00A"),
+        ("a.xml", "<a></a>", "holds no RPCs"),
+        ("a.xml", "no XML", "cannot read"),
+        ("a.csv", "", "are read from"),
+    ],
+)
+def test_what_holds_no_rpcs_is_said(tmp_path: Path, name: str, text: str, reason: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(GeoreferencingError, match=reason):
+        read_rpc(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "reason"),
+    [
+        ("LINE_OFF", "", "cannot be understood"),
+        ("LINE_SCALE", "0", "scales of 0"),
+        ("LINE_NUM_COEFF", "1 2 3", "3 coefficients"),
+        ("SAMP_OFF", "many", "many"),
+    ],
+)
+def test_broken_tags_are_said(key: str, value: str, reason: str) -> None:
+    with pytest.raises(GeoreferencingError, match=reason):
+        rpc_from_tags(rpc_to_tags(CAMERA) | {key: value}, "image.tif")
+
+
+def test_an_image_without_rpcs_is_said(tmp_path: Path) -> None:
+    path = write_image(tmp_path / "image.tif")
+    with (
+        open_raster(path, allow_sensor_geometry=True) as source,
+        pytest.raises(GeoreferencingError, match="has no RPCs"),
+    ):
+        rpc_of(source)
+
+
+def test_other_formats_are_not_written(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="written as"):
+        write_rpc(tmp_path / "a.xml", CAMERA)
+    with pytest.raises(OutputError, match="cannot write"):
+        write_rpc(tmp_path / "none" / "a.txt", CAMERA)
