@@ -95,9 +95,9 @@ def test_the_wave_is_no_model_of_degree_1() -> None:
 
 def test_goals_are_the_mean_and_the_largest_deficit() -> None:
     records = [
-        *shares("a", REAL, 0.80, (0.60, 0.82, 0.3)),
-        *shares("b", REAL, 0.74, (0.78, 0.70, 0.2)),
-        *shares("c", SIMULATED, 0.70, (0.60, 0.60, 0.3)),
+        *shares("a", REAL, 0.80, (0.60, 0.82, 0.5, 0.3)),
+        *shares("b", REAL, 0.74, (0.78, 0.70, 0.5, 0.2)),
+        *shares("c", SIMULATED, 0.70, (0.60, 0.60, 0.5, 0.3)),
     ]
     found = goals(records, quick=False)
     assert [goal.found for goal in found[:4]] == ["77.0%", "4.0%", "87.0%", "4.0%"]
@@ -107,9 +107,9 @@ def test_goals_are_the_mean_and_the_largest_deficit() -> None:
 
 def test_the_table_has_every_pair_and_the_means() -> None:
     records = [
-        *shares("a", REAL, 0.80, (0.60, 0.82, 0.3)),
-        *shares("b", REAL, 0.74, (0.78, 0.70, 0.2)),
-        *shares("c", SIMULATED, 0.50, (0.60, 0.60, 0.3)),
+        *shares("a", REAL, 0.80, (0.60, 0.82, 0.5, 0.3)),
+        *shares("b", REAL, 0.74, (0.78, 0.70, 0.5, 0.2)),
+        *shares("c", SIMULATED, 0.50, (0.60, 0.60, 0.5, 0.3)),
     ]
     table = shares_table(records, "alone")
     assert table.head == ("pair", "chips", FUSED, *SINGLE, "fused, distorted")
@@ -120,6 +120,6 @@ def test_the_table_has_every_pair_and_the_means() -> None:
         "c",
         f"mean of {SIMULATED}",
     ]
-    assert table.rows[0][1:] == ["10", "80%", "60%", "82%", "30%", "75%"]
-    assert table.rows[2][1:] == ["20", "77.0%", "69.0%", "76.0%", "25.0%", "72.0%"]
+    assert table.rows[0][1:] == ["10", "80%", "60%", "82%", "50%", "30%", "75%"]
+    assert table.rows[2][1:] == ["20", "77.0%", "69.0%", "76.0%", "50.0%", "25.0%", "72.0%"]
     assert shares_table(records, "supported").rows[0][2] == "90%"

@@ -10,6 +10,7 @@ from groundtie.rasters.patch import Patch
 from groundtie.similarity.orientation import (
     SCALES_PX,
     compress,
+    edge_strength,
     orientation_fields,
     squared_gradients,
 )
@@ -169,3 +170,26 @@ def test_the_same_image_has_the_same_field_to_the_last_digit() -> None:
         blocks.append(np.empty(size * 37, np.uint8))
         found.add(field_of(image.copy()).tobytes())
     assert len(found) == 1
+
+
+def test_edge_strength_is_the_soft_size_of_the_gradient() -> None:
+    """|g| / (|g| + median |g|), with scipy's Gaussian derivatives."""
+    image = texture(*SHAPE)
+    derivative = {"sigma": SCALES_PX[0], "mode": "reflect", "truncate": 6.0}
+    size = np.hypot(*(gaussian_filter(image, order=o, **derivative) for o in ((0, 1), (1, 0))))
+    valid = np.ones(SHAPE, bool)
+    found = edge_strength(field_of(image, SCALES_PX[0]), valid)
+    assert found.all_valid
+    close = np.abs(found.values - size / (size + np.median(size)))[INNER] < 0.03
+    assert close.mean() > 0.9
+
+
+def test_edge_strength_near_masked_pixels_does_not_count() -> None:
+    image = texture(*SHAPE).astype(np.float32)
+    valid = np.ones(SHAPE, bool)
+    valid[40:60, 30:50] = False
+    field = squared_gradients(image, valid, SCALES_PX[:1])[0]
+    found = edge_strength(field, valid)
+    reach = int(np.ceil(3 * SCALES_PX[0]))
+    around = cv2.dilate((~valid).astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0
+    np.testing.assert_array_equal(found.valid, ~around)

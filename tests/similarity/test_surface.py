@@ -72,7 +72,7 @@ def test_the_peak_is_where_the_content_lies_further_right_and_down(
     assert surface.max() > 6
 
 
-@pytest.mark.parametrize("similarity", ["fused", "nmi", "orientation"])
+@pytest.mark.parametrize("similarity", ["fused", "nmi", "orientation", "edge-strength"])
 def test_inverted_contrast_is_as_similar(similarity: str) -> None:
     template, search = patches((2, 3))
     settings = SimilaritySettings(similarity)

@@ -3,7 +3,8 @@
 Edges keep their place and direction between a SAR and an optical image when their contrast does
 not keep its sign. Squaring the complex gradient makes opposite directions the same; dividing by
 its magnitude makes weak and strong edges alike (orientation correlation: Fitch et al. 2002;
-normalised gradient fields: Haber & Modersitzki 2006).
+normalised gradient fields: Haber & Modersitzki 2006). How strong edges are is evidence of its own:
+see `edge_strength`.
 """
 
 from __future__ import annotations
@@ -90,6 +91,21 @@ def squared_gradients(
     fields.real = (square_x - square_y) * weight
     fields.imag = 2 * gx * gy * weight
     return fields
+
+
+def edge_strength(finest: NDArray[np.complex64], valid: NDArray[np.bool_]) -> Patch:
+    """Return how strong edges are, whatever their direction: 0 (none) to 1.
+
+    Parameters
+    ----------
+    finest
+        The squared gradients at the first of `SCALES_PX`, shape (h, w).
+    valid
+        Which pixels of the image count, shape (h, w). Strength counts a few pixels less.
+    """
+    # Not np.abs, whose last digits may depend on where arrays lie in memory.
+    strength = np.sqrt(finest.real**2 + finest.imag**2)
+    return Patch(strength, valid if valid.all() else _erode(valid, SCALES_PX[0]))
 
 
 def _gradient(image: NDArray[np.float32], scale_px: float) -> NDArray[np.float32]:

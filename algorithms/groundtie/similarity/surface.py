@@ -18,10 +18,17 @@ from .binning import to_bins
 from .correlation import MINIMUM_OVERLAP, correlate_fields, correlate_grey, overlap_share
 from .joint_histogram import count_joint_histograms, reach
 from .measures import MEASURES
-from .orientation import orientation_fields
+from .orientation import edge_strength, orientation_fields
 
 Surface = NDArray[np.float32]
-SIMILARITIES = ("fused", "nmi", "orientation", "ncc", *(m for m in MEASURES if m != "nmi"))
+SIMILARITIES = (
+    "fused",
+    "nmi",
+    "orientation",
+    "edge-strength",
+    "ncc",
+    *(m for m in MEASURES if m != "nmi"),
+)
 
 # Pixels that windows have beyond the chip on each side: what the widest gradient filter and the
 # widest histogram kernel reach.
@@ -30,9 +37,12 @@ BORDER_PX = 8
 # A surface's slow trend, which says nothing of a peak, is its Gaussian mean of this width.
 TREND_PX = 5.0
 
-# What mutual information counts beside orientation, 1, in the fused similarity. Measured on real
-# SAR pairs (share of 61 px chips within 3 px): 1: 75.6 %, 0.75: 76.4 %, 0.5: 76.1 %.
+# What mutual information and edge strength count beside orientation, 1, in the fused similarity.
+# docs/method-support.md tells what other weights gave.
 _HISTOGRAM_WEIGHT = np.float32(0.75)
+_STRENGTH_WEIGHT = np.float32(0.75)
+
+_ON_EDGES = ("fused", "orientation", "edge-strength")
 
 # A surface that varies by less than this holds nothing but rounding.
 _FLAT = 1e-9
@@ -45,8 +55,9 @@ class SimilaritySettings:
     Parameters
     ----------
     similarity
-        One of `SIMILARITIES`: "fused" adds up orientation and NMI, "orientation" correlates
-        squared gradients, "ncc" grey values; the others are measures on joint histograms.
+        One of `SIMILARITIES`: "fused" adds up orientation, NMI and edge strength, "orientation"
+        correlates squared gradients, "edge-strength" their size, "ncc" grey values; the others
+        are measures on joint histograms.
     bins
         Number of bins; None: chosen by the window's size.
     binning
@@ -109,6 +120,8 @@ class Features:
         Pixels that `bins` has on each side beyond the patch, for the histogram's kernel.
     fields
         Orientation fields at all scales, shape (scales, h, w); None if not needed.
+    strength
+        How strong edges are; None if not needed.
     """
 
     patch: Patch
@@ -116,6 +129,7 @@ class Features:
     bin_count: int
     margin: int
     fields: NDArray[np.complex64] | None
+    strength: Patch | None
 
     def inner(self, border: int) -> Features:
         """Return the features of the window without a border on each side."""
@@ -126,6 +140,7 @@ class Features:
             self.bin_count,
             self.margin,
             None if self.fields is None else self.fields[:, inside, inside],
+            None if self.strength is None else self.strength.inner(border),
         )
 
     @property
@@ -153,12 +168,15 @@ def describe(window: Patch, chip_pixels: int, settings: SimilaritySettings) -> F
     margin = reach(settings.gpve_order)
     bins: NDArray[np.uint8] | None = None
     fields: NDArray[np.complex64] | None = None
+    strength: Patch | None = None
     if settings.measure is not None:
         around = window.inner(BORDER_PX - margin)
         bins = to_bins(around.values, around.valid, bin_count, settings.binning)
-    if settings.similarity in ("fused", "orientation"):
-        fields = orientation_fields(window)[:, inner, inner]
-    return Features(window.inner(BORDER_PX), bins, bin_count, margin, fields)
+    if settings.similarity in _ON_EDGES:
+        fields = orientation_fields(window)
+        strength = edge_strength(fields[0], window.valid).inner(BORDER_PX)
+        fields = fields[:, inner, inner]
+    return Features(window.inner(BORDER_PX), bins, bin_count, margin, fields, strength)
 
 
 def histogram_surface(
@@ -181,6 +199,12 @@ def orientation_surface(template: Features, search: Features) -> Surface:
     valid = template.patch.valid, search.patch.valid
     surfaces = correlate_fields(template.fields, search.fields, *valid)
     return normalise(np.sum([detrend(surface) for surface in surfaces], axis=0))
+
+
+def strength_surface(template: Features, search: Features) -> Surface:
+    """Return the correlation of edge strength over shifts."""
+    assert template.strength is not None and search.strength is not None
+    return correlate_grey(template.strength, search.strength)
 
 
 def similarity_surface(
@@ -217,6 +241,8 @@ def similarity_surface(
         parts.append(detrend(measured) * _HISTOGRAM_WEIGHT)
     if settings.similarity in ("fused", "orientation"):
         parts.append(orientation_surface(template, search))
+    if settings.similarity in ("fused", "edge-strength"):
+        parts.append(detrend(strength_surface(template, search)) * _STRENGTH_WEIGHT)
     if settings.similarity == "ncc":
         parts.append(detrend(correlate_grey(template.patch, search.patch)))
     surface = normalise(np.sum(parts, axis=0))

@@ -77,10 +77,10 @@ def coregister(
         Choice(
             label="Similarity",
             help="What tells that two windows show the same place: mutual information (nmi), the "
-            "orientation of edges, both together (fused), correlation of grey values (ncc), which "
-            "is for images of the same kind only, or another measure on joint histograms: "
-            "Shannon's (mi), Rényi's or Tsallis's information of order 2, cluster reward, "
-            "correlation ratio.",
+            "orientation of edges, their strength, all three together (fused), correlation of "
+            "grey values (ncc), which is for images of the same kind only, or another measure on "
+            "joint histograms: Shannon's (mi), Rényi's or Tsallis's information of order 2, "
+            "cluster reward, correlation ratio.",
             choices=SIMILARITIES,
         ),
     ] = "fused",

@@ -151,8 +151,8 @@ class SurfaceSettings:
         radius = window.radius_px
         template = reference.inner(radius + BORDER_PX)
         search = input.inner(BORDER_PX)
-        if self.similarity in ("fused", "orientation"):
-            values, evidence = self._by_orientation(reference, input, window, executor)
+        if self.similarity in ("fused", "orientation", "edge-strength"):
+            values, evidence = self._by_edges(reference, input, window, executor)
         else:
             if self.similarity == "ncc":
                 values = correlate_grey(template, search)
@@ -169,7 +169,7 @@ class SurfaceSettings:
             np.where(enough, evidence, 0).astype(np.float32),
         )
 
-    def _by_orientation(
+    def _by_edges(
         self, reference: Patch, input: Patch, window: Window, executor: Executor
     ) -> tuple[Surface, Surface]:
         pixels, radius = window.chip_px**2, window.radius_px
@@ -179,6 +179,8 @@ class SurfaceSettings:
         evidence = surfaces.similarity_surface(template, here, radius, settings, executor)
         if self.similarity == "fused":
             return evidence, evidence
+        if self.similarity == "edge-strength":
+            return surfaces.strength_surface(template, here), evidence
         assert template.fields is not None and here.fields is not None
         valid = template.patch.valid, here.patch.valid
         return correlate_fields(template.fields, here.fields, *valid).mean(axis=0), evidence
