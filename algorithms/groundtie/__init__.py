@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from .tools.assess import assess
     from .tools.coregister import coregister
     from .tools.estimate_rotation import estimate_rotation
+    from .tools.filter_speckle import filter_speckle
+    from .tools.mask_threshold import mask_threshold
     from .tools.similarity_surface import similarity_surface
     from .tools.simulate import simulate
     from .tools.warp import warp
@@ -25,7 +27,9 @@ __all__ = [
     "assess",
     "coregister",
     "estimate_rotation",
+    "filter_speckle",
     "load_transform",
+    "mask_threshold",
     "similarity_surface",
     "simulate",
     "warp",

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LINT = "from importlinter.cli import lint_imports_command; lint_imports_command()"
 PACKAGES = (
     *("tools", "simulation", "quality", "sensor", "features", "search"),
-    *("similarity", "masks", "geometry", "rasters"),
+    *("similarity", "masks", "geometry", "rasters", "speckle"),
 )
 
 

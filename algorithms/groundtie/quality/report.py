@@ -17,6 +17,7 @@ import scipy
 
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
+from ..masks.choice import MaskUsed
 from ..rasters.atomic import writing
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
@@ -71,6 +72,8 @@ class Report:
         What the tool was called with.
     seconds
         How long it took.
+    mask
+        Which mask was used; None: no question of one.
     """
 
     title: str
@@ -81,12 +84,14 @@ class Report:
     surfaces: tuple[tuple[str, Surface], ...]
     parameters: dict[str, Any]
     seconds: float
+    mask: MaskUsed | None = None
 
     def summary(self) -> dict[str, Any]:
         """Return the report's numbers as values that strict JSON can carry."""
         values = {
             "verdict": self.verdict.summary(),
             "transform": None if self.transform is None else self.transform.to_json(),
+            "mask": None if self.mask is None else self.mask.summary(),
             "parameters": self.parameters,
             "versions": versions(),
             "seconds": self.seconds,
@@ -110,7 +115,7 @@ class Report:
             title=self.title,
             verdict=self.verdict,
             grid=self.pair.grid,
-            notes=self.pair.notes(),
+            notes=[*self.pair.notes(), *([] if self.mask is None else [self.mask.line()])],
             metres=_metres_per_px(self.pair.grid),
             model=None if self.transform is None else self.transform.model.kind,
             correction=_Correction.of(self.transform, self.pair.grid),

@@ -140,7 +140,7 @@ def warp_raster(
         ) as dataset,
         ThreadPoolExecutor(workers) as pool,
     ):
-        for i, (values, known) in enumerate(_in_order(pool, warp.tile, tasks, workers + 1)):
+        for i, (values, known) in enumerate(in_order(pool, warp.tile, tasks, workers + 1)):
             tile, group = tasks[i]
             place = rasterio.windows.Window(*tile)
             dataset.write(values, list(group), window=place)
@@ -219,7 +219,7 @@ def _band_groups(source: RasterSource) -> list[tuple[int, ...]]:
     return [tuple(numbers[i : i + most]) for i in range(0, source.count, most)]
 
 
-def _in_order(
+def in_order(
     pool: ThreadPoolExecutor,
     work: Callable[[Item], Result],
     items: Iterable[Item],

@@ -6,6 +6,7 @@ import contextlib
 import itertools
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from rasterio.enums import ColorInterp, Resampling
 from ..errors import ParameterError
 from .atomic import writing
 from .grid import PIXEL_COORDINATES, Grid
-from .reading import CACHE_BYTES, RasterSource, fits
+from .reading import CACHE_BYTES, BandInfo, RasterSource, fits
 
 BLOCK = 512
 
@@ -83,6 +84,12 @@ def create_like(
         check_complete(path)
         _add_overviews(path, nearest=source.colormap is not None)
         check_complete(path)
+
+
+def one_band(source: RasterSource, dtype: str) -> RasterSource:
+    """Return a raster, for `create_like`, as one grey band of a dtype that says nothing else."""
+    band = BandInfo(dtype, None, ColorInterp.gray, None, None, 1.0, 0.0, {})
+    return replace(source, bands=(band,), has_mask_band=False, colormap=None, tags={})
 
 
 def check_complete(path: str | os.PathLike[str]) -> None:

@@ -13,6 +13,8 @@ NAMES = (
     "warp",
     "assess",
     "similarity_surface",
+    "filter_speckle",
+    "mask_threshold",
     "simulate",
 )
 

@@ -111,6 +111,55 @@ GpveOrder = Annotated[
         advanced=True,
     ),
 ]
+Radar = Annotated[
+    Path, RasterIn(label="Radar image", help="A SAR image, as amplitude, intensity or complex.")
+]
+RadarBand = Annotated[
+    int | None,
+    Band(
+        label="Band",
+        help="The band that is looked at; by default the mean of all bands.",
+        of="input",
+        advanced=True,
+    ),
+]
+MaskOut = Annotated[
+    Path,
+    RasterOut(label="Mask", help="GeoTIFF that is 1 where pixels take part and 0 elsewhere."),
+]
+HighPercent = Annotated[
+    float,
+    Number(
+        label="Brightest part masked",
+        help="Share of the radar image that takes no part because it shines: walls and corners. "
+        "Thresholds are those of means over 4 × 4 pixels.",
+        unit="%",
+        minimum=0,
+        maximum=90,
+        advanced=True,
+    ),
+]
+LowPercent = Annotated[
+    float,
+    Number(
+        label="Darkest part masked",
+        help="Share of the radar image that takes no part because it is dark: radar shadow, but "
+        "roads and water, too.",
+        unit="%",
+        minimum=0,
+        maximum=90,
+        advanced=True,
+    ),
+]
+MaskGrowth = Annotated[
+    float,
+    Distance(
+        label="Growth of what is masked",
+        help="What lies within this distance of masked pixels takes no part either.",
+        maximum=200,
+        advanced=True,
+    ),
+]
 TransformOut = Annotated[
     Path | None,
     FileOut(

@@ -14,6 +14,7 @@ from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..geometry.models import KINDS
 from ..kinds import Choice, Distance, FileOut, Number, VectorOut
+from ..masks.choice import MASKS, NONE
 from ..progress import SILENT, Progress
 from ..quality.report import Report
 from ..rasters.pair import Image, default_radius_m, make_pair
@@ -27,9 +28,12 @@ from ..similarity.binning import BINNINGS
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
 from .common import (
     GpveOrder,
+    HighPercent,
     Input,
     InputBand,
     InputMask,
+    LowPercent,
+    MaskGrowth,
     MatchingPixelSize,
     Output,
     Reference,
@@ -41,6 +45,7 @@ from .common import (
     Workers,
     worker_count,
 )
+from .masking import MASK_IMAGES, MaskRequest
 from .registered_output import OUTPUT_GRIDS, RegisteredOutput, model_for_grid
 from .registration import (
     RegistrationFiles,
@@ -158,6 +163,28 @@ def coregister(
     reference_mask: ReferenceMask = None,
     input_mask: InputMask = None,
     matching_pixel_size: MatchingPixelSize = None,
+    mask: Annotated[
+        str,
+        Choice(
+            label="Mask",
+            help="What takes part, for scenes with high buildings, which lean over their "
+            "surroundings: threshold leaves out what shines in the radar image.",
+            choices=MASKS,
+            advanced=True,
+        ),
+    ] = NONE,
+    mask_image: Annotated[
+        str,
+        Choice(
+            label="Image that is masked",
+            help="By default the one with the more speckle: the radar's.",
+            choices=MASK_IMAGES,
+            advanced=True,
+        ),
+    ] = AUTO,
+    mask_high_percent: HighPercent = 20.0,
+    mask_low_percent: LowPercent = 0.0,
+    mask_growth: MaskGrowth = 0.0,
     chip_size: Annotated[
         int | None,
         Number(
@@ -260,6 +287,8 @@ def coregister(
         )
         for note in pair.notes():
             progress.update(0.0, note)
+        request = MaskRequest(mask, mask_image, mask_high_percent, mask_low_percent, mask_growth)
+        pair, mask_used = request.apply(pair, search_radius, stack, progress.part(0.0, 0.1))
         spacing_px = None if spacing is None else spacing / pair.grid.pixel_size_m
         local = LocalSearch(
             pair, lay_out_chips(pair, chip_size, spacing_px), settings, two_way_px=two_way_error
@@ -280,12 +309,13 @@ def coregister(
                 max_error,
                 seed,
                 executor,
-                progress.part(0.0, 0.7),
+                progress.part(0.1, 0.7),
             )
         page = Report(
             title=f"{Path(input).name} registered to {Path(reference).name}",
             verdict=result.verdict,
             pair=pair,
+            mask=mask_used,
             points=result.points,
             transform=result.transform,
             surfaces=result.extreme_surfaces() if report is not None else (),

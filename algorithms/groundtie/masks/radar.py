@@ -1,0 +1,37 @@
+"""Which image of a pair is the radar's."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..rasters.pair import Image
+from ..rasters.patch import Patch
+from ..rasters.reading import Window
+from ..speckle.statistics import FloatImage, calm_variation2
+
+# Looked at in the middle of an image, at full resolution: averaging would take speckle away.
+_SAMPLE_PX = 1024
+
+
+def is_more_speckled(image: Image, other: Image) -> bool:
+    """Tell whether an image has more speckle than another.
+
+    Parameters
+    ----------
+    image, other
+        The images; their grey values are taken for amplitudes.
+    """
+    return _calm(image) >= _calm(other)
+
+
+def power(patch: Patch) -> FloatImage:
+    """Return the power of amplitudes, 0 where invalid."""
+    return np.where(patch.valid, patch.values * patch.values, np.float32(0))
+
+
+def _calm(image: Image) -> float:
+    grid = image.source.grid
+    width, height = min(grid.width, _SAMPLE_PX), min(grid.height, _SAMPLE_PX)
+    middle = Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
+    patch = Patch(*image.source.read(middle, image.band))
+    return calm_variation2(power(patch), patch.valid)

@@ -1,0 +1,110 @@
+"""Masks by grey value: what shines, as walls and double bounces do, takes no part (thesis S 4.5).
+
+The thresholds stand in the histogram of the block-averaged image, where speckle is less; they are
+applied to the blocks at full resolution.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RasterContentError
+from ..progress import SILENT, Progress
+from ..rasters.reading import Mask, Window
+from .scene import Scene, Selection, block_means
+
+# Side of the blocks whose means are compared, in pixels (thesis S 4.5).
+BLOCK_PX = 4
+
+# Blocks of a scene that its histogram is made from, at most.
+_SAMPLE = 4_000_000
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """Which shares of a scene's grey values take no part.
+
+    Parameters
+    ----------
+    high_percent, low_percent
+        Percentage of the brightest and of the darkest blocks.
+    grow_px
+        Distance, in pixels, within which a block that takes no part keeps others from it.
+    """
+
+    high_percent: float
+    low_percent: float = 0.0
+    grow_px: int = 0
+
+    def on(self, scene: Scene, progress: Progress = SILENT) -> ThresholdMask:
+        """Return the mask of a scene.
+
+        Raises
+        ------
+        RasterContentError
+            No pixel of the scene is valid.
+        """
+        step = max(scene.grid.width * scene.grid.height // (BLOCK_PX**2 * _SAMPLE), 1)
+        strips = scene.reduced_strips(BLOCK_PX, progress)
+        sample = np.concatenate([part.values[::step][part.valid[::step]] for part in strips])
+        if sample.size == 0:
+            raise RasterContentError(f"{scene.like.path} has no valid pixels to make a mask of")
+        low, high = np.percentile(sample, [self.low_percent, 100 - self.high_percent])
+        return ThresholdMask(
+            scene,
+            float(low) if self.low_percent > 0 else -np.inf,
+            float(high) if self.high_percent > 0 else np.inf,
+            self.grow_px,
+        )
+
+
+@dataclass(frozen=True)
+class ThresholdMask:
+    """Tells which pixels of a scene take part: blocks from `low` to `high`, in grey values."""
+
+    scene: Scene
+    low: float
+    high: float
+    grow_px: int
+
+    def select(self, window: Window) -> Selection:
+        """Return which pixels of a window take part."""
+        # Whole blocks, and as many around as the mask grows by.
+        left, top = (_blocks_before(at - self.grow_px) for at in (window.col, window.row))
+        right = _blocks_after(window.col + window.width + self.grow_px)
+        bottom = _blocks_after(window.row + window.height + self.grow_px)
+        patch = self.scene.read(Window(left, top, right - left, bottom - top))
+        means = block_means(patch, BLOCK_PX)
+        out = means.valid & ((means.values > self.high) | (means.values < self.low))
+        inside = np.s_[
+            window.row - top : window.row - top + window.height,
+            window.col - left : window.col - left + window.width,
+        ]
+        full = np.repeat(np.repeat(out, BLOCK_PX, axis=0), BLOCK_PX, axis=1)
+        valid = patch.valid[inside]
+        return Selection(valid & ~grown(full, self.grow_px)[inside], valid)
+
+
+def grown(mask: Mask, distance_px: int) -> Mask:
+    """Return a mask with all pixels within a distance of it, shape (h, w)."""
+    if distance_px == 0:
+        return mask
+    return np.asarray(cv2.dilate(mask.astype(np.uint8), disc(distance_px)) > 0)
+
+
+def disc(radius_px: int) -> NDArray[np.uint8]:
+    """Return the pixels within a distance of the centre, shape (2 r + 1, 2 r + 1), as 0 and 1."""
+    offset = np.arange(-radius_px, radius_px + 1)
+    return np.asarray(np.hypot.outer(offset, offset) <= radius_px + 0.5, np.uint8)
+
+
+def _blocks_before(position: int) -> int:
+    return position // BLOCK_PX * BLOCK_PX
+
+
+def _blocks_after(position: int) -> int:
+    return -(-position // BLOCK_PX) * BLOCK_PX

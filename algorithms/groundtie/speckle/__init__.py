@@ -1,0 +1,1 @@
+"""Speckle: its statistics, and filters that smooth it and keep edges."""

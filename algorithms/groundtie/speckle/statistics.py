@@ -1,0 +1,159 @@
+"""Statistics of speckled intensity: local mean and variation, equivalent number of looks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+FloatImage = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+# Window in which looks are estimated, and the bins, in octaves of the squared variation, whose
+# fullest tells what is common to all homogeneous areas. No image has less than one look.
+_LOOKS_WINDOW_PX = 15
+_BIN_OCTAVES = 0.125
+_OCTAVES = (-14.0, 0.375)
+
+# Window, and share of all windows, by which speckled images are told from others.
+_CALM_WINDOW_PX = 3
+_CALM_SHARE = 0.1
+
+# Windows with fewer valid pixels than this share tell nothing of the looks.
+_LEAST_VALID = 0.9
+
+
+@dataclass(frozen=True)
+class LocalStatistics:
+    """Mean and squared coefficient of variation around each pixel, float32 of shape (h, w)."""
+
+    mean: FloatImage
+    variation2: FloatImage
+
+
+def local_statistics(intensity: FloatImage, valid: Mask, window_px: int) -> LocalStatistics:
+    """Return the statistics of the valid pixels in a square window around each pixel.
+
+    Parameters
+    ----------
+    intensity
+        Power of the signal, shape (h, w); invalid pixels are 0.
+    valid
+        Which pixels count, shape (h, w). What lies beyond the image does not.
+    window_px
+        Side of the window, odd.
+
+    Returns
+    -------
+    LocalStatistics
+        Both 0 where nothing in the window is valid.
+    """
+    size = (window_px, window_px)
+    outside = cv2.BORDER_CONSTANT
+    total: FloatImage = np.asarray(
+        cv2.boxFilter(intensity, cv2.CV_32F, size, normalize=False, borderType=outside), np.float32
+    )
+    squares: FloatImage = np.asarray(
+        cv2.sqrBoxFilter(intensity, cv2.CV_32F, size, normalize=False, borderType=outside),
+        np.float32,
+    )
+    weight = 1 / np.maximum(window_counts(valid, window_px), np.float32(1))
+    mean: FloatImage = np.asarray(total * weight, np.float32)
+    squares *= weight
+    power = np.maximum(mean * mean, np.finfo(np.float32).tiny)
+    variation2: FloatImage = np.asarray(squares / power, np.float32)
+    variation2 -= 1
+    return LocalStatistics(mean, np.maximum(variation2, np.float32(0), out=variation2))
+
+
+def window_counts(valid: Mask, window_px: int) -> FloatImage:
+    """Return the number of valid pixels in the window around each pixel, float32 (h, w)."""
+    if valid.all():
+        rows, cols = (_inside(size, window_px) for size in valid.shape)
+        return np.asarray(np.outer(rows, cols), np.float32)
+    return np.asarray(
+        cv2.boxFilter(
+            valid.astype(np.float32),
+            cv2.CV_32F,
+            (window_px, window_px),
+            normalize=False,
+            borderType=cv2.BORDER_CONSTANT,
+        )
+    )
+
+
+def _inside(size: int, window_px: int) -> FloatImage:
+    """Return how much of a window along one axis lies inside, for each position."""
+    half = window_px // 2
+    position = np.arange(size)
+    inside = np.minimum(position, half) + np.minimum(size - 1 - position, half) + 1
+    return inside.astype(np.float32)
+
+
+def estimate_looks(intensity: FloatImage, valid: Mask) -> float:
+    """Return the equivalent number of looks of an image.
+
+    In a homogeneous area, intensity has the squared coefficient of variation 1 / looks. Windows
+    that hold edges or texture vary more, each in its own way: the most frequent value is that of
+    the homogeneous ones (Foucher et al. 2000, doi:10.1109/IGARSS.2000.861621).
+
+    Parameters
+    ----------
+    intensity
+        Power of the signal, shape (h, w); invalid pixels are 0.
+    valid
+        Which pixels count, shape (h, w).
+
+    Returns
+    -------
+    float
+        At least 1, which is returned, too, if no window is valid or none varies.
+    """
+    variation2 = local_statistics(intensity, valid, _LOOKS_WINDOW_PX).variation2
+    full = window_counts(valid, _LOOKS_WINDOW_PX) >= _LEAST_VALID * _LOOKS_WINDOW_PX**2
+    inside = (variation2 > 2 ** _OCTAVES[0]) & (variation2 < 2 ** _OCTAVES[1])
+    usual = variation2[full & inside]
+    if usual.size == 0:
+        return 1.0
+    octave = np.log2(usual)
+    bins = round((_OCTAVES[1] - _OCTAVES[0]) / _BIN_OCTAVES)
+    counts, edges = np.histogram(octave, bins, _OCTAVES)
+    peak = int(np.convolve(counts, np.ones(3), "same").argmax())
+    low, high = edges[max(peak - 2, 0)], edges[min(peak + 3, bins)]
+    return max(float(1 / np.median(usual[(octave >= low) & (octave < high)])), 1.0)
+
+
+def calm_variation2(intensity: FloatImage, valid: Mask) -> float:
+    """Return the squared coefficient of variation in the calmest tenth of the smallest windows.
+
+    Speckle leaves no window calm, while a camera's noise is far below its signal: of a radar and
+    an optical image, the radar's is larger (measured: on all of 20 real pairs).
+
+    Parameters
+    ----------
+    intensity
+        Power of the signal, shape (h, w); invalid pixels are 0.
+    valid
+        Which pixels count, shape (h, w).
+
+    Returns
+    -------
+    float
+        0 if no window is valid.
+    """
+    local = local_statistics(intensity, valid, _CALM_WINDOW_PX)
+    full = window_counts(valid, _CALM_WINDOW_PX) == _CALM_WINDOW_PX**2
+    calm = local.variation2[full & (local.mean > 0)]
+    return float(np.quantile(calm, _CALM_SHARE)) if calm.size else 0.0
+
+
+def speckle_variation2(looks: float, *, amplitude: bool = False) -> float:
+    """Return the squared coefficient of variation of pure speckle, of intensity or amplitude."""
+    if not amplitude:
+        return 1 / looks
+    # Mean of the square root of a gamma variate of mean 1 and shape `looks`.
+    mean = math.exp(math.lgamma(looks + 0.5) - math.lgamma(looks)) / math.sqrt(looks)
+    return 1 / mean**2 - 1

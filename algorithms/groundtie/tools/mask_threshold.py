@@ -1,0 +1,70 @@
+"""Mask the pixels of a radar image that shine, as buildings do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..declaration import Output as ResultOutput
+from ..declaration import tool
+from ..masks.scene import Scene, write_mask
+from ..masks.threshold import Threshold
+from ..progress import SILENT, Progress
+from ..rasters.atomic import Outputs
+from ..rasters.reading import bounded_cache, open_raster
+from .common import HighPercent, LowPercent, MaskGrowth, MaskOut, Radar, RadarBand
+
+
+@dataclass(frozen=True)
+class ThresholdMaskResult:
+    """The mask, the share of pixels that take part, and the grey values they lie between."""
+
+    output: Path
+    share: float
+    low: float
+    high: float
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry; a threshold that is not set is None."""
+        limits = {"low": self.low, "high": self.high}
+        finite = {name: None if abs(at) == float("inf") else at for name, at in limits.items()}
+        return {"output": str(self.output), "share": self.share, **finite}
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        return [
+            f"wrote {self.output}",
+            f"{self.share:.1%} of the pixels take part: block means of {self.low:g} to "
+            f"{self.high:g}",
+        ]
+
+
+@tool(
+    title="Mask by thresholds",
+    group="Radar",
+    outputs=(ResultOutput("SHARE", "Share of the pixels that take part", "share"),),
+)
+def mask_threshold(
+    input: Radar,
+    output: MaskOut,
+    mask_high_percent: HighPercent = 20.0,
+    mask_low_percent: LowPercent = 0.0,
+    mask_growth: MaskGrowth = 0.0,
+    band: RadarBand = None,
+    progress: Progress = SILENT,
+) -> ThresholdMaskResult:
+    """Mask the pixels of a radar image that shine, as buildings do.
+
+    The thresholds are percentiles of the means over blocks of 4 × 4 pixels; whole blocks take
+    part or do not. The mask is for `coregister` (reference_mask, input_mask), which makes the
+    same one itself with mask=threshold.
+    """
+    with bounded_cache(), open_raster(input) as source:
+        scene = Scene.of(source, band)
+        grow_px = round(mask_growth / source.grid.pixel_size_m)
+        threshold = Threshold(mask_high_percent, mask_low_percent, grow_px)
+        mask = threshold.on(scene, progress.part(0.0, 0.3))
+        with Outputs() as outputs:
+            share = write_mask(scene, outputs.stage(output), mask.select, progress.part(0.3, 1.0))
+    return ThresholdMaskResult(output, share, mask.low, mask.high)

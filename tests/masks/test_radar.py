@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+from raster_files import write_raster
+
+from groundtie.masks.radar import is_more_speckled
+from groundtie.rasters.pair import Image
+from groundtie.rasters.reading import open_raster
+
+
+@pytest.mark.parametrize("looks", [1, 4, 20])
+def test_speckle_tells_the_radar_from_the_camera(tmp_path: Path, looks: int) -> None:
+    random = np.random.default_rng(0)
+    scene = np.kron(random.uniform(20, 200, (25, 25)), np.ones((8, 8)))
+    radar = scene * np.sqrt(random.gamma(looks, 1 / looks, scene.shape))
+    camera = scene + random.normal(0, 3, scene.shape)
+    with ExitStack() as stack:
+        one, other = (
+            Image(
+                stack.enter_context(
+                    open_raster(write_raster(tmp_path / name, image.astype(np.float32)))
+                )
+            )
+            for name, image in (("radar.tif", radar), ("camera.tif", camera))
+        )
+        assert is_more_speckled(one, other)
+        assert not is_more_speckled(other, one)
+
+
+def test_the_radar_image_of_every_real_pair_is_found(real_data: Path) -> None:
+    cases = json.loads((real_data / "cases.json").read_text())
+    pairs = [case for case in cases if case["kind"].startswith("sar-optical")]
+    assert len(pairs) >= 10
+    for case in pairs:
+        with ExitStack() as stack:
+            radar, camera = (
+                Image(
+                    stack.enter_context(
+                        open_raster(real_data / case[which], allow_sensor_geometry=True)
+                    )
+                )
+                for which in ("reference", "input")
+            )
+            assert is_more_speckled(radar, camera), case["id"]

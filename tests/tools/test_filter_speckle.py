@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from raster_files import utm_grid, write_raster
+
+from groundtie import filter_speckle
+from groundtie.errors import ParameterError, RasterContentError
+from groundtie.speckle.filters import FILTERS, SpeckleFilter
+
+LOOKS = 4.0
+SIZE = (530, 610)
+
+
+def amplitude(seed: int = 0) -> np.ndarray:
+    """Return amplitudes of 1000 and 3000 with speckle."""
+    power = np.full(SIZE, 1e6)
+    power[:, 300:] = 9e6
+    speckle = np.random.default_rng(seed).gamma(LOOKS, 1 / LOOKS, SIZE)
+    return np.sqrt(power * speckle)
+
+
+def read(path: Path) -> np.ndarray:
+    with rasterio.open(path) as dataset:
+        return dataset.read()
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_tiles_make_what_the_filter_makes_of_the_whole(tmp_path: Path, name: str) -> None:
+    image = amplitude().astype(np.float32)
+    path = write_raster(tmp_path / "in.tif", image, utm_grid(*SIZE[::-1]))
+    result = filter_speckle(path, tmp_path / "out.tif", name, 5, looks=LOOKS)
+    whole = SpeckleFilter(name, 5, LOOKS)(image**2, np.ones(SIZE, bool))
+    np.testing.assert_allclose(read(result.output)[0], np.sqrt(whole), rtol=2e-3)
+
+
+def test_looks_are_estimated_and_rise(tmp_path: Path) -> None:
+    path = write_raster(tmp_path / "in.tif", np.rint(amplitude()).astype(np.uint16))
+    result = filter_speckle(path, tmp_path / "out.tif")
+    assert result.looks == pytest.approx(LOOKS, rel=0.05)
+    assert result.looks_after > 20 * LOOKS
+    assert read(result.output).dtype == np.uint16
+    # The mean power stays; one grey level of rounding is nothing beside it.
+    power = (read(result.output)[0, :, 350:].astype(float) ** 2).mean()
+    assert power == pytest.approx(9e6, rel=0.01)
+
+
+def test_intensities_are_not_squared(tmp_path: Path) -> None:
+    image = (amplitude() ** 2).astype(np.float32)
+    path = write_raster(tmp_path / "in.tif", image)
+    result = filter_speckle(path, tmp_path / "out.tif", "lee", values="intensity", looks=LOOKS)
+    expected = SpeckleFilter("lee", 7, LOOKS)(image, np.ones(SIZE, bool))
+    np.testing.assert_allclose(read(result.output)[0], expected, rtol=1e-3)
+
+
+def test_nodata_stays_and_weighs_nothing(tmp_path: Path) -> None:
+    image = np.rint(amplitude()).astype(np.uint16)
+    image[100:200, 50:90] = 7
+    bands = np.stack([image, image[::-1]])
+    path = write_raster(tmp_path / "in.tif", bands, utm_grid(*SIZE[::-1]), nodata=7)
+    result = filter_speckle(path, tmp_path / "out.tif", "enhanced-frost", 9)
+    out = read(result.output)
+    np.testing.assert_array_equal(out == 7, bands == 7)
+    assert np.abs(out[0, 98:202, 49].astype(float) - 1000).max() < 400
+    with rasterio.open(result.output) as dataset:
+        assert dataset.nodata == 7
+
+
+def test_complex_pixels_become_amplitudes(tmp_path: Path) -> None:
+    phase = np.exp(2j * np.pi * np.random.default_rng(3).random(SIZE))
+    image = amplitude().astype(np.float32)
+    path = write_raster(tmp_path / "in.tif", (image * phase).astype(np.complex64))
+    out = read(filter_speckle(path, tmp_path / "out.tif", "kuan", looks=LOOKS).output)
+    assert out.dtype == np.float32
+    expected = SpeckleFilter("kuan", 7, LOOKS)(image**2, np.ones(SIZE, bool))
+    np.testing.assert_allclose(out[0], np.sqrt(expected), rtol=2e-3)
+
+
+def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
+    path = write_raster(tmp_path / "in.tif", amplitude().astype(np.float32))
+    with pytest.raises(ParameterError, match="odd number, not 6"):
+        filter_speckle(path, tmp_path / "out.tif", window=6)
+    empty = write_raster(tmp_path / "empty.tif", np.zeros((40, 40), np.uint8), nodata=0)
+    with pytest.raises(RasterContentError, match="no valid pixels"):
+        filter_speckle(empty, tmp_path / "out.tif")
+    assert not (tmp_path / "out.tif").exists()
