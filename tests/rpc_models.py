@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 import rasterio.rpc
+from affine import Affine
 from numpy.typing import NDArray
+from raster_files import write_raster
+from rasterio.crs import CRS
 from rasterio.transform import RPCTransformer
 
+from groundtie.rasters.grid import Grid, reproject
 from groundtie.sensor.rpc import RPC
 from groundtie.sensor.rpc_fit import fit_rpc
 from groundtie.sensor.rpc_tags import rpc_to_tags
+from groundtie.sensor.surfaces import LON_LAT
 
 FloatArray = NDArray[np.float64]
 
@@ -71,3 +77,43 @@ def rasterio_project(
 def real_tags(path: Path) -> dict[str, str]:
     with rasterio.open(path) as dataset:
         return dict(dataset.tags(ns="RPC"))
+
+
+def relief(lon_lat: FloatArray) -> FloatArray:
+    """Return smooth heights, (n,), between 100 and 500 m."""
+    x, y = (np.asarray(lon_lat) - [9.0, 45.15]).T * 111_195.0
+    return 300 + 120 * np.sin(x / 110) * np.cos(y / 90) + 80 * np.sin((x + y) / 230)
+
+
+def write_dem(
+    path: Path,
+    crs: str = "EPSG:4326",
+    size: int = 60,
+    pixel_m: float = 25.0,
+    offset_m: float = 0.0,
+    **more: object,
+) -> Path:
+    """Write `relief` around the camera's image as a raster of any CRS."""
+    crs_of = CRS.from_user_input(crs)
+    centre = reproject(np.array([[9.0, 45.15]]), LON_LAT, crs_of)[0]
+    step = pixel_m / (111_195.0 if crs_of.is_geographic else 1.0)
+    corner = centre + [-size / 2 * step, size / 2 * step]
+    transform = Affine(step, 0, corner[0], 0, -step, corner[1])
+    grid = Grid(transform, crs_of, size, size)
+    cols, rows = np.meshgrid(np.arange(size), np.arange(size))
+    xy = grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
+    heights = relief(reproject(xy, crs_of, LON_LAT)).reshape(size, size) + offset_m
+    holes = more.pop("holes", None)
+    if holes is not None:
+        heights[holes] = -32768
+        more["nodata"] = -32768
+    return write_raster(path, heights.astype(np.float32), grid, **more)
+
+
+def write_positions(path: Path, rpc: RPC, size: tuple[int, int] = (600, 500)) -> Path:
+    """Write an image whose two bands hold the column and row of each pixel."""
+    bands = np.stack(np.meshgrid(np.arange(size[0]), np.arange(size[1]))).astype(np.float32)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        write_raster(path, bands, rpcs=to_rasterio(rpc))
+    return path

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .tools.estimate_rotation import estimate_rotation
     from .tools.filter_speckle import filter_speckle
     from .tools.mask_threshold import mask_threshold
+    from .tools.orthorectify import orthorectify
     from .tools.similarity_surface import similarity_surface
     from .tools.simulate import simulate
     from .tools.warp import warp
@@ -30,6 +31,7 @@ __all__ = [
     "filter_speckle",
     "load_transform",
     "mask_threshold",
+    "orthorectify",
     "similarity_surface",
     "simulate",
     "warp",

@@ -17,6 +17,7 @@ from ..progress import SILENT, Progress
 from .grid import Grid
 from .reading import Mask, RasterSource, Window
 from .warping import (
+    DenseMap,
     ToInputPx,
     coordinates,
     inside_window,
@@ -205,7 +206,9 @@ def _choose_nodata(source: RasterSource) -> float | None:
 
 
 def _is_covered(warp: _Warp) -> bool:
-    """Tell whether every pixel of the target lies on the source."""
+    """Tell whether every pixel of the target is known to lie on the source."""
+    if isinstance(warp.to_input_px, DenseMap):
+        return False
     grid = warp.source.grid
     return all(
         lattice(warp.target.window(*tile), warp.to_input_px).lies_within(grid.width, grid.height)

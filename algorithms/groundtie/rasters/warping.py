@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import cv2
 import numpy as np
@@ -28,6 +28,20 @@ _ON_PIXELS = 1e-6
 
 # Stands for positions that are not finite: outside of every image.
 _NOWHERE = -1e9
+
+
+@runtime_checkable
+class DenseMap(Protocol):
+    """A map from a grid to input pixels that knows best how to find them for all of its pixels.
+
+    It need not be smooth: terrain, for one, may have steps anywhere.
+    """
+
+    def __call__(self, xy: FloatArray) -> FloatArray:
+        """Return the input pixels (col, row), shape (n, 2), at map positions (n, 2)."""
+
+    def coordinates(self, grid: Grid) -> FloatArray:
+        """Return the input column and row of every pixel of a grid, shape (2, height, width)."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +100,8 @@ def coordinates(grid: Grid, to_input_px: ToInputPx) -> FloatArray:
 
     Good to 0.01 px; positions that are not finite become far outside. Parameters as `lattice`.
     """
+    if isinstance(to_input_px, DenseMap):
+        return to_input_px.coordinates(grid)
     nodes = lattice(grid, to_input_px)
     rows, cols = np.arange(grid.height), np.arange(grid.width)
     if len(nodes.rows) == grid.height and len(nodes.cols) == grid.width:

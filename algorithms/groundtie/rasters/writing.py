@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import rasterio
+import rasterio.shutil
 from rasterio.enums import ColorInterp, Resampling
 
 from ..errors import ParameterError
@@ -90,6 +91,29 @@ def one_band(source: RasterSource, dtype: str) -> RasterSource:
     """Return a raster, for `create_like`, as one grey band of a dtype that says nothing else."""
     band = BandInfo(dtype, None, ColorInterp.gray, None, None, 1.0, 0.0, {})
     return replace(source, bands=(band,), has_mask_band=False, colormap=None, tags={})
+
+
+def write_cog(source: str | os.PathLike[str], path: str | os.PathLike[str], workers: int) -> None:
+    """Copy a GeoTIFF of `create_like` into a Cloud Optimized GeoTIFF.
+
+    Parameters
+    ----------
+    source, path
+        The file that is read, and the one that is written; see `atomic.Outputs.stage`.
+    workers
+        Threads that compress.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written completely.
+    """
+    options = {"blocksize": BLOCK, "compress": "deflate", "level": 1, "bigtiff": "if_safer"}
+    with writing(path, *_gdal_errors()), rasterio.Env(GDAL_CACHEMAX=CACHE_BYTES):
+        rasterio.shutil.copy(
+            source, path, driver="COG", predictor="yes", num_threads=workers, **options
+        )
+        check_complete(path)
 
 
 def check_complete(path: str | os.PathLike[str]) -> None:

@@ -65,24 +65,28 @@ def derivative(coefficients: FloatArray, coordinate: int) -> FloatArray:
     return lower
 
 
-def in_blocks(work: Callable[[slice, FloatArray], None], count: int, workers: int) -> None:
+def in_blocks(
+    work: Callable[[slice, FloatArray], None], count: int, workers: int, terms: int = TERMS
+) -> None:
     """Call `work` for all blocks of `count` points, with a matrix for the terms of each.
 
     Parameters
     ----------
     work
-        Takes the points' range and a matrix, (20, points), that it may overwrite.
+        Takes the points' range and a matrix, (terms, points), that it may overwrite.
     count
         Number of points.
     workers
         Number of threads; each works on a run of neighbouring blocks.
+    terms
+        Rows of the matrix.
     """
 
     def run(first: int, stop: int) -> None:
-        terms = np.empty((TERMS, min(BLOCK, stop - first)))
+        matrix = np.empty((terms, min(BLOCK, stop - first)))
         for start in range(first, stop, BLOCK):
             end = min(start + BLOCK, stop)
-            work(slice(start, end), terms[:, : end - start])
+            work(slice(start, end), matrix[:, : end - start])
 
     workers = min(workers, -(-count // BLOCK))
     if workers <= 1:

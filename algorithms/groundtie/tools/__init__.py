@@ -11,6 +11,7 @@ NAMES = (
     "coregister",
     "estimate_rotation",
     "warp",
+    "orthorectify",
     "assess",
     "similarity_surface",
     "filter_speckle",

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from ..kinds import Band, Choice, Distance, FileOut, Number, RasterIn, RasterOut
+from ..rasters.grid import Grid
 from ..rasters.warping import METHODS
 
 Reference = Annotated[
@@ -173,3 +174,8 @@ TransformOut = Annotated[
 def worker_count(workers: int | None) -> int:
     """Return the number of threads to use: as asked for, or one per processor."""
     return workers or os.cpu_count() or 1
+
+
+def crs_name(grid: Grid) -> str:
+    """Return the name of a grid's CRS."""
+    return "no CRS" if grid.crs is None else str(grid.crs.to_string())

@@ -21,7 +21,7 @@ from ..rasters.delivery import warp_raster
 from ..rasters.grid import Grid, reproject
 from ..rasters.reading import open_raster
 from ..rasters.target_grids import covering_grid, registered_grid
-from .common import Input, Output, Resampling, Workers, worker_count
+from .common import Input, Output, Resampling, Workers, crs_name, worker_count
 from .stored_transform import TiePointFit, load_stored, transform_of
 
 FloatArray = NDArray[np.float64]
@@ -43,7 +43,7 @@ class WarpResult:
             "width": self.grid.width,
             "height": self.grid.height,
             "pixel_size": list(self.grid.pixel_size),
-            "crs": _crs_name(self.grid),
+            "crs": crs_name(self.grid),
             "model": self.transform.model.kind,
             "tie_points": None if self.fit is None else vars(self.fit),
         }
@@ -54,7 +54,7 @@ class WarpResult:
         size = " × ".join(f"{side:g}" for side in grid.pixel_size)
         lines = [
             f"wrote {self.output}",
-            f"grid: {grid.width} × {grid.height} pixels of {size}, {_crs_name(grid)}",
+            f"grid: {grid.width} × {grid.height} pixels of {size}, {crs_name(grid)}",
             f"model: {self.transform.model.kind}",
         ]
         if self.fit is not None:
@@ -156,7 +156,3 @@ def _target_grid(found: Transform, reference: Path | None, pixel_size: float | N
     footprint = reproject(found.inverse(found.input_grid.outline()), found.crs, grid.crs)
     covering_grid(grid, footprint, within=True)
     return grid
-
-
-def _crs_name(grid: Grid) -> str:
-    return "no CRS" if grid.crs is None else str(grid.crs.to_string())

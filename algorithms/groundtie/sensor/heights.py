@@ -1,0 +1,173 @@
+"""Heights above the ellipsoid: constant, or of a raster whose vertical datum is known."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import rasterio
+from numpy.typing import NDArray
+
+from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
+from ..rasters.reading import RasterSource
+from .smooth_map import Positions
+from .surfaces import RasterSurface, surface_over
+
+FloatArray = NDArray[np.float64]
+
+ELLIPSOIDAL = "ellipsoidal"
+
+# PROJ's grids of the geoids' heights above the ellipsoid, by the names that it had and has.
+GEOID_GRIDS = {
+    "EGM96": ("us_nga_egm96_15.tif", "egm96_15.gtx"),
+    "EGM2008": ("us_nga_egm08_25.tif", "egm08_25.gtx"),
+}
+DATUMS = (ELLIPSOIDAL, *GEOID_GRIDS)
+
+
+# Takes a smooth function of longitude and latitude, (n, 2) → (n, k), and its largest error; returns
+# its values at all pixels of a grid, (k, h, w).
+OnPixels = Callable[[Positions, float], FloatArray]
+
+# Interpolation between nodes may be wrong by this: pixels of the terrain model, and metres.
+_TOLERANCE_PX = 1e-3
+_TOLERANCE_M = 1e-3
+
+
+class Heights(Protocol):
+    """Heights above the ellipsoid over a region."""
+
+    @property
+    def typical_m(self) -> float:
+        """A height of the region."""
+
+    def at(self, lon_lat: FloatArray) -> FloatArray:
+        """Return heights in metres, shape (n,), at longitudes and latitudes; NaN if unknown."""
+
+    def on_pixels(self, on_pixels: OnPixels) -> FloatArray:
+        """Return heights in metres at all pixels of a grid, shape (h, w)."""
+
+
+@dataclass(frozen=True)
+class ConstantHeight:
+    """The same height everywhere, in metres above the ellipsoid."""
+
+    height_m: float
+
+    @property
+    def typical_m(self) -> float:
+        """A height of the region."""
+        return self.height_m
+
+    def at(self, lon_lat: FloatArray) -> FloatArray:
+        """Return heights in metres, shape (n,)."""
+        return np.full(len(lon_lat), self.height_m)
+
+    def on_pixels(self, on_pixels: OnPixels) -> FloatArray:
+        """Return heights in metres at all pixels of a grid, shape (h, w)."""
+        return on_pixels(lambda lon_lat: self.at(lon_lat)[:, None], _TOLERANCE_M)[0]
+
+
+@dataclass(frozen=True)
+class TerrainHeights:
+    """Heights of a terrain model.
+
+    Parameters
+    ----------
+    terrain
+        The model.
+    geoid
+        What its heights count from, as heights above the ellipsoid; None: the ellipsoid.
+    offset_m
+        What is added everywhere, in metres.
+    """
+
+    terrain: RasterSurface
+    geoid: RasterSurface | None = None
+    offset_m: float = 0.0
+
+    @property
+    def typical_m(self) -> float:
+        """A height of the region: its median, and the geoid's."""
+        geoid = 0.0 if self.geoid is None else float(np.median(self.geoid.filled))
+        return float(np.median(self.terrain.filled)) + geoid + self.offset_m
+
+    def at(self, lon_lat: FloatArray) -> FloatArray:
+        """Return heights in metres, shape (n,), at longitudes and latitudes; NaN if unknown."""
+        heights = self.terrain.at(lon_lat)
+        if self.geoid is not None:
+            heights = heights + self.geoid.at(lon_lat)
+        return heights + self.offset_m
+
+    def on_pixels(self, on_pixels: OnPixels) -> FloatArray:
+        """Return heights in metres at all pixels of a grid, shape (h, w)."""
+        heights = self.terrain.at_pixels(on_pixels(self.terrain.to_px, _TOLERANCE_PX))
+        geoid = self.geoid
+        if geoid is not None:
+            heights += on_pixels(lambda lon_lat: geoid.at(lon_lat)[:, None], _TOLERANCE_M)[0]
+        return heights + self.offset_m if self.offset_m else heights
+
+
+def terrain_heights(
+    dem: RasterSource, geoid: RasterSource | None, lon_lat: FloatArray
+) -> TerrainHeights:
+    """Return the heights of a terrain model over a region.
+
+    Parameters
+    ----------
+    dem
+        The terrain model, of any CRS; voids are filled from their rims.
+    geoid
+        Heights of the geoid that the model's heights count from; None: they count from the
+        ellipsoid.
+    lon_lat
+        Places of the region, shape (n, 2): those in between are asked for, too.
+
+    Raises
+    ------
+    GeoreferencingError, NoOverlapError, RasterContentError
+        One of the rasters has no CRS, does not cover the region, or holds no value there.
+    """
+    terrain = surface_over(dem, lon_lat)
+    if geoid is None:
+        return TerrainHeights(terrain)
+    try:
+        return TerrainHeights(terrain, surface_over(geoid, lon_lat))
+    except (GeoreferencingError, NoOverlapError, RasterContentError) as error:
+        raise type(error)(f"the geoid cannot be used: {error}") from error
+
+
+def find_geoid(datum: str) -> Path | None:
+    """Return the grid of the geoid of a vertical datum; None for the ellipsoid.
+
+    Raises
+    ------
+    GeoreferencingError
+        PROJ's grid is not installed.
+    """
+    if datum == ELLIPSOIDAL:
+        return None
+    names = GEOID_GRIDS[datum]
+    for folder in _proj_folders():
+        for name in names:
+            if (folder / name).is_file():
+                return folder / name
+    raise GeoreferencingError(
+        f"heights above {datum} need PROJ's grid {names[0]}, which is not installed: get it with "
+        f"projsync --file {names[0]}, or give a geoid grid"
+    )
+
+
+def _proj_folders() -> list[Path]:
+    """Return where PROJ looks for grids."""
+    named = [os.environ.get(key, "") for key in ("PROJ_DATA", "PROJ_LIB")]
+    own = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "proj"
+    folders = [Path(part) for text in named for part in text.split(os.pathsep) if part]
+    shared = [Path(sys.prefix) / "share" / "proj", Path("/usr/local/share/proj")]
+    bundled = Path(rasterio.__file__).parent / "proj_data"
+    return [*folders, own, bundled, *shared, Path("/usr/share/proj")]

@@ -1,0 +1,204 @@
+"""An image located by RPCs and heights: map position ↔ image position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from affine import Affine
+from numpy.typing import ArrayLike, NDArray
+from rasterio.crs import CRS
+
+from ..errors import NoOverlapError
+from ..rasters.grid import Grid, reproject
+from ..rasters.reading import RasterSource
+from .heights import ConstantHeight, Heights, terrain_heights
+from .rpc import RPC
+from .smooth_map import Positions, smooth_map
+from .surfaces import LON_LAT
+
+FloatArray = NDArray[np.float64]
+
+# Heights found by intersecting a line of sight with the terrain are right to this, in metres.
+_PRECISION_M = 1e-4
+_STEPS = 60
+
+# Longitudes and latitudes from map positions may be wrong by this: 0.1 mm.
+_TOLERANCE_DEG = 1e-9
+
+# The map around the image that can be projected into it, as a share of the image's side.
+_AROUND = 0.5
+
+_NODES = 9
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """How an image sees the ground.
+
+    Parameters
+    ----------
+    rpc
+        The sensor model.
+    heights
+        Heights of the ground above the ellipsoid.
+    crs
+        CRS of the map.
+    to_lon_lat
+        From map positions to longitude and latitude, shapes (n, 2).
+    """
+
+    rpc: RPC
+    heights: Heights
+    crs: CRS
+    to_lon_lat: Positions
+
+    def to_px(self, xy: ArrayLike) -> FloatArray:
+        """Return the image positions (col, row), shape (n, 2), of map positions.
+
+        NaN where the height is not known or the RPCs do not hold.
+        """
+        lon_lat = self.to_lon_lat(np.asarray(xy, float))
+        height = self.heights.at(lon_lat)
+        px = self.rpc.project(lon_lat, height)
+        px[~self.rpc.is_valid(lon_lat, height)] = np.nan
+        return px
+
+    def heights_at(self, xy: ArrayLike) -> FloatArray:
+        """Return the heights above the ellipsoid, shape (n,), of map positions."""
+        return self.heights.at(self.to_lon_lat(np.asarray(xy, float)))
+
+    def to_map(self, px: ArrayLike) -> FloatArray:
+        """Return the map positions, shape (n, 2), that image positions see.
+
+        The height at which the line of sight meets the ground is found by the secant method; NaN
+        where it does not meet it.
+        """
+        return reproject(self.to_ground(px)[0], LON_LAT, self.crs)
+
+    def to_ground(self, px: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return longitude and latitude, (n, 2), and height, (n,), that image positions see."""
+        px = np.asarray(px, float)
+        height = np.full(len(px), self.heights.typical_m)
+        lon_lat, above = self._above(px, height)
+        previous, previous_above, height = height, above, height + above
+        with np.errstate(all="ignore"):
+            for _ in range(_STEPS):
+                lon_lat, above = self._above(px, height)
+                if np.nanmax(np.abs(above), initial=0.0) < _PRECISION_M:
+                    break
+                slope = (above - previous_above) / (height - previous)
+                # Steep slopes towards the sensor make the plain step overshoot.
+                step = np.where(np.isfinite(slope) & (slope < -0.2), -above / slope, above / 2)
+                step = np.where(np.abs(above) < _PRECISION_M, 0.0, step)
+                previous, previous_above, height = height, above, height + step
+        lost = ~(np.abs(above) < _PRECISION_M)
+        lon_lat[lost], height = np.nan, np.where(lost, np.nan, height)
+        return lon_lat, height
+
+    def _above(self, px: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return where lines of sight have a height, and how far the ground lies above them."""
+        lon_lat = self.rpc.localise(px, height)
+        return lon_lat, self.heights.at(lon_lat) - height
+
+    def with_rpc(self, rpc: RPC) -> Orientation:
+        """Return the orientation by other RPCs of the same image."""
+        return replace(self, rpc=rpc)
+
+
+@dataclass(frozen=True)
+class SensorGrid(Grid):
+    """The pixels of an image that is located by its orientation.
+
+    To all that asks where pixels lie on the map it is a grid as any other; its geotransform is an
+    approximation, good for pixel sizes.
+
+    Parameters
+    ----------
+    orientation
+        How the image sees the ground.
+    """
+
+    orientation: Orientation
+
+    def pixel_to_map(self, px: ArrayLike) -> FloatArray:
+        return self.orientation.to_map(np.asarray(px, float).reshape(-1, 2))
+
+    def map_to_pixel(self, xy: ArrayLike) -> FloatArray:
+        return self.orientation.to_px(np.asarray(xy, float).reshape(-1, 2))
+
+
+def orient(
+    source: RasterSource,
+    rpc: RPC,
+    crs: CRS,
+    dem: RasterSource | None,
+    geoid: RasterSource | None = None,
+    height_m: float | None = None,
+) -> Orientation:
+    """Return the orientation of an image.
+
+    Parameters
+    ----------
+    source
+        The image.
+    rpc
+        Its sensor model.
+    crs
+        CRS of the map.
+    dem
+        A terrain model; None: the height is the same everywhere.
+    geoid
+        What the model's heights count from; None: the ellipsoid (see `terrain_heights`).
+    height_m
+        Height above the ellipsoid where there is no terrain model; None: that of the RPCs.
+
+    Raises
+    ------
+    NoOverlapError
+        The terrain model does not cover the image.
+    GeoreferencingError, RasterContentError
+        See `terrain_heights`.
+    """
+    size = source.grid.width, source.grid.height
+    low, high = (rpc.offset[2] + sign * abs(rpc.scale[2]) for sign in (-1, 1))
+    extremes = np.vstack([seen_at(rpc, size, height) for height in (low, high)])
+    heights: Heights
+    if dem is None:
+        heights = ConstantHeight(rpc.offset[2] if height_m is None else height_m)
+    else:
+        heights = terrain_heights(dem, geoid, extremes)
+    seen = seen_at(rpc, size, heights.typical_m)
+    known = np.isfinite(heights.at(seen))
+    if dem is not None and not known.all():
+        share = "nothing" if not known.any() else f"only {100 * known.mean():.0f} %"
+        raise NoOverlapError(f"{dem.path} covers {share} of the area of {source.path}")
+    xy = reproject(np.vstack([extremes, seen]), LON_LAT, crs)
+    if not np.isfinite(xy).all():
+        raise NoOverlapError(f"{source.path} lies outside of the domain of {crs.to_string()}")
+    around = _AROUND * (xy.max(axis=0) - xy.min(axis=0))
+
+    def exact(places: FloatArray) -> FloatArray:
+        return reproject(places, crs, LON_LAT)
+
+    to_lon_lat = smooth_map(exact, xy.min(axis=0) - around, xy.max(axis=0) + around, _TOLERANCE_DEG)
+    return Orientation(rpc, heights, crs, to_lon_lat)
+
+
+def seen_at(rpc: RPC, size: tuple[int, int], height_m: float) -> FloatArray:
+    """Return longitudes and latitudes all over an image, (n, 2), at a height; none is NaN."""
+    along = [np.linspace(-0.5, side - 0.5, _NODES) for side in size]
+    px = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
+    lon_lat = rpc.localise(px, height_m)
+    return lon_lat[np.isfinite(lon_lat).all(axis=1)]
+
+
+def sensor_grid(source: RasterSource, orientation: Orientation) -> SensorGrid:
+    """Return the grid of an image that is located by its orientation."""
+    width, height = source.grid.width, source.grid.height
+    corners = np.array([[0, 0], [width, 0], [0, height]], float) - 0.5
+    ground = orientation.rpc.localise(corners, orientation.heights.typical_m)
+    origin, right, down = reproject(ground, LON_LAT, orientation.crs)
+    along, across = (right - origin) / width, (down - origin) / height
+    transform = Affine(along[0], across[0], origin[0], along[1], across[1], origin[1])
+    return SensorGrid(transform, orientation.crs, width, height, orientation)

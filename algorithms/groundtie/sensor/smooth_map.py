@@ -1,0 +1,92 @@
+"""A polynomial in place of a map projection: the same positions, hundreds of times as fast."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .polynomials import in_blocks
+
+FloatArray = NDArray[np.float64]
+Positions = Callable[[FloatArray], FloatArray]
+
+_DEGREE = 5
+_NODES = 12
+_CHECKS = 400
+
+# Each term is one of lower degree times u (0) or v (1), by rising degree.
+_PRODUCTS = tuple(
+    (total * (total - 1) // 2 + max(j - 1, 0), int(j > 0))
+    for total in range(1, _DEGREE + 1)
+    for j in range(total + 1)
+)
+_TERMS = len(_PRODUCTS) + 1
+
+
+@dataclass(frozen=True)
+class SmoothMap:
+    """A polynomial of degree 5 from positions in a box to other positions; NaN outside of it.
+
+    Parameters
+    ----------
+    low, high
+        Corners of the box, shape (2,).
+    coefficients
+        Shape (2, 21).
+    """
+
+    low: FloatArray
+    high: FloatArray
+    coefficients: FloatArray
+
+    def __call__(self, xy: FloatArray) -> FloatArray:
+        """Return the other positions, shape (n, 2), of positions (n, 2)."""
+        moved = np.empty((len(xy), 2))
+
+        def work(part: slice, terms: FloatArray) -> None:
+            unit = self._unit(xy[part])
+            _fill(unit, terms)
+            moved[part] = (self.coefficients @ terms).T
+            moved[part][(np.abs(unit) > 1 + 1e-9).any(axis=0)] = np.nan
+
+        in_blocks(work, len(xy), 1, _TERMS)
+        return moved
+
+    def _unit(self, xy: FloatArray) -> FloatArray:
+        return np.asarray((2 * (xy - self.low) / (self.high - self.low) - 1).T)
+
+
+def smooth_map(exact: Positions, low: FloatArray, high: FloatArray, tolerance: float) -> Positions:
+    """Return a polynomial that stands in for a function over a box; the function if none is exact.
+
+    Parameters
+    ----------
+    exact
+        Takes positions (n, 2) to positions (n, 2).
+    low, high
+        Corners of the box, shape (2,).
+    tolerance
+        Largest error, in the result's unit, that is found at other places than those of the fit.
+    """
+    nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)  # Chebyshev's
+    unit = np.stack(np.meshgrid(nodes, nodes)).reshape(2, -1)
+    checks = np.random.default_rng(0).uniform(-1, 1, (2, _CHECKS))
+    terms = np.empty((_TERMS, unit.shape[1]))
+    _fill(unit, terms)
+    values = exact((low + high) / 2 + unit.T * (high - low) / 2)
+    if not np.isfinite(values).all():
+        return exact
+    coefficients = np.linalg.lstsq(terms.T, values, rcond=None)[0].T
+    fitted = SmoothMap(low, high, np.ascontiguousarray(coefficients))
+    places = (low + high) / 2 + checks.T * (high - low) / 2
+    error = np.abs(fitted(places) - exact(places)).max()
+    return fitted if error < tolerance else exact
+
+
+def _fill(unit: FloatArray, terms: FloatArray) -> None:
+    terms[0] = 1.0
+    for term, (factor, coordinate) in enumerate(_PRODUCTS, start=1):
+        np.multiply(terms[factor], unit[coordinate], out=terms[term])

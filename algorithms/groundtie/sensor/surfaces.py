@@ -1,0 +1,182 @@
+"""Values of a raster of heights, of any CRS, at longitudes and latitudes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from rasterio.crs import CRS
+
+from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
+from ..rasters.grid import reproject
+from ..rasters.reading import RasterSource, Window
+from .smooth_map import Positions, smooth_map
+from .voids import fill_voids
+
+FloatArray = NDArray[np.float64]
+
+LON_LAT = CRS.from_epsg(4326)
+
+# Pixels of the raster that are read at a time, a side.
+_BLOCK = 1024
+
+# Points that are interpolated at a time: what they need stays in the processor's cache.
+_POINTS = 1 << 14
+
+# Voids are filled from the region reduced to at most so many pixels a side.
+_FILL_SIDE = 512
+
+# No place of the Earth is lower or higher, in metres: such values are voids that nobody declared.
+_LOWEST_M, _HIGHEST_M = -600.0, 9_200.0
+
+# Positions in pixels of the raster may be wrong by this much.
+_TOLERANCE_PX = 1e-3
+
+# Positions beyond the outer pixels' centres by less, in pixels, have the values of these.
+_MARGIN_PX = 1.0
+
+
+@dataclass(frozen=True)
+class RasterSurface:
+    """A raster whose values are interpolated bilinearly; voids are filled from their rims.
+
+    Parameters
+    ----------
+    source
+        The raster, open; its first band holds the values.
+    to_px
+        From longitude and latitude to its pixels, shapes (n, 2).
+    region
+        The pixels that are asked for.
+    filled
+        The region, reduced, without voids, for those of the raster.
+    void_share
+        Share of the region that holds no value.
+    """
+
+    source: RasterSource
+    to_px: Positions
+    region: Window
+    filled: NDArray[np.float32]
+    void_share: float
+
+    def at(self, lon_lat: FloatArray) -> FloatArray:
+        """Return the values, shape (n,), at longitudes and latitudes; NaN beyond the raster."""
+        return self.at_pixels(np.ascontiguousarray(self.to_px(lon_lat).T))
+
+    def at_pixels(self, px: FloatArray) -> FloatArray:
+        """Return the values, of any shape, at columns and rows, (2, …); NaN beyond the raster."""
+        last = np.array([self.source.grid.width, self.source.grid.height]) - 1
+        if px.size == 0:
+            return np.zeros(px.shape[1:])
+        low, high = px.reshape(2, -1).min(axis=1), px.reshape(2, -1).max(axis=1)
+        if np.all((low >= 0) & (high <= last)):
+            return self._inside(px, low, high)
+        outside = np.zeros(px.shape[1:], bool)
+        for axis in (0, 1):
+            # Not "beyond the last": NaN is outside, too.
+            outside |= ~((px[axis] >= -_MARGIN_PX) & (px[axis] <= last[axis] + _MARGIN_PX))
+        values = np.full(px.shape[1:], np.nan)
+        if not outside.all():
+            part = np.stack([np.clip(px[axis][~outside], 0, last[axis]) for axis in (0, 1)])
+            values[~outside] = self._inside(part, part.min(axis=1), part.max(axis=1))
+        return values
+
+    def _inside(self, px: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+        if (high - low).max() < 2 * _BLOCK:
+            return self._in_window(px, low, high)
+        flat = px.reshape(2, -1)
+        values = np.empty(flat.shape[1])
+        block = (flat[0] // _BLOCK).astype(int) + (1 << 20) * (flat[1] // _BLOCK).astype(int)
+        for each in np.unique(block):
+            part = flat[:, block == each]
+            values[block == each] = self._in_window(part, part.min(axis=1), part.max(axis=1))
+        return values.reshape(px.shape[1:])
+
+    def _in_window(self, px: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+        (left, top), (right, bottom) = np.floor(low).astype(int), np.floor(high).astype(int) + 2
+        window = Window(int(left), int(top), int(right - left), int(bottom - top))
+        image, valid = read_heights(self.source, window)
+        if not valid.all():
+            rows, cols = np.nonzero(~valid)
+            image[rows, cols] = self._fill_at(cols + window.col, rows + window.row)
+        values = _bilinear(image, px[0].ravel() - window.col, px[1].ravel() - window.row)
+        return values.reshape(px.shape[1:])
+
+    def _fill_at(self, cols: NDArray[np.int_], rows: NDArray[np.int_]) -> FloatArray:
+        height, width = self.filled.shape
+        x = (cols - self.region.col + 0.5) * width / self.region.width - 0.5
+        y = (rows - self.region.row + 0.5) * height / self.region.height - 0.5
+        padded = np.pad(self.filled, ((0, 1), (0, 1)), mode="edge")
+        return _bilinear(padded, np.clip(x, 0, width - 1), np.clip(y, 0, height - 1))
+
+
+def _bilinear(image: NDArray[np.float32], x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return an image's values, (n,), at positions left of its last column and row."""
+    width, flat = image.shape[1], image.ravel()
+    values = np.empty(len(x))
+    for start in range(0, len(x), _POINTS):
+        part = slice(start, start + _POINTS)
+        left, top = x[part].astype(np.int32), y[part].astype(np.int32)
+        right, below = x[part] - left, y[part] - top
+        corner = top * np.int32(width) + left
+        upper, lower = flat.take(corner), flat.take(corner + np.int32(width))
+        upper = upper + right * (flat.take(corner + np.int32(1)) - upper)
+        lower = lower + right * (flat.take(corner + np.int32(width + 1)) - lower)
+        values[part] = upper + below * (lower - upper)
+    return values
+
+
+def read_heights(
+    source: RasterSource, window: Window, out_shape: tuple[int, int] | None = None
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Return heights and which of them are valid, as `RasterSource.read`."""
+    values, valid = source.read(window, 1, out_shape)
+    return values, valid & (values > _LOWEST_M) & (values < _HIGHEST_M)
+
+
+def surface_over(source: RasterSource, lon_lat: FloatArray, margin_px: int = 2) -> RasterSurface:
+    """Return the surface of a raster over a region.
+
+    Parameters
+    ----------
+    source
+        The raster.
+    lon_lat
+        Places of the region, (n, 2): those in between are asked for, too.
+    margin_px
+        How far around the region is read for filling voids.
+
+    Raises
+    ------
+    GeoreferencingError
+        The raster has no CRS.
+    NoOverlapError
+        No place of the region lies on it.
+    RasterContentError
+        It holds no value there.
+    """
+    grid = source.grid
+    if grid.crs is None:
+        raise GeoreferencingError(f"{source.path} has no CRS")
+
+    def exact(places: FloatArray) -> FloatArray:
+        return grid.map_to_pixel(reproject(places, LON_LAT, grid.crs))
+
+    size = np.array([grid.width, grid.height])
+    px = exact(lon_lat)
+    low = np.clip(np.floor(px.min(axis=0)).astype(int) - margin_px, 0, size)
+    high = np.clip(np.ceil(px.max(axis=0)).astype(int) + margin_px + 1, 0, size)
+    if (high <= low).any():
+        raise NoOverlapError(f"{source.path} does not cover the image")
+    region = Window(int(low[0]), int(low[1]), *(high - low).tolist())
+    reduce = max(max(region.width, region.height) / _FILL_SIDE, 1.0)
+    shape = (max(int(region.height / reduce), 1), max(int(region.width / reduce), 1))
+    values, valid = read_heights(source, region, None if reduce == 1 else shape)
+    if not valid.any():
+        raise RasterContentError(f"{source.path} holds no heights in the area of the image")
+    corner, opposite = lon_lat.min(axis=0), lon_lat.max(axis=0)
+    around = 0.05 * (opposite - corner) + 1e-4
+    to_px = smooth_map(exact, corner - around, opposite + around, _TOLERANCE_PX)
+    return RasterSurface(source, to_px, region, fill_voids(values, valid), 1 - float(valid.mean()))

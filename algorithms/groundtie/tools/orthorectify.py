@@ -1,0 +1,180 @@
+"""Orthorectify an image by its RPCs and a terrain model."""
+
+from __future__ import annotations
+
+import tempfile
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from rasterio.crs import CRS
+from rasterio.errors import CRSError
+
+from ..declaration import Output as ResultOutput
+from ..declaration import tool
+from ..errors import GeoreferencingError, ParameterError
+from ..kinds import Distance, Flag, RasterIn, RasterOut, Text
+from ..progress import SILENT, Progress
+from ..rasters.atomic import Outputs
+from ..rasters.delivery import warp_raster
+from ..rasters.grid import Grid
+from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.target_grids import covering_grid, registered_grid
+from ..rasters.writing import write_cog
+from ..sensor.dense import DenseOrientation
+from ..sensor.orientation import Orientation
+from .common import Resampling, Workers, crs_name, worker_count
+from .sensor_input import (
+    Dem,
+    DemDatum,
+    Geoid,
+    Ground,
+    Height,
+    RpcFile,
+    SensorImage,
+    open_sensor_image,
+    utm_of,
+)
+
+
+@dataclass(frozen=True)
+class OrthoResult:
+    """What `orthorectify` made: the file, its grid, and the heights that were used, in words."""
+
+    output: Path
+    grid: Grid
+    heights: str
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {
+            "output": str(self.output),
+            "width": self.grid.width,
+            "height": self.grid.height,
+            "pixel_size": list(self.grid.pixel_size),
+            "crs": crs_name(self.grid),
+            "heights": self.heights,
+        }
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        size = " × ".join(f"{side:g}" for side in self.grid.pixel_size)
+        return [
+            f"wrote {self.output}",
+            f"grid: {self.grid.width} × {self.grid.height} pixels of {size}, {crs_name(self.grid)}",
+            self.heights,
+        ]
+
+
+@tool(
+    title="Orthorectify",
+    group="Sensor models",
+    outputs=(
+        ResultOutput("WIDTH", "Width of the result in pixels", "width"),
+        ResultOutput("HEIGHT", "Height of the result in pixels", "height"),
+    ),
+)
+def orthorectify(
+    image: SensorImage,
+    output: Annotated[
+        Path,
+        RasterOut(
+            label="Orthoimage",
+            help="GeoTIFF with the image's bands, data type, nodata value, colours and metadata.",
+        ),
+    ],
+    dem: Dem = None,
+    dem_datum: DemDatum = None,
+    reference: Annotated[
+        Path | None,
+        RasterIn(
+            label="Reference image",
+            help="The result gets exactly the grid of this raster, so that the two stack. By "
+            "default the result covers all of the image.",
+        ),
+    ] = None,
+    pixel_size: Annotated[
+        float | None,
+        Distance(
+            label="Pixel size",
+            help="Pixel size of the result; by default that of the image on the ground.",
+            minimum=1e-6,
+        ),
+    ] = None,
+    crs: Annotated[
+        str | None,
+        Text(
+            label="CRS",
+            help="CRS of the result, as EPSG:32632; by default the UTM zone of the image.",
+        ),
+    ] = None,
+    height: Height = None,
+    geoid: Geoid = None,
+    rpc: RpcFile = None,
+    resampling: Resampling = "cubic",
+    cog: Annotated[
+        bool,
+        Flag(
+            label="Cloud optimized",
+            help="Write a Cloud Optimized GeoTIFF; it is copied once more.",
+            advanced=True,
+        ),
+    ] = False,
+    workers: Workers = None,
+    progress: Progress = SILENT,
+) -> OrthoResult:
+    """Orthorectify an image by its RPCs and a terrain model.
+
+    Every pixel of the map is looked up in the image where the RPCs see the ground at the height
+    that the terrain model has there. All bands are resampled once. Pixels that the image does not
+    see, or whose height is not known, hold no data. Places that others hide, as behind houses in a
+    surface model, show what hides them.
+    """
+    if reference is not None and (pixel_size is not None or crs is not None):
+        raise ParameterError("give either a reference, which has CRS and pixel size, or these")
+    ground = Ground(dem, dem_datum, geoid, height)
+    with ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        source, model = open_sensor_image(image, rpc, stack)
+        progress.update(0.0, ground.note(model))
+        grid = None
+        if reference is not None:
+            grid = stack.enter_context(open_raster(reference)).grid
+            if grid.crs is None:
+                raise GeoreferencingError(f"{reference} has no CRS")
+        map_crs = grid.crs if grid is not None else _crs(crs) or utm_of(source, model)
+        orientation = ground.orientation(source, model, map_crs, stack)
+        target = _target_grid(orientation, source.grid, grid, pixel_size)
+        outputs = stack.enter_context(Outputs())
+        staged, threads = outputs.stage(output), worker_count(workers)
+        with tempfile.TemporaryDirectory(dir=output.resolve().parent) as folder:
+            written = Path(folder) / "ortho.tif" if cog else staged
+            warp_raster(
+                source,
+                DenseOrientation(orientation),
+                target,
+                written,
+                resampling,
+                workers=threads,
+                progress=progress.part(0.0, 0.8 if cog else 1.0),
+            )
+            if cog:
+                write_cog(written, staged, threads)
+    return OrthoResult(output, target, ground.note(model))
+
+
+def _target_grid(
+    orientation: Orientation, image: Grid, grid: Grid | None, pixel_size: float | None
+) -> Grid:
+    if grid is None:
+        return registered_grid(image, orientation.to_map, orientation.crs, pixel_size)
+    covering_grid(grid, orientation.to_map(image.outline()), within=True)
+    return grid
+
+
+def _crs(text: str | None) -> CRS | None:
+    try:
+        return None if text is None else CRS.from_user_input(text)
+    except (CRSError, ValueError) as error:
+        raise ParameterError(f"crs is not understood: {text}") from error

@@ -1,0 +1,152 @@
+"""What tools for images with RPCs share: their parameters, and the image oriented by them."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from rasterio.crs import CRS
+
+from ..errors import ParameterError
+from ..kinds import Choice, FileIn, Number, RasterIn
+from ..rasters.reading import RasterSource, open_raster
+from ..sensor.heights import DATUMS, find_geoid
+from ..sensor.orientation import Orientation, orient, seen_at
+from ..sensor.rpc import RPC
+from ..sensor.rpc_files import rpc_of
+
+SensorImage = Annotated[
+    Path,
+    RasterIn(
+        label="Image with RPCs",
+        help="An image in the geometry of its sensor. Its RPCs are in its tags or in a file beside "
+        "it that GDAL finds (_RPC.TXT, .RPB, DIMAP).",
+    ),
+]
+Dem = Annotated[
+    Path | None,
+    RasterIn(
+        label="Terrain model",
+        help="Heights of the ground, in any CRS; voids are filled from their rims. Without it, "
+        "one height holds everywhere.",
+    ),
+]
+DemDatum = Annotated[
+    str | None,
+    Choice(
+        label="Vertical datum",
+        help="What the heights of the terrain model count from: the ellipsoid, as RPCs do, or a "
+        "geoid (SRTM: EGM96; Copernicus: EGM2008). Taking one for the other moves heights by "
+        "up to 100 m.",
+        choices=DATUMS,
+    ),
+]
+Geoid = Annotated[
+    Path | None,
+    RasterIn(
+        label="Geoid grid",
+        help="Heights of another geoid above the ellipsoid, in place of a vertical datum by name.",
+        advanced=True,
+    ),
+]
+Height = Annotated[
+    float | None,
+    Number(
+        label="Height",
+        help="Height above the ellipsoid that holds everywhere without a terrain model; by "
+        "default the RPCs' own.",
+        unit="m",
+        minimum=-1000,
+        maximum=10_000,
+        advanced=True,
+    ),
+]
+RpcFile = Annotated[
+    Path | None,
+    FileIn(
+        label="RPC file",
+        help="RPCs to use in place of the image's own: _RPC.TXT, .RPB or the RPC XML of DIMAP 2.",
+        suffixes=(".txt", ".rpb", ".xml"),
+        advanced=True,
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Where heights come from, as a user says it.
+
+    Parameters
+    ----------
+    dem, datum, geoid
+        A terrain model, and what it counts from: a datum's name or a geoid's grid.
+    height_m
+        The height without a terrain model; None: the RPCs' own.
+
+    Raises
+    ------
+    ParameterError
+        They do not go together.
+    """
+
+    dem: Path | None
+    datum: str | None
+    geoid: Path | None
+    height_m: float | None
+
+    def __post_init__(self) -> None:
+        if self.dem is None and (self.datum is not None or self.geoid is not None):
+            raise ParameterError("a vertical datum or geoid goes with a terrain model (dem)")
+        if self.dem is not None and self.height_m is not None:
+            raise ParameterError("give either a terrain model (dem) or one height")
+        if self.dem is not None and (self.datum is None) == (self.geoid is None):
+            raise ParameterError(
+                "say what the heights of the terrain model count from: either dem_datum "
+                f"({', '.join(DATUMS)}) or a geoid grid"
+            )
+
+    def note(self, rpc: RPC) -> str:
+        """Return in words which heights are used."""
+        if self.dem is not None:
+            return f"heights of {self.dem} above {self.datum or self.geoid}"
+        height = rpc.offset[2] if self.height_m is None else self.height_m
+        return f"no terrain model: the height is {height:g} m above the ellipsoid everywhere"
+
+    def orientation(
+        self, source: RasterSource, rpc: RPC, crs: CRS, stack: ExitStack
+    ) -> Orientation:
+        """Return an image's orientation; rasters are opened within `stack`."""
+
+        def opened(path: Path) -> RasterSource:
+            return stack.enter_context(open_raster(path))
+
+        geoid = self.geoid
+        if geoid is None and self.datum is not None:
+            geoid = find_geoid(self.datum)
+        return orient(
+            source,
+            rpc,
+            crs,
+            None if self.dem is None else opened(self.dem),
+            None if geoid is None else opened(geoid),
+            self.height_m,
+        )
+
+
+def open_sensor_image(
+    image: Path, rpc_file: Path | None, stack: ExitStack
+) -> tuple[RasterSource, RPC]:
+    """Open an image in sensor geometry, and return it with its RPCs."""
+    source = stack.enter_context(open_raster(image, allow_sensor_geometry=True))
+    return source, rpc_of(source, rpc_file)
+
+
+def utm_of(source: RasterSource, rpc: RPC) -> CRS:
+    """Return the UTM zone (WGS 84) that an image's centre lies in."""
+    size = source.grid.width, source.grid.height
+    longitude, latitude = np.median(seen_at(rpc, size, rpc.offset[2]), axis=0).tolist()
+    zone = int((longitude + 180) // 6) % 60 + 1
+    return CRS.from_epsg((32600 if latitude >= 0 else 32700) + zone)

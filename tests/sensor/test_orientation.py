@@ -1,0 +1,152 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from affine import Affine
+from raster_files import write_raster
+from rasterio.crs import CRS
+from rasterio.transform import RPCTransformer
+from rpc_models import REAL, camera_rpc, real_tags, to_rasterio, write_dem, write_positions
+
+from groundtie.errors import NoOverlapError
+from groundtie.rasters.grid import Grid, reproject
+from groundtie.rasters.reading import open_raster
+from groundtie.sensor.dense import DenseOrientation
+from groundtie.sensor.orientation import Orientation, orient, sensor_grid
+from groundtie.sensor.rpc_tags import rpc_from_tags
+from groundtie.sensor.surfaces import LON_LAT
+
+UTM = CRS.from_epsg(32632)
+RPC = camera_rpc()
+
+
+@contextmanager
+def oriented(folder: Path, crs: CRS = UTM, **of_dem: object) -> Iterator[Orientation]:
+    image = write_positions(folder / "image.tif", RPC)
+    dem_path = write_dem(folder / "dem.tif", **of_dem)  # type: ignore[arg-type]
+    with (
+        open_raster(image, allow_sensor_geometry=True) as source,
+        open_raster(dem_path) as dem,
+    ):
+        yield orient(source, RPC, crs, dem)
+
+
+def tile_of(orientation: Orientation, size: int = 300, pixel_m: float = 1.0) -> Grid:
+    centre = orientation.to_map([[300.0, 250.0]])[0]
+    corner = centre + [-size / 2 * pixel_m, size / 2 * pixel_m]
+    transform = Affine(pixel_m, 0, corner[0], 0, -pixel_m, corner[1])
+    return Grid(transform, orientation.crs, size, size - 33)
+
+
+def pixels(grid: Grid) -> np.ndarray:
+    cols, rows = np.meshgrid(np.arange(grid.width), np.arange(grid.height))
+    return grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
+
+
+@pytest.mark.parametrize("crs", [UTM, CRS.from_epsg(3035), LON_LAT])
+def test_map_and_image_are_each_others_inverse(tmp_path: Path, crs: CRS) -> None:
+    px = np.random.default_rng(0).uniform([0, 0], [600, 500], (2000, 2))
+    with oriented(tmp_path, crs) as orientation:
+        xy = orientation.to_map(px)
+        assert np.isfinite(xy).all()
+        assert np.abs(orientation.to_px(xy) - px).max() < 1e-3
+        grid = sensor_grid_of(tmp_path, orientation)
+        np.testing.assert_array_equal(grid.map_to_pixel(xy), orientation.to_px(xy))
+        np.testing.assert_array_equal(grid.pixel_to_map(px), xy)
+        assert grid.pixel_size_m == pytest.approx(1.0, rel=0.01)
+
+
+def sensor_grid_of(folder: Path, orientation: Orientation) -> Grid:
+    with open_raster(folder / "image.tif", allow_sensor_geometry=True) as source:
+        return sensor_grid(source, orientation)
+
+
+def test_positions_on_the_terrain_are_gdals(tmp_path: Path) -> None:
+    with oriented(tmp_path) as orientation:
+        px = np.random.default_rng(0).uniform([5, 5], [595, 495], (500, 2))
+        xy = orientation.to_map(px)
+        lon_lat = reproject(xy, UTM, LON_LAT)
+        found = orientation.to_px(xy)
+    with RPCTransformer(to_rasterio(RPC), RPC_DEM=str(tmp_path / "dem.tif")) as transformer:
+        rows, cols = transformer.rowcol(*lon_lat.T, op=lambda value: value)
+    assert np.abs(found - (np.column_stack([cols, rows]) - 0.5)).max() < 0.01
+
+
+@pytest.mark.parametrize("pixel_m", [0.4, 1.0, 7.0])
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:32632"])
+def test_the_dense_positions_are_the_single_ones(tmp_path: Path, crs: str, pixel_m: float) -> None:
+    with oriented(tmp_path, crs=UTM) as orientation:
+        tile = tile_of(orientation, 300 if pixel_m < 5 else 60, pixel_m)
+        dense = DenseOrientation(orientation).coordinates(tile)
+        single = orientation.to_px(pixels(tile)).T.reshape(dense.shape)
+    assert dense.shape == (2, tile.height, tile.width)
+    assert np.abs(dense - single).max() < 2e-3
+
+
+def test_houses_in_a_surface_model_are_seen_by_the_dense_positions(tmp_path: Path) -> None:
+    grid = Grid(Affine(1, 0, 499_000, 0, -1, 5_000_800), UTM, 2000, 1800)
+    heights = np.full((1800, 2000), 200, np.float32)
+    heights[::37, ::41] += 60  # posts of a metre: no lattice meets them by chance
+    write_raster(tmp_path / "dsm.tif", heights, grid)
+    image = write_positions(tmp_path / "image.tif", RPC)
+    with (
+        open_raster(image, allow_sensor_geometry=True) as source,
+        open_raster(tmp_path / "dsm.tif") as dsm,
+    ):
+        orientation = orient(source, RPC, UTM, dsm)
+        tile = tile_of(orientation)
+        dense = DenseOrientation(orientation).coordinates(tile)
+        single = orientation.to_px(pixels(tile)).T.reshape(dense.shape)
+    assert np.ptp(dense[0] - orientation.rpc.image_offset[0]) > 100
+    assert np.abs(dense - single).max() < 2e-3
+
+
+def test_far_places_are_not_in_the_image(tmp_path: Path) -> None:
+    with oriented(tmp_path, pixel_m=100.0) as orientation:
+        near = orientation.to_map([[300.0, 250.0]])
+        assert np.isnan(orientation.to_px(near + [50_000.0, 0.0])).all()
+        far = tile_of(orientation).shifted(50_000.0, 0.0)
+        assert (DenseOrientation(orientation).coordinates(far) < -1e8).all()
+        edge = tile_of(orientation, 400, 10.0)
+        dense = DenseOrientation(orientation).coordinates(edge)
+        single = orientation.to_px(pixels(edge)).T.reshape(dense.shape)
+    both = (dense > -1e8).all(axis=0) & np.isfinite(single).all(axis=0)
+    assert both.sum() > 1000
+    assert np.abs(dense - single)[:, both].max() < 2e-3
+    # What lies in the image is found by both.
+    inside = np.all((single > 0) & (single < [[[600]], [[500]]]), axis=0)
+    assert both[inside].all()
+
+
+def test_a_terrain_model_must_cover_the_image(tmp_path: Path) -> None:
+    with pytest.raises(NoOverlapError, match="covers only"), oriented(tmp_path, size=20):
+        pass
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_images_meet_their_surface_model(real_data: Path, name: str) -> None:
+    """Lines of sight that hit the surface model return to where they came from."""
+    rpc = rpc_from_tags(real_tags(real_data / name), name)
+    with (
+        open_raster(real_data / name, allow_sensor_geometry=True) as source,
+        open_raster(real_data / "rpc-triplet" / "dsm.tif") as dsm,
+    ):
+        orientation = orient(source, rpc, dsm.grid.crs, None, None, 180.0)
+        from groundtie.sensor.heights import terrain_heights  # the model covers a part only
+
+        px = np.random.default_rng(0).uniform(450, 650, (300, 2))
+        region = orientation.rpc.localise(px, 180.0)
+        terrain = Orientation(
+            rpc,
+            terrain_heights(dsm, None, region),
+            dsm.grid.crs,
+            orientation.to_lon_lat,
+        )
+        xy = terrain.to_map(px)
+        seen = np.isfinite(xy).all(axis=1)
+        assert seen.mean() > 0.9
+        assert np.abs(terrain.to_px(xy[seen]) - px[seen]).max() < 1e-3

@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse import lil_matrix
+from scipy.sparse.linalg import spsolve
+
+from groundtie.sensor.voids import fill_voids
+
+
+def ramp(height: int, width: int) -> np.ndarray:
+    rows, cols = np.mgrid[:height, :width]
+    return (300 + 2.0 * cols - 1.5 * rows).astype(np.float32)
+
+
+@pytest.mark.parametrize("shape", [(60, 80), (61, 47), (33, 128)])
+@pytest.mark.parametrize("side", [1, 5, 20])
+def test_a_slope_goes_on_through_a_void(shape: tuple[int, int], side: int) -> None:
+    heights, valid = ramp(*shape), np.ones(shape, bool)
+    valid[6 : 6 + side, 9 : 9 + side] = False
+    filled = fill_voids(np.where(valid, heights, -9999).astype(np.float32), valid)
+    assert np.abs(filled - heights).max() < 0.25
+    np.testing.assert_array_equal(filled[valid], heights[valid])
+
+
+def test_the_fill_is_the_membrane_of_laplaces_equation() -> None:
+    rows, cols = np.mgrid[:40, :40]
+    heights = (100 + 30 * np.sin(cols / 9) * np.cos(rows / 7)).astype(np.float32)
+    valid = np.ones(heights.shape, bool)
+    valid[12:24, 10:26] = False
+    index = -np.ones(heights.shape, int)
+    index[~valid] = np.arange((~valid).sum())
+    system, known = lil_matrix((index.max() + 1,) * 2), np.zeros(index.max() + 1)
+    for r, c in zip(*np.nonzero(~valid), strict=True):
+        system[index[r, c], index[r, c]] = 4
+        for i, j in ((r - 1, c), (r + 1, c), (r, c - 1), (r, c + 1)):
+            if valid[i, j]:
+                known[index[r, c]] += heights[i, j]
+            else:
+                system[index[r, c], index[i, j]] = -1
+    expected = spsolve(system.tocsr(), known)
+    filled = fill_voids(heights, valid)
+    assert np.abs(filled[~valid] - expected).max() < 1.0  # of 60 m of relief
+
+
+def test_one_value_fills_all() -> None:
+    valid = np.zeros((9, 14), bool)
+    valid[3, 4] = True
+    filled = fill_voids(np.full((9, 14), 7, np.float32), valid)
+    np.testing.assert_allclose(filled, 7, rtol=1e-6)
+    with pytest.raises(ValueError, match="nothing is valid"):
+        fill_voids(np.zeros((4, 4), np.float32), np.zeros((4, 4), bool))

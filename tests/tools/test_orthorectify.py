@@ -1,0 +1,193 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from affine import Affine
+from raster_files import full_disk, write_raster
+from rasterio.crs import CRS
+from rasterio.warp import Resampling
+from rasterio.warp import reproject as gdal_reproject
+from rpc_models import camera_rpc, to_rasterio, write_dem, write_positions
+
+import groundtie
+from groundtie.errors import GroundTieError, OutputError, ParameterError
+from groundtie.rasters.grid import Grid
+from groundtie.sensor.rpc_files import write_rpc
+
+RPC = camera_rpc()
+UTM = CRS.from_epsg(32632)
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, Path]:
+    return {
+        "image": write_positions(tmp_path / "image.tif", RPC),
+        "dem": write_dem(tmp_path / "dem.tif"),
+        "output": tmp_path / "ortho.tif",
+    }
+
+
+def by_gdal(files: dict[str, Path], like: Path, resampling: str) -> np.ndarray:
+    """Return GDAL's exact orthoimage of the same grid, NaN where it has nothing."""
+    with rasterio.open(like) as ortho, rasterio.open(files["image"]) as image:
+        out = np.full((image.count, ortho.height, ortho.width), np.nan, np.float32)
+        gdal_reproject(
+            image.read(),
+            out,
+            rpcs=image.rpcs,
+            src_crs="EPSG:4326",
+            dst_crs=ortho.crs,
+            dst_transform=ortho.transform,
+            dst_nodata=np.nan,
+            resampling=Resampling[resampling],
+            tolerance=0,
+            RPC_DEM=str(files["dem"]),
+        )
+    return out
+
+
+@pytest.mark.parametrize("resampling", ["bilinear", "cubic"])
+def test_positions_are_those_of_gdal(files: dict[str, Path], resampling: str) -> None:
+    """The image holds its own columns and rows, so the orthoimage's values are positions."""
+    groundtie.orthorectify(**files, dem_datum="ellipsoidal", resampling=resampling)
+    with rasterio.open(files["output"]) as ortho:
+        own, crs = ortho.read(), ortho.crs
+    expected = by_gdal(files, files["output"], resampling)
+    both = np.isfinite(own).all(axis=0) & np.isfinite(expected).all(axis=0)
+    assert crs == UTM
+    assert both.mean() > 0.7
+    assert np.abs(own - expected)[:, both].max() < 0.05
+    # Outlines agree but for a pixel's width.
+    assert (np.isfinite(own[0]) != np.isfinite(expected[0])).mean() < 0.01
+
+
+def test_the_grid_of_a_reference_is_taken(files: dict[str, Path], tmp_path: Path) -> None:
+    grid = Grid(Affine(2, 0, 499_900, 0, -2, 4_999_800), UTM, 90, 70)
+    groundtie.orthorectify(**files, dem_datum="ellipsoidal", pixel_size=2.0)
+    with rasterio.open(files["output"]) as ortho:
+        x, y = ortho.transform * (ortho.width / 2, ortho.height / 2)
+    grid = Grid(Affine(2, 0, round(x), 0, -2, round(y)), UTM, 90, 70)
+    reference = write_raster(tmp_path / "reference.tif", np.ones((70, 90), np.uint8), grid)
+    result = groundtie.orthorectify(
+        **files, dem_datum="ellipsoidal", reference=reference, resampling="bilinear"
+    )
+    assert result.grid == grid
+    with rasterio.open(files["output"]) as ortho:
+        assert (ortho.width, ortho.height, ortho.transform) == (90, 70, grid.transform)
+        expected = by_gdal(files, files["output"], "bilinear")
+        assert np.abs(ortho.read() - expected).max() < 0.05
+
+
+def test_a_geoid_moves_what_is_seen_from_aside(files: dict[str, Path], tmp_path: Path) -> None:
+    """Heights above a geoid 40 m high are the same as heights that are 40 m larger."""
+    geoid = write_raster(
+        tmp_path / "geoid.tif",
+        np.full((4, 4), 40, np.float32),
+        crs=CRS.from_epsg(4326),
+        transform=Affine(1, 0, 7, 0, -1, 47),
+    )
+    groundtie.orthorectify(**files, geoid=geoid, crs="EPSG:32632", pixel_size=3.0)
+    raised = {"dem": write_dem(tmp_path / "raised.tif", offset_m=40.0), "image": files["image"]}
+    expected = by_gdal(raised, files["output"], "bilinear")
+    with rasterio.open(files["output"]) as ortho:
+        own = ortho.read()
+    # 3 m pixels are means of 3 × 3: at a slant a mean of positions is not the position.
+    assert np.nanquantile(np.abs(own - expected), 0.9) < 0.5
+    groundtie.orthorectify(**files, dem_datum="ellipsoidal", crs="EPSG:32632", pixel_size=3.0)
+    with rasterio.open(files["output"]) as ortho:
+        assert np.nanmedian(np.abs(ortho.read() - by_gdal(raised, files["output"], "bilinear"))) > 2
+
+
+def test_without_a_terrain_model_one_height_holds(files: dict[str, Path]) -> None:
+    del files["dem"]
+    result = groundtie.orthorectify(**files, height=250.0, resampling="bilinear")
+    with rasterio.open(files["output"]) as ortho, rasterio.open(files["image"]) as image:
+        out = np.full((2, ortho.height, ortho.width), np.nan, np.float32)
+        gdal_reproject(
+            image.read(), out, rpcs=to_rasterio(RPC), src_crs="EPSG:4326", dst_crs=ortho.crs,
+            dst_transform=ortho.transform, dst_nodata=np.nan, resampling=Resampling.bilinear,
+            tolerance=0, RPC_HEIGHT="250",
+        )  # fmt: skip
+        assert np.nanmax(np.abs(ortho.read() - out)) < 0.05
+    assert "250 m" in result.heights
+
+
+def test_a_cloud_optimized_geotiff_holds_the_same(files: dict[str, Path]) -> None:
+    groundtie.orthorectify(**files, dem_datum="ellipsoidal", pixel_size=2.0)
+    with rasterio.open(files["output"]) as plain:
+        expected = plain.read()
+    groundtie.orthorectify(**files, dem_datum="ellipsoidal", pixel_size=2.0, cog=True)
+    with rasterio.open(files["output"]) as cog:
+        assert cog.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG"
+        np.testing.assert_array_equal(cog.read(), expected)
+    assert sorted(path.name for path in files["output"].parent.iterdir()) == [
+        "dem.tif", "image.tif", "ortho.tif",
+    ]  # fmt: skip
+
+
+def test_other_rpcs_can_be_given(files: dict[str, Path], tmp_path: Path) -> None:
+    write_rpc(tmp_path / "moved_RPC.TXT", RPC.shifted((7.0, -4.0)))
+    plain = groundtie.orthorectify(**files, dem_datum="ellipsoidal", resampling="bilinear")
+    with rasterio.open(files["output"]) as ortho:
+        before = ortho.read()
+    reference = tmp_path / "before.tif"
+    files["output"].rename(reference)
+    moved = groundtie.orthorectify(
+        **files, dem_datum="ellipsoidal", resampling="bilinear", reference=reference,
+        rpc=tmp_path / "moved_RPC.TXT",
+    )  # fmt: skip
+    assert moved.grid == plain.grid
+    with rasterio.open(files["output"]) as ortho:
+        difference = ortho.read() - before
+    assert np.nanmedian(difference[0]) == pytest.approx(7, abs=1e-2)
+    assert np.nanmedian(difference[1]) == pytest.approx(-4, abs=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({}, "count from"),
+        ({"dem_datum": "ellipsoidal", "height": 5.0}, "either a terrain model"),
+        ({"dem": None, "dem_datum": "EGM96"}, "goes with a terrain model"),
+        ({"dem_datum": "ellipsoidal", "crs": "EPSG:none"}, "crs is not understood"),
+        ({"dem_datum": "ellipsoidal", "reference": "dem.tif", "crs": "EPSG:3035"}, "either a ref"),
+    ],
+)
+def test_parameters_that_do_not_go_together(
+    files: dict[str, Path], changes: dict[str, object], reason: str
+) -> None:
+    if "reference" in changes:
+        changes = changes | {"reference": write_dem(files["dem"].with_name("other.tif"))}
+    with pytest.raises(ParameterError, match=reason):
+        groundtie.orthorectify(**(files | changes))  # type: ignore[arg-type]
+    assert not files["output"].exists()
+
+
+def test_an_image_without_rpcs_writes_nothing(files: dict[str, Path]) -> None:
+    write_raster(files["image"], np.ones((20, 20), np.uint8))
+    with pytest.raises(GroundTieError, match="has no RPCs"):
+        groundtie.orthorectify(**files, dem_datum="ellipsoidal")
+    assert not files["output"].exists()
+
+
+def test_a_reference_elsewhere_writes_nothing(files: dict[str, Path], tmp_path: Path) -> None:
+    reference = write_raster(
+        tmp_path / "far.tif",
+        np.ones((20, 20), np.uint8),
+        Grid(Affine(1, 0, 700_000, 0, -1, 4_000_000), UTM, 20, 20),
+    )
+    with pytest.raises(GroundTieError, match="does not lie on the grid"):
+        groundtie.orthorectify(**files, dem_datum="ellipsoidal", reference=reference)
+    assert not files["output"].exists()
+
+
+@pytest.mark.parametrize("cog", [False, True])
+def test_a_full_disk_leaves_nothing_behind(files: dict[str, Path], cog: bool) -> None:
+    with full_disk(100_000), pytest.raises(OutputError):
+        groundtie.orthorectify(**files, dem_datum="ellipsoidal", cog=cog)
+    assert sorted(path.name for path in files["output"].parent.iterdir()) == [
+        "dem.tif", "image.tif",
+    ]  # fmt: skip
