@@ -123,3 +123,12 @@ def test_no_points_at_all() -> None:
     assert utm_grid(4, 4).map_to_pixel(nothing).shape == (0, 2)
     assert reproject(nothing, WGS84, UTM).shape == (0, 2)
     assert apply_affine(Affine.identity(), nothing).shape == (0, 2)
+
+
+def test_positions_off_the_projection_are_infinite_and_spoil_no_others() -> None:
+    lonlat = np.array([[15.0, 45.0], [15.0, 95.0], [15.5, 45.5], [15.5, -120.0], [14.0, 46.0]])
+    found = reproject(lonlat, WGS84, UTM)
+    outside = [False, True, False, True, False]
+    np.testing.assert_array_equal(np.isinf(found).all(axis=1), outside)
+    good = lonlat[~np.array(outside)]
+    np.testing.assert_allclose(reproject(found[~np.array(outside)], UTM, WGS84), good, atol=1e-9)

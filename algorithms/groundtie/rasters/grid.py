@@ -14,6 +14,7 @@ import numpy as np
 import rasterio.warp
 from affine import Affine
 from numpy.typing import ArrayLike, NDArray
+from rasterio._err import CPLE_BaseError
 from rasterio.crs import CRS
 
 FloatArray = NDArray[np.float64]
@@ -151,5 +152,13 @@ def reproject(xy: FloatArray, source: CRS | None, target: CRS | None) -> FloatAr
     """
     if source is None or target is None or source == target:
         return xy
-    moved = rasterio.warp.transform(source, target, xy[:, 0], xy[:, 1])
+    try:
+        moved = rasterio.warp.transform(source, target, xy[:, 0], xy[:, 1])
+    except CPLE_BaseError:
+        # One position outside fails them all: halves tell which.
+        if len(xy) == 1:
+            return np.full((1, 2), np.inf)
+        half = len(xy) // 2
+        parts = [reproject(part, source, target) for part in (xy[:half], xy[half:])]
+        return np.concatenate(parts)
     return np.column_stack(moved[:2])
