@@ -18,6 +18,7 @@ SUITES = (
     "real",
     "crossings",
     "simulated",
+    "city",
     "large_shift",
     "rotated_pairs",
     "rotation",

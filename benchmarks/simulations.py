@@ -18,12 +18,21 @@ from .cases import image_size, read_check_points
 
 @dataclass(frozen=True)
 class Simulation:
-    """What a simulated pair is made from; see `groundtie.simulate`."""
+    """What a simulated pair is made from; see `groundtie.simulate`.
+
+    Parameters
+    ----------
+    size, density, seed, shift
+        Its parameters of the same names.
+    further
+        Names and values of any others.
+    """
 
     size: int
     density: str
     seed: int
     shift: float = 8.0
+    further: tuple[tuple[str, float | str], ...] = ()
 
     @property
     def name(self) -> str:
@@ -32,13 +41,26 @@ class Simulation:
 
     def pair(self, cache: Path) -> Pair:
         """Return the pair, which is made unless the folder `cache` has it."""
-        folder = cache / f"{self.density}-{self.size}-{self.shift:g}-{self.seed}-{_simulator()}"
+        folder = cache / "-".join(
+            f"{part:g}" if isinstance(part, float) else str(part)
+            for part in (self.density, self.size, self.shift, self.seed, *self._further())
+        )
         # The truth is there only if all files are.
         if not (folder / files.NAMES["truth"]).exists():
             groundtie.simulate(
-                folder, size=self.size, density=self.density, seed=self.seed, shift=self.shift
+                folder,
+                size=self.size,
+                density=self.density,
+                seed=self.seed,
+                shift=self.shift,
+                **dict(self.further),
             )
         return read_pair(folder)
+
+    def _further(self) -> list[str]:
+        """What else the folder's name must tell."""
+        digest = hashlib.sha256(repr(self.further).encode()).hexdigest()[:8]
+        return ([digest] if self.further else []) + [_simulator()]
 
 
 def read_pair(folder: Path) -> Pair:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from groundtie.simulation.cover import Cover, ParcelTable
+from groundtie.simulation.cover import PLAIN_WALL, Cover, ParcelTable
 from groundtie.simulation.scene import Scene
 
 GROUND_DB = -20.0
@@ -52,6 +52,8 @@ def build_scene(
             backscatter_db=np.array([GROUND_DB, ROOF_DB, GROUND_DB + 10], np.float32),
             reflectance=np.repeat(spectra[:, None], 4, axis=1),
             rows_rad=np.zeros(3, np.float32),
+            window_m=np.zeros(3, np.float32),
+            wall_reflectance=np.full(3, PLAIN_WALL, np.float32),
         ),
     )
 

@@ -10,7 +10,7 @@ import rasterio
 
 from groundtie.errors import OutputError
 from groundtie.geometry.transform import load_transform
-from groundtie.simulation.files import CHECK_POINT_COLUMNS, write_pair
+from groundtie.simulation.files import CHECK_POINT_COLUMNS, ROOF_POINT_COLUMNS, write_pair
 from groundtie.simulation.misregistration import DISTORTIONS, DistortionOptions
 from groundtie.simulation.optical import OpticalOptions
 from groundtie.simulation.pair import PairOptions, SimulatedPair, simulate_pair
@@ -115,6 +115,29 @@ class TestCheckPoints:
         np.testing.assert_allclose(
             pair.reference_grid.pixel_to_map(table[:, 2:4]), table[:, :2], atol=1e-5
         )
+
+
+class TestRoofPoints:
+    def test_are_those_of_the_pair(self, tmp_path: Path) -> None:
+        options = PairOptions(scene=SceneOptions((200, 200), density="urban", seed=2))
+        made = simulate_pair(options)
+        with write_pair(made, tmp_path)["roof_points"].open(newline="", encoding="utf-8") as stream:
+            rows = list(csv.reader(stream))
+        assert tuple(rows[0]) == ROOF_POINT_COLUMNS
+        table = np.array(rows[1:], float)
+        assert len(table) == len(made.roof_points.px) > 10
+        for columns, expected in (
+            (slice(0, 2), made.reference_grid.pixel_to_map(made.roof_points.px)),
+            (2, made.roof_points.height_m),
+            (slice(3, 5), made.roof_points.reference_px),
+            (slice(5, 7), made.roof_points.input_px),
+        ):
+            np.testing.assert_allclose(table[:, columns], expected, atol=1e-5)
+
+    def test_of_a_place_without_roofs_are_none(self, tmp_path: Path) -> None:
+        made = simulate_pair(PairOptions(scene=SceneOptions((96, 96), density="rural")))
+        lines = write_pair(made, tmp_path)["roof_points"].read_text().splitlines()
+        assert lines == [",".join(ROOF_POINT_COLUMNS)]
 
 
 class TestWholeOrNothing:

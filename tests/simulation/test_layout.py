@@ -13,7 +13,7 @@ def laid_out(
 ) -> tuple[np.ndarray, ParcelTable]:
     book = ParcelBook(np.random.default_rng(seed))
     layout = Layout(shape, px_per_m, density, np.random.default_rng(seed), book)
-    return layout.draw(), book.table()
+    return layout.draw()[0], book.table()
 
 
 def share(labels: np.ndarray, table: ParcelTable, cover: Cover) -> float:

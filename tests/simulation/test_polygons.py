@@ -13,9 +13,11 @@ from groundtie.simulation.polygons import (
     clip,
     contains,
     fitted_rectangle,
+    inset,
     main_frame,
     points_along,
     rectangle,
+    strip_along,
     subdivide,
 )
 
@@ -155,3 +157,31 @@ class TestSubdivide:
 
         assert cut(3) == cut(3)
         assert cut(3) != cut(4)
+
+
+class TestInset:
+    def test_of_a_turned_rectangle(self) -> None:
+        inner = inset(rectangle((10, 20), (8, 6), 0.4), 1.5)
+        np.testing.assert_allclose(inner, rectangle((10, 20), (6.5, 4.5), 0.4))
+
+    def test_sides_move_by_the_distance(self) -> None:
+        outer = [(0.0, 0.0), (100.0, 10.0), (90.0, 80.0), (-10.0, 60.0)]
+        inner = inset(outer, 7.0)
+        assert inner is not None
+        for k, (a, b) in enumerate(zip(outer, outer[1:] + outer[:1], strict=True)):
+            along = np.subtract(b, a) / math.dist(a, b)
+            for corner in (inner[k], inner[(k + 1) % 4]):
+                x, y = np.subtract(corner, a)
+                assert along[0] * y - along[1] * x == pytest.approx(7)
+
+    def test_none_where_nothing_is_left(self) -> None:
+        assert inset(rectangle((0, 0), (20, 5), 0.0), 6.0) is None
+        assert inset([(0.0, 0.0), (100.0, 0.0), (0.0, 20.0)], 5.0) is None
+
+
+def test_strip_along_a_street() -> None:
+    street = rectangle((10, 5), (40, 4), 0.6)
+    beside = (10 - 2.5 * math.sin(0.6), 5 + 2.5 * math.cos(0.6))
+    np.testing.assert_allclose(
+        strip_along(street, 2.5, 1.0, 3.0), rectangle(beside, (43, 1), 0.6), atol=1e-9
+    )

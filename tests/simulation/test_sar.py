@@ -324,3 +324,38 @@ class TestReproducible:
 def test_refuses_what_cannot_be(wrong: dict) -> None:
     with pytest.raises(ParameterError):
         SarOptions(**wrong)
+
+
+@pytest.mark.usefixtures("smooth")
+class TestWindows:
+    """Windows gather a wall's power in a lattice of points and take none away."""
+
+    PITCH_M = 4.0
+    ROWS = 250
+
+    def wall(self, make_scene: MakeScene, window_m: float) -> np.ndarray:
+        """The layover of a wall 60 m high before its narrow roof, from 250 rows."""
+        scene = make_scene((self.ROWS, COLUMNS), ((slice(0, self.ROWS), slice(140, 142), 60.0),))
+        scene.parcels.window_m[1] = window_m
+        power = sar_power(scene, SarOptions(35.0))
+        layover = 60 / math.tan(math.radians(35))
+        return power[:, int(140 - layover) + 4 : 136]
+
+    def test_power_is_the_same_on_average(self, make_scene: MakeScene) -> None:
+        plain, windowed = (self.wall(make_scene, window_m).mean() for window_m in (0, self.PITCH_M))
+        assert windowed == pytest.approx(plain, rel=0.05)
+
+    def test_they_repeat_along_the_wall(self, make_scene: MakeScene) -> None:
+        by_row = self.wall(make_scene, self.PITCH_M).mean(axis=1)
+        spectrum = np.abs(np.fft.rfft(by_row - by_row.mean()))
+        assert np.argmax(spectrum[: self.ROWS // 3]) == round(self.ROWS / self.PITCH_M)
+        plain = self.wall(make_scene, 0).mean(axis=1)
+        assert by_row.std() > 3 * plain.std()
+
+    def test_they_repeat_with_the_storeys(self, make_scene: MakeScene) -> None:
+        """60 m are 20 storeys: 20 rows of points over the layover of 60 / tan 35°."""
+        wall = self.wall(make_scene, self.PITCH_M)
+        by_range = wall.mean(axis=0)
+        spectrum = np.abs(np.fft.rfft(by_range - by_range.mean(), 2048))
+        storey = 3 / math.tan(math.radians(35))
+        assert np.argmax(spectrum[100:]) + 100 == pytest.approx(2048 / storey, rel=0.03)

@@ -7,7 +7,12 @@ import pytest
 
 from groundtie.errors import ParameterError
 from groundtie.simulation.cover import Cover
-from groundtie.simulation.scene import SceneOptions, generate_scene
+from groundtie.simulation.scene import (
+    DENSITY_NAMES,
+    SceneOptions,
+    generate_scene,
+    generate_scenes,
+)
 
 SMALL = SceneOptions(size_px=(320, 280), seed=4)
 
@@ -20,6 +25,7 @@ class TestOptions:
             {"density": "village"},
             {"pixel_size_m": 0.0},
             {"relief_m": -1.0},
+            {"changed": 1.5},
         ],
         ids=lambda change: next(iter(change)),
     )
@@ -77,6 +83,30 @@ class TestHeights:
         scene = generate_scene(SMALL)
         standing = np.isin(scene.cover(), (Cover.BUILDING, Cover.FOREST))
         assert not scene.object_m[~standing].any()
+
+
+class TestChanges:
+    @pytest.mark.parametrize("density", ["suburban", "urban"])
+    def test_buildings_are_pulled_down_and_put_up(self, density: str) -> None:
+        options = SceneOptions((600, 600), density=density, seed=2)
+        before, after = generate_scenes(replace(options, changed=0.3))
+        radar, camera = (
+            set(np.unique(s.parcel[s.cover() == Cover.BUILDING])) for s in (before, after)
+        )
+        for only in (radar - camera, camera - radar):
+            assert len(only) / len(radar | camera) == pytest.approx(0.15, abs=0.07)
+        assert before.terrain_m is after.terrain_m
+        assert not after.object_m[after.cover() == Cover.ROAD].any()
+
+    @pytest.mark.parametrize("density", ["rural", "suburban", "urban"])
+    def test_nothing_changes_unless_it_is_wanted(self, density: str) -> None:
+        before, after = generate_scenes(replace(SMALL, density=density))
+        assert after is before
+
+    @pytest.mark.parametrize("density", DENSITY_NAMES)
+    def test_nothing_is_higher_than_said(self, density: str) -> None:
+        options = SceneOptions((400, 400), density=density, seed=1)
+        assert generate_scene(options).object_m.max() <= options.highest_object_m
 
 
 class TestReproducible:

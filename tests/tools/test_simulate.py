@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -13,7 +14,14 @@ from groundtie.errors import CancelledError, GroundTieError, OutputError, Parame
 from groundtie.progress import Progress
 from groundtie.tools.simulate import simulate
 
-NAMES = ["check_points.csv", "dem.tif", "input.tif", "reference.tif", "truth.json"]
+NAMES = [
+    "check_points.csv",
+    "dem.tif",
+    "input.tif",
+    "reference.tif",
+    "roof_points.csv",
+    "truth.json",
+]
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -70,6 +78,33 @@ def test_parameters_reach_the_pair(tmp_path: Path) -> None:
         assert np.ptp(dem.read()) == 0
 
 
+def test_views_reach_the_pair(tmp_path: Path) -> None:
+    simulate(
+        tmp_path,
+        128,
+        "city",
+        relief=0.0,
+        changed=25.0,
+        incidence=45.0,
+        orbit="descending",
+        off_nadir=20.0,
+        view_azimuth=90.0,
+    )
+    options = json.loads((tmp_path / "truth.json").read_text())["options"]
+    assert options["scene"]["changed"] == 0.25
+    assert options["optical"]["view_azimuth_deg"] == 90
+    assert options["optical"]["off_nadir_deg"] == 20
+    with (tmp_path / "roof_points.csv").open(newline="", encoding="utf-8") as stream:
+        roofs = list(csv.DictReader(stream))
+    assert roofs
+    with rasterio.open(tmp_path / "reference.tif") as reference:
+        west = reference.bounds.left + 0.5
+    for roof in roofs:
+        layover = float(roof["reference_col"]) - (float(roof["x"]) - west)
+        # The tangent of 45° is 1, and the radar looks west.
+        assert layover == pytest.approx(float(roof["height_m"]), abs=1e-5)
+
+
 def test_more_looks_are_less_speckle(tmp_path: Path) -> None:
     roughness = []
     for looks in (1.0, 16.0):
@@ -84,7 +119,7 @@ def test_more_looks_are_less_speckle(tmp_path: Path) -> None:
     ("values", "error"),
     [
         ({"size": 10}, ParameterError),
-        ({"density": "city"}, ParameterError),
+        ({"density": "village"}, ParameterError),
         ({"distortion": "none"}, ParameterError),
         ({"size": 96, "input_pixel_size": 20.0}, ParameterError),
         ({"size": 96, "warp": 40.0}, ParameterError),

@@ -27,7 +27,11 @@ class Cover(IntEnum):
     WATER = 4
     BUILDING = 5
     PAVEMENT = 6
+    CAR = 7
+    RAIL = 8
 
+
+PLAIN_WALL = 0.22
 
 OPEN_GROUND = (Cover.ROAD, Cover.FIELD, Cover.GRASS, Cover.PAVEMENT)
 
@@ -70,6 +74,18 @@ _SURFACES = {
         0.15,
     ),
     Cover.PAVEMENT: _Surface((-16, -12), ((0.16, 0.18, 0.20, 0.23),), 0.2),
+    Cover.CAR: _Surface(
+        (-14, -1),
+        (
+            (0.45, 0.46, 0.46, 0.46),  # white
+            (0.26, 0.27, 0.28, 0.29),  # silver
+            (0.03, 0.03, 0.03, 0.03),  # black
+            (0.05, 0.06, 0.25, 0.30),  # red
+            (0.20, 0.10, 0.05, 0.12),  # blue
+        ),
+        0.2,
+    ),
+    Cover.RAIL: _Surface((-13, -10), ((0.11, 0.13, 0.16, 0.19),), 0.15),
 }
 
 
@@ -88,7 +104,12 @@ class ParcelTable:
     reflectance : float32 array (n, 4)
         Reflectance in `BANDS`.
     rows_rad : float32 array (n,)
-        Direction across the plough rows of a field.
+        Direction across the plough rows of a field or the tracks of a railway.
+    window_m : float32 array (n,)
+        Spacing of the windows of a building's walls, whose corners glitter to the radar; 0 where
+        the walls are plain.
+    wall_reflectance : float32 array (n,)
+        Reflectance of the walls, in all bands.
     """
 
     cover: npt.NDArray[np.uint8]
@@ -96,6 +117,8 @@ class ParcelTable:
     backscatter_db: npt.NDArray[np.float32]
     reflectance: npt.NDArray[np.float32]
     rows_rad: npt.NDArray[np.float32]
+    window_m: npt.NDArray[np.float32]
+    wall_reflectance: npt.NDArray[np.float32]
 
 
 class ParcelBook:
@@ -103,9 +126,11 @@ class ParcelBook:
 
     def __init__(self, generator: np.random.Generator) -> None:
         self._generator = generator
-        self._rows: list[tuple[int, float, float, Reflectance, float]] = []
+        self._rows: list[tuple[int, float, float, Reflectance, float, float, float]] = []
 
-    def add(self, cover: Cover, height_m: float = 0.0, rows_rad: float = 0.0) -> int:
+    def add(
+        self, cover: Cover, height_m: float = 0.0, rows_rad: float = 0.0, window_m: float = 0.0
+    ) -> int:
         """Draw a parcel's radiometry and return its number."""
         surface = _SURFACES[cover]
         low, high = surface.backscatter_db
@@ -116,18 +141,20 @@ class ParcelBook:
             value * brightness * (1 + 0.08 * (2 * shades[1 + band // 2] - 1) * (-1) ** band)
             for band, value in enumerate(spectrum)
         )
-        self._rows.append(
-            (int(cover), height_m, low + (high - low) * radar, (blue, green, red, nir), rows_rad)
-        )
+        decibels, spectrum = low + (high - low) * radar, (blue, green, red, nir)
+        wall = PLAIN_WALL if window_m == 0 else 0.12 + 0.22 * shades[3]
+        self._rows.append((int(cover), height_m, decibels, spectrum, rows_rad, window_m, wall))
         return len(self._rows) - 1
 
     def table(self) -> ParcelTable:
         """Return all parcels added so far."""
-        cover, height, backscatter, reflectance, rows = zip(*self._rows, strict=True)
+        cover, height, backscatter, reflectance, rows, window, wall = zip(*self._rows, strict=True)
         return ParcelTable(
             np.array(cover, np.uint8),
             np.array(height, np.float32),
             np.array(backscatter, np.float32),
             np.array(reflectance, np.float32),
             np.array(rows, np.float32),
+            np.array(window, np.float32),
+            np.array(wall, np.float32),
         )

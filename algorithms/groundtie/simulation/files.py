@@ -27,6 +27,7 @@ NAMES = {
     "dem": "dem.tif",
     "truth": "truth.json",
     "check_points": "check_points.csv",
+    "roof_points": "roof_points.csv",
 }
 CHECK_POINT_COLUMNS = (
     "reference_x",
@@ -36,6 +37,7 @@ CHECK_POINT_COLUMNS = (
     "input_col",
     "input_row",
 )
+ROOF_POINT_COLUMNS = ("x", "y", "height_m", *CHECK_POINT_COLUMNS[2:])
 
 
 def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
@@ -45,7 +47,7 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
     -------
     dict
         Paths of reference, input, dem (bare ground in metres on the reference's pixels), truth
-        (JSON, which `load_transform` reads) and check_points (CSV).
+        (JSON, which `load_transform` reads), check_points and roof_points (CSV).
 
     Raises
     ------
@@ -63,7 +65,8 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
         terrain = pair.scene.terrain_m[pair.scene.window]
         _write_raster(staged["dem"], terrain[None], pair.reference_grid, ["Height of ground (m)"])
         staged["truth"].write_text(json.dumps(truth_json(pair), indent=1), encoding="utf-8")
-        _write_check_points(staged["check_points"], pair)
+        _write_table(staged["check_points"], CHECK_POINT_COLUMNS, _check_points(pair))
+        _write_table(staged["roof_points"], ROOF_POINT_COLUMNS, _roof_points(pair))
     return paths
 
 
@@ -121,10 +124,19 @@ def _write_raster(
             raster.set_band_description(band, name)
 
 
-def _write_check_points(path: Path, pair: SimulatedPair) -> None:
+def _check_points(pair: SimulatedPair) -> FloatArray:
     xy = pair.reference_grid.pixel_to_map(pair.check_points_px)
-    table = np.hstack([xy, pair.check_points_px, pair.truth(xy)])
+    return np.hstack([xy, pair.check_points_px, pair.truth(xy)])
+
+
+def _roof_points(pair: SimulatedPair) -> FloatArray:
+    points = pair.roof_points
+    xy = pair.reference_grid.pixel_to_map(points.px)
+    return np.hstack([xy, points.height_m[:, None], points.reference_px, points.input_px])
+
+
+def _write_table(path: Path, columns: Sequence[str], table: FloatArray) -> None:
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
-        writer.writerow(CHECK_POINT_COLUMNS)
+        writer.writerow(columns)
         writer.writerows([[f"{value:.6f}" for value in row] for row in table])

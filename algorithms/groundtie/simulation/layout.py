@@ -9,10 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
-import numpy.typing as npt
 
+from .canvas import NO_CHANGES, Canvas, Changes, Labels, Standing, Tree
 from .cover import Cover, ParcelBook
 from .polygons import (
     Point,
@@ -23,8 +22,6 @@ from .polygons import (
     rectangle,
     subdivide,
 )
-
-_SUBPIXEL_BITS = 4
 
 
 @dataclass(frozen=True)
@@ -67,21 +64,15 @@ def highest_object_m(density: str) -> float:
     return max(CANOPY_M[1], *(use.height_m[1] for use, _ in DENSITIES[density]))
 
 
-class Layout:
-    """Draws the parcels of one scene.
+class Layout(Canvas):
+    """Draws the parcels of a scene in the country or of a town.
 
     Parameters
     ----------
-    shape : tuple of int
-        Rows and columns of the label image.
-    px_per_m : float
-        Horizontal scale: pixels for a metre of the sizes in `Use`.
+    shape, px_per_m, generator, book, changes
+        See `Canvas`; `px_per_m` scales the sizes in `Use`.
     density : str
         One of `DENSITIES`.
-    generator : numpy.random.Generator
-        Source of the layout.
-    book : ParcelBook
-        Receives the parcels.
     """
 
     def __init__(
@@ -91,18 +82,15 @@ class Layout:
         density: str,
         generator: np.random.Generator,
         book: ParcelBook,
+        changes: Changes = NO_CHANGES,
     ) -> None:
-        self.labels: npt.NDArray[np.int32] = np.zeros(shape, np.int32)
-        self._scale = px_per_m
+        super().__init__(shape, px_per_m, generator, book, changes)
         self._density = density
-        self._random = generator
-        self._book = book
-        self._cover_of: list[Cover] = []
         self._buildings: list[tuple[Polygon, float]] = []
         self._trees: list[Point] = []
 
-    def draw(self) -> npt.NDArray[np.int32]:
-        """Draw the whole scene and return the label image, int32 (rows, columns)."""
+    def draw(self) -> tuple[Labels, Labels]:
+        """Draw the whole scene; see `Canvas.images`."""
         self.labels[:] = self._add(Cover.GRASS)
         height, width = self.labels.shape
         # Streets follow the turned outline, which reaches beyond the scene on all sides.
@@ -118,7 +106,7 @@ class Layout:
             self._fill(lane, self._add(Cover.ROAD))
         self._draw_buildings()
         self._draw_trees()
-        return self.labels
+        return self.images()
 
     def _draw_district(self, district: Polygon) -> None:
         uses, weights = zip(*DENSITIES[self._density], strict=True)
@@ -178,7 +166,7 @@ class Layout:
     def _draw_waters(self) -> None:
         """Draw all banks, then all waters, so that no bank runs through another water."""
         height, width = self.labels.shape
-        shores = [self._river(height, width)]
+        shores = [self._river(height, width, (6, 14), 5)]
         area_m2 = height * width / self._scale**2
         for _ in range(int(self._random.poisson(area_m2 / _LAKE_M2))):
             centre = (self._uniform(0, width), self._uniform(0, height))
@@ -189,40 +177,12 @@ class Layout:
         for _, water in shores:
             self._fill(water, self._add(Cover.WATER), convex=False)
 
-    def _river(self, height: int, width: int) -> tuple[Polygon, Polygon]:
-        """Outlines of the banks and of the water of a winding river across the scene."""
-        angle = self._uniform(0, math.pi)
-        length = math.hypot(height, width)
-        s = np.linspace(-length / 2, length / 2, max(int(length / (8 * self._scale)), 20))
-        wave = np.zeros_like(s)
-        for wavelength, amplitude in ((900.0, 70.0), (380.0, 28.0), (170.0, 7.0)):
-            phase = self._uniform(0, 2 * math.pi)
-            wave += amplitude * np.sin(2 * math.pi * s / (wavelength * self._scale) + phase)
-        wave = wave * self._scale + self._uniform(-0.2, 0.2) * min(height, width)
-        half = self._uniform(6, 14) * self._scale * (1 + 0.25 * np.sin(s / (60 * self._scale)))
-
-        def outline(reach: npt.NDArray[np.float64]) -> Polygon:
-            along = np.concatenate([s, s[::-1]])
-            across = np.concatenate([wave - reach, (wave + reach)[::-1]])
-            x = width / 2 + along * math.cos(angle) - across * math.sin(angle)
-            y = height / 2 + along * math.sin(angle) + across * math.cos(angle)
-            return list(zip(x.tolist(), y.tolist(), strict=True))
-
-        return outline(half + 5 * self._scale), outline(half)
-
-    def _blob(self, centre: Point, radius: float) -> Polygon:
-        turn = np.linspace(0, 2 * math.pi, 60, endpoint=False)
-        # The outline follows the place, so that the bank runs along the shore.
-        wobble = 0.22 * np.sin(2 * turn + centre[0]) + 0.12 * np.sin(3 * turn + centre[1])
-        reach = radius * (1 + wobble)
-        x, y = centre[0] + reach * np.cos(turn), centre[1] + 0.8 * reach * np.sin(turn)
-        return list(zip(x.tolist(), y.tolist(), strict=True))
-
     def _draw_buildings(self) -> None:
         for footprint, height_m in self._buildings:
             outline = points_along(footprint, _PROBES_PER_SIDE)
             if not any(self._cover_at(point) == Cover.WATER for point in outline):
-                self._fill(footprint, self._add(Cover.BUILDING, height_m))
+                building = self._add(Cover.BUILDING, height_m)
+                self._stand(Standing(footprint, building, self._changes.draw()))
 
     def _draw_trees(self) -> None:
         kinds = [self._add(Cover.FOREST, self._uniform(4, 12)) for _ in range(_TREE_KINDS)]
@@ -230,9 +190,9 @@ class Layout:
         for place in self._trees:
             kind, size = self._random.random(2).tolist()
             radius_px = (1.5 + 2.5 * size) * self._scale
-            if radius_px >= 1 and self._cover_at(place) not in keep_off:
-                outline = self._blob(place, radius_px)
-                self._fill(outline, kinds[int(kind * _TREE_KINDS)], convex=False)
+            if radius_px >= 1:
+                crown = self._blob(place, radius_px)
+                self._stand(Tree(crown, kinds[int(kind * _TREE_KINDS)], place, keep_off))
 
     def _scatter_trees(self, polygon: Polygon, mean_count: float) -> None:
         centre, half, angle = main_frame(polygon)
@@ -240,28 +200,3 @@ class Layout:
         for _ in range(int(self._random.poisson(mean_count))):
             u, v = self._uniform(-0.9, 0.9) * half[0], self._uniform(-0.9, 0.9) * half[1]
             self._trees.append((centre[0] + u * cos - v * sin, centre[1] + u * sin + v * cos))
-
-    def _add(self, cover: Cover, height_m: float = 0.0, rows_rad: float = 0.0) -> int:
-        self._cover_of.append(cover)
-        return self._book.add(cover, height_m, rows_rad)
-
-    def _touches_scene(self, polygon: Polygon) -> bool:
-        height, width = self.labels.shape
-        x, y = zip(*polygon, strict=True)
-        return min(x) < width and max(x) > 0 and min(y) < height and max(y) > 0
-
-    def _cover_at(self, point: Point) -> Cover:
-        height, width = self.labels.shape
-        column = min(max(round(point[0]), 0), width - 1)
-        row = min(max(round(point[1]), 0), height - 1)
-        return self._cover_of[self.labels[row, column]]
-
-    def _fill(self, polygon: Polygon, label: int, *, convex: bool = True) -> None:
-        corners = np.rint(np.array(polygon) * (1 << _SUBPIXEL_BITS)).astype(np.int32)
-        if convex:
-            cv2.fillConvexPoly(self.labels, corners, label, cv2.LINE_8, _SUBPIXEL_BITS)
-        else:
-            cv2.fillPoly(self.labels, [corners], label, cv2.LINE_8, _SUBPIXEL_BITS)
-
-    def _uniform(self, low: float, high: float) -> float:
-        return low + (high - low) * float(self._random.random())

@@ -28,6 +28,9 @@ class Stream(IntEnum):
     OPTICAL_NOISE = 11
     DISTORTION = 12
     CHECK_POINTS = 13
+    CHANGES = 14
+    TRAFFIC = 15
+    ROOF_POINTS = 16
 
 
 def random_stream(seed: int, stream: Stream, part: int = 0) -> np.random.Generator:

@@ -27,13 +27,12 @@ _DARK_DN = 60.0
 _DN_PER_REFLECTANCE = 3400.0
 _LEVEL_PX = 0.01
 _AMBIENT = 0.3
-_WALL_ALBEDO = 0.22
 _PATCHES_M = 18.0
 _ROW_PERIOD_M = 5.0
 # Relative contrast of fine texture, patches and plough rows of each class, in the order of Cover.
-_FINE = np.array([0.03, 0.05, 0.07, 0.10, 0.02, 0.05, 0.12], np.float32)
-_PATCH = np.array([0.04, 0.07, 0.08, 0.05, 0.02, 0.0, 0.08], np.float32)
-_ROWS = np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0], np.float32)
+_FINE = np.array([0.03, 0.05, 0.07, 0.10, 0.02, 0.05, 0.12, 0.1, 0.15], np.float32)
+_PATCH = np.array([0.04, 0.07, 0.08, 0.05, 0.02, 0.0, 0.08, 0.0, 0.1], np.float32)
+_ROWS = np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25], np.float32)
 
 
 @dataclass(frozen=True)
@@ -108,8 +107,8 @@ def render_radiance(scene: Scene, options: OpticalOptions) -> FloatImage:
         brightness = _illumination(scene, context, options)
         texture = _texture(scene, context, patches, index)
         seen, is_wall = _visible(scene, context, options, inside)
-        wall = _WALL_ALBEDO * _wall_light(options)
         label = scene.parcel[context].ravel()[seen]
+        wall = scene.parcels.wall_reflectance[label[is_wall]] * np.float32(_wall_light(options))
         factor = (brightness * texture).ravel()[seen]
         for k, band in enumerate(band_index):
             light = scene.parcels.reflectance[label, band] * factor

@@ -14,8 +14,7 @@ from ..errors import ParameterError
 from ..geometry.transform import Transform
 from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
-from .cover import OPEN_GROUND
-from .layout import highest_object_m
+from .check_points import RoofPoints, Scenes, ground_points, roof_points
 from .misregistration import (
     DistortionOptions,
     SourcePositions,
@@ -26,7 +25,7 @@ from .misregistration import (
 from .noise import Stream, random_stream
 from .optical import OpticalOptions, blur, quantise, render_radiance
 from .sar import SarOptions, render_sar
-from .scene import Scene, SceneOptions, generate_scene
+from .scene import Scene, SceneOptions, generate_scenes
 
 CRS_EPSG = 32633
 CORNER_M = (412_000.0, 5_334_000.0)
@@ -34,8 +33,6 @@ CORNER_M = (412_000.0, 5_334_000.0)
 # The scene depends on its outer size: in coarse steps, it stays the same when only the distortion
 # or the look changes somewhat.
 _MARGIN_STEP_PX = 64
-_CHECK_POINTS_PER_SIDE = 12
-_CHECK_POINT_TRIES = 20
 
 
 @dataclass(frozen=True)
@@ -81,8 +78,10 @@ class SimulatedPair:
         `truth.input_grid` is the georeferencing that the input claims.
     check_points_px : float64 array (n, 2)
         Reference pixels (col, row) on open ground that the input shows.
+    roof_points : RoofPoints
+        Points on roofs, which the two images show elsewhere than the ground below them.
     scene : Scene
-        The country, with its margin.
+        The country, with its margin, when the radar took its image.
     """
 
     options: PairOptions
@@ -91,6 +90,7 @@ class SimulatedPair:
     input: npt.NDArray[np.uint16]
     truth: Transform
     check_points_px: npt.NDArray[np.float64]
+    roof_points: RoofPoints
     scene: Scene
 
 
@@ -117,11 +117,11 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
     progress.update(0.0, "laying out the scene")
     needed = needed_margin(model, reference_grid, claimed) + _object_reach_px(options)
     margin = math.ceil(needed / _MARGIN_STEP_PX) * _MARGIN_STEP_PX
-    scene = generate_scene(scene_options, margin)
+    scenes = Scenes(*generate_scenes(scene_options, margin))
     progress.update(0.25, "looking with the radar")
-    reference = render_sar(scene, options.sar)
+    reference = render_sar(scenes.radar, options.sar)
     progress.update(0.4, "looking with the camera")
-    radiance = render_radiance(scene, options.optical)
+    radiance = render_radiance(scenes.camera, options.optical)
     scene_grid = reference_grid.window(-margin, -margin, width + 2 * margin, height + 2 * margin)
     positions = SourcePositions.of(truth, scene_grid)
     image = np.empty((len(radiance), claimed.height, claimed.width), np.uint16)
@@ -130,7 +130,7 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
         # Below 0.6 px the cubic kernel could not follow the scene any more.
         blur(light, max(options.optical.psf_sigma_px * options.pixel_ratio, 0.6))
         seen = resample(light, positions, claimed.height)
-        noise = random_stream(scene.seed, Stream.OPTICAL_NOISE, band)
+        noise = random_stream(scene_options.seed, Stream.OPTICAL_NOISE, band)
         image[band] = quantise(seen, options.optical, noise)
     return SimulatedPair(
         options=options,
@@ -138,32 +138,16 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
         reference_grid=reference_grid,
         input=image,
         truth=truth,
-        check_points_px=_check_points(scene, reference_grid, truth),
-        scene=scene,
+        check_points_px=ground_points(scenes, reference_grid, truth),
+        roof_points=roof_points(scenes, reference_grid, truth, options.sar, options.optical),
+        scene=scenes.radar,
     )
 
 
 def _object_reach_px(options: PairOptions) -> int:
     """How far from its foot an object or a hill can show up in either image."""
-    object_m = highest_object_m(options.scene.density)
+    object_m = options.scene.highest_object_m
     cot = options.sar.cot_incidence
     radar_m = (object_m + options.scene.relief_m) * cot + object_m / cot
     camera_m = object_m * (options.optical.lean + options.optical.shadow)
     return math.ceil(max(radar_m, camera_m) / options.scene.pixel_size_m)
-
-
-def _check_points(scene: Scene, grid: Grid, truth: Transform) -> npt.NDArray[np.float64]:
-    """One point on open ground in each cell of a lattice, where there is one."""
-    generator = random_stream(scene.seed, Stream.CHECK_POINTS)
-    side = np.arange(_CHECK_POINTS_PER_SIDE)
-    cell = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 1, 2)
-    drawn = generator.random((len(cell), _CHECK_POINT_TRIES, 2))
-    px = (cell + drawn) / _CHECK_POINTS_PER_SIDE * [grid.width - 1, grid.height - 1]
-    column, row = np.rint(px).astype(np.intp).transpose(2, 0, 1) + scene.margin_px
-    open_ground = np.isin(scene.parcels.cover[scene.parcel[row, column]], OPEN_GROUND)
-    open_ground &= scene.object_m[row, column] == 0
-    shown = truth.input_grid.contains(truth(grid.pixel_to_map(px.reshape(-1, 2))))
-    usable = open_ground & shown.reshape(open_ground.shape)
-    first = usable.argmax(axis=1)
-    has_one = usable.any(axis=1)
-    return np.asarray(px[np.nonzero(has_one)[0], first[has_one]])

@@ -137,3 +137,41 @@ def _split(
     near = (point[0] - normal[0] * gap / 2, point[1] - normal[1] * gap / 2)
     lane = clip(clip(polygon, near, normal), far, opposite)
     return clip(polygon, far, normal), clip(polygon, near, opposite), lane
+
+
+def inset(polygon: Polygon, distance: float) -> Polygon | None:
+    """Move all sides of a convex polygon inwards; None where a side would be lost.
+
+    The corners turn from the first axis to the second, as those of `rectangle` do. Corner k of the
+    result belongs to corner k of the polygon.
+    """
+    corners = np.array(polygon)
+    along = np.roll(corners, -1, axis=0) - corners
+    length = np.hypot(*along.T)
+    if length.min() < 2 * distance:
+        return None
+    normal = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
+    before = np.roll(normal, 1, axis=0)
+    mitre = 1 + np.sum(normal * before, axis=1)
+    if mitre.min() < 0.3:
+        return None
+    inner = corners + distance * (normal + before) / mitre[:, None]
+    left = np.sum((np.roll(inner, -1, axis=0) - inner) * along, axis=1) / length
+    return None if left.min() < distance / 2 else [(x, y) for x, y in inner.tolist()]
+
+
+def strip_along(polygon: Polygon, offset: float, half_width: float, longer: float) -> Polygon:
+    """Return the strip that runs along a long polygon at some distance from its middle line.
+
+    Parameters
+    ----------
+    polygon : list of points
+        Long convex polygon.
+    offset, half_width : float
+        Where the strip's middle line is, and half its width.
+    longer : float
+        How much further than the polygon the strip reaches at both ends.
+    """
+    centre, half, angle = main_frame(polygon)
+    shifted = (centre[0] - offset * math.sin(angle), centre[1] + offset * math.cos(angle))
+    return rectangle(shifted, (half[0] + longer, half_width), angle)

@@ -23,19 +23,25 @@ from .scene import Scene
 
 FloatImage = npt.NDArray[np.float32]
 
+ORBITS = ("ascending", "descending")
+
 _SAMPLES_PER_PIXEL = 2
 _MIN_WALL_PX = 0.5
 _NORMAL_SIGMA_PX = 1.5
 _LEVEL_PX = 0.05
 
 # Standard deviation of the fine texture of each class in dB, in the order of Cover.
-_TEXTURE_DB = np.array([0.3, 0.6, 0.8, 2.0, 0.3, 2.5, 2.5], np.float32)
+_TEXTURE_DB = np.array([0.3, 0.6, 0.8, 2.0, 0.3, 2.5, 2.5, 2.0, 2.0], np.float32)
 _PATCH_DB = 0.7
 _PATCH_M = 25.0
 _BRIGHT_POINT_SHARE = 0.004
+_BRIGHT_POINTS_ON = (Cover.BUILDING, Cover.PAVEMENT, Cover.RAIL)
 _BRIGHT_POINT_DB = 15.0
 _STOREY_M = 3.0
 _WALL_BACKSCATTER = 0.3
+# Share of a wall's power that comes from the corners of its windows, and where in a storey.
+_GLITTER_SHARE = 0.7
+_SILL = 0.3
 _DOUBLE_BOUNCE_PER_PX = 1.2
 _CORNER_WIDTH_COS = math.cos(math.radians(12))
 _NOISE_FLOOR = 10 ** (-25 / 10)
@@ -67,7 +73,7 @@ class SarOptions:
         """Refuse what cannot be simulated."""
         if not 10 <= self.incidence_deg <= 70:
             raise ParameterError(f"incidence_deg must be 10 to 70, not {self.incidence_deg}")
-        if self.orbit not in ("ascending", "descending"):
+        if self.orbit not in ORBITS:
             raise ParameterError(f"orbit must be ascending or descending, not {self.orbit!r}")
         if not self.looks > 0 or not self.amplitude_at_0_db > 0:
             raise ParameterError("looks and amplitude_at_0_db must be positive")
@@ -138,9 +144,18 @@ def _strip_power(
     walls = random_stream(scene.seed, Stream.SAR_WALLS, index)
     storey_px = max(_STOREY_M / scene.pixel_size_m, 1.0)
     cot = options.cot_incidence
-    power = _range_power(terrain, objects, backscatter, building, cot, storey_px, walls)
+    windows = _window_gain(scene, rows)[:, mirror]
+    power = _range_power(terrain, objects, backscatter, building, windows, cot, storey_px, walls)
     power += np.float32(_NOISE_FLOOR)
     return power[:, mirror]
+
+
+def _window_gain(scene: Scene, rows: slice) -> FloatImage:
+    """How much stronger than on average windows glitter in each row; −1 for plain walls."""
+    window_m = scene.parcels.window_m[scene.parcel[rows]]
+    pitch_px = np.maximum(window_m / np.float32(scene.pixel_size_m), 1)
+    hit = np.arange(rows.start, rows.stop)[:, None] % pitch_px < 1
+    return np.where(window_m > 0, np.where(hit, pitch_px, 0), np.float32(-1))
 
 
 def _backscatter(
@@ -153,7 +168,7 @@ def _backscatter(
     level_db += _PATCH_DB * patches.rows(rows.start, rows.stop)
     level_db += _TEXTURE_DB[cover] * generator.standard_normal(label.shape, dtype=np.float32)
     bright = generator.random(label.shape, dtype=np.float32) < _BRIGHT_POINT_SHARE
-    bright &= (cover == Cover.BUILDING) | (cover == Cover.PAVEMENT)
+    bright &= np.isin(cover, _BRIGHT_POINTS_ON)
     level_db[bright] += _BRIGHT_POINT_DB
     return np.exp(level_db * np.float32(math.log(10) / 10))
 
@@ -186,6 +201,7 @@ def _range_power(
     objects: FloatImage,
     backscatter: FloatImage,
     building: npt.NDArray[np.bool_],
+    windows: FloatImage,
     cot: float,
     storey_px: float,
     generator: np.random.Generator,
@@ -203,7 +219,7 @@ def _range_power(
     skyline = _skyline(top + slope / 2, cot)
     power = _surface_power(line, top, slope, backscatter, skyline, cot)
     power += _wall_power(
-        line, terrain + slope / 2, objects, building, skyline, cot, storey_px, generator
+        line, terrain + slope / 2, objects, building, windows, skyline, cot, storey_px, generator
     )
     position = np.arange(columns, dtype=np.float32) - terrain * np.float32(cot) - line.origin
     lower = position.astype(np.intp)
@@ -247,6 +263,7 @@ def _wall_power(
     ground: FloatImage,
     objects: FloatImage,
     building: npt.NDArray[np.bool_],
+    windows: FloatImage,
     skyline: npt.NDArray[np.float64],
     cot: float,
     storey_px: float,
@@ -267,12 +284,19 @@ def _wall_power(
     storey = np.arange(len(wall)) - np.repeat(np.cumsum(storeys) - storeys, storeys)
     height = visible[wall] / storeys[wall]
     low = (head - visible)[wall] + storey * height
-    strength = generator.standard_exponential(len(wall)) * facing[wall] ** 2 * _WALL_BACKSCATTER
+    drawn = generator.standard_exponential(len(wall))
+    gain = windows[row, left + 1][wall]
+    plain = np.where(gain < 0, 1, 1 - _GLITTER_SHARE)
+    strength = drawn * facing[wall] ** 2 * _WALL_BACKSCATTER * plain
     # The running sum of a box's start and end, which lie half a pixel further because a bin
     # reaches half a pixel to both sides of its position.
     edges = x[wall] + 0.5 - np.stack([low + height, low]) * cot
     ends = np.stack([strength / cot, -strength / cot])
     total = np.cumsum(line.splat(np.tile(row[wall], 2), edges.ravel(), ends.ravel()), axis=1)
+    # The windows of a wall are alike, so that their corners make a regular lattice.
+    glitter = (1 + drawn) / 2 * height * np.maximum(gain, 0)
+    glitter *= facing[wall] ** 2 * _WALL_BACKSCATTER * _GLITTER_SHARE
+    total += line.splat(row[wall], x[wall] - (low + _SILL * height) * cot, glitter)
     grounded = visible_foot <= foot + _LEVEL_PX
     corner = np.exp((facing - 1) / (1 - _CORNER_WIDTH_COS)) * visible * grounded
     strength = generator.standard_exponential(len(row)) * _DOUBLE_BOUNCE_PER_PX

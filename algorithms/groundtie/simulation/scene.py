@@ -8,12 +8,17 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import ParameterError
+from .blocks import HIGHEST_M
+from .canvas import Changes, Labels
+from .city import CITY, CityLayout
 from .cover import Cover, ParcelBook, ParcelTable
-from .layout import DENSITIES, Layout
+from .layout import DENSITIES, Layout, highest_object_m
 from .noise import SmoothNoise, Stream, random_stream, strips
 
 _CROWN_M = 2.2
 _COARSEST_FULL_SIZE_M = 2.5
+
+DENSITY_NAMES = (*DENSITIES, CITY)
 
 
 @dataclass(frozen=True)
@@ -27,12 +32,15 @@ class SceneOptions:
     pixel_size_m : float
         Size of the pixels of the scene and of its SAR image.
     density : str
-        "rural" (0–3 % built, 3–8 m high), "suburban" (up to 25 %, 4–12 m) or "urban" (about half,
-        10–60 m).
+        "rural" (0–3 % built, 3–8 m high), "suburban" (up to 25 %, 4–12 m), "urban" (about half,
+        10–60 m) or "city" (streets, courtyards and towers up to 60 m, cars and railways).
     relief_m : float
         Height range of the terrain where the scene is larger than its hills.
     seed : int
         Everything random follows from it.
+    changed : float
+        Share of the buildings that stand in one of the images only: half of them are pulled down
+        after the radar's image, half are new in the camera's.
     """
 
     size_px: tuple[int, int] = (1000, 1000)
@@ -40,6 +48,7 @@ class SceneOptions:
     density: str = "suburban"
     relief_m: float = 20.0
     seed: int = 0
+    changed: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated."""
@@ -47,12 +56,19 @@ class SceneOptions:
             raise ParameterError(
                 f"the scene must be at least 16 px wide and high, not {self.size_px}"
             )
-        if self.density not in DENSITIES:
+        if self.density not in DENSITY_NAMES:
             raise ParameterError(
-                f"density must be one of {', '.join(DENSITIES)}, not {self.density!r}"
+                f"density must be one of {', '.join(DENSITY_NAMES)}, not {self.density!r}"
             )
         if not self.pixel_size_m > 0 or self.relief_m < 0:
             raise ParameterError("pixel_size_m must be positive and relief_m not negative")
+        if not 0 <= self.changed <= 1:
+            raise ParameterError(f"changed must be 0 to 1, not {self.changed}")
+
+    @property
+    def highest_object_m(self) -> float:
+        """The greatest height that a building or a canopy can have."""
+        return HIGHEST_M if self.density == CITY else highest_object_m(self.density)
 
 
 @dataclass(frozen=True)
@@ -98,7 +114,12 @@ class Scene:
 
 
 def generate_scene(options: SceneOptions, margin_px: int = 0) -> Scene:
-    """Generate a scene.
+    """Generate a scene as it is at the radar's acquisition; see `generate_scenes`."""
+    return generate_scenes(options, margin_px)[0]
+
+
+def generate_scenes(options: SceneOptions, margin_px: int = 0) -> tuple[Scene, Scene]:
+    """Generate a scene as it is at the radar's and at the camera's acquisition.
 
     Parameters
     ----------
@@ -106,30 +127,39 @@ def generate_scene(options: SceneOptions, margin_px: int = 0) -> Scene:
         What the country looks like.
     margin_px : int
         How far the country goes on beyond the wanted size.
+
+    Returns
+    -------
+    two Scenes
+        One and the same if nothing has changed.
     """
     width, height = (size + 2 * margin_px for size in options.size_px)
     shape = (height, width)
     book = ParcelBook(random_stream(options.seed, Stream.SURFACES))
+    labels = _layout(options, shape, book).draw()
+    parcels = book.table()
+    terrain_m = _terrain(options, shape)
+
+    def scene(parcel: Labels) -> Scene:
+        objects_m = _object_heights(options, parcel, parcels)
+        seed, pixel_m = options.seed, options.pixel_size_m
+        return Scene(pixel_m, margin_px, seed, terrain_m, objects_m, parcel, parcels)
+
+    radar = scene(labels[0])
+    return radar, radar if labels[1] is labels[0] else scene(labels[1])
+
+
+def _layout(options: SceneOptions, shape: tuple[int, int], book: ParcelBook) -> Layout | CityLayout:
     # Fields and houses of coarse images grow with the pixel, or they would be smaller than one.
     enlargement = max(options.pixel_size_m / _COARSEST_FULL_SIZE_M, 1.0)
-    layout = Layout(
-        shape,
-        enlargement / options.pixel_size_m,
-        options.density,
-        random_stream(options.seed, Stream.LAYOUT),
-        book,
-    )
-    parcel = layout.draw()
-    parcels = book.table()
-    return Scene(
-        pixel_size_m=options.pixel_size_m,
-        margin_px=margin_px,
-        seed=options.seed,
-        terrain_m=_terrain(options, shape),
-        object_m=_object_heights(options, parcel, parcels),
-        parcel=parcel,
-        parcels=parcels,
-    )
+    scale = enlargement / options.pixel_size_m
+    generator = random_stream(options.seed, Stream.LAYOUT)
+    changing = random_stream(options.seed, Stream.CHANGES) if options.changed > 0 else None
+    changes = Changes(options.changed, changing)
+    if options.density == CITY:
+        traffic = random_stream(options.seed, Stream.TRAFFIC)
+        return CityLayout(shape, scale, generator, book, changes, traffic)
+    return Layout(shape, scale, options.density, generator, book, changes)
 
 
 def _terrain(options: SceneOptions, shape: tuple[int, int]) -> npt.NDArray[np.float32]:

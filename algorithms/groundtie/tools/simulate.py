@@ -10,11 +10,11 @@ from ..declaration import tool
 from ..kinds import Choice, Distance, FolderOut, Number
 from ..progress import SILENT, Progress
 from ..simulation.files import write_pair
-from ..simulation.layout import DENSITIES
 from ..simulation.misregistration import DISTORTIONS, DistortionOptions
+from ..simulation.optical import OpticalOptions
 from ..simulation.pair import PairOptions, simulate_pair
-from ..simulation.sar import SarOptions
-from ..simulation.scene import SceneOptions
+from ..simulation.sar import ORBITS, SarOptions
+from ..simulation.scene import DENSITY_NAMES, SceneOptions
 from .common import Seed
 
 
@@ -39,8 +39,8 @@ def simulate(
         Path,
         FolderOut(
             label="Folder",
-            help="Gets reference.tif (SAR), input.tif (optical), dem.tif, truth.json and "
-            "check_points.csv.",
+            help="Gets reference.tif (SAR), input.tif (optical), dem.tif, truth.json, "
+            "check_points.csv and roof_points.csv.",
         ),
     ],
     size: Annotated[
@@ -59,8 +59,8 @@ def simulate(
         Choice(
             label="Density",
             help="How much of the scene is built up: rural up to 3 %, suburban up to 25 %, urban "
-            "about half, with high buildings.",
-            choices=tuple(DENSITIES),
+            "about half, with high buildings; city has streets with cars, courtyards and towers.",
+            choices=DENSITY_NAMES,
         ),
     ] = "suburban",
     distortion: Annotated[
@@ -90,6 +90,17 @@ def simulate(
             maximum=100,
         ),
     ] = 1.0,
+    changed: Annotated[
+        float,
+        Number(
+            label="Changed buildings",
+            help="Share of the buildings that stand in one of the images only: half of them are "
+            "pulled down after the SAR image, half are new in the optical one.",
+            unit="%",
+            minimum=0,
+            maximum=100,
+        ),
+    ] = 0.0,
     seed: Seed = 0,
     pixel_size: Annotated[
         float,
@@ -121,6 +132,37 @@ def simulate(
             advanced=True,
         ),
     ] = 35.0,
+    orbit: Annotated[
+        str,
+        Choice(
+            label="Orbit",
+            help="Ascending: the radar looks east; descending: it looks west.",
+            choices=ORBITS,
+            advanced=True,
+        ),
+    ] = "ascending",
+    off_nadir: Annotated[
+        float,
+        Number(
+            label="Off-nadir angle",
+            help="Angle between the camera's line of sight and the vertical: buildings lean by it.",
+            unit="°",
+            minimum=0,
+            maximum=45,
+            advanced=True,
+        ),
+    ] = 12.0,
+    view_azimuth: Annotated[
+        float,
+        Number(
+            label="View azimuth",
+            help="Where the camera is, seen from the ground, clockwise from north.",
+            unit="°",
+            minimum=0,
+            maximum=360,
+            advanced=True,
+        ),
+    ] = 250.0,
     rotation: Annotated[
         float,
         Number(
@@ -162,8 +204,9 @@ def simulate(
     same seed gives the same pair. The file truth.json is a transform like those of coregister.
     """
     options = PairOptions(
-        scene=SceneOptions((size, size), pixel_size, density, relief, seed),
-        sar=SarOptions(incidence_deg=incidence, looks=looks),
+        scene=SceneOptions((size, size), pixel_size, density, relief, seed, changed / 100),
+        sar=SarOptions(incidence_deg=incidence, orbit=orbit, looks=looks),
+        optical=OpticalOptions(view_azimuth_deg=view_azimuth, off_nadir_deg=off_nadir),
         distortion=DistortionOptions(distortion, shift, rotation, scale, warp),
         input_pixel_size_m=input_pixel_size,
     )

@@ -1,0 +1,209 @@
+"""Places whose positions in both images are known exactly: on open ground, and on roofs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import map_coordinates
+
+from ..geometry.transform import Transform
+from ..rasters.grid import Grid
+from .cover import OPEN_GROUND, Cover
+from .noise import Stream, random_stream
+from .optical import OpticalOptions, direction
+from .sar import SarOptions
+from .scene import Scene
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.intp]
+
+_PER_SIDE = 12
+_TRIES = 20
+_ROOF_MARGIN_PX = 2
+_ITERATIONS = 30
+_LEVEL_PX = 0.05
+
+
+@dataclass(frozen=True)
+class Scenes:
+    """A scene when the radar and when the camera took its image."""
+
+    radar: Scene
+    camera: Scene
+
+
+@dataclass(frozen=True)
+class RoofPoints:
+    """Points on flat roofs that stand in both images and are seen by both sensors.
+
+    Attributes
+    ----------
+    px : float64 array (n, 2)
+        Reference pixels (col, row) of their true position on the map.
+    height_m : float64 array (n,)
+        Height above the ground.
+    reference_px : float64 array (n, 2)
+        Where the radar image shows them: nearer to the radar by height / tan(incidence) on level
+        ground.
+    input_px : float64 array (n, 2)
+        Where the optical image shows them: leaning away from the camera by
+        height · tan(off-nadir angle), and displaced as the ground is.
+    """
+
+    px: FloatArray
+    height_m: FloatArray
+    reference_px: FloatArray
+    input_px: FloatArray
+
+
+def ground_points(scenes: Scenes, grid: Grid, truth: Transform) -> FloatArray:
+    """Return one point on open ground in each cell of a lattice, where there is one.
+
+    Returns
+    -------
+    float64 array (n, 2)
+        Reference pixels (col, row).
+    """
+    px, place = _drawn(scenes.radar, grid, Stream.CHECK_POINTS)
+    usable = truth.input_grid.contains(truth(grid.pixel_to_map(px.reshape(-1, 2))))
+    usable = usable.reshape(place[0].shape)
+    for scene in (scenes.radar, scenes.camera):
+        usable &= np.isin(scene.parcels.cover[scene.parcel[place]], OPEN_GROUND)
+        usable &= scene.object_m[place] == 0
+    return _first_of_each(px, usable)
+
+
+def roof_points(
+    scenes: Scenes, grid: Grid, truth: Transform, sar: SarOptions, optical: OpticalOptions
+) -> RoofPoints:
+    """Return one point on a roof in each cell of a lattice, where both sensors see one."""
+    px, place = _drawn(scenes.radar, grid, Stream.ROOF_POINTS)
+    usable = _inside_a_roof(scenes, place)
+    usable &= ~_hidden_from_radar(scenes.radar, place, sar)
+    usable &= ~_hidden_from_camera(scenes.camera, place, optical)
+    height_m = scenes.radar.object_m[place].astype(float)
+    shown = radar_position(scenes.radar, px, height_m, sar)
+    seen = truth(grid.pixel_to_map(camera_position(scenes.camera, px, height_m, optical)))
+    for positions, image in ((shown, grid), (seen, truth.input_grid)):
+        usable &= image.contains(positions.reshape(-1, 2)).reshape(usable.shape)
+    return RoofPoints(
+        _first_of_each(px, usable),
+        _first_of_each(height_m, usable),
+        _first_of_each(shown, usable),
+        _first_of_each(seen.reshape(px.shape), usable),
+    )
+
+
+def radar_position(
+    scene: Scene, px: FloatArray, height_m: FloatArray, sar: SarOptions
+) -> FloatArray:
+    """Return where the geocoded radar image shows points above the ground.
+
+    The radar knows the slant range alone, and the bare terrain says which ground has that range.
+
+    Parameters
+    ----------
+    px : float64 array (..., 2)
+        Reference pixels (col, row) below the points.
+    height_m : float64 array (...)
+        Heights above the ground.
+    """
+    towards_radar = -1 if sar.orbit == "ascending" else 1
+    column, row = px[..., 0], px[..., 1]
+
+    def terrain_m(x: FloatArray) -> FloatArray:
+        place = np.stack([row, x]) + scene.margin_px
+        # As the radar image does, each row on its own, and along it between the pixels.
+        place[0] = np.rint(place[0])
+        return np.asarray(map_coordinates(scene.terrain_m, place, float, order=1, mode="nearest"))
+
+    level_m, shown = terrain_m(column), column
+    for _ in range(_ITERATIONS):
+        above_m = level_m + height_m - terrain_m(shown)
+        shown = column + towards_radar * above_m * sar.cot_incidence / scene.pixel_size_m
+    return np.stack([shown, row], axis=-1)
+
+
+def camera_position(
+    scene: Scene, px: FloatArray, height_m: FloatArray, optical: OpticalOptions
+) -> FloatArray:
+    """Return where an optical image without misregistration shows points above the ground."""
+    towards_camera = np.array(direction(optical.view_azimuth_deg))
+    return np.asarray(
+        px - towards_camera * (height_m * optical.lean / scene.pixel_size_m)[..., None]
+    )
+
+
+def _drawn(
+    scene: Scene, grid: Grid, stream: Stream
+) -> tuple[FloatArray, tuple[IntArray, IntArray]]:
+    """Places in each cell of a lattice: reference pixels, and (row, column) of the scene."""
+    side = np.arange(_PER_SIDE)
+    cell = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 1, 2)
+    drawn = random_stream(scene.seed, stream).random((len(cell), _TRIES, 2))
+    px = (cell + drawn) / _PER_SIDE * [grid.width - 1, grid.height - 1]
+    column, row = np.rint(px).astype(np.intp).transpose(2, 0, 1) + scene.margin_px
+    return px, (row, column)
+
+
+def _first_of_each(values: FloatArray, usable: npt.NDArray[np.bool_]) -> FloatArray:
+    """Values of the first usable place of each cell that has one."""
+    first, has_one = usable.argmax(axis=1), usable.any(axis=1)
+    return np.asarray(values[np.nonzero(has_one)[0], first[has_one]])
+
+
+def _inside_a_roof(scenes: Scenes, place: tuple[IntArray, IntArray]) -> npt.NDArray[np.bool_]:
+    """Whether the same roof is all around a place in both images."""
+    row, column = place
+    number = scenes.radar.parcel[place]
+    inside = scenes.radar.parcels.cover[number] == Cover.BUILDING
+    rows, columns = scenes.radar.parcel.shape
+    for scene in (scenes.radar, scenes.camera):
+        for down in (-_ROOF_MARGIN_PX, 0, _ROOF_MARGIN_PX):
+            for along in (-_ROOF_MARGIN_PX, 0, _ROOF_MARGIN_PX):
+                beside = np.clip(row + down, 0, rows - 1), np.clip(column + along, 0, columns - 1)
+                inside &= scene.parcel[beside] == number
+    return np.asarray(inside)
+
+
+def _hidden_from_radar(
+    scene: Scene, place: tuple[IntArray, IntArray], sar: SarOptions
+) -> npt.NDArray[np.bool_]:
+    step = (-1.0 if sar.orbit == "ascending" else 1.0, 0.0)
+    return _hidden(scene.terrain_m + scene.object_m, scene, place, step, sar.cot_incidence)
+
+
+def _hidden_from_camera(
+    scene: Scene, place: tuple[IntArray, IntArray], optical: OpticalOptions
+) -> npt.NDArray[np.bool_]:
+    if optical.lean < 1e-6:
+        return np.zeros(place[0].shape, bool)
+    # The optical image is orthorectified: its terrain hides nothing.
+    step = direction(optical.view_azimuth_deg)
+    return _hidden(scene.object_m, scene, place, step, 1 / optical.lean)
+
+
+def _hidden(
+    height_m: npt.NDArray[np.float32],
+    scene: Scene,
+    place: tuple[IntArray, IntArray],
+    step: tuple[float, float],
+    rise: float,
+) -> npt.NDArray[np.bool_]:
+    """Whether the ray that rises towards a sensor meets something; `step` is (columns, rows)."""
+    row, column = place
+    height_px = height_m / np.float32(scene.pixel_size_m)
+    ray, highest = height_px[place], float(height_px.max())
+    hidden = np.zeros(row.shape, bool)
+    rows, columns = height_px.shape
+    for k in range(1, math.ceil((highest - float(ray.min())) / rise) + 1):
+        there = (
+            np.rint(row + k * step[1]).astype(np.intp),
+            np.rint(column + k * step[0]).astype(np.intp),
+        )
+        there = np.clip(there[0], 0, rows - 1), np.clip(there[1], 0, columns - 1)
+        hidden |= height_px[there] > ray + k * rise + _LEVEL_PX
+    return hidden

@@ -1,0 +1,225 @@
+"""A dense city: boulevards, streets with cars and trees, blocks, squares, a river, a railway."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .blocks import QUARTERS, Building, Quarter
+from .canvas import BOTH, Acquisition, Canvas, Changes, Labels, Standing, Tree
+from .cover import Cover, ParcelBook
+from .polygons import (
+    Point,
+    Polygon,
+    area,
+    main_frame,
+    points_along,
+    rectangle,
+    strip_along,
+    subdivide,
+)
+
+CITY = "city"
+
+_DISTRICT_M2 = 90_000
+_BOULEVARD_M = (24.0, 30.0)
+_KERB_M = 2.5
+_OPEN_BLOCK_SHARE = 0.08
+_RIVER_CHANCE = 0.7
+_RAILWAY_CHANCE = 0.6
+_TRAINS = 3
+_CAR_M = (4.6, 1.9)
+_PARKING_PITCH_M = 6.0
+_MOVING_PITCH_M = 22.0
+_PARKED_SHARE = 0.55
+_TREE_PITCH_M = 10.0
+_KINDS = 10
+_WINDOW_M = (2.8, 4.5)
+_PROBES_PER_SIDE = 6
+
+
+@dataclass(frozen=True)
+class _Street:
+    lane: Polygon
+    half_width: float
+    trees: bool
+
+    def carriageway(self, kerb: float) -> Polygon:
+        """Return the part for cars, which reaches into the streets at both ends."""
+        return strip_along(self.lane, 0.0, self.half_width - kerb, kerb + 1)
+
+
+class CityLayout(Canvas):
+    """Draws the parcels of a dense city.
+
+    Parameters
+    ----------
+    shape, px_per_m, generator, book, changes
+        See `Canvas`.
+    traffic : numpy.random.Generator
+        Source of cars and trains, which differ in the two images.
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        px_per_m: float,
+        generator: np.random.Generator,
+        book: ParcelBook,
+        changes: Changes,
+        traffic: np.random.Generator,
+    ) -> None:
+        super().__init__(shape, px_per_m, generator, book, changes)
+        self._traffic = traffic
+        self._buildings: list[Building] = []
+        self._trees: list[Point] = []
+
+    def draw(self) -> tuple[Labels, Labels]:
+        """Draw the whole city; see `Canvas.images`."""
+        self.labels[:] = self._add(Cover.PAVEMENT)
+        height, width = self.labels.shape
+        half = math.hypot(height, width) / 2
+        outline = rectangle((width / 2, height / 2), (half, half), self._uniform(0, math.pi / 2))
+        boulevard = self._uniform(*_BOULEVARD_M) * self._scale
+        parts = subdivide(outline, _DISTRICT_M2 * self._scale**2, boulevard, self._random)
+        streets: list[_Street] = []
+        for district in parts.cells:
+            if self._touches_scene(district):
+                streets += self._draw_district(district)
+        self._draw_streets(streets)
+        self._draw_river()
+        trains = self._draw_railway()
+        boulevards = [_Street(lane, boulevard / 2, True) for lane in parts.lanes]
+        self._draw_streets(boulevards)
+        self._plant_trees()
+        self._put_up_buildings()
+        self._park_cars(streets + boulevards)
+        self._things += trains
+        return self.images()
+
+    def _draw_district(self, district: Polygon) -> list[_Street]:
+        shares = np.cumsum([quarter.share for quarter in QUARTERS])
+        quarter = QUARTERS[int(np.searchsorted(shares, self._random.random() * shares[-1]))]
+        street = self._uniform(*quarter.street_m) * self._scale
+        parts = subdivide(district, quarter.block_m2 * self._scale**2, street, self._random)
+        for block in parts.cells:
+            if self._random.random() < _OPEN_BLOCK_SHARE:
+                self._draw_open_block(block)
+            else:
+                self._draw_block(block, quarter)
+        trees = bool(self._random.random() < 0.5)
+        return [_Street(lane, street / 2, trees) for lane in parts.lanes]
+
+    def _draw_open_block(self, block: Polygon) -> None:
+        park = self._random.random() < 0.6
+        self._fill(block, self._add(Cover.GRASS if park else Cover.PAVEMENT))
+        self._scatter_trees(block, 1 / 150 if park else 1 / 800)
+
+    def _draw_block(self, block: Polygon, quarter: Quarter) -> None:
+        green = self._random.random() < 0.3
+        self._fill(block, self._add(Cover.GRASS if green else quarter.ground))
+        self._buildings += quarter.build(block, self._scale, self._random)
+        self._scatter_trees(block, quarter.trees_per_m2)
+
+    def _draw_streets(self, streets: list[_Street]) -> None:
+        """Draw pavements, then carriageways, so that no pavement runs across a junction."""
+        for street in streets:
+            self._fill(street.lane, self._add(Cover.PAVEMENT))
+        asphalt = [self._add(Cover.ROAD) for _ in range(_KINDS)]
+        for number, street in enumerate(streets):
+            self._fill(street.carriageway(_KERB_M * self._scale), asphalt[number % _KINDS])
+            if street.trees:
+                for side in (-1, 1):
+                    offset = side * (street.half_width - 0.5 * _KERB_M * self._scale)
+                    self._trees += self._places(street.lane, offset, _TREE_PITCH_M)
+
+    def _draw_river(self) -> None:
+        if self._random.random() < _RIVER_CHANCE:
+            height, width = self.labels.shape
+            quay, water = self._river(height, width, (14, 28), 8)
+            self._fill(quay, self._add(Cover.PAVEMENT), convex=False)
+            self._fill(water, self._add(Cover.WATER), convex=False)
+
+    def _draw_railway(self) -> list[Standing]:
+        """Draw the tracks and return the trains."""
+        if self._random.random() >= _RAILWAY_CHANCE:
+            return []
+        height, width = self.labels.shape
+        angle, half_width = self._uniform(0, math.pi), self._uniform(12, 26) * self._scale
+        aside = self._uniform(-0.35, 0.35) * min(height, width)
+        centre = (width / 2 - aside * math.sin(angle), height / 2 + aside * math.cos(angle))
+        tracks = rectangle(centre, (math.hypot(height, width), half_width), angle)
+        self._fill(tracks, self._add(Cover.RAIL, rows_rad=angle + math.pi / 2))
+        coach = self._add(Cover.CAR, 4.0)
+        trains = []
+        for when in Acquisition:
+            for _ in range(_TRAINS):
+                along, across = self._traffic.uniform(-1, 1, 2).tolist()
+                u, v = along * width / 2, across * (half_width - 3 * self._scale)
+                cos, sin = math.cos(angle), math.sin(angle)
+                place = (centre[0] + u * cos - v * sin, centre[1] + u * sin + v * cos)
+                train = rectangle(place, (70 * self._scale, 1.5 * self._scale), angle)
+                trains.append(Standing(train, coach, (when,)))
+        return trains
+
+    def _plant_trees(self) -> None:
+        kinds = [self._add(Cover.FOREST, self._uniform(5, 14)) for _ in range(_KINDS)]
+        keep_off = (Cover.WATER, Cover.ROAD, Cover.RAIL)
+        for place in self._trees:
+            kind, size = self._random.random(2).tolist()
+            radius = (1.6 + 2.4 * size) * self._scale
+            if radius >= 1:
+                crown = self._blob(place, radius)
+                self._stand(Tree(crown, kinds[int(kind * _KINDS)], place, keep_off))
+
+    def _put_up_buildings(self) -> None:
+        keep_off = (Cover.WATER, Cover.RAIL, Cover.ROAD)
+        for building in self._buildings:
+            outline, _ = building.parts[0]
+            if any(self._cover_at(p) in keep_off for p in points_along(outline, _PROBES_PER_SIDE)):
+                continue
+            when = self._changes.draw()
+            window_m = self._uniform(*_WINDOW_M)
+            for part, height_m in building.parts:
+                roof = self._add(Cover.BUILDING, height_m, window_m=window_m)
+                self._stand(Standing(part, roof, when))
+
+    def _park_cars(self, streets: list[_Street]) -> None:
+        """Put cars along the kerbs and on the lanes, others in each image."""
+        if self._scale * _CAR_M[1] < 1:
+            return
+        kinds = [self._add(Cover.CAR, 1.5) for _ in range(_KINDS)]
+        # Pixels that are touched are filled: half of one is taken off on all sides.
+        half_car = (_CAR_M[0] / 2 * self._scale - 0.4, _CAR_M[1] / 2 * self._scale - 0.4)
+        for street in streets:
+            *_, angle = main_frame(street.lane)
+            kerb = street.half_width - (_KERB_M + 1.2) * self._scale
+            for offset, pitch_m in (
+                *((side * kerb, _PARKING_PITCH_M) for side in (-1, 1)),
+                *((side * kerb / 2, _MOVING_PITCH_M) for side in (-1, 1)),
+            ):
+                for place in self._places(street.lane, offset, pitch_m):
+                    for when in BOTH:
+                        drawn, kind = self._traffic.random(2).tolist()
+                        if drawn < _PARKED_SHARE and self._cover_at(place) == Cover.ROAD:
+                            car = rectangle(place, half_car, angle)
+                            self._stand(Standing(car, kinds[int(kind * _KINDS)], (when,)))
+
+    def _places(self, lane: Polygon, offset: float, pitch_m: float) -> list[Point]:
+        """Places in the scene at even distances along a lane."""
+        centre, half, angle = main_frame(lane)
+        cos, sin = math.cos(angle), math.sin(angle)
+        along = np.arange(-half[0], half[0], pitch_m * self._scale)
+        x, y = centre[0] + along * cos - offset * sin, centre[1] + along * sin + offset * cos
+        height, width = self.labels.shape
+        inside = (x > 0) & (x < width - 1) & (y > 0) & (y < height - 1)
+        return list(zip(x[inside].tolist(), y[inside].tolist(), strict=True))
+
+    def _scatter_trees(self, block: Polygon, per_m2: float) -> None:
+        centre, half, angle = main_frame(block)
+        cos, sin = math.cos(angle), math.sin(angle)
+        for _ in range(int(self._random.poisson(area(block) / self._scale**2 * per_m2))):
+            u, v = self._uniform(-0.92, 0.92) * half[0], self._uniform(-0.92, 0.92) * half[1]
+            self._trees.append((centre[0] + u * cos - v * sin, centre[1] + u * sin + v * cos))

@@ -1,0 +1,144 @@
+"""A simulated dense city: whether layover draws a registration away from the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .accuracy import REFUSED, SILENTLY_WRONG
+from .attempt import Outcome, accepted, attempt, count
+from .simulations import Simulation
+from .suites import Goal, Settings, SuiteResult, Table, run_cases
+from .tables import accuracy_table
+
+SIZE_PX = 1000
+CHANGED_PERCENT = 10.0
+WITHIN_PX = 1.0
+_QUICK_SEEDS = 1
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Parameters of `coregister` and what is wanted of them.
+
+    Parameters
+    ----------
+    parameters
+        Parameters that differ from their defaults.
+    median_px
+        Largest median error on the ground that is wanted; None: reported only.
+    share_within
+        Smallest share of the seeds within `WITHIN_PX` that is wanted; None: reported only.
+    """
+
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    median_px: float | None = None
+    share_within: float | None = None
+
+
+SETTINGS: dict[str, Setting] = {
+    "NMI, no mask": Setting({"similarity": "nmi"}),
+    "orientation, no mask": Setting({"similarity": "orientation"}),
+    "fused, no mask": Setting(),
+}
+
+
+@dataclass(frozen=True)
+class CityCase:
+    """A city, registered by one of the settings."""
+
+    seed: int
+    setting: str
+    cache: Path
+
+    def run(self, workers: int | None) -> Outcome:
+        """Make the pair if need be, register it and judge the result."""
+        pair = city(self.seed).pair(self.cache)
+        parameters = SETTINGS[self.setting].parameters
+        return attempt(f"city, seed {self.seed}", self.setting, pair, workers, **parameters)
+
+
+def city(seed: int) -> Simulation:
+    """Return the city of a seed, whose views follow from it: 35–47° radar, 5–25° camera."""
+    generator = np.random.default_rng((35, 47, seed))
+    further = (
+        ("changed", CHANGED_PERCENT),
+        ("looks", float(generator.choice([1, 2, 4]))),
+        ("incidence", round(generator.uniform(35, 47), 1)),
+        ("orbit", str(generator.choice(["ascending", "descending"]))),
+        ("off_nadir", round(generator.uniform(5, 25), 1)),
+        ("view_azimuth", round(generator.uniform(0, 360), 1)),
+    )
+    return Simulation(SIZE_PX, "city", seed, further=further)
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite."""
+    seeds = range(1, 1 + (_QUICK_SEEDS if settings.quick else settings.seeds))
+    # Seed by seed, so that processes do not make the same pair at the same time.
+    for seed in seeds:
+        city(seed).pair(settings.cache)
+    cases = [CityCase(seed, setting, settings.cache) for seed in seeds for setting in SETTINGS]
+    outcomes = run_cases(cases, settings.jobs)
+    groups = {s: [o for o in outcomes if o.group == s] for s in SETTINGS}
+    return SuiteResult(
+        f"Simulated dense city, {SIZE_PX}×{SIZE_PX} px",
+        [goal for name, group in groups.items() for goal in goals(name, group)],
+        (ground_table(groups), accuracy_table("By setting", groups)),
+        [outcome.record() for outcome in outcomes],
+        ("The error is that at check points on open ground; roofs are elsewhere in both images.",),
+    )
+
+
+def goals(name: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
+    """Return the goals of one setting and what was found."""
+    setting, median, share = SETTINGS[name], median_px(outcomes), share_within(outcomes)
+    wrong = count(outcomes, SILENTLY_WRONG)
+    wanted, at_least = setting.median_px, setting.share_within
+    return (
+        Goal(
+            f"{name}: median error on the ground",
+            "reported" if wanted is None else f"at most {wanted:g} px",
+            f"{median:.2f} px",
+            None if wanted is None else median <= wanted,
+        ),
+        Goal(
+            f"{name}: within {WITHIN_PX:g} px",
+            "reported" if at_least is None else f"at least {at_least:.0%}",
+            f"{share:.0%}",
+            None if at_least is None else share >= at_least,
+        ),
+        Goal(f"{name}: silently wrong", "none", f"{wrong} of {len(outcomes)}", wrong == 0),
+    )
+
+
+def ground_table(groups: Mapping[str, Sequence[Outcome]]) -> Table:
+    """Return a table of the errors on the ground, one row for each setting."""
+    head = ("setting", "median error (px)", "within 1 px", "refused", "silently wrong", "seeds")
+    rows = [
+        [
+            name,
+            f"{median_px(group):.2f}",
+            f"{share_within(group):.0%}",
+            str(count(group, REFUSED)),
+            str(count(group, SILENTLY_WRONG)),
+            str(len(group)),
+        ]
+        for name, group in groups.items()
+    ]
+    return Table("On the ground", head, rows)
+
+
+def median_px(outcomes: Sequence[Outcome]) -> float:
+    """Return the median error of what was accepted; NaN if nothing was."""
+    errors = [outcome.error_px for outcome in accepted(outcomes)]
+    return float(np.median(errors)) if errors else float("nan")
+
+
+def share_within(outcomes: Sequence[Outcome]) -> float:
+    """Return the share of all cases, refused ones too, that are accepted and that accurate."""
+    return sum(o.error_px <= WITHIN_PX for o in accepted(outcomes)) / len(outcomes)

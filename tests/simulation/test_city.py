@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from groundtie.simulation.canvas import NO_CHANGES, Changes
+from groundtie.simulation.city import CityLayout
+from groundtie.simulation.cover import Cover, ParcelBook, ParcelTable
+
+SHAPE = (700, 800)
+
+
+def laid_out(
+    seed: int = 0, changed: float = 0.0, px_per_m: float = 1.0
+) -> tuple[np.ndarray, np.ndarray, ParcelTable]:
+    """The images' labels, and the parcels."""
+    book = ParcelBook(np.random.default_rng(seed))
+    changes = Changes(changed, np.random.default_rng(seed + 100)) if changed else NO_CHANGES
+    layout = CityLayout(
+        SHAPE,
+        px_per_m,
+        np.random.default_rng(seed),
+        book,
+        changes,
+        np.random.default_rng(seed + 200),
+    )
+    radar, camera = layout.draw()
+    return radar, camera, book.table()
+
+
+def shares(labels: np.ndarray, table: ParcelTable) -> dict[Cover, float]:
+    counts = np.bincount(table.cover[labels].ravel(), minlength=len(Cover))
+    return {cover: float(counts[cover] / labels.size) for cover in Cover}
+
+
+class TestParts:
+    def test_covers_of_a_city(self) -> None:
+        made = [laid_out(seed) for seed in range(5)]
+        found = [shares(radar, table) for radar, _, table in made]
+        mean = {cover: np.mean([share[cover] for share in found]) for cover in Cover}
+        assert 0.25 < mean[Cover.BUILDING] < 0.5
+        assert 0.08 < mean[Cover.ROAD] < 0.25
+        assert 0.05 < mean[Cover.FOREST] < 0.25
+        assert 0.005 < mean[Cover.CAR] < 0.05
+        assert mean[Cover.WATER] > 0.01
+        assert mean[Cover.RAIL] > 0.01
+        assert mean[Cover.FIELD] == 0
+
+    def test_heights_reach_up_to_60_m(self) -> None:
+        heights = np.concatenate(
+            [t.height_m[t.cover == Cover.BUILDING] for *_, t in map(laid_out, range(3))]
+        )
+        assert heights.max() <= 60
+        assert heights.max() > 50
+        assert 12 < np.median(heights) < 30
+
+    def test_nothing_stands_across_water_or_rails(self) -> None:
+        """Their outlines do not touch them: the ground on both sides of a wall is dry."""
+        book = ParcelBook(np.random.default_rng(7))
+        layout = CityLayout(
+            SHAPE, 1.0, np.random.default_rng(7), book, NO_CHANGES, np.random.default_rng(1)
+        )
+        radar, _ = layout.draw()
+        cover = book.table().cover
+        ground = cover[layout.labels]
+        barred = np.isin(ground, (Cover.WATER, Cover.RAIL))
+        assert barred.any()
+        assert (cover[radar][barred] == Cover.BUILDING).mean() < 0.002
+
+    def test_walls_have_windows(self) -> None:
+        *_, table = laid_out()
+        built = table.cover == Cover.BUILDING
+        assert np.all((table.window_m[built] >= 2.8) & (table.window_m[built] <= 4.5))
+        assert not table.window_m[~built].any()
+        assert np.ptp(table.wall_reflectance[built]) > 0.15
+
+    def test_no_cars_where_they_are_smaller_than_a_pixel(self) -> None:
+        radar, _, table = laid_out(px_per_m=0.4)
+        assert shares(radar, table)[Cover.CAR] < 0.01
+
+
+class TestAcquisitions:
+    def test_cars_drive_away_and_nothing_else_changes(self) -> None:
+        radar, camera, table = laid_out(3)
+        covers = table.cover[radar], table.cover[camera]
+        differ = covers[0] != covers[1]
+        car = (covers[0] == Cover.CAR) | (covers[1] == Cover.CAR)
+        assert differ.any()
+        assert np.all(car[differ])
+        assert (covers[0] == Cover.CAR).mean() == pytest.approx(
+            (covers[1] == Cover.CAR).mean(), rel=0.15
+        )
+
+    @pytest.mark.parametrize("changed", [0.1, 0.4])
+    def test_share_of_changed_buildings(self, changed: float) -> None:
+        radar, camera, table = laid_out(3, changed)
+        in_radar, in_camera = (
+            set(np.unique(labels[table.cover[labels] == Cover.BUILDING]))
+            for labels in (radar, camera)
+        )
+        number = len(in_radar | in_camera)
+        for gone in (in_radar - in_camera, in_camera - in_radar):
+            assert len(gone) / number == pytest.approx(changed / 2, rel=0.4)
+
+    def test_changes_leave_the_rest_as_it_is(self) -> None:
+        unchanged, _, table = laid_out(3)
+        radar, _, _ = laid_out(3, 0.2)
+        built = table.cover[unchanged] == Cover.BUILDING
+        assert np.array_equal(radar[~built], unchanged[~built])
+
+
+class TestReproducible:
+    def test_same_seed(self) -> None:
+        assert np.array_equal(laid_out(9)[0], laid_out(9)[0])
+
+    def test_other_seed(self) -> None:
+        assert not np.array_equal(laid_out(9)[0], laid_out(10)[0])
