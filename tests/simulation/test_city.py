@@ -38,10 +38,10 @@ class TestParts:
         made = [laid_out(seed) for seed in range(5)]
         found = [shares(radar, table) for radar, _, table in made]
         mean = {cover: np.mean([share[cover] for share in found]) for cover in Cover}
-        assert 0.25 < mean[Cover.BUILDING] < 0.5
+        assert 0.2 < mean[Cover.BUILDING] < 0.4
         assert 0.08 < mean[Cover.ROAD] < 0.25
         assert 0.05 < mean[Cover.FOREST] < 0.25
-        assert 0.005 < mean[Cover.CAR] < 0.05
+        assert 0.003 < mean[Cover.CAR] < 0.05
         assert mean[Cover.WATER] > 0.01
         assert mean[Cover.RAIL] > 0.01
         assert mean[Cover.FIELD] == 0
@@ -52,7 +52,7 @@ class TestParts:
         )
         assert heights.max() <= 60
         assert heights.max() > 50
-        assert 12 < np.median(heights) < 30
+        assert 10 < np.median(heights) < 25
 
     def test_nothing_stands_across_water_or_rails(self) -> None:
         """Their outlines do not touch them: the ground on both sides of a wall is dry."""

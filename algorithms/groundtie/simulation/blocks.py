@@ -76,7 +76,7 @@ def perimeter(block: Polygon, scale: float, generator: np.random.Generator) -> l
     yard = inset(block, _between(generator, 11, 15) * scale)
     if yard is None:
         return lots(block, scale, generator)
-    eaves_m = _between(generator, 14, 25)
+    eaves_m = _between(generator, 12, 22)
     buildings = []
     for k in range(len(block)):
         after = (k + 1) % len(block)
@@ -102,7 +102,7 @@ def lots(block: Polygon, scale: float, generator: np.random.Generator) -> list[B
         fill = (_between(generator, 0.85, 0.98), _between(generator, 0.85, 0.98))
         footprint = fitted_rectangle(lot, fill)
         if footprint is not None:
-            height_m = 9 + 32 * generator.random() ** 2
+            height_m = 8 + 30 * generator.random() ** 2.5
             buildings.append(_with_roof(footprint, height_m, scale, generator))
     return buildings
 
@@ -128,7 +128,7 @@ def towers(block: Polygon, scale: float, generator: np.random.Generator) -> list
 def slabs(block: Polygon, scale: float, generator: np.random.Generator) -> list[Building]:
     """Parallel slabs of flats, far enough apart for some sun."""
     centre, half, angle = main_frame(block)
-    height_m = _between(generator, 16, 40)
+    height_m = _between(generator, 15, 36)
     depth = _between(generator, 5.5, 7.5) * scale
     pitch = 2 * depth + max(0.8 * height_m, 18) * scale
     buildings = []
@@ -156,11 +156,11 @@ def halls(block: Polygon, scale: float, generator: np.random.Generator) -> list[
 
 
 QUARTERS = (
-    Quarter(0.38, 9000, (11, 18), perimeter, Cover.PAVEMENT, 1 / 700),
-    Quarter(0.20, 8000, (10, 16), lots, Cover.PAVEMENT, 1 / 2500),
-    Quarter(0.18, 8500, (14, 22), towers, Cover.PAVEMENT, 1 / 900),
-    Quarter(0.14, 16000, (12, 18), slabs, Cover.GRASS, 1 / 260),
-    Quarter(0.10, 14000, (12, 20), halls, Cover.PAVEMENT, 1 / 1500),
+    Quarter(0.36, 10500, (13, 20), perimeter, Cover.PAVEMENT, 1 / 900),
+    Quarter(0.20, 9000, (10, 17), lots, Cover.PAVEMENT, 1 / 2500),
+    Quarter(0.15, 10000, (17, 25), towers, Cover.PAVEMENT, 1 / 1200),
+    Quarter(0.16, 18000, (13, 20), slabs, Cover.GRASS, 1 / 400),
+    Quarter(0.13, 15000, (14, 22), halls, Cover.PAVEMENT, 1 / 2000),
 )
 
 

@@ -26,15 +26,15 @@ CITY = "city"
 _DISTRICT_M2 = 90_000
 _BOULEVARD_M = (24.0, 30.0)
 _KERB_M = 2.5
-_OPEN_BLOCK_SHARE = 0.08
+_OPEN_BLOCK_SHARE = 0.14
 _RIVER_CHANCE = 0.7
 _RAILWAY_CHANCE = 0.6
 _TRAINS = 3
 _CAR_M = (4.6, 1.9)
 _PARKING_PITCH_M = 6.0
 _MOVING_PITCH_M = 22.0
-_PARKED_SHARE = 0.55
-_TREE_PITCH_M = 10.0
+_PARKED_SHARE = 0.45
+_TREE_PITCH_M = 12.0
 _KINDS = 10
 _WINDOW_M = (2.8, 4.5)
 _PROBES_PER_SIDE = 6
@@ -109,13 +109,13 @@ class CityLayout(Canvas):
                 self._draw_open_block(block)
             else:
                 self._draw_block(block, quarter)
-        trees = bool(self._random.random() < 0.5)
+        trees = bool(self._random.random() < 0.4)
         return [_Street(lane, street / 2, trees) for lane in parts.lanes]
 
     def _draw_open_block(self, block: Polygon) -> None:
         park = self._random.random() < 0.6
         self._fill(block, self._add(Cover.GRASS if park else Cover.PAVEMENT))
-        self._scatter_trees(block, 1 / 150 if park else 1 / 800)
+        self._scatter_trees(block, 1 / 220 if park else 1 / 900)
 
     def _draw_block(self, block: Polygon, quarter: Quarter) -> None:
         green = self._random.random() < 0.3
