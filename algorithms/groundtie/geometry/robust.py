@@ -219,3 +219,19 @@ def block_folds(px: FloatArray) -> NDArray[np.int_]:
     """
     block = blocks_of(px)
     return np.asarray((block[:, 0] + 2 * block[:, 1]) % FOLDS)
+
+
+def standard_errors(rise: FloatArray, px: FloatArray) -> float:
+    """Return the sum of a rise in its standard errors; neighbours rise together, so by blocks.
+
+    Parameters
+    ----------
+    rise
+        By how much something is larger at each point, shape (n,).
+    px
+        Where the points lie, shape (n, 2).
+    """
+    block = blocks_of(px) @ [1, FOLDS]
+    sums = np.array([rise[block == b].sum() for b in np.unique(block)])
+    error = sums.std(ddof=1) * np.sqrt(len(sums)) if len(sums) > 1 else np.inf
+    return float(sums.sum() / max(error, 1e-12))

@@ -18,7 +18,7 @@ from scipy.ndimage import spline_filter1d
 from scipy.optimize import minimize
 
 from ..geometry.models import DEGREE, PARAMETERS, Frame, Model, PolynomialModel, monomials
-from ..geometry.robust import FOLDS, block_folds, blocks_of
+from ..geometry.robust import block_folds, standard_errors
 from .matching import Surfaces
 
 FloatArray = NDArray[np.float64]
@@ -147,7 +147,7 @@ def choose_alignment(
         tried = _align(kind, fields, start)
         scores = scores | tried.left_out_score
         left_out = _left_out_scores(fields[-1], tried)
-        if _standard_errors(left_out - kept, fields[-1].px) > _STANDARD_ERRORS[kind]:
+        if standard_errors(left_out - kept, fields[-1].px) > _STANDARD_ERRORS[kind]:
             chosen, kept = tried, left_out
     return Alignment(chosen.model, chosen.fold_models, scores)
 
@@ -176,14 +176,6 @@ def _left_out_scores(field: _Field, alignment: Alignment) -> FloatArray:
         part = field.take(folds == fold)
         scores[folds == fold] = part.scores(model(part.px))[0]
     return scores
-
-
-def _standard_errors(rise: FloatArray, px: FloatArray) -> float:
-    """Return a rise in its standard errors; neighbours rise together, so it counts by blocks."""
-    block = blocks_of(px) @ [1, FOLDS]
-    sums = np.array([rise[block == b].sum() for b in np.unique(block)])
-    error = sums.std(ddof=1) * np.sqrt(len(sums)) if len(sums) > 1 else np.inf
-    return float(sums.sum() / max(error, 1e-12))
 
 
 def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Affine) -> list[_Field]:

@@ -95,14 +95,14 @@ class LocalSearch:
         surfaces, aligned, expected = self._align(coarse, kind, seed, executor, progress)
         if DEGREE[aligned.model.kind] <= 1 and _lies_far(expected):
             # Chips near the border of their search windows saw too little: look again, from here.
-            coarse = self._on_map(aligned.model)
+            coarse = self.on_map(aligned.model)
             surfaces, aligned, expected = self._align(coarse, kind, seed, executor, progress)
         points = self._points(surfaces, coarse, expected)
         model, fold_models = aligned.model, aligned.fold_models
         as_claimed = Transform.as_claimed(self.pair.grid.crs, self.pair.input.source.grid)
         if kind == "tps":
             model, fold_models = fit_thin_plate(points, as_claimed, self.pair.grid, model, _NEAR_PX)
-        transform = Transform(self._on_map(model), as_claimed.crs, as_claimed.input_grid)
+        transform = Transform(self.on_map(model), as_claimed.crs, as_claimed.input_grid)
         agreeing = self._agreeing(points, transform)
         if 2 * agreeing.used.sum() < PARAMETERS[transform.model.kind]:
             raise TooFewPointsError(
@@ -123,7 +123,7 @@ class LocalSearch:
         centres, both = surfaces.centres, surfaces.both
         if len(centres) < 4:
             raise TooFewPointsError(f"only {len(centres)} chips could be matched")
-        prior = self._prior(coarse)
+        prior = self.prior(coarse)
         supported = support(both, centres, _SUPPORT_SPACINGS * self.layout.spacing_px)
         px = centres.astype(float)
         shifts = np.array([find_peak(surface).shift_px for surface in supported])
@@ -139,7 +139,8 @@ class LocalSearch:
             aligned = align(kind, centres, both, prior, start)
         return surfaces, aligned, apply_affine(~prior, aligned.model(px)) - px
 
-    def _on_map(self, model: Model) -> Model:
+    def on_map(self, model: Model) -> Model:
+        """Return a model of the matching grid's pixels as one on the map."""
         return model.on_map(self.pair.grid.transform * Affine.translation(0.5, 0.5))
 
     def check_points(
@@ -198,7 +199,7 @@ class LocalSearch:
         chip_px = self.layout.chip_px if blind else self.layout.check_chip_px
         return matcher.match(centres, chip_px, radius_px, executor, progress)
 
-    def _prior(self, coarse: Model) -> Affine:
+    def prior(self, coarse: Model) -> Affine:
         """Return a model of degree 1 on the map as an affine transform of the grid's pixels."""
         grid = self.pair.grid
         origin, right, down = grid.map_to_pixel(coarse(grid.pixel_to_map([[0, 0], [1, 0], [0, 1]])))

@@ -43,12 +43,18 @@ def compress(window: Patch) -> NDArray[np.float32]:
     values = window.values[window.valid]
     if values.size == 0:
         return np.zeros_like(window.values)
-    if np.mean(values < 0) > _NEGATIVE_SHARE:
+    if is_logarithmic(window):
         return np.where(window.valid, window.values, np.float32(np.median(values)))
     positive = values[values > 0]
     median = np.float32(np.median(positive)) if positive.size else np.float32(1)
     filled = np.where(window.valid, window.values, median)
     return np.log(np.maximum(filled, 0) / median + np.float32(_LOG_OFFSET))
+
+
+def is_logarithmic(window: Patch) -> bool:
+    """Tell whether grey values are on a logarithmic scale already (decibels): many are negative."""
+    values = window.values[window.valid]
+    return values.size > 0 and bool(np.mean(values < 0) > _NEGATIVE_SHARE)
 
 
 def orientation_fields(window: Patch) -> NDArray[np.complex64]:

@@ -1,0 +1,124 @@
+"""SIFT features of SAR images (thesis S 6.3): with all octaves, or without the first.
+
+The first octave of SIFT's scale space, on the image at twice its size, holds most features of a SAR
+image, and most of them are speckle. SIFT-OCT leaves this octave out. OpenCV's SIFT always begins on
+an image twice as large as the one that it is given, so it gets one of half the size, blurred as the
+scale space demands: its first octave is then the image's second. Nothing is found to be dropped.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rasters.patch import Patch
+from ..similarity.orientation import compress
+from ..speckle.isef import isef
+from .points import FeaturePoints
+
+FloatImage = NDArray[np.float32]
+ByteImage = NDArray[np.uint8]
+
+# Contrast below which a feature is dropped, in OpenCV's terms: three times Lowe's, of the range of
+# grey values. Without speckle's octave features are weaker, and right ones among them.
+_CONTRAST = {"sift": 0.04, "sift-oct": 0.06, "sift-isef-oct": 0.04}
+DETECTORS = tuple(_CONTRAST)
+
+_LAYERS = 3
+_EDGE_RATIO = 10.0
+_FIRST_SIGMA_PX = 1.6
+
+# OpenCV enlarges its image so that positions come out a quarter of a pixel too far.
+_OPENCV_OFFSET_PX = 0.25
+
+# OpenCV takes its image to be blurred by this, in its pixels.
+_OPENCV_BLUR_PX = 0.5
+
+# Decay of the ISEF per pixel, S eq 6.2.
+_ISEF_DECAY = 0.5
+
+# Share of the pixels that is saturated at either end of the grey values.
+_SATURATED = 0.01
+
+# A feature needs valid pixels up to so many of its scales.
+_SEES_SCALES = 3.0
+
+
+@dataclass(frozen=True)
+class Detector:
+    """How features are found.
+
+    Parameters
+    ----------
+    name
+        One of `DETECTORS`: "sift"; "sift-oct", without the first octave; "sift-isef-oct", the same
+        on an image that was smoothed by the infinite symmetric exponential filter.
+    contrast
+        Least contrast of a feature as OpenCV counts it (three times Lowe's), as a share of the
+        range of grey values; None: as fits the detector.
+    """
+
+    name: str = "sift-oct"
+    contrast: float | None = None
+
+    def detect(self, window: Patch) -> FeaturePoints:
+        """Return the features of an image window, upright, each position and scale once.
+
+        Grey values are compressed to a logarithmic scale first, on which speckle is alike
+        everywhere.
+        """
+        if window.is_flat:
+            return FeaturePoints.none()
+        image = compress(window)
+        if self.name == "sift-isef-oct":
+            image = isef(image, _ISEF_DECAY)
+        grey = to_grey(image, window.valid)
+        found = self._detect_all(grey) if self.name == "sift" else self._detect_from_second(grey)
+        return found.take(_seen_whole(found, window.valid))
+
+    def _detect_all(self, grey: ByteImage) -> FeaturePoints:
+        return self._opencv(grey)
+
+    def _detect_from_second(self, grey: ByteImage) -> FeaturePoints:
+        blurred = cv2.GaussianBlur(grey, (0, 0), _FIRST_SIGMA_PX)
+        half = self._opencv(np.ascontiguousarray(blurred[::2, ::2]))
+        # Variances of Gaussians add up, so the true scale follows from what OpenCV believes.
+        more = (_FIRST_SIGMA_PX / 2) ** 2 - _OPENCV_BLUR_PX**2
+        return FeaturePoints(
+            2 * half.position_px,
+            2 * np.sqrt(half.scale_px**2 + more),
+            half.orientation_rad,
+            half.response,
+            half.octave + 1,
+        )
+
+    def _opencv(self, grey: ByteImage) -> FeaturePoints:
+        contrast = _CONTRAST[self.name] if self.contrast is None else self.contrast
+        sift = cv2.SIFT.create(0, _LAYERS, contrast, _EDGE_RATIO, _FIRST_SIGMA_PX)
+        rows = [(*k.pt, k.size, k.response, k.octave) for k in sift.detect(grey, None)]
+        # OpenCV repeats a feature for each of its orientations.
+        table = np.unique(np.array(rows, float).reshape(-1, 5), axis=0)
+        # The octave is the lowest byte, a signed number.
+        octave = (table[:, 4].astype(int) & 0xFF).astype(np.uint8).astype(np.int8).astype(int)
+        position = table[:, :2] - _OPENCV_OFFSET_PX
+        return FeaturePoints(position, table[:, 2] / 2, np.zeros(len(table)), table[:, 3], octave)
+
+
+def to_grey(image: FloatImage, valid: NDArray[np.bool_]) -> ByteImage:
+    """Return an image as bytes, its valid grey values stretched over their range."""
+    low, high = np.quantile(image[valid], (_SATURATED, 1 - _SATURATED))
+    scaled = (image - low) * (255 / max(high - low, 1e-6))
+    return np.asarray(np.clip(np.rint(scaled), 0, 255), np.uint8)
+
+
+def _seen_whole(found: FeaturePoints, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell which features see nothing of what is masked; the image's own border does not count."""
+    if valid.all():
+        return np.ones(len(found), bool)
+    distance = cv2.distanceTransform(valid.astype(np.uint8), cv2.DIST_L2, 5)
+    last = np.array(valid.shape)[::-1] - 1
+    cols, rows = np.clip(np.rint(found.position_px).astype(int), 0, last).T
+    return np.asarray(distance[rows, cols] > _SEES_SCALES * found.scale_px)

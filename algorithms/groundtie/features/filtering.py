@@ -1,0 +1,48 @@
+"""Filtered matching: the worst match goes until the rest agree (thesis S 3.4.4, 6.7.1)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.fitting import fit_model
+from ..geometry.models import PARAMETERS
+
+FloatArray = NDArray[np.float64]
+
+_SIGMAS = 2.0
+
+
+def filter_matches(
+    px: FloatArray, partner_px: FloatArray, kind: str = "affine", sigmas: float = _SIGMAS
+) -> NDArray[np.bool_]:
+    """Tell which matches remain when the worst is dropped until none is far off.
+
+    A model is fitted to all, the match with the largest residual is dropped, the model is fitted
+    again, until all residuals are below so many of their standard deviations. It needs more right
+    than wrong matches to start from.
+
+    Parameters
+    ----------
+    px, partner_px
+        Positions that belong together, shape (n, 2).
+    kind
+        One of `models.KINDS`.
+    sigmas
+        Largest residual in standard deviations of all residuals.
+
+    Returns
+    -------
+    Shape (n,); all False if there are too few matches for the model.
+    """
+    kept = np.ones(len(px), bool)
+    fewest = PARAMETERS[kind] // 2 + 1
+    while kept.sum() >= fewest:
+        model = fit_model(kind, px, partner_px, kept.astype(float))
+        residuals = np.hypot(*(partner_px - model(px)).T)
+        spread = np.sqrt(np.mean(residuals[kept] ** 2))
+        worst = int(np.argmax(np.where(kept, residuals, -1.0)))
+        if residuals[worst] <= sigmas * spread or residuals[worst] == 0:
+            return kept
+        kept[worst] = False
+    return np.zeros(len(px), bool)

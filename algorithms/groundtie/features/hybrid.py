@@ -1,0 +1,168 @@
+"""The hybrid chain's tie points (thesis S 6.9): features near where a rough model puts them.
+
+Mutual information on reduced images has found the rough model; features are matched without a
+limit on the ratio, but only near their prediction. Most of these matches are wrong, and fall
+anywhere in the gate; a robust fit tells the right ones. Chips around them may refine their places.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.estimation import Estimate, fit_thin_plate
+from ..geometry.fitting import fit_model
+from ..geometry.models import Model
+from ..geometry.tie_points import USED, TiePoints
+from ..geometry.transform import Transform
+from ..progress import SILENT, Progress
+from ..search.local import LocalSearch
+from ..search.matching import ChipMatcher
+from ..similarity.evidence import find_peak
+from ..similarity.surface import SimilaritySettings
+from .estimation import AUTO, Fit, fit_matches
+from .tile_matching import FeatureMatcher
+
+FloatArray = NDArray[np.float64]
+
+# A partner without a rival in its gate is as much nearer than the next as this, at most.
+_LARGEST_SCORE = 10.0
+
+# Chips around matches: how large, how far they are moved, and how many of them at most.
+_CHIP_PX, _CHIP_RADIUS_PX = 81, 4
+
+# The scene is divided into so many cells a side; the best match of each is refined.
+_CELLS = 14
+
+# Right matches lie this near a polynomial where a thin-plate spline is to bend further.
+_TPS_RADIUS_PX = 5.0
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Matches as they are fitted: in matching pixels, the input's as it was resampled."""
+
+    px: FloatArray
+    partner_px: FloatArray
+    score: FloatArray
+    window_area: float
+
+
+@dataclass(frozen=True)
+class FeatureSearch:
+    """Finds the model of a pair by features, refined by chips if asked to.
+
+    Parameters
+    ----------
+    matcher
+        Matches features, of which the reference's see nothing of what is held out.
+    local
+        Knows the grid and what is held out.
+    refinement
+        Similarity by which chips refine the matches; None: they stay where they were found.
+    """
+
+    matcher: FeatureMatcher
+    local: LocalSearch
+    refinement: SimilaritySettings | None = None
+
+    def estimate(
+        self, coarse: Model, kind: str, seed: int, executor: Executor, progress: Progress = SILENT
+    ) -> Estimate:
+        """Match features near a rough model, and fit a model to the matches.
+
+        Parameters
+        ----------
+        coarse
+            The misregistration on the map, a model of degree 1; it may be wrong by the gate.
+        kind
+            One of `models.KINDS`, or "auto" for the simplest polynomial that the matches justify.
+        seed
+            Of random samples.
+        executor
+            Threads to work in.
+        progress
+            Is told of every tile and chip.
+
+        Raises
+        ------
+        TooFewPointsError
+            Too few matches agree on a model.
+        """
+        matches = self.matcher.match(coarse, executor, progress.part(0.0, 0.7))
+        score = 1 / np.maximum(matches.ratio, 1 / _LARGEST_SCORE)
+        area = float(np.pi * self.matcher.gate_px**2)
+        places = _Places(matches.reference.position_px, matches.input.position_px, score, area)
+        fit = self._fit(kind, places, coarse, seed)
+        if self.refinement is not None:
+            right = fit.mixture.right
+            px = places.px[right]
+            coarse = self.local.on_map(fit_model("affine", px, fit.model(px)))
+            picked = px[_spread_out(px, score[right])]
+            places = self._refined(picked, coarse, executor, progress.part(0.7, 1.0))
+            fit = self._fit(kind, places, coarse, seed)
+        return self._estimate(kind, places, coarse, fit)
+
+    def _fit(self, kind: str, places: _Places, coarse: Model, seed: int) -> Fit:
+        polynomial = AUTO if kind == "tps" else kind
+        prior = self.local.prior(coarse)
+        return fit_matches(
+            polynomial, places.px, places.partner_px, prior, places.window_area, seed
+        )
+
+    def _refined(
+        self, px: FloatArray, model: Model, executor: Executor, progress: Progress
+    ) -> _Places:
+        """Return chips around features and where they lie by their similarity."""
+        assert self.refinement is not None
+        pair = self.local.pair
+        chips = ChipMatcher(
+            pair,
+            pair.grid,
+            lambda xy: pair.claimed_px(model(xy)),
+            self.refinement,
+            self.local.held_out,
+        )
+        centres = np.unique(np.rint(px).astype(int), axis=0)
+        surfaces = chips.match(centres, _CHIP_PX, _CHIP_RADIUS_PX, executor, progress)
+        peaks = [find_peak(surface) for surface in surfaces.both]
+        inside = np.array([not peak.at_border for peak in peaks], bool)
+        shifts = np.array([peak.shift_px for peak in peaks]).reshape(-1, 2)[inside]
+        heights = np.array([peak.height for peak in peaks])[inside]
+        where = surfaces.centres[inside].astype(float)
+        return _Places(where, where + shifts, heights, (2 * _CHIP_RADIUS_PX + 1.0) ** 2)
+
+    def _estimate(self, kind: str, places: _Places, coarse: Model, fit: Fit) -> Estimate:
+        pair = self.local.pair
+        grid = pair.grid
+        there = coarse(grid.pixel_to_map(places.partner_px))
+        count, sigma = len(places.px), fit.mixture.sigma
+        points = TiePoints(
+            reference_xy=grid.pixel_to_map(places.px),
+            input_px=pair.claimed_px(there),
+            score=places.score,
+            covariance_px2=np.broadcast_to(np.eye(2) * sigma**2, (count, 2, 2)).copy(),
+            # Partners are each other's nearest.
+            two_way_error_px=np.zeros(count),
+            is_check=np.zeros(count, bool),
+            state=np.full(count, USED),
+        )
+        points = points.reject(~fit.mixture.right, "disagrees with the model")
+        as_claimed = Transform.as_claimed(grid.crs, pair.input.source.grid)
+        model, fold_models = fit.model, fit.fold_models
+        if kind == "tps":
+            model, fold_models = fit_thin_plate(points, as_claimed, grid, model, _TPS_RADIUS_PX)
+        transform = Transform(self.local.on_map(model), as_claimed.crs, as_claimed.input_grid)
+        return Estimate(transform, points, fold_models)
+
+
+def _spread_out(px: FloatArray, score: FloatArray) -> NDArray[np.int_]:
+    """Return which of the points to take: the best of each cell, of the best cells."""
+    low, high = px.min(axis=0), px.max(axis=0)
+    cell = np.minimum((px - low) / np.maximum(high - low, 1e-9) * _CELLS, _CELLS - 1).astype(int)
+    best_first = np.argsort(-score, kind="stable")
+    _, first = np.unique(cell[best_first] @ [1, _CELLS], return_index=True)
+    return best_first[np.sort(first)]

@@ -1,0 +1,175 @@
+"""Features matched all over a pair, tile by tile, near where a rough model puts them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.models import Model
+from ..progress import SILENT, Progress
+from ..rasters.grid import Grid
+from ..rasters.pair import ImagePair
+from ..rasters.patch import Patch
+from ..rasters.reading import Mask, Window
+from ..search.matching import MaskOf
+from .descriptors import Descriptor
+from .detectors import Detector
+from .matching import GATE_PX, match_near
+from .points import FeaturePoints
+
+FloatArray = NDArray[np.float64]
+
+# Tiles of the matching grid, and what features near their border see beyond it.
+_TILE_PX = 1024
+_MARGIN_PX = 64
+
+# More features than this in a tile make matching longer, not better.
+_MOST_PER_TILE = 6000
+
+
+@dataclass(frozen=True)
+class FeatureMatches:
+    """Pairs of features on the matching grid, the input's resampled by a rough model.
+
+    Parameters
+    ----------
+    reference, input
+        The features, row by row partners.
+    ratio
+        Distance of the descriptors over that to the next best partner, shape (n,).
+    found
+        How many features each image has.
+    """
+
+    reference: FeaturePoints
+    input: FeaturePoints
+    ratio: FloatArray
+    found: tuple[int, int]
+
+    @classmethod
+    def concatenate(cls, parts: list[FeatureMatches]) -> FeatureMatches:
+        """Return the matches of all tiles."""
+        return cls(
+            FeaturePoints.concatenate([part.reference for part in parts]),
+            FeaturePoints.concatenate([part.input for part in parts]),
+            np.concatenate([part.ratio for part in parts]),
+            (sum(part.found[0] for part in parts), sum(part.found[1] for part in parts)),
+        )
+
+
+@dataclass(frozen=True)
+class FeatureMatcher:
+    """Matches features of a pair on its matching grid, near where a rough model puts them.
+
+    Parameters
+    ----------
+    pair
+        The images.
+    detector, descriptor
+        How features are found and described.
+    ratio
+        Largest ratio of the distances to the nearest and the next partner.
+    gate_px
+        How far a partner may lie from where the rough model puts it.
+    held_out
+        Returns for a piece of the grid which pixels of the reference must not be seen; None: all
+        may be.
+    ground
+        The reference with the mask of its level ground; features elsewhere are left out. None: all
+        of it.
+    """
+
+    pair: ImagePair
+    detector: Detector = field(default_factory=Detector)
+    descriptor: Descriptor = field(default_factory=Descriptor)
+    ratio: float = 1.0
+    gate_px: float = GATE_PX
+    held_out: MaskOf | None = None
+    ground: ImagePair | None = None
+
+    def match(
+        self, coarse: Model, executor: Executor, progress: Progress = SILENT
+    ) -> FeatureMatches:
+        """Return the matches all over the matching grid.
+
+        Parameters
+        ----------
+        coarse
+            The misregistration on the map; it may be wrong by `gate_px`.
+        executor
+            Threads to work in.
+        progress
+            Is told of every tile.
+        """
+        tiles = list(_tiles(self.pair.grid))
+
+        def one(tile: Window) -> FeatureMatches:
+            progress.check()
+            return self._match_tile(tile, coarse)
+
+        parts = []
+        for part in executor.map(one, tiles):
+            parts.append(part)
+            progress.update(len(parts) / len(tiles))
+        return FeatureMatches.concatenate(parts)
+
+    def _match_tile(self, tile: Window, coarse: Model) -> FeatureMatches:
+        margin = _MARGIN_PX + int(np.ceil(self.gate_px))
+        corner = tile.col - margin, tile.row - margin
+        size = tile.width + 2 * margin, tile.height + 2 * margin
+        piece = self.pair.grid.window(*corner, *size)
+        hidden = None if self.held_out is None else self.held_out(piece)
+        reference = self.pair.reference_patch(piece, hidden)
+        input = self.pair.input_patch(piece, lambda xy: self.pair.claimed_px(coarse(xy)))
+        if hidden is not None:
+            # Where a descriptor sees less of the one image, it sees as little of the other.
+            input = Patch(input.values, input.valid & ~hidden)
+        core = Window(margin, margin, tile.width, tile.height)
+        gate = margin - _MARGIN_PX
+        around = Window(_MARGIN_PX, _MARGIN_PX, tile.width + 2 * gate, tile.height + 2 * gate)
+        own = self._features(reference, core)
+        if self.ground is not None:
+            on_ground = self.ground.reference_patch(piece).valid
+            cols, rows = np.rint(own.position_px).astype(int).T
+            own = own.take(on_ground[rows, cols])
+        others = self._features(input, around)
+        points, descriptors = self.descriptor.describe(reference, own)
+        partners, partner_descriptors = self.descriptor.describe(input, others)
+        matches = match_near(
+            descriptors,
+            partner_descriptors,
+            points.position_px,
+            partners.position_px,
+            self.gate_px,
+            self.ratio,
+        )
+        return FeatureMatches(
+            points.take(matches.first).moved(corner),
+            partners.take(matches.second).moved(corner),
+            matches.ratio,
+            (len(own), int(_inside(others, core).sum())),
+        )
+
+    def _features(self, patch: Patch, window: Window) -> FeaturePoints:
+        """Return the strongest features in a window of a patch."""
+        found = self.detector.detect(patch)
+        return found.take(_inside(found, window)).strongest(_MOST_PER_TILE)
+
+
+def _inside(found: FeaturePoints, window: Window) -> Mask:
+    """Tell which features lie on the pixels of a window."""
+    at = np.rint(found.position_px)
+    low = np.array([window.col, window.row])
+    return np.asarray(np.all((at >= low) & (at < low + [window.width, window.height]), axis=1))
+
+
+def _tiles(grid: Grid) -> Iterator[Window]:
+    """Return tiles that cover a grid."""
+    for row in range(0, grid.height, _TILE_PX):
+        for col in range(0, grid.width, _TILE_PX):
+            width, height = min(_TILE_PX, grid.width - col), min(_TILE_PX, grid.height - row)
+            yield Window(col, row, width, height)

@@ -1,0 +1,130 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from speckled_pairs import radar_image, whole
+
+from groundtie.features.detectors import DETECTORS, Detector, to_grey
+from groundtie.features.points import FeaturePoints
+from groundtie.rasters.patch import Patch
+
+FloatImage = NDArray[np.float32]
+
+
+def blob(x: float, y: float, sigma: float, side: int = 160) -> Patch:
+    """Return a dark Gaussian in decibels, which are not compressed any further."""
+    rows, cols = np.mgrid[:side, :side]
+    image = -10 - 5 * np.exp(-((cols - x) ** 2 + (rows - y) ** 2) / (2 * sigma**2))
+    # Grey values are stretched between what the darkest and the brightest percent has.
+    image[:4], image[-4:] = -16, -9
+    return whole(image)
+
+
+def nearest(found: FeaturePoints, x: float, y: float) -> FeaturePoints:
+    return found.take([int(np.argmin(np.hypot(*(found.position_px - [x, y]).T)))])
+
+
+@pytest.mark.parametrize("name", DETECTORS)
+@pytest.mark.parametrize(("sigma", "octave"), [(3.0, 0), (6.0, 1), (12.0, 2)])
+def test_a_blob_is_found_where_it_is(name: str, sigma: float, octave: int) -> None:
+    x, y = 81.3, 76.8
+    found = nearest(Detector(name).detect(blob(x, y, sigma)), x, y)
+    # Without the quarter of a pixel that OpenCV is off, half a one at half the size.
+    np.testing.assert_allclose(found.position_px[0], [x, y], atol=0.12)
+    assert found.octave[0] == octave
+
+
+@pytest.mark.parametrize("name", DETECTORS)
+def test_scales_grow_with_the_blob(name: str) -> None:
+    scales = [
+        nearest(Detector(name).detect(blob(80, 80, sigma)), 80, 80).scale_px[0]
+        for sigma in (4.0, 8.0)
+    ]
+    # Gaussians of s and of 2^(1/3) s differ most on a blob between them, which OpenCV calls s;
+    # what is filtered before is a little larger.
+    between = 2 ** (1 / 6)
+    np.testing.assert_allclose(
+        scales, np.array([4.0, 8.0]) / between, rtol=0.12 if name != "sift-isef-oct" else 0.25
+    )
+
+
+def test_sift_is_opencv_s_without_its_repetitions_and_offset() -> None:
+    window = whole(radar_image(150, 170))
+    grey = to_grey(np.log(window.values / np.median(window.values) + np.float32(0.1)), window.valid)
+    theirs = cv2.SIFT.create(0, 3, 0.04, 10.0, 1.6).detect(grey, None)
+    expected = np.unique([(*k.pt, k.size) for k in theirs], axis=0)
+    found = Detector("sift").detect(window)
+    assert len(found) == len(expected) < len(theirs)
+    np.testing.assert_allclose(found.position_px + 0.25, expected[:, :2])
+    np.testing.assert_allclose(2 * found.scale_px, expected[:, 2])
+    np.testing.assert_array_equal(np.unique(found.octave)[:3], [-1, 0, 1])
+
+
+def test_without_the_first_octave_the_features_of_larger_ones_are_found() -> None:
+    window = whole(radar_image(400, 400))
+    by_opencv = Detector("sift", 0.04).detect(window)
+    found = Detector("sift-oct", 0.02).detect(window)
+    assert found.octave.min() == 0
+    assert found.scale_px.min() > 1.6
+    assert (by_opencv.octave == -1).mean() > 0.6
+
+    def share_found(of: FeaturePoints) -> float:
+        apart = np.linalg.norm(of.position_px[:, None] - found.position_px[None], axis=2)
+        growth = np.abs(np.log(of.scale_px[:, None] / found.scale_px[None]))
+        return float(((apart < 0.3 * of.scale_px[:, None]) & (growth < 0.25)).any(axis=1).mean())
+
+    assert share_found(by_opencv.take(by_opencv.octave >= 1)) > 0.9
+    assert share_found(by_opencv.take(by_opencv.octave == -1)) < 0.3
+
+
+def test_features_of_two_images_with_other_speckle_are_the_same_beyond_the_first_octave() -> None:
+    one, other = (
+        Detector("sift-oct").detect(whole(radar_image(300, 300, speckle_seed=seed)))
+        for seed in (1, 2)
+    )
+    apart = np.linalg.norm(one.position_px[:, None] - other.position_px[None], axis=2)
+    chance = 1 - np.exp(-len(other) * np.pi * 1.5**2 / 300**2)
+    assert (apart.min(axis=1) < 1.5).mean() > max(5 * chance, 0.35)
+
+
+def test_brightness_and_contrast_of_amplitudes_change_nothing() -> None:
+    image = radar_image(200, 200)
+    found, brighter = (Detector().detect(whole(image * gain)) for gain in (1.0, 7.0))
+    # But for how quantiles are rounded.
+    np.testing.assert_allclose(brighter.position_px, found.position_px, atol=0.02)
+
+
+def test_nothing_is_found_near_masked_pixels_nor_told_by_them() -> None:
+    image = radar_image(200, 200)
+    valid = np.ones(image.shape, bool)
+    valid[60:120, 80:150] = False
+    found = Detector().detect(Patch(image, valid))
+    spoiled = Detector().detect(Patch(np.where(valid, image, np.float32(9999)), valid))
+    np.testing.assert_array_equal(found.position_px, spoiled.position_px)
+    distance = np.maximum(np.abs(found.position_px - [114.5, 89.5]) - [34.5, 29.5], 0)
+    assert len(found) > 50
+    assert (np.hypot(*distance.T) > 2 * found.scale_px).all()
+
+
+def test_a_lower_contrast_finds_more() -> None:
+    window = whole(radar_image(200, 200))
+    few, many = (Detector("sift-oct", contrast).detect(window) for contrast in (0.09, 0.03))
+    assert len(few) < len(many)
+
+
+@pytest.mark.parametrize("valid", [True, False])
+def test_a_constant_or_masked_window_has_no_features(valid: bool) -> None:
+    window = Patch(np.full((64, 64), 5, np.float32), np.full((64, 64), valid))
+    assert len(Detector().detect(window)) == 0
+
+
+def test_the_strongest_are_kept_in_their_order() -> None:
+    found = Detector().detect(whole(radar_image(200, 200)))
+    kept = found.strongest(10)
+    assert len(kept) == 10
+    assert kept.response.min() >= np.sort(found.response)[-10]
+    rows = [np.nonzero((found.position_px == p).all(axis=1))[0][0] for p in kept.position_px]
+    assert rows == sorted(rows)
+    assert found.strongest(10**6) is found
