@@ -6,24 +6,17 @@ import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
-from ..declaration import Output as ResultOutput
 from ..declaration import tool
-from ..geometry.models import KINDS
-from ..kinds import Choice, Distance, FileOut, Number, VectorOut
+from ..kinds import Choice, Distance, Number
 from ..masks.choice import MASKS, NONE
 from ..progress import SILENT, Progress
-from ..quality.report import Report
-from ..rasters.pair import Image, default_radius_m, make_pair
-from ..rasters.reading import RasterSource, bounded_cache, open_raster
+from ..rasters.pair import default_radius_m, make_pair
+from ..rasters.reading import bounded_cache
 from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
-from ..search.pose import PoseSearch
-from ..search.pose_searches import DEFAULT_SEARCH, SEARCHES
-from ..search.rough import RoughSearch
 from ..similarity.binning import BINNINGS
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
 from .common import (
@@ -46,24 +39,31 @@ from .common import (
     worker_count,
 )
 from .masking import MASK_IMAGES, MaskRequest
-from .registered_output import OUTPUT_GRIDS, RegisteredOutput, model_for_grid
+from .registered_output import RegisteredOutput, model_for_grid
 from .registration import (
     RegistrationFiles,
     RegistrationResult,
-    accepted_or_refused,
+    deliver,
+    open_image,
     register,
+    rough_search,
+)
+from .registration_parameters import (
+    OUTPUTS,
+    MaxError,
+    Model,
+    OutputGrid,
+    ReportOut,
+    Search,
+    SearchScale,
+    TiePointsOut,
 )
 
 
 @tool(
     title="Co-register images",
     group="Registration",
-    outputs=(
-        ResultOutput("CHECK_RMSE_PX", "Error at check points (px)", "verdict.check_rmse_px"),
-        ResultOutput("CHECK_CE90_M", "CE90 at check points (m)", "verdict.check_ce90_m"),
-        ResultOutput("POINTS", "Number of tie points", "verdict.points"),
-        ResultOutput("REASON", "Reason of the verdict", "verdict.reason", text=True),
-    ),
+    outputs=OUTPUTS,
 )
 def coregister(
     reference: Reference,
@@ -89,54 +89,12 @@ def coregister(
             choices=SIMILARITIES,
         ),
     ] = "fused",
-    model: Annotated[
-        str,
-        Choice(
-            label="Model",
-            help="Which misregistration is taken out; auto takes the simplest model that the "
-            "points justify.",
-            choices=(AUTO, *KINDS),
-        ),
-    ] = AUTO,
-    max_error: Annotated[
-        float,
-        Number(
-            label="Largest error",
-            help="The registration is refused if its root mean square error at check points, "
-            "which take no part in the fit, is larger.",
-            unit="px",
-            minimum=0.1,
-            maximum=100,
-        ),
-    ] = 3.0,
-    tie_points: Annotated[
-        Path | None,
-        VectorOut(
-            label="Tie points",
-            help="Lines from where the input claims a point to be to where it is.",
-            suffixes=(".gpkg", ".geojson", ".csv", ".points"),
-        ),
-    ] = None,
+    model: Model = AUTO,
+    max_error: MaxError = 3.0,
+    tie_points: TiePointsOut = None,
     transform: TransformOut = None,
-    report: Annotated[
-        Path | None,
-        FileOut(
-            label="Report",
-            help="A page that shows the result and how far to trust it; its numbers are put "
-            "beside it as JSON. It is written for a refused registration, too.",
-            suffixes=(".html",),
-        ),
-    ] = None,
-    search: Annotated[
-        str,
-        Choice(
-            label="Rough search",
-            help="What finds the rough position on a reduced image. By default all shifts are "
-            "tried, and rotation-steps where a rotation or scale is searched for.",
-            choices=(AUTO, *SEARCHES),
-            advanced=True,
-        ),
-    ] = AUTO,
+    report: ReportOut = None,
+    search: Search = AUTO,
     search_rotation: Annotated[
         float,
         Number(
@@ -148,16 +106,7 @@ def coregister(
             advanced=True,
         ),
     ] = 0.0,
-    search_scale: Annotated[
-        float,
-        Number(
-            label="Largest scale",
-            help="By which factor the input may be larger or smaller than it claims.",
-            minimum=1,
-            maximum=4,
-            advanced=True,
-        ),
-    ] = 1.0,
+    search_scale: SearchScale = 1.0,
     reference_band: ReferenceBand = None,
     input_band: InputBand = None,
     reference_mask: ReferenceMask = None,
@@ -240,17 +189,7 @@ def coregister(
             advanced=True,
         ),
     ] = 2.0,
-    output_grid: Annotated[
-        str,
-        Choice(
-            label="Output grid",
-            help="Grid of the registered image: the reference's pixels exactly, so that both "
-            "stack; pixels like the input's own; or, for a pure shift, the input's untouched "
-            "pixels with a corrected geotransform.",
-            choices=OUTPUT_GRIDS,
-            advanced=True,
-        ),
-    ] = "reference",
+    output_grid: OutputGrid = "reference",
     resampling: Resampling = "cubic",
     workers: Workers = None,
     seed: Seed = 0,
@@ -272,16 +211,9 @@ def coregister(
     settings = SimilaritySettings(similarity, bins, binning, gpve_order)
     with ExitStack() as stack:
         stack.enter_context(bounded_cache())
-
-        def opened(path: Path) -> RasterSource:
-            return stack.enter_context(open_raster(path))
-
-        def optional(path: Path | None) -> RasterSource | None:
-            return None if path is None else opened(path)
-
         pair = make_pair(
-            Image(opened(reference), reference_band, optional(reference_mask)),
-            Image(opened(input), input_band, optional(input_mask)),
+            open_image(stack, reference, reference_band, reference_mask),
+            open_image(stack, input, input_band, input_mask),
             matching_pixel_size,
             search_radius,
         )
@@ -293,12 +225,8 @@ def coregister(
         local = LocalSearch(
             pair, lay_out_chips(pair, chip_size, spacing_px), settings, two_way_px=two_way_error
         )
-        rough = RoughSearch(
-            default_radius_m(pair.grid) if search_radius is None else search_radius,
-            search_rotation,
-            (1 / search_scale, search_scale),
-            _pose_search(search, search_rotation > 0 or search_scale > 1),
-        )
+        radius_m = default_radius_m(pair.grid) if search_radius is None else search_radius
+        rough = rough_search(radius_m, search_rotation, search_scale, search)
         threads = worker_count(workers)
         with ThreadPoolExecutor(threads) as executor:
             result = register(
@@ -311,29 +239,14 @@ def coregister(
                 executor,
                 progress.part(0.1, 0.7),
             )
-        page = Report(
-            title=f"{Path(input).name} registered to {Path(reference).name}",
-            verdict=result.verdict,
-            pair=pair,
-            mask=mask_used,
-            points=result.points,
-            transform=result.transform,
-            surfaces=result.extreme_surfaces() if report is not None else (),
-            parameters={k: v for k, v in parameters.items() if v is not None},
-            seconds=time.perf_counter() - started,
+        registered = RegisteredOutput(output, output_grid, resampling)
+        return deliver(
+            result,
+            registered,
+            files,
+            parameters,
+            started,
+            threads,
+            progress.part(0.7, 1.0),
+            mask_used,
         )
-        with accepted_or_refused(result, page, files) as outputs:
-            points, found = result.accepted()
-            files.write_points(points, found, outputs)
-            progress.update(0.7, "writing the registered image")
-            RegisteredOutput(output, output_grid, resampling).write(
-                pair, found, outputs, threads, progress.part(0.7, 1.0)
-            )
-    return RegistrationResult.of(result, page.summary(), {"output": output, **files.written()})
-
-
-def _pose_search(name: str, beyond_shifts: bool) -> PoseSearch | None:
-    """Return the search of a name; None: all shifts are tried."""
-    if name == AUTO:
-        return SEARCHES[DEFAULT_SEARCH] if beyond_shifts else None
-    return SEARCHES[name]

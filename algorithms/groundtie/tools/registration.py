@@ -6,32 +6,47 @@ rasters → ImagePair → rough shift → tie points → transform → verdict �
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..errors import NothingFoundError, NotRegisteredError, SameFileError, TooFewPointsError
 from ..geometry.estimation import Estimate
+from ..geometry.models import Model
 from ..geometry.tie_point_files import write_tie_points
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
+from ..masks.choice import MaskUsed
 from ..progress import Progress
 from ..quality.report import Report
 from ..quality.verdict import Verdict, judge, refuse
 from ..rasters.atomic import Outputs, writing
-from ..rasters.pair import ImagePair
-from ..search.local import LocalSearch
+from ..rasters.pair import Image, ImagePair
+from ..rasters.reading import open_raster
+from ..search.local import AUTO, LocalSearch
+from ..search.pose_searches import DEFAULT_SEARCH, SEARCHES
 from ..search.pyramid import find_coarse_model
 from ..search.rough import RoughSearch
 from ..similarity.surface import Surface
+from .registered_output import RegisteredOutput
 
 # How many surfaces of the best and of the worst check points a report shows.
 _EXTREMES = 3
+
+
+class TiePointMatching(Protocol):
+    """What finds tie points near a rough model without a look at held-out blocks, and a model."""
+
+    def estimate(
+        self, coarse: Model, kind: str, seed: int, executor: Executor, progress: Progress
+    ) -> Estimate:
+        """Return the model that tie points agree on; `TooFewPointsError` if none do."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +107,26 @@ class Registration:
         return None if self.estimate is None else self.estimate.transform
 
 
+def open_image(
+    stack: ExitStack, path: Path, band: int | None = None, mask: Path | None = None
+) -> Image:
+    """Open a raster and its mask, which `stack` closes."""
+    shown = None if mask is None else stack.enter_context(open_raster(mask))
+    return Image(stack.enter_context(open_raster(path)), band, shown)
+
+
+def rough_search(
+    radius_m: float, rotation_deg: float, largest_scale: float, name: str
+) -> RoughSearch:
+    """Return the search of a name within limits; "auto": all shifts, or else rotation steps."""
+    beyond_shifts = rotation_deg > 0 or largest_scale > 1
+    if name == AUTO:
+        poses = SEARCHES[DEFAULT_SEARCH] if beyond_shifts else None
+    else:
+        poses = SEARCHES[name]
+    return RoughSearch(radius_m, rotation_deg, (1 / largest_scale, largest_scale), poses)
+
+
 def register(
     pair: ImagePair,
     search: LocalSearch,
@@ -101,6 +136,7 @@ def register(
     seed: int,
     executor: Executor,
     progress: Progress,
+    matching: TiePointMatching | None = None,
 ) -> Registration:
     """Register the input of a pair to its reference, and judge the result.
 
@@ -109,7 +145,7 @@ def register(
     pair
         The images.
     search
-        How tie points are searched for.
+        How tie points are searched for; gives the check points, whatever gives those of the fit.
     rough
         How far the input may lie from where it claims to be, and how it is searched for.
     model
@@ -122,12 +158,15 @@ def register(
         Threads to work in.
     progress
         Is told of every step.
+    matching
+        What finds the tie points of the fit; None: `search`, on its chips.
     """
+    matching = matching or search
     progress.update(0.0, "searching for the rough shift")
     try:
         coarse = find_coarse_model(pair, search, rough, executor, progress.part(0.0, 0.4))
         progress.update(0.4, "matching tie points")
-        estimate = search.estimate(coarse, model, seed, executor, progress.part(0.4, 0.8))
+        estimate = matching.estimate(coarse, model, seed, executor, progress.part(0.4, 0.8))
     except (NothingFoundError, TooFewPointsError) as error:
         return Registration(pair, search, None, None, refuse(str(error)))
     progress.update(0.8, "checking with points that took no part")
@@ -260,3 +299,62 @@ class RegistrationResult:
             f"1 in 10^{-v.log10_chance:.0f}",
             *(f"{name}: {path}" for name, path in self.files.items()),
         ]
+
+
+def deliver(
+    registration: Registration,
+    output: RegisteredOutput,
+    files: RegistrationFiles,
+    parameters: Mapping[str, Any],
+    started: float,
+    workers: int,
+    progress: Progress,
+    mask: MaskUsed | None = None,
+) -> RegistrationResult:
+    """Write what a registration leaves: the image and its files, or of a refused one the report.
+
+    Parameters
+    ----------
+    registration
+        The registration; its rasters are open.
+    output
+        How the registered image is made.
+    files
+        The files beside it.
+    parameters
+        What the tool was called with.
+    started
+        When, by `time.perf_counter`.
+    workers
+        Number of threads.
+    progress
+        Is told of every tile.
+    mask
+        Which mask was used; None: no question of one.
+
+    Raises
+    ------
+    NotRegisteredError
+        The registration was refused.
+    """
+    pair = registration.pair
+    names = [Path(image.source.path).name for image in (pair.input, pair.reference)]
+    page = Report(
+        title=f"{names[0]} registered to {names[1]}",
+        verdict=registration.verdict,
+        pair=pair,
+        mask=mask,
+        points=registration.points,
+        transform=registration.transform,
+        surfaces=registration.extreme_surfaces() if files.report is not None else (),
+        parameters={k: v for k, v in parameters.items() if v is not None},
+        seconds=time.perf_counter() - started,
+    )
+    with accepted_or_refused(registration, page, files) as outputs:
+        points, found = registration.accepted()
+        files.write_points(points, found, outputs)
+        progress.update(0.0, "writing the registered image")
+        output.write(pair, found, outputs, workers, progress)
+    return RegistrationResult.of(
+        registration, page.summary(), {"output": output.path, **files.written()}
+    )
