@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .tools.estimate_rotation import estimate_rotation
     from .tools.filter_speckle import filter_speckle
     from .tools.mask_threshold import mask_threshold
+    from .tools.match_sar_sar import match_sar_sar
     from .tools.orthorectify import orthorectify
     from .tools.similarity_surface import similarity_surface
     from .tools.simulate import simulate
@@ -31,6 +32,7 @@ __all__ = [
     "filter_speckle",
     "load_transform",
     "mask_threshold",
+    "match_sar_sar",
     "orthorectify",
     "similarity_surface",
     "simulate",

@@ -9,6 +9,7 @@ from ..declaration import Tool, tool_of
 # In the order in which they are offered; a tool's function has the name of its module.
 NAMES = (
     "coregister",
+    "match_sar_sar",
     "estimate_rotation",
     "warp",
     "orthorectify",

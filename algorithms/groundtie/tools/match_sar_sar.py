@@ -1,0 +1,267 @@
+"""Register a SAR image to another one: mutual information and SIFT together (thesis S 6.9)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any
+
+from ..declaration import tool
+from ..errors import ParameterError
+from ..features.descriptors import Descriptor
+from ..features.detectors import DETECTORS, Detector
+from ..features.gradients import GRADIENTS
+from ..features.hybrid import FeatureSearch
+from ..features.tile_matching import FeatureMatcher
+from ..kinds import Choice, Distance, Number, RasterIn
+from ..progress import SILENT, Progress
+from ..rasters.pair import Image, default_radius_m, make_pair
+from ..rasters.reading import bounded_cache
+from ..search.layout import lay_out_chips
+from ..search.local import AUTO, LocalSearch
+from ..similarity.surface import SIMILARITIES, SimilaritySettings
+from .common import (
+    Input,
+    InputBand,
+    InputMask,
+    MatchingPixelSize,
+    Output,
+    Reference,
+    ReferenceBand,
+    ReferenceMask,
+    Resampling,
+    Seed,
+    TransformOut,
+    Workers,
+    worker_count,
+)
+from .registered_output import RegisteredOutput, model_for_grid
+from .registration import (
+    RegistrationFiles,
+    RegistrationResult,
+    deliver,
+    open_image,
+    register,
+    rough_search,
+)
+from .registration_parameters import (
+    OUTPUTS,
+    MaxError,
+    Model,
+    OutputGrid,
+    ReportOut,
+    Search,
+    SearchScale,
+    TiePointsOut,
+)
+
+_NO_REFINEMENT = "none"
+
+# Without georeferencing images may lie this far off each other, as a share of the longer side.
+_FREE_SHARE = 0.25
+
+
+@tool(title="Match SAR with SAR", group="Registration", outputs=OUTPUTS)
+def match_sar_sar(
+    reference: Reference,
+    input: Input,
+    output: Output,
+    search_radius: Annotated[
+        float | None,
+        Distance(
+            label="Search radius",
+            help="How far the input may lie from its right place. By default 100 m or 20 pixels "
+            "of the coarser image, whichever is larger; without georeferencing a quarter of the "
+            "input's longer side.",
+        ),
+    ] = None,
+    ground_mask: Annotated[
+        Path | None,
+        RasterIn(
+            label="Mask of level ground",
+            help="Where this raster is 0 or has no data, features of the reference take no part "
+            "in the model, and check points do not look: buildings and hills, which lean.",
+        ),
+    ] = None,
+    model: Model = AUTO,
+    max_error: MaxError = 3.0,
+    tie_points: TiePointsOut = None,
+    transform: TransformOut = None,
+    report: ReportOut = None,
+    detector: Annotated[
+        str,
+        Choice(
+            label="Detector",
+            help="Which features are found: those of SIFT; those without its first octave, which "
+            "holds most of the speckle (sift-oct); the same after smoothing by an exponential "
+            "filter (sift-isef-oct).",
+            choices=DETECTORS,
+            advanced=True,
+        ),
+    ] = "sift-oct",
+    contrast: Annotated[
+        float,
+        Number(
+            label="Least contrast",
+            help="Weaker features are left out: a share of the range of grey values, as OpenCV "
+            "counts it (three times Lowe's).",
+            minimum=0.0,
+            maximum=1.0,
+            advanced=True,
+        ),
+    ] = 0.03,
+    gradient: Annotated[
+        str,
+        Choice(
+            label="Gradient",
+            help="What features are described by: differences of neighbouring pixels or "
+            "Deriche's recursive ones, of logarithms; ratios of exponentially weighted averages "
+            "with their sign (roewa) or without it.",
+            choices=GRADIENTS,
+            advanced=True,
+        ),
+    ] = "differences",
+    ratio: Annotated[
+        float,
+        Number(
+            label="Largest ratio",
+            help="Largest ratio of the distances to the nearest and to the next best feature of "
+            "the input; 1 keeps the nearest one in any case.",
+            minimum=0.1,
+            maximum=1.0,
+            advanced=True,
+        ),
+    ] = 1.0,
+    gate: Annotated[
+        float,
+        Number(
+            label="Gate",
+            help="How far a feature's partner may lie from where the rough search puts it.",
+            unit="px",
+            minimum=1,
+            maximum=64,
+            advanced=True,
+        ),
+    ] = 16.0,
+    refinement: Annotated[
+        str,
+        Choice(
+            label="Refinement",
+            help="Similarity by which chips around matched features refine their places; none "
+            "leaves them where they were found.",
+            choices=(_NO_REFINEMENT, *SIMILARITIES),
+            advanced=True,
+        ),
+    ] = "nmi",
+    similarity: Annotated[
+        str,
+        Choice(
+            label="Similarity",
+            help="What the rough shift is searched for and check points are matched by; see "
+            "coregister.",
+            choices=SIMILARITIES,
+            advanced=True,
+        ),
+    ] = "fused",
+    search: Search = AUTO,
+    search_rotation: Annotated[
+        float | None,
+        Number(
+            label="Largest rotation",
+            help="How far the input may be turned, either way, against where it claims to lie. By "
+            "default not at all; without georeferencing any rotation.",
+            unit="°",
+            minimum=0,
+            maximum=180,
+            advanced=True,
+        ),
+    ] = None,
+    search_scale: SearchScale = 1.0,
+    reference_band: ReferenceBand = None,
+    input_band: InputBand = None,
+    reference_mask: ReferenceMask = None,
+    input_mask: InputMask = None,
+    matching_pixel_size: MatchingPixelSize = None,
+    output_grid: OutputGrid = "reference",
+    resampling: Resampling = "cubic",
+    workers: Workers = None,
+    seed: Seed = 0,
+    progress: Progress = SILENT,
+    parameters: Mapping[str, Any] = MappingProxyType({}),
+) -> RegistrationResult:
+    """Register a SAR image to another one: other sensor, incidence angle, orbit or date.
+
+    A rough shift is searched for on reduced images; SIFT features are matched near where it puts
+    them, and refined by mutual information in chips around them; a robust model is fitted. Parts
+    of the reference are held out of all of this; points in them decide whether the registration
+    is accepted. A refused registration writes no image.
+
+    Images without georeferencing are matched in pixel coordinates and may be turned by any angle;
+    distances are then in pixels.
+    """
+    started = time.perf_counter()
+    if ground_mask is not None and reference_mask is not None:
+        raise ParameterError("give ground_mask or reference_mask, not both")
+    files = RegistrationFiles(tie_points, transform, report)
+    kind = model_for_grid(model, output_grid)
+    with ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        there = open_image(stack, reference, reference_band, reference_mask)
+        here = open_image(stack, input, input_band, input_mask)
+        radius_m = _free_radius(here) if search_radius is None else search_radius
+        pair = make_pair(there, here, matching_pixel_size, radius_m)
+        for note in pair.notes():
+            progress.update(0.0, note)
+        ground = pair
+        if ground_mask is not None:
+            shown = open_image(stack, reference, reference_band, ground_mask)
+            ground = replace(pair, reference=shown)
+        local = LocalSearch(ground, lay_out_chips(pair), SimilaritySettings(similarity))
+        features = FeatureSearch(
+            FeatureMatcher(
+                pair,
+                Detector(detector, contrast),
+                Descriptor(gradient),
+                ratio,
+                gate,
+                local.held_out,
+                None if ground_mask is None else ground,
+            ),
+            local,
+            None if refinement == _NO_REFINEMENT else SimilaritySettings(refinement),
+        )
+        turned = 0.0 if here.source.grid.is_georeferenced else 180.0
+        rough = rough_search(
+            default_radius_m(pair.grid) if radius_m is None else radius_m,
+            turned if search_rotation is None else search_rotation,
+            search_scale,
+            search,
+        )
+        threads = worker_count(workers)
+        with ThreadPoolExecutor(threads) as executor:
+            result = register(
+                pair,
+                local,
+                rough,
+                kind,
+                max_error,
+                seed,
+                executor,
+                progress.part(0.0, 0.7),
+                features,
+            )
+        registered = RegisteredOutput(output, output_grid, resampling)
+        return deliver(
+            result, registered, files, parameters, started, threads, progress.part(0.7, 1.0)
+        )
+
+
+def _free_radius(input: Image) -> float | None:
+    """Return how far an image without georeferencing may lie off, in pixels."""
+    grid = input.source.grid
+    return None if grid.is_georeferenced else _FREE_SHARE * max(grid.width, grid.height)

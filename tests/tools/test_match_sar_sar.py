@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from raster_files import write_raster
+from speckled_pairs import write_speckled_pair
+from textured_pairs import TexturedPair, error_px, listing, pixels, shift_on_map
+
+from groundtie import match_sar_sar
+from groundtie.errors import NotRegisteredError, ParameterError
+from groundtie.geometry.tie_point_files import read_tie_points
+from groundtie.geometry.transform import load_transform
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
+
+SIZE = (300, 280)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
+    folder = tmp_path_factory.mktemp("speckled")
+    return write_speckled_pair(folder, SIZE, shift_on_map(70.0, -45.0))
+
+
+def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: Path) -> None:
+    found = match_sar_sar(
+        files.reference,
+        files.input,
+        tmp_path / "out.tif",
+        tie_points=tmp_path / "points.gpkg",
+        transform=tmp_path / "transform.json",
+        report=tmp_path / "report.html",
+    )
+    assert error_px(found.transform, files) < 0.4
+    assert error_px(load_transform(tmp_path / "transform.json"), files) < 0.4
+    assert found.verdict.accepted
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["verdict"]["accepted"] is True
+    assert "<html" in (tmp_path / "report.html").read_text().lower()
+    table = read_tie_points(tmp_path / "points.gpkg", found.transform.input_grid)
+    assert len(table.reference_xy) == len(found.points)
+    reference, registered = (
+        np.log(pixels(path)[0][40:-40, 40:-40] + 1.0)
+        for path in (files.reference, tmp_path / "out.tif")
+    )
+    assert np.corrcoef(reference.ravel(), registered.ravel())[0, 1] > 0.5
+
+
+def test_check_points_lie_where_no_feature_was_seen(files: TexturedPair, tmp_path: Path) -> None:
+    found = match_sar_sar(files.reference, files.input, tmp_path / "out.tif", refinement="none")
+    points = found.points
+    fit, check = (
+        files.grid.map_to_pixel(points.reference_xy[points.is_check == c]) for c in (0, 1)
+    )
+    apart = np.linalg.norm(fit[:, None] - check[None], axis=2)
+    assert len(check) >= 4
+    assert apart.min() > 15
+
+
+def test_another_place_is_refused_and_leaves_its_report_only(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    other = write_speckled_pair(tmp_path / "in", SIZE, shift_on_map(0, 0), input_seed=77)
+    with pytest.raises(NotRegisteredError):
+        match_sar_sar(
+            other.reference, other.input, tmp_path / "o.tif", report=tmp_path / "report.html"
+        )
+    assert set(listing(tmp_path)) >= {"report.html", "report.json"}
+    assert not (tmp_path / "o.tif").exists()
+
+
+def test_images_without_georeferencing_may_be_turned(tmp_path: Path) -> None:
+    turned = write_speckled_pair(tmp_path, SIZE, shift_on_map(0, 0))
+    values = np.rot90(pixels(turned.input)[0]).copy()
+    plain = [
+        write_raster(tmp_path / f"{name}.tif", image)
+        for name, image in (("plain", pixels(turned.reference)[0]), ("turned", values))
+    ]
+    found = match_sar_sar(*plain, tmp_path / "out.tif")
+    grid = Grid(PIXEL_COORDINATES, None, *SIZE)
+    px = np.array([[50.0, 60.0], [200.0, 100.0], [150.0, 220.0]])
+    # Counter-clockwise: columns become rows from below.
+    expected = np.column_stack([px[:, 1], SIZE[0] - 1 - px[:, 0]])
+    off = found.transform(grid.pixel_to_map(px)) - expected
+    assert np.hypot(*off.T).max() < 1.0
+
+
+def test_matches_off_the_ground_take_no_part(files: TexturedPair, tmp_path: Path) -> None:
+    ground = np.ones((SIZE[1], SIZE[0]), np.uint8)
+    ground[:, :90] = 0
+    mask = write_raster(tmp_path / "ground.tif", ground, files.grid)
+    found = match_sar_sar(files.reference, files.input, tmp_path / "out.tif", ground_mask=mask)
+    px = files.grid.map_to_pixel(found.points.reference_xy)
+    # Chips around features and check points are larger than these.
+    assert px[~found.points.is_check, 0].min() > 89
+    assert error_px(found.transform, files) < 0.6
+
+
+def test_two_masks_of_the_reference_are_refused(files: TexturedPair, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="not both"):
+        match_sar_sar(
+            files.reference,
+            files.input,
+            tmp_path / "out.tif",
+            ground_mask=files.reference,
+            reference_mask=files.reference,
+        )
