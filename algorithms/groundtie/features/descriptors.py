@@ -7,7 +7,7 @@ matrix, and all features are described by one product. Lowe 2004; thesis S appen
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -41,6 +41,9 @@ _LARGEST_COMPONENT = 0.2
 _LAYERS = 3
 _FIRST_SCALE_PX = 1.6
 _IMAGE_BLUR_PX = 0.5
+
+# A gradient sees what lies within so many scales, but for the Gaussian's tail.
+_SEES_SCALES = 2.5
 
 # Orientation: bins of its histogram, width of its window in scales, how far it reaches in widths,
 # and how high a further peak must be.
@@ -105,66 +108,78 @@ class Descriptor:
         tables: list[FeaturePoints] = []
         descriptors = [np.zeros((0, LENGTH), np.float32)]
         owners = [np.zeros(0, int)]
-        for level, which in _levels(found):
-            own = found.take(which)
-            fields = level.gradient(image, valid, self.estimator)
-            local = replace(own, position_px=level.enter(own.position_px))
-            local = replace(local, scale_px=own.scale_px / level.pixel_px)
+        layer_of = np.rint(_LAYERS * np.log2(found.scale_px / _FIRST_SCALE_PX)).astype(int)
+        layers = [int(layer) for layer in np.unique(layer_of)]
+        distance = _distance(valid)
+        for layer, level in zip(layers, _scale_space(image, layers), strict=True):
+            pixel = 2 ** _octave_of(layer)
+            seen = distance[::pixel, ::pixel] > _SEES_SCALES * _scale_of(layer)
+            fields = _gradient(level, seen, self.estimator)
+            own = np.nonzero(layer_of == layer)[0]
             for start in range(0, len(own), _BLOCK):
-                block = np.arange(start, min(start + _BLOCK, len(own)))
-                turned, index = local.take(block), np.arange(len(block))
+                block = own[start : start + _BLOCK]
+                points = found.take(block)
+                local = replace(
+                    points,
+                    position_px=points.position_px / pixel,
+                    scale_px=points.scale_px / pixel,
+                )
+                index = np.arange(len(block))
                 if not self.upright:
-                    turned, index = _oriented(fields, turned)
-                descriptors.append(_described(fields, turned))
-                tables.append(own.take(block[index]).turned(turned.orientation_rad))
-                owners.append(which[block[index]])
+                    local, index = _oriented(fields, local)
+                descriptors.append(_described(fields, local))
+                tables.append(points.take(index).turned(local.orientation_rad))
+                owners.append(block[index])
         if not tables:
             return FeaturePoints.none(), descriptors[0]
         order = np.argsort(np.concatenate(owners), kind="stable")
         return FeaturePoints.concatenate(tables).take(order), np.concatenate(descriptors)[order]
 
 
-@dataclass(frozen=True)
-class _Level:
-    """A level of the scale space: an octave's pixels, blurred to a scale of the image."""
-
-    octave: int
-    scale_px: float
-
-    @property
-    def pixel_px(self) -> int:
-        """Side of its pixels."""
-        return int(2 ** max(self.octave, 0))
-
-    def enter(self, px: FloatArray) -> FloatArray:
-        """Return image positions in its pixels, of which the first lies on the image's first."""
-        return px / self.pixel_px
-
-    def gradient(self, image: FloatImage, valid: NDArray[np.bool_], estimator: str) -> Gradient:
-        """Return the gradient of the blurred image, zero where masked pixels are seen."""
-        blur = float(np.sqrt(max(self.scale_px**2 - _IMAGE_BLUR_PX**2, 0.01)))
-        step = slice(None, None, self.pixel_px)
-        level = np.array(cv2.GaussianBlur(image, (0, 0), blur)[step, step], np.float32)
-        along_cols, along_rows = gradient(level, estimator)
-        strength = np.hypot(along_cols, along_rows)
-        counts = strength > _ROUNDING * np.abs(level).max()
-        if not valid.all():
-            reach = 2 * int(np.ceil(2 * self.scale_px)) + 1
-            seen = cv2.erode(valid.astype(np.uint8), np.ones((reach, reach), np.uint8))
-            counts &= seen[step, step] > 0
-        zero = np.float32(0)
-        return np.where(counts, along_cols, zero), np.where(counts, along_rows, zero)
+def _distance(valid: NDArray[np.bool_]) -> FloatImage:
+    """Return how far each pixel is from a masked one."""
+    if valid.all():
+        return np.full(valid.shape, np.inf, np.float32)
+    return np.asarray(cv2.distanceTransform(valid.astype(np.uint8), cv2.DIST_L2, 5), np.float32)
 
 
-def _levels(found: FeaturePoints) -> Iterator[tuple[_Level, NDArray[np.int_]]]:
-    """Return the levels that features lie on, and which do."""
-    layer = np.rint(_LAYERS * np.log2(found.scale_px / _FIRST_SCALE_PX)).astype(int)
-    # Layers 1 to 3 of an octave hold its features.
-    octave = (layer - 1) // _LAYERS
-    for number in np.unique(layer):
-        which = np.nonzero(layer == number)[0]
-        scale = _FIRST_SCALE_PX * 2 ** (float(number) / _LAYERS)
-        yield _Level(int(octave[which[0]]), scale), which
+def _scale_space(image: FloatImage, layers: Iterable[int]) -> Iterator[FloatImage]:
+    """Return an image blurred to the scales of rising layers, each in the pixels of its octave."""
+    own = _blurred(image, _IMAGE_BLUR_PX, _FIRST_SCALE_PX)
+    octave = 0
+    for layer in layers:
+        while octave < _octave_of(layer):
+            # The first pixels lie on one another.
+            own = _blurred(own, _FIRST_SCALE_PX, 2 * _FIRST_SCALE_PX)[::2, ::2]
+            octave += 1
+        if layer <= 0:
+            yield _blurred(image, _IMAGE_BLUR_PX, _scale_of(layer))
+        else:
+            yield _blurred(own, _FIRST_SCALE_PX, _scale_of(layer) / 2**octave)
+
+
+def _octave_of(layer: int) -> int:
+    """Return the octave in whose pixels a layer is; those of the enlarged image stay in 0."""
+    return max((layer - 1) // _LAYERS, 0)
+
+
+def _scale_of(layer: int) -> float:
+    return float(_FIRST_SCALE_PX * 2 ** (layer / _LAYERS))
+
+
+def _blurred(image: FloatImage, blur_px: float, wanted_px: float) -> FloatImage:
+    """Return an image that is blurred by `blur_px` already as one blurred by `wanted_px`."""
+    more = float(np.sqrt(max(wanted_px**2 - blur_px**2, 0.01)))
+    return np.asarray(cv2.GaussianBlur(np.ascontiguousarray(image), (0, 0), more), np.float32)
+
+
+def _gradient(level: FloatImage, seen: NDArray[np.bool_], estimator: str) -> Gradient:
+    """Return the gradient of a level, zero where masked pixels are seen or all is rounding."""
+    along_cols, along_rows = gradient(level, estimator)
+    least = np.float32(_ROUNDING * np.abs(level).max())
+    counts = seen & (along_cols**2 + along_rows**2 > least**2)
+    zero = np.float32(0)
+    return np.where(counts, along_cols, zero), np.where(counts, along_rows, zero)
 
 
 def _lattice(half: float, count: int) -> FloatArray:

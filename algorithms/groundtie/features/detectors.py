@@ -43,6 +43,9 @@ _ISEF_DECAY = 0.5
 # Share of the pixels that is saturated at either end of the grey values.
 _SATURATED = 0.01
 
+# About how many pixels this is told by.
+_QUANTILE_PIXELS = 20_000
+
 # A feature needs valid pixels up to so many of its scales.
 _SEES_SCALES = 3.0
 
@@ -109,7 +112,12 @@ class Detector:
 
 def to_grey(image: FloatImage, valid: NDArray[np.bool_]) -> ByteImage:
     """Return an image as bytes, its valid grey values stretched over their range."""
-    low, high = np.quantile(image[valid], (_SATURATED, 1 - _SATURATED))
+    # Some of a large image's pixels tell as much as all.
+    step = max(int(np.sqrt(image.size / _QUANTILE_PIXELS)), 1)
+    sample = image[::step, ::step][valid[::step, ::step]]
+    if sample.size == 0:
+        sample = image[valid]
+    low, high = np.quantile(sample, (_SATURATED, 1 - _SATURATED))
     scaled = (image - low) * (255 / max(high - low, 1e-6))
     return np.asarray(np.clip(np.rint(scaled), 0, 255), np.uint8)
 

@@ -12,6 +12,9 @@ FloatArray = NDArray[np.float64]
 
 _SIGMAS = 2.0
 
+# Smaller residuals are rounding.
+_ROUNDING_PX = 1e-6
+
 
 def filter_matches(
     px: FloatArray, partner_px: FloatArray, kind: str = "affine", sigmas: float = _SIGMAS
@@ -42,7 +45,7 @@ def filter_matches(
         residuals = np.hypot(*(partner_px - model(px)).T)
         spread = np.sqrt(np.mean(residuals[kept] ** 2))
         worst = int(np.argmax(np.where(kept, residuals, -1.0)))
-        if residuals[worst] <= sigmas * spread or residuals[worst] == 0:
+        if residuals[worst] <= max(sigmas * spread, _ROUNDING_PX):
             return kept
         kept[worst] = False
     return np.zeros(len(px), bool)

@@ -15,6 +15,7 @@ NAMES = (
     "orthorectify",
     "assess",
     "similarity_surface",
+    "detector_repeatability",
     "filter_speckle",
     "mask_threshold",
     "simulate",

@@ -1,0 +1,248 @@
+"""How well feature detectors and descriptors do on a registered pair."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from ..declaration import tool
+from ..errors import ParameterError
+from ..features.evaluation import Evaluation, Variant, evaluate
+from ..features.matching import METHODS
+from ..features.repeatability import CLASS_NAMES
+from ..geometry.transform import Transform, load_transform
+from ..kinds import Choice, FileIn, FileOut, Number, Text
+from ..progress import SILENT, Progress
+from ..rasters.atomic import Outputs, writing
+from ..rasters.pair import ImagePair, make_pair
+from ..rasters.patch import Patch
+from ..rasters.reading import bounded_cache
+from .common import (
+    Input,
+    InputBand,
+    InputMask,
+    MatchingPixelSize,
+    Reference,
+    ReferenceBand,
+    ReferenceMask,
+)
+from .registration import open_image
+from .repeatability_picture import draw_evaluations
+from .stored_transform import transform_of
+
+
+@dataclass(frozen=True)
+class RepeatabilityResult:
+    """What `detector_repeatability` measured.
+
+    Parameters
+    ----------
+    evaluations
+        One for each variant.
+    files
+        What was written, by name.
+    """
+
+    evaluations: tuple[Evaluation, ...]
+    files: dict[str, str]
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {
+            "variants": [one.summary() for one in self.evaluations],
+            "files": self.files,
+        }
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        return [
+            *(
+                f"{one.variant}: {one.detections[0]} and {one.detections[1]} features, "
+                f"{one.repeated.scores[0]:.0%} repeat within {CLASS_NAMES[0]} overlap error; "
+                f"{one.matched.matches} matches, {one.filtered.matches} after filtering; "
+                f"{one.detecting_s + one.matching_s:.2f} s"
+                for one in self.evaluations
+            ),
+            *(f"{name}: {path}" for name, path in self.files.items()),
+        ]
+
+
+@tool(title="Repeatability of detectors", group="Quality")
+def detector_repeatability(
+    reference: Reference,
+    input: Input,
+    output: Annotated[
+        Path,
+        FileOut(
+            label="Table",
+            help="What was measured, a row for each variant.",
+            suffixes=(".csv",),
+        ),
+    ],
+    variants: Annotated[
+        str,
+        Text(
+            label="Variants",
+            help="What is compared, separated by commas: each a detector (sift, sift-oct, "
+            "sift-isef-oct), and if need be a gradient (differences, recursive, roewa, "
+            "roewa-unsigned) and oriented for descriptors that turn with the image, joined by +.",
+        ),
+    ] = "sift,sift-oct,sift-isef-oct",
+    transform: Annotated[
+        Path | None,
+        FileIn(
+            label="Transform",
+            help="The registration, from reference to input. Without it the input's own "
+            "georeferencing is believed.",
+            suffixes=(".json",),
+        ),
+    ] = None,
+    ratio: Annotated[
+        float,
+        Number(
+            label="Largest ratio",
+            help="Largest ratio of the distances to the nearest and to the next best feature.",
+            minimum=0.1,
+            maximum=1.0,
+        ),
+    ] = 0.8,
+    picture: Annotated[
+        Path | None,
+        FileOut(
+            label="Picture",
+            help="Repeatability and matches by class of overlap error, to look at.",
+            suffixes=(".png",),
+        ),
+    ] = None,
+    numbers: Annotated[
+        Path | None,
+        FileOut(label="Numbers", help="The same as the table, as JSON.", suffixes=(".json",)),
+    ] = None,
+    size: Annotated[
+        int,
+        Number(
+            label="Size",
+            help="Largest side of the piece in the middle of the overlap that is looked at.",
+            unit="px",
+            integer=True,
+            minimum=64,
+            maximum=4096,
+        ),
+    ] = 2000,
+    contrast: Annotated[
+        float | None,
+        Number(
+            label="Least contrast",
+            help="Weaker features are left out: a share of the range of grey values, as OpenCV "
+            "counts it; by default as fits each detector.",
+            minimum=0.0,
+            maximum=1.0,
+            advanced=True,
+        ),
+    ] = None,
+    method: Annotated[
+        str,
+        Choice(
+            label="Matching",
+            help="Whether nearest features are found approximately by k-d trees, or exactly.",
+            choices=METHODS,
+            advanced=True,
+        ),
+    ] = METHODS[-1],
+    reference_band: ReferenceBand = None,
+    input_band: InputBand = None,
+    reference_mask: ReferenceMask = None,
+    input_mask: InputMask = None,
+    matching_pixel_size: MatchingPixelSize = None,
+    progress: Progress = SILENT,
+) -> RepeatabilityResult:
+    """Measure how well feature detectors and descriptors do on a registered pair.
+
+    Features are circles as large as their scale. Those of both images correspond if their circles
+    overlap; the smaller the error of the overlap, the better they repeat. Features are then matched
+    by their descriptors alone, and the worst matches dropped until the rest agree on an affine
+    model.
+    """
+    chosen = [Variant.parse(name.strip(), contrast) for name in variants.split(",")]
+    if len({variant.name for variant in chosen}) < len(chosen):
+        raise ParameterError(f"a variant is named twice: {variants}")
+    with ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        pair = make_pair(
+            open_image(stack, reference, reference_band, reference_mask),
+            open_image(stack, input, input_band, input_mask),
+            matching_pixel_size,
+            0.0,
+        )
+        for note in pair.notes():
+            progress.update(0.0, note)
+        known = None
+        if transform is not None:
+            known = transform_of(load_transform(transform), pair.input.source, transform)
+        patches = _read(pair, known, size)
+    evaluations = []
+    for i, variant in enumerate(chosen):
+        progress.update(0.1 + 0.8 * i / len(chosen), f"trying {variant.name}")
+        evaluations.append(evaluate(variant, *patches, ratio, method))
+    files = {"output": output, "picture": picture, "numbers": numbers}
+    result = RepeatabilityResult(
+        tuple(evaluations), {name: str(path) for name, path in files.items() if path is not None}
+    )
+    progress.update(0.9, "writing")
+    with Outputs() as outputs:
+        write_table(outputs.stage(output), evaluations)
+        if picture is not None:
+            draw_evaluations(outputs.stage(picture), evaluations)
+        if numbers is not None:
+            staged = outputs.stage(numbers)
+            with writing(staged):
+                staged.write_text(json.dumps(result.summary(), indent=1), encoding="utf-8")
+    return result
+
+
+def _read(pair: ImagePair, transform: Transform | None, largest: int) -> tuple[Patch, Patch]:
+    """Return the middle of the overlap in both images, the input resampled onto the reference."""
+    grid = pair.grid
+    width, height = min(grid.width, largest), min(grid.height, largest)
+    piece = grid.window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
+    reference = pair.reference_patch(piece)
+    input = pair.input_patch(piece, pair.claimed_px if transform is None else transform)
+    # Where one image shows nothing, features of the other cannot repeat.
+    both = reference.valid & input.valid
+    return Patch(reference.values, both), Patch(input.values, both)
+
+
+def write_table(path: Path, evaluations: Sequence[Evaluation]) -> None:
+    """Write evaluations as a CSV file, a row each."""
+    with writing(path), path.open("w", newline="", encoding="utf-8") as file:
+        rows = [_row(one) for one in evaluations]
+        table = csv.DictWriter(file, rows[0])
+        table.writeheader()
+        table.writerows(rows)
+
+
+def _row(one: Evaluation) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "variant": one.variant,
+        "reference_features": one.detections[0],
+        "input_features": one.detections[1],
+    }
+    row |= _by_class("repeatability", [f"{score:.4f}" for score in one.repeated.scores])
+    for name, part in (("matches", one.matched), ("filtered", one.filtered)):
+        row[name] = part.matches
+        row[f"{name}_std_x_px"], row[f"{name}_std_y_px"] = (f"{std:.3f}" for std in part.std_px)
+        row |= _by_class(name, part.by_class.tolist())
+    row["detecting_s"], row["matching_s"] = f"{one.detecting_s:.4f}", f"{one.matching_s:.4f}"
+    return row
+
+
+def _by_class(name: str, values: Sequence[Any]) -> dict[str, Any]:
+    columns = (
+        cls.replace(" %", "").replace("–", "_").replace("> ", "over_") for cls in CLASS_NAMES
+    )
+    return {f"{name}_{column}": value for column, value in zip(columns, values, strict=True)}
