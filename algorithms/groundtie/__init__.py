@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .tools.orthorectify import orthorectify
     from .tools.similarity_surface import similarity_surface
     from .tools.simulate import simulate
+    from .tools.simulate_sensor import simulate_sensor
     from .tools.warp import warp
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "orthorectify",
     "similarity_surface",
     "simulate",
+    "simulate_sensor",
     "warp",
 ]
 

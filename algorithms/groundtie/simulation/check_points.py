@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import map_coordinates
 
-from ..geometry.transform import Transform
 from ..rasters.grid import Grid
 from .cover import OPEN_GROUND, Cover
 from .noise import Stream, random_stream
@@ -50,7 +50,7 @@ class RoofPoints:
         ground.
     input_px : float64 array (n, 2)
         Where the optical image shows them: leaning away from the camera by
-        height · tan(off-nadir angle), and displaced as the ground is.
+        height · tan(off-nadir angle), and displaced as the ground there is.
     """
 
     px: FloatArray
@@ -59,7 +59,29 @@ class RoofPoints:
     input_px: FloatArray
 
 
-def ground_points(scenes: Scenes, grid: Grid, truth: Transform) -> FloatArray:
+@dataclass(frozen=True)
+class OpticalImage:
+    """Where an optical image shows the ground.
+
+    Attributes
+    ----------
+    to_px : function
+        From reference pixels (col, row) of places on the ground to those of the image, (n, 2).
+    grid : Grid
+        The image's pixels.
+    """
+
+    to_px: Callable[[FloatArray], FloatArray]
+    grid: Grid
+
+    def seen(self, px: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+        """Return image positions of reference pixels, (..., 2), and which the image shows."""
+        shown = self.to_px(px.reshape(-1, 2))
+        inside = self.grid.contains(shown)
+        return shown.reshape(px.shape), inside.reshape(px.shape[:-1])
+
+
+def ground_points(scenes: Scenes, grid: Grid, image: OpticalImage) -> FloatArray:
     """Return one point on open ground in each cell of a lattice, where there is one.
 
     Returns
@@ -68,8 +90,7 @@ def ground_points(scenes: Scenes, grid: Grid, truth: Transform) -> FloatArray:
         Reference pixels (col, row).
     """
     px, place = _drawn(scenes.radar, grid, Stream.CHECK_POINTS)
-    usable = truth.input_grid.contains(truth(grid.pixel_to_map(px.reshape(-1, 2))))
-    usable = usable.reshape(place[0].shape)
+    _, usable = image.seen(px)
     for scene in (scenes.radar, scenes.camera):
         usable &= np.isin(scene.parcels.cover[scene.parcel[place]], OPEN_GROUND)
         usable &= scene.object_m[place] == 0
@@ -77,24 +98,18 @@ def ground_points(scenes: Scenes, grid: Grid, truth: Transform) -> FloatArray:
 
 
 def roof_points(
-    scenes: Scenes, grid: Grid, truth: Transform, sar: SarOptions, optical: OpticalOptions
+    scenes: Scenes, grid: Grid, image: OpticalImage, sar: SarOptions, optical: OpticalOptions
 ) -> RoofPoints:
     """Return one point on a roof in each cell of a lattice, where both sensors see one."""
     px, place = _drawn(scenes.radar, grid, Stream.ROOF_POINTS)
-    usable = _inside_a_roof(scenes, place)
-    usable &= ~_hidden_from_radar(scenes.radar, place, sar)
-    usable &= ~_hidden_from_camera(scenes.camera, place, optical)
     height_m = scenes.radar.object_m[place].astype(float)
     shown = radar_position(scenes.radar, px, height_m, sar)
-    seen = truth(grid.pixel_to_map(camera_position(scenes.camera, px, height_m, optical)))
-    for positions, image in ((shown, grid), (seen, truth.input_grid)):
-        usable &= image.contains(positions.reshape(-1, 2)).reshape(usable.shape)
-    return RoofPoints(
-        _first_of_each(px, usable),
-        _first_of_each(height_m, usable),
-        _first_of_each(shown, usable),
-        _first_of_each(seen.reshape(px.shape), usable),
-    )
+    seen, usable = image.seen(camera_position(scenes.camera, px, height_m, optical))
+    usable &= grid.contains(shown.reshape(-1, 2)).reshape(usable.shape)
+    usable &= _inside_a_roof(scenes, place)
+    usable &= ~_hidden_from_radar(scenes.radar, place, sar)
+    usable &= ~_hidden_from_camera(scenes.camera, place, optical)
+    return RoofPoints(*(_first_of_each(values, usable) for values in (px, height_m, shown, seen)))
 
 
 def radar_position(

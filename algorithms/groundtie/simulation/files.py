@@ -17,6 +17,8 @@ from rasterio.errors import RasterioError
 from ..geometry.models import DEGREE
 from ..rasters.atomic import Outputs, writing
 from ..rasters.grid import Grid
+from ..sensor.rpc import RPC
+from ..sensor.rpc_tags import rpc_to_tags
 from .pair import SimulatedPair
 
 FloatArray = npt.NDArray[np.float64]
@@ -60,13 +62,13 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
     bands = [band.capitalize() for band in pair.options.optical.bands]
     with Outputs() as outputs, writing(folder, RasterioError):
         staged = {key: outputs.stage(path) for key, path in paths.items()}
-        _write_raster(staged["reference"], pair.reference[None], pair.reference_grid, ["Amplitude"])
-        _write_raster(staged["input"], pair.input, pair.truth.input_grid, bands)
+        write_raster(staged["reference"], pair.reference[None], pair.reference_grid, ["Amplitude"])
+        write_raster(staged["input"], pair.input, pair.truth.input_grid, bands)
         terrain = pair.scene.terrain_m[pair.scene.window]
-        _write_raster(staged["dem"], terrain[None], pair.reference_grid, ["Height of ground (m)"])
+        write_raster(staged["dem"], terrain[None], pair.reference_grid, ["Height of ground (m)"])
         staged["truth"].write_text(json.dumps(truth_json(pair), indent=1), encoding="utf-8")
-        _write_table(staged["check_points"], CHECK_POINT_COLUMNS, _check_points(pair))
-        _write_table(staged["roof_points"], ROOF_POINT_COLUMNS, _roof_points(pair))
+        write_table(staged["check_points"], CHECK_POINT_COLUMNS, _check_points(pair))
+        write_table(staged["roof_points"], ROOF_POINT_COLUMNS, _roof_points(pair))
     return paths
 
 
@@ -100,17 +102,20 @@ def _matrix(
     return np.column_stack([linear, base - linear @ centre]).tolist()
 
 
-def _write_raster(
-    path: Path, image: npt.NDArray[Any], grid: Grid, band_names: Sequence[str]
+def write_raster(
+    path: Path,
+    image: npt.NDArray[Any],
+    grid: Grid,
+    band_names: Sequence[str],
+    rpc: RPC | None = None,
 ) -> None:
+    """Write bands, shape (bands, rows, columns), as GeoTIFF, with RPCs if there are any."""
     profile = {
         "driver": "GTiff",
         "count": len(image),
         "height": grid.height,
         "width": grid.width,
         "dtype": image.dtype,
-        "crs": grid.crs,
-        "transform": grid.transform,
         "tiled": True,
         "blockxsize": 256,
         "blockysize": 256,
@@ -118,10 +123,14 @@ def _write_raster(
         "predictor": 3 if image.dtype.kind == "f" else 2,
         "bigtiff": "if_safer",
     }
+    if grid.is_georeferenced:
+        profile |= {"crs": grid.crs, "transform": grid.transform}
     with rasterio.open(path, "w", **profile) as raster:
         raster.write(image)
         for band, name in enumerate(band_names, start=1):
             raster.set_band_description(band, name)
+        if rpc is not None:
+            raster.update_tags(ns="RPC", **rpc_to_tags(rpc))
 
 
 def _check_points(pair: SimulatedPair) -> FloatArray:
@@ -135,7 +144,8 @@ def _roof_points(pair: SimulatedPair) -> FloatArray:
     return np.hstack([xy, points.height_m[:, None], points.reference_px, points.input_px])
 
 
-def _write_table(path: Path, columns: Sequence[str], table: FloatArray) -> None:
+def write_table(path: Path, columns: Sequence[str], table: FloatArray) -> None:
+    """Write a table as CSV, with six decimals."""
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(columns)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -155,7 +156,18 @@ class SourcePositions:
         return np.stack([self.rows(row, column), self.columns(row, column)])
 
 
-def resample(image: FloatImage, positions: SourcePositions, height: int) -> FloatImage:
+class Positions(Protocol):
+    """Where the pixels of an image lie on the pixels of the scene."""
+
+    @property
+    def width(self) -> int:
+        """Width of the image in pixels."""
+
+    def strip(self, start: int, stop: int) -> npt.NDArray[np.float64]:
+        """Return scene (row, column), shape (2, stop − start, width), of some rows."""
+
+
+def resample(image: FloatImage, positions: Positions, height: int) -> FloatImage:
     """Interpolate an image (rows, columns) at the pixels of the input by cubic B-splines."""
     coefficients = spline_filter(image, order=3, output=np.float32, mode="mirror")
     result = np.empty((height, positions.width), np.float32)

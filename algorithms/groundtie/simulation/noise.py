@@ -31,6 +31,7 @@ class Stream(IntEnum):
     CHANGES = 14
     TRAFFIC = 15
     ROOF_POINTS = 16
+    ATTITUDE = 17
 
 
 def random_stream(seed: int, stream: Stream, part: int = 0) -> np.random.Generator:

@@ -14,7 +14,7 @@ from ..errors import ParameterError
 from ..geometry.transform import Transform
 from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
-from .check_points import RoofPoints, Scenes, ground_points, roof_points
+from .check_points import OpticalImage, RoofPoints, Scenes, ground_points, roof_points
 from .misregistration import (
     DistortionOptions,
     SourcePositions,
@@ -30,8 +30,6 @@ from .scene import Scene, SceneOptions, generate_scenes
 CRS_EPSG = 32633
 CORNER_M = (412_000.0, 5_334_000.0)
 
-# The scene depends on its outer size: in coarse steps, it stays the same when only the distortion
-# or the look changes somewhat.
 _MARGIN_STEP_PX = 64
 
 
@@ -107,23 +105,19 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
     if not 0.25 <= options.pixel_ratio <= 16:
         raise ParameterError("input_pixel_size_m must be 0.25 to 16 times the scene's pixel size")
     scene_options = options.scene
-    width, height = scene_options.size_px
-    px_m = scene_options.pixel_size_m
-    transform = Affine(px_m, 0, CORNER_M[0], 0, -px_m, CORNER_M[1])
-    reference_grid = Grid(transform, CRS.from_epsg(CRS_EPSG), width, height)
+    reference_grid = map_grid(scene_options)
     claimed = reference_grid.scaled(options.pixel_ratio)
     model = draw_misregistration(options.distortion, claimed, scene_options.seed)
     truth = Transform(model, reference_grid.crs, claimed)
     progress.update(0.0, "laying out the scene")
-    needed = needed_margin(model, reference_grid, claimed) + _object_reach_px(options)
-    margin = math.ceil(needed / _MARGIN_STEP_PX) * _MARGIN_STEP_PX
+    reach = object_reach_px(scene_options, options.sar, options.optical)
+    margin = in_steps(needed_margin(model, reference_grid, claimed) + reach)
     scenes = Scenes(*generate_scenes(scene_options, margin))
     progress.update(0.25, "looking with the radar")
     reference = render_sar(scenes.radar, options.sar)
     progress.update(0.4, "looking with the camera")
     radiance = render_radiance(scenes.camera, options.optical)
-    scene_grid = reference_grid.window(-margin, -margin, width + 2 * margin, height + 2 * margin)
-    positions = SourcePositions.of(truth, scene_grid)
+    positions = SourcePositions.of(truth, scene_grid(reference_grid, margin))
     image = np.empty((len(radiance), claimed.height, claimed.width), np.uint16)
     for band, light in enumerate(radiance):
         progress.update(0.5 + 0.5 * band / len(radiance), "resampling the optical image")
@@ -132,22 +126,45 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
         seen = resample(light, positions, claimed.height)
         noise = random_stream(scene_options.seed, Stream.OPTICAL_NOISE, band)
         image[band] = quantise(seen, options.optical, noise)
+    optical = OpticalImage(lambda px: truth(reference_grid.pixel_to_map(px)), claimed)
     return SimulatedPair(
         options=options,
         reference=reference,
         reference_grid=reference_grid,
         input=image,
         truth=truth,
-        check_points_px=ground_points(scenes, reference_grid, truth),
-        roof_points=roof_points(scenes, reference_grid, truth, options.sar, options.optical),
+        check_points_px=ground_points(scenes, reference_grid, optical),
+        roof_points=roof_points(scenes, reference_grid, optical, options.sar, options.optical),
         scene=scenes.radar,
     )
 
 
-def _object_reach_px(options: PairOptions) -> int:
-    """How far from its foot an object or a hill can show up in either image."""
-    object_m = options.scene.highest_object_m
-    cot = options.sar.cot_incidence
-    radar_m = (object_m + options.scene.relief_m) * cot + object_m / cot
-    camera_m = object_m * (options.optical.lean + options.optical.shadow)
-    return math.ceil(max(radar_m, camera_m) / options.scene.pixel_size_m)
+def map_grid(options: SceneOptions) -> Grid:
+    """Return the grid of the SAR image of a scene."""
+    px_m = options.pixel_size_m
+    transform = Affine(px_m, 0, CORNER_M[0], 0, -px_m, CORNER_M[1])
+    return Grid(transform, CRS.from_epsg(CRS_EPSG), *options.size_px)
+
+
+def scene_grid(grid: Grid, margin_px: int) -> Grid:
+    """Return the grid of a scene that goes on beyond the grid of its SAR image."""
+    around = 2 * margin_px
+    return grid.window(-margin_px, -margin_px, grid.width + around, grid.height + around)
+
+
+def object_reach_px(scene: SceneOptions, sar: SarOptions, optical: OpticalOptions) -> int:
+    """Return how far from its foot an object or a hill can show up in either image."""
+    object_m = scene.highest_object_m
+    cot = sar.cot_incidence
+    radar_m = (object_m + scene.relief_m) * cot + object_m / cot
+    camera_m = object_m * (optical.lean + optical.shadow)
+    return math.ceil(max(radar_m, camera_m) / scene.pixel_size_m)
+
+
+def in_steps(margin_px: int) -> int:
+    """Return a margin that is at least as wide.
+
+    The scene depends on its outer size: in coarse steps, it stays the same when only the
+    distortion or the look changes somewhat.
+    """
+    return math.ceil(margin_px / _MARGIN_STEP_PX) * _MARGIN_STEP_PX

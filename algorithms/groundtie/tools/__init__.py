@@ -19,6 +19,7 @@ NAMES = (
     "filter_speckle",
     "mask_threshold",
     "simulate",
+    "simulate_sensor",
 )
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from ..declaration import tool
 from ..kinds import Choice, Distance, FolderOut, Number
@@ -13,24 +12,21 @@ from ..simulation.files import write_pair
 from ..simulation.misregistration import DISTORTIONS, DistortionOptions
 from ..simulation.optical import OpticalOptions
 from ..simulation.pair import PairOptions, simulate_pair
-from ..simulation.sar import ORBITS, SarOptions
-from ..simulation.scene import DENSITY_NAMES, SceneOptions
+from ..simulation.sar import SarOptions
+from ..simulation.scene import SceneOptions
 from .common import Seed
-
-
-@dataclass(frozen=True)
-class SimulationResult:
-    """The files of a simulated pair, by name."""
-
-    files: dict[str, Path]
-
-    def summary(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry."""
-        return {"files": {name: str(path) for name, path in self.files.items()}}
-
-    def lines(self) -> list[str]:
-        """Return the result as lines of text."""
-        return [f"{name}: {path}" for name, path in self.files.items()]
+from .simulated import (
+    Changed,
+    Density,
+    Incidence,
+    Looks,
+    OffNadir,
+    Orbit,
+    PixelSize,
+    SimulationResult,
+    Size,
+    ViewAzimuth,
+)
 
 
 @tool(title="Simulate a SAR–optical pair", group="Simulation")
@@ -43,26 +39,8 @@ def simulate(
             "check_points.csv and roof_points.csv.",
         ),
     ],
-    size: Annotated[
-        int,
-        Number(
-            label="Size",
-            help="Width and height of the scene.",
-            unit="px",
-            integer=True,
-            minimum=64,
-            maximum=20_000,
-        ),
-    ] = 1000,
-    density: Annotated[
-        str,
-        Choice(
-            label="Density",
-            help="How much of the scene is built up: rural up to 3 %, suburban up to 25 %, urban "
-            "about half, with high buildings; city has streets with cars, courtyards and towers.",
-            choices=DENSITY_NAMES,
-        ),
-    ] = "suburban",
+    size: Size = 1000,
+    density: Density = "suburban",
     distortion: Annotated[
         str,
         Choice(
@@ -81,33 +59,10 @@ def simulate(
             maximum=2000,
         ),
     ] = 8.0,
-    looks: Annotated[
-        float,
-        Number(
-            label="Looks",
-            help="Number of looks of the SAR image: fewer are noisier.",
-            minimum=1,
-            maximum=100,
-        ),
-    ] = 1.0,
-    changed: Annotated[
-        float,
-        Number(
-            label="Changed buildings",
-            help="Share of the buildings that stand in one of the images only: half of them are "
-            "pulled down after the SAR image, half are new in the optical one.",
-            unit="%",
-            minimum=0,
-            maximum=100,
-        ),
-    ] = 0.0,
+    looks: Looks = 1.0,
+    changed: Changed = 0.0,
     seed: Seed = 0,
-    pixel_size: Annotated[
-        float,
-        Distance(
-            label="Pixel size", help="Pixel size of the SAR image.", minimum=0.1, advanced=True
-        ),
-    ] = 1.0,
+    pixel_size: PixelSize = 1.0,
     input_pixel_size: Annotated[
         float | None,
         Distance(
@@ -121,48 +76,10 @@ def simulate(
         float,
         Distance(label="Relief", help="Range of the terrain's heights.", advanced=True),
     ] = 20.0,
-    incidence: Annotated[
-        float,
-        Number(
-            label="Incidence angle",
-            help="Angle between the radar's line of sight and the vertical.",
-            unit="°",
-            minimum=15,
-            maximum=60,
-            advanced=True,
-        ),
-    ] = 35.0,
-    orbit: Annotated[
-        str,
-        Choice(
-            label="Orbit",
-            help="Ascending: the radar looks east; descending: it looks west.",
-            choices=ORBITS,
-            advanced=True,
-        ),
-    ] = "ascending",
-    off_nadir: Annotated[
-        float,
-        Number(
-            label="Off-nadir angle",
-            help="Angle between the camera's line of sight and the vertical: buildings lean by it.",
-            unit="°",
-            minimum=0,
-            maximum=45,
-            advanced=True,
-        ),
-    ] = 12.0,
-    view_azimuth: Annotated[
-        float,
-        Number(
-            label="View azimuth",
-            help="Where the camera is, seen from the ground, clockwise from north.",
-            unit="°",
-            minimum=0,
-            maximum=360,
-            advanced=True,
-        ),
-    ] = 250.0,
+    incidence: Incidence = 35.0,
+    orbit: Orbit = "ascending",
+    off_nadir: OffNadir = 12.0,
+    view_azimuth: ViewAzimuth = 250.0,
     rotation: Annotated[
         float,
         Number(

@@ -1,0 +1,77 @@
+"""What is wrong with a sensor model: where it claims the image positions of the ground to be."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import ParameterError
+from .noise import Stream, random_stream
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class AttitudeOptions:
+    """How large the error is; its directions are drawn.
+
+    Attributes
+    ----------
+    shift_m : float
+        Length of the shift on the ground: an error of position, pitch and roll.
+    drift_px : float
+        How much the shift changes from the first line to the last one.
+    rotation_deg : float
+        Turn about the centre of the image: an error of yaw.
+    """
+
+    shift_m: float = 60.0
+    drift_px: float = 2.0
+    rotation_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be simulated."""
+        if self.shift_m < 0 or self.drift_px < 0 or abs(self.rotation_deg) > 1:
+            raise ParameterError(
+                "shift and drift must not be negative, the rotation of a sensor at most 1°"
+            )
+
+
+@dataclass(frozen=True)
+class AttitudeError:
+    """An affine map from true to claimed image positions (col, row).
+
+    Attributes
+    ----------
+    matrix : float64 array (2, 3)
+        Claimed position = matrix · (true column, true row, 1).
+    """
+
+    matrix: FloatArray
+
+    @classmethod
+    def draw(
+        cls, options: AttitudeOptions, size_px: tuple[int, int], pixel_m: float, seed: int
+    ) -> AttitudeError:
+        """Draw the directions of shift and drift."""
+        generator = random_stream(seed, Stream.ATTITUDE)
+        azimuths = generator.uniform(0, 2 * math.pi, 2)
+        shift, drift = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
+        turn = math.radians(options.rotation_deg)
+        linear = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+        linear[:, 1] += drift * options.drift_px / size_px[1]
+        centre = (np.array(size_px) - 1) / 2
+        moved = centre + shift * options.shift_m / pixel_m
+        return cls(np.column_stack([linear, moved - linear @ centre]))
+
+    def __call__(self, px: FloatArray) -> FloatArray:
+        """Return the claimed positions, shape (n, 2), of true ones."""
+        return np.asarray(px @ self.matrix[:, :2].T + self.matrix[:, 2])
+
+    def inverse(self) -> AttitudeError:
+        """Return the map from claimed to true positions."""
+        linear = np.linalg.inv(self.matrix[:, :2])
+        return AttitudeError(np.column_stack([linear, -linear @ self.matrix[:, 2]]))

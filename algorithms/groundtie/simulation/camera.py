@@ -1,0 +1,110 @@
+"""A push-broom camera in orbit: collinearity with a perspective centre of its own for each line.
+
+Positions are (x, y, height) in metres: the map's plane and heights above the ellipsoid, taken for
+Cartesian. Over a scene of some kilometres the satellite flies straight on and does not turn, so
+that both directions, ground to image and image to ground, are closed formulas.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PushBroom:
+    """A line of detectors that is carried along.
+
+    Attributes
+    ----------
+    centre_px : float64 array (2,)
+        Image position (col, row) that looks along `view`.
+    position_m : float64 array (3,)
+        Perspective centre when the centre's line is exposed.
+    step_m : float64 array (3,)
+        How far it moves from line to line.
+    view, across : float64 array (3,)
+        Unit vectors, perpendicular to each other: where the centre looks, and where columns run.
+    focal_px : float
+        Focal length in detectors.
+    """
+
+    centre_px: FloatArray
+    position_m: FloatArray
+    step_m: FloatArray
+    view: FloatArray
+    across: FloatArray
+    focal_px: float
+
+    @classmethod
+    def aimed(
+        cls,
+        target_m: tuple[float, float, float],
+        size_px: tuple[int, int],
+        pixel_m: float,
+        view_azimuth_deg: float,
+        off_nadir_deg: float,
+        heading_deg: float,
+        altitude_m: float,
+    ) -> PushBroom:
+        """Return the camera whose image is centred on a target.
+
+        Parameters
+        ----------
+        target_m : tuple of float
+            What the centre of the image shows.
+        size_px : tuple of int
+            Width and height of the image.
+        pixel_m : float
+            Distance of lines on the ground, and size of a detector across the line of sight.
+        view_azimuth_deg, off_nadir_deg : float
+            Where the camera is, seen from the target, clockwise from north and from the vertical.
+        heading_deg : float
+            Where it flies to, clockwise from north.
+        altitude_m : float
+            Its height above the target.
+        """
+        azimuth, off_nadir, heading = np.radians([view_azimuth_deg, off_nadir_deg, heading_deg])
+        upwards = np.array(
+            [
+                math.sin(azimuth) * math.sin(off_nadir),
+                math.cos(azimuth) * math.sin(off_nadir),
+                math.cos(off_nadir),
+            ]
+        )
+        distance_m = altitude_m / math.cos(off_nadir)
+        forward = np.array([math.sin(heading), math.cos(heading), 0.0])
+        across = np.cross(forward, -upwards)
+        return cls(
+            (np.array(size_px) - 1) / 2,
+            np.array(target_m) + distance_m * upwards,
+            pixel_m * forward,
+            -upwards,
+            across / np.linalg.norm(across),
+            distance_m / pixel_m,
+        )
+
+    def project(self, ground_m: FloatArray) -> FloatArray:
+        """Return the image positions (col, row), shape (n, 2), of ground positions (n, 3).
+
+        A point is seen when the plane of the detectors and the perspective centre sweeps over it.
+        """
+        offset = ground_m - self.position_m
+        normal = np.cross(self.view, self.across)
+        lines = offset @ normal / (self.step_m @ normal)
+        ray = offset - lines[:, None] * self.step_m
+        columns = self.focal_px * (ray @ self.across) / (ray @ self.view)
+        return np.column_stack([columns, lines]) + self.centre_px
+
+    def localise(self, px: FloatArray, height_m: FloatArray | float) -> FloatArray:
+        """Return the map positions (x, y), shape (n, 2), that are seen at heights, (n,) or one."""
+        columns, lines = (px - self.centre_px).T
+        origin = self.position_m + lines[:, None] * self.step_m
+        ray = self.view + columns[:, None] / self.focal_px * self.across
+        reach = (height_m - origin[:, 2]) / ray[:, 2]
+        return np.asarray(origin[:, :2] + reach[:, None] * ray[:, :2])

@@ -1,0 +1,96 @@
+"""A simulated sensor image as files."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rasterio.errors import RasterioError
+
+from ..rasters.atomic import Outputs, writing
+from ..rasters.grid import PIXEL_COORDINATES, Grid
+from ..sensor.rpc_files import write_rpc
+from .files import write_raster, write_table
+from .sensor_image import FloatArray, SensorImage
+
+NAMES = {
+    "reference": "reference.tif",
+    "image": "sensor.tif",
+    "dem": "dem.tif",
+    "exact_rpc": "exact_rpc.txt",
+    "truth": "truth.json",
+    "check_points": "check_points.csv",
+    "roof_points": "roof_points.csv",
+}
+CHECK_POINT_COLUMNS = ("reference_x", "reference_y", "height_m", "input_col", "input_row")
+ROOF_POINT_COLUMNS = (
+    *("x", "y", "ground_m", "height_m"),
+    *("reference_col", "reference_row", "input_col", "input_row"),
+)
+
+
+def write_sensor_image(made: SensorImage, folder: str | Path) -> dict[str, Path]:
+    """Write a sensor image into a folder, which is made if need be; all files appear or none.
+
+    Returns
+    -------
+    dict
+        Paths of reference (SAR orthoimage), image (with the delivered RPCs in its tags), dem (bare
+        ground, metres above the ellipsoid), exact_rpc, truth (JSON), check_points and roof_points
+        (CSV).
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
+    paths = {key: Path(folder) / name for key, name in NAMES.items()}
+    with writing(folder):
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    bands = [band.capitalize() for band in made.options.optical.bands]
+    own = Grid(PIXEL_COORDINATES, None, made.image.shape[2], made.image.shape[1])
+    with Outputs() as outputs, writing(folder, RasterioError):
+        staged = {key: outputs.stage(path) for key, path in paths.items()}
+        write_raster(staged["reference"], made.reference[None], made.reference_grid, ["Amplitude"])
+        write_raster(staged["image"], made.image, own, bands, made.delivered.rpc)
+        heights = ["Height of ground above the ellipsoid (m)"]
+        write_raster(staged["dem"], made.terrain_m[None], made.terrain_grid, heights)
+        write_rpc(staged["exact_rpc"], made.exact.rpc)
+        staged["truth"].write_text(json.dumps(truth_json(made), indent=1), encoding="utf-8")
+        write_table(staged["check_points"], CHECK_POINT_COLUMNS, _check_points(made))
+        write_table(staged["roof_points"], ROOF_POINT_COLUMNS, _roof_points(made))
+    return paths
+
+
+def truth_json(made: SensorImage) -> dict[str, Any]:
+    """Return what is true of a sensor image, and all that it was drawn from.
+
+    `true_to_delivered` and `delivered_to_true` are the 2×3 matrices between the image positions
+    (col, row, 1) of the camera and those of the delivered RPCs.
+    """
+    return {
+        "seed": made.options.scene.seed,
+        "vertical_datum": "ellipsoidal",
+        "true_to_delivered": made.error.matrix.tolist(),
+        "delivered_to_true": made.error.inverse().matrix.tolist(),
+        "largest_rpc_residual_px": {
+            "exact": made.exact.largest_residual_px,
+            "delivered": made.delivered.largest_residual_px,
+        },
+        "options": asdict(made.options),
+    }
+
+
+def _check_points(made: SensorImage) -> FloatArray:
+    ground = made.ground_m(made.check_points_px)
+    return np.hstack([ground, made.camera.project(ground)])
+
+
+def _roof_points(made: SensorImage) -> FloatArray:
+    points = made.roof_points
+    ground = made.ground_m(points.px)
+    heights = points.height_m[:, None]
+    return np.hstack([ground, heights, points.reference_px, points.input_px])

@@ -1,0 +1,276 @@
+"""An optical image in the geometry of its sensor, with RPCs, and a SAR image of the same ground."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import map_coordinates
+
+from ..errors import ParameterError
+from ..progress import SILENT, Progress
+from ..rasters.grid import PIXEL_COORDINATES, Grid, reproject
+from ..sensor.rpc_fit import RPCFit, fit_rpc
+from ..sensor.surfaces import LON_LAT
+from .attitude import AttitudeError, AttitudeOptions
+from .camera import PushBroom
+from .check_points import OpticalImage, RoofPoints, Scenes, ground_points, roof_points
+from .misregistration import resample
+from .noise import Stream, random_stream, strips
+from .optical import OpticalOptions, blur, quantise, render_radiance
+from .pair import in_steps, map_grid, object_reach_px, scene_grid
+from .sar import SarOptions, render_sar
+from .scene import SceneOptions, generate_scenes
+
+FloatArray = npt.NDArray[np.float64]
+
+# Height above the ellipsoid that the scene's terrain counts from.
+GROUND_M = 450.0
+
+# Heights that RPCs hold for, beyond those of the terrain, and the lattice that they are fitted to.
+_RPC_REACH_M = 200.0
+_RPC_NODES = 21
+_RPC_HEIGHTS = 7
+
+_PRECISION_M = 1e-5
+_STEPS = 100
+
+
+@dataclass(frozen=True)
+class SensorOptions:
+    """Everything that a simulated sensor image follows from.
+
+    Attributes
+    ----------
+    scene, sar, optical, attitude
+        Options of the parts; the camera stands where `optical` says.
+    heading_deg : float
+        Where the satellite flies to, clockwise from north.
+    altitude_m : float
+        Its height above the ground.
+    """
+
+    scene: SceneOptions = field(default_factory=SceneOptions)
+    sar: SarOptions = field(default_factory=SarOptions)
+    optical: OpticalOptions = field(default_factory=OpticalOptions)
+    attitude: AttitudeOptions = field(default_factory=AttitudeOptions)
+    heading_deg: float = 193.0
+    altitude_m: float = 681_000.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be simulated."""
+        if self.optical.off_nadir_deg > 45:
+            raise ParameterError("the camera must look down by 45° or more steeply")
+
+
+@dataclass(frozen=True)
+class SensorImage:
+    """A simulated sensor image.
+
+    Attributes
+    ----------
+    options : SensorOptions
+        What it was made from.
+    reference : uint16 array (rows, columns)
+        SAR amplitude, geocoded.
+    reference_grid : Grid
+        Where it lies.
+    image : uint16 array (bands, rows, columns)
+        Optical image, 11 bit, in the geometry of its sensor.
+    camera : PushBroom
+        That geometry.
+    error : AttitudeError
+        What is wrong with the delivered RPCs.
+    exact, delivered : RPCFit
+        RPCs of the camera, and those with the error.
+    terrain_m : float32 array (rows, columns)
+        Height of the bare ground above the ellipsoid, beyond all that the image shows or claims
+        to show.
+    terrain_grid : Grid
+        Where it lies.
+    check_points_px : float64 array (n, 2)
+        Reference pixels (col, row) on open ground that the image shows.
+    roof_points : RoofPoints
+        Points on roofs that both images show.
+    """
+
+    options: SensorOptions
+    reference: npt.NDArray[np.uint16]
+    reference_grid: Grid
+    image: npt.NDArray[np.uint16]
+    camera: PushBroom
+    error: AttitudeError
+    exact: RPCFit
+    delivered: RPCFit
+    terrain_m: npt.NDArray[np.float32]
+    terrain_grid: Grid
+    check_points_px: FloatArray
+    roof_points: RoofPoints
+
+    def ground_m(self, px: FloatArray) -> FloatArray:
+        """Return the ground (x, y, height), shape (n, 3), of reference pixels (n, 2)."""
+        xy = self.reference_grid.pixel_to_map(px)
+        return Terrain(self.terrain_m, self.terrain_grid).under(xy)
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """Heights of the ground above the ellipsoid, linear between the pixels of a grid."""
+
+    height_m: npt.NDArray[np.float32]
+    grid: Grid
+
+    def at(self, xy: FloatArray) -> FloatArray:
+        """Return heights, shape (n,), at map positions (n, 2)."""
+        place = self.grid.map_to_pixel(xy)[:, ::-1].T
+        return np.asarray(map_coordinates(self.height_m, place, float, order=1, mode="nearest"))
+
+    def under(self, xy: FloatArray) -> FloatArray:
+        """Return the ground (x, y, height), shape (n, 3), at map positions (n, 2)."""
+        return np.column_stack([xy, self.at(xy)])
+
+    def seen_by(self, camera: PushBroom, px: FloatArray) -> FloatArray:
+        """Return the map positions of the ground that image positions see, both (n, 2)."""
+        height_m = np.full(len(px), GROUND_M)
+        for _ in range(_STEPS):
+            xy = camera.localise(px, height_m)
+            found = self.at(xy)
+            change = np.abs(found - height_m).max(initial=0.0)
+            height_m = found
+            if change < _PRECISION_M:
+                break
+        return xy
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Where the pixels of the image lie on the pixels of the scene, (2, rows, columns)."""
+
+    places: FloatArray
+
+    @property
+    def width(self) -> int:
+        return self.places.shape[2]
+
+    def strip(self, start: int, stop: int) -> FloatArray:
+        """Return scene (row, column), shape (2, stop − start, width), of some rows."""
+        return self.places[:, start:stop]
+
+
+def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -> SensorImage:
+    """Simulate a sensor image; the same options give the same image.
+
+    Raises
+    ------
+    ParameterError
+        The options do not go together.
+    CancelledError
+        The user cancelled the work.
+    """
+    scene_options, view = options.scene, options.optical
+    size, pixel_m = scene_options.size_px, scene_options.pixel_size_m
+    grid = map_grid(scene_options)
+    camera = _camera(options, grid)
+    error = AttitudeError.draw(options.attitude, size, pixel_m, scene_options.seed)
+    progress.update(0.0, "laying out the scene")
+    margin = _margin_px(options, grid, camera, error)
+    scenes = Scenes(*generate_scenes(scene_options, margin))
+    terrain = Terrain(scenes.radar.terrain_m + np.float32(GROUND_M), scene_grid(grid, margin))
+    progress.update(0.25, "looking with the radar")
+    reference = render_sar(scenes.radar, options.sar)
+    progress.update(0.4, "looking with the camera")
+    radiance = render_radiance(scenes.camera, view)
+    seen = _seen(camera, terrain, size)
+    image = np.empty((len(radiance), size[1], size[0]), np.uint16)
+    for band, light in enumerate(radiance):
+        progress.update(0.5 + 0.5 * band / len(radiance), "resampling the optical image")
+        blur(light, view.psf_sigma_px)
+        noise = random_stream(scene_options.seed, Stream.OPTICAL_NOISE, band)
+        image[band] = quantise(resample(light, seen, size[1]), view, noise)
+    exact, delivered = _rpcs(options, camera, error, grid)
+    optical = OpticalImage(
+        lambda px: camera.project(terrain.under(grid.pixel_to_map(px))),
+        Grid(PIXEL_COORDINATES, None, *size),
+    )
+    return SensorImage(
+        options=options,
+        reference=reference,
+        reference_grid=grid,
+        image=image,
+        camera=camera,
+        error=error,
+        exact=exact,
+        delivered=delivered,
+        terrain_m=terrain.height_m,
+        terrain_grid=terrain.grid,
+        check_points_px=ground_points(scenes, grid, optical),
+        roof_points=roof_points(scenes, grid, optical, options.sar, view),
+    )
+
+
+def _camera(options: SensorOptions, grid: Grid) -> PushBroom:
+    """Return the camera that looks at the middle of the scene."""
+    x, y = grid.pixel_to_map([grid.centre_px])[0].tolist()
+    return PushBroom.aimed(
+        (x, y, GROUND_M),
+        options.scene.size_px,
+        options.scene.pixel_size_m,
+        options.optical.view_azimuth_deg,
+        options.optical.off_nadir_deg,
+        options.heading_deg,
+        options.altitude_m,
+    )
+
+
+def _margin_px(options: SensorOptions, grid: Grid, camera: PushBroom, error: AttitudeError) -> int:
+    """Return how far the scene goes on beyond the SAR image.
+
+    All that the image shows, and that its RPCs claim it to show, has heights and objects.
+    """
+    outline = Grid(PIXEL_COORDINATES, None, *options.scene.size_px).outline()
+    # Hills rise up to a half above and below the range that they have over most of the scene.
+    reach_m = 1.5 * options.scene.relief_m
+    seen = [
+        grid.map_to_pixel(camera.localise(px, GROUND_M + height_m))
+        for px in (outline, error.inverse()(outline))
+        for height_m in (-reach_m, reach_m)
+    ]
+    px = np.concatenate(seen)
+    beyond = np.maximum(-px, px - [grid.width - 1, grid.height - 1]).max()
+    reach = object_reach_px(options.scene, options.sar, options.optical)
+    return in_steps(max(math.ceil(float(beyond)), 0) + reach)
+
+
+def _seen(camera: PushBroom, terrain: Terrain, size: tuple[int, int]) -> _Seen:
+    """Return where the scene's pixels are that the image's pixels see."""
+    places = np.empty((2, size[1], size[0]))
+    for _, start, stop in strips(size[1]):
+        column, row = np.meshgrid(np.arange(size[0]), np.arange(start, stop))
+        px = np.stack([column, row], axis=-1).reshape(-1, 2).astype(float)
+        place = terrain.grid.map_to_pixel(terrain.seen_by(camera, px))
+        places[:, start:stop] = place[:, ::-1].T.reshape(2, stop - start, size[0])
+    return _Seen(places)
+
+
+def _rpcs(
+    options: SensorOptions, camera: PushBroom, error: AttitudeError, grid: Grid
+) -> tuple[RPCFit, RPCFit]:
+    """Return the RPCs of the camera, and those with the error, over the image's own range."""
+    width, height = options.scene.size_px
+    reach_m = 1.5 * options.scene.relief_m + _RPC_REACH_M
+    axes = (
+        np.linspace(-0.5, width - 0.5, _RPC_NODES),
+        np.linspace(-0.5, height - 0.5, _RPC_NODES),
+        np.linspace(GROUND_M - reach_m, GROUND_M + reach_m, _RPC_HEIGHTS),
+    )
+    columns, rows, heights = (part.ravel() for part in np.meshgrid(*axes))
+    claimed = np.column_stack([columns, rows])
+
+    def fitted(px: FloatArray) -> RPCFit:
+        lon_lat = reproject(camera.localise(px, heights), grid.crs, LON_LAT)
+        return fit_rpc(lon_lat, heights, claimed)
+
+    # The error moves what is seen: RPCs with it see their image's pixels elsewhere.
+    return fitted(claimed), fitted(error.inverse()(claimed))

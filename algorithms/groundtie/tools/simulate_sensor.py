@@ -1,0 +1,110 @@
+"""Simulate an optical image in sensor geometry, with RPCs whose errors are known exactly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from ..declaration import tool
+from ..kinds import Distance, FolderOut, Number
+from ..progress import SILENT, Progress
+from ..simulation.attitude import AttitudeOptions
+from ..simulation.optical import OpticalOptions
+from ..simulation.sar import SarOptions
+from ..simulation.scene import SceneOptions
+from ..simulation.sensor_files import write_sensor_image
+from ..simulation.sensor_image import SensorOptions, simulate_sensor_image
+from .common import Seed
+from .simulated import (
+    Changed,
+    Density,
+    Incidence,
+    Looks,
+    OffNadir,
+    Orbit,
+    PixelSize,
+    SimulationResult,
+    Size,
+    ViewAzimuth,
+)
+
+
+@tool(title="Simulate a sensor image", group="Simulation")
+def simulate_sensor(
+    folder: Annotated[
+        Path,
+        FolderOut(
+            label="Folder",
+            help="Gets sensor.tif (optical, with RPCs), reference.tif (SAR), dem.tif, "
+            "exact_rpc.txt, truth.json, check_points.csv and roof_points.csv.",
+        ),
+    ],
+    size: Size = 1000,
+    density: Density = "suburban",
+    relief: Annotated[
+        float, Distance(label="Relief", help="Range of the terrain's heights.", maximum=1000)
+    ] = 60.0,
+    shift: Annotated[
+        float,
+        Distance(
+            label="Shift",
+            help="How far off on the ground the RPCs are; the direction is drawn.",
+            maximum=2000,
+        ),
+    ] = 60.0,
+    drift: Annotated[
+        float,
+        Number(
+            label="Drift",
+            help="How much their error changes from the first line of the image to the last.",
+            unit="px",
+            minimum=0,
+            maximum=50,
+        ),
+    ] = 2.0,
+    rotation: Annotated[
+        float,
+        Number(
+            label="Rotation",
+            help="How far they are turned about the centre of the image.",
+            unit="°",
+            minimum=-1,
+            maximum=1,
+        ),
+    ] = 0.0,
+    off_nadir: OffNadir = 20.0,
+    looks: Looks = 1.0,
+    changed: Changed = 0.0,
+    seed: Seed = 0,
+    pixel_size: PixelSize = 1.0,
+    incidence: Incidence = 35.0,
+    orbit: Orbit = "ascending",
+    view_azimuth: ViewAzimuth = 250.0,
+    heading: Annotated[
+        float,
+        Number(
+            label="Heading",
+            help="Where the satellite with the camera flies to, clockwise from north.",
+            unit="°",
+            minimum=0,
+            maximum=360,
+            advanced=True,
+        ),
+    ] = 193.0,
+    progress: Progress = SILENT,
+) -> SimulationResult:
+    """Simulate an optical image in sensor geometry, with RPCs whose errors are known exactly.
+
+    A push-broom camera in orbit looks at a scene with terrain and buildings; its image is not
+    orthorectified. The RPCs in the image's tags are wrong by an error of attitude, those in
+    exact_rpc.txt are right. The SAR image of the same ground lies on the map.
+    """
+    options = SensorOptions(
+        scene=SceneOptions((size, size), pixel_size, density, relief, seed, changed / 100),
+        sar=SarOptions(incidence_deg=incidence, orbit=orbit, looks=looks),
+        optical=OpticalOptions(view_azimuth_deg=view_azimuth, off_nadir_deg=off_nadir),
+        attitude=AttitudeOptions(shift, drift, rotation),
+        heading_deg=heading,
+    )
+    made = simulate_sensor_image(options, progress)
+    return SimulationResult(write_sensor_image(made, folder))

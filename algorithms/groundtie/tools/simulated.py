@@ -1,0 +1,113 @@
+"""What the simulators share: parameters of scenes and of views of them, and the result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from ..kinds import Choice, Distance, Number
+from ..simulation.sar import ORBITS
+from ..simulation.scene import DENSITY_NAMES
+
+Size = Annotated[
+    int,
+    Number(
+        label="Size",
+        help="Width and height of the scene.",
+        unit="px",
+        integer=True,
+        minimum=64,
+        maximum=20_000,
+    ),
+]
+Density = Annotated[
+    str,
+    Choice(
+        label="Density",
+        help="How much of the scene is built up: rural up to 3 %, suburban up to 25 %, urban "
+        "about half, with high buildings; city has streets with cars, courtyards and towers.",
+        choices=DENSITY_NAMES,
+    ),
+]
+Looks = Annotated[
+    float,
+    Number(
+        label="Looks",
+        help="Number of looks of the SAR image: fewer are noisier.",
+        minimum=1,
+        maximum=100,
+    ),
+]
+Changed = Annotated[
+    float,
+    Number(
+        label="Changed buildings",
+        help="Share of the buildings that stand in one of the images only: half of them are "
+        "pulled down after the SAR image, half are new in the optical one.",
+        unit="%",
+        minimum=0,
+        maximum=100,
+    ),
+]
+PixelSize = Annotated[
+    float,
+    Distance(label="Pixel size", help="Pixel size of the SAR image.", minimum=0.1, advanced=True),
+]
+Incidence = Annotated[
+    float,
+    Number(
+        label="Incidence angle",
+        help="Angle between the radar's line of sight and the vertical.",
+        unit="°",
+        minimum=15,
+        maximum=60,
+        advanced=True,
+    ),
+]
+Orbit = Annotated[
+    str,
+    Choice(
+        label="Orbit",
+        help="Ascending: the radar looks east; descending: it looks west.",
+        choices=ORBITS,
+        advanced=True,
+    ),
+]
+OffNadir = Annotated[
+    float,
+    Number(
+        label="Off-nadir angle",
+        help="Angle between the camera's line of sight and the vertical: buildings lean by it.",
+        unit="°",
+        minimum=0,
+        maximum=45,
+        advanced=True,
+    ),
+]
+ViewAzimuth = Annotated[
+    float,
+    Number(
+        label="View azimuth",
+        help="Where the camera is, seen from the ground, clockwise from north.",
+        unit="°",
+        minimum=0,
+        maximum=360,
+        advanced=True,
+    ),
+]
+
+
+@dataclass(frozen=True)
+class SimulationResult:
+    """The files of a simulated scene, by name."""
+
+    files: dict[str, Path]
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {"files": {name: str(path) for name, path in self.files.items()}}
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        return [f"{name}: {path}" for name, path in self.files.items()]
