@@ -17,10 +17,12 @@ if TYPE_CHECKING:
     from .tools.coregister import coregister
     from .tools.detector_repeatability import detector_repeatability
     from .tools.estimate_rotation import estimate_rotation
+    from .tools.extract_gcps import extract_gcps
     from .tools.filter_speckle import filter_speckle
     from .tools.mask_threshold import mask_threshold
     from .tools.match_sar_sar import match_sar_sar
     from .tools.orthorectify import orthorectify
+    from .tools.refine_rpc import refine_rpc
     from .tools.similarity_surface import similarity_surface
     from .tools.simulate import simulate
     from .tools.simulate_sensor import simulate_sensor
@@ -32,11 +34,13 @@ __all__ = [
     "coregister",
     "detector_repeatability",
     "estimate_rotation",
+    "extract_gcps",
     "filter_speckle",
     "load_transform",
     "mask_threshold",
     "match_sar_sar",
     "orthorectify",
+    "refine_rpc",
     "similarity_surface",
     "simulate",
     "simulate_sensor",

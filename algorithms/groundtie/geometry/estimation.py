@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +39,7 @@ class Estimate:
 
     transform: Transform
     points: TiePoints
-    fold_models: tuple[Model, ...]
+    fold_models: tuple[Callable[[FloatArray], FloatArray], ...]
 
     def spread_px(self, at_px: FloatArray) -> FloatArray:
         """Return the standard deviation of predictions, shape (n,), in matching pixels.

@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import json
 import os
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -66,6 +67,8 @@ class StoredTiePoints:
         False for rejected points, shape (n,).
     crs
         CRS of the reference map.
+    more
+        Further columns, shape (n,) each; NaN where a value is missing.
     """
 
     reference_xy: FloatArray
@@ -73,9 +76,15 @@ class StoredTiePoints:
     is_check: NDArray[np.bool_]
     used: NDArray[np.bool_]
     crs: CRS | None
+    more: dict[str, FloatArray] = field(default_factory=dict)
 
 
-def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform: Transform) -> None:
+def write_tie_points(
+    path: str | os.PathLike[str],
+    points: TiePoints,
+    transform: Transform,
+    more: Mapping[str, FloatArray] = MappingProxyType({}),
+) -> None:
     """Write tie points in the format that the suffix of `path` tells.
 
     `.gpkg` and `.geojson` hold lines from where the input claims a point to be to where the
@@ -90,6 +99,8 @@ def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform:
         The points.
     transform
         What their residuals refer to, with the CRS of the map and the input's grid.
+    more
+        Further columns of numbers, shape (n,) each, by their names; `.points` has no room for them.
 
     Raises
     ------
@@ -100,10 +111,12 @@ def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform:
     if write is None:
         raise OutputError(f"tie points are written as {', '.join(_WRITERS)}: {path}")
     with writing(path):
-        write(Path(path), points, transform)
+        write(Path(path), points, transform, more)
 
 
-def read_tie_points(path: str | os.PathLike[str], input_grid: Grid) -> StoredTiePoints:
+def read_tie_points(
+    path: str | os.PathLike[str], input_grid: Grid, more: Sequence[str] = ()
+) -> StoredTiePoints:
     """Read tie points that `write_tie_points`, or a person with QGIS, wrote.
 
     Parameters
@@ -114,6 +127,8 @@ def read_tie_points(path: str | os.PathLike[str], input_grid: Grid) -> StoredTie
     input_grid
         Grid of the input. Georeferenced inputs find their pixels by the claimed positions, so
         that any raster of the scene can be given; others find them by column and row.
+    more
+        Further columns of numbers to read, where the file has them.
 
     Raises
     ------
@@ -124,7 +139,7 @@ def read_tie_points(path: str | os.PathLike[str], input_grid: Grid) -> StoredTie
     if read is None:
         raise TransformFileError(f"tie points are read from {', '.join(_READERS)}: {path}")
     try:
-        return read(Path(path), input_grid)
+        return read(Path(path), input_grid, more)
     except (
         OSError,
         ValueError,
@@ -136,7 +151,7 @@ def read_tie_points(path: str | os.PathLike[str], input_grid: Grid) -> StoredTie
         raise TransformFileError(f"cannot read the tie points {path}: {reason}") from error
 
 
-def _rows(points: TiePoints, transform: Transform) -> list[Row]:
+def _rows(points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]) -> list[Row]:
     residual = points.residual_px(transform)
     claimed = transform.claimed_xy(points.input_px)
     sigma = np.sqrt(points.covariance_px2[:, [0, 1], [0, 1]])
@@ -150,11 +165,12 @@ def _rows(points: TiePoints, transform: Transform) -> list[Row]:
             points.score,
             points.two_way_error_px,
             sigma,
+            *more.values(),
         ]
     )
     texts = {"reference_crs": "" if transform.crs is None else transform.crs.to_string()}
     return [
-        dict(zip(_NUMBERS, values, strict=True)) | {"role": role, "state": state} | texts
+        dict(zip((*_NUMBERS, *more), values, strict=True)) | {"role": role, "state": state} | texts
         for values, role, state in zip(
             numbers.tolist(), points.role.tolist(), points.state.tolist(), strict=True
         )
@@ -168,11 +184,13 @@ def _line(row: Row, crs: CRS | None, target: CRS | None) -> dict[str, Any]:
     return {"type": "LineString", "coordinates": reproject(ends, crs, target).tolist()}
 
 
-def _write_gpkg(path: Path, points: TiePoints, transform: Transform) -> None:
+def _write_gpkg(
+    path: Path, points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]
+) -> None:
     from .geopackage import write_layer  # heavy
 
-    rows = _rows(points, transform)
-    properties = dict.fromkeys(_NUMBERS, "float") | dict.fromkeys(_TEXTS, "str")
+    rows = _rows(points, transform, more)
+    properties = dict.fromkeys((*_NUMBERS, *more), "float") | dict.fromkeys(_TEXTS, "str")
     records = (
         {
             "type": "Feature",
@@ -184,27 +202,33 @@ def _write_gpkg(path: Path, points: TiePoints, transform: Transform) -> None:
     write_layer(path, _LAYER, records, len(rows), properties, transform.crs)
 
 
-def _write_geojson(path: Path, points: TiePoints, transform: Transform) -> None:
+def _write_geojson(
+    path: Path, points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]
+) -> None:
     features = [
         {
             "type": "Feature",
             "geometry": _line(row, transform.crs, _GEOJSON_CRS),
             "properties": {name: _or_null(value) for name, value in row.items()},
         }
-        for row in _rows(points, transform)
+        for row in _rows(points, transform, more)
     ]
     collection = {"type": "FeatureCollection", "name": _LAYER, "features": features}
     path.write_text(json.dumps(collection, indent=1, allow_nan=False), encoding="utf-8")
 
 
-def _write_csv(path: Path, points: TiePoints, transform: Transform) -> None:
+def _write_csv(
+    path: Path, points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]
+) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.DictWriter(file, (*_NUMBERS, *_TEXTS), lineterminator="\n")
+        table = csv.DictWriter(file, (*_NUMBERS, *more, *_TEXTS), lineterminator="\n")
         table.writeheader()
-        table.writerows(_rows(points, transform))
+        table.writerows(_rows(points, transform, more))
 
 
-def _write_points(path: Path, points: TiePoints, transform: Transform) -> None:
+def _write_points(
+    path: Path, points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]
+) -> None:
     source_xy = _georeferencer_grid(transform.input_grid).pixel_to_map(points.input_px)
     residual = points.residual_px(transform)
     lines = [] if transform.crs is None else [f"#CRS: {transform.crs.to_wkt()}"]
@@ -220,25 +244,27 @@ def _write_points(path: Path, points: TiePoints, transform: Transform) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _read_gpkg(path: Path, input_grid: Grid) -> StoredTiePoints:
+def _read_gpkg(path: Path, input_grid: Grid, more: Sequence[str]) -> StoredTiePoints:
     from .geopackage import read_layer  # heavy
 
     rows, crs = read_layer(path)
-    return _from_rows(rows, input_grid, crs)
+    return _from_rows(rows, input_grid, crs, more)
 
 
-def _read_geojson(path: Path, input_grid: Grid) -> StoredTiePoints:
+def _read_geojson(path: Path, input_grid: Grid, more: Sequence[str]) -> StoredTiePoints:
     collection = json.loads(path.read_text(encoding="utf-8"))
     rows = [feature["properties"] for feature in collection["features"]]
-    return _from_rows(rows, input_grid, input_grid.crs)
+    return _from_rows(rows, input_grid, input_grid.crs, more)
 
 
-def _read_csv(path: Path, input_grid: Grid) -> StoredTiePoints:
+def _read_csv(path: Path, input_grid: Grid, more: Sequence[str]) -> StoredTiePoints:
     with path.open(encoding="utf-8-sig", newline="") as file:
-        return _from_rows(list(csv.DictReader(file)), input_grid, input_grid.crs)
+        return _from_rows(list(csv.DictReader(file)), input_grid, input_grid.crs, more)
 
 
-def _from_rows(rows: list[Row], input_grid: Grid, usual_crs: CRS | None) -> StoredTiePoints:
+def _from_rows(
+    rows: list[Row], input_grid: Grid, usual_crs: CRS | None, more: Sequence[str]
+) -> StoredTiePoints:
     """Return the points of a table; without a column `reference_crs` the map has the usual CRS."""
     named = {str(row["reference_crs"] or "") for row in rows if "reference_crs" in row}
     if len(named) > 1:
@@ -259,10 +285,11 @@ def _from_rows(rows: list[Row], input_grid: Grid, usual_crs: CRS | None) -> Stor
         np.array([role == "check" for role in roles], bool),
         np.array([state == USED for state in states], bool),
         crs,
+        {name: np.array([_number(row.get(name)) for row in rows]) for name in more},
     )
 
 
-def _read_points(path: Path, input_grid: Grid) -> StoredTiePoints:
+def _read_points(path: Path, input_grid: Grid, more: Sequence[str]) -> StoredTiePoints:
     """Read a Georeferencer file; without a CRS line its map is in the raster's CRS."""
     crs = input_grid.crs
     lines = path.read_text(encoding="utf-8-sig").splitlines()
@@ -280,6 +307,7 @@ def _read_points(path: Path, input_grid: Grid) -> StoredTiePoints:
         np.zeros(len(rows), bool),
         np.array([row["enable"].strip() != "0" for row in rows], bool),
         crs,
+        {name: np.full(len(rows), np.nan) for name in more},
     )
 
 
@@ -291,17 +319,21 @@ def _columns(rows: Iterable[Row], x: str, y: str) -> FloatArray:
     return np.array([[float(row[x]), float(row[y])] for row in rows], float).reshape(-1, 2)
 
 
+def _number(value: Any) -> float:
+    return float("nan") if value is None or value == "" else float(value)
+
+
 def _or_null(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-_WRITERS: dict[str, Callable[[Path, TiePoints, Transform], None]] = {
+_WRITERS: dict[str, Callable[[Path, TiePoints, Transform, Mapping[str, FloatArray]], None]] = {
     ".gpkg": _write_gpkg,
     ".geojson": _write_geojson,
     ".csv": _write_csv,
     ".points": _write_points,
 }
-_READERS: dict[str, Callable[[Path, Grid], StoredTiePoints]] = {
+_READERS: dict[str, Callable[[Path, Grid, Sequence[str]], StoredTiePoints]] = {
     ".gpkg": _read_gpkg,
     ".geojson": _read_geojson,
     ".csv": _read_csv,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -156,6 +156,7 @@ def write_with_geotransform(
     grid: Grid,
     path: str | os.PathLike[str],
     *,
+    rpc_tags: Mapping[str, str] | None = None,
     progress: Progress = SILENT,
 ) -> None:
     """Write a raster's pixels, untouched, with another geotransform and CRS into a GeoTIFF.
@@ -168,6 +169,8 @@ def write_with_geotransform(
         Its new grid, of the same size.
     path
         The GeoTIFF to write; see `atomic.Outputs.stage`.
+    rpc_tags
+        RPCs that locate it, as GDAL's metadata domain RPC.
     progress
         Told of every tile.
 
@@ -181,6 +184,8 @@ def write_with_geotransform(
     nodata = source.bands[0].nodata
     places = list(tiles(grid))
     with create_like(source, grid, path, nodata=nodata) as dataset:
+        if rpc_tags is not None:
+            dataset.update_tags(ns="RPC", **rpc_tags)
         for i, tile in enumerate(places):
             place = rasterio.windows.Window(*tile)
             values, mask = source.read_untouched(tile)

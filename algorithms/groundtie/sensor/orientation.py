@@ -185,9 +185,9 @@ def orient(
     return Orientation(rpc, heights, crs, to_lon_lat)
 
 
-def seen_at(rpc: RPC, size: tuple[int, int], height_m: float) -> FloatArray:
+def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODES) -> FloatArray:
     """Return longitudes and latitudes all over an image, (n, 2), at a height; none is NaN."""
-    along = [np.linspace(-0.5, side - 0.5, _NODES) for side in size]
+    along = [np.linspace(-0.5, side - 0.5, nodes) for side in size]
     px = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
     lon_lat = rpc.localise(px, height_m)
     return lon_lat[np.isfinite(lon_lat).all(axis=1)]

@@ -12,6 +12,8 @@ NAMES = (
     "match_sar_sar",
     "estimate_rotation",
     "warp",
+    "extract_gcps",
+    "refine_rpc",
     "orthorectify",
     "assess",
     "similarity_surface",

@@ -1,0 +1,101 @@
+"""Corrections of RPCs in image space, and folding them into the coefficients.
+
+What is wrong with RPCs are attitude and position of the satellite; over a scene that moves image
+positions by a shift, drifts along the lines, or an affine change (Fraser & Hanley 2003,
+doi:10.14358/PERS.69.1.53).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..geometry.models import monomials
+from .rpc import RPC
+from .rpc_fit import RPCFit, fit_rpc, ground_lattice
+
+FloatArray = NDArray[np.float64]
+
+# Terms of each model, an axis, from the simplest to the most flexible.
+TERMS = {"shift": 1, "shift_drift": 2, "affine": 3}
+KINDS = tuple(TERMS)
+
+# Heights between which RPCs are fitted again: their own range, so that they hold there as before.
+_HEIGHTS = 7
+
+
+@dataclass(frozen=True)
+class Bias:
+    """What is added to the image positions of RPCs to make them right.
+
+    Parameters
+    ----------
+    kind
+        One of `KINDS`.
+    size
+        Width and height of the image, pixels.
+    coefficients
+        Column and row of the correction, px, for each term; shape (terms, 2). Terms are 1, the
+        row and the column, within ±1 over the image.
+    covariance
+        Of the coefficients, raveled, px²; shape (2 terms, 2 terms).
+    """
+
+    kind: str
+    size: tuple[int, int]
+    coefficients: FloatArray
+    covariance: FloatArray
+
+    def __call__(self, px: ArrayLike) -> FloatArray:
+        """Return the corrections (col, row), shape (n, 2), at image positions of the RPCs."""
+        return design(self.kind, self.size, np.asarray(px, float)) @ self.coefficients
+
+    def sigma_px(self, px: ArrayLike) -> FloatArray:
+        """Return the standard deviation of the corrections, shape (n,), in pixels."""
+        terms = design(self.kind, self.size, np.asarray(px, float))
+        count = terms.shape[1]
+        blocks = self.covariance.reshape(count, 2, count, 2)
+        variance = np.einsum("ni,iajb,nj->nab", terms, blocks, terms)
+        return np.asarray(np.sqrt(np.trace(variance, axis1=1, axis2=2)))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the correction as values that JSON can carry."""
+        names = ("constant", "row", "col")[: len(self.coefficients)]
+        sigma = np.sqrt(np.diag(self.covariance)).reshape(-1, 2)
+        return {
+            "model": self.kind,
+            "terms": {
+                name: {"col_px": c[0], "row_px": c[1], "sigma_col_px": s[0], "sigma_row_px": s[1]}
+                for name, c, s in zip(
+                    names, self.coefficients.tolist(), sigma.tolist(), strict=True
+                )
+            },
+            "covariance_px2": self.covariance.tolist(),
+        }
+
+
+def design(kind: str, size: tuple[int, int], px: FloatArray) -> FloatArray:
+    """Return the terms of a model at image positions, shape (n, terms)."""
+    middle = (np.array(size) - 1) / 2
+    unit = (px - middle) / (np.array(size) / 2)
+    return monomials(unit[:, ::-1], 1)[:, : TERMS[kind]]
+
+
+def fold(rpc: RPC, bias: Bias) -> RPCFit:
+    """Return RPCs that a correction is part of, and how far they miss it.
+
+    A shift moves the offsets, which is exact; other models are taken up by a new fit to a lattice
+    over the image and the RPCs' range of heights.
+    """
+    if bias.kind == "shift":
+        return RPCFit(rpc.shifted(bias.coefficients[0]), 0.0, 0.0)
+    low, high = (rpc.offset[2] + sign * abs(rpc.scale[2]) for sign in (-1, 1))
+    lon_lat, height = ground_lattice(rpc, bias.size, np.linspace(low, high, _HEIGHTS))
+    seen = np.isfinite(lon_lat).all(axis=1)
+    lon_lat, height = lon_lat[seen], height[seen]
+    px = rpc.project(lon_lat, height)
+    stated = {"error_bias_m": rpc.error_bias_m, "error_random_m": rpc.error_random_m}
+    return fit_rpc(lon_lat, height, px + bias(px), **stated)

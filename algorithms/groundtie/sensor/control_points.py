@@ -1,0 +1,179 @@
+"""Ground control points: places in the image whose position and height on the ground are known."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rasterio.crs import CRS
+
+from ..errors import TransformFileError
+from ..geometry.tie_point_files import read_tie_points, write_tie_points
+from ..geometry.tie_points import USED, TiePoints
+from ..geometry.transform import Transform
+from ..rasters.atomic import writing
+from ..rasters.grid import Grid, reproject
+from .adjustment import Control
+from .orientation import Orientation, SensorGrid
+from .rpc import RPC
+from .surfaces import LON_LAT
+
+FloatArray = NDArray[np.float64]
+
+HEIGHT, CORRELATION = "height_m", "sigma_correlation"
+_SIGMAS = ("sigma_x_px", "sigma_y_px")
+
+# Standard deviation, in pixels, of points that come without one.
+_USUAL_SIGMA_PX = 1.0
+
+# What GDAL takes as `gdal_translate --optfile`.
+GDAL_SUFFIX = ".txt"
+SUFFIXES = (".gpkg", ".geojson", ".csv", ".points", GDAL_SUFFIX)
+
+
+@dataclass(frozen=True)
+class ControlPoints:
+    """Ground control points of an image with RPCs.
+
+    Parameters
+    ----------
+    points
+        Position on the map and in the image, scores and state; covariances are in image pixels².
+    height_m
+        Height above the ellipsoid, shape (n,).
+    crs
+        CRS of the map.
+    """
+
+    points: TiePoints
+    height_m: FloatArray
+    crs: CRS
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def take(self, which: Any) -> ControlPoints:
+        """Return the rows that the index or mask `which` selects."""
+        return replace(self, points=self.points.take(which), height_m=self.height_m[which])
+
+    def with_points(self, points: TiePoints) -> ControlPoints:
+        """Return the same places with other states."""
+        return replace(self, points=points)
+
+    @property
+    def lon_lat(self) -> FloatArray:
+        """Longitude and latitude, shape (n, 2)."""
+        return reproject(self.points.reference_xy, self.crs, LON_LAT)
+
+    def seen_by(self, rpc: RPC, size: tuple[int, int]) -> Control:
+        """Return the points as RPCs see them."""
+        return Control(
+            rpc.project(self.lon_lat, self.height_m),
+            self.points.input_px,
+            self.points.covariance_px2,
+            size,
+        )
+
+    def write(self, path: str | os.PathLike[str], orientation: Orientation, grid: Grid) -> None:
+        """Write the points in the format that the suffix of `path` tells (see `SUFFIXES`).
+
+        Residuals and lines refer to `orientation`: lines lead from where it sees a point on the
+        map to where the point is. `grid` is the image's own.
+
+        Raises
+        ------
+        OutputError
+            The file cannot be written, or its suffix is not known.
+        """
+        if Path(path).suffix.lower() == GDAL_SUFFIX:
+            with writing(path):
+                Path(path).write_text(self._gdal_options(), encoding="utf-8")
+            return
+        own: Grid = SensorGrid(grid.transform, self.crs, grid.width, grid.height, orientation)
+        if Path(path).suffix.lower() == ".points":
+            own = grid  # the Georeferencer counts an image's own pixels
+        covariance = self.points.covariance_px2
+        sigma = np.sqrt(covariance[:, 0, 0] * covariance[:, 1, 1])
+        more = {HEIGHT: self.height_m, CORRELATION: covariance[:, 0, 1] / sigma}
+        transform = Transform.as_claimed(self.crs, own)
+        write_tie_points(path, self.points, transform, more)
+
+    def _gdal_options(self) -> str:
+        """Return the used points of the fit as options of gdal_translate."""
+        kept = self.take(self.points.used & ~self.points.is_check)
+        lines = [f"-a_srs {self.crs.to_string()}"]
+        for (col, row), (x, y), height in zip(
+            kept.points.input_px, kept.points.reference_xy, kept.height_m, strict=True
+        ):
+            # GDAL counts pixels from the corner of the first one.
+            lines.append(f"-gcp {col + 0.5:.6f} {row + 0.5:.6f} {x:.17g} {y:.17g} {height:.4f}")
+        return "\n".join(lines) + "\n"
+
+
+def read_control_points(path: Path, orientation: Orientation, grid: Grid) -> ControlPoints:
+    """Read ground control points, or tie points that a person set in QGIS.
+
+    Parameters
+    ----------
+    path
+        A `.gpkg`, `.geojson`, `.csv` or `.points` file (see `geometry.tie_point_files`). Points
+        without a height get that of the ground, those without a sigma one of 1 px.
+    orientation
+        Gives heights, and the CRS of the map if the file does not tell it.
+    grid
+        The image's own grid.
+
+    Raises
+    ------
+    TransformFileError
+        The file cannot be read or understood, or holds no points.
+    """
+    pixels = replace(grid, crs=None)
+    names = (HEIGHT, CORRELATION, *_SIGMAS)
+    stored = read_tie_points(path, _own_pixels(pixels), names)
+    if len(stored.reference_xy) == 0:
+        raise TransformFileError(f"{path} holds no points")
+    crs = stored.crs or orientation.crs
+    height = stored.more[HEIGHT]
+    lon_lat = reproject(stored.reference_xy, crs, LON_LAT)
+    height = np.where(np.isfinite(height), height, orientation.heights.at(lon_lat))
+    count = len(height)
+    state = np.where(stored.used, USED, "rejected: in the file").astype(object)
+    state[np.array(stored.used) & ~np.isfinite(height)] = "rejected: no height"
+    points = TiePoints(
+        reference_xy=stored.reference_xy,
+        input_px=stored.input_px,
+        score=np.full(count, np.nan),
+        covariance_px2=_covariances(*(stored.more[name] for name in (*_SIGMAS, CORRELATION))),
+        two_way_error_px=np.full(count, np.nan),
+        is_check=stored.is_check,
+        state=state.astype(str),
+    )
+    return ControlPoints(points, np.where(np.isfinite(height), height, 0.0), crs)
+
+
+def _own_pixels(grid: Grid) -> Grid:
+    """Return a grid whose map positions are an image's pixels, wherever the image claims to be."""
+    from ..rasters.grid import PIXEL_COORDINATES
+
+    return replace(grid, transform=PIXEL_COORDINATES)
+
+
+def _covariances(x: FloatArray, y: FloatArray, correlation: FloatArray) -> FloatArray:
+    x, y = (np.where(np.isfinite(sigma), sigma, _USUAL_SIGMA_PX) for sigma in (x, y))
+    both = np.where(np.isfinite(correlation), correlation, 0.0) * x * y
+    return np.stack([np.stack([x**2, both], -1), np.stack([both, y**2], -1)], -2)
+
+
+def joined(parts: Sequence[ControlPoints]) -> ControlPoints:
+    """Return the rows of several tables of one map, one after the other."""
+    return ControlPoints(
+        TiePoints.concatenate([part.points for part in parts]),
+        np.concatenate([part.height_m for part in parts]),
+        parts[0].crs,
+    )

@@ -1,0 +1,172 @@
+"""Whether heights fit the RPCs: what can be told of a wrong vertical datum, and what cannot.
+
+All heights being wrong by the same moves the image positions by nearly the same everywhere, as a
+shift of the RPCs does, whatever the relief: a refinement takes it up, and residuals do not show
+it. What may show it are the range of heights that the RPCs were made for, heights that the control
+points themselves have, and, with a wide field of view only, how the effect varies over the image.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import GroundTieError
+from ..rasters.reading import open_raster
+from .adjustment import Adjustment, Control
+from .bias import design
+from .heights import ConstantHeight, find_geoid
+from .orientation import FloatArray, Orientation, seen_at
+from .surfaces import surface_over
+
+# Ground beyond the RPCs' range of heights by more is worth telling: metres, and share of the scale.
+_BEYOND_M, _BEYOND_SHARE = 10.0, 0.05
+
+# A height offset is told if it is larger than so many standard deviations, and than this.
+_SIGMAS = 4.0
+_OFFSET_M = 10.0
+
+# Shares of the ground that are left out at both ends of its range.
+_TAIL = 0.01
+
+
+@dataclass(frozen=True)
+class HeightCheck:
+    """What is known of the heights' zero.
+
+    Parameters
+    ----------
+    ground_m
+        Lowest and highest ground in the image, metres above the ellipsoid.
+    range_m
+        Lowest and highest height that the RPCs were made for.
+    geoid_m
+        Height of the geoid EGM96 above the ellipsoid; None: its grid is not installed.
+    offset_m, offset_sigma_m
+        What would have to be added to all heights, by the residuals of the control points, and
+        its standard deviation, which is large: see above.
+    control_offset_m
+        Median of the control points' own heights minus the ground's; None: they have none.
+    """
+
+    ground_m: tuple[float, float]
+    range_m: tuple[float, float]
+    geoid_m: float | None
+    offset_m: float | None = None
+    offset_sigma_m: float | None = None
+    control_offset_m: float | None = None
+
+    @property
+    def beyond_m(self) -> float:
+        """How far the ground leaves the RPCs' range: below (negative) or above it."""
+        below = min(self.ground_m[0] - self.range_m[0], 0.0)
+        above = max(self.ground_m[1] - self.range_m[1], 0.0)
+        return below if -below > above else above
+
+    def summary(self) -> dict[str, Any]:
+        """Return the check as values that JSON can carry."""
+        return asdict(self) | {"warnings": self.warnings()}
+
+    def warnings(self) -> list[str]:
+        """Return in words what speaks against the heights."""
+        told = []
+        scale = (self.range_m[1] - self.range_m[0]) / 2
+        if abs(self.beyond_m) > max(_BEYOND_M, _BEYOND_SHARE * scale):
+            geoid = (
+                "" if self.geoid_m is None else f" (EGM96 is {self.geoid_m:.0f} m above it here)"
+            )
+            told.append(
+                f"the ground lies at {self.ground_m[0]:.0f} to {self.ground_m[1]:.0f} m above the "
+                f"ellipsoid{geoid}, but the RPCs were made for {self.range_m[0]:.0f} to "
+                f"{self.range_m[1]:.0f} m: is the vertical datum right?"
+            )
+        if self.control_offset_m is not None and abs(self.control_offset_m) > _OFFSET_M:
+            told.append(
+                f"the control points lie {self.control_offset_m:+.0f} m from the ground of the "
+                "terrain model: is the vertical datum right?"
+            )
+        if (
+            self.offset_m is not None
+            and self.offset_sigma_m is not None
+            and abs(self.offset_m) > max(_SIGMAS * self.offset_sigma_m, _OFFSET_M)
+        ):
+            told.append(
+                f"by the residuals all heights are wrong by {self.offset_m:+.0f} ± "
+                f"{self.offset_sigma_m:.0f} m: is the vertical datum right?"
+            )
+        return told
+
+
+def check_heights(
+    orientation: Orientation,
+    size: tuple[int, int],
+    control: Control | None = None,
+    adjustment: Adjustment | None = None,
+    control_offset_m: float | None = None,
+) -> HeightCheck:
+    """Check the heights of an orientation.
+
+    Parameters
+    ----------
+    orientation
+        How the image sees the ground.
+    size
+        Width and height of the image.
+    control, adjustment
+        Control points of the image and what was fitted to them.
+    control_offset_m
+        See `HeightCheck`.
+    """
+    rpc = orientation.rpc
+    seen = seen_at(rpc, size, orientation.heights.typical_m, 33)
+    heights = orientation.heights.at(seen)
+    heights = heights[np.isfinite(heights)]
+    low, high = (float(np.quantile(heights, tail)) for tail in (_TAIL, 1 - _TAIL))
+    reach = abs(rpc.scale[2])
+    offset = sigma = None
+    if control is not None and adjustment is not None:
+        offset, sigma = _offset(orientation, control, adjustment)
+    constant = isinstance(orientation.heights, ConstantHeight)
+    return HeightCheck(
+        (low, high),
+        (rpc.offset[2] - reach, rpc.offset[2] + reach),
+        None if constant else _geoid(seen),
+        offset,
+        sigma,
+        control_offset_m,
+    )
+
+
+def _geoid(lon_lat: FloatArray) -> float | None:
+    try:
+        path = find_geoid("EGM96")
+        assert path is not None
+        with open_raster(path) as source:
+            return float(np.nanmean(surface_over(source, lon_lat).at(lon_lat)))
+    except GroundTieError:
+        return None
+
+
+def _offset(
+    orientation: Orientation, control: Control, adjustment: Adjustment
+) -> tuple[float, float]:
+    """Return what residuals say of a common error of all heights, and its standard deviation."""
+    used = control.take(adjustment.used)
+    height = orientation.heights.typical_m
+    ground = orientation.rpc.localise(used.expected_px, height)
+    slope = orientation.rpc.derivatives(ground, height)[:, :, 2]
+    terms = design(adjustment.bias.kind, used.size, used.expected_px)
+    columns = [np.kron(terms, np.eye(2)), slope.reshape(-1, 1)]
+    sigma = max(adjustment.sigma_px, 0.05)
+    covariance = used.covariance_px2 + sigma**2 * np.eye(2)
+    root = np.linalg.cholesky(np.linalg.inv(covariance)).swapaxes(1, 2)
+    full = np.hstack(columns).reshape(len(used), 2, -1)
+    residuals = used.found_px - used.expected_px
+    system = (root @ full).reshape(2 * len(used), -1)
+    known = (root @ residuals[:, :, None]).reshape(-1)
+    scale = np.sqrt((system**2).sum(axis=0))
+    inverse = np.linalg.pinv((system / scale).T @ (system / scale), rcond=1e-15, hermitian=True)
+    found = inverse @ ((system / scale).T @ known) / scale
+    return float(found[-1]), float(np.sqrt(max(inverse[-1, -1], 0.0)) / scale[-1])

@@ -1,0 +1,189 @@
+"""Extract ground control for an image with RPCs from a reference image and a terrain model."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from ..declaration import Output as ResultOutput
+from ..declaration import tool
+from ..errors import NotRegisteredError
+from ..kinds import VectorOut
+from ..masks.choice import NONE, REFERENCE, MaskUsed
+from ..progress import SILENT, Progress
+from ..quality.verdict import Verdict
+from ..rasters.atomic import Outputs
+from ..rasters.reading import bounded_cache
+from ..sensor.control_points import SUFFIXES, ControlPoints
+from ..similarity.surface import SimilaritySettings
+from .common import (
+    HighPercent,
+    LowPercent,
+    MatchingPixelSize,
+    Reference,
+    ReferenceBand,
+    ReferenceMask,
+    Seed,
+    Workers,
+    worker_count,
+)
+from .ground_control import GroundControl, Matching, match_ground_control, open_reference
+from .masking import MaskRequest
+from .sensor_input import (
+    Dem,
+    DemDatum,
+    Geoid,
+    Ground,
+    Height,
+    RpcFile,
+    SensorImage,
+    open_sensor_image,
+)
+from .sensor_matching import (
+    ChipSize,
+    ImageBand,
+    MaskKind,
+    MaxError,
+    SearchRadius,
+    Similarity,
+    TwoWayError,
+)
+
+
+@dataclass(frozen=True)
+class GcpResult:
+    """What `extract_gcps` found.
+
+    Parameters
+    ----------
+    points
+        The points, check points included.
+    verdict
+        Whether they can be trusted, by the check points.
+    mask
+        The mask that was used.
+    output
+        The file.
+    heights
+        Which heights were used, in words.
+    """
+
+    points: ControlPoints
+    verdict: Verdict
+    mask: MaskUsed
+    output: Path
+    heights: str
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {
+            "output": str(self.output),
+            "points": len(self.points),
+            "points_used": int(self.points.points.used.sum()),
+            "heights": self.heights,
+            "mask": self.mask.summary(),
+            "verdict": self.verdict.summary(),
+        }
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        table, verdict = self.points.points, self.verdict
+        return [
+            f"accepted: {verdict.reason}",
+            f"{int((table.used & ~table.is_check).sum())} of {int((~table.is_check).sum())} "
+            f"points, and {int((table.used & table.is_check).sum())} check points",
+            f"error at check points: RMSE {verdict.check_rmse_px:.2f} px "
+            f"({verdict.check_rmse_m:.2f} m)",
+            self.heights,
+            self.mask.line(),
+            f"wrote {self.output}",
+        ]
+
+
+@tool(
+    title="Extract ground control",
+    group="Sensor models",
+    outputs=(
+        ResultOutput("POINTS", "Number of points that are used", "points_used"),
+        ResultOutput("CHECK_RMSE_PX", "Error at check points (px)", "verdict.check_rmse_px"),
+    ),
+)
+def extract_gcps(
+    image: SensorImage,
+    reference: Reference,
+    output: Annotated[
+        Path,
+        VectorOut(
+            label="Ground control points",
+            help="Points with position in the image and on the map, height, covariance and scores; "
+            ".txt holds options of gdal_translate.",
+            suffixes=SUFFIXES,
+        ),
+    ],
+    dem: Dem = None,
+    dem_datum: DemDatum = None,
+    search_radius: SearchRadius = None,
+    similarity: Similarity = "fused",
+    max_error: MaxError = 3.0,
+    height: Height = None,
+    geoid: Geoid = None,
+    rpc: RpcFile = None,
+    image_band: ImageBand = None,
+    reference_band: ReferenceBand = None,
+    reference_mask: ReferenceMask = None,
+    mask: MaskKind = NONE,
+    mask_high_percent: HighPercent = 20.0,
+    mask_low_percent: LowPercent = 10.0,
+    matching_pixel_size: MatchingPixelSize = None,
+    chip_size: ChipSize = None,
+    two_way_error: TwoWayError = 2.0,
+    workers: Workers = None,
+    seed: Seed = 0,
+    progress: Progress = SILENT,
+) -> GcpResult:
+    """Extract ground control for an image with RPCs from a reference image and a terrain model.
+
+    The image is projected onto the reference's map by its RPCs and matched there as coregister
+    does; what is found is carried back into the image. A rough error of the RPCs within the search
+    radius is found first. Held-out points decide whether the points can be trusted; if not,
+    nothing is written.
+    """
+    ground = Ground(dem, dem_datum, geoid, height)
+    matching = Matching(
+        search_radius,
+        SimilaritySettings(similarity),
+        MaskRequest(mask, REFERENCE, mask_high_percent, mask_low_percent, 0.0),
+        matching_pixel_size,
+        chip_size,
+        two_way_error,
+        max_error,
+        seed,
+        image_band,
+    )
+    with ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        source, model = open_sensor_image(image, rpc, stack)
+        located = open_reference(reference, reference_band, reference_mask, stack)
+        progress.update(0.0, ground.note(model))
+        orientation = ground.orientation(source, model, located.source.grid.crs, stack)
+        with ThreadPoolExecutor(worker_count(workers)) as executor:
+            found = match_ground_control(
+                source, orientation, located, matching, executor, stack, progress
+            )
+        points = accepted_points(found, image, reference)
+        with Outputs() as outputs:
+            points.write(outputs.stage(output), orientation, source.grid)
+    return GcpResult(points, found.registration.verdict, found.mask, output, ground.note(model))
+
+
+def accepted_points(found: GroundControl, image: Path, reference: Path) -> ControlPoints:
+    """Return the points that were found; raise `NotRegisteredError` if they are refused."""
+    verdict = found.registration.verdict
+    if not verdict.accepted or found.points is None:
+        raise NotRegisteredError(
+            f"{image} was not matched with {reference}: {verdict.reason}", verdict
+        )
+    return found.points
