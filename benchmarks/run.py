@@ -22,6 +22,7 @@ SUITES = (
     "large_shift",
     "rotated_pairs",
     "rotation",
+    "rpc",
     "speed",
     "methods",
     "peaks",

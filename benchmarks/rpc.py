@@ -1,0 +1,239 @@
+"""Refined RPCs: real ones with known biases, and half-real images matched with real SAR images."""
+
+from __future__ import annotations
+
+import csv
+import tempfile
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import rasterio
+from rasterio.errors import NotGeoreferencedWarning
+
+import groundtie
+from groundtie.errors import NotRegisteredError
+from groundtie.sensor.bias import Bias, fold
+from groundtie.sensor.rpc import RPC
+from groundtie.sensor.rpc_files import read_rpc
+from groundtie.sensor.rpc_tags import rpc_to_tags
+
+from .accuracy import CORRECT, REFUSED, classify
+from .attempt import Outcome, count, unregistered
+from .half_real import BIASES, PLACES, SENSORS, bias_of, make_scene, place_case, sensor_rpc
+from .suites import Case, Goal, Settings, SuiteResult, run_cases
+from .tables import accuracy_table
+
+HALF_REAL, ROUND_TRIP, BLUNDERS = "half real", "round trip", "blunders"
+
+# Control points of the round trip: how many, how well measured, and how many are wrong by how much.
+_POINTS = 100
+_NOISE_PX = 0.3
+_BLUNDERS = 0.3
+_BLUNDER_PX = 100.0
+RECOVERED_PX = 0.1
+CHANGED_PX = 0.2
+_SIZE = (6000, 5000)
+
+
+@dataclass(frozen=True)
+class HalfRealCase:
+    """A half-real image with biased RPCs, refined by the real SAR image."""
+
+    data: Path
+    place: str
+    number: int
+
+    @property
+    def name(self) -> str:
+        """Place, sensor and number of the bias."""
+        return f"{self.place}, {self.sensor}, bias {self.number}"
+
+    @property
+    def sensor(self) -> str:
+        """Which real RPCs: they take turns."""
+        return tuple(SENSORS)[(PLACES.index(self.place) + self.number) % len(SENSORS)]
+
+    def run(self, workers: int | None) -> Outcome:
+        """Make the scene, refine its RPCs and judge them by the true ones."""
+        with tempfile.TemporaryDirectory() as folder:
+            scene = make_scene(
+                place_case(self.data, self.place),
+                sensor_rpc(self.data, self.sensor),
+                self.number,
+                Path(folder),
+            )
+            output = Path(folder) / "refined_RPC.TXT"
+            started = time.perf_counter()
+            try:
+                result = groundtie.refine_rpc(
+                    scene.image,
+                    output,
+                    reference=scene.reference,
+                    dem=scene.dem,
+                    dem_datum="ellipsoidal",
+                    workers=workers,
+                )
+            except NotRegisteredError as refusal:
+                seconds = time.perf_counter() - started
+                return unregistered(
+                    REFUSED, self.name, HALF_REAL, scene.sigma_px, seconds, str(refusal)
+                )
+            seconds = time.perf_counter() - started
+            error = scene.error_px(read_rpc(output))
+        verdict = classify(True, error, scene.sigma_px)
+        return Outcome(
+            self.name,
+            HALF_REAL,
+            verdict,
+            verdict,
+            error,
+            error,
+            scene.sigma_px,
+            seconds,
+            result.judged.verdict.check_rmse_px,
+            result.adjustment.bias.kind,
+            result.judged.verdict.reason,
+        )
+
+
+@dataclass(frozen=True)
+class RoundTripCase:
+    """Real RPCs, a known bias, and measured control points, some of which may be wrong."""
+
+    data: Path
+    sensor: str
+    number: int
+    wrong: bool
+
+    @property
+    def group(self) -> str:
+        """With which others it is counted."""
+        return BLUNDERS if self.wrong else ROUND_TRIP
+
+    def run(self, workers: int | None) -> Outcome:
+        """Refine, with and without blunders, and compare with the truth or with each other."""
+        truth = sensor_rpc(self.data, self.sensor)
+        truth = truth.shifted(np.array(_SIZE) / 2 - truth.image_offset)
+        bias = bias_of(self.number, _SIZE)
+        started = time.perf_counter()
+        with tempfile.TemporaryDirectory() as folder:
+            clean, result = self._refined(truth, bias, Path(folder), 0.0)
+            seconds = time.perf_counter() - started
+            if self.wrong:
+                found, result = self._refined(truth, bias, Path(folder), _BLUNDERS)
+                error = _distance_px(found, clean, truth)
+            else:
+                error = _distance_px(clean, truth, truth)
+        limit = CHANGED_PX if self.wrong else RECOVERED_PX
+        verdict = CORRECT if error <= limit else "inaccurate"
+        reason = result.judged.verdict.reason
+        return Outcome(
+            f"{self.sensor}, bias {self.number}", self.group, verdict, verdict, error, error,
+            limit, seconds, result.judged.verdict.check_rmse_px, result.adjustment.bias.kind, reason,
+        )  # fmt: skip
+
+    def _refined(
+        self, truth: RPC, bias: Bias, folder: Path, wrong: float
+    ) -> tuple[RPC, groundtie.tools.refine_rpc.RefinedRpc]:
+        random = np.random.default_rng(self.number)
+        px = random.uniform(0, 1, (_POINTS, 2)) * _SIZE
+        height = truth.offset[2] + random.uniform(-0.2, 0.2, _POINTS) * truth.scale[2]
+        lon_lat = truth.localise(px, height)
+        measured = px + random.normal(0, _NOISE_PX, px.shape)
+        moved = random.permutation(_POINTS)[: int(wrong * _POINTS)]
+        measured[moved] += random.uniform(-_BLUNDER_PX, _BLUNDER_PX, (len(moved), 2))
+        table = folder / "points.csv"
+        with table.open("w", newline="") as file:
+            writer = csv.writer(file)
+            names = "reference_x", "reference_y", "input_col", "input_row", "height_m"
+            writer.writerow([*names, "reference_crs", "sigma_x_px", "sigma_y_px"])
+            for row in np.column_stack([lon_lat, measured, height]).tolist():
+                writer.writerow([*row, "EPSG:4326", _NOISE_PX, _NOISE_PX])
+        image = folder / "image.tif"
+        _write_empty(image, fold(truth, bias).rpc)
+        output = folder / "refined.RPB"
+        result = groundtie.refine_rpc(image, output, gcps=table, height=truth.offset[2])
+        return read_rpc(output), result
+
+
+def _distance_px(found: RPC, expected: RPC, truth: RPC) -> float:
+    """Return the RMSE between two models of one image, pixels."""
+    nodes = np.stack(np.meshgrid(*(np.linspace(0, side, 15) for side in _SIZE)), -1).reshape(-1, 2)
+    ground = truth.localise(nodes, truth.offset[2])
+    apart = found.project(ground, truth.offset[2]) - expected.project(ground, truth.offset[2])
+    return float(np.sqrt((apart**2).sum(axis=1).mean()))
+
+
+def _write_empty(path: Path, rpc: RPC) -> None:
+    profile = {"driver": "GTiff", "count": 1, "dtype": "uint8", "sparse_ok": True, "tiled": True}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        with rasterio.open(path, "w", width=_SIZE[0], height=_SIZE[1], **profile) as dataset:
+            dataset.rpcs = rasterio.rpc.RPC.from_gdal(rpc_to_tags(rpc))
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite."""
+    cases: list[Case] = [
+        HalfRealCase(settings.data, place, number)
+        for place in PLACES
+        for number in range(1 if settings.quick else BIASES)
+    ]
+    cases += [
+        RoundTripCase(settings.data, sensor, number, wrong)
+        for wrong in (False, True)
+        for sensor in SENSORS
+        for number in range(1 if settings.quick else BIASES)
+    ]
+    outcomes = run_cases(cases, settings.jobs)
+    groups = {g: [o for o in outcomes if o.group == g] for g in (HALF_REAL, ROUND_TRIP, BLUNDERS)}
+    return SuiteResult(
+        "RPCs",
+        goals(groups[HALF_REAL], groups[ROUND_TRIP], groups[BLUNDERS]),
+        (accuracy_table("By kind", groups),),
+        [outcome.record() for outcome in outcomes],
+        (
+            "Half real: the optical image of a real pair, seen by real RPCs over made-up hills; "
+            "shifts to 50 px, every second with a drift to 4 px. The error is the RMSE of the "
+            "refined RPCs all over the image, against the true ones.",
+            f"Round trip: real RPCs, {_POINTS} control points with {_NOISE_PX:g} px of noise. "
+            f"Blunders: {_BLUNDERS:.0%} of the points moved by up to {_BLUNDER_PX:g} px; the error "
+            "is what that changes.",
+        ),
+    )
+
+
+def goals(
+    half_real: Sequence[Outcome], round_trip: Sequence[Outcome], blunders: Sequence[Outcome]
+) -> tuple[Goal, ...]:
+    """Return the goals and what was found."""
+    right, refused = count(half_real, CORRECT), count(half_real, REFUSED)
+    return (
+        Goal(
+            "half real: within sigma + 1 px, or refused",
+            "all",
+            f"{right + refused} of {len(half_real)} ({right} right, {refused} refused), largest "
+            f"{_largest(half_real):.2f} px",
+            right + refused == len(half_real),
+        ),
+        Goal(
+            "round trip: biases recovered",
+            f"to {RECOVERED_PX:g} px",
+            f"{_largest(round_trip):.3f} px",
+            _largest(round_trip) <= RECOVERED_PX,
+        ),
+        Goal(
+            f"{_BLUNDERS:.0%} blunders change the refined RPCs",
+            f"by {CHANGED_PX:g} px",
+            f"{_largest(blunders):.3f} px",
+            _largest(blunders) <= CHANGED_PX,
+        ),
+    )
+
+
+def _largest(outcomes: Sequence[Outcome]) -> float:
+    return max((o.error_px for o in outcomes if np.isfinite(o.error_px)), default=float("nan"))
