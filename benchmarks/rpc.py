@@ -132,9 +132,18 @@ class RoundTripCase:
         verdict = CORRECT if error <= limit else "inaccurate"
         reason = result.judged.verdict.reason
         return Outcome(
-            f"{self.sensor}, bias {self.number}", self.group, verdict, verdict, error, error,
-            limit, seconds, result.judged.verdict.check_rmse_px, result.adjustment.bias.kind, reason,
-        )  # fmt: skip
+            f"{self.sensor}, bias {self.number}",
+            self.group,
+            verdict,
+            verdict,
+            error,
+            error,
+            limit,
+            seconds,
+            result.judged.verdict.check_rmse_px,
+            result.adjustment.bias.kind,
+            reason,
+        )
 
     def _refined(
         self, truth: RPC, bias: Bias, folder: Path, wrong: float

@@ -91,6 +91,7 @@ def write_dem(
     size: int = 60,
     pixel_m: float = 25.0,
     offset_m: float = 0.0,
+    steepness: float = 1.0,
     **more: object,
 ) -> Path:
     """Write `relief` around the camera's image as a raster of any CRS."""
@@ -102,7 +103,8 @@ def write_dem(
     grid = Grid(transform, crs_of, size, size)
     cols, rows = np.meshgrid(np.arange(size), np.arange(size))
     xy = grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
-    heights = relief(reproject(xy, crs_of, LON_LAT)).reshape(size, size) + offset_m
+    heights = relief(reproject(xy, crs_of, LON_LAT)).reshape(size, size)
+    heights = 300 + steepness * (heights - 300) + offset_m
     holes = more.pop("holes", None)
     if holes is not None:
         heights[holes] = -32768

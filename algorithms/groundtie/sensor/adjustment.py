@@ -23,6 +23,9 @@ METHODS = (ROBUST, WORST_FIRST)
 _SIGMA_RANGE_PX = (0.1, 2.5)
 _STEPS = 30
 
+# No image is measured better than this.
+SMALLEST_SIGMA_PX = 1e-3
+
 # Points agree with a first model within this, in pixels.
 _CONSENSUS_PX = 3.0
 
@@ -229,7 +232,7 @@ def _without_improbable(control: Control, kind: str, seed: int) -> tuple[NDArray
     for _ in range(_STEPS):
         mixture = fit_mixture(residuals, (2 * reach) ** 2, _SIGMA_RANGE_PX)
         same = np.array_equal(used, mixture.right)
-        used, sigma = mixture.right, mixture.sigma
+        used, sigma = mixture.right, _excess(control.take(mixture.right), mixture.sigma)
         if same or used.sum() < TERMS[kind]:
             break
         residuals = control.residuals_px(_fit(control.take(used), kind, sigma))
@@ -247,14 +250,22 @@ def _without_worst(
         if distance.max() <= largest_residual_px:
             break
         used[distance.argmax()] = False
-    residuals = control.take(used).residuals_px(_fit(control.take(used), kind, 0.0))
-    return used, float(np.sqrt(np.mean(residuals**2)))
+    kept = control.take(used)
+    residuals = kept.residuals_px(_fit(kept, kind, 0.0))
+    return used, _excess(kept, float(np.sqrt(np.mean(residuals**2))))
+
+
+def _excess(control: Control, sigma_px: float) -> float:
+    """Return the standard deviation of points beyond what their covariances tell, an axis."""
+    told = np.trace(control.covariance_px2, axis1=1, axis2=2).mean() / 2 if len(control) else 0.0
+    return float(np.sqrt(max(sigma_px**2 - told, 0.0)))
 
 
 def _fit(control: Control, kind: str, sigma_px: float) -> Bias:
     """Fit a model by least squares, weighted by the points' covariances and a common variance."""
     terms = design(kind, control.size, control.expected_px)
-    weights = np.linalg.inv(control.covariance_px2 + max(sigma_px, 1e-3) ** 2 * np.eye(2))
+    common = max(sigma_px, SMALLEST_SIGMA_PX) ** 2
+    weights = np.linalg.inv(control.covariance_px2 + common * np.eye(2))
     normal = np.einsum("ni,nab,nj->iajb", terms, weights, terms).reshape(2 * terms.shape[1], -1)
     right = np.einsum(
         "ni,nab,nb->ia", terms, weights, control.found_px - control.expected_px

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import GroundTieError
 from ..rasters.reading import open_raster
-from .adjustment import Adjustment, Control
+from .adjustment import SMALLEST_SIGMA_PX, Adjustment, Control
 from .bias import design
 from .heights import ConstantHeight, find_geoid
 from .orientation import FloatArray, Orientation, seen_at
@@ -159,7 +159,7 @@ def _offset(
     slope = orientation.rpc.derivatives(ground, height)[:, :, 2]
     terms = design(adjustment.bias.kind, used.size, used.expected_px)
     columns = [np.kron(terms, np.eye(2)), slope.reshape(-1, 1)]
-    sigma = max(adjustment.sigma_px, 0.05)
+    sigma = max(adjustment.sigma_px, SMALLEST_SIGMA_PX)
     covariance = used.covariance_px2 + sigma**2 * np.eye(2)
     root = np.linalg.cholesky(np.linalg.inv(covariance)).swapaxes(1, 2)
     full = np.hstack(columns).reshape(len(used), 2, -1)

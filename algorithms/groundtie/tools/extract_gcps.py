@@ -32,6 +32,7 @@ from .common import (
 )
 from .ground_control import GroundControl, Matching, match_ground_control, open_reference
 from .masking import MaskRequest
+from .registration_parameters import MaxError
 from .sensor_input import (
     Dem,
     DemDatum,
@@ -46,7 +47,6 @@ from .sensor_matching import (
     ChipSize,
     ImageBand,
     MaskKind,
-    MaxError,
     SearchRadius,
     Similarity,
     TwoWayError,

@@ -43,6 +43,7 @@ from .common import (
 from .extract_gcps import accepted_points
 from .ground_control import Matching, match_ground_control, open_reference
 from .masking import MaskRequest
+from .registration_parameters import MaxError
 from .sensor_input import (
     Dem,
     DemDatum,
@@ -58,7 +59,6 @@ from .sensor_matching import (
     ChipSize,
     ImageBand,
     MaskKind,
-    MaxError,
     SearchRadius,
     Similarity,
     TwoWayError,

@@ -24,17 +24,6 @@ Similarity = Annotated[
         choices=SIMILARITIES,
     ),
 ]
-MaxError = Annotated[
-    float,
-    Number(
-        label="Largest error",
-        help="The result is refused if the root mean square error at points that took no part is "
-        "larger.",
-        unit="px",
-        minimum=0.1,
-        maximum=100,
-    ),
-]
 ImageBand = Annotated[
     int | None,
     Band(

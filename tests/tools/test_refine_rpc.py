@@ -1,0 +1,205 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from raster_files import full_disk
+from rpc_models import camera_rpc, to_rasterio, write_dem, write_positions
+from rpc_scenes import SIZE, Scene, make_scene
+
+import groundtie
+from groundtie.errors import GroundTieError, NotRegisteredError, OutputError, ParameterError
+from groundtie.sensor.bias import Bias, fold
+from groundtie.sensor.rpc import RPC
+from groundtie.sensor.rpc_files import read_rpc
+from groundtie.sensor.rpc_tags import rpc_from_tags
+
+DRIFT = Bias("shift_drift", SIZE, np.array([[-27.0, 33.0], [2.5, -3.0]]), np.zeros((4, 4)))
+TRUTH = camera_rpc()
+POINTS_SIZE = (600, 500)
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return make_scene(tmp_path_factory.mktemp("scene"), DRIFT)
+
+
+def test_a_reference_and_a_terrain_model_make_the_rpcs_right(scene: Scene, tmp_path: Path) -> None:
+    result = groundtie.refine_rpc(
+        scene.image,
+        tmp_path / "refined_RPC.TXT",
+        scene.reference,
+        dem=scene.dem,
+        dem_datum="ellipsoidal",
+        similarity="orientation",
+        residuals=tmp_path / "residuals.gpkg",
+    )
+    assert scene.error_px(scene.delivered) > 30
+    assert scene.error_px(read_rpc(tmp_path / "refined_RPC.TXT")) < 1.0
+    assert result.judged.before.rmse > 30
+    assert result.judged.after.rmse < 1.5
+    assert result.judged.held_out == "check points"
+    import fiona
+
+    with fiona.open(tmp_path / "residuals.gpkg") as layer:
+        rows = [feature["properties"] for feature in layer]
+    used = [row["residual_px"] for row in rows if row["state"] == "used"]
+    assert np.median(used) < 1.5
+
+
+def write_points(
+    folder: Path,
+    bias: Bias | None,
+    count: int = 40,
+    wrong: int = 0,
+    corner: float = 1.0,
+    height_error_m: float = 0.0,
+    name: str = "gcps.csv",
+) -> dict[str, Path]:
+    """Write an image with biased RPCs, and control points measured to 0.2 px."""
+    delivered = TRUTH if bias is None else fold(TRUTH, bias).rpc
+    image = write_positions(folder / "image.tif", delivered)
+    dem = write_dem(folder / "dem.tif", size=90)
+    random = np.random.default_rng(0)
+    px = random.uniform(0, 1, (count, 2)) * POINTS_SIZE * corner
+    height = random.uniform(100, 500, count)
+    lon_lat = TRUTH.localise(px, height)
+    px = px + random.normal(0, 0.2, px.shape)
+    px[:wrong] += random.uniform(-100, 100, (wrong, 2))
+    lines = [
+        "reference_x,reference_y,input_col,input_row,height_m,reference_crs,sigma_x_px,sigma_y_px"
+    ]
+    for (lon, lat), (col, row), z in zip(lon_lat, px, height + height_error_m, strict=True):
+        lines.append(f"{lon:.12f},{lat:.12f},{col:.6f},{row:.6f},{z:.4f},EPSG:4326,0.2,0.2")
+    (folder / name).write_text("\n".join(lines) + "\n")
+    return {"image": image, "gcps": folder / name, "dem": dem}
+
+
+def error_px(rpc: RPC) -> float:
+    nodes = np.stack(np.meshgrid(*(np.linspace(0, side, 9) for side in POINTS_SIZE)), -1)
+    px = nodes.reshape(-1, 2)
+    return float(
+        np.abs(
+            TRUTH.project(TRUTH.localise(px, 300.0), 300.0)
+            - rpc.project(TRUTH.localise(px, 300.0), 300.0)
+        ).max()
+    )
+
+
+def bias_of(kind: str) -> Bias:
+    terms = {"shift": 1, "shift_drift": 2, "affine": 3}[kind]
+    coefficients = np.array([[14.0, -35.0], [3.0, 2.0], [-2.0, 4.0]])[:terms]
+    return Bias(kind, POINTS_SIZE, coefficients, np.zeros((2 * terms,) * 2))
+
+
+@pytest.mark.parametrize("blunders", ["robust", "worst-first"])
+@pytest.mark.parametrize("kind", ["shift", "shift_drift", "affine"])
+def test_given_points_recover_a_bias(tmp_path: Path, kind: str, blunders: str) -> None:
+    files = write_points(tmp_path, bias_of(kind), 60, wrong=18)
+    result = groundtie.refine_rpc(
+        output=tmp_path / "refined.RPB", dem_datum="ellipsoidal", blunders=blunders, **files
+    )
+    assert result.adjustment.bias.kind == kind
+    assert error_px(read_rpc(tmp_path / "refined.RPB")) < 0.35
+    assert result.judged.verdict.fit_points_used == 42
+    assert result.fit.largest_residual_px <= 0.01
+    summary = result.summary()
+    assert summary["verdict"]["held_out"] == "points left out in turn"
+    assert summary["bias"]["model"] == kind
+
+
+def test_an_image_is_copied_with_its_refined_tags(tmp_path: Path) -> None:
+    files = write_points(tmp_path, bias_of("shift"))
+    groundtie.refine_rpc(output=tmp_path / "refined.tif", dem_datum="ellipsoidal", **files)
+    with rasterio.open(files["image"]) as before, rasterio.open(tmp_path / "refined.tif") as after:
+        np.testing.assert_array_equal(after.read(), before.read())
+        assert after.transform == before.transform
+        assert error_px(rpc_from_tags(after.tags(ns="RPC"), "refined")) < 0.35
+
+
+def test_refined_images_orthorectify_to_where_they_belong(tmp_path: Path) -> None:
+    files = write_points(tmp_path, bias_of("affine"))
+    groundtie.refine_rpc(output=tmp_path / "refined.tif", dem_datum="ellipsoidal", **files)
+    groundtie.orthorectify(
+        tmp_path / "refined.tif", tmp_path / "ortho.tif", files["dem"], dem_datum="ellipsoidal",
+        resampling="bilinear",
+    )  # fmt: skip
+    right = write_positions(tmp_path / "right.tif", TRUTH)
+    with rasterio.open(right, "r+") as dataset:
+        dataset.rpcs = to_rasterio(TRUTH)
+    groundtie.orthorectify(
+        right, tmp_path / "expected.tif", files["dem"], dem_datum="ellipsoidal",
+        reference=tmp_path / "ortho.tif", resampling="bilinear",
+    )  # fmt: skip
+    with rasterio.open(tmp_path / "ortho.tif") as a, rasterio.open(tmp_path / "expected.tif") as b:
+        assert np.nanmax(np.abs(a.read() - b.read())) < 0.35
+
+
+def test_right_rpcs_are_left_alone(tmp_path: Path) -> None:
+    files = write_points(tmp_path, None)
+    with pytest.raises(NotRegisteredError, match="not nearer than before"):
+        groundtie.refine_rpc(output=tmp_path / "refined.RPB", dem_datum="ellipsoidal", **files)
+    assert not (tmp_path / "refined.RPB").exists()
+
+
+@pytest.mark.parametrize(
+    ("points", "reason"),
+    [
+        ({"count": 2}, "needs at least 3 control points"),
+        ({"corner": 0.2}, "spread over"),
+        ({"count": 30, "wrong": 30}, "agree"),
+    ],
+)
+def test_points_that_tell_too_little_are_refused(
+    tmp_path: Path, points: dict[str, float], reason: str
+) -> None:
+    files = write_points(tmp_path, bias_of("shift"), **points)  # type: ignore[arg-type]
+    with pytest.raises(NotRegisteredError, match=reason):
+        groundtie.refine_rpc(output=tmp_path / "refined.RPB", dem_datum="ellipsoidal", **files)
+    assert not (tmp_path / "refined.RPB").exists()
+
+
+def test_heights_that_contradict_the_terrain_model_are_told(tmp_path: Path) -> None:
+    """The points have heights above the ellipsoid, the terrain model as said, too."""
+    files = write_points(tmp_path, bias_of("shift"))
+    write_dem(files["dem"], size=90, offset_m=-280.0)
+    result = groundtie.refine_rpc(output=tmp_path / "refined.RPB", dem_datum="ellipsoidal", **files)
+    assert any("vertical datum" in line for line in result.lines())
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "reason"),
+    [
+        ({"gcps": None}, ParameterError, "either a reference or"),
+        ({"reference": "dem.tif"}, ParameterError, "either a reference or"),
+        ({"dem_datum": None}, ParameterError, "count from"),
+        ({"output": "refined.xml"}, ParameterError, r"must end in \.txt"),
+        ({"model": "spline"}, ParameterError, "one of auto, shift"),
+    ],
+)
+def test_calls_that_cannot_be_right(
+    tmp_path: Path, changes: dict[str, object], error: type[GroundTieError], reason: str
+) -> None:
+    files = write_points(tmp_path, bias_of("shift"))
+    if "reference" in changes:
+        changes = changes | {"reference": files["image"]}
+    if "output" in changes:
+        changes = changes | {"output": tmp_path / str(changes["output"])}
+    call = {"output": tmp_path / "refined.RPB", "dem_datum": "ellipsoidal", **files, **changes}
+    with pytest.raises(error, match=reason):
+        groundtie.refine_rpc(**call)  # type: ignore[arg-type]
+    assert not list(tmp_path.glob("refined*"))
+
+
+def test_a_full_disk_leaves_nothing_behind(tmp_path: Path) -> None:
+    files = write_points(tmp_path, bias_of("shift"))
+    with full_disk(50_000), pytest.raises(OutputError):
+        groundtie.refine_rpc(
+            output=tmp_path / "refined.tif",
+            residuals=tmp_path / "residuals.gpkg",
+            dem_datum="ellipsoidal",
+            **files,
+        )
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["dem.tif", "gcps.csv", "image.tif"]
