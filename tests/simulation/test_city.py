@@ -39,8 +39,8 @@ class TestParts:
         found = [shares(radar, table) for radar, _, table in made]
         mean = {cover: np.mean([share[cover] for share in found]) for cover in Cover}
         assert 0.2 < mean[Cover.BUILDING] < 0.4
-        assert 0.08 < mean[Cover.ROAD] < 0.25
-        assert 0.05 < mean[Cover.FOREST] < 0.25
+        assert 0.08 < mean[Cover.ASPHALT] < 0.25
+        assert 0.02 < mean[Cover.FOREST] < 0.15
         assert 0.003 < mean[Cover.CAR] < 0.05
         assert mean[Cover.WATER] > 0.01
         assert mean[Cover.RAIL] > 0.01
@@ -93,14 +93,19 @@ class TestAcquisitions:
 
     @pytest.mark.parametrize("changed", [0.1, 0.4])
     def test_share_of_changed_buildings(self, changed: float) -> None:
-        radar, camera, table = laid_out(3, changed)
-        in_radar, in_camera = (
-            set(np.unique(labels[table.cover[labels] == Cover.BUILDING]))
-            for labels in (radar, camera)
-        )
-        number = len(in_radar | in_camera)
-        for gone in (in_radar - in_camera, in_camera - in_radar):
-            assert len(gone) / number == pytest.approx(changed / 2, rel=0.4)
+        only_radar = only_camera = number = 0
+        for seed in range(4):
+            radar, camera, table = laid_out(seed, changed)
+            in_radar, in_camera = (
+                set(np.unique(labels[table.cover[labels] == Cover.BUILDING]))
+                for labels in (radar, camera)
+            )
+            only_radar += len(in_radar - in_camera)
+            only_camera += len(in_camera - in_radar)
+            number += len(in_radar | in_camera)
+        # Buildings have two or three parts each: some 500 draws.
+        for gone in (only_radar, only_camera):
+            assert gone / number == pytest.approx(changed / 2, rel=0.35)
 
     def test_changes_leave_the_rest_as_it_is(self) -> None:
         unchanged, _, table = laid_out(3)

@@ -81,7 +81,7 @@ def test_parameters_reach_the_pair(tmp_path: Path) -> None:
 def test_views_reach_the_pair(tmp_path: Path) -> None:
     simulate(
         tmp_path,
-        128,
+        200,
         "city",
         relief=0.0,
         changed=25.0,

@@ -156,10 +156,10 @@ def halls(block: Polygon, scale: float, generator: np.random.Generator) -> list[
 
 
 QUARTERS = (
-    Quarter(0.36, 10500, (13, 20), perimeter, Cover.PAVEMENT, 1 / 900),
+    Quarter(0.36, 10500, (13, 20), perimeter, Cover.PAVEMENT, 1 / 1500),
     Quarter(0.20, 9000, (10, 17), lots, Cover.PAVEMENT, 1 / 2500),
-    Quarter(0.15, 10000, (17, 25), towers, Cover.PAVEMENT, 1 / 1200),
-    Quarter(0.16, 18000, (13, 20), slabs, Cover.GRASS, 1 / 400),
+    Quarter(0.15, 10000, (17, 25), towers, Cover.PAVEMENT, 1 / 2000),
+    Quarter(0.16, 18000, (13, 20), slabs, Cover.GRASS, 1 / 600),
     Quarter(0.13, 15000, (14, 22), halls, Cover.PAVEMENT, 1 / 2000),
 )
 

@@ -34,7 +34,7 @@ _CAR_M = (4.6, 1.9)
 _PARKING_PITCH_M = 6.0
 _MOVING_PITCH_M = 22.0
 _PARKED_SHARE = 0.45
-_TREE_PITCH_M = 12.0
+_TREE_PITCH_M = 14.0
 _KINDS = 10
 _WINDOW_M = (2.8, 4.5)
 _PROBES_PER_SIDE = 6
@@ -109,13 +109,13 @@ class CityLayout(Canvas):
                 self._draw_open_block(block)
             else:
                 self._draw_block(block, quarter)
-        trees = bool(self._random.random() < 0.4)
+        trees = bool(self._random.random() < 0.3)
         return [_Street(lane, street / 2, trees) for lane in parts.lanes]
 
     def _draw_open_block(self, block: Polygon) -> None:
         park = self._random.random() < 0.6
         self._fill(block, self._add(Cover.GRASS if park else Cover.PAVEMENT))
-        self._scatter_trees(block, 1 / 220 if park else 1 / 900)
+        self._scatter_trees(block, 1 / 300 if park else 1 / 1500)
 
     def _draw_block(self, block: Polygon, quarter: Quarter) -> None:
         green = self._random.random() < 0.3
@@ -127,7 +127,7 @@ class CityLayout(Canvas):
         """Draw pavements, then carriageways, so that no pavement runs across a junction."""
         for street in streets:
             self._fill(street.lane, self._add(Cover.PAVEMENT))
-        asphalt = [self._add(Cover.ROAD) for _ in range(_KINDS)]
+        asphalt = [self._add(Cover.ASPHALT) for _ in range(_KINDS)]
         for number, street in enumerate(streets):
             self._fill(street.carriageway(_KERB_M * self._scale), asphalt[number % _KINDS])
             if street.trees:
@@ -165,8 +165,8 @@ class CityLayout(Canvas):
         return trains
 
     def _plant_trees(self) -> None:
-        kinds = [self._add(Cover.FOREST, self._uniform(5, 14)) for _ in range(_KINDS)]
-        keep_off = (Cover.WATER, Cover.ROAD, Cover.RAIL)
+        kinds = [self._add(Cover.FOREST, self._uniform(4, 11)) for _ in range(_KINDS)]
+        keep_off = (Cover.WATER, Cover.ASPHALT, Cover.RAIL)
         for place in self._trees:
             kind, size = self._random.random(2).tolist()
             radius = (1.6 + 2.4 * size) * self._scale
@@ -175,7 +175,7 @@ class CityLayout(Canvas):
                 self._stand(Tree(crown, kinds[int(kind * _KINDS)], place, keep_off))
 
     def _put_up_buildings(self) -> None:
-        keep_off = (Cover.WATER, Cover.RAIL, Cover.ROAD)
+        keep_off = (Cover.WATER, Cover.RAIL, Cover.ASPHALT)
         for building in self._buildings:
             outline, _ = building.parts[0]
             if any(self._cover_at(p) in keep_off for p in points_along(outline, _PROBES_PER_SIDE)):
@@ -203,7 +203,7 @@ class CityLayout(Canvas):
                 for place in self._places(street.lane, offset, pitch_m):
                     for when in BOTH:
                         drawn, kind = self._traffic.random(2).tolist()
-                        if drawn < _PARKED_SHARE and self._cover_at(place) == Cover.ROAD:
+                        if drawn < _PARKED_SHARE and self._cover_at(place) == Cover.ASPHALT:
                             car = rectangle(place, half_car, angle)
                             self._stand(Standing(car, kinds[int(kind * _KINDS)], (when,)))
 

@@ -29,11 +29,12 @@ class Cover(IntEnum):
     PAVEMENT = 6
     CAR = 7
     RAIL = 8
+    ASPHALT = 9
 
 
 PLAIN_WALL = 0.22
 
-OPEN_GROUND = (Cover.ROAD, Cover.FIELD, Cover.GRASS, Cover.PAVEMENT)
+OPEN_GROUND = (Cover.ROAD, Cover.FIELD, Cover.GRASS, Cover.PAVEMENT, Cover.ASPHALT)
 
 Reflectance = tuple[float, float, float, float]
 
@@ -85,6 +86,7 @@ _SURFACES = {
         ),
         0.2,
     ),
+    Cover.ASPHALT: _Surface((-21, -18), ((0.08, 0.09, 0.10, 0.12),), 0.25),
     Cover.RAIL: _Surface((-13, -10), ((0.11, 0.13, 0.16, 0.19),), 0.15),
 }
 

@@ -30,9 +30,9 @@ _AMBIENT = 0.3
 _PATCHES_M = 18.0
 _ROW_PERIOD_M = 5.0
 # Relative contrast of fine texture, patches and plough rows of each class, in the order of Cover.
-_FINE = np.array([0.03, 0.05, 0.07, 0.10, 0.02, 0.05, 0.12, 0.1, 0.15], np.float32)
-_PATCH = np.array([0.04, 0.07, 0.08, 0.05, 0.02, 0.0, 0.08, 0.0, 0.1], np.float32)
-_ROWS = np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25], np.float32)
+_FINE = np.array([0.03, 0.05, 0.07, 0.10, 0.02, 0.05, 0.12, 0.1, 0.15, 0.03], np.float32)
+_PATCH = np.array([0.04, 0.07, 0.08, 0.05, 0.02, 0.0, 0.08, 0.0, 0.1, 0.04], np.float32)
+_ROWS = np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25, 0.0], np.float32)
 
 
 @dataclass(frozen=True)

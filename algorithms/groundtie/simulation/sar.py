@@ -31,7 +31,7 @@ _NORMAL_SIGMA_PX = 1.5
 _LEVEL_PX = 0.05
 
 # Standard deviation of the fine texture of each class in dB, in the order of Cover.
-_TEXTURE_DB = np.array([0.3, 0.6, 0.8, 2.0, 0.3, 2.5, 2.5, 2.0, 2.0], np.float32)
+_TEXTURE_DB = np.array([0.3, 0.6, 0.8, 2.0, 0.3, 2.5, 2.5, 2.0, 2.0, 0.3], np.float32)
 _PATCH_DB = 0.7
 _PATCH_M = 25.0
 _BRIGHT_POINT_SHARE = 0.004
