@@ -12,22 +12,32 @@ from pathlib import Path
 
 import numpy as np
 import rasterio
+from rasterio.crs import CRS
 from rasterio.errors import NotGeoreferencedWarning
 
 import groundtie
 from groundtie.errors import NotRegisteredError
+from groundtie.rasters.grid import reproject
 from groundtie.sensor.bias import Bias, fold
 from groundtie.sensor.rpc import RPC
 from groundtie.sensor.rpc_files import read_rpc
 from groundtie.sensor.rpc_tags import rpc_to_tags
+from groundtie.sensor.surfaces import LON_LAT
 
-from .accuracy import CORRECT, REFUSED, classify
+from .accuracy import CORRECT, CORRECT_PX, REFUSED, FloatArray, classify
 from .attempt import Outcome, count, unregistered
 from .half_real import BIASES, PLACES, SENSORS, bias_of, make_scene, place_case, sensor_rpc
 from .suites import Case, Goal, Settings, SuiteResult, run_cases
 from .tables import accuracy_table
 
 HALF_REAL, ROUND_TRIP, BLUNDERS = "half real", "round trip", "blunders"
+RURAL, URBAN = "simulated, hills", "simulated, town"
+DENSITY = {RURAL: "rural", URBAN: "urban"}
+GOAL_PX = {RURAL: 1.0, URBAN: 2.0}
+
+# Simulated RPCs are wrong by up to so much on the ground.
+_LARGEST_SHIFT_M = 300.0
+_NEAR_PX = 2.0
 
 # Control points of the round trip: how many, how well measured, and how many are wrong by how much.
 _POINTS = 100
@@ -98,6 +108,94 @@ class HalfRealCase:
             result.adjustment.bias.kind,
             result.judged.verdict.reason,
         )
+
+
+@dataclass(frozen=True)
+class SimulatedCase:
+    """A simulated push-broom image whose RPCs are refined by the simulated SAR image."""
+
+    group: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Kind and seed."""
+        return f"{self.group}, seed {self.seed}"
+
+    def run(self, workers: int | None) -> Outcome:
+        """Make the scene, refine its RPCs and judge them at the check points."""
+        with tempfile.TemporaryDirectory() as folder:
+            scene = Path(folder)
+            random = np.random.default_rng(self.seed)
+            groundtie.simulate_sensor(
+                scene,
+                density=DENSITY[self.group],
+                shift=random.uniform(5, _LARGEST_SHIFT_M),
+                drift=random.uniform(0, 4),
+                seed=self.seed,
+            )
+            started = time.perf_counter()
+            try:
+                result = groundtie.refine_rpc(
+                    scene / "sensor.tif",
+                    scene / "refined_RPC.TXT",
+                    reference=scene / "reference.tif",
+                    dem=scene / "dem.tif",
+                    dem_datum="ellipsoidal",
+                    search_radius=1.1 * _LARGEST_SHIFT_M,
+                    residuals=scene / "points.csv",
+                    workers=workers,
+                )
+            except NotRegisteredError as refusal:
+                seconds = time.perf_counter() - started
+                return unregistered(REFUSED, self.name, self.group, 0.0, seconds, str(refusal))
+            seconds = time.perf_counter() - started
+            crs = _crs_of(scene / "reference.tif")
+            error = _rms(
+                _misses(read_rpc(scene / "refined_RPC.TXT"), scene / "check_points.csv", crs)
+            )
+            kept = _misses(read_rpc(scene / "exact_rpc.txt"), scene / "points.csv", crs)
+        near = float((np.hypot(*kept.T) < _NEAR_PX).mean())
+        return Outcome(
+            self.name,
+            self.group,
+            classify(True, error, GOAL_PX[self.group] - CORRECT_PX),
+            classify(True, error, GOAL_PX[self.group] - CORRECT_PX),
+            error,
+            error,
+            0.0,
+            seconds,
+            result.judged.verdict.check_rmse_px,
+            result.adjustment.bias.kind,
+            f"{near:.0%} of the kept points within {_NEAR_PX:g} px of the truth",
+        )
+
+
+def _crs_of(path: Path) -> CRS:
+    with rasterio.open(path) as dataset:
+        return dataset.crs
+
+
+def _misses(rpc: RPC, table: Path, crs: CRS) -> FloatArray:
+    """Return measured minus projected positions of the points of a table, (n, 2).
+
+    Of tables that tell, those count that the fit kept.
+    """
+    with table.open(newline="") as file:
+        kept = {"state": "used", "role": "fit"}
+        rows = [
+            row
+            for row in csv.DictReader(file)
+            if all(row.get(name, value) == value for name, value in kept.items())
+        ]
+    names = "reference_x", "reference_y", "height_m", "input_col", "input_row"
+    x, y, height, col, row = np.array([[float(r[n]) for n in names] for r in rows]).T
+    lon_lat = reproject(np.column_stack([x, y]), crs, LON_LAT)
+    return np.column_stack([col, row]) - rpc.project(lon_lat, height)
+
+
+def _rms(misses: FloatArray) -> float:
+    return float(np.sqrt((misses**2).sum(axis=1).mean()))
 
 
 @dataclass(frozen=True)
@@ -198,17 +296,28 @@ def run(settings: Settings) -> SuiteResult:
         for sensor in SENSORS
         for number in range(1 if settings.quick else BIASES)
     ]
+    cases += [
+        SimulatedCase(group, seed)
+        for group in DENSITY
+        for seed in range(1, (1 if settings.quick else settings.seeds) + 1)
+    ]
     outcomes = run_cases(cases, settings.jobs)
-    groups = {g: [o for o in outcomes if o.group == g] for g in (HALF_REAL, ROUND_TRIP, BLUNDERS)}
+    kinds = (HALF_REAL, ROUND_TRIP, BLUNDERS, RURAL, URBAN)
+    groups = {kind: [o for o in outcomes if o.group == kind] for kind in kinds}
     return SuiteResult(
         "RPCs",
-        goals(groups[HALF_REAL], groups[ROUND_TRIP], groups[BLUNDERS]),
+        (
+            *goals(groups[HALF_REAL], groups[ROUND_TRIP], groups[BLUNDERS]),
+            *(simulated_goal(group, groups[group]) for group in DENSITY),
+        ),
         (accuracy_table("By kind", groups),),
         [outcome.record() for outcome in outcomes],
         (
             "Half real: the optical image of a real pair, seen by real RPCs over made-up hills; "
             "shifts to 50 px, every second with a drift to 4 px. The error is the RMSE of the "
             "refined RPCs all over the image, against the true ones.",
+            "Simulated: shifts of 5 to 300 m, drift to 4 px; the error is the RMSE at the scene's "
+            "own check points on the ground, which no tool has seen.",
             f"Round trip: real RPCs, {_POINTS} control points with {_NOISE_PX:g} px of noise. "
             f"Blunders: {_BLUNDERS:.0%} of the points moved by up to {_BLUNDER_PX:g} px; the error "
             "is what that changes.",
@@ -241,6 +350,18 @@ def goals(
             f"{_largest(blunders):.3f} px",
             _largest(blunders) <= CHANGED_PX,
         ),
+    )
+
+
+def simulated_goal(group: str, outcomes: Sequence[Outcome]) -> Goal:
+    """Return the goal of simulated scenes of one kind and what was found."""
+    right, refused = count(outcomes, CORRECT), count(outcomes, REFUSED)
+    return Goal(
+        f"{group}: error at check points",
+        f"at most {GOAL_PX[group]:g} px, or refused",
+        f"{right + refused} of {len(outcomes)} ({right} right, {refused} refused), largest "
+        f"{_largest(outcomes):.2f} px",
+        right + refused == len(outcomes),
     )
 
 

@@ -14,6 +14,7 @@ from .version import __version__
 if TYPE_CHECKING:
     from .geometry.transform import load_transform
     from .tools.assess import assess
+    from .tools.assess_sensor import assess_sensor
     from .tools.coregister import coregister
     from .tools.detector_repeatability import detector_repeatability
     from .tools.estimate_rotation import estimate_rotation
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = [
     "__version__",
     "assess",
+    "assess_sensor",
     "coregister",
     "detector_repeatability",
     "estimate_rotation",

@@ -126,7 +126,7 @@ def test_arrows_without_check_points_or_any_point(only_fit: bool) -> None:
     [(1.0, 1), (1.99, 1), (2, 2), (4.9, 2), (5, 5), (9.99, 5), (10, 10), (730, 500), (0.03, 0.02)],
 )
 def test_round_numbers(value: float, rounded: float) -> None:
-    assert figures._round_down(value) == pytest.approx(rounded, rel=1e-12)
+    assert figures.round_length(value) == pytest.approx(rounded, rel=1e-12)
 
 
 def test_the_map_draws_these_arrows_and_its_scale() -> None:

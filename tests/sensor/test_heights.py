@@ -13,7 +13,7 @@ from scipy.interpolate import RegularGridInterpolator
 from groundtie.errors import GeoreferencingError, NoOverlapError, RasterContentError
 from groundtie.rasters.grid import Grid, reproject
 from groundtie.rasters.reading import open_raster
-from groundtie.sensor.heights import ConstantHeight, find_geoid, terrain_heights
+from groundtie.sensor.heights import ConstantHeight, declared_datum, find_geoid, terrain_heights
 from groundtie.sensor.surfaces import LON_LAT, surface_over
 
 REGION = np.array([[8.998, 45.148], [9.002, 45.152]])
@@ -137,3 +137,12 @@ def test_a_geoid_grid_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("groundtie.sensor.heights._proj_folders", lambda: [])
     with pytest.raises(GeoreferencingError, match=r"us_nga_egm96_15\.tif"):
         find_geoid("EGM96")
+
+
+@pytest.mark.parametrize(
+    ("crs", "expected"),
+    [("EPSG:4326", None), ("EPSG:4326+5773", "EGM96"), ("EPSG:4326+3855", "EGM2008")],
+)
+def test_a_compound_crs_names_the_datum(tmp_path: Path, crs: str, expected: str | None) -> None:
+    with open_raster(write_dem(tmp_path / "dem.tif", crs)) as dem:
+        assert declared_datum(dem) == expected

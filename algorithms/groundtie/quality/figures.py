@@ -120,12 +120,12 @@ def residual_arrows(residuals: Residuals, grid: Grid) -> Arrows:
     factor = 1.0
     if believed.any():
         typical = max(float(np.median(residuals.length_px[believed])), _SMALLEST_PX)
-        factor = max(_round_down(0.04 * side / typical), 1.0)
+        factor = max(round_length(0.04 * side / typical), 1.0)
     return Arrows(
         residuals.position_px,
         residuals.residual_px * factor,
         factor,
-        _round_down(0.12 * side / factor),
+        round_length(0.12 * side / factor),
     )
 
 
@@ -293,7 +293,7 @@ def _without_frame(axes: Any) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _round_down(value: float) -> float:
+def round_length(value: float) -> float:
     """Return the largest of 1, 2, 5, 10, 20, … (0.1, 0.2, …) that is not above a value."""
     decade = 10.0 ** math.floor(math.log10(value))
     return float(max(n for n in _ROUND_NUMBERS if n * decade <= value * (1 + 1e-9)) * decade)

@@ -142,6 +142,15 @@ def terrain_heights(
         raise type(error)(f"the geoid cannot be used: {error}") from error
 
 
+def declared_datum(dem: RasterSource) -> str | None:
+    """Return the vertical datum that a terrain model's compound CRS names, if it is a known one."""
+    crs = dem.grid.crs
+    text = "" if crs is None else str(crs.to_wkt()).upper().replace(" ", "")
+    if "VERT_CS" not in text and "VERTCRS" not in text:
+        return None
+    return next((name for name in GEOID_GRIDS if name in text), None)
+
+
 def find_geoid(datum: str) -> Path | None:
     """Return the grid of the geoid of a vertical datum; None for the ellipsoid.
 

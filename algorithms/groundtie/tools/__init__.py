@@ -16,6 +16,7 @@ NAMES = (
     "refine_rpc",
     "orthorectify",
     "assess",
+    "assess_sensor",
     "similarity_surface",
     "detector_repeatability",
     "filter_speckle",

@@ -13,7 +13,7 @@ from rasterio.crs import CRS
 from ..errors import ParameterError
 from ..kinds import Choice, FileIn, Number, RasterIn
 from ..rasters.reading import RasterSource, open_raster
-from ..sensor.heights import DATUMS, find_geoid
+from ..sensor.heights import DATUMS, declared_datum, find_geoid
 from ..sensor.orientation import Orientation, orient, seen_at
 from ..sensor.rpc import RPC
 from ..sensor.rpc_files import rpc_of
@@ -118,7 +118,15 @@ class Ground:
     def orientation(
         self, source: RasterSource, rpc: RPC, crs: CRS, stack: ExitStack
     ) -> Orientation:
-        """Return an image's orientation; rasters are opened within `stack`."""
+        """Return an image's orientation; rasters are opened within `stack`.
+
+        Raises
+        ------
+        ParameterError
+            The terrain model itself names another vertical datum.
+        GeoreferencingError, NoOverlapError, RasterContentError
+            See `orient` and `find_geoid`.
+        """
 
         def opened(path: Path) -> RasterSource:
             return stack.enter_context(open_raster(path))
@@ -126,11 +134,17 @@ class Ground:
         geoid = self.geoid
         if geoid is None and self.datum is not None:
             geoid = find_geoid(self.datum)
+        dem = None if self.dem is None else opened(self.dem)
+        declared = None if dem is None else declared_datum(dem)
+        if declared is not None and self.datum is not None and declared != self.datum:
+            raise ParameterError(
+                f"{self.dem} says that its heights count from {declared}, not {self.datum}"
+            )
         return orient(
             source,
             rpc,
             crs,
-            None if self.dem is None else opened(self.dem),
+            dem,
             None if geoid is None else opened(geoid),
             self.height_m,
         )

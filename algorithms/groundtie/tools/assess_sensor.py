@@ -1,0 +1,145 @@
+"""Judge the RPCs of an image at independent check points, before and after a refinement."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from ..declaration import Output as ResultOutput
+from ..declaration import tool
+from ..errors import TooFewPointsError
+from ..kinds import FileIn, FileOut
+from ..progress import SILENT, Progress
+from ..quality.sensor_accuracy import SensorErrors, draw_vectors, table_lines, write_table
+from ..rasters.atomic import Outputs
+from ..rasters.reading import bounded_cache
+from ..sensor.control_points import SUFFIXES, read_control_points
+from ..sensor.rpc import RPC
+from ..sensor.rpc_files import read_rpc
+from .sensor_input import (
+    Dem,
+    DemDatum,
+    Geoid,
+    Ground,
+    Height,
+    RpcFile,
+    SensorImage,
+    open_sensor_image,
+    utm_of,
+)
+
+BEFORE, AFTER = "before", "after"
+
+
+@dataclass(frozen=True)
+class SensorAssessment:
+    """Errors at check points, by the RPCs as delivered and, if given, as refined.
+
+    Parameters
+    ----------
+    errors
+        By "before" and "after".
+    points
+        Number of points.
+    files
+        What was written, by name.
+    """
+
+    errors: dict[str, SensorErrors]
+    points: int
+    files: dict[str, str]
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        measured = {name: errors.summary() for name, errors in self.errors.items()}
+        return {"points": self.points, AFTER: None, **measured, "files": self.files}
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        return [
+            *table_lines(self.errors),
+            *(f"{name}: {path}" for name, path in self.files.items()),
+        ]
+
+
+@tool(
+    title="Assess RPCs",
+    group="Quality",
+    outputs=(
+        ResultOutput("POINTS", "Number of check points", "points"),
+        ResultOutput("BEFORE_RMSE_M", "Error before (m)", "before.rmse_m"),
+        ResultOutput("BEFORE_CE90_M", "CE90 before (m)", "before.ce90_m"),
+    ),
+)
+def assess_sensor(
+    image: SensorImage,
+    check_points: Annotated[
+        Path,
+        FileIn(
+            label="Check points",
+            help="Points that are independent of the refinement. If some have the role check, "
+            "these alone count.",
+            suffixes=SUFFIXES[:-1],
+        ),
+    ],
+    refined: Annotated[
+        Path | None,
+        FileIn(
+            label="Refined RPCs",
+            help="RPCs of refine_rpc: _RPC.TXT, .RPB, or an image (.tif) that has them.",
+            suffixes=(".txt", ".rpb", ".xml", ".tif", ".tiff"),
+        ),
+    ] = None,
+    dem: Dem = None,
+    dem_datum: DemDatum = None,
+    table: Annotated[
+        Path | None,
+        FileOut(label="Table", help="The errors of each point.", suffixes=(".csv",)),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        FileOut(label="Picture", help="The errors as arrows in the image.", suffixes=(".png",)),
+    ] = None,
+    height: Height = None,
+    geoid: Geoid = None,
+    rpc: RpcFile = None,
+    progress: Progress = SILENT,
+) -> SensorAssessment:
+    """Judge the RPCs of an image at independent check points, before and after a refinement.
+
+    Errors on the ground are measured at the points' own heights; points without heights take them
+    from the terrain model. All used points count, however large their errors.
+    """
+    ground = Ground(dem, dem_datum, geoid, height)
+    with ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        source, delivered = open_sensor_image(image, rpc, stack)
+        progress.update(0.0, ground.note(delivered))
+        orientation = ground.orientation(source, delivered, utm_of(source, delivered), stack)
+        points = read_control_points(check_points, orientation, source.grid)
+        which = points.points.used
+        if (which & points.points.is_check).any():
+            which = which & points.points.is_check
+        points = points.take(which)
+        if len(points) == 0:
+            raise TooFewPointsError(f"{check_points} holds no points that are used")
+        errors = {BEFORE: SensorErrors.of(delivered, points)}
+        if refined is not None:
+            errors[AFTER] = SensorErrors.of(_refined(refined, stack), points)
+        size = source.grid.width, source.grid.height
+        written = {"table": table, "picture": picture}
+        with Outputs() as outputs:
+            if table is not None:
+                write_table(outputs.stage(table), points, errors)
+            if picture is not None:
+                draw_vectors(outputs.stage(picture), points, errors, size)
+    files = {name: str(path) for name, path in written.items() if path is not None}
+    return SensorAssessment(errors, len(points), files)
+
+
+def _refined(path: Path, stack: ExitStack) -> RPC:
+    if path.suffix.lower() in (".tif", ".tiff"):
+        return open_sensor_image(path, None, stack)[1]
+    return read_rpc(path)

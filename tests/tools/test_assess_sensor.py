@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from rpc_models import camera_rpc, write_dem, write_positions
+
+import groundtie
+from groundtie.errors import GroundTieError, TooFewPointsError
+from groundtie.sensor.rpc_files import write_rpc
+
+TRUTH = camera_rpc()
+BIAS = (12.0, -5.0)
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, Path]:
+    """Write an image whose RPCs are 12 columns and -5 rows off, refined ones, and six points."""
+    image = write_positions(tmp_path / "image.tif", TRUTH.shifted((-BIAS[0], -BIAS[1])))
+    write_rpc(tmp_path / "refined_RPC.TXT", TRUTH.shifted((0.3, 0.0)))
+    px = np.random.default_rng(0).uniform(50, 450, (6, 2))
+    height = np.linspace(100, 500, 6)
+    rows = np.column_stack([TRUTH.localise(px, height), px, height])
+    lines = ["reference_x,reference_y,input_col,input_row,height_m,reference_crs,role"]
+    lines += [",".join(f"{v:.12f}" for v in row) + ",EPSG:4326,check" for row in rows]
+    lines.append("9.0,45.15,1.0,2.0,300.0,EPSG:4326,fit")
+    (tmp_path / "points.csv").write_text("\n".join(lines))
+    return {"image": image, "check_points": tmp_path / "points.csv"}
+
+
+def test_errors_are_measured_in_pixels_and_metres(files: dict[str, Path], tmp_path: Path) -> None:
+    result = groundtie.assess_sensor(**files, refined=tmp_path / "refined_RPC.TXT", height=300.0)
+    assert result.points == 6
+    np.testing.assert_allclose(result.errors["before"].error_px, [BIAS] * 6, atol=1e-6)
+    np.testing.assert_allclose(result.errors["after"].error_px, [(-0.3, 0.0)] * 6, atol=1e-6)
+    # Pixels are 1 m, turned by 8°; longitudes and latitudes are made metres.
+    lengths = np.hypot(*result.errors["before"].error_m.T)
+    np.testing.assert_allclose(lengths, 13.0, rtol=0.01)
+    summary = result.summary()
+    assert summary["before"]["ce90_m"] == pytest.approx(13.0, rel=0.01)
+    assert summary["after"]["rmse_px"] == pytest.approx(0.3, abs=1e-6)
+    assert result.lines()[0].split() == [
+        "point",
+        "before",
+        "x",
+        "y",
+        "(m)",
+        "after",
+        "x",
+        "y",
+        "(m)",
+    ]
+    assert len(result.lines()) == 1 + 6 + 2 + 2
+
+
+def test_table_and_picture_are_written(files: dict[str, Path], tmp_path: Path) -> None:
+    groundtie.assess_sensor(
+        **files, refined=tmp_path / "refined_RPC.TXT", height=300.0,
+        table=tmp_path / "errors.csv", picture=tmp_path / "errors.png",
+    )  # fmt: skip
+    rows = list(csv.DictReader((tmp_path / "errors.csv").open()))
+    assert len(rows) == 6
+    assert float(rows[0]["before_col_px"]) == pytest.approx(12.0, abs=1e-6)
+    picture = cv2.imread(str(tmp_path / "errors.png"))
+    assert picture.shape[1] > picture.shape[0] > 300
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 10
+
+
+def test_points_without_heights_take_the_grounds(files: dict[str, Path], tmp_path: Path) -> None:
+    dem = write_dem(tmp_path / "dem.tif", steepness=0.0)
+    px = np.array([[100.0, 100.0], [400.0, 300.0], [500.0, 50.0]])
+    rows = np.column_stack([TRUTH.localise(px, 300.0), px])
+    lines = ["reference_x,reference_y,input_col,input_row,reference_crs"]
+    lines += [",".join(f"{v:.12f}" for v in row) + ",EPSG:4326" for row in rows]
+    files["check_points"].write_text("\n".join(lines))
+    result = groundtie.assess_sensor(**files, dem=dem, dem_datum="ellipsoidal")
+    np.testing.assert_allclose(result.errors["before"].error_px, [BIAS] * 3, atol=1e-3)
+    assert result.summary()["after"] is None
+
+
+def test_without_points_nothing_is_judged(files: dict[str, Path], tmp_path: Path) -> None:
+    files["check_points"].write_text(
+        "reference_x,reference_y,input_col,input_row,state\n9.0,45.15,1,2,rejected: blunder\n"
+    )
+    with pytest.raises(TooFewPointsError, match="no points that are used"):
+        groundtie.assess_sensor(**files, height=300.0, table=tmp_path / "a.csv")
+    assert not (tmp_path / "a.csv").exists()
+
+
+def test_refined_rpcs_must_be_there(files: dict[str, Path], tmp_path: Path) -> None:
+    with pytest.raises(GroundTieError, match="cannot read the RPCs"):
+        groundtie.assess_sensor(**files, refined=tmp_path / "none.txt", height=300.0)
