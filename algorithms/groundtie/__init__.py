@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .tools.estimate_rotation import estimate_rotation
     from .tools.extract_gcps import extract_gcps
     from .tools.filter_speckle import filter_speckle
+    from .tools.mask_regions import mask_regions
     from .tools.mask_threshold import mask_threshold
     from .tools.match_sar_sar import match_sar_sar
     from .tools.orthorectify import orthorectify
@@ -39,6 +40,7 @@ __all__ = [
     "extract_gcps",
     "filter_speckle",
     "load_transform",
+    "mask_regions",
     "mask_threshold",
     "match_sar_sar",
     "orthorectify",

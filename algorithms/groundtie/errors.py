@@ -58,6 +58,10 @@ class TransformFileError(GroundTieError, ValueError):
     """A transform or tie-point file cannot be understood."""
 
 
+class VectorLayerError(GroundTieError, ValueError):
+    """A vector layer cannot be read, or holds nothing that can be used."""
+
+
 class TooFewPointsError(GroundTieError, ValueError):
     """There are fewer tie points than the model needs."""
 

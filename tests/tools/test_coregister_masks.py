@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import fiona
+import numpy as np
 import pytest
+import rasterio
 from tools.conftest import SimulatedFiles
 
+from groundtie.errors import ParameterError
 from groundtie.tools.coregister import coregister
 
 
@@ -39,3 +43,44 @@ def test_either_image_can_be_masked(
         mask = result.numbers["mask"]
         assert mask["image"] == expected
         assert mask["share"] == pytest.approx(0.9, abs=0.06)
+
+
+def test_fields_are_left_without_a_mask_by_auto(
+    simulated: Callable[[str], SimulatedFiles], tmp_path: Path
+) -> None:
+    pair = simulated("shift")
+    result = coregister(pair.reference, pair.input, tmp_path / "out.tif", mask="auto")
+    mask = result.numbers["mask"]
+    assert mask["kind"] == "none" and "too few buildings" in mask["reason"]
+
+
+def test_a_layer_does_the_same_job(
+    simulated: Callable[[str], SimulatedFiles], tmp_path: Path
+) -> None:
+    """A polygon over the left two thirds: nothing else of the reference takes part."""
+    pair = simulated("shift")
+    with rasterio.open(pair.reference) as source:
+        left, bottom, right, top = source.bounds
+        crs = source.crs.to_wkt()
+    right = left + (right - left) * 2 / 3
+    ring = [(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)]
+    schema = {"geometry": "Polygon", "properties": {}}
+    layer = tmp_path / "ground.gpkg"
+    with fiona.open(layer, "w", driver="GPKG", crs_wkt=crs, schema=schema) as file:
+        geometry = {"type": "Polygon", "coordinates": [ring]}
+        file.write({"type": "Feature", "geometry": geometry, "properties": {}})
+    result = coregister(pair.reference, pair.input, tmp_path / "out.tif", mask_layer=layer)
+    mask = result.numbers["mask"]
+    assert (mask["kind"], mask["image"]) == ("layer", "reference")
+    assert mask["share"] == pytest.approx(2 / 3, abs=0.01)
+    xy = result.points.take(result.points.used).reference_xy
+    # Chips may lie across the border, but none beyond it.
+    assert np.all(xy[:, 0] < right + 60)
+    with pytest.raises(ParameterError, match="either mask=threshold or a mask layer"):
+        coregister(
+            pair.reference,
+            pair.input,
+            tmp_path / "other.tif",
+            mask="threshold",
+            mask_layer=layer,
+        )

@@ -2,11 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-NONE, THRESHOLD = "none", "threshold"
-MASKS = (NONE, THRESHOLD)
+import numpy as np
+
+from ..progress import SILENT, Progress
+from . import threshold
+from .regions import GroundRegions
+from .scene import Scene
+
+NONE, THRESHOLD, REGIONS, AUTO = "none", "threshold", "regions", "auto"
+MASKS = (NONE, THRESHOLD, REGIONS, AUTO)
+
+# Block means above this many times their median shine, and scenes of which more than that share
+# shines are dense towns. Measured shares: real towns up to 10 %, dense cities 16–27 %.
+_BRIGHT = 4.0
+_DENSE = 0.13
+
+# Regions must cover this share of a scene, and their skeleton be so many times its side.
+_LEAST_GROUND, _LEAST_SKELETON = 0.1, 2.0
+
+# What a mask by a vector layer is called.
+LAYER = "layer"
 
 REFERENCE, INPUT = "reference", "input"
 
@@ -18,7 +37,7 @@ class MaskUsed:
     Parameters
     ----------
     kind
-        One of `MASKS`.
+        One of `MASKS`, or `LAYER`.
     image
         Which image was masked: "reference" or "input"; None without a mask.
     share
@@ -41,3 +60,43 @@ class MaskUsed:
         if self.image is None:
             return f"mask: {self.kind}, {self.reason}"
         return f"mask: {self.kind}, {self.share:.0%} of the {self.image} take part; {self.reason}"
+
+
+def choose(
+    scene: Scene, find: Callable[[Progress], GroundRegions], progress: Progress = SILENT
+) -> tuple[str, str]:
+    """Return the kind of mask that suits a radar image, and why.
+
+    Parameters
+    ----------
+    scene
+        Grey values are amplitudes.
+    find
+        Finds the regions on the ground; called only if the image is a dense town's.
+    progress
+        Is told of every step.
+    """
+    share = bright_share(scene, progress.part(0.0, 0.2))
+    shine = f"{share:.0%} of the image shines"
+    if share < _DENSE:
+        return NONE, f"{shine}: too few buildings to lead astray"
+    ground = find(progress.part(0.2, 1.0))
+    side_m = float(np.sqrt(scene.grid.width * scene.grid.height)) * scene.grid.pixel_size_m
+    usable = f"{shine}, and {ground.skeleton_m:.0f} m of roads and banks"
+    if ground.part.mean() < _LEAST_GROUND or ground.skeleton_m < _LEAST_SKELETON * side_m:
+        return THRESHOLD, f"{usable} are too little to rely on"
+    return REGIONS, f"{usable} are enough to rely on"
+
+
+def bright_share(scene: Scene, progress: Progress = SILENT) -> float:
+    """Return the share of an image, 0 to 1, that is brighter than usual by 6 dB or more.
+
+    Means over 4 × 4 pixels are compared with their median.
+    """
+    parts = [
+        part.values[part.valid] ** 2 for part in scene.reduced_strips(threshold.BLOCK_PX, progress)
+    ]
+    power = np.concatenate(parts)
+    if power.size == 0:
+        return 0.0
+    return float(np.mean(power > _BRIGHT * np.median(power)))

@@ -103,6 +103,11 @@ class ImagePair:
             grid, to_input_px, lambda xy: to_mask(own.pixel_to_map(to_input_px(xy)))
         )
 
+    @property
+    def is_masked(self) -> bool:
+        """Whether a mask tells what of an image takes part."""
+        return self.reference.mask is not None or self.input.mask is not None
+
     def notes(self) -> list[str]:
         """Return what a user should know of how the images are read."""
         return [

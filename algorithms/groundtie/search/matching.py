@@ -25,8 +25,9 @@ FloatArray = NDArray[np.float64]
 ToPixel = Callable[[FloatArray], FloatArray]
 MaskOf = Callable[[Grid], NDArray[np.bool_]]
 
-# Chips with less valid area than this in either image are not matched.
-_LEAST_VALID = 0.4
+# Chips with less valid area than this in either image are not matched. What a mask leaves was
+# chosen for what it tells: a little of it may be enough.
+_LEAST_VALID, _LEAST_VALID_MASKED = 0.4, 0.1
 
 
 @dataclass(frozen=True)
@@ -161,10 +162,10 @@ class ChipMatcher:
         piece = self.grid.window(int(corner[0]), int(corner[1]), side, side)
         hidden = None if self.held_out is None else self.held_out(piece)
         reference = self.pair.reference_patch(piece, hidden)
-        if not _can_be_matched(reference.inner(radius_px)):
+        if not self._can_be_matched(reference.inner(radius_px)):
             return None
         input = self.pair.input_patch(piece, self.to_input_px)
-        if not _can_be_matched(input.inner(radius_px)):
+        if not self._can_be_matched(input.inner(radius_px)):
             return None
         there = describe(reference, chip_px**2, self.settings)
         here = describe(input, chip_px**2, self.settings)
@@ -174,7 +175,7 @@ class ChipMatcher:
         backward = similarity_surface(here.inner(radius_px), there, radius_px, self.settings)
         return np.stack([forward, backward[::-1, ::-1]])
 
-
-def _can_be_matched(chip: Patch) -> bool:
-    core = chip.inner(BORDER_PX)
-    return core.valid_share >= _LEAST_VALID and not core.is_flat
+    def _can_be_matched(self, chip: Patch) -> bool:
+        core = chip.inner(BORDER_PX)
+        least = _LEAST_VALID_MASKED if self.pair.is_masked else _LEAST_VALID
+        return core.valid_share >= least and not core.is_flat

@@ -12,11 +12,15 @@ from numpy.typing import NDArray
 FloatImage = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
+# Mean power, squared, below which there is nothing: running sums leave this much behind.
+_NO_POWER = np.float32(1e-30)
+
 # Window in which looks are estimated, and the bins, in octaves of the squared variation, whose
 # fullest tells what is common to all homogeneous areas. No image has less than one look.
-_LOOKS_WINDOW_PX = 15
+_LOOKS_WINDOW_PX = 9
 _BIN_OCTAVES = 0.125
 _OCTAVES = (-14.0, 0.375)
+_PEAK = 0.2
 
 # Window, and share of all windows, by which speckled images are told from others.
 _CALM_WINDOW_PX = 3
@@ -63,8 +67,9 @@ def local_statistics(intensity: FloatImage, valid: Mask, window_px: int) -> Loca
     weight = 1 / np.maximum(window_counts(valid, window_px), np.float32(1))
     mean: FloatImage = np.asarray(total * weight, np.float32)
     squares *= weight
-    power = np.maximum(mean * mean, np.finfo(np.float32).tiny)
-    variation2: FloatImage = np.asarray(squares / power, np.float32)
+    power = mean * mean
+    variation2: FloatImage = np.ones_like(mean)
+    np.divide(squares, power, out=variation2, where=power > _NO_POWER)
     variation2 -= 1
     return LocalStatistics(mean, np.maximum(variation2, np.float32(0), out=variation2))
 
@@ -97,8 +102,8 @@ def estimate_looks(intensity: FloatImage, valid: Mask) -> float:
     """Return the equivalent number of looks of an image.
 
     In a homogeneous area, intensity has the squared coefficient of variation 1 / looks. Windows
-    that hold edges or texture vary more, each in its own way: the most frequent value is that of
-    the homogeneous ones (Foucher et al. 2000, doi:10.1109/IGARSS.2000.861621).
+    that hold edges or texture vary more, each in its own way: the first of the frequent values is
+    that of the homogeneous ones (after Foucher et al. 2000, doi:10.1109/IGARSS.2000.861621).
 
     Parameters
     ----------
@@ -121,7 +126,11 @@ def estimate_looks(intensity: FloatImage, valid: Mask) -> float:
     octave = np.log2(usual)
     bins = round((_OCTAVES[1] - _OCTAVES[0]) / _BIN_OCTAVES)
     counts, edges = np.histogram(octave, bins, _OCTAVES)
-    peak = int(np.convolve(counts, np.ones(3), "same").argmax())
+    counts = np.convolve(counts, np.ones(3), "same")
+    # Texture and edges only add to the variation: of several peaks, the first is speckle's.
+    rising = np.append(-1, counts)[:-1] < counts
+    falling = np.append(counts, -1)[1:] <= counts
+    peak = int(np.argmax(rising & falling & (counts >= _PEAK * counts.max())))
     low, high = edges[max(peak - 2, 0)], edges[min(peak + 3, bins)]
     return max(float(1 / np.median(usual[(octave >= low) & (octave < high)])), 1.0)
 

@@ -21,6 +21,7 @@ NAMES = (
     "detector_repeatability",
     "filter_speckle",
     "mask_threshold",
+    "mask_regions",
     "simulate",
     "simulate_sensor",
 )

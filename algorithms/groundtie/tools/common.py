@@ -129,11 +129,12 @@ MaskOut = Annotated[
     RasterOut(label="Mask", help="GeoTIFF that is 1 where pixels take part and 0 elsewhere."),
 ]
 HighPercent = Annotated[
-    float,
+    float | None,
     Number(
         label="Brightest part masked",
-        help="Share of the radar image that takes no part because it shines: walls and corners. "
-        "Thresholds are those of means over 4 × 4 pixels.",
+        help="Share that takes no part because it shines, as walls and corners do; by default "
+        "20 % of the radar image with threshold, 10 % of what regions leave. Means over "
+        "4 × 4 pixels are compared.",
         unit="%",
         minimum=0,
         maximum=90,
@@ -149,6 +150,17 @@ LowPercent = Annotated[
         unit="%",
         minimum=0,
         maximum=90,
+        advanced=True,
+    ),
+]
+MaskWidth = Annotated[
+    float,
+    Distance(
+        label="Width of lines",
+        help="Window by which skeletons of long regions, and lines of a vector layer, are "
+        "broadened.",
+        minimum=0.1,
+        maximum=500,
         advanced=True,
     ),
 ]

@@ -6,12 +6,14 @@ import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
 from ..declaration import tool
-from ..kinds import Choice, Distance, Number
+from ..kinds import Choice, Distance, Number, VectorIn
 from ..masks.choice import MASKS, NONE
+from ..masks.regions import WIDTH_M
 from ..progress import SILENT, Progress
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
@@ -27,6 +29,7 @@ from .common import (
     InputMask,
     LowPercent,
     MaskGrowth,
+    MaskWidth,
     MatchingPixelSize,
     Output,
     Reference,
@@ -117,7 +120,8 @@ def coregister(
         Choice(
             label="Mask",
             help="What takes part, for scenes with high buildings, which lean over their "
-            "surroundings: threshold leaves out what shines in the radar image.",
+            "surroundings: threshold leaves out what shines in the radar image, regions all "
+            "but homogeneous ground: roads, waters, squares; auto chooses by what the image shows.",
             choices=MASKS,
             advanced=True,
         ),
@@ -131,9 +135,19 @@ def coregister(
             advanced=True,
         ),
     ] = AUTO,
-    mask_high_percent: HighPercent = 20.0,
+    mask_layer: Annotated[
+        Path | None,
+        VectorIn(
+            label="Layer that is the mask",
+            help="Vector layer of what lies on the ground, as roads and waters: of the reference, "
+            "nothing else takes part. Polygons, and lines as wide as told below.",
+            advanced=True,
+        ),
+    ] = None,
+    mask_high_percent: HighPercent = None,
     mask_low_percent: LowPercent = 0.0,
     mask_growth: MaskGrowth = 0.0,
+    mask_width: MaskWidth = WIDTH_M,
     chip_size: Annotated[
         int | None,
         Number(
@@ -219,7 +233,15 @@ def coregister(
         )
         for note in pair.notes():
             progress.update(0.0, note)
-        request = MaskRequest(mask, mask_image, mask_high_percent, mask_low_percent, mask_growth)
+        request = MaskRequest(
+            mask,
+            mask_image,
+            mask_high_percent,
+            mask_low_percent,
+            mask_growth,
+            mask_width,
+            mask_layer,
+        )
         pair, mask_used = request.apply(pair, search_radius, stack, progress.part(0.0, 0.1))
         spacing_px = None if spacing is None else spacing / pair.grid.pixel_size_m
         local = LocalSearch(

@@ -9,7 +9,7 @@ from typing import Any
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..masks.scene import Scene, write_mask
-from ..masks.threshold import Threshold
+from ..masks.threshold import HIGH_PERCENT, Threshold
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
@@ -48,7 +48,7 @@ class ThresholdMaskResult:
 def mask_threshold(
     input: Radar,
     output: MaskOut,
-    mask_high_percent: HighPercent = 20.0,
+    mask_high_percent: HighPercent = None,
     mask_low_percent: LowPercent = 0.0,
     mask_growth: MaskGrowth = 0.0,
     band: RadarBand = None,
@@ -63,7 +63,8 @@ def mask_threshold(
     with bounded_cache(), open_raster(input) as source:
         scene = Scene.of(source, band)
         grow_px = round(mask_growth / source.grid.pixel_size_m)
-        threshold = Threshold(mask_high_percent, mask_low_percent, grow_px)
+        high = HIGH_PERCENT if mask_high_percent is None else mask_high_percent
+        threshold = Threshold(high, mask_low_percent, grow_px)
         mask = threshold.on(scene, progress.part(0.0, 0.3))
         with Outputs() as outputs:
             share = write_mask(scene, outputs.stage(output), mask.select, progress.part(0.3, 1.0))

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from ..masks.choice import INPUT, NONE, REFERENCE, MaskUsed
+from ..errors import ParameterError
+from ..masks import regions, threshold
+from ..masks.choice import AUTO, INPUT, LAYER, NONE, REFERENCE, REGIONS, MaskUsed, choose
+from ..masks.layer import read_layer
 from ..masks.radar import is_more_speckled
-from ..masks.scene import Scene, write_mask
+from ..masks.regions import GroundRegions, find_ground
+from ..masks.scene import Scene, Selection, write_mask
 from ..masks.threshold import Threshold
 from ..progress import Progress
 from ..rasters.pair import ImagePair, default_radius_m
 from ..rasters.patch import Patch
 from ..rasters.reading import Window, open_raster
 
-AUTO = "auto"
 MASK_IMAGES = (AUTO, REFERENCE, INPUT)
 
 
@@ -33,14 +38,20 @@ class MaskRequest:
     image
         One of `MASK_IMAGES`.
     high_percent, low_percent, growth_m
-        See `masks.threshold.Threshold`; the growth is in metres.
+        See `masks.threshold.Threshold`; the growth is in metres. None: what is usual.
+    width_m
+        See `masks.regions.find_ground`; of the layer's lines, too.
+    layer
+        A vector layer that is the mask instead; None: none.
     """
 
     kind: str
     image: str
-    high_percent: float
+    high_percent: float | None
     low_percent: float
     growth_m: float
+    width_m: float = regions.WIDTH_M
+    layer: Path | None = None
 
     def apply(
         self, pair: ImagePair, radius_m: float | None, stack: ExitStack, progress: Progress
@@ -58,19 +69,47 @@ class MaskRequest:
         progress
             Is told of every tile.
         """
+        if self.layer is not None:
+            return self._by_layer(pair, radius_m, stack, progress)
         if self.kind == NONE:
             return pair, MaskUsed(NONE, None, 1.0, "as asked for")
         name, reason = self._image(pair)
-        radius_m = default_radius_m(pair.grid) if radius_m is None else radius_m
         scene = _scene(pair, name, radius_m)
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="groundtie-")))
-        path = folder / "mask.tif"
+        kind = self.kind
+        if kind == AUTO:
+            kind, reason = choose(scene, partial(self._ground, scene), progress.part(0.0, 0.5))
+        if kind == NONE:
+            return pair, MaskUsed(NONE, None, 1.0, reason)
+        select = self._selection(kind, scene, progress.part(0.5, 0.8))
+        used = MaskUsed(kind, name, 0.0, reason)
+        return _masked(pair, scene, select, used, stack, progress.part(0.8, 1.0))
+
+    def _selection(
+        self, kind: str, scene: Scene, progress: Progress
+    ) -> Callable[[Window], Selection]:
+        if kind == REGIONS:
+            return self._ground(scene, progress).select
         growth_px = round(self.growth_m / scene.grid.pixel_size_m)
-        threshold = Threshold(self.high_percent, self.low_percent, growth_px)
-        mask = threshold.on(scene, progress.part(0.0, 0.3))
-        share = write_mask(scene, path, mask.select, progress.part(0.3, 1.0))
-        masked = replace(getattr(pair, name), mask=stack.enter_context(open_raster(path)))
-        return replace(pair, **{name: masked}), MaskUsed(self.kind, name, share, reason)
+        by_level = Threshold(self._high(threshold.HIGH_PERCENT), self.low_percent, growth_px)
+        return by_level.on(scene, progress).select
+
+    def _ground(self, scene: Scene, progress: Progress) -> GroundRegions:
+        return find_ground(scene, self.width_m, self._high(regions.HIGH_PERCENT), progress)
+
+    def _by_layer(
+        self, pair: ImagePair, radius_m: float | None, stack: ExitStack, progress: Progress
+    ) -> tuple[ImagePair, MaskUsed]:
+        """Return the pair with the vector layer's mask on the reference, which is in its place."""
+        if self.kind != NONE:
+            raise ParameterError(f"give either mask={self.kind} or a mask layer")
+        assert self.layer is not None
+        scene = _scene(pair, REFERENCE, radius_m)
+        select = read_layer(self.layer, scene, self.width_m).select
+        used = MaskUsed(LAYER, REFERENCE, 0.0, f"what {Path(self.layer).name} covers")
+        return _masked(pair, scene, select, used, stack, progress)
+
+    def _high(self, usual: float) -> float:
+        return usual if self.high_percent is None else self.high_percent
 
     def _image(self, pair: ImagePair) -> tuple[str, str]:
         if self.image != AUTO:
@@ -80,8 +119,26 @@ class MaskRequest:
         return INPUT, "it has the more speckle"
 
 
-def _scene(pair: ImagePair, name: str, radius_m: float) -> Scene:
+def _masked(
+    pair: ImagePair,
+    scene: Scene,
+    select: Callable[[Window], Selection],
+    used: MaskUsed,
+    stack: ExitStack,
+    progress: Progress,
+) -> tuple[ImagePair, MaskUsed]:
+    """Return the pair with a mask, which is a file until the stack is closed, on one image."""
+    assert used.image is not None
+    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="groundtie-")))
+    share = write_mask(scene, folder / "mask.tif", select, progress)
+    mask = stack.enter_context(open_raster(folder / "mask.tif"))
+    image = replace(getattr(pair, used.image), mask=mask)
+    return replace(pair, **{used.image: image}), replace(used, share=share)
+
+
+def _scene(pair: ImagePair, name: str, radius_m: float | None) -> Scene:
     """Return one image of a pair on the matching lattice, as far as searches may reach."""
+    radius_m = default_radius_m(pair.grid) if radius_m is None else radius_m
     reach = int(np.ceil(radius_m / pair.grid.pixel_size_m))
     grid = pair.grid.window(
         -reach, -reach, pair.grid.width + 2 * reach, pair.grid.height + 2 * reach

@@ -1,0 +1,90 @@
+"""Region growing: from calm places to all that is as bright and hangs together with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rasters.reading import Mask, Window
+
+# One seed at most in each square of this side, in pixels.
+_SEED_PX = 8
+
+# Marks in OpenCV's mask: not to be entered, the region that grows.
+_TAKEN, _GROWING = 1, 2
+
+
+@dataclass(frozen=True)
+class Region:
+    """Pixels that hang together: `mask`, shape (height, width) of their bounding box `box`.
+
+    `level_db` is their mean.
+    """
+
+    box: Window
+    mask: Mask
+    level_db: float
+
+
+def grow_regions(
+    level_db: NDArray[np.float32],
+    variation2: NDArray[np.float32],
+    valid: Mask,
+    calm_variation2: float,
+    tolerance_db: float,
+    smallest_px: int,
+) -> Iterator[Region]:
+    """Yield the homogeneous regions of an image, those around the calmest seeds first.
+
+    Castleman 1996, Digital Image Processing: a region takes in neighbours that differ from its
+    seed by no more than a tolerance. No pixel belongs to two regions.
+
+    Parameters
+    ----------
+    level_db
+        Smoothed image in decibels, shape (h, w).
+    variation2
+        Squared coefficient of variation around each pixel, same shape: the calm are seeds.
+    valid
+        Which pixels may belong to a region, same shape.
+    calm_variation2
+        What varies more is no seed.
+    tolerance_db
+        Largest difference from the seed.
+    smallest_px
+        Smaller regions are not returned.
+    """
+    taken = np.pad((~valid).astype(np.uint8), 1, constant_values=_TAKEN)
+    flags = 4 | (_GROWING << 8) | cv2.FLOODFILL_MASK_ONLY | cv2.FLOODFILL_FIXED_RANGE
+    image = np.ascontiguousarray(level_db, np.float32)
+    for row, col in _seeds(np.where(valid, variation2, np.inf), calm_variation2):
+        if taken[row + 1, col + 1]:
+            continue
+        area, _, _, box = cv2.floodFill(
+            image, taken, (int(col), int(row)), 0, tolerance_db, tolerance_db, flags
+        )
+        window = Window(*box)
+        part = taken[window.row + 1 :, window.col + 1 :][: window.height, : window.width]
+        mask = part == _GROWING
+        part[mask] = _TAKEN
+        if area >= smallest_px:
+            inside = level_db[window.row :, window.col :][: window.height, : window.width]
+            yield Region(window, mask, float(inside[mask].mean()))
+
+
+def _seeds(variation2: NDArray[np.float32], largest: float) -> NDArray[np.intp]:
+    """Return rows and columns, shape (n, 2), of the calmest pixel of each square, calmest first."""
+    height, width = (side // _SEED_PX for side in variation2.shape)
+    squares = variation2[: height * _SEED_PX, : width * _SEED_PX]
+    squares = squares.reshape(height, _SEED_PX, width, _SEED_PX).swapaxes(1, 2)
+    flat = squares.reshape(height, width, _SEED_PX**2)
+    place, least = flat.argmin(axis=2), flat.min(axis=2)
+    row, col = np.nonzero(least <= largest)
+    order = np.argsort(least[row, col], kind="stable")
+    row, col = row[order], col[order]
+    inner = place[row, col]
+    return np.column_stack([row * _SEED_PX + inner // _SEED_PX, col * _SEED_PX + inner % _SEED_PX])

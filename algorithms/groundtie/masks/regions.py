@@ -1,0 +1,221 @@
+"""Masks by regions: what is flat and homogeneous, as roads, waters and fields are (S 5.3.2).
+
+Speckle is filtered, regions grow from calm places, their shapes tell ground from roofs, and what
+is long is thinned to its skeleton and broadened by a window again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RasterContentError
+from ..progress import SILENT, Progress
+from ..rasters.patch import Patch
+from ..rasters.reading import Mask, Window
+from ..speckle.filters import SpeckleFilter
+from ..speckle.statistics import estimate_looks, local_statistics
+from .growing import Region, grow_regions
+from .radar import power
+from .scene import Scene, Selection
+from .shapes import Shape
+from .skeleton import pruned, skeleton
+from .threshold import disc
+
+# Window by which skeletons are broadened, 5–19 m in thesis S, and percentage of the brightest
+# pixels inside that take no part after all.
+WIDTH_M = 11.0
+HIGH_PERCENT = 10.0
+
+# Larger scenes are looked at with larger pixels.
+_MOST_PIXELS = 24_000_000
+
+_FILTER_PX = 7
+_CALM_PX = 9
+
+# A place is calm if it varies little more than speckle alone; a region takes in what differs from
+# its seed by so much.
+_CALM_EXCESS = 1.3
+_TOLERANCE_DB = 2.5
+
+# Regions: long ones from this length and elongation on, others from this area on.
+_SMALLEST_M2 = 200.0
+_LONG_M, _ELONGATION = 50.0, 3.0
+_LARGE_M2 = 1500.0
+
+# Ground lies in the lower part of the histogram (S 5.3.2); its upper part is roofs and walls.
+_BRIGHTEST_PERCENT = 60.0
+
+# Regions as dark as the darkest of the scene are radar shadow, unless as large as a lake.
+_DARKEST_PERCENT = 5.0
+_SHADOW_DB = 1.5
+_LAKE_M2 = 20_000.0
+
+# Borders are made even by this before they are thinned.
+_EVEN_M = 2.0
+
+# The surroundings up to this distance take part, too: banks and kerbs are on the ground, and all
+# that a homogeneous area can tell. Gaps up to twice as wide close.
+_BORDER_M = 3.0
+
+
+@dataclass(frozen=True)
+class GroundRegions:
+    """What lies on the ground, on a grid of pixels `factor` times the scene's.
+
+    Parameters
+    ----------
+    scene
+        The image.
+    factor
+        Side of the pixels of what follows, in pixels of the scene.
+    regions, skeleton, part
+        Homogeneous regions that were kept; the skeleton of the long ones; what takes part: the
+    skeleton, broadened, and the large regions that are wider. Shape (h, w).
+    high
+        Grey value above which nothing takes part, of means over 4 × 4 pixels of the scene.
+    skeleton_m
+        Length of the skeleton.
+    """
+
+    scene: Scene
+    factor: int
+    regions: Mask
+    skeleton: Mask
+    part: Mask
+    skeleton_m: float
+    high: float
+
+    def select(self, window: Window) -> Selection:
+        """Return which pixels of a window take part."""
+        return self.cut(self.part, window, self.high)
+
+    def cut(self, mask: Mask, window: Window, high: float = np.inf) -> Selection:
+        """Return what of one of the masks lies in a window of the scene."""
+        patch = self.scene.read(window)
+        rows = np.arange(window.row, window.row + window.height) // self.factor
+        cols = np.arange(window.col, window.col + window.width) // self.factor
+        inside = (rows >= 0) & (rows < mask.shape[0]), (cols >= 0) & (cols < mask.shape[1])
+        shown = mask[np.ix_(rows.clip(0, mask.shape[0] - 1), cols.clip(0, mask.shape[1] - 1))]
+        shown = shown & inside[0][:, None] & inside[1] & patch.valid
+        if np.isfinite(high):
+            shown &= _smooth(patch) <= high
+        return Selection(shown, patch.valid)
+
+
+def find_ground(
+    scene: Scene,
+    width_m: float = WIDTH_M,
+    high_percent: float = HIGH_PERCENT,
+    progress: Progress = SILENT,
+) -> GroundRegions:
+    """Find what lies on the ground in a radar image.
+
+    Parameters
+    ----------
+    scene
+        Grey values are amplitudes.
+    width_m
+        Window by which skeletons are broadened; 5–19 m in thesis S.
+    high_percent
+        Percentage of the brightest pixels inside that take no part after all.
+    progress
+        Is told of every step.
+
+    Raises
+    ------
+    RasterContentError
+        No pixel of the scene is valid.
+    """
+    factor = int(np.ceil(np.sqrt(scene.grid.width * scene.grid.height / _MOST_PIXELS)))
+    patch = scene.reduced(factor, progress.part(0.0, 0.3))
+    if not patch.valid.any():
+        raise RasterContentError(f"{scene.like.path} has no valid pixels to make a mask of")
+    pixel_m = scene.grid.pixel_size_m * factor
+    longs, wide = _kept_regions(patch, pixel_m, width_m, progress.part(0.3, 0.8))
+    even = _without_holes(longs, round(_SMALLEST_M2 / pixel_m**2), max(round(_EVEN_M / pixel_m), 1))
+    lines = pruned(skeleton(even), round(width_m / pixel_m / 2))
+    progress.update(0.9)
+    broad = cv2.dilate(lines.astype(np.uint8), disc(max(round(width_m / pixel_m / 2), 1)))
+    border = disc(max(round(_BORDER_M / pixel_m), 1))
+    part = cv2.dilate(((broad > 0) | wide).astype(np.uint8), border) > 0
+    inside = _smooth(patch)[part & patch.valid]
+    high = float(np.percentile(inside, 100 - high_percent)) if inside.size else np.inf
+    return GroundRegions(
+        scene, factor, longs | wide, lines, part, _length_px(lines) * pixel_m, high
+    )
+
+
+def _kept_regions(
+    patch: Patch, pixel_m: float, width_m: float, progress: Progress
+) -> tuple[Mask, Mask]:
+    """Return the long regions on the ground, and the large ones wider than the window."""
+    intensity = power(patch)
+    looks = estimate_looks(intensity, patch.valid)
+    level = _decibels(SpeckleFilter("enhanced-frost", _FILTER_PX, looks)(intensity, patch.valid))
+    calm = local_statistics(intensity, patch.valid, _CALM_PX).variation2
+    brightest = np.percentile(level[patch.valid], _BRIGHTEST_PERCENT)
+    progress.update(0.5)
+    smallest = max(int(_SMALLEST_M2 / pixel_m**2), 1)
+    grown = grow_regions(level, calm, patch.valid, _CALM_EXCESS / looks, _TOLERANCE_DB, smallest)
+    regions = [region for region in grown if region.level_db <= brightest]
+    shadow_db = _darkest_db(regions) + _SHADOW_DB
+    longs, wide = np.zeros(level.shape, bool), np.zeros(level.shape, bool)
+    for region in regions:
+        shape = Shape.of(region.mask)
+        area_m2 = shape.area * pixel_m**2
+        if region.level_db < shadow_db and area_m2 < _LAKE_M2:
+            continue
+        if shape.length * pixel_m >= _LONG_M and shape.elongation >= _ELONGATION:
+            _add(longs, region)
+        if area_m2 >= _LARGE_M2 and shape.width * pixel_m > width_m:
+            _add(wide, region)
+    return longs, wide
+
+
+def _darkest_db(regions: list[Region]) -> float:
+    """Return the level below which a few percent of the regions' area lie."""
+    if not regions:
+        return -np.inf
+    level = np.array([region.level_db for region in regions])
+    area = np.array([np.count_nonzero(region.mask) for region in regions])
+    order = level.argsort()
+    below = np.cumsum(area[order]) / area.sum()
+    return float(level[order][np.searchsorted(below, _DARKEST_PERCENT / 100)])
+
+
+def _without_holes(mask: Mask, smallest_px: int, radius_px: int) -> Mask:
+    """Return a mask with even borders and without holes that are smaller than some pixels."""
+    even = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, disc(radius_px))
+    even = cv2.morphologyEx(even, cv2.MORPH_OPEN, disc(radius_px))
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(1 - even, connectivity=4)
+    small = stats[:, cv2.CC_STAT_AREA] < smallest_px
+    small[0] = False  # the mask itself
+    return np.asarray((even > 0) | small[labels])
+
+
+def _add(mask: Mask, region: Region) -> None:
+    box = region.box
+    mask[box.row :, box.col :][: box.height, : box.width] |= region.mask
+
+
+def _decibels(intensity: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.asarray(10 * np.log10(np.maximum(intensity, np.float32(1e-6))), np.float32)
+
+
+def _smooth(patch: Patch) -> NDArray[np.float32]:
+    """Return the mean over 4 × 4 pixels around each pixel; invalid ones count as 0."""
+    return np.asarray(cv2.blur(np.where(patch.valid, patch.values, np.float32(0)), (4, 4)))
+
+
+def _length_px(lines: Mask) -> float:
+    """Return the length of lines one pixel wide: steps along rows and columns, and diagonals."""
+    straight = np.count_nonzero(lines[1:] & lines[:-1]) + np.count_nonzero(
+        lines[:, 1:] & lines[:, :-1]
+    )
+    down = lines[1:, 1:] & lines[:-1, :-1] & ~lines[1:, :-1] & ~lines[:-1, 1:]
+    up = lines[:-1, 1:] & lines[1:, :-1] & ~lines[1:, 1:] & ~lines[:-1, :-1]
+    return float(straight + np.sqrt(2) * (np.count_nonzero(down) + np.count_nonzero(up)))

@@ -1,0 +1,93 @@
+"""Mask all of a radar image but homogeneous regions on the ground: roads, waters, squares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+from ..declaration import Output as ResultOutput
+from ..declaration import tool
+from ..kinds import RasterOut
+from ..masks.regions import HIGH_PERCENT, WIDTH_M, find_ground
+from ..masks.scene import Scene, write_mask
+from ..progress import SILENT, Progress
+from ..rasters.atomic import Outputs
+from ..rasters.reading import bounded_cache, open_raster
+from .common import HighPercent, MaskOut, MaskWidth, Radar, RadarBand
+
+
+@dataclass(frozen=True)
+class RegionMaskResult:
+    """The mask, the share of pixels that take part, and the length of the skeleton in metres."""
+
+    share: float
+    skeleton_m: float
+    files: dict[str, Path]
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        files = {name: str(path) for name, path in self.files.items()}
+        return {"share": self.share, "skeleton_m": self.skeleton_m, "files": files}
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        return [
+            f"{self.share:.1%} of the pixels take part; {self.skeleton_m:.0f} m of skeleton",
+            *(f"{name}: {path}" for name, path in self.files.items()),
+        ]
+
+
+@tool(
+    title="Mask by regions",
+    group="Radar",
+    outputs=(
+        ResultOutput("SHARE", "Share of the pixels that take part", "share"),
+        ResultOutput("SKELETON_M", "Length of the skeleton (m)", "skeleton_m"),
+    ),
+)
+def mask_regions(
+    input: Radar,
+    output: MaskOut,
+    regions: Annotated[
+        Path | None,
+        RasterOut(
+            label="Regions",
+            help="GeoTIFF that is 1 on homogeneous regions whose shape is that of roads, waters, "
+            "fields or squares.",
+        ),
+    ] = None,
+    skeleton: Annotated[
+        Path | None,
+        RasterOut(label="Skeleton", help="GeoTIFF that is 1 on the skeleton of long regions."),
+    ] = None,
+    mask_width: MaskWidth = WIDTH_M,
+    mask_high_percent: HighPercent = None,
+    band: RadarBand = None,
+    progress: Progress = SILENT,
+) -> RegionMaskResult:
+    """Mask all of a radar image but homogeneous regions on the ground: roads, waters, squares.
+
+    Speckle is filtered, regions grow from calm places, and those stay that are long or large and
+    neither bright nor radar shadow. Long ones are thinned to their skeleton and broadened by a
+    window; what shines inside takes no part. The mask is for `coregister` (reference_mask,
+    input_mask), which makes the same one itself with mask=regions.
+    """
+    high = HIGH_PERCENT if mask_high_percent is None else mask_high_percent
+    files = {"mask": output, "regions": regions, "skeleton": skeleton}
+    with bounded_cache(), open_raster(input) as source:
+        scene = Scene.of(source, band)
+        ground = find_ground(scene, mask_width, high, progress.part(0.0, 0.7))
+        with Outputs() as outputs:
+            share = write_mask(scene, outputs.stage(output), ground.select, progress.part(0.7, 0.8))
+            for path, part in ((regions, ground.regions), (skeleton, ground.skeleton)):
+                if path is not None:
+                    write_mask(
+                        scene,
+                        outputs.stage(path),
+                        partial(ground.cut, part),
+                        progress.part(0.8, 1.0),
+                    )
+    written = {name: path for name, path in files.items() if path is not None}
+    return RegionMaskResult(share, ground.skeleton_m, written)

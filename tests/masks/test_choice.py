@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from raster_files import utm_grid, write_raster
+
+from groundtie.masks.choice import MaskUsed, bright_share, choose
+from groundtie.masks.regions import GroundRegions
+from groundtie.masks.scene import Scene
+from groundtie.progress import Progress
+from groundtie.rasters.reading import open_raster
+
+
+def scene_of(path: Path, image: np.ndarray) -> Scene:
+    return Scene.of(open_raster(write_raster(path, image, utm_grid(*image.shape[::-1], 1.0))))
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3])
+def test_the_bright_share_is_that_of_what_was_drawn(tmp_path: Path, share: float) -> None:
+    random = np.random.default_rng(0)
+    power = np.ones((400, 400))
+    power[: int(400 * share)] = 20.0
+    image = np.sqrt(power * random.gamma(4, 1 / 4, power.shape)).astype(np.float32)
+    assert bright_share(scene_of(tmp_path / "a.tif", image)) == pytest.approx(share, abs=0.005)
+
+
+def never(progress: Progress) -> GroundRegions:
+    raise AssertionError("there is no need to look for the ground")
+
+
+def test_fields_need_no_mask(tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    fields = np.kron(random.uniform(200, 500, (20, 20)), np.ones((20, 20)))
+    fields *= np.sqrt(random.gamma(1, 1, fields.shape))
+    kind, reason = choose(scene_of(tmp_path / "a.tif", fields.astype(np.float32)), never)
+    assert kind == "none" and "too few" in reason
+
+
+@pytest.mark.parametrize(
+    ("share", "skeleton_m", "expected"),
+    [(0.3, 900.0, "regions"), (0.3, 300.0, "threshold"), (0.05, 900.0, "threshold")],
+)
+def test_dense_towns_get_regions_where_there_are_enough(
+    tmp_path: Path, share: float, skeleton_m: float, expected: str
+) -> None:
+    random = np.random.default_rng(0)
+    shining = np.kron(random.random((20, 20)) < 0.25, np.ones((20, 20)))
+    town = np.where(shining, 600, 100) * np.sqrt(random.gamma(1, 1, shining.shape))
+    scene = scene_of(tmp_path / "a.tif", town.astype(np.float32))
+    part = np.zeros(shining.shape, bool)
+    part[: round(share * 400)] = True
+    ground = GroundRegions(scene, 1, part, part, part, skeleton_m, np.inf)
+    kind, reason = choose(scene, lambda _: ground)
+    assert kind == expected
+    assert f"{skeleton_m:.0f} m of roads" in reason
+
+
+def test_it_is_said_in_a_line() -> None:
+    used = MaskUsed("threshold", "reference", 0.8, "it has the more speckle")
+    assert used.line() == "mask: threshold, 80% of the reference take part; it has the more speckle"
+    assert MaskUsed("none", None, 1.0, "as asked for").line() == "mask: none, as asked for"
