@@ -9,33 +9,60 @@ from typing import Any
 import numpy as np
 from rasterio.crs import CRS
 from rasterio.errors import CRSError
+from rasterio.warp import transform_geom
 
 from ..errors import GeoreferencingError, VectorLayerError
-from ..rasters.grid import reproject
-from ..rasters.reading import Window
+from ..rasters.reading import Mask, Window
 from .scene import Scene, Selection
+from .threshold import grown
+
+_AREAS = ("Polygon", "MultiPolygon")
+_LINES = ("LineString", "MultiLineString")
 
 
 @dataclass(frozen=True)
 class LayerMask:
-    """What a vector layer covers of a scene; `shapes` are shapely polygons on the scene's map."""
+    """What a vector layer covers of a scene.
+
+    Parameters
+    ----------
+    scene
+        What is masked.
+    areas, lines
+        GeoJSON geometries on the scene's map.
+    reach_px
+        Half of the width of the lines.
+    """
 
     scene: Scene
-    shapes: tuple[Any, ...]
+    areas: tuple[Any, ...]
+    lines: tuple[Any, ...]
+    reach_px: int
 
     def select(self, window: Window) -> Selection:
         """Return which pixels of a window take part: those whose centres are covered."""
+        reach = self.reach_px
+        around = Window(
+            window.col - reach,
+            window.row - reach,
+            window.width + 2 * reach,
+            window.height + 2 * reach,
+        )
+        along = grown(self._drawn(self.lines, around), reach)
+        inside = np.s_[reach : reach + window.height, reach : reach + window.width]
+        covered = self._drawn(self.areas, window) | along[inside]
+        valid = self.scene.read(window).valid
+        return Selection(valid & covered, valid)
+
+    def _drawn(self, geometries: tuple[Any, ...], window: Window) -> Mask:
         from rasterio.features import rasterize
 
-        piece = self.scene.grid.window(*window)
-        covered = rasterize(
-            self.shapes,
-            out_shape=(window.height, window.width),
-            transform=piece.transform,
-            dtype=np.uint8,
-        )
-        valid = self.scene.read(window).valid
-        return Selection(valid & (covered > 0), valid)
+        shape = (window.height, window.width)
+        if not geometries:
+            return np.zeros(shape, bool)
+        transform = self.scene.grid.window(*window).transform
+        drawn = rasterize(geometries, out_shape=shape, transform=transform, dtype=np.uint8)
+        return np.asarray(drawn > 0)
 
 
 def read_layer(path: str | os.PathLike[str], scene: Scene, width_m: float) -> LayerMask:
@@ -58,32 +85,32 @@ def read_layer(path: str | os.PathLike[str], scene: Scene, width_m: float) -> La
         Only one of layer and scene has a CRS.
     """
     import fiona
-    import shapely
     from fiona.errors import FionaError
-    from shapely.geometry import shape
 
     try:
         with fiona.open(os.fspath(path)) as layer:
             crs = _crs(layer.crs_wkt)
-            found = [shape(item["geometry"]) for item in layer if item["geometry"] is not None]
+            every = [item["geometry"] for item in layer if item["geometry"] is not None]
     except (FionaError, OSError, ValueError) as error:
         raise VectorLayerError(f"cannot read the vector layer {path}: {error}") from error
-    flat = [part for whole in found for part in getattr(whole, "geoms", [whole])]
-    kinds = ("Polygon", "LineString", "LinearRing")
-    flat = [part for part in flat if part.geom_type in kinds and not part.is_empty]
-    if not flat:
-        raise VectorLayerError(f"the vector layer {path} has neither polygons nor lines")
     grid = scene.grid
     if (crs is None) != (grid.crs is None):
         raise GeoreferencingError(f"only one of {path} and {scene.like.path} has a CRS")
+    found = [_plain(geometry) for geometry in every if geometry["type"] in _AREAS + _LINES]
+    if crs is not None and crs != grid.crs:
+        found = [transform_geom(crs, grid.crs, geometry) for geometry in found]
+    areas, lines = (
+        tuple(geometry for geometry in found if geometry["type"] in kinds)
+        for kinds in (_AREAS, _LINES)
+    )
+    if not areas and not lines:
+        raise VectorLayerError(f"the vector layer {path} has neither polygons nor lines")
+    return LayerMask(scene, areas, lines, int(width_m / grid.pixel_size_m / 2))
 
-    def on_map(xy: np.ndarray) -> np.ndarray:
-        return reproject(xy, crs, grid.crs)
 
-    moved = [shapely.transform(part, on_map) for part in flat]
-    half = width_m / 2 / float(np.mean(grid.metres_per_unit))
-    shapes = [part if part.geom_type == "Polygon" else part.buffer(half) for part in moved]
-    return LayerMask(scene, tuple(shapes))
+def _plain(geometry: Any) -> dict[str, Any]:
+    """Return a geometry of fiona as GeoJSON has it."""
+    return {"type": geometry["type"], "coordinates": geometry["coordinates"]}
 
 
 def _crs(text: str) -> CRS | None:
