@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
-from ..geometry.robust import FOLDS, block_folds, blocks_of, find_consensus, fit_mixture
+from ..geometry.robust import block_folds, find_consensus, fit_mixture
 from .bias import KINDS, TERMS, Bias, design
 
 FloatArray = NDArray[np.float64]
@@ -39,8 +39,9 @@ _FEWEST_POINTS = 3
 # A model is carried by points that leave it uncertain by less, over the image, in pixels.
 _LARGEST_SIGMA_PX = 1.0
 
-# A more flexible model must lower the error at left-out points by so many standard errors.
-_STANDARD_ERRORS = 2.5
+# A more flexible model must make left-out points more probable, and one of its further
+# coefficients must be larger than so many standard deviations.
+_SIGMAS = 3.5
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,7 @@ def adjust(
         raise failed[0]
     chosen = found[0]
     for tried in found[1:]:
-        if _is_carried(tried, control) and _is_better(tried, chosen, control):
+        if _is_carried(tried, control) and _is_better(tried, chosen):
             chosen = tried
     errors = {kind: rmse for each in found for kind, rmse in each.left_out_rmse_px.items()}
     return replace(chosen, left_out_rmse_px=errors)
@@ -171,14 +172,16 @@ def _is_carried(tried: Adjustment, control: Control) -> bool:
     )
 
 
-def _is_better(tried: Adjustment, chosen: Adjustment, control: Control) -> bool:
-    """Tell whether a model makes the points clearly more probable, each left out of its fit."""
-    gain = _log_likelihoods(tried) - _log_likelihoods(chosen)
-    # Neighbours gain together, so they count by blocks.
-    blocks = blocks_of(control.expected_px) @ [1, FOLDS]
-    sums = np.array([gain[blocks == block].sum() for block in np.unique(blocks)])
-    error = sums.std(ddof=1) * np.sqrt(len(sums)) if len(sums) > 1 else np.inf
-    return bool(sums.sum() > _STANDARD_ERRORS * error)
+def _is_better(tried: Adjustment, chosen: Adjustment) -> bool:
+    """Tell whether points want the terms that a model has and a simpler one has not."""
+    gain = float((_log_likelihoods(tried) - _log_likelihoods(chosen)).sum())
+    more = slice(len(chosen.bias.coefficients), None)
+    by_points = np.diag(tried.bias.covariance).reshape(-1, 2)
+    count = len(tried.fold_biases)
+    folds = np.array([bias.coefficients for bias in tried.fold_biases])
+    by_blocks = folds.var(axis=0) * (count - 1)  # the jackknife: neighbours err together
+    sigma = np.sqrt(np.maximum(by_points, by_blocks))[more]
+    return gain > 0 and bool((np.abs(tried.bias.coefficients[more]) > _SIGMAS * sigma).any())
 
 
 def _log_likelihoods(adjustment: Adjustment) -> FloatArray:
