@@ -54,6 +54,10 @@ peer skimage /usr/bin/python3 -- scikit-image rasterio
 peer opencv /usr/bin/python3 -- 'opencv-python-headless<5' rasterio
 peer otb /usr/bin/python3 -- rasterio
 
+# RPCs; rpcm may need libtiff's headers (package libtiff-dev).
+peer orthority /usr/bin/python3 -- orthority
+peer rpcm /usr/bin/python3 -- rpcm
+
 # AROSICS needs GDAL's Python module, which must match Debian's libgdal: package python3-gdal.
 gdal=$(/usr/bin/python3 -c 'import osgeo.gdal; print(osgeo.gdal.__version__)' 2>/dev/null)
 peer arosics /usr/bin/python3 --system-site-packages -- arosics "gdal==${gdal:-3.6.2}" 'numpy<2'

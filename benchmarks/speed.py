@@ -20,6 +20,7 @@ from groundtie.geometry.transform import Transform
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.surface import BORDER_PX, SimilaritySettings, describe, histogram_surface
 
+from . import rpc_speed
 from .attempt import Pair, on_pixels
 from .processes import OUTPUT, Measured, measure, measure_often
 from .simulations import Simulation
@@ -74,8 +75,12 @@ def run(settings: Settings) -> SuiteResult:
     affine = time_affine(settings, times)
     sizes = () if settings.quick else tuple(SECONDS)
     large = [time_size(settings, size, times if size < LARGEST_PX else 1) for size in sizes]
+    timings = rpc_speed.time_points(settings, times, peer_python("orthority"))
+    if not settings.quick:
+        timings += rpc_speed.time_ortho(settings, times)
     records = [*surfaces, *affine, *large]
-    goals = [surface_goal(surfaces), *affine_goals(affine)]
+    records += [Record(what, name, seconds, note=note) for what, name, seconds, note in timings]
+    goals = [surface_goal(surfaces), *affine_goals(affine), *rpc_speed.goals(timings)]
     goals += [
         goal for size, record in zip(sizes, large, strict=True) for goal in size_goals(size, record)
     ]
