@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .tools.filter_speckle import filter_speckle
     from .tools.mask_regions import mask_regions
     from .tools.mask_threshold import mask_threshold
+    from .tools.match_optical import match_optical
     from .tools.match_sar_sar import match_sar_sar
     from .tools.orthorectify import orthorectify
     from .tools.refine_rpc import refine_rpc
@@ -42,6 +43,7 @@ __all__ = [
     "load_transform",
     "mask_regions",
     "mask_threshold",
+    "match_optical",
     "match_sar_sar",
     "orthorectify",
     "refine_rpc",

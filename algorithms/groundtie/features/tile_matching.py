@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
 from ..search.matching import MaskOf
 from .descriptors import Descriptor
-from .detectors import Detector
+from .detectors import Detector, FloatImage
 from .matching import GATE_PX, match_near
 from .points import FeaturePoints
 
@@ -29,6 +30,27 @@ _MARGIN_PX = 64
 
 # More features than this in a tile make matching longer, not better.
 _MOST_PER_TILE = 6000
+
+
+class Detecting(Protocol):
+    """What finds features."""
+
+    def detect(self, window: Patch) -> FeaturePoints:
+        """Return the features of an image window, upright."""
+
+
+class Describing(Protocol):
+    """What describes features."""
+
+    def describe(self, window: Patch, found: FeaturePoints) -> tuple[FeaturePoints, FloatImage]:
+        """Return m features, which may be repeated, and their descriptors, shape (m, k)."""
+
+
+class Refining(Protocol):
+    """What tells which features may be matched."""
+
+    def keep(self, window: Patch, px: FloatArray) -> Mask:
+        """Return for positions (col, row) of a window, shape (n, 2), which may be, (n,)."""
 
 
 @dataclass(frozen=True)
@@ -81,15 +103,18 @@ class FeatureMatcher:
     ground
         The reference with the mask of its level ground; features elsewhere are left out. None: all
         of it.
+    refining
+        What tells which features of the reference and of the input may be matched; None: all.
     """
 
     pair: ImagePair
-    detector: Detector = field(default_factory=Detector)
-    descriptor: Descriptor = field(default_factory=Descriptor)
+    detector: Detecting = field(default_factory=Detector)
+    descriptor: Describing = field(default_factory=Descriptor)
     ratio: float = 1.0
     gate_px: float = GATE_PX
     held_out: MaskOf | None = None
     ground: ImagePair | None = None
+    refining: tuple[Refining | None, Refining | None] = (None, None)
 
     def match(
         self, coarse: Model, executor: Executor, progress: Progress = SILENT
@@ -131,12 +156,12 @@ class FeatureMatcher:
         core = Window(margin, margin, tile.width, tile.height)
         gate = margin - _MARGIN_PX
         around = Window(_MARGIN_PX, _MARGIN_PX, tile.width + 2 * gate, tile.height + 2 * gate)
-        own = self._features(reference, core)
+        own = self._features(reference, core, self.refining[0])
         if self.ground is not None:
             on_ground = self.ground.reference_patch(piece).valid
             cols, rows = np.rint(own.position_px).astype(int).T
             own = own.take(on_ground[rows, cols])
-        others = self._features(input, around)
+        others = self._features(input, around, self.refining[1])
         points, descriptors = self.descriptor.describe(reference, own)
         partners, partner_descriptors = self.descriptor.describe(input, others)
         matches = match_near(
@@ -154,10 +179,13 @@ class FeatureMatcher:
             (len(own), int(_inside(others, core).sum())),
         )
 
-    def _features(self, patch: Patch, window: Window) -> FeaturePoints:
-        """Return the strongest features in a window of a patch."""
+    def _features(self, patch: Patch, window: Window, refining: Refining | None) -> FeaturePoints:
+        """Return the strongest features in a window of a patch, of those that may be matched."""
         found = self.detector.detect(patch)
-        return found.take(_inside(found, window)).strongest(_MOST_PER_TILE)
+        found = found.take(_inside(found, window))
+        if refining is not None:
+            found = found.take(refining.keep(patch, found.position_px))
+        return found.strongest(_MOST_PER_TILE)
 
 
 def _inside(found: FeaturePoints, window: Window) -> Mask:

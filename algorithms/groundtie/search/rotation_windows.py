@@ -15,6 +15,7 @@ from ..geometry.transform import Transform
 from ..rasters.grid import PIXEL_COORDINATES, Grid, apply_affine
 from ..rasters.pair import Image
 from ..rasters.patch import Patch
+from .matching import MaskOf
 from .pose import Pose, PoseLimits
 
 FloatArray = NDArray[np.float64]
@@ -76,7 +77,11 @@ class PoseWindows:
 
 
 def read_windows(
-    reference: Image, input: Image, scale: tuple[float, float], radius_m: float | None = None
+    reference: Image,
+    input: Image,
+    scale: tuple[float, float],
+    radius_m: float | None = None,
+    held_out: MaskOf | None = None,
 ) -> PoseWindows:
     """Read what two images may have in common.
 
@@ -88,6 +93,9 @@ def read_windows(
         Smallest and largest scale that will be searched for.
     radius_m
         How far the input may lie from where it claims to be; None: a quarter of its longer side.
+    held_out
+        Returns for a piece of the grid which pixels of the reference must not be seen; None: all
+        may be.
 
     Raises
     ------
@@ -122,7 +130,9 @@ def read_windows(
     grids = [_grid(frame, own, centre, size, pixel) for size in (half, around)]
     # Larger by their last, incomplete pixels, windows still have one centre.
     windows = PoseWindows(
-        reference.read_onto(grids[0], own.map_to_pixel),
+        reference.read_onto(
+            grids[0], own.map_to_pixel, hidden=None if held_out is None else held_out(grids[0])
+        ),
         input.read_onto(grids[1], claim),
         grids[0],
         grids[1],

@@ -9,7 +9,9 @@ import numpy as np
 from affine import Affine
 
 from ..errors import RasterContentError
+from ..geometry.fitting import fit_model
 from ..geometry.models import Frame, Model, PolynomialModel
+from ..geometry.transform import Transform
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
@@ -17,7 +19,8 @@ from ..similarity.correlation import MINIMUM_OVERLAP
 from ..similarity.evidence import find_peak
 from ..similarity.surface import BORDER_PX, SimilaritySettings, describe, similarity_surface
 from .matching import MaskOf
-from .pose import Pose, PoseLimits, PoseSearch
+from .pose import PoseSearch
+from .rotation_windows import read_windows
 
 # The longer side of the reduced image, in pixels, and how many candidates are kept.
 LEVEL_SIDE_PX = 512
@@ -111,12 +114,11 @@ def rough_candidates(
         settings = replace(settings, bins=_BINS)
     if rough.poses is None:
         return _shifts(pair, level, radius_px, settings, held_out, executor)
-    reach = radius_px + _reach_of_poses(level, rough)
-    reference, input = _patches(pair, level, 0, reach, held_out, executor)
-    limits = PoseLimits(radius_px, rough.rotation_deg, rough.scale)
-    found = rough.poses(reference, input, limits, settings, executor)[:CANDIDATES]
-    shapes = reference.values.shape, input.values.shape
-    return [Candidate(_pose_model(level, one.pose, shapes, reach), one.height) for one in found]
+    windows = read_windows(pair.reference, pair.input, rough.scale, rough.radius_m, held_out)
+    limits = windows.limits(rough.rotation_deg, rough.scale)
+    both = windows.reference, windows.input
+    found = rough.poses(*both, limits, settings, executor)[:CANDIDATES]
+    return [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in found]
 
 
 def _shifts(
@@ -168,23 +170,10 @@ def _patches(
     return reference, input
 
 
-def _reach_of_poses(level: Grid, rough: RoughSearch) -> int:
-    """Return how far beyond the level a turned or larger image of it reaches, in pixels."""
-    if rough.rotation_deg == 0 and rough.scale == (1.0, 1.0):
-        return 0
-    farthest = rough.scale[1] * np.hypot(level.width, level.height)
-    return max(int(np.ceil((farthest - min(level.width, level.height)) / 2)), 0)
-
-
-def _pose_model(
-    level: Grid, pose: Pose, shapes: tuple[tuple[int, ...], tuple[int, ...]], reach: int
-) -> Model:
-    """Return a pose between windows, the input's wider by `reach`, as a model on the map."""
-    (height, width), (rows, cols) = shapes
-    a, b, c, d, e, f, *_ = pose.between((height, width), (rows, cols))
-    coefficients = np.array([[c - reach, f - reach], [a - 1, d], [b, e - 1]])
-    centres = level.transform * Affine.translation(0.5, 0.5)
-    return PolynomialModel("affine", Frame(Affine.identity()), coefficients).on_map(centres)
+def _on_map(transform: Transform, level: Grid) -> Model:
+    """Return a transform of degree 1 as a model from map positions to claimed ones."""
+    xy = level.pixel_to_map(level.outline(4))
+    return fit_model("affine", xy, transform.claimed_xy(transform(xy)))
 
 
 def _require_content(path: str, patch: Patch) -> None:

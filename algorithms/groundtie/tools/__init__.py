@@ -10,6 +10,7 @@ from ..declaration import Tool, tool_of
 NAMES = (
     "coregister",
     "match_sar_sar",
+    "match_optical",
     "estimate_rotation",
     "warp",
     "extract_gcps",

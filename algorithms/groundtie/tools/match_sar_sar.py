@@ -20,7 +20,7 @@ from ..features.hybrid import FeatureSearch
 from ..features.tile_matching import FeatureMatcher
 from ..kinds import Choice, Distance, Number, RasterIn
 from ..progress import SILENT, Progress
-from ..rasters.pair import Image, default_radius_m, make_pair
+from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
 from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
@@ -45,6 +45,7 @@ from .registration import (
     RegistrationFiles,
     RegistrationResult,
     deliver,
+    free_radius,
     open_image,
     register,
     rough_search,
@@ -61,9 +62,6 @@ from .registration_parameters import (
 )
 
 _NO_REFINEMENT = "none"
-
-# Without georeferencing images may lie this far off each other, as a share of the longer side.
-_FREE_SHARE = 0.25
 
 
 @tool(title="Match SAR with SAR", group="Registration", outputs=OUTPUTS)
@@ -213,7 +211,7 @@ def match_sar_sar(
         stack.enter_context(bounded_cache())
         there = open_image(stack, reference, reference_band, reference_mask)
         here = open_image(stack, input, input_band, input_mask)
-        radius_m = _free_radius(here) if search_radius is None else search_radius
+        radius_m = free_radius(here) if search_radius is None else search_radius
         pair = make_pair(there, here, matching_pixel_size, radius_m)
         for note in pair.notes():
             progress.update(0.0, note)
@@ -259,9 +257,3 @@ def match_sar_sar(
         return deliver(
             result, registered, files, parameters, started, threads, progress.part(0.7, 1.0)
         )
-
-
-def _free_radius(input: Image) -> float | None:
-    """Return how far an image without georeferencing may lie off, in pixels."""
-    grid = input.source.grid
-    return None if grid.is_georeferenced else _FREE_SHARE * max(grid.width, grid.height)

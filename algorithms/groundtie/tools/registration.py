@@ -36,6 +36,9 @@ from ..search.rough import RoughSearch
 from ..similarity.surface import Surface
 from .registered_output import RegisteredOutput
 
+# Without georeferencing images may lie this far off each other, as a share of the longer side.
+_FREE_SHARE = 0.25
+
 # How many surfaces of the best and of the worst check points a report shows.
 _EXTREMES = 3
 
@@ -113,6 +116,12 @@ def open_image(
     """Open a raster and its mask, which `stack` closes."""
     shown = None if mask is None else stack.enter_context(open_raster(mask))
     return Image(stack.enter_context(open_raster(path)), band, shown)
+
+
+def free_radius(input: Image) -> float | None:
+    """Return how far an image without georeferencing may lie off, in pixels; None: it has some."""
+    grid = input.source.grid
+    return None if grid.is_georeferenced else _FREE_SHARE * max(grid.width, grid.height)
 
 
 def rough_search(

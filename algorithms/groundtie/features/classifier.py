@@ -1,0 +1,155 @@
+"""A support vector machine that tells which features may be matched (thesis P 5.2, 5.3).
+
+It is kept as JSON that says all there is to it, and needs no scikit-learn to be used.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ParameterError
+from ..rasters.atomic import writing
+from ..rasters.patch import Patch
+from .patch_statistics import STATISTICS, patch_statistics
+
+FloatArray = NDArray[np.float64]
+
+# Degrees of the kernels (γ x·v + 1) ^ degree; the others have none.
+DEGREE = {"polynomial": 3, "quadratic": 2}
+KERNELS = ("linear", "rbf", *DEGREE)
+OFFSET = 1.0
+
+_FORMAT = "groundtie feature classifier"
+_VERSION = 1
+
+# So many values of kernels are held in memory at a time.
+_BLOCK = 4_000_000
+
+
+@dataclass(frozen=True)
+class FeatureClassifier:
+    """A support vector machine on the statistics of patches.
+
+    Parameters
+    ----------
+    statistics
+        One of `patch_statistics.STATISTICS`.
+    kernel
+        One of `KERNELS`.
+    gamma
+        Factor of the kernel.
+    mean, spread
+        What is taken off the statistics, and what they are divided by, shape (k,).
+    vectors
+        Support vectors, of scaled statistics, shape (n, k).
+    weights
+        Of the support vectors, shape (n,).
+    intercept
+        Is added to the weighted sum.
+    pixel_size_m
+        Pixel size of the image it was trained on.
+    """
+
+    statistics: str
+    kernel: str
+    gamma: float
+    mean: FloatArray
+    spread: FloatArray
+    vectors: FloatArray
+    weights: FloatArray
+    intercept: float
+    pixel_size_m: float
+
+    def decide(self, statistics: FloatArray) -> FloatArray:
+        """Return for statistics, shape (m, k), values that are positive for what is kept, (m,)."""
+        scaled = (statistics - self.mean) / self.spread
+        found = np.empty(len(scaled))
+        step = max(_BLOCK // len(self.vectors), 1)
+        for start in range(0, len(scaled), step):
+            block = slice(start, start + step)
+            found[block] = self._kernel(scaled[block]) @ self.weights + self.intercept
+        return found
+
+    def keep(self, window: Patch, px: FloatArray) -> NDArray[np.bool_]:
+        """Tell which positions (col, row) of a window, shape (n, 2), may be matched, (n,)."""
+        return np.asarray(self.decide(patch_statistics(self.statistics, window, px)) > 0)
+
+    def _kernel(self, scaled: FloatArray) -> FloatArray:
+        products = scaled @ self.vectors.T
+        if self.kernel == "linear":
+            return products
+        if self.kernel == "rbf":
+            own, other = (scaled**2).sum(axis=1), (self.vectors**2).sum(axis=1)
+            return np.asarray(np.exp(-self.gamma * (own[:, None] + other - 2 * products)))
+        return np.asarray((self.gamma * products + OFFSET) ** DEGREE[self.kernel])
+
+    def write(self, path: Path) -> None:
+        """Write the classifier as JSON."""
+        values = {
+            "format": _FORMAT,
+            "version": _VERSION,
+            "statistics": self.statistics,
+            "kernel": self.kernel,
+            "gamma": self.gamma,
+            "mean": self.mean.tolist(),
+            "spread": self.spread.tolist(),
+            "intercept": self.intercept,
+            "pixel_size_m": self.pixel_size_m,
+            "weights": self.weights.tolist(),
+            "vectors": self.vectors.tolist(),
+        }
+        with writing(path):
+            path.write_text(json.dumps(values), encoding="utf-8")
+
+
+def read_classifier(path: Path) -> FeatureClassifier:
+    """Read a classifier from its JSON.
+
+    Raises
+    ------
+    ParameterError
+        The file is none, or cannot be read.
+    """
+    try:
+        return _from_json(json.loads(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise ParameterError(f"{path} cannot be read: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise ParameterError(f"{path} is no feature classifier: {error}") from error
+
+
+def _from_json(values: dict[str, Any]) -> FeatureClassifier:
+    if values["format"] != _FORMAT or values["version"] != _VERSION:
+        raise ValueError(f"format {values['format']!r} of version {values['version']!r}")
+    if values["statistics"] not in STATISTICS or values["kernel"] not in KERNELS:
+        raise ValueError(f"statistics {values['statistics']!r}, kernel {values['kernel']!r}")
+    found = FeatureClassifier(
+        statistics=values["statistics"],
+        kernel=values["kernel"],
+        gamma=float(values["gamma"]),
+        mean=np.array(values["mean"], float),
+        spread=np.array(values["spread"], float),
+        vectors=np.array(values["vectors"], float),
+        weights=np.array(values["weights"], float),
+        intercept=float(values["intercept"]),
+        pixel_size_m=float(values["pixel_size_m"]),
+    )
+    count = len(patch_statistics(found.statistics, _NOTHING, np.zeros((1, 2)))[0])
+    if found.vectors.shape != (len(found.weights), count) or len(found.vectors) == 0:
+        raise ValueError("support vectors of the wrong shape")
+    if found.mean.shape != (count,) or found.spread.shape != (count,):
+        raise ValueError("scaling of the wrong shape")
+    numbers = found.gamma, found.intercept, found.pixel_size_m
+    arrays = found.mean, found.spread, found.vectors, found.weights
+    if not all(np.isfinite(each).all() for each in (*arrays, np.array(numbers))):
+        raise ValueError("a number is not finite")
+    return found
+
+
+_NOTHING = Patch(np.zeros((1, 1), np.float32), np.zeros((1, 1), bool))

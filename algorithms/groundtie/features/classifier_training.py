@@ -1,0 +1,142 @@
+"""Training of feature classifiers, with scikit-learn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import TooFewPointsError
+from .classifier import DEGREE, OFFSET, FeatureClassifier
+
+FloatArray = NDArray[np.float64]
+
+# Fewer labelled points of a class than this tell nothing.
+FEWEST_POINTS = 10
+
+# More of a class make training longer, not better.
+_MOST_POINTS = 2000
+
+# How much a point on the wrong side costs (the C of C-SVM).
+_COST = 1.0
+
+# Labelled points are divided into so many blocks a side, which are left out one fold at a time.
+_BLOCKS, _FOLDS = 6, 3
+
+
+@dataclass(frozen=True)
+class Training:
+    """Labelled points of an image.
+
+    Parameters
+    ----------
+    statistics
+        Of the patches around them, shape (n, k).
+    kept
+        Which may be matched, shape (n,).
+    px
+        Where they lie (col, row), shape (n, 2).
+    """
+
+    statistics: FloatArray
+    kept: NDArray[np.bool_]
+    px: FloatArray
+
+    def take(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Training:
+        """Return the points that the mask or index `which` selects."""
+        return Training(self.statistics[which], self.kept[which], self.px[which])
+
+
+def train_classifier(
+    labelled: Training, statistics: str, kernel: str, pixel_size_m: float, seed: int
+) -> FeatureClassifier:
+    """Train a classifier; both classes count alike, however many points they have.
+
+    Parameters
+    ----------
+    labelled
+        The points.
+    statistics, kernel, pixel_size_m
+        See `FeatureClassifier`.
+    seed
+        Of the choice of points where there are more than are needed.
+
+    Raises
+    ------
+    TooFewPointsError
+        A class has too few points.
+    """
+    from sklearn.svm import SVC
+
+    _require_both(labelled)
+    chosen = labelled.take(_some_of_each(labelled.kept, seed))
+    mean = chosen.statistics.mean(axis=0)
+    spread = np.maximum(chosen.statistics.std(axis=0), 1e-12)
+    gamma = 1 / chosen.statistics.shape[1]
+    machine = SVC(
+        C=_COST,
+        kernel="poly" if kernel in DEGREE else kernel,
+        degree=DEGREE.get(kernel, 1),
+        gamma=gamma,
+        coef0=OFFSET,
+        class_weight="balanced",
+    )
+    machine.fit((chosen.statistics - mean) / spread, chosen.kept)
+    return FeatureClassifier(
+        statistics=statistics,
+        kernel=kernel,
+        gamma=gamma,
+        mean=mean,
+        spread=spread,
+        vectors=np.asarray(machine.support_vectors_, float),
+        weights=np.asarray(machine.dual_coef_, float)[0],
+        intercept=float(machine.intercept_[0]),
+        pixel_size_m=pixel_size_m,
+    )
+
+
+def left_out_accuracy(labelled: Training, statistics: str, kernel: str, seed: int) -> float:
+    """Return the mean share of both classes that classifiers tell which have not seen them.
+
+    Blocks of neighbouring points are left out of the training together; NaN if the points of a
+    class lie too near each other for that.
+    """
+    low, high = labelled.px.min(axis=0), labelled.px.max(axis=0)
+    unit = (labelled.px - low) / np.maximum(high - low, 1e-9)
+    block = np.minimum((unit * _BLOCKS).astype(int), _BLOCKS - 1)
+    folds = block.sum(axis=1) % _FOLDS
+    told: list[NDArray[np.bool_]] = []
+    truth: list[NDArray[np.bool_]] = []
+    for fold in range(_FOLDS):
+        rest, out = labelled.take(folds != fold), labelled.take(folds == fold)
+        try:
+            found = train_classifier(rest, statistics, kernel, 1.0, seed)
+        except TooFewPointsError:
+            continue
+        told.append(found.decide(out.statistics) > 0)
+        truth.append(out.kept)
+    if not told:
+        return float("nan")
+    right, kept = np.concatenate(told) == np.concatenate(truth), np.concatenate(truth)
+    if kept.all() or not kept.any():
+        return float("nan")
+    return float((right[kept].mean() + right[~kept].mean()) / 2)
+
+
+def _require_both(labelled: Training) -> None:
+    for what, count in (("kept", labelled.kept.sum()), ("left out", (~labelled.kept).sum())):
+        if count < FEWEST_POINTS:
+            raise TooFewPointsError(
+                f"only {count} labelled points are to be {what}, fewer than {FEWEST_POINTS}"
+            )
+
+
+def _some_of_each(kept: NDArray[np.bool_], seed: int) -> NDArray[np.intp]:
+    """Return which points to train with: all, or so many of each class, in their order."""
+    random = np.random.default_rng(seed)
+    chosen = []
+    for label in (True, False):
+        own = np.nonzero(kept == label)[0]
+        chosen.append(random.permutation(own)[:_MOST_POINTS])
+    return np.sort(np.concatenate(chosen))

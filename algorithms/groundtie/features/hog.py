@@ -1,0 +1,108 @@
+"""Histograms of oriented gradients as descriptors of features (thesis P 4.3–4.5).
+
+The patch of 41 × 41 samples around a feature is divided into 3 × 3 cells; each has a histogram of
+the directions of gradients, which neither contrast nor its sign changes: 81 values with nine
+directions, 63 with seven. Dalal & Triggs 2005.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rasters.patch import Patch
+from ..similarity.orientation import compress
+from .gradients import FloatImage, Gradient
+from .points import FeaturePoints
+from .sampling import sampled_gradient, square_lattice, unit_rows
+from .scale_space import describe_at_scales
+
+FloatArray = NDArray[np.float64]
+
+PATCH_PX = 41
+CELLS = 3
+
+# A scaled patch has a sample every so many scales: it is as wide as SURF's descriptor.
+_SAMPLE_SCALES = 0.5
+
+
+@dataclass(frozen=True)
+class HogDescriptor:
+    """How features are described.
+
+    Parameters
+    ----------
+    directions
+        Number of directions from 0° to 180°; descriptors have 9 times as many values.
+    upright
+        Whether features keep the image's axes; else each is turned by its own orientation, and
+        one with several is repeated.
+    scaled
+        Whether the patch grows with the feature; else all have 41 × 41 pixels, and keep their
+        scales only where they are returned.
+    """
+
+    directions: int = 9
+    upright: bool = True
+    scaled: bool = True
+
+    @property
+    def length(self) -> int:
+        """How many values a descriptor has."""
+        return CELLS * CELLS * self.directions
+
+    def describe(self, window: Patch, found: FeaturePoints) -> tuple[FeaturePoints, FloatImage]:
+        """Return the features, oriented if they are to be, and what is around them.
+
+        Parameters
+        ----------
+        window
+            The image; masked pixels tell nothing.
+        found
+            Features in it, shape (n,).
+
+        Returns
+        -------
+        points, descriptors
+            m features, m ≥ n unless upright, and their descriptors of unit length (zero where
+            there is no gradient), shape (m, 9 · directions) float32: rows and columns of cells,
+            then directions from columns towards rows.
+        """
+        return self.describe_image(compress(window), window.valid, found)
+
+    def describe_image(
+        self, image: FloatImage, valid: NDArray[np.bool_], found: FeaturePoints
+    ) -> tuple[FeaturePoints, FloatImage]:
+        """Describe features of an image whose grey values are taken as they are."""
+        if not self.scaled:
+            found = replace(found, scale_px=np.full(len(found), 1 / _SAMPLE_SCALES))
+        return describe_at_scales(
+            image, valid, found, "differences", self.upright, self._described, self.length
+        )
+
+    def _described(self, fields: Gradient, points: FeaturePoints) -> FloatImage:
+        """Return the descriptors of features in pixels of the gradient."""
+        lattice = square_lattice(_SAMPLE_SCALES * PATCH_PX / 2, PATCH_PX)
+        strength, direction = sampled_gradient(fields, points, lattice)
+        place = direction * np.float32(self.directions / np.pi)
+        weights = _cell_weights()
+        half = np.float32(self.directions / 2)
+        values = np.empty((len(points), CELLS * CELLS, self.directions), np.float32)
+        for number in range(self.directions):
+            away = np.abs((place - number + half) % self.directions - half)
+            share = np.maximum(1 - away, 0)
+            share *= strength
+            values[:, :, number] = share @ weights
+        return unit_rows(values.reshape(len(points), self.length))
+
+
+@cache
+def _cell_weights() -> FloatImage:
+    """Return the share of each of the patch's samples in the cells, shape (41², 9)."""
+    # Cells share their samples with their neighbours, as directions do.
+    at = (np.arange(PATCH_PX) + 0.5) * CELLS / PATCH_PX - 0.5
+    along = np.maximum(1 - np.abs(at[:, None] - np.arange(CELLS)), 0)
+    return np.asarray(np.kron(along, along), np.float32)

@@ -1,0 +1,131 @@
+"""Gradients of an image at the scales of its features, for whatever describes these."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .gradients import FloatImage, Gradient, gradient
+from .points import FeaturePoints
+from .sampling import oriented
+
+Describe = Callable[[Gradient, FeaturePoints], FloatImage]
+
+# Scale space: layers an octave, the first scale, and how much an image is blurred as it is.
+_LAYERS = 3
+_FIRST_SCALE_PX = 1.6
+_IMAGE_BLUR_PX = 0.5
+
+# A gradient sees what lies within so many scales, but for the Gaussian's tail.
+_SEES_SCALES = 2.5
+
+# Gradients below this share of the largest value are rounding.
+_ROUNDING = 1e-5
+
+# So many features are described at a time.
+_BLOCK = 512
+
+
+def describe_at_scales(
+    image: FloatImage,
+    valid: NDArray[np.bool_],
+    found: FeaturePoints,
+    estimator: str,
+    upright: bool,
+    describe: Describe,
+    length: int,
+) -> tuple[FeaturePoints, FloatImage]:
+    """Return features, oriented if they are to be, and their descriptors.
+
+    Parameters
+    ----------
+    image, valid
+        Grey values and which of them count, shape (h, w).
+    found
+        Features, shape (n,).
+    estimator
+        One of `gradients.GRADIENTS`.
+    upright
+        Whether features keep the image's axes; else each is turned by its own orientation, and
+        one with several is repeated.
+    describe
+        Returns the descriptors, shape (m, k), of m features from the gradient at their scale, in
+        whose pixels they are.
+    length
+        How many values a descriptor has.
+    """
+    tables = [FeaturePoints.none()]
+    descriptors = [np.zeros((0, length), np.float32)]
+    owners = [np.zeros(0, int)]
+    layer_of = np.rint(_LAYERS * np.log2(found.scale_px / _FIRST_SCALE_PX)).astype(int)
+    layers = [int(layer) for layer in np.unique(layer_of)]
+    distance = _distance(valid)
+    for layer, level in zip(layers, _scale_space(image, layers), strict=True):
+        pixel = 2 ** _octave_of(layer)
+        seen = distance[::pixel, ::pixel] > _SEES_SCALES * _scale_of(layer)
+        fields = _gradient(level, seen, estimator)
+        own = np.nonzero(layer_of == layer)[0]
+        for start in range(0, len(own), _BLOCK):
+            block = own[start : start + _BLOCK]
+            points = found.take(block)
+            local = replace(
+                points, position_px=points.position_px / pixel, scale_px=points.scale_px / pixel
+            )
+            index = np.arange(len(block))
+            if not upright:
+                local, index = oriented(fields, local)
+            descriptors.append(describe(fields, local))
+            tables.append(points.take(index).turned(local.orientation_rad))
+            owners.append(block[index])
+    order = np.argsort(np.concatenate(owners), kind="stable")
+    return FeaturePoints.concatenate(tables).take(order), np.concatenate(descriptors)[order]
+
+
+def _distance(valid: NDArray[np.bool_]) -> FloatImage:
+    """Return how far each pixel is from a masked one."""
+    if valid.all():
+        return np.full(valid.shape, np.inf, np.float32)
+    return np.asarray(cv2.distanceTransform(valid.astype(np.uint8), cv2.DIST_L2, 5), np.float32)
+
+
+def _scale_space(image: FloatImage, layers: Iterable[int]) -> Iterator[FloatImage]:
+    """Return an image blurred to the scales of rising layers, each in the pixels of its octave."""
+    own = _blurred(image, _IMAGE_BLUR_PX, _FIRST_SCALE_PX)
+    octave = 0
+    for layer in layers:
+        while octave < _octave_of(layer):
+            # The first pixels lie on one another.
+            own = _blurred(own, _FIRST_SCALE_PX, 2 * _FIRST_SCALE_PX)[::2, ::2]
+            octave += 1
+        if layer <= 0:
+            yield _blurred(image, _IMAGE_BLUR_PX, _scale_of(layer))
+        else:
+            yield _blurred(own, _FIRST_SCALE_PX, _scale_of(layer) / 2**octave)
+
+
+def _octave_of(layer: int) -> int:
+    """Return the octave in whose pixels a layer is; those of the enlarged image stay in 0."""
+    return max((layer - 1) // _LAYERS, 0)
+
+
+def _scale_of(layer: int) -> float:
+    return float(_FIRST_SCALE_PX * 2 ** (layer / _LAYERS))
+
+
+def _blurred(image: FloatImage, blur_px: float, wanted_px: float) -> FloatImage:
+    """Return an image that is blurred by `blur_px` already as one blurred by `wanted_px`."""
+    more = float(np.sqrt(max(wanted_px**2 - blur_px**2, 0.01)))
+    return np.asarray(cv2.GaussianBlur(np.ascontiguousarray(image), (0, 0), more), np.float32)
+
+
+def _gradient(level: FloatImage, seen: NDArray[np.bool_], estimator: str) -> Gradient:
+    """Return the gradient of a level, zero where masked pixels are seen or all is rounding."""
+    along_cols, along_rows = gradient(level, estimator)
+    least = np.float32(_ROUNDING * np.abs(level).max())
+    counts = seen & (along_cols**2 + along_rows**2 > least**2)
+    zero = np.float32(0)
+    return np.where(counts, along_cols, zero), np.where(counts, along_rows, zero)

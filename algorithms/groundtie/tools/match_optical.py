@@ -1,0 +1,282 @@
+"""Register optical images to one another by features (thesis P, chapters 4 and 5)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any
+
+from ..declaration import tool
+from ..features.classifier import FeatureClassifier, read_classifier
+from ..features.hybrid import FeatureSearch
+from ..features.optical import DESCRIPTORS, DETECTORS, optical_descriptor, optical_detector
+from ..features.tile_matching import FeatureMatcher
+from ..kinds import Choice, Distance, FileIn, Number
+from ..progress import SILENT, Progress
+from ..rasters.pair import default_radius_m, make_pair
+from ..rasters.reading import bounded_cache
+from ..search.layout import lay_out_chips
+from ..search.local import AUTO, LocalSearch
+from ..similarity.surface import SIMILARITIES, SimilaritySettings
+from .common import (
+    Input,
+    InputBand,
+    InputMask,
+    MatchingPixelSize,
+    Output,
+    Reference,
+    ReferenceBand,
+    ReferenceMask,
+    Resampling,
+    Seed,
+    TransformOut,
+    Workers,
+    worker_count,
+)
+from .registered_output import RegisteredOutput, model_for_grid
+from .registration import (
+    RegistrationFiles,
+    RegistrationResult,
+    deliver,
+    free_radius,
+    open_image,
+    register,
+    rough_search,
+)
+from .registration_parameters import (
+    OUTPUTS,
+    MaxError,
+    Model,
+    OutputGrid,
+    ReportOut,
+    Search,
+    TiePointsOut,
+)
+
+_NO_REFINEMENT = "none"
+
+
+# Least contrast of SIFT's features, and least determinant of SURF's, on grey values from 0 to 1.
+_THRESHOLD = {"sift": 0.03, "surf": 0.0004}
+
+# Without georeferencing, the input may be larger or smaller by this.
+_FREE_SCALE = 2.0
+
+
+@tool(title="Match optical images", group="Registration", outputs=OUTPUTS)
+def match_optical(
+    reference: Reference,
+    input: Input,
+    output: Output,
+    search_radius: Annotated[
+        float | None,
+        Distance(
+            label="Search radius",
+            help="How far the input may lie from its right place. By default 100 m or 20 pixels "
+            "of the coarser image, whichever is larger; without georeferencing a quarter of the "
+            "input's longer side.",
+        ),
+    ] = None,
+    input_classifier: Annotated[
+        Path | None,
+        FileIn(
+            label="Classifier for the input",
+            help="What train_feature_classifier has written; features of the input that it tells "
+            "to leave out, those of clouds for instance, are not matched.",
+            suffixes=(".json",),
+        ),
+    ] = None,
+    model: Model = AUTO,
+    max_error: MaxError = 3.0,
+    tie_points: TiePointsOut = None,
+    transform: TransformOut = None,
+    report: ReportOut = None,
+    detector: Annotated[
+        str,
+        Choice(
+            label="Detector",
+            help="Which features are found: SIFT's or SURF's. SURF's authors held patents, which "
+            "may still run in some countries.",
+            choices=DETECTORS,
+            advanced=True,
+        ),
+    ] = "sift",
+    descriptor: Annotated[
+        str,
+        Choice(
+            label="Descriptor",
+            help="What features are described by: histograms of oriented gradients in a patch of "
+            "41 px, with nine directions (hog81) or seven (hog63), which do not mind inverted "
+            "contrast; SIFT's descriptor; or SURF's 64 Haar wavelets.",
+            choices=DESCRIPTORS,
+            advanced=True,
+        ),
+    ] = "hog81",
+    threshold: Annotated[
+        float | None,
+        Number(
+            label="Least contrast",
+            help="Weaker features are left out: a share of the range of grey values for sift, by "
+            "default 0.03, as OpenCV counts it; the determinant of the Hessian for surf, by "
+            "default 0.0004.",
+            minimum=0.0,
+            maximum=1.0,
+            advanced=True,
+        ),
+    ] = None,
+    reference_classifier: Annotated[
+        Path | None,
+        FileIn(
+            label="Classifier for the reference",
+            help="The same for features of the reference.",
+            suffixes=(".json",),
+            advanced=True,
+        ),
+    ] = None,
+    ratio: Annotated[
+        float,
+        Number(
+            label="Largest ratio",
+            help="Largest ratio of the distances to the nearest and to the next best feature of "
+            "the input; 1 keeps the nearest one in any case.",
+            minimum=0.1,
+            maximum=1.0,
+            advanced=True,
+        ),
+    ] = 1.0,
+    gate: Annotated[
+        float,
+        Number(
+            label="Gate",
+            help="How far a feature's partner may lie from where the rough search puts it.",
+            unit="px",
+            minimum=1,
+            maximum=64,
+            advanced=True,
+        ),
+    ] = 16.0,
+    refinement: Annotated[
+        str,
+        Choice(
+            label="Refinement",
+            help="Similarity by which chips around matched features refine their places; none "
+            "leaves them where they were found.",
+            choices=(_NO_REFINEMENT, *SIMILARITIES),
+            advanced=True,
+        ),
+    ] = "fused",
+    similarity: Annotated[
+        str,
+        Choice(
+            label="Similarity",
+            help="What the rough shift is searched for and check points are matched by; see "
+            "coregister.",
+            choices=SIMILARITIES,
+            advanced=True,
+        ),
+    ] = "fused",
+    search: Search = AUTO,
+    search_rotation: Annotated[
+        float | None,
+        Number(
+            label="Largest rotation",
+            help="How far the input may be turned, either way, against where it claims to lie. By "
+            "default not at all; without georeferencing any rotation.",
+            unit="°",
+            minimum=0,
+            maximum=180,
+            advanced=True,
+        ),
+    ] = None,
+    search_scale: Annotated[
+        float | None,
+        Number(
+            label="Largest scale",
+            help="By which factor the input may be larger or smaller than it claims. By default "
+            "1; without georeferencing 2.",
+            minimum=1,
+            maximum=4,
+            advanced=True,
+        ),
+    ] = None,
+    reference_band: ReferenceBand = None,
+    input_band: InputBand = None,
+    reference_mask: ReferenceMask = None,
+    input_mask: InputMask = None,
+    matching_pixel_size: MatchingPixelSize = None,
+    output_grid: OutputGrid = "reference",
+    resampling: Resampling = "cubic",
+    workers: Workers = None,
+    seed: Seed = 0,
+    progress: Progress = SILENT,
+    parameters: Mapping[str, Any] = MappingProxyType({}),
+) -> RegistrationResult:
+    """Register optical images to one another: other bands, dates or sensors, day and night.
+
+    A rough shift is searched for on reduced images; features are matched near where it puts them,
+    and refined by chips around them; a robust model is fitted. Parts of the reference are held out
+    of all of this; points in them decide whether the registration is accepted. A refused
+    registration writes no image.
+
+    Images without georeferencing are matched in pixel coordinates and may be turned by any angle
+    and scaled by up to 2; distances are then in pixels.
+    """
+    started = time.perf_counter()
+    files = RegistrationFiles(tie_points, transform, report)
+    kind = model_for_grid(model, output_grid)
+    with ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        there = open_image(stack, reference, reference_band, reference_mask)
+        here = open_image(stack, input, input_band, input_mask)
+        radius_m = free_radius(here) if search_radius is None else search_radius
+        pair = make_pair(there, here, matching_pixel_size, radius_m)
+        for note in pair.notes():
+            progress.update(0.0, note)
+        local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings(similarity))
+        features = FeatureSearch(
+            FeatureMatcher(
+                pair,
+                optical_detector(
+                    detector, _THRESHOLD[detector] if threshold is None else threshold
+                ),
+                optical_descriptor(descriptor),
+                ratio,
+                gate,
+                local.held_out,
+                refining=(_classifier(reference_classifier), _classifier(input_classifier)),
+            ),
+            local,
+            None if refinement == _NO_REFINEMENT else SimilaritySettings(refinement),
+        )
+        is_free = not here.source.grid.is_georeferenced
+        rough = rough_search(
+            default_radius_m(pair.grid) if radius_m is None else radius_m,
+            180.0 * is_free if search_rotation is None else search_rotation,
+            (_FREE_SCALE if is_free else 1.0) if search_scale is None else search_scale,
+            search,
+        )
+        threads = worker_count(workers)
+        with ThreadPoolExecutor(threads) as executor:
+            result = register(
+                pair,
+                local,
+                rough,
+                kind,
+                max_error,
+                seed,
+                executor,
+                progress.part(0.0, 0.7),
+                features,
+            )
+        registered = RegisteredOutput(output, output_grid, resampling)
+        return deliver(
+            result, registered, files, parameters, started, threads, progress.part(0.7, 1.0)
+        )
+
+
+def _classifier(path: Path | None) -> FeatureClassifier | None:
+    return None if path is None else read_classifier(path)

@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from speckled_pairs import whole
+from textured_pairs import texture
+
+from groundtie.features.hog import HogDescriptor
+from groundtie.features.points import FeaturePoints
+from groundtie.rasters.patch import Patch
+
+SIDE = 200
+
+
+def points(*rows: tuple[float, float, float, float]) -> FeaturePoints:
+    """Return features from columns, rows, scales and orientations."""
+    table = np.array(rows, float)
+    return FeaturePoints(
+        table[:, :2], table[:, 2], table[:, 3], np.ones(len(table)), np.zeros(len(table), int)
+    )
+
+
+def image(seed: int = 0) -> NDArray[np.float32]:
+    # Half of it negative: taken as it is, on a logarithmic scale already.
+    return texture(SIDE, SIDE, seed).astype(np.float32)
+
+
+def directly(values: NDArray[np.float32], x: int, y: int, directions: int) -> NDArray[np.float64]:
+    """Return the values of an upright patch of 41 × 41 pixels, sample by sample."""
+    # The image is blurred by half a pixel as it is, and wanted at a scale of 2.
+    wanted = 1.6 * 2 ** (1 / 3)
+    level = cv2.GaussianBlur(values, (0, 0), np.sqrt(1.6**2 - 0.5**2))
+    level = cv2.GaussianBlur(level, (0, 0), np.sqrt(wanted**2 - 1.6**2)).astype(float)
+    histogram = np.zeros((3, 3, directions))
+    for row in range(41):
+        for col in range(41):
+            i, j = x + col - 20, y + row - 20
+            gx, gy = level[j, i + 1] - level[j, i - 1], level[j + 1, i] - level[j - 1, i]
+            strength, angle = np.hypot(gx, gy), np.arctan2(gy, gx) % np.pi
+            for cell_row in range(3):
+                for cell_col in range(3):
+                    down = 1 - abs((row + 0.5) * 3 / 41 - 0.5 - cell_row)
+                    right = 1 - abs((col + 0.5) * 3 / 41 - 0.5 - cell_col)
+                    share = max(down, 0) * max(right, 0)
+                    for number in range(directions):
+                        away = abs(angle * directions / np.pi - number)
+                        near = max(1 - min(away, directions - away), 0)
+                        histogram[cell_row, cell_col, number] += strength * share * near
+    return histogram.ravel() / np.linalg.norm(histogram)
+
+
+@pytest.mark.parametrize("directions", [9, 7])
+def test_values_are_those_of_the_definition(directions: int) -> None:
+    values = image()
+    descriptor = HogDescriptor(directions, scaled=False)
+    _, found = descriptor.describe(whole(values), points((101, 87, 5.0, 0)))
+    assert found.shape == (1, {9: 81, 7: 63}[directions])
+    np.testing.assert_allclose(found[0], directly(values, 101, 87, directions), atol=1e-4)
+
+
+def test_inverted_contrast_does_not_count() -> None:
+    spots = points((70, 90, 2, 0), (120, 101, 3, 0))
+    _, first = HogDescriptor().describe(whole(image()), spots)
+    _, second = HogDescriptor().describe(whole(1 - 4 * image()), spots)
+    np.testing.assert_allclose(first, second, atol=1e-4)
+
+
+def test_another_place_is_another_descriptor() -> None:
+    _, found = HogDescriptor().describe(whole(image()), points((70, 90, 2, 0), (120, 101, 2, 0)))
+    assert found[0] @ found[1] < 0.95
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, rtol=1e-5)
+
+
+def test_scaled_patches_grow_with_the_feature() -> None:
+    values = image()
+    large = cv2.resize(values, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
+    spots, twice = points((70, 90, 3, 0)), points((140.5, 180.5, 6, 0))
+    for scaled, alike in ((True, True), (False, False)):
+        descriptor = HogDescriptor(scaled=scaled)
+        _, first = descriptor.describe(whole(values), spots)
+        _, second = descriptor.describe(whole(large), twice)
+        assert bool(first[0] @ second[0] > 0.98) == alike
+
+
+def test_oriented_descriptors_do_not_mind_quarter_turns() -> None:
+    values = image()
+    spots = points((70, 90, 2, 0), (120, 101, 3, 0))
+    first, one = HogDescriptor(upright=False).describe(whole(values), spots)
+    turned = np.column_stack([spots.position_px[:, 1], SIDE - 1 - spots.position_px[:, 0]])
+    second, other = HogDescriptor(upright=False).describe(
+        whole(np.rot90(values)), replace(spots, position_px=turned)
+    )
+    assert len(first) == len(second)
+    # Features with several orientations come in the order of these, which begins elsewhere.
+    assert (np.max(one @ other.T, axis=1) > 0.999).all()
+
+
+def test_masked_pixels_tell_nothing() -> None:
+    values, valid = image(), np.ones((SIDE, SIDE), bool)
+    valid[:, 100:] = False
+    spots = points((92, 90, 2, 0))
+    one, other = (
+        HogDescriptor().describe(Patch(np.where(valid, values, fill), valid), spots)[1]
+        for fill in (np.float32(-50), np.float32(80))
+    )
+    np.testing.assert_array_equal(one, other)
+    assert np.abs(one).max() > 0
+
+
+def test_no_features_have_no_descriptors() -> None:
+    found, values = HogDescriptor(7).describe(whole(image()), FeaturePoints.none())
+    assert len(found) == 0
+    assert values.shape == (0, 63)

@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from scipy.stats import skew
+from textured_pairs import texture
+
+from groundtie.features.patch_statistics import STATISTICS, patch_statistics
+from groundtie.rasters.patch import Patch
+
+PX = np.array([[50.0, 40.0], [3.2, 70.1], [89.0, 0.0]])
+
+
+def window() -> Patch:
+    values = (np.exp(texture(80, 90)) * 50 + 20_000).astype(np.float32)
+    valid = np.ones(values.shape, bool)
+    valid[30:50, :35] = False
+    return Patch(np.where(valid, values, np.float32(-9999)), valid)
+
+
+def around(image: np.ndarray, of: Patch, x: float, y: float) -> np.ndarray:
+    """Return the valid pixels of a patch of 41 × 41, cut at the border."""
+    col, row = round(x), round(y)
+    inside = slice(max(row - 20, 0), row + 21), slice(max(col - 20, 0), col + 21)
+    return image[inside][of.valid[inside]].astype(float)
+
+
+def test_mean_and_variance_are_those_of_the_valid_pixels() -> None:
+    found = patch_statistics("mean-variance", window(), PX)
+    for row, (x, y) in zip(found, PX, strict=True):
+        pixels = around(window().values, window(), x, y)
+        np.testing.assert_allclose(row, [pixels.mean(), pixels.var()], rtol=1e-6)
+
+
+def test_texture_adds_skewness_and_what_is_fine() -> None:
+    whole = Patch(window().values, np.ones((80, 90), bool))
+    whole = Patch(np.where(window().valid, whole.values, np.float32(20_050)), whole.valid)
+    found = patch_statistics("texture", whole, PX)
+    values = whole.values.astype(float)
+    fine = (values - cv2.blur(values, (5, 5))) ** 2
+    for row, (x, y) in zip(found, PX, strict=True):
+        pixels = around(values, whole, x, y)
+        np.testing.assert_allclose(row[2], skew(pixels), rtol=1e-6)
+        np.testing.assert_allclose(row[4], around(fine, whole, x, y).mean(), rtol=1e-6)
+        assert 0 < row[3] < np.ptp(pixels)
+
+
+@pytest.mark.parametrize("name", STATISTICS)
+def test_nothing_has_no_statistics(name: str) -> None:
+    assert len(patch_statistics(name, window(), np.zeros((0, 2)))) == 0
+    nothing = Patch(np.zeros((9, 9), np.float32), np.zeros((9, 9), bool))
+    assert np.isfinite(patch_statistics(name, nothing, np.zeros((3, 2)))).all()

@@ -1,0 +1,151 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from raster_files import write_raster
+from textured_pairs import (
+    TexturedPair,
+    error_px,
+    listing,
+    pixels,
+    shift_on_map,
+    write_textured_pair,
+)
+
+from groundtie import match_optical
+from groundtie.errors import NotRegisteredError, ParameterError
+from groundtie.features.classifier_training import Training, train_classifier
+from groundtie.features.optical import DESCRIPTORS, DETECTORS
+from groundtie.geometry.tie_point_files import read_tie_points
+from groundtie.geometry.transform import load_transform
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
+
+SIZE = (300, 280)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
+    # The input's contrast is inverted.
+    folder = tmp_path_factory.mktemp("textured")
+    return write_textured_pair(folder, SIZE, shift_on_map(70.0, -45.0), noise=0.1)
+
+
+def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: Path) -> None:
+    found = match_optical(
+        files.reference,
+        files.input,
+        tmp_path / "out.tif",
+        tie_points=tmp_path / "points.gpkg",
+        transform=tmp_path / "transform.json",
+        report=tmp_path / "report.html",
+    )
+    assert error_px(found.transform, files) < 0.3
+    assert error_px(load_transform(tmp_path / "transform.json"), files) < 0.3
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["verdict"]["accepted"] is True
+    table = read_tie_points(tmp_path / "points.gpkg", found.transform.input_grid)
+    assert len(table.reference_xy) == len(found.points)
+    reference, registered = (
+        pixels(path)[0][40:-40, 40:-40].astype(float)
+        for path in (files.reference, tmp_path / "out.tif")
+    )
+    assert np.corrcoef(reference.ravel(), registered.ravel())[0, 1] < -0.9
+
+
+@pytest.mark.parametrize("detector", DETECTORS)
+@pytest.mark.parametrize("descriptor", DESCRIPTORS)
+def test_every_feature_finds_it_where_contrast_is_alike(
+    files: TexturedPair, tmp_path: Path, detector: str, descriptor: str
+) -> None:
+    upright = write_raster(
+        tmp_path / "in.tif", 4000 - pixels(files.input)[0], files.truth.input_grid
+    )
+    found = match_optical(
+        files.reference,
+        upright,
+        tmp_path / "out.tif",
+        detector=detector,
+        descriptor=descriptor,
+        refinement="none",
+    )
+    assert error_px(found.transform, files) < 0.5
+
+
+def test_check_points_lie_where_no_feature_was_seen(files: TexturedPair, tmp_path: Path) -> None:
+    found = match_optical(files.reference, files.input, tmp_path / "out.tif", refinement="none")
+    fit, check = (
+        files.grid.map_to_pixel(found.points.reference_xy[found.points.is_check == c])
+        for c in (0, 1)
+    )
+    apart = np.linalg.norm(fit[:, None] - check[None], axis=2)
+    assert len(check) >= 4
+    assert apart.min() > 15
+
+
+def test_another_place_is_refused_and_leaves_its_report_only(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    other = write_textured_pair(tmp_path / "in", SIZE, shift_on_map(0, 0), input_seed=77)
+    with pytest.raises(NotRegisteredError):
+        match_optical(
+            other.reference, other.input, tmp_path / "o.tif", report=tmp_path / "report.html"
+        )
+    assert set(listing(tmp_path)) >= {"report.html", "report.json"}
+    assert not (tmp_path / "o.tif").exists()
+
+
+def test_images_without_georeferencing_may_be_turned_and_larger(tmp_path: Path) -> None:
+    pair = write_textured_pair(tmp_path, SIZE, shift_on_map(0, 0), noise=0.1)
+    values = np.kron(np.rot90(pixels(pair.input)[0]), np.ones((2, 2), np.uint16))[:, 60:]
+    plain = [
+        write_raster(tmp_path / f"{name}.tif", image)
+        for name, image in (("plain", pixels(pair.reference)[0]), ("turned", values))
+    ]
+    found = match_optical(*plain, tmp_path / "out.tif")
+    px = np.array([[50.0, 60.0], [200.0, 100.0], [150.0, 220.0]])
+    # Counter-clockwise: columns become rows from below; every pixel becomes four.
+    turned = np.column_stack([px[:, 1], SIZE[0] - 1 - px[:, 0]])
+    expected = 2 * turned + 0.5 - [60, 0]
+    off = found.transform(Grid(PIXEL_COORDINATES, None, *SIZE).pixel_to_map(px)) - expected
+    assert np.hypot(*off.T).max() < 1.5
+
+
+def bright_is_left_out(path: Path, limit: float) -> Path:
+    """Write a classifier that leaves out patches with means above a limit."""
+    random = np.random.default_rng(0)
+    means = np.concatenate([random.uniform(0, limit, 300), random.uniform(limit, 2 * limit, 300)])
+    statistics = np.column_stack([means, random.uniform(0, 1e5, 600)])
+    labelled = Training(statistics, means < limit, random.uniform(0, 100, (600, 2)))
+    train_classifier(labelled, "mean-variance", "linear", 10.0, 0).write(path)
+    return path
+
+
+def test_features_that_a_classifier_leaves_out_take_no_part(
+    files: TexturedPair, tmp_path: Path
+) -> None:
+    values = pixels(files.input)[0].astype(float)
+    values[:, :130] += 1500
+    bright = write_raster(tmp_path / "in.tif", values.astype(np.uint16), files.truth.input_grid)
+    classifier = bright_is_left_out(tmp_path / "c.json", 2750)
+    for chosen in (None, classifier):
+        found = match_optical(
+            files.reference,
+            bright,
+            tmp_path / "out.tif",
+            input_classifier=chosen,
+            refinement="none",
+        )
+        nearest = found.points.input_px[~found.points.is_check, 0].min()
+        assert (nearest > 110) == (chosen is not None)
+        assert error_px(found.transform, files) < 0.6
+
+
+def test_a_file_that_is_no_classifier_is_refused(files: TexturedPair, tmp_path: Path) -> None:
+    (tmp_path / "c.json").write_text("{}")
+    with pytest.raises(ParameterError, match="no feature classifier"):
+        match_optical(
+            files.reference, files.input, tmp_path / "o.tif", input_classifier=tmp_path / "c.json"
+        )
+    assert list(listing(tmp_path)) == ["c.json"]
