@@ -19,6 +19,7 @@ SUITES = (
     "crossings",
     "simulated",
     "city",
+    "layover",
     "large_shift",
     "rotated_pairs",
     "rotation",
