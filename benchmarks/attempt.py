@@ -1,4 +1,4 @@
-"""One registration by the public function `coregister`, judged and timed."""
+"""One registration by a tool's public function, judged and timed."""
 
 from __future__ import annotations
 
@@ -11,12 +11,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import rasterio
-
 import groundtie
 from groundtie.errors import NotRegisteredError
 from groundtie.geometry.transform import Transform
-from groundtie.rasters.grid import Grid
+from groundtie.rasters.reading import open_raster
 
 from .accuracy import CRASHED, REFUSED, FloatArray, Mapping, Truth, classify
 
@@ -93,13 +91,19 @@ class Outcome:
 
 
 def attempt(
-    name: str, group: str, pair: Pair, workers: int | None = None, **parameters: Any
+    name: str,
+    group: str,
+    pair: Pair,
+    workers: int | None = None,
+    *,
+    tool: str = "coregister",
+    **parameters: Any,
 ) -> Outcome:
-    """Register a pair and compare with its truth; `parameters` are those of `coregister`."""
+    """Register a pair by a tool of that name, with its `parameters`; compare with the truth."""
     with tempfile.TemporaryDirectory() as folder:
         started = time.perf_counter()
         try:
-            result = groundtie.coregister(
+            result = getattr(groundtie, tool)(
                 pair.reference,
                 pair.input,
                 Path(folder) / "registered.tif",
@@ -137,8 +141,8 @@ def attempt(
 
 def on_pixels(transform: Transform, reference: Path) -> Mapping:
     """Return the function from reference pixels to input pixels of a transform."""
-    with rasterio.open(reference) as source:
-        grid = Grid(source.transform, source.crs, source.width, source.height)
+    with open_raster(reference) as source:
+        grid = source.grid
 
     def mapping(px: FloatArray) -> FloatArray:
         return transform(grid.pixel_to_map(px))

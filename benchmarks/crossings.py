@@ -45,13 +45,14 @@ class Crossing:
 
     reference: RealCase
     input: RealCase
+    tool: str = "coregister"
 
     def run(self, workers: int | None) -> Outcome:
         """Register what cannot be registered."""
         with tempfile.TemporaryDirectory() as folder:
             pair = write_crossing(self.reference, self.input, Path(folder))
             name = f"{self.reference.name} × {self.input.name}"
-            return _attempt(name, CROSSING, pair, workers)
+            return _attempt(name, CROSSING, pair, workers, self.tool)
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,11 @@ class Speckled:
             return _attempt(f"{self.case.name}, {group}", group, pair, workers)
 
 
-def _attempt(name: str, group: str, pair: Pair, workers: int | None) -> Outcome:
-    return attempt(name, group, pair, workers, search_radius=search_radius_m(LARGEST_SHIFT_PX))
+def _attempt(
+    name: str, group: str, pair: Pair, workers: int | None, tool: str = "coregister"
+) -> Outcome:
+    radius_m = search_radius_m(LARGEST_SHIFT_PX)
+    return attempt(name, group, pair, workers, tool=tool, search_radius=radius_m)
 
 
 def write_crossing(reference: RealCase, input: RealCase, folder: Path) -> Pair:

@@ -24,6 +24,7 @@ SUITES = (
     "rotated_pairs",
     "rotation",
     "rpc",
+    "sar_sar",
     "speed",
     "methods",
     "peaks",

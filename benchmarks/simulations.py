@@ -60,7 +60,7 @@ class Simulation:
     def _further(self) -> list[str]:
         """What else the folder's name must tell."""
         digest = hashlib.sha256(repr(self.further).encode()).hexdigest()[:8]
-        return ([digest] if self.further else []) + [_simulator()]
+        return ([digest] if self.further else []) + [simulator_version()]
 
 
 def read_pair(folder: Path) -> Pair:
@@ -68,7 +68,7 @@ def read_pair(folder: Path) -> Pair:
     paths = {key: folder / name for key, name in files.NAMES.items()}
     mapping = on_pixels(groundtie.load_transform(paths["truth"]), paths["reference"])
     size = image_size(paths["reference"])
-    linear = _linear(mapping, size)
+    linear = linear_of(mapping, size)
     points = read_check_points(paths["check_points"])
     return Pair(
         paths["reference"],
@@ -78,14 +78,14 @@ def read_pair(folder: Path) -> Pair:
     )
 
 
-def _linear(mapping: Mapping, size: tuple[int, int]) -> FloatArray:
+def linear_of(mapping: Mapping, size: tuple[int, int]) -> FloatArray:
     """Return input pixels per reference pixel at the centre, shape (2, 2)."""
     steps = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     base, along_col, along_row = mapping(np.array(size) / 2 + steps)
     return np.column_stack([along_col - base, along_row - base])
 
 
-def _simulator() -> str:
+def simulator_version() -> str:
     """Return a fingerprint of the simulator's source, so that no pair outlives it."""
     folder = Path(files.__file__).parent
     sources = b"".join(path.read_bytes() for path in sorted(folder.glob("*.py")))

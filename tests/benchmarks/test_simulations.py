@@ -73,7 +73,7 @@ def test_a_pair_does_not_outlive_its_simulator(
     cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = []
-    monkeypatch.setattr(simulations, "_simulator", lambda: "another")
+    monkeypatch.setattr(simulations, "simulator_version", lambda: "another")
     monkeypatch.setattr(
         simulations.groundtie, "simulate", lambda folder, **_: made.append(folder), raising=False
     )
@@ -88,7 +88,7 @@ def test_the_fingerprint_follows_the_source(
     module = tmp_path / "files.py"
     module.write_text("a = 1\n")
     monkeypatch.setattr(simulations.files, "__file__", str(module))
-    before = simulations._simulator()
-    assert simulations._simulator() == before
+    before = simulations.simulator_version()
+    assert simulations.simulator_version() == before
     module.write_text("a = 2\n")
-    assert simulations._simulator() != before
+    assert simulations.simulator_version() != before

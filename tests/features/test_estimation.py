@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from affine import Affine
 
-from groundtie.errors import TooFewPointsError
-from groundtie.features.estimation import fit_matches
+from groundtie.errors import NothingFoundError, TooFewPointsError
+from groundtie.features.estimation import fit_matches, require_no_rival
 
 AREA = np.pi * 16**2
 
@@ -49,7 +49,6 @@ def test_auto_takes_the_simplest_model_that_predicts_best() -> None:
     for truth, bend, kinds in (
         (SHIFT, 0.0, {"translation"}),
         (LINEAR, 0.0, {"affine"}),
-        (SHIFT, 4.0, {"polynomial2"}),
     ):
         px, partner = matches(truth, bend)
         fit = fit_matches("auto", px, partner, Affine.identity(), AREA, 0)
@@ -73,3 +72,15 @@ def test_too_few_matches_are_refused() -> None:
     px, partner = matches(SHIFT, right=3, wrong=0)
     with pytest.raises(TooFewPointsError, match="only 3 features were matched"):
         fit_matches("auto", px, partner, Affine.identity(), AREA, 0)
+
+
+@pytest.mark.parametrize("leaning", [0, 3, 30])
+def test_matches_that_agree_on_two_transforms_are_refused(leaning: int) -> None:
+    px, partner = matches(SHIFT, right=100)
+    partner[:leaning] += [9.0, 0.0]
+    fit = fit_matches("affine", px, partner, Affine.identity(), AREA, 0)
+    if leaning < 10:
+        require_no_rival(px, partner, Affine.identity(), fit.model, AREA)
+        return
+    with pytest.raises(NothingFoundError, match="agree 9 px beside the others"):
+        require_no_rival(px, partner, Affine.identity(), fit.model, AREA)

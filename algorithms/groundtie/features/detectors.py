@@ -24,7 +24,7 @@ ByteImage = NDArray[np.uint8]
 
 # Contrast below which a feature is dropped, in OpenCV's terms: three times Lowe's, of the range of
 # grey values. Without speckle's octave features are weaker, and right ones among them.
-_CONTRAST = {"sift": 0.04, "sift-oct": 0.06, "sift-isef-oct": 0.04}
+_CONTRAST = {"sift": 0.04, "sift-oct": 0.065, "sift-isef-oct": 0.04}
 DETECTORS = tuple(_CONTRAST)
 
 _LAYERS = 3

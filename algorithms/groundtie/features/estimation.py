@@ -8,7 +8,8 @@ import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
 
-from ..errors import TooFewPointsError
+from ..errors import NothingFoundError, TooFewPointsError
+from ..geometry.chance import log10_false_alarms
 from ..geometry.estimation import SIGMA_RANGE_PX
 from ..geometry.fitting import fit_model
 from ..geometry.models import PARAMETERS, Frame, Model
@@ -33,17 +34,18 @@ _CONSENSUS_PX = 3.0
 _MATCHES_PER_PARAMETER = 3
 
 # What "auto" chooses from, and by how many standard errors a more flexible model must bring
-# matches nearer that were left out of its fit: bending is rare, and extrapolates badly.
-_STANDARD_ERRORS = {
-    "translation": 0.0,
-    "similarity": 1.0,
-    "affine": 1.0,
-    "polynomial2": 2.0,
-    "polynomial3": 2.0,
-}
+# matches nearer that were left out of its fit. What bends between radar images of other incidence
+# angles are mostly forests and cities, which lean, and not the ground.
+_STANDARD_ERRORS = {"translation": 0.0, "similarity": 1.0, "affine": 1.0}
 
 # Matches further off than this are wrong whatever the model, in pixels.
 _FAR_PX = 3.0
+
+# So many matches that agree elsewhere make a rival, if they are this share of those that agree on
+# the model, and random ones would hardly ever (log10) agree so. Real pairs: -1.2 at most.
+_FEWEST_RIVALS = 10
+_RIVAL_SHARE = 0.1
+_RIVAL_ALARMS = -10.0
 
 
 @dataclass(frozen=True)
@@ -116,6 +118,44 @@ def fit_matches(
         for fold in np.unique(folds)
     )
     return Fit(model, fold_models, mixture)
+
+
+def require_no_rival(
+    px: FloatArray, partner_px: FloatArray, prior: Affine, model: Model, window_area: float
+) -> None:
+    """Refuse a model if many of the matches that it calls wrong agree on a shift from it.
+
+    Forests and cities lie on other transforms than the ground between radar images of different
+    incidence angles, each as firm in itself as the ground.
+
+    Parameters
+    ----------
+    px, partner_px, prior, window_area
+        See `fit_matches`.
+    model
+        What was fitted to them.
+
+    Raises
+    ------
+    NothingFoundError
+        There is such a shift.
+    """
+    residual = apply_affine(prior, partner_px) - model(px)
+    length = np.hypot(*residual.T)
+    far = length > _FAR_PX + _CONSENSUS_PX
+    if far.sum() < _FEWEST_RIVALS:
+        return
+    at, residual = px[far], residual[far]
+    shift = find_consensus(at, at + residual, _CONSENSUS_PX, "translation")
+    others = int((distances(shift, at, at + residual) <= _CONSENSUS_PX).sum())
+    probability = np.pi * _CONSENSUS_PX**2 / window_area
+    alarms = log10_false_alarms(others, len(at), probability, 1)
+    if alarms < _RIVAL_ALARMS and others >= _RIVAL_SHARE * (length <= _FAR_PX).sum():
+        apart = float(np.hypot(*shift([[0.0, 0.0]])[0]))
+        raise NothingFoundError(
+            f"{others} features agree {apart:.0f} px beside the others: ground and what stands on "
+            "it; give a mask of the ground"
+        )
 
 
 def _fit(

@@ -23,7 +23,7 @@ from ..search.local import LocalSearch
 from ..search.matching import ChipMatcher
 from ..similarity.evidence import find_peak
 from ..similarity.surface import SimilaritySettings
-from .estimation import AUTO, Fit, fit_matches
+from .estimation import AUTO, Fit, fit_matches, require_no_rival
 from .tile_matching import FeatureMatcher
 
 FloatArray = NDArray[np.float64]
@@ -34,8 +34,12 @@ _LARGEST_SCORE = 10.0
 # Chips around matches: how large, how far they are moved, and how many of them at most.
 _CHIP_PX, _CHIP_RADIUS_PX = 81, 4
 
-# The scene is divided into so many cells a side; the best match of each is refined.
-_CELLS = 14
+# Of the matches in each of so many cells a side the best is refined.
+_CHIP_CELLS = 14
+
+# Forests and cities have more features than fields, and lean. So that they do not outvote the
+# ground, no cell has more than so many matches.
+_CELL_PX, _PER_CELL = 64.0, 6
 
 # Right matches lie this near a polynomial where a thin-plate spline is to bend further.
 _TPS_RADIUS_PX = 5.0
@@ -91,17 +95,23 @@ class FeatureSearch:
         ------
         TooFewPointsError
             Too few matches agree on a model.
+        NothingFoundError
+            Many of them agree on two.
         """
         matches = self.matcher.match(coarse, executor, progress.part(0.0, 0.7))
         score = 1 / np.maximum(matches.ratio, 1 / _LARGEST_SCORE)
         area = float(np.pi * self.matcher.gate_px**2)
-        places = _Places(matches.reference.position_px, matches.input.position_px, score, area)
+        kept = best_of_cells(matches.reference.position_px, score, _CELL_PX, _PER_CELL)
+        px, partner_px = matches.reference.position_px[kept], matches.input.position_px[kept]
+        places = _Places(px, partner_px, score[kept], area)
         fit = self._fit(kind, places, coarse, seed)
+        require_no_rival(px, partner_px, self.local.prior(coarse), fit.model, area)
         if self.refinement is not None:
             right = fit.mixture.right
-            px = places.px[right]
+            px, score = places.px[right], places.score[right]
             coarse = self.local.on_map(fit_model("affine", px, fit.model(px)))
-            picked = px[_spread_out(px, score[right])]
+            side = float(np.ptp(places.px, axis=0).max()) / _CHIP_CELLS
+            picked = px[best_of_cells(px, score, side, 1)]
             places = self._refined(picked, coarse, executor, progress.part(0.7, 1.0))
             fit = self._fit(kind, places, coarse, seed)
         return self._estimate(kind, places, coarse, fit)
@@ -159,10 +169,26 @@ class FeatureSearch:
         return Estimate(transform, points, fold_models)
 
 
-def _spread_out(px: FloatArray, score: FloatArray) -> NDArray[np.int_]:
-    """Return which of the points to take: the best of each cell, of the best cells."""
-    low, high = px.min(axis=0), px.max(axis=0)
-    cell = np.minimum((px - low) / np.maximum(high - low, 1e-9) * _CELLS, _CELLS - 1).astype(int)
-    best_first = np.argsort(-score, kind="stable")
-    _, first = np.unique(cell[best_first] @ [1, _CELLS], return_index=True)
-    return best_first[np.sort(first)]
+def best_of_cells(
+    px: FloatArray, score: FloatArray, cell_px: float, count: int
+) -> NDArray[np.int_]:
+    """Return which points to take: of those in each square cell the best, at most so many.
+
+    Parameters
+    ----------
+    px
+        Positions, shape (n, 2).
+    score
+        What is better, shape (n,).
+    cell_px
+        Side of the cells.
+    count
+        How many of each are taken.
+    """
+    cells = np.floor(px / max(cell_px, 1e-9)).astype(int)
+    _, cell = np.unique(cells, axis=0, return_inverse=True)
+    cell = cell.ravel()
+    order = np.lexsort((-score, cell))
+    _, first = np.unique(cell[order], return_index=True)
+    rank = np.arange(len(order)) - np.repeat(first, np.diff([*first, len(order)]))
+    return np.sort(order[rank < count])

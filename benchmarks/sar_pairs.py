@@ -1,0 +1,163 @@
+"""Simulated pairs of radar images: one place seen twice, from other sides, at other times."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+import math
+import sys
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import rasterio.crs
+from affine import Affine
+
+from groundtie.geometry.transform import Transform, load_transform
+from groundtie.rasters.grid import Grid
+from groundtie.simulation.misregistration import (
+    DistortionOptions,
+    SourcePositions,
+    draw_misregistration,
+    needed_margin,
+    resample,
+)
+from groundtie.simulation.sar import SarOptions, add_speckle, quantise_amplitude, sar_power
+from groundtie.simulation.scene import Scene, SceneOptions, generate_scenes
+
+from .accuracy import Truth
+from .attempt import Pair, on_pixels
+from .cases import CRS, write_image
+from .simulations import linear_of, simulator_version
+
+# How the second image differs: incidence angles, the share of buildings that stand in one image
+# only, and of parcels (fields, woods) that shine otherwise, by up to so much.
+INCIDENCES_DEG = (30.0, 40.0)
+CHANGED_BUILDINGS = 0.1
+_CHANGED_PARCELS, _CHANGE_DB = 0.3, 4.0
+
+# Bright points would ring when they are resampled: nothing is darker than the noise floor.
+_FLOOR = 10 ** (-25 / 10)
+
+# The second image's textures and speckle are others.
+_LATER = 100_000
+
+_NAMES = ("reference.tif", "input.tif", "ground.tif", "truth.json")
+
+# Ground nearer to trees and houses than this is mixed up with what leans over it.
+_BESIDE_PX = 8
+
+
+@dataclass(frozen=True)
+class SarPair:
+    """What a simulated pair of radar images is made from.
+
+    Parameters
+    ----------
+    size, density, seed
+        See `groundtie.simulate`; pixels are of 1 m.
+    looks
+        Of both images.
+    opposite
+        Whether they look from opposite sides, from an ascending and a descending orbit.
+    relief_m
+        Height of the hills; both images are corrected with a terrain model.
+    """
+
+    size: int
+    density: str
+    seed: int
+    looks: int
+    opposite: bool
+    relief_m: float = 20.0
+
+    @property
+    def name(self) -> str:
+        """Name for people."""
+        sides = "opposite orbits" if self.opposite else "same orbit"
+        return f"{self.density} {self.size}², {self.looks} looks, {sides}, seed {self.seed}"
+
+    def pair(self, cache: Path) -> Pair:
+        """Return the pair, which is made unless the folder `cache` has it."""
+        words = "-".join(f"{value}" for value in asdict(self).values())
+        folder = cache / f"sar-{words}-{simulator_version()}-{_own_version()}"
+        paths = [folder / name for name in _NAMES]
+        # The truth is written last.
+        if not paths[-1].exists():
+            folder.mkdir(parents=True, exist_ok=True)
+            self._write(*paths)
+        mapping = on_pixels(load_transform(paths[-1]), paths[0])
+        size = (self.size, self.size)
+        lattice = Truth.on_lattice(mapping, size, linear_of(mapping, size))
+        return Pair(paths[0], paths[1], lattice, lattice)
+
+    def ground(self, cache: Path) -> Path:
+        """Return the mask of the level ground on the reference, once the pair is made."""
+        return self.pair(cache).reference.with_name(_NAMES[2])
+
+    def _write(
+        self, reference_path: Path, input_path: Path, ground_path: Path, truth_path: Path
+    ) -> None:
+        grid = Grid(
+            Affine(1, 0, 412_000, 0, -1, 5_334_000),
+            rasterio.crs.CRS.from_string(CRS),
+            self.size,
+            self.size,
+        )
+        distortion = DistortionOptions("affine", shift_px=12.0, warp_px=4.0)
+        model = draw_misregistration(distortion, grid, self.seed)
+        truth = Transform(model, grid.crs, grid)
+        # What the second image shows beyond the first is part of the scene that is rendered.
+        around = needed_margin(model, grid, grid)
+        options = SceneOptions(
+            (self.size + 2 * around,) * 2,
+            density=self.density,
+            relief_m=self.relief_m,
+            seed=self.seed,
+            changed=CHANGED_BUILDINGS,
+        )
+        earlier, later = generate_scenes(options, _reach_px(options))
+        looks = float(self.looks)
+        first = SarOptions(INCIDENCES_DEG[0], "ascending", looks)
+        second = SarOptions(
+            INCIDENCES_DEG[1], "descending" if self.opposite else "ascending", looks
+        )
+        inner = slice(around, around + self.size)
+        speckle = np.random.default_rng((self.seed, 1)), np.random.default_rng((self.seed, 2))
+        power = add_speckle(sar_power(earlier, first)[inner, inner], looks, speckle[0])
+        image = quantise_amplitude(power, first)
+        write_image(image[None], grid.transform, reference_path)
+        wide = grid.window(-around, -around, *options.size_px)
+        positions = SourcePositions.of(truth, wide)
+        seen = resample(sar_power(_changed(later), second), positions, self.size)
+        power = add_speckle(np.maximum(seen, np.float32(_FLOOR)), looks, speckle[1])
+        write_image(quantise_amplitude(power, second)[None], grid.transform, input_path)
+        stands = earlier.object_m[earlier.window][inner, inner] > 0
+        beside = np.ones((2 * _BESIDE_PX + 1,) * 2, np.uint8)
+        ground = 1 - cv2.dilate(stands.astype(np.uint8), beside)
+        write_image(ground[None], grid.transform, ground_path)
+        truth_path.write_text(json.dumps(truth.to_json()), encoding="utf-8")
+
+
+def _changed(scene: Scene) -> Scene:
+    """Return a scene at a later date: other textures, some parcels brighter or darker."""
+    random = np.random.default_rng((scene.seed, 3))
+    level = scene.parcels.backscatter_db
+    change = random.uniform(-_CHANGE_DB, _CHANGE_DB, level.shape)
+    change[random.random(level.shape) > _CHANGED_PARCELS] = 0
+    parcels = replace(scene.parcels, backscatter_db=(level + change).astype(level.dtype))
+    return replace(scene, seed=scene.seed + _LATER, parcels=parcels)
+
+
+def _reach_px(options: SceneOptions) -> int:
+    """Return how far from its foot a building or a hill shows in a radar image."""
+    tangent = math.tan(math.radians(min(INCIDENCES_DEG)))
+    height = options.highest_object_m + options.relief_m
+    return math.ceil(height / tangent + options.highest_object_m * tangent) + 1
+
+
+def _own_version() -> str:
+    source = inspect.getsource(sys.modules[__name__])
+    return hashlib.sha256(source.encode()).hexdigest()[:8]

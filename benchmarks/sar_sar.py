@@ -1,0 +1,267 @@
+"""Radar images registered to radar images: real and simulated pairs, crossings, features."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from . import feature_counts
+from .accuracy import CORRECT, REFUSED, SILENTLY_WRONG
+from .attempt import Outcome, Pair, accepted, attempt, count
+from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
+from .crossings import Crossing, crossings
+from .real import LARGEST_SHIFT_PX, SHIFTS
+from .sar_pairs import CHANGED_BUILDINGS, INCIDENCES_DEG, SarPair
+from .suites import Case, Goal, Settings, SuiteResult, Table, run_cases
+from .tables import accuracy_table
+
+TOOL = "match_sar_sar"
+SAR_SAR = "sar-sar"
+
+# Cases whose images are turned by 18°: they are matched without georeferencing, too.
+_TURNED = ("ss-ponds", "ss-meander")
+_FREE = "without georeferencing"
+
+_SIZE_PX = 800
+_LARGE_PX = 2000
+_DENSITIES = ("rural", "suburban")
+_MOST_LOOKS = 4
+_QUICK_CROSSINGS = 20
+
+_WANTED_CORRECT = 0.95
+_LARGEST_ERROR_PX = {False: 1.0, True: 2.0}
+_LONGEST_S = 15.0
+
+
+@dataclass(frozen=True)
+class RealAttempt:
+    """A real pair: with a wrong shift of a number, or without georeferencing (None)."""
+
+    case: RealCase
+    number: int | None
+
+    def run(self, workers: int | None) -> Outcome:
+        """Register the pair and judge the result."""
+        case, number = self.case, self.number
+        if number is None:
+            pair = Pair(case.reference, case.input, *case.truths(), case.sigma_px)
+            return attempt(case.name, _FREE, pair, workers, tool=TOOL)
+        shift = draw_shift(case, LARGEST_SHIFT_PX, number)
+        with tempfile.TemporaryDirectory() as folder:
+            return attempt(
+                f"{case.name} ({shift[0]:+.1f}, {shift[1]:+.1f})",
+                SAR_SAR,
+                write_case(case, shift, Path(folder)),
+                workers,
+                tool=TOOL,
+                search_radius=search_radius_m(LARGEST_SHIFT_PX),
+            )
+
+
+@dataclass(frozen=True)
+class SimulatedAttempt:
+    """A simulated pair, with the mask of its ground or without one."""
+
+    simulation: SarPair
+    masked: bool
+    cache: Path
+
+    @property
+    def group(self) -> str:
+        """Name of the cases that are counted together."""
+        return _group(self.simulation.opposite, self.masked)
+
+    def run(self, workers: int | None) -> Outcome:
+        """Make the pair if need be, register it and judge the result."""
+        pair = self.simulation.pair(self.cache)
+        given = {"ground_mask": self.simulation.ground(self.cache)} if self.masked else {}
+        return attempt(self.simulation.name, self.group, pair, workers, tool=TOOL, **given)
+
+
+def _group(opposite: bool, masked: bool) -> str:
+    sides = "opposite orbits" if opposite else "same orbit"
+    return f"{sides}, {'ground mask' if masked else 'no mask'}"
+
+
+def simulations(seeds: int) -> list[SarPair]:
+    """Return pairs of both kinds of orbits; density and looks go round with the seed."""
+    return [
+        SarPair(
+            _SIZE_PX,
+            _DENSITIES[seed % len(_DENSITIES)],
+            seed,
+            1 + seed % _MOST_LOOKS,
+            opposite,
+        )
+        for opposite in (False, True)
+        for seed in range(1, seeds + 1)
+    ]
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite."""
+    every = read_cases(settings.data)
+    own = [case for case in every if case.kind == SAR_SAR]
+    detectors, chains, turns = _counts(own)
+    real: list[Case] = [
+        *(RealAttempt(c, n) for c in own for n in range(1 if settings.quick else SHIFTS)),
+        *(RealAttempt(case, None) for case in own if case.name in _TURNED),
+    ]
+    crossed = [
+        Crossing(one.reference, one.input, TOOL)
+        for one in crossings(every)
+        if one.reference.kind == SAR_SAR
+    ]
+    simulated: list[Case] = [
+        SimulatedAttempt(simulation, masked, settings.cache)
+        for simulation in simulations(1 if settings.quick else settings.seeds)
+        for masked in (True, False)
+    ]
+    outcomes = {
+        "real": run_cases(real, settings.jobs),
+        "crossed": run_cases(
+            crossed[:: max(len(crossed) // _QUICK_CROSSINGS, 1)] if settings.quick else crossed,
+            settings.jobs,
+        ),
+        "simulated": run_cases(simulated, settings.jobs),
+    }
+    # By itself: it is timed.
+    large = SimulatedAttempt(SarPair(_LARGE_PX, "rural", 1, 4, True), True, settings.cache)
+    large.simulation.pair(settings.cache)
+    outcomes["large"] = run_cases([large], 1)
+    groups = {_group(o, m): [] for m in (True, False) for o in (False, True)}
+    for outcome in outcomes["simulated"]:
+        groups[outcome.group].append(outcome)
+    pairs = {
+        name: [o for o in outcomes["real"] if o.name.split(" ")[0] == name]
+        for name in (case.name for case in own)
+    }
+    return SuiteResult(
+        "Radar images registered to radar images",
+        (
+            *feature_counts.goals(detectors, chains, turns),
+            *real_goals(outcomes["real"]),
+            *other_goals(outcomes["crossed"], groups, outcomes["large"][0]),
+        ),
+        (
+            feature_counts.detector_table(detectors),
+            feature_counts.chain_table(chains),
+            feature_counts.turn_table(turns),
+            accuracy_table("Real pairs", pairs),
+            accuracy_table("Simulated pairs", groups),
+            _reasons(outcomes["simulated"]),
+        ),
+        [
+            *feature_counts.records([*detectors, *chains, *turns]),
+            *(outcome.record() for part in outcomes.values() for outcome in part),
+        ],
+        (
+            f"Simulated: {_SIZE_PX} px, rural and suburban, 1 to {_MOST_LOOKS} looks, incidence "
+            f"{INCIDENCES_DEG[0]:g}° and {INCIDENCES_DEG[1]:g}°, {CHANGED_BUILDINGS:.0%} of the "
+            "buildings and three in ten parcels changed, other speckle and texture. The ground "
+            "mask is the simulator's: what is 8 px and more from trees and houses.",
+        ),
+    )
+
+
+def _counts(
+    cases: Sequence[RealCase],
+) -> tuple[
+    list[feature_counts.DetectorCount],
+    list[feature_counts.ChainCount],
+    list[feature_counts.TurnCount],
+]:
+    gradients = ("differences", "recursive", "roewa", "roewa-unsigned")
+    return (
+        [
+            feature_counts.count_detector(case, detector)
+            for case in cases
+            for detector in feature_counts.DETECTORS
+        ],
+        [feature_counts.count_chain(case) for case in cases],
+        [feature_counts.count_turn(case, gradient) for gradient in gradients for case in cases],
+    )
+
+
+def real_goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
+    """Return the goals on real pairs and what was found."""
+    wrong = count(outcomes, SILENTLY_WRONG)
+    right, refused = count(outcomes, CORRECT), count(outcomes, REFUSED)
+    free = [outcome for outcome in outcomes if outcome.group == _FREE]
+    found = f"{right} of {len(outcomes)}, {refused} refused"
+    return (
+        Goal(
+            "Real pairs: correct",
+            "all that are not refused",
+            found,
+            right + refused == len(outcomes),
+        ),
+        Goal("Real pairs: silently wrong", "none", str(wrong), wrong == 0),
+        Goal(
+            "Turned by 18°, without georeferencing: correct",
+            "all",
+            f"{count(free, CORRECT)} of {len(free)}",
+            count(free, CORRECT) == len(free),
+        ),
+    )
+
+
+def other_goals(
+    crossed: Sequence[Outcome], groups: dict[str, list[Outcome]], large: Outcome
+) -> tuple[Goal, ...]:
+    """Return the goals on crossings and simulated pairs and what was found."""
+    refused = count(crossed, REFUSED)
+    goals = [
+        Goal("Crossings: refused", "all", f"{refused} of {len(crossed)}", refused == len(crossed))
+    ]
+    for opposite, largest in _LARGEST_ERROR_PX.items():
+        own = groups[_group(opposite, True)]
+        good = sum(outcome.error_px <= largest for outcome in accepted(own))
+        goals.append(
+            Goal(
+                f"Simulated, {_group(opposite, True)}: within {largest:g} px",
+                f"at least {_WANTED_CORRECT:.0%}",
+                f"{good} of {len(own)}",
+                good >= _WANTED_CORRECT * len(own),
+            )
+        )
+    for masked in (True, False):
+        both = [*groups[_group(False, masked)], *groups[_group(True, masked)]]
+        wrong = count(both, SILENTLY_WRONG)
+        words = "ground mask" if masked else "no mask"
+        goals.append(
+            Goal(
+                f"Simulated, {words}: silently wrong",
+                "none" if masked else "reported",
+                f"{wrong} of {len(both)}",
+                wrong == 0 if masked else None,
+            )
+        )
+    goals.append(
+        Goal(
+            f"{_LARGE_PX}×{_LARGE_PX} px, end to end",
+            f"at most {_LONGEST_S:g} s on two processors",
+            f"{large.seconds:.1f} s ({large.verdict})",
+            large.seconds <= _LONGEST_S,
+        )
+    )
+    return tuple(goals)
+
+
+def _reasons(outcomes: Sequence[Outcome]) -> Table:
+    """Return why simulated pairs were refused, and errors of what was accepted."""
+    rows = []
+    for group in dict.fromkeys(outcome.group for outcome in outcomes):
+        own = [outcome for outcome in outcomes if outcome.group == group]
+        errors = [outcome.error_px for outcome in accepted(own)]
+        spread = np.quantile(errors, (0.5, 0.9, 1.0)) if errors else [np.nan] * 3
+        refused = [outcome.reason for outcome in own if outcome.verdict == REFUSED]
+        rows.append(
+            [group, *(f"{error:.2f}" for error in spread), "; ".join(sorted(refused)) or "–"]
+        )
+    head = ("pairs", "median error (px)", "90 %", "largest", "refused because")
+    return Table("Simulated pairs: errors and refusals", head, rows)
