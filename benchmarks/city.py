@@ -44,6 +44,9 @@ SETTINGS: dict[str, Setting] = {
     "NMI, no mask": Setting({"similarity": "nmi"}),
     "orientation, no mask": Setting({"similarity": "orientation"}),
     "fused, no mask": Setting(),
+    "fused, threshold": Setting({"mask": "threshold"}, median_px=1.5),
+    "fused, regions": Setting({"mask": "regions"}, median_px=1.0, share_within=0.8),
+    "fused, auto": Setting({"mask": "auto"}, median_px=1.0, share_within=0.8),
 }
 
 

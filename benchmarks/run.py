@@ -20,6 +20,7 @@ SUITES = (
     "simulated",
     "city",
     "layover",
+    "masks",
     "large_shift",
     "rotated_pairs",
     "rotation",

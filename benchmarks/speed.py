@@ -6,19 +6,25 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 import rasterio
 from numpy.typing import NDArray
 
 from groundtie.geometry.transform import Transform
+from groundtie.masks.regions import find_ground
+from groundtie.masks.scene import Scene
 from groundtie.rasters.patch import Patch
+from groundtie.rasters.reading import open_raster
 from groundtie.similarity.surface import BORDER_PX, SimilaritySettings, describe, histogram_surface
+from groundtie.speckle.filters import FILTERS, SpeckleFilter
 
 from . import rpc_speed
 from .attempt import Pair, on_pixels
@@ -48,6 +54,12 @@ _LARGEST_SHIFT_PX = 20
 LARGEST_PX = 10_000
 SECONDS = {2000: 6.0, LARGEST_PX: 60.0}
 PEAK_BYTES = 1.5e9
+
+# A radar image, filtered and searched for regions on one core.
+RADAR_PX = 4000
+FILTER, FILTER_RATE = "speckle filter ", 20.0
+REGIONS, REGION_SECONDS = f"regions on the ground, {RADAR_PX}×{RADAR_PX} px", 10.0
+
 _SEED = 1
 
 
@@ -75,12 +87,14 @@ def run(settings: Settings) -> SuiteResult:
     affine = time_affine(settings, times)
     sizes = () if settings.quick else tuple(SECONDS)
     large = [time_size(settings, size, times if size < LARGEST_PX else 1) for size in sizes]
+    radar = time_radar(times)
     timings = rpc_speed.time_points(settings, times, peer_python("orthority"))
     if not settings.quick:
         timings += rpc_speed.time_ortho(settings, times)
-    records = [*surfaces, *affine, *large]
+    records = [*surfaces, *affine, *large, *radar]
     records += [Record(what, name, seconds, note=note) for what, name, seconds, note in timings]
-    goals = [surface_goal(surfaces), *affine_goals(affine), *rpc_speed.goals(timings)]
+    goals = [surface_goal(surfaces), *affine_goals(affine), *radar_goals(radar)]
+    goals += rpc_speed.goals(timings)
     goals += [
         goal for size, record in zip(sizes, large, strict=True) for goal in size_goals(size, record)
     ]
@@ -209,6 +223,59 @@ def describe_found(program: str, output: str, pair: Pair) -> str:
     matrix = np.array(found)
     error = pair.truth.error_px(lambda px: px @ matrix[:, :2].T + matrix[:, 2])
     return f"error {error:.2f} px"
+
+
+def time_radar(times: int) -> list[Record]:
+    """Time speckle filters and the search for regions, on one core."""
+    generator = np.random.default_rng(_SEED)
+    cells = generator.choice([1.0, 4.0, 20.0], (RADAR_PX // 80, RADAR_PX // 80))
+    power = np.kron(cells, np.ones((80, 80))) * generator.standard_gamma(1, (RADAR_PX, RADAR_PX))
+    image, valid = power.astype(np.float32), np.ones(power.shape, bool)
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        records = [
+            Record(
+                f"{FILTER}{name}", OWN, _shortest(SpeckleFilter(name, 7, 1.0), times, image, valid)
+            )
+            for name in FILTERS
+        ]
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "radar.tif"
+            profile = {"driver": "GTiff", "dtype": "float32", "count": 1}
+            with rasterio.open(path, "w", width=RADAR_PX, height=RADAR_PX, **profile) as written:
+                written.write(np.sqrt(image), 1)
+            with open_raster(path) as source:
+                seconds = _shortest(find_ground, times, Scene.of(source))
+        records.append(Record(REGIONS, OWN, seconds))
+    finally:
+        cv2.setNumThreads(threads)
+    return records
+
+
+def _shortest(work: Callable[..., Any], times: int, *arguments: Any) -> float:
+    """Return the processor's time for work in this thread alone, whatever else the machine does."""
+    seconds = []
+    for _ in range(times):
+        started = time.thread_time()
+        work(*arguments)
+        seconds.append(time.thread_time() - started)
+    return min(seconds)
+
+
+def radar_goals(records: Sequence[Record]) -> list[Goal]:
+    """Return the goals for what radar images need and what was found."""
+    goals = []
+    for record in records:
+        if record.what == REGIONS:
+            wanted, reached = f"at most {REGION_SECONDS:g} s", record.seconds <= REGION_SECONDS
+            found = f"{record.seconds:.1f} s"
+        else:
+            rate = RADAR_PX**2 / record.seconds / 1e6
+            wanted, reached = f"at least {FILTER_RATE:g} Mpx/s", rate >= FILTER_RATE
+            found = f"{rate:.0f} Mpx/s"
+        goals.append(Goal(record.what, wanted, found, reached))
+    return goals
 
 
 def surface_goal(records: Sequence[Record]) -> Goal:

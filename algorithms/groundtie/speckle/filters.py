@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -60,77 +61,75 @@ class SpeckleFilter:
             Which pixels count, shape (h, w); the others weigh nothing.
         """
         intensity = np.where(valid, intensity, np.float32(0))
-        by_window = FILTERS[self.name]
-        if by_window is None:
-            return np.where(valid, _exponential(self, intensity, valid), np.float32(0))
-        half = self.reach_px
-        padded, counted = np.pad(intensity, half), np.pad(valid, half)
+        reach = self.reach_px
+        padded, counted = np.pad(intensity, reach), np.pad(valid, reach)
         out = np.empty_like(intensity)
         for row in range(0, intensity.shape[0], _TILE_PX):
             for col in range(0, intensity.shape[1], _TILE_PX):
-                around = np.s_[row : row + _TILE_PX + 2 * half, col : col + _TILE_PX + 2 * half]
-                tile = _Window.of(padded[around], counted[around], self.window_px)
-                out[row : row + _TILE_PX, col : col + _TILE_PX] = by_window(self, tile)
+                around = np.s_[row : row + _TILE_PX + 2 * reach, col : col + _TILE_PX + 2 * reach]
+                tile = _Tile(padded[around], counted[around], reach)
+                out[row : row + _TILE_PX, col : col + _TILE_PX] = FILTERS[self.name](self, tile)
         out[~valid] = 0
         return out
 
 
 @dataclass(frozen=True)
-class _Window:
-    """A tile with margins of half a window, and what lies within: pixels and their statistics."""
+class _Tile:
+    """Pixels with a margin on each side as wide as a filter reaches, and which of them count."""
 
     padded: FloatImage
     counted: Mask
-    intensity: FloatImage
-    local: LocalStatistics
+    reach_px: int
 
-    @classmethod
-    def of(cls, padded: FloatImage, counted: Mask, window_px: int) -> _Window:
-        half = window_px // 2
-        inside = np.s_[half:-half, half:-half]
-        local = local_statistics(padded, counted, window_px)
-        local = LocalStatistics(local.mean[inside], local.variation2[inside])
-        return cls(padded, counted, padded[inside], local)
+    @property
+    def inside(self) -> tuple[slice, slice]:
+        """The tile without its margin."""
+        return np.s_[self.reach_px : -self.reach_px, self.reach_px : -self.reach_px]
+
+    @property
+    def intensity(self) -> FloatImage:
+        return self.padded[self.inside]
+
+    @cached_property
+    def local(self) -> LocalStatistics:
+        """Statistics in windows that reach as far as the margin."""
+        local = local_statistics(self.padded, self.counted, 2 * self.reach_px + 1)
+        return LocalStatistics(local.mean[self.inside], local.variation2[self.inside])
 
 
-def _lee(by: SpeckleFilter, window: _Window) -> FloatImage:
+def _lee(by: SpeckleFilter, tile: _Tile) -> FloatImage:
     """Lee 1980, doi:10.1109/TPAMI.1980.4766994, for multiplicative noise."""
-    return _linear(window, _signal_share(window.local, by.looks))
+    return _linear(tile, _signal_share(tile.local, by.looks))
 
 
-def _kuan(by: SpeckleFilter, window: _Window) -> FloatImage:
+def _kuan(by: SpeckleFilter, tile: _Tile) -> FloatImage:
     """Kuan et al. 1985, doi:10.1109/TPAMI.1985.4767641."""
-    return _linear(window, _signal_share(window.local, by.looks) / np.float32(1 + 1 / by.looks))
+    return _linear(tile, _signal_share(tile.local, by.looks) / np.float32(1 + 1 / by.looks))
 
 
-def _frost(by: SpeckleFilter, window: _Window) -> FloatImage:
-    return enhanced_frost(window.padded, window.counted, window.local, by.looks, by.damping)
+def _frost(by: SpeckleFilter, tile: _Tile) -> FloatImage:
+    return enhanced_frost(tile.padded, tile.counted, tile.local, by.looks, by.damping)
 
 
-def _gamma_map(by: SpeckleFilter, window: _Window) -> FloatImage:
+def _gamma_map(by: SpeckleFilter, tile: _Tile) -> FloatImage:
     """Lopes, Nezry, Touzi and Laur 1990, doi:10.1109/IGARSS.1990.689026."""
-    mean, variation2 = window.local.mean, window.local.variation2
+    mean, variation2 = tile.local.mean, tile.local.variation2
     looks, speckle2 = np.float32(by.looks), np.float32(1 / by.looks)
     alpha = (1 + speckle2) / np.maximum(variation2 - speckle2, np.float32(1e-6))
     centre = (alpha - looks - 1) * mean
-    root = np.sqrt(centre * centre + 4 * alpha * looks * window.intensity * mean)
+    root = np.sqrt(centre * centre + 4 * alpha * looks * tile.intensity * mean)
     likeliest = (centre + root) / (2 * alpha)
     smooth = np.where(variation2 > speckle2, likeliest, mean)
     # Beyond this there is no gamma distribution left: a single strong target.
-    return np.where(variation2 < 2 * speckle2, smooth, window.intensity)
+    return np.where(variation2 < 2 * speckle2, smooth, tile.intensity)
 
 
-def _exponential(by: SpeckleFilter, intensity: FloatImage, valid: Mask) -> FloatImage:
-    decay, reach = decay_for_window(by.window_px), by.reach_px
-    inside = np.s_[reach:-reach, reach:-reach]
-    smooth = isef(np.pad(intensity, reach), decay)[inside]
-    if valid.all():
-        # A product of what is inside along either axis, at a fraction of the cost.
-        height, width = valid.shape
-        rows = isef(np.pad(np.ones((height, 1), np.float32), ((reach, reach), (0, 0))), decay)
-        cols = isef(np.pad(np.ones((1, width), np.float32), ((0, 0), (reach, reach))), decay)
-        return np.asarray(smooth / (rows[reach:-reach] * cols[:, reach:-reach]))
-    weight = isef(np.pad(valid.astype(np.float32), reach), decay)[inside]
+def _exponential(by: SpeckleFilter, tile: _Tile) -> FloatImage:
+    decay = decay_for_window(by.window_px)
+    smooth = isef(tile.padded, decay)[tile.inside]
+    if tile.counted.all():
+        return smooth
+    weight = isef(tile.counted.astype(np.float32), decay)[tile.inside]
     return np.asarray(smooth / np.maximum(weight, np.float32(1e-6)))
 
 
@@ -140,15 +139,14 @@ def _signal_share(local: LocalStatistics, looks: float) -> FloatImage:
     return np.maximum(share, 0)
 
 
-def _linear(window: _Window, weight: FloatImage) -> FloatImage:
-    return window.local.mean + weight * (window.intensity - window.local.mean)
+def _linear(tile: _Tile, weight: FloatImage) -> FloatImage:
+    return tile.local.mean + weight * (tile.intensity - tile.local.mean)
 
 
-# "isef" is recursive: it has no window.
-FILTERS: dict[str, Callable[[SpeckleFilter, _Window], FloatImage] | None] = {
+FILTERS: dict[str, Callable[[SpeckleFilter, _Tile], FloatImage]] = {
     "enhanced-frost": _frost,
     "lee": _lee,
     "kuan": _kuan,
     "gamma-map": _gamma_map,
-    "isef": None,
+    "isef": _exponential,
 }
