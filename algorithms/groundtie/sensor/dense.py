@@ -45,10 +45,12 @@ class DenseOrientation:
         """Return the image column and row of every pixel of a grid, shape (2, height, width)."""
         orientation = self.orientation
 
-        def on_pixels(function: Positions, tolerance: float) -> FloatArray:
-            return _interpolated(grid, lambda xy: function(orientation.to_lon_lat(xy)), tolerance)
+        def on_nodes(function: Positions, tolerance: float) -> _Nodes:
+            return _fine_enough(grid, lambda xy: function(orientation.to_lon_lat(xy)), tolerance)
 
-        height = orientation.heights.on_pixels(on_pixels)
+        height = orientation.heights.on_pixels(
+            lambda function, tolerance: on_nodes(function, tolerance).planes()
+        )
         low, high = float(height.min()), float(height.max())
         known = None
         if not np.isfinite([low, high]).all():
@@ -65,15 +67,18 @@ class DenseOrientation:
             )
             return np.hstack([level, (above - below) / 2, (above + below) / 2 - level])
 
-        planes = on_pixels(expansion, _TOLERANCE_PX)
+        nodes = on_nodes(expansion, _TOLERANCE_PX)
         lost = self._lost(grid, height, (low, high))
         height -= middle
         height *= 1 / reach
-        px = planes[2:4]
-        if np.nanmax(np.abs(planes[4:, ::_FIRST_STEP, ::_FIRST_STEP])) > _TOLERANCE_PX:
-            px += height * planes[4:]
-        px *= height
-        px += planes[:2]
+        bent = np.nanmax(np.abs(nodes.values[..., 4:]), initial=0.0) > _TOLERANCE_PX
+        px = np.empty((2, grid.height, grid.width))
+        for axis, out in enumerate(px):
+            slope = nodes.plane(2 + axis)
+            if bent:
+                slope = slope + height * nodes.plane(4 + axis)
+            np.multiply(slope, height, out=out)
+            out += nodes.plane(axis)
         if known is not None or lost is not None or not np.isfinite(px.sum()):
             nowhere = ~np.isfinite(px).all(axis=0)
             px[:, nowhere if lost is None else nowhere | lost] = _NOWHERE
@@ -92,10 +97,35 @@ class DenseOrientation:
         return ~rpc.is_valid(lon_lat, height.ravel()).reshape(height.shape)
 
 
-def _interpolated(
+@dataclass(frozen=True)
+class _Nodes:
+    """Values at the centres of cells of step × step pixels, one cell beyond a grid each way.
+
+    `values` have the shape (rows, cols, k).
+    """
+
+    grid: Grid
+    step: int
+    values: FloatArray
+
+    def plane(self, k: int) -> FloatArray:
+        """Return one of the values at all pixels, shape (height, width)."""
+        rows, cols = (n * self.step for n in self.values.shape[:2])
+        # Resizing takes nodes for centres of cells, as they are.
+        whole = cv2.resize(np.ascontiguousarray(self.values[..., k]), (cols, rows))
+        return np.asarray(
+            whole[self.step : self.step + self.grid.height, self.step : self.step + self.grid.width]
+        )
+
+    def planes(self) -> list[FloatArray]:
+        """Return all values at all pixels, each of the shape (height, width)."""
+        return [self.plane(k) for k in range(self.values.shape[2])]
+
+
+def _fine_enough(
     grid: Grid, function: Callable[[FloatArray], FloatArray], tolerance: float
-) -> FloatArray:
-    """Return a smooth function of map positions at all pixels of a grid, (k, height, width).
+) -> _Nodes:
+    """Return a smooth function of map positions at nodes between which it can be interpolated.
 
     It is evaluated at a lattice that is halved until it is good enough halfway between nodes; NaN
     where the function is.
@@ -120,13 +150,7 @@ def _interpolated(
         if not unknown.any() and np.abs(mean - between).max() < tolerance:
             break
         step //= 2
-    rows, cols = (n * step for n in nodes.shape[:2])
-    # Each node is the centre of a cell of step × step pixels; the outer cells lie outside.
-    inside = slice(step, step + grid.height), slice(step, step + grid.width)
-    planes = np.empty((nodes.shape[2], grid.height, grid.width))
-    for k, plane in enumerate(planes):
-        plane[...] = cv2.resize(nodes[..., k], (cols, rows))[inside]
-    return planes
+    return _Nodes(grid, step, nodes)
 
 
 def _evaluate(

@@ -31,8 +31,8 @@ DATUMS = (ELLIPSOIDAL, *GEOID_GRIDS)
 
 
 # Takes a smooth function of longitude and latitude, (n, 2) → (n, k), and its largest error; returns
-# its values at all pixels of a grid, (k, h, w).
-OnPixels = Callable[[Positions, float], FloatArray]
+# its values at all pixels of a grid, k times (h, w).
+OnPixels = Callable[[Positions, float], list[FloatArray]]
 
 # Interpolation between nodes may be wrong by this: pixels of the terrain model, and metres.
 _TOLERANCE_PX = 1e-3
@@ -106,7 +106,7 @@ class TerrainHeights:
 
     def on_pixels(self, on_pixels: OnPixels) -> FloatArray:
         """Return heights in metres at all pixels of a grid, shape (h, w)."""
-        heights = self.terrain.at_pixels(on_pixels(self.terrain.to_px, _TOLERANCE_PX))
+        heights = self.terrain.at_pixels(*on_pixels(self.terrain.to_px, _TOLERANCE_PX))
         geoid = self.geoid
         if geoid is not None:
             heights += on_pixels(lambda lon_lat: geoid.at(lon_lat)[:, None], _TOLERANCE_M)[0]

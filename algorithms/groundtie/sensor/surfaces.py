@@ -63,68 +63,73 @@ class RasterSurface:
 
     def at(self, lon_lat: FloatArray) -> FloatArray:
         """Return the values, shape (n,), at longitudes and latitudes; NaN beyond the raster."""
-        return self.at_pixels(np.ascontiguousarray(self.to_px(lon_lat).T))
+        return self.at_pixels(*self.to_px(lon_lat).T)
 
-    def at_pixels(self, px: FloatArray) -> FloatArray:
-        """Return the values, of any shape, at columns and rows, (2, …); NaN beyond the raster."""
-        last = np.array([self.source.grid.width, self.source.grid.height]) - 1
-        if px.size == 0:
-            return np.zeros(px.shape[1:])
-        low, high = px.reshape(2, -1).min(axis=1), px.reshape(2, -1).max(axis=1)
-        if np.all((low >= 0) & (high <= last)):
-            return self._inside(px, low, high)
-        outside = np.zeros(px.shape[1:], bool)
-        for axis in (0, 1):
-            # Not "beyond the last": NaN is outside, too.
-            outside |= ~((px[axis] >= -_MARGIN_PX) & (px[axis] <= last[axis] + _MARGIN_PX))
-        values = np.full(px.shape[1:], np.nan)
-        if not outside.all():
-            part = np.stack([np.clip(px[axis][~outside], 0, last[axis]) for axis in (0, 1)])
-            values[~outside] = self._inside(part, part.min(axis=1), part.max(axis=1))
+    def at_pixels(self, cols: FloatArray, rows: FloatArray) -> FloatArray:
+        """Return the values at columns and rows, all of one shape; NaN beyond the raster."""
+        width, height = self.source.grid.width, self.source.grid.height
+        if cols.size == 0:
+            return np.zeros(cols.shape)
+        box = cols.min(), rows.min(), cols.max(), rows.max()
+        if min(box[:2]) >= 0 and box[2] <= width - 1 and box[3] <= height - 1:
+            return self._inside(cols.ravel(), rows.ravel()).reshape(cols.shape)
+        # So that NaN is outside, too.
+        on_it = (cols >= -_MARGIN_PX) & (cols <= width - 1 + _MARGIN_PX)
+        on_it &= (rows >= -_MARGIN_PX) & (rows <= height - 1 + _MARGIN_PX)
+        values = np.full(cols.shape, np.nan)
+        if on_it.any():
+            values[on_it] = self._inside(
+                np.clip(cols[on_it], 0, width - 1), np.clip(rows[on_it], 0, height - 1)
+            )
         return values
 
-    def _inside(self, px: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-        if (high - low).max() < 2 * _BLOCK:
-            return self._in_window(px, low, high)
-        flat = px.reshape(2, -1)
-        values = np.empty(flat.shape[1])
-        block = (flat[0] // _BLOCK).astype(int) + (1 << 20) * (flat[1] // _BLOCK).astype(int)
+    def _inside(self, cols: FloatArray, rows: FloatArray) -> FloatArray:
+        if max(np.ptp(cols), np.ptp(rows)) < 2 * _BLOCK:
+            return self._in_window(cols, rows)
+        values = np.empty(len(cols))
+        block = (cols // _BLOCK).astype(int) + (1 << 20) * (rows // _BLOCK).astype(int)
         for each in np.unique(block):
-            part = flat[:, block == each]
-            values[block == each] = self._in_window(part, part.min(axis=1), part.max(axis=1))
-        return values.reshape(px.shape[1:])
+            here = block == each
+            values[here] = self._in_window(cols[here], rows[here])
+        return values
 
-    def _in_window(self, px: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-        (left, top), (right, bottom) = np.floor(low).astype(int), np.floor(high).astype(int) + 2
-        window = Window(int(left), int(top), int(right - left), int(bottom - top))
+    def _in_window(self, cols: FloatArray, rows: FloatArray) -> FloatArray:
+        left, top = int(cols.min()), int(rows.min())
+        window = Window(left, top, int(cols.max()) + 2 - left, int(rows.max()) + 2 - top)
         image, valid = read_heights(self.source, window)
         if not valid.all():
-            rows, cols = np.nonzero(~valid)
-            image[rows, cols] = self._fill_at(cols + window.col, rows + window.row)
-        values = _bilinear(image, px[0].ravel() - window.col, px[1].ravel() - window.row)
-        return values.reshape(px.shape[1:])
+            void_rows, void_cols = np.nonzero(~valid)
+            image[void_rows, void_cols] = self._fill_at(void_cols + left, void_rows + top)
+        return _bilinear(image, cols, rows, left, top)
 
     def _fill_at(self, cols: NDArray[np.int_], rows: NDArray[np.int_]) -> FloatArray:
         height, width = self.filled.shape
         x = (cols - self.region.col + 0.5) * width / self.region.width - 0.5
         y = (rows - self.region.row + 0.5) * height / self.region.height - 0.5
         padded = np.pad(self.filled, ((0, 1), (0, 1)), mode="edge")
-        return _bilinear(padded, np.clip(x, 0, width - 1), np.clip(y, 0, height - 1))
+        return _bilinear(padded, np.clip(x, 0, width - 1), np.clip(y, 0, height - 1), 0, 0)
 
 
-def _bilinear(image: NDArray[np.float32], x: FloatArray, y: FloatArray) -> FloatArray:
-    """Return an image's values, (n,), at positions left of its last column and row."""
-    width, flat = image.shape[1], image.ravel()
+def _bilinear(
+    image: NDArray[np.float32], x: FloatArray, y: FloatArray, first_x: int, first_y: int
+) -> FloatArray:
+    """Return values, (n,), of an image whose first pixel lies at (first_x, first_y).
+
+    Positions lie left of its last column and above its last row. Heights are exact to 0.1 mm.
+    """
+    width, flat = np.int32(image.shape[1]), image.ravel()
     values = np.empty(len(x))
     for start in range(0, len(x), _POINTS):
         part = slice(start, start + _POINTS)
         left, top = x[part].astype(np.int32), y[part].astype(np.int32)
-        right, below = x[part] - left, y[part] - top
-        corner = top * np.int32(width) + left
-        upper, lower = flat.take(corner), flat.take(corner + np.int32(width))
-        upper = upper + right * (flat.take(corner + np.int32(1)) - upper)
-        lower = lower + right * (flat.take(corner + np.int32(width + 1)) - lower)
-        values[part] = upper + below * (lower - upper)
+        right, below = (x[part] - left).astype(np.float32), (y[part] - top).astype(np.float32)
+        corner = (top - np.int32(first_y)) * width + (left - np.int32(first_x))
+        upper, lower = flat.take(corner), flat.take(corner + width)
+        upper += right * (flat.take(corner + np.int32(1)) - upper)
+        lower += right * (flat.take(corner + (width + np.int32(1))) - lower)
+        lower -= upper
+        lower *= below
+        np.add(upper, lower, out=values[part])
     return values
 
 
