@@ -122,6 +122,13 @@ def test_far_places_are_not_in_the_image(tmp_path: Path) -> None:
     assert both[inside].all()
 
 
+def test_lines_of_sight_that_miss_the_terrain_are_nan(tmp_path: Path) -> None:
+    with oriented(tmp_path) as orientation:
+        xy = orientation.to_map([[300.0, 250.0], [90_000.0, 250.0], [np.nan, 1.0]])
+    assert np.isfinite(xy).all(axis=1).tolist() == [True, False, False]
+    assert np.isnan(xy[1:]).all()
+
+
 def test_a_terrain_model_must_cover_the_image(tmp_path: Path) -> None:
     with pytest.raises(NoOverlapError, match="covers only"), oriented(tmp_path, size=20):
         pass

@@ -74,7 +74,8 @@ class Orientation:
         The height at which the line of sight meets the ground is found by the secant method; NaN
         where it does not meet it.
         """
-        return reproject(self.to_ground(px)[0], LON_LAT, self.crs)
+        xy = reproject(self.to_ground(px)[0], LON_LAT, self.crs)
+        return np.where(np.isfinite(xy), xy, np.nan)
 
     def to_ground(self, px: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return longitude and latitude, (n, 2), and height, (n,), that image positions see."""

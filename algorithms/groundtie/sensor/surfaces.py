@@ -167,7 +167,8 @@ def surface_over(source: RasterSource, lon_lat: FloatArray, margin_px: int = 2) 
         raise GeoreferencingError(f"{source.path} has no CRS")
 
     def exact(places: FloatArray) -> FloatArray:
-        return grid.map_to_pixel(reproject(places, LON_LAT, grid.crs))
+        xy = reproject(places, LON_LAT, grid.crs)
+        return grid.map_to_pixel(np.where(np.isfinite(xy), xy, np.nan))
 
     size = np.array([grid.width, grid.height])
     px = exact(lon_lat)
