@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 import rasterio.crs
 from affine import Affine
+from numpy.typing import NDArray
 
 from groundtie.geometry.transform import Transform, load_transform
 from groundtie.rasters.grid import Grid
@@ -46,7 +47,7 @@ _LATER = 100_000
 
 _NAMES = ("reference.tif", "input.tif", "ground.tif", "truth.json")
 
-# Ground nearer to trees and houses than this is mixed up with what leans over it.
+# The input may be off by this, so ground nearer to what leans in it is left out, too.
 _BESIDE_PX = 8
 
 
@@ -134,11 +135,25 @@ class SarPair:
         seen = resample(sar_power(_changed(later), second), positions, self.size)
         power = add_speckle(np.maximum(seen, np.float32(_FLOOR)), looks, speckle[1])
         write_image(quantise_amplitude(power, second)[None], grid.transform, input_path)
-        stands = earlier.object_m[earlier.window][inner, inner] > 0
+        hidden = _hidden(earlier, first) | _hidden(later, second)
         beside = np.ones((2 * _BESIDE_PX + 1,) * 2, np.uint8)
-        ground = 1 - cv2.dilate(stands.astype(np.uint8), beside)
+        ground = 1 - cv2.dilate(hidden.astype(np.uint8), beside)[earlier.window][inner, inner]
         write_image(ground[None], grid.transform, ground_path)
         truth_path.write_text(json.dumps(truth.to_json()), encoding="utf-8")
+
+
+def _hidden(scene: Scene, sar: SarOptions) -> NDArray[np.bool_]:
+    """Return what of the ground an image does not show: under layover, in shadow, built upon."""
+    tangent = math.tan(math.radians(sar.incidence_deg))
+    height_px = scene.object_m / scene.pixel_size_m
+    # A radar that looks towards larger columns sees heights lean towards smaller ones.
+    towards = -1 if sar.orbit == "ascending" else 1
+    hidden = height_px > 0
+    for direction, reach in ((towards, 1 / tangent), (-towards, tangent)):
+        for steps in range(1, math.ceil(float(height_px.max()) * reach) + 1):
+            tall = np.roll(height_px * reach >= steps, direction * steps, axis=1)
+            hidden |= tall
+    return hidden
 
 
 def _changed(scene: Scene) -> Scene:

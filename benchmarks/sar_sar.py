@@ -163,7 +163,8 @@ def run(settings: Settings) -> SuiteResult:
             f"Simulated: {_SIZE_PX} px, rural and suburban, 1 to {_MOST_LOOKS} looks, incidence "
             f"{INCIDENCES_DEG[0]:g}° and {INCIDENCES_DEG[1]:g}°, {CHANGED_BUILDINGS:.0%} of the "
             "buildings and three in ten parcels changed, other speckle and texture. The ground "
-            "mask is the simulator's: what is 8 px and more from trees and houses.",
+            "mask is the simulator's: what layover or shadow hides in either image, and 8 px "
+            "beside it, is left out.",
         ),
     )
 

@@ -80,7 +80,7 @@ class Detector:
             image = isef(image, _ISEF_DECAY)
         grey = to_grey(image, window.valid)
         found = self._detect_all(grey) if self.name == "sift" else self._detect_from_second(grey)
-        return found.take(_seen_whole(found, window.valid))
+        return found.take(seen_whole(found, window.valid))
 
     def _detect_all(self, grey: ByteImage) -> FeaturePoints:
         return self._opencv(grey)
@@ -122,11 +122,16 @@ def to_grey(image: FloatImage, valid: NDArray[np.bool_]) -> ByteImage:
     return np.asarray(np.clip(np.rint(scaled), 0, 255), np.uint8)
 
 
-def _seen_whole(found: FeaturePoints, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell which features see nothing of what is masked; the image's own border does not count."""
+def seen_whole(
+    found: FeaturePoints, valid: NDArray[np.bool_], scales: float = _SEES_SCALES
+) -> NDArray[np.bool_]:
+    """Tell which features have nothing masked within so many of their scales.
+
+    The image's own border does not count.
+    """
     if valid.all():
         return np.ones(len(found), bool)
     distance = cv2.distanceTransform(valid.astype(np.uint8), cv2.DIST_L2, 5)
     last = np.array(valid.shape)[::-1] - 1
     cols, rows = np.clip(np.rint(found.position_px).astype(int), 0, last).T
-    return np.asarray(distance[rows, cols] > _SEES_SCALES * found.scale_px)
+    return np.asarray(distance[rows, cols] > scales * found.scale_px)

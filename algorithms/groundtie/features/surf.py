@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .box_hessian import FloatImage, determinants, integral_image, sigma_of
-from .detectors import _seen_whole, to_grey
+from .detectors import seen_whole, to_grey
 from .points import FeaturePoints
 
 FloatArray = NDArray[np.float64]
@@ -60,7 +60,7 @@ class SurfDetector:
             return FeaturePoints.none()
         grey = to_grey(compress(window), window.valid)
         found = self.detect_image(grey.astype(np.float32) / np.float32(255), executor)
-        return found.take(_seen_whole(found, window.valid))
+        return found.take(seen_whole(found, window.valid))
 
     def detect_image(self, image: FloatImage, executor: Executor | None = None) -> FeaturePoints:
         """Return the features of an image with grey values from 0 to 1, shape (h, w)."""

@@ -18,7 +18,7 @@ from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
 from ..search.matching import MaskOf
 from .descriptors import Descriptor
-from .detectors import Detector, FloatImage
+from .detectors import Detector, FloatImage, seen_whole
 from .matching import GATE_PX, match_near
 from .points import FeaturePoints
 
@@ -27,6 +27,9 @@ FloatArray = NDArray[np.float64]
 # Tiles of the matching grid, and what features near their border see beyond it.
 _TILE_PX = 1024
 _MARGIN_PX = 64
+
+# A feature stands on the ground if all within so many of its scales is ground.
+_GROUND_SCALES = 1.5
 
 # More features than this in a tile make matching longer, not better.
 _MOST_PER_TILE = 6000
@@ -159,8 +162,7 @@ class FeatureMatcher:
         own = self._features(reference, core, self.refining[0])
         if self.ground is not None:
             on_ground = self.ground.reference_patch(piece).valid
-            cols, rows = np.rint(own.position_px).astype(int).T
-            own = own.take(on_ground[rows, cols])
+            own = own.take(seen_whole(own, on_ground, _GROUND_SCALES))
         others = self._features(input, around, self.refining[1])
         points, descriptors = self.descriptor.describe(reference, own)
         partners, partner_descriptors = self.descriptor.describe(input, others)
