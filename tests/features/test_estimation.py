@@ -84,3 +84,11 @@ def test_matches_that_agree_on_two_transforms_are_refused(leaning: int) -> None:
         return
     with pytest.raises(NothingFoundError, match="agree 9 px beside the others"):
         require_no_rival(px, partner, Affine.identity(), fit.model, AREA)
+
+
+def test_matches_that_slip_to_both_sides_are_no_rival() -> None:
+    px, partner = matches(SHIFT, right=160)
+    partner[:30] += [9.0, 0.0]
+    partner[30:60] -= [9.0, 0.0]
+    fit = fit_matches("affine", px, partner, Affine.identity(), AREA, 0)
+    require_no_rival(px, partner, Affine.identity(), fit.model, AREA)

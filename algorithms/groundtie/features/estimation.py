@@ -146,12 +146,19 @@ def require_no_rival(
     if far.sum() < _FEWEST_RIVALS:
         return
     at, residual = px[far], residual[far]
-    shift = find_consensus(at, at + residual, _CONSENSUS_PX, "translation")
-    others = int((distances(shift, at, at + residual) <= _CONSENSUS_PX).sum())
+    rival = find_consensus(at, at + residual, _CONSENSUS_PX, "translation")
+    shift = rival([[0.0, 0.0]])[0]
+
+    def agreeing(on: FloatArray) -> int:
+        return int((np.hypot(*(residual - on).T) <= _CONSENSUS_PX).sum())
+
+    others = agreeing(shift)
+    # Along roads and between crowns features slip to both sides alike; what stands leans to one.
+    leaning = others - agreeing(-shift)
     probability = np.pi * _CONSENSUS_PX**2 / window_area
     alarms = log10_false_alarms(others, len(at), probability, 1)
-    if alarms < _RIVAL_ALARMS and others >= _RIVAL_SHARE * (length <= _FAR_PX).sum():
-        apart = float(np.hypot(*shift([[0.0, 0.0]])[0]))
+    if alarms < _RIVAL_ALARMS and leaning >= _RIVAL_SHARE * (length <= _FAR_PX).sum():
+        apart = float(np.hypot(*shift))
         raise NothingFoundError(
             f"{others} features agree {apart:.0f} px beside the others: ground and what stands on "
             "it; give a mask of the ground"
