@@ -169,6 +169,13 @@ def test_heights_that_contradict_the_terrain_model_are_told(tmp_path: Path) -> N
     assert any("vertical datum" in line for line in result.lines())
 
 
+def test_one_height_for_all_is_no_terrain_to_contradict(tmp_path: Path) -> None:
+    files = write_points(tmp_path, bias_of("shift"))
+    del files["dem"]
+    result = groundtie.refine_rpc(output=tmp_path / "refined.RPB", height=100.0, **files)
+    assert not any("vertical datum" in line for line in result.lines())
+
+
 @pytest.mark.parametrize(
     ("changes", "error", "reason"),
     [

@@ -262,7 +262,7 @@ def refine_rpc(
             assert gcps is not None
             orientation = ground.orientation(source, delivered, utm_of(source, delivered), stack)
             points = read_control_points(gcps, orientation, source.grid)
-            own_heights = _median_above(points, orientation)
+            own_heights = None if dem is None else _median_above(points, orientation)
         progress.update(0.9, "estimating the bias")
         adjusted = _Adjusted.of(
             points, source, orientation, model, blunders, largest_residual, seed
