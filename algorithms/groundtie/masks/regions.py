@@ -74,7 +74,7 @@ class GroundRegions:
         Side of the pixels of what follows, in pixels of the scene.
     regions, skeleton, part
         Homogeneous regions that were kept; the skeleton of the long ones; what takes part: the
-    skeleton, broadened, and the large regions that are wider. Shape (h, w).
+        skeleton, broadened, and the large regions that are wider. Shape (h, w).
     high
         Grey value above which nothing takes part, of means over 4 × 4 pixels of the scene.
     skeleton_m

@@ -231,7 +231,7 @@ def coregister(
             matching_pixel_size,
             search_radius,
         )
-        for note in pair.notes():
+        for note in ("deciding what takes part", *pair.notes()):
             progress.update(0.0, note)
         request = MaskRequest(
             mask,
