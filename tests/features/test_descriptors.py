@@ -97,9 +97,17 @@ def test_a_shift_of_the_image_changes_no_descriptor(estimator: str, upright: boo
     points, here = descriptor.describe(whole(image[40:220, 40:220]), inner)
     # By whole pixels of the octaves in use.
     moved, there = descriptor.describe(whole(image[24:236, 32:240]), inner.moved((8, 16)))
-    np.testing.assert_allclose(moved.position_px - points.position_px, [[8, 16]] * len(points))
-    # Grey values are compressed by their median, which differs a little.
-    assert np.median((here * there).sum(axis=1)) > 0.99
+
+    def key(of: FeaturePoints) -> NDArray[np.float64]:
+        turn = of.orientation_rad
+        return np.column_stack([of.position_px, np.cos(turn), np.sin(turn)])
+
+    apart = np.abs(key(moved.moved((-8, -16)))[:, None] - key(points)[None]).max(axis=2)
+    one, other = np.nonzero(apart < 0.05)
+    # Grey values are compressed by their median, which differs a little: a second orientation
+    # may count here and not there.
+    assert len(one) > 0.9 * max(len(points), len(moved)) > 20
+    assert np.median((there[one] * here[other]).sum(axis=1)) > 0.99
 
 
 @pytest.mark.parametrize("estimator", GRADIENTS)
