@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from .tools.similarity_surface import similarity_surface
     from .tools.simulate import simulate
     from .tools.simulate_sensor import simulate_sensor
+    from .tools.train_feature_classifier import train_feature_classifier
     from .tools.warp import warp
 
 __all__ = [
@@ -50,6 +51,7 @@ __all__ = [
     "similarity_surface",
     "simulate",
     "simulate_sensor",
+    "train_feature_classifier",
     "warp",
 ]
 

@@ -24,9 +24,9 @@ from .points import FeaturePoints
 
 FloatArray = NDArray[np.float64]
 
-# Tiles of the matching grid, and what features near their border see beyond it.
+# Tiles of a grid, and what features near their border see beyond it.
 _TILE_PX = 1024
-_MARGIN_PX = 64
+MARGIN_PX = 64
 
 # A feature stands on the ground if all within so many of its scales is ground.
 _GROUND_SCALES = 1.5
@@ -133,20 +133,20 @@ class FeatureMatcher:
         progress
             Is told of every tile.
         """
-        tiles = list(_tiles(self.pair.grid))
+        parts_of_grid = list(tiles(self.pair.grid))
 
         def one(tile: Window) -> FeatureMatches:
             progress.check()
             return self._match_tile(tile, coarse)
 
         parts = []
-        for part in executor.map(one, tiles):
+        for part in executor.map(one, parts_of_grid):
             parts.append(part)
-            progress.update(len(parts) / len(tiles))
+            progress.update(len(parts) / len(parts_of_grid))
         return FeatureMatches.concatenate(parts)
 
     def _match_tile(self, tile: Window, coarse: Model) -> FeatureMatches:
-        margin = _MARGIN_PX + int(np.ceil(self.gate_px))
+        margin = MARGIN_PX + int(np.ceil(self.gate_px))
         corner = tile.col - margin, tile.row - margin
         size = tile.width + 2 * margin, tile.height + 2 * margin
         piece = self.pair.grid.window(*corner, *size)
@@ -157,8 +157,8 @@ class FeatureMatcher:
             # Where a descriptor sees less of the one image, it sees as little of the other.
             input = Patch(input.values, input.valid & ~hidden)
         core = Window(margin, margin, tile.width, tile.height)
-        gate = margin - _MARGIN_PX
-        around = Window(_MARGIN_PX, _MARGIN_PX, tile.width + 2 * gate, tile.height + 2 * gate)
+        gate = margin - MARGIN_PX
+        around = Window(MARGIN_PX, MARGIN_PX, tile.width + 2 * gate, tile.height + 2 * gate)
         own = self._features(reference, core, self.refining[0])
         if self.ground is not None:
             on_ground = self.ground.reference_patch(piece).valid
@@ -178,26 +178,26 @@ class FeatureMatcher:
             points.take(matches.first).moved(corner),
             partners.take(matches.second).moved(corner),
             matches.ratio,
-            (len(own), int(_inside(others, core).sum())),
+            (len(own), int(inside(others.position_px, core).sum())),
         )
 
     def _features(self, patch: Patch, window: Window, refining: Refining | None) -> FeaturePoints:
         """Return the strongest features in a window of a patch, of those that may be matched."""
         found = self.detector.detect(patch)
-        found = found.take(_inside(found, window))
+        found = found.take(inside(found.position_px, window))
         if refining is not None:
             found = found.take(refining.keep(patch, found.position_px))
         return found.strongest(_MOST_PER_TILE)
 
 
-def _inside(found: FeaturePoints, window: Window) -> Mask:
-    """Tell which features lie on the pixels of a window."""
-    at = np.rint(found.position_px)
+def inside(px: FloatArray, window: Window) -> Mask:
+    """Tell which positions (col, row), shape (n, 2), lie on the pixels of a window."""
+    at = np.rint(px)
     low = np.array([window.col, window.row])
     return np.asarray(np.all((at >= low) & (at < low + [window.width, window.height]), axis=1))
 
 
-def _tiles(grid: Grid) -> Iterator[Window]:
+def tiles(grid: Grid) -> Iterator[Window]:
     """Return tiles that cover a grid."""
     for row in range(0, grid.height, _TILE_PX):
         for col in range(0, grid.width, _TILE_PX):

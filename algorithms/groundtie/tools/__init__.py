@@ -11,6 +11,7 @@ NAMES = (
     "coregister",
     "match_sar_sar",
     "match_optical",
+    "train_feature_classifier",
     "estimate_rotation",
     "warp",
     "extract_gcps",

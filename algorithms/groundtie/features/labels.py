@@ -1,0 +1,229 @@
+"""Labelled features of an image, from a raster or a vector layer, to train a classifier with."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from rasterio.crs import CRS
+from rasterio.warp import transform_geom
+
+from ..errors import GeoreferencingError, ParameterError, VectorLayerError
+from ..progress import SILENT, Progress
+from ..rasters.grid import Grid, reproject
+from ..rasters.pair import Image
+from ..rasters.reading import RasterSource, Window
+from ..rasters.warping import sample
+from .classifier_training import Training
+from .patch_statistics import patch_statistics
+from .tile_matching import MARGIN_PX, Detecting, inside, tiles
+
+FloatArray = NDArray[np.float64]
+Labels = NDArray[np.int8]
+
+# What a feature is labelled: to be kept, to be left out, or not at all.
+KEPT, LEFT_OUT, UNKNOWN = 1, 0, -1
+
+
+class LabelSource(Protocol):
+    """What tells the labels of features, or has labelled points of its own."""
+
+    def label(self, piece: Grid, px: FloatArray) -> Labels:
+        """Return the labels of positions (col, row) on a grid, shape (n, 2), shape (n,)."""
+
+    def points(self, piece: Grid) -> tuple[FloatArray, Labels]:
+        """Return points of its own as positions on a grid, shape (m, 2), and their labels."""
+
+
+@dataclass(frozen=True)
+class RasterLabels:
+    """Labels of a raster's first band: pixels of some values are to be left out, others kept."""
+
+    source: RasterSource
+    crs: CRS | None
+    left_out: frozenset[str]
+
+    def label(self, piece: Grid, px: FloatArray) -> Labels:
+        own = self.source.grid
+
+        def to_px(xy: FloatArray) -> FloatArray:
+            return own.map_to_pixel(reproject(xy, self.crs, own.crs))
+
+        values, known = sample(self.source, piece, to_px, "nearest", 1)
+        numbers = [float(text) for text in self.left_out]
+        labels = np.where(np.isin(values, numbers), LEFT_OUT, KEPT)
+        return _looked_up(np.where(known, labels, UNKNOWN).astype(np.int8), px)
+
+    def points(self, piece: Grid) -> tuple[FloatArray, Labels]:
+        return np.zeros((0, 2)), np.zeros(0, np.int8)
+
+
+@dataclass(frozen=True)
+class LayerLabels:
+    """Labels of a vector layer: features in its polygons, and its points.
+
+    Parameters
+    ----------
+    areas
+        Polygons as GeoJSON on the image's map, and their labels.
+    xy, labels
+        Points on the image's map, shape (m, 2), and their labels.
+    """
+
+    areas: tuple[tuple[dict[str, Any], int], ...]
+    xy: FloatArray
+    labels: Labels
+
+    def label(self, piece: Grid, px: FloatArray) -> Labels:
+        if not self.areas:
+            return np.full(len(px), UNKNOWN, np.int8)
+        from rasterio.features import rasterize
+
+        drawn = rasterize(
+            [(geometry, label + 1) for geometry, label in self.areas],
+            out_shape=(piece.height, piece.width),
+            transform=piece.transform,
+            dtype=np.uint8,
+        )
+        return _looked_up(drawn.astype(np.int8) - 1, px)
+
+    def points(self, piece: Grid) -> tuple[FloatArray, Labels]:
+        return piece.map_to_pixel(self.xy), self.labels
+
+
+def _looked_up(image: Labels, px: FloatArray) -> Labels:
+    cols, rows = np.rint(px).astype(int).T
+    return np.asarray(image[rows, cols], np.int8)
+
+
+def raster_labels(source: RasterSource, image: Image, left_out: Sequence[str]) -> RasterLabels:
+    """Return the labels of a raster.
+
+    Raises
+    ------
+    ParameterError
+        What is left out are no numbers.
+    """
+    for text in left_out:
+        try:
+            float(text)
+        except ValueError:
+            raise ParameterError(f"left_out must be numbers for a raster, not {text!r}") from None
+    return RasterLabels(source, image.source.grid.crs, frozenset(left_out))
+
+
+def layer_labels(
+    path: str | os.PathLike[str], field: str, left_out: Sequence[str], grid: Grid
+) -> LayerLabels:
+    """Read the labels of a layer's points and polygons.
+
+    Parameters
+    ----------
+    path
+        Any vector file that fiona reads; its first layer is taken.
+    field
+        Name of the attribute that tells the class.
+    left_out
+        Values of the attribute that are to be left out; all others are kept.
+    grid
+        That of the image.
+
+    Raises
+    ------
+    VectorLayerError
+        The layer cannot be read, has no such attribute, or neither points nor polygons.
+    GeoreferencingError
+        Only one of layer and image has a CRS.
+    """
+    import fiona
+    from fiona.errors import FionaError
+
+    try:
+        with fiona.open(os.fspath(path)) as layer:
+            crs = CRS.from_wkt(layer.crs_wkt) if layer.crs_wkt else None
+            if field not in layer.schema["properties"]:
+                names = ", ".join(layer.schema["properties"]) or "none"
+                raise VectorLayerError(f"{path} has no attribute {field!r}; it has: {names}")
+            items = [
+                (_plain(item["geometry"]), item["properties"][field])
+                for item in layer
+                if item["geometry"] is not None and item["properties"][field] is not None
+            ]
+    except (FionaError, OSError) as error:
+        raise VectorLayerError(f"cannot read the vector layer {path}: {error}") from error
+    if (crs is None) != (grid.crs is None):
+        raise GeoreferencingError(f"only one of {path} and the image has a CRS")
+    areas, xy, labels = [], [], []
+    for geometry, value in items:
+        label = LEFT_OUT if _is_one_of(value, left_out) else KEPT
+        if crs is not None and crs != grid.crs:
+            geometry = transform_geom(crs, grid.crs, geometry)
+        if geometry["type"] in ("Polygon", "MultiPolygon"):
+            areas.append((geometry, label))
+        elif geometry["type"] in ("Point", "MultiPoint"):
+            each = np.atleast_2d(geometry["coordinates"])[:, :2]
+            xy.extend(each.tolist())
+            labels.extend([label] * len(each))
+    if not areas and not xy:
+        raise VectorLayerError(f"{path} has neither points nor polygons with a class")
+    return LayerLabels(tuple(areas), np.array(xy).reshape(-1, 2), np.array(labels, np.int8))
+
+
+def _plain(geometry: Any) -> dict[str, Any]:
+    return {"type": geometry["type"], "coordinates": geometry["coordinates"]}
+
+
+def _is_one_of(value: Any, texts: Sequence[str]) -> bool:
+    # Numbers of a layer may be 1 or 1.0.
+    return f"{value:g}" in texts if isinstance(value, float) else str(value) in texts
+
+
+def labelled_points(
+    image: Image,
+    labels: LabelSource,
+    detector: Detecting,
+    statistics: str,
+    progress: Progress = SILENT,
+) -> Training:
+    """Return labelled features of an image, and labelled points, with what is around them.
+
+    Parameters
+    ----------
+    image
+        The image; it is read in tiles.
+    labels
+        What tells which are to be kept.
+    detector
+        What finds features.
+    statistics
+        One of `patch_statistics.STATISTICS`.
+    progress
+        Is told of every tile.
+    """
+    grid = image.source.grid
+    parts = []
+    every = list(tiles(grid))
+    for number, tile in enumerate(every):
+        corner = tile.col - MARGIN_PX, tile.row - MARGIN_PX
+        piece = grid.window(*corner, tile.width + 2 * MARGIN_PX, tile.height + 2 * MARGIN_PX)
+        core = Window(MARGIN_PX, MARGIN_PX, tile.width, tile.height)
+        patch = image.read_onto(piece, grid.map_to_pixel)
+        found = detector.detect(patch)
+        px = found.take(inside(found.position_px, core)).position_px
+        told = labels.label(piece, px)
+        own, own_labels = labels.points(piece)
+        here = inside(own, core)
+        px, told = np.vstack([px, own[here]]), np.concatenate([told, own_labels[here]])
+        px, told = px[told != UNKNOWN], told[told != UNKNOWN]
+        values = patch_statistics(statistics, patch, px)
+        parts.append(Training(values, told == KEPT, px + corner))
+        progress.update((number + 1) / len(every))
+    return Training(
+        np.concatenate([part.statistics for part in parts]),
+        np.concatenate([part.kept for part in parts]),
+        np.concatenate([part.px for part in parts]),
+    )

@@ -1,0 +1,167 @@
+"""Train a classifier that keeps features on clouds, shadows or changes out of the matching."""
+
+from __future__ import annotations
+
+import math
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from ..declaration import Output as ResultOutput
+from ..declaration import tool
+from ..errors import ParameterError
+from ..features.classifier import KERNELS
+from ..features.classifier_training import left_out_accuracy, train_classifier
+from ..features.labels import LabelSource, labelled_points, layer_labels, raster_labels
+from ..features.optical import optical_detector
+from ..features.patch_statistics import STATISTICS
+from ..kinds import Band, Choice, FileOut, RasterIn, Text, VectorIn
+from ..progress import SILENT, Progress
+from ..rasters.atomic import Outputs
+from ..rasters.pair import Image
+from ..rasters.reading import bounded_cache, open_raster
+from .common import Seed
+
+# Weaker features than those that are matched are labelled, too: as many as there may be.
+_CONTRAST = 0.02
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """The classifier, from how many points, and how well it tells points that it has not seen.
+
+    The accuracy is the mean of both classes' shares that are told rightly, by classifiers without
+    the blocks in which the points lie; None if the points lie too near each other to tell.
+    """
+
+    output: Path
+    kept: int
+    left_out: int
+    support_vectors: int
+    accuracy: float | None
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {
+            "output": str(self.output),
+            "kept": self.kept,
+            "left_out": self.left_out,
+            "support_vectors": self.support_vectors,
+            "accuracy": self.accuracy,
+        }
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        known = "unknown" if self.accuracy is None else f"{self.accuracy:.1%}"
+        return [
+            f"wrote {self.output}: {self.support_vectors} support vectors",
+            f"trained on {self.kept} points to be kept and {self.left_out} to be left out",
+            f"mean accuracy of both classes in blocks that were not seen: {known} (chance: 50 %)",
+        ]
+
+
+@tool(
+    title="Train a feature classifier",
+    group="Registration",
+    outputs=(ResultOutput("ACCURACY", "Mean accuracy of both classes", "accuracy"),),
+)
+def train_feature_classifier(
+    input: Annotated[
+        Path, RasterIn(label="Image", help="The image whose features or points are labelled.")
+    ],
+    output: Annotated[
+        Path,
+        FileOut(label="Classifier", help="For match_optical.", suffixes=(".json",)),
+    ],
+    labels: Annotated[
+        Path | None,
+        VectorIn(
+            label="Labelled layer",
+            help="Points, or polygons around features, with an attribute that tells their class.",
+        ),
+    ] = None,
+    label_raster: Annotated[
+        Path | None,
+        RasterIn(
+            label="Labelled raster",
+            help="A raster whose values tell the class of features: a cloud mask.",
+        ),
+    ] = None,
+    field: Annotated[
+        str, Text(label="Attribute", help="The layer's attribute that tells the class.")
+    ] = "class",
+    left_out: Annotated[
+        str,
+        Text(
+            label="Left out",
+            help="Values of the attribute or of the raster, separated by commas, whose features "
+            "are to be left out; those of all other values are kept.",
+        ),
+    ] = "1",
+    kernel: Annotated[
+        str,
+        Choice(
+            label="Kernel",
+            help="Of the support vector machine; polynomial is of degree 3, quadratic of 2.",
+            choices=KERNELS,
+        ),
+    ] = "polynomial",
+    statistics: Annotated[
+        str,
+        Choice(
+            label="Statistics",
+            help="What is looked at in the 41 × 41 pixels around a feature: mean and variance of "
+            "the grey values, or these with skewness, gradients and fine detail (texture).",
+            choices=tuple(STATISTICS),
+        ),
+    ] = "mean-variance",
+    band: Annotated[
+        int | None,
+        Band(
+            label="Band",
+            help="The band that is looked at, as it will be matched; by default the mean of all "
+            "bands.",
+            of="input",
+            advanced=True,
+        ),
+    ] = None,
+    seed: Seed = 0,
+    progress: Progress = SILENT,
+) -> TrainingResult:
+    """Train a classifier that keeps features on clouds, shadows or changes out of the matching.
+
+    A support vector machine learns to tell features that are to be kept from others by what the
+    image looks like around them. Features are found in the image and labelled by a raster or by
+    polygons; a layer's points are taken as they are. The classifier is for images of the same
+    kind: the same bands, units and about the same pixel size.
+    """
+    if (labels is None) == (label_raster is None):
+        raise ParameterError("give labels or label_raster, one of them")
+    values = tuple(text.strip() for text in left_out.split(",") if text.strip())
+    if not values:
+        raise ParameterError("left_out names no value")
+    with ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        image = Image(stack.enter_context(open_raster(input)), band)
+        source: LabelSource
+        if labels is not None:
+            source = layer_labels(labels, field, values, image.source.grid)
+        else:
+            assert label_raster is not None
+            source = raster_labels(stack.enter_context(open_raster(label_raster)), image, values)
+        detector = optical_detector("sift", _CONTRAST)
+        points = labelled_points(image, source, detector, statistics, progress.part(0.0, 0.6))
+        size_m = image.source.grid.pixel_size_m
+    progress.update(0.6, "training")
+    classifier = train_classifier(points, statistics, kernel, size_m, seed)
+    accuracy = left_out_accuracy(points, statistics, kernel, seed)
+    with Outputs() as outputs:
+        classifier.write(outputs.stage(output))
+    return TrainingResult(
+        output,
+        int(points.kept.sum()),
+        int((~points.kept).sum()),
+        len(classifier.weights),
+        accuracy if math.isfinite(accuracy) else None,
+    )
