@@ -30,6 +30,7 @@ SUITES = (
     "methods",
     "peaks",
     "fusion",
+    "optical",
 )
 
 

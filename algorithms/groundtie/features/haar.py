@@ -6,6 +6,7 @@ all features at once.
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import cv2
@@ -58,7 +59,9 @@ class HaarDescriptor:
 
     upright: bool = True
 
-    def describe(self, window: Patch, found: FeaturePoints) -> tuple[FeaturePoints, FloatImage]:
+    def describe(
+        self, window: Patch, found: FeaturePoints, executor: Executor | None = None
+    ) -> tuple[FeaturePoints, FloatImage]:
         """Return the features, oriented if they are to be, and what is around them.
 
         Parameters
@@ -67,6 +70,8 @@ class HaarDescriptor:
             The image; wavelets that see masked pixels count as zero.
         found
             Features in it, shape (n,).
+        executor
+            Threads to work in; None: this one.
 
         Returns
         -------
@@ -77,15 +82,18 @@ class HaarDescriptor:
         """
         masked = None if window.all_valid else _counts(~window.valid)
         sums = _Sums(integral_image(compress(window)), masked)
-        tables = [FeaturePoints.none()]
-        descriptors = [np.zeros((0, LENGTH), np.float32)]
-        for start in range(0, len(found), _BLOCK):
-            points = found.take(slice(start, start + _BLOCK))
+        blocks = [found.take(slice(at, at + _BLOCK)) for at in range(0, len(found), _BLOCK)]
+
+        def one(points: FeaturePoints) -> tuple[FeaturePoints, FloatImage]:
             if not self.upright:
                 points = points.turned(_orientations(sums, points))
-            tables.append(points)
-            descriptors.append(_described(sums, points))
-        return FeaturePoints.concatenate(tables), np.concatenate(descriptors)
+            return points, _described(sums, points)
+
+        done = list(map(one, blocks) if executor is None else executor.map(one, blocks))
+        return (
+            FeaturePoints.concatenate([FeaturePoints.none(), *(points for points, _ in done)]),
+            np.concatenate([np.zeros((0, LENGTH), np.float32), *(values for _, values in done)]),
+        )
 
 
 def _counts(mask: NDArray[np.bool_]) -> IntegralImage:

@@ -1,0 +1,199 @@
+"""Optical images registered by features: match rates, clouds, and whole registrations."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from groundtie.features.classifier import KERNELS
+
+from .accuracy import CORRECT, REFUSED, SILENTLY_WRONG
+from .attempt import Outcome, Pair, attempt, count
+from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
+from .match_rates import LIMITS_PX, METHODS, ClearCase, CloudyCase, MatchRate
+from .rotated_pairs import rotated_cases
+from .suites import Goal, Settings, SuiteResult, Table, run_cases
+from .tables import accuracy_table
+
+KINDS = ("optical-optical", "optical-infrared", "day-night")
+_ROTATED = ("optical-optical-rotated", "optical-infrared-rotated")
+_LARGEST_SHIFT_PX = 20.0
+
+# Of the registrations so many must be correct.
+_WANTED_SHARE = 0.9
+
+
+@dataclass(frozen=True)
+class RegistrationCase:
+    """A pair that match_optical registers: georeferenced with a wrong shift, or not at all."""
+
+    case: RealCase
+    georeferenced: bool
+
+    def run(self, workers: int | None) -> Outcome:
+        """Register the pair and judge the result."""
+        case = self.case
+        if not self.georeferenced:
+            truth, lattice = case.truths()
+            pair = Pair(case.reference, case.input, truth, lattice, case.sigma_px)
+            return attempt(case.name, case.kind, pair, workers, tool="match_optical")
+        with tempfile.TemporaryDirectory() as folder:
+            return attempt(
+                case.name,
+                case.kind,
+                write_case(case, draw_shift(case, _LARGEST_SHIFT_PX, 0), Path(folder)),
+                workers,
+                tool="match_optical",
+                search_radius=search_radius_m(_LARGEST_SHIFT_PX),
+            )
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite."""
+    cases = [case for case in read_cases(settings.data) if case.kind in KINDS]
+    turned = [case for case in rotated_cases(settings.data) if case.kind in _ROTATED]
+    if settings.quick:
+        cases, turned = [case for case in cases if case.name in ("oi-2", "oo-burn")], turned[:1]
+    clear = _rates([ClearCase(case) for case in cases], settings.jobs)
+    cloudy = _rates([CloudyCase(case) for case in cases], settings.jobs)
+    registrations = [RegistrationCase(case, True) for case in cases]
+    registrations += [RegistrationCase(case, False) for case in turned]
+    outcomes = run_cases(registrations, settings.jobs)
+    groups = {
+        kind: [outcome for outcome in outcomes if outcome.group == kind]
+        for kind in (*KINDS, *_ROTATED)
+    }
+    groups = {kind: members for kind, members in groups.items() if members}
+    return SuiteResult(
+        "Optical images by features",
+        goals(clear, cloudy, outcomes),
+        (
+            mean_table(clear),
+            pair_table("Correct-match rate within 5 px, by pair (%)", clear, list(METHODS)),
+            cloud_table(cloudy),
+            accuracy_table("Registrations by match_optical", groups),
+            outcome_table(outcomes),
+        ),
+        [each.__dict__ | {"rates": list(each.rates)} for each in (*clear, *cloudy)]
+        + [outcome.record() for outcome in outcomes],
+        (
+            "Matches are mutual nearest neighbours among the 2000 strongest features of each "
+            "image, all over the image, without a limit on the ratio. Times are of the processor, "
+            "for both images.",
+        ),
+    )
+
+
+def _rates(cases: Sequence[ClearCase | CloudyCase], jobs: int) -> list[MatchRate]:
+    return [rate for rates in run_cases(cases, jobs) for rate in rates.found]
+
+
+def _mean(rates: Iterable[MatchRate], of: Callable[[MatchRate], float]) -> float:
+    return float(np.mean([of(rate) for rate in rates]))
+
+
+def goals(
+    clear: Sequence[MatchRate], cloudy: Sequence[MatchRate], outcomes: Sequence[Outcome]
+) -> tuple[Goal, ...]:
+    """Return the goals and what was found."""
+    gain = 100 * (
+        _mean((r for r in clear if r.method == "HOG-81"), lambda r: r.rates[0])
+        - _mean((r for r in clear if r.method == "SURF-64"), lambda r: r.rates[0])
+    )
+    gains = _gains(cloudy, "polynomial")
+    better = sum(gain > 0 for gain in gains)
+    right, wrong = count(outcomes, CORRECT), count(outcomes, SILENTLY_WRONG)
+    refused, total = count(outcomes, REFUSED), len(outcomes)
+    return (
+        Goal("HOG-81 above SURF-64, mean", "at least 5 points", f"{gain:+.1f} points", gain >= 5),
+        Goal(
+            "polynomial refinement raises the rate on cloudy pairs",
+            "all",
+            f"{better} of {len(gains)}; mean {np.mean(gains):+.1f} points",
+            better == len(gains),
+        ),
+        Goal(
+            "registrations correct",
+            "at least 90 %",
+            f"{right} of {total}, {refused} refused",
+            right >= _WANTED_SHARE * total,
+        ),
+        Goal("silently wrong", "none", f"{wrong} of {total}", wrong == 0),
+    )
+
+
+def _gains(cloudy: Sequence[MatchRate], kernel: str) -> list[float]:
+    """Return by how many points a kernel raises the rate of each cloudy pair."""
+    before = {rate.name: rate.rates[0] for rate in cloudy if not rate.refinement}
+    return [100 * (r.rates[0] - before[r.name]) for r in cloudy if r.refinement == kernel]
+
+
+def mean_table(rates: Sequence[MatchRate]) -> Table:
+    """Return the means of all methods."""
+    rows = []
+    for method in METHODS:
+        own = [rate for rate in rates if rate.method == method]
+        rows.append(
+            [
+                method,
+                *(
+                    f"{100 * _mean(own, lambda rate, number=number: rate.rates[number]):.1f}"
+                    for number in range(len(LIMITS_PX))
+                ),
+                f"{_mean(own, lambda rate: rate.correct_at_20):.1f}",
+                f"{_mean(own, lambda rate: rate.matches):.0f}",
+                f"{_mean(own, lambda rate: rate.seconds):.2f}",
+            ]
+        )
+    head = ("method", "% within 5 px", "% within 1.5 px", "correct@20", "matches", "s")
+    return Table("Means over all pairs", head, rows)
+
+
+def pair_table(title: str, rates: Sequence[MatchRate], methods: Sequence[str]) -> Table:
+    """Return the rate of each pair and method, and correct@20."""
+    by_name: dict[str, dict[str, MatchRate]] = {}
+    for rate in rates:
+        by_name.setdefault(rate.name, {})[rate.method] = rate
+    rows = [
+        [name, *(f"{100 * own[m].rates[0]:.0f} ({own[m].correct_at_20:g})" for m in methods)]
+        for name, own in by_name.items()
+    ]
+    return Table(f"{title}, in brackets correct@20", ("pair", *methods), rows)
+
+
+def cloud_table(rates: Sequence[MatchRate]) -> Table:
+    """Return the rates on cloudy pairs without and with refinement by each kernel."""
+    by_name: dict[str, dict[str, MatchRate]] = {}
+    for rate in rates:
+        by_name.setdefault(rate.name, {})[rate.refinement] = rate
+    names = ("", *KERNELS)
+    rows = [
+        [
+            name,
+            *(
+                f"{100 * own[k].rates[0]:.1f} ({own[k].matches})" if k in own else "–"
+                for k in names
+            ),
+        ]
+        for name, own in by_name.items()
+    ]
+    refined = [own for own in by_name.values() if len(own) == len(names)]
+    means = [f"{100 * _mean([own[k] for own in refined], lambda r: r.rates[0]):.1f}" for k in names]
+    return Table(
+        "Simulated clouds: % of HOG-81's matches within 5 px (matches)",
+        ("pair", "not refined", *KERNELS),
+        [*rows, ["mean", *means]] if refined else rows,
+    )
+
+
+def outcome_table(outcomes: Sequence[Outcome]) -> Table:
+    """Return every registration."""
+    rows = [
+        [o.name, o.verdict, f"{o.error_px:.2f}", f"{o.sigma_px:g}", f"{o.seconds:.1f}", o.reason]
+        for o in outcomes
+    ]
+    return Table("Every registration", ("pair", "", "error (px)", "σ (px)", "s", "reason"), rows)
