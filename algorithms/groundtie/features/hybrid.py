@@ -67,11 +67,15 @@ class FeatureSearch:
         Knows the grid and what is held out.
     refinement
         Similarity by which chips refine the matches; None: they stay where they were found.
+    first_kind
+        Kind of the model around which chips refine; a simple one needs few right matches. None:
+        as asked for.
     """
 
     matcher: FeatureMatcher
     local: LocalSearch
     refinement: SimilaritySettings | None = None
+    first_kind: str | None = None
 
     def estimate(
         self, coarse: Model, kind: str, seed: int, executor: Executor, progress: Progress = SILENT
@@ -104,9 +108,10 @@ class FeatureSearch:
         kept = best_of_cells(matches.reference.position_px, score, _CELL_PX, _PER_CELL)
         px, partner_px = matches.reference.position_px[kept], matches.input.position_px[kept]
         places = _Places(px, partner_px, score[kept], area)
-        fit = self._fit(kind, places, coarse, seed)
+        refined = self.refinement is not None
+        fit = self._fit((refined and self.first_kind) or kind, places, coarse, seed)
         require_no_rival(px, partner_px, self.local.prior(coarse), fit.model, area)
-        if self.refinement is not None:
+        if refined:
             right = fit.mixture.right
             px, score = places.px[right], places.score[right]
             coarse = self.local.on_map(fit_model("affine", px, fit.model(px)))

@@ -63,6 +63,9 @@ _NO_REFINEMENT = "none"
 # Least contrast of SIFT's features, and least determinant of SURF's, on grey values from 0 to 1.
 _THRESHOLD = {"sift": 0.03, "surf": 0.0004}
 
+# Small images have few matches, enough for this but not to choose a model by.
+_FIRST_KIND = "similarity"
+
 # Without georeferencing, the input may be larger or smaller by this.
 _FREE_SCALE = 2.0
 
@@ -251,6 +254,7 @@ def match_optical(
             ),
             local,
             None if refinement == _NO_REFINEMENT else SimilaritySettings(refinement),
+            _FIRST_KIND if kind == AUTO else None,
         )
         is_free = not here.source.grid.is_georeferenced
         rough = rough_search(
