@@ -183,3 +183,26 @@ class TestErrors:
         )
         with pytest.raises(RasterContentError, match=message):
             windows_of(reference, input)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_masks_of_the_images_hide_what_they_hide(tmp_path: Path, which: int) -> None:
+    grid = utm_grid(120, 100)
+    paths = [waves(tmp_path / name, grid) for name in ("a.tif", "b.tif")]
+    shown = np.ones((100, 120), np.uint8)
+    shown[:, :30] = 0
+    mask = write_raster(tmp_path / "mask.tif", shown, grid)
+    with images(*paths) as pair, open_raster(mask) as hides:
+        pair[which] = Image(pair[which].source, None, hides)
+        windows = read_windows(*pair, SCALES)
+    patches = windows.reference, windows.input
+    grids = windows.reference_grid, windows.input_grid
+    easting = grids[which].pixel_to_map([[col, 0] for col in range(grids[which].width)])[:, 0]
+    column = easting > grid.pixel_to_map([[29.5, 0]])[0, 0]
+    middle = patches[which].values.shape[0] // 2
+    covered = patches[1 - which].valid[patches[1 - which].values.shape[0] // 2].any()
+    assert covered
+    inside = (easting > grid.pixel_to_map([[0, 0]])[0, 0]) & (
+        easting < grid.pixel_to_map([[119, 0]])[0, 0]
+    )
+    np.testing.assert_array_equal(patches[which].valid[middle][inside], column[inside])

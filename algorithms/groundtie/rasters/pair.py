@@ -46,13 +46,7 @@ class Image:
     band: int | None = None
     mask: RasterSource | None = None
 
-    def read_onto(
-        self,
-        grid: Grid,
-        to_px: ToPixel,
-        to_mask_px: ToPixel | None = None,
-        hidden: Mask | None = None,
-    ) -> Patch:
+    def read_onto(self, grid: Grid, to_px: ToPixel, hidden: Mask | None = None) -> Patch:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
         values, valid = sample(self.source, grid, to_px, "cubic", self.band)
         if hidden is not None:
@@ -60,8 +54,11 @@ class Image:
             values, valid = np.where(hidden, np.float32(0), values), valid & ~hidden
         if not self.source.says_what_is_valid:
             valid = valid & ~_empty_areas(values, valid)
-        if self.mask is not None and to_mask_px is not None:
-            shown, known = sample(self.mask, grid, to_mask_px, "nearest", 1)
+        if self.mask is not None:
+            own, to_mask = self.source.grid, _claimed_pixels(self.source.grid, self.mask.grid)
+            shown, known = sample(
+                self.mask, grid, lambda xy: to_mask(own.pixel_to_map(to_px(xy))), "nearest", 1
+            )
             valid = valid & known & (shown != 0)
         return Patch(values, valid)
 
@@ -88,20 +85,11 @@ class ImagePair:
 
     def reference_patch(self, grid: Grid, hidden: Mask | None = None) -> Patch:
         """Return the reference on a grid in its CRS, masked where it is to be hidden."""
-        mask = self.reference.mask
-        to_mask = None if mask is None else _claimed_pixels(self.grid, mask.grid)
-        to_px = self.reference.source.grid.map_to_pixel
-        return self.reference.read_onto(grid, to_px, to_mask, hidden)
+        return self.reference.read_onto(grid, self.reference.source.grid.map_to_pixel, hidden)
 
     def input_patch(self, grid: Grid, to_input_px: ToPixel) -> Patch:
         """Return the input on a grid; `to_input_px` takes map positions to input pixels."""
-        mask, own = self.input.mask, self.input.source.grid
-        if mask is None:
-            return self.input.read_onto(grid, to_input_px)
-        to_mask = _claimed_pixels(own, mask.grid)
-        return self.input.read_onto(
-            grid, to_input_px, lambda xy: to_mask(own.pixel_to_map(to_input_px(xy)))
-        )
+        return self.input.read_onto(grid, to_input_px)
 
     @property
     def is_masked(self) -> bool:
