@@ -22,6 +22,7 @@ Similarity = Annotated[
         label="Similarity",
         help="What tells that two windows show the same place; see coregister.",
         choices=SIMILARITIES,
+        advanced=True,
     ),
 ]
 ImageBand = Annotated[
