@@ -22,6 +22,7 @@ from ..search.local import AUTO, LocalSearch
 from ..similarity.binning import BINNINGS
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
 from .common import (
+    ChipSize,
     GpveOrder,
     HighPercent,
     Input,
@@ -148,19 +149,7 @@ def coregister(
     mask_low_percent: LowPercent = 0.0,
     mask_growth: MaskGrowth = 0.0,
     mask_width: MaskWidth = WIDTH_M,
-    chip_size: Annotated[
-        int | None,
-        Number(
-            label="Chip size",
-            help="Side of the windows that are matched, in pixels of the matching grid; by "
-            "default by the size of the overlap.",
-            unit="px",
-            integer=True,
-            minimum=16,
-            maximum=1024,
-            advanced=True,
-        ),
-    ] = None,
+    chip_size: ChipSize = None,
     spacing: Annotated[
         float | None,
         Distance(

@@ -20,6 +20,7 @@ from ..rasters.reading import bounded_cache
 from ..sensor.control_points import SUFFIXES, ControlPoints
 from ..similarity.surface import SimilaritySettings
 from .common import (
+    ChipSize,
     HighPercent,
     LowPercent,
     MatchingPixelSize,
@@ -44,7 +45,6 @@ from .sensor_input import (
     open_sensor_image,
 )
 from .sensor_matching import (
-    ChipSize,
     ImageBand,
     MaskKind,
     SearchRadius,

@@ -15,13 +15,13 @@ from ..features.classifier import FeatureClassifier, read_classifier
 from ..features.hybrid import FeatureSearch
 from ..features.optical import DESCRIPTORS, DETECTORS, optical_descriptor, optical_detector
 from ..features.tile_matching import FeatureMatcher
-from ..kinds import Choice, Distance, FileIn, Number
+from ..kinds import Choice, FileIn, Number
 from ..progress import SILENT, Progress
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
 from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
-from ..similarity.surface import SIMILARITIES, SimilaritySettings
+from ..similarity.surface import SimilaritySettings
 from .common import (
     Input,
     InputBand,
@@ -36,6 +36,15 @@ from .common import (
     TransformOut,
     Workers,
     worker_count,
+)
+from .feature_parameters import (
+    CheckSimilarity,
+    FreeSearchRadius,
+    FreeSearchRotation,
+    Gate,
+    LargestRatio,
+    Refinement,
+    refinement_settings,
 )
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import (
@@ -57,9 +66,6 @@ from .registration_parameters import (
     TiePointsOut,
 )
 
-_NO_REFINEMENT = "none"
-
-
 # Least contrast of SIFT's features, and least determinant of SURF's, on grey values from 0 to 1.
 _THRESHOLD = {"sift": 0.03, "surf": 0.0004}
 
@@ -75,15 +81,7 @@ def match_optical(
     reference: Reference,
     input: Input,
     output: Output,
-    search_radius: Annotated[
-        float | None,
-        Distance(
-            label="Search radius",
-            help="How far the input may lie from its right place. By default 100 m or 20 pixels "
-            "of the coarser image, whichever is larger; without georeferencing a quarter of the "
-            "input's longer side.",
-        ),
-    ] = None,
+    search_radius: FreeSearchRadius = None,
     input_classifier: Annotated[
         Path | None,
         FileIn(
@@ -140,61 +138,12 @@ def match_optical(
             advanced=True,
         ),
     ] = None,
-    ratio: Annotated[
-        float,
-        Number(
-            label="Largest ratio",
-            help="Largest ratio of the distances to the nearest and to the next best feature of "
-            "the input; 1 keeps the nearest one in any case.",
-            minimum=0.1,
-            maximum=1.0,
-            advanced=True,
-        ),
-    ] = 1.0,
-    gate: Annotated[
-        float,
-        Number(
-            label="Gate",
-            help="How far a feature's partner may lie from where the rough search puts it.",
-            unit="px",
-            minimum=1,
-            maximum=64,
-            advanced=True,
-        ),
-    ] = 16.0,
-    refinement: Annotated[
-        str,
-        Choice(
-            label="Refinement",
-            help="Similarity by which chips around matched features refine their places; none "
-            "leaves them where they were found.",
-            choices=(_NO_REFINEMENT, *SIMILARITIES),
-            advanced=True,
-        ),
-    ] = "fused",
-    similarity: Annotated[
-        str,
-        Choice(
-            label="Similarity",
-            help="What the rough shift is searched for and check points are matched by; see "
-            "coregister.",
-            choices=SIMILARITIES,
-            advanced=True,
-        ),
-    ] = "fused",
+    ratio: LargestRatio = 1.0,
+    gate: Gate = 16.0,
+    refinement: Refinement = "fused",
+    similarity: CheckSimilarity = "fused",
     search: Search = AUTO,
-    search_rotation: Annotated[
-        float | None,
-        Number(
-            label="Largest rotation",
-            help="How far the input may be turned, either way, against where it claims to lie. By "
-            "default not at all; without georeferencing any rotation.",
-            unit="°",
-            minimum=0,
-            maximum=180,
-            advanced=True,
-        ),
-    ] = None,
+    search_rotation: FreeSearchRotation = None,
     search_scale: Annotated[
         float | None,
         Number(
@@ -253,7 +202,7 @@ def match_optical(
                 refining=(_classifier(reference_classifier), _classifier(input_classifier)),
             ),
             local,
-            None if refinement == _NO_REFINEMENT else SimilaritySettings(refinement),
+            refinement_settings(refinement),
             _FIRST_KIND if kind == AUTO else None,
         )
         is_free = not here.source.grid.is_georeferenced

@@ -18,13 +18,13 @@ from ..features.detectors import DETECTORS, Detector
 from ..features.gradients import GRADIENTS
 from ..features.hybrid import FeatureSearch
 from ..features.tile_matching import FeatureMatcher
-from ..kinds import Choice, Distance, Number, RasterIn
+from ..kinds import Choice, Number, RasterIn
 from ..progress import SILENT, Progress
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
 from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
-from ..similarity.surface import SIMILARITIES, SimilaritySettings
+from ..similarity.surface import SimilaritySettings
 from .common import (
     Input,
     InputBand,
@@ -39,6 +39,15 @@ from .common import (
     TransformOut,
     Workers,
     worker_count,
+)
+from .feature_parameters import (
+    CheckSimilarity,
+    FreeSearchRadius,
+    FreeSearchRotation,
+    Gate,
+    LargestRatio,
+    Refinement,
+    refinement_settings,
 )
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import (
@@ -61,23 +70,13 @@ from .registration_parameters import (
     TiePointsOut,
 )
 
-_NO_REFINEMENT = "none"
-
 
 @tool(title="Match SAR with SAR", group="Registration", outputs=OUTPUTS)
 def match_sar_sar(
     reference: Reference,
     input: Input,
     output: Output,
-    search_radius: Annotated[
-        float | None,
-        Distance(
-            label="Search radius",
-            help="How far the input may lie from its right place. By default 100 m or 20 pixels "
-            "of the coarser image, whichever is larger; without georeferencing a quarter of the "
-            "input's longer side.",
-        ),
-    ] = None,
+    search_radius: FreeSearchRadius = None,
     ground_mask: Annotated[
         Path | None,
         RasterIn(
@@ -124,61 +123,12 @@ def match_sar_sar(
             advanced=True,
         ),
     ] = "differences",
-    ratio: Annotated[
-        float,
-        Number(
-            label="Largest ratio",
-            help="Largest ratio of the distances to the nearest and to the next best feature of "
-            "the input; 1 keeps the nearest one in any case.",
-            minimum=0.1,
-            maximum=1.0,
-            advanced=True,
-        ),
-    ] = 1.0,
-    gate: Annotated[
-        float,
-        Number(
-            label="Gate",
-            help="How far a feature's partner may lie from where the rough search puts it.",
-            unit="px",
-            minimum=1,
-            maximum=64,
-            advanced=True,
-        ),
-    ] = 16.0,
-    refinement: Annotated[
-        str,
-        Choice(
-            label="Refinement",
-            help="Similarity by which chips around matched features refine their places; none "
-            "leaves them where they were found.",
-            choices=(_NO_REFINEMENT, *SIMILARITIES),
-            advanced=True,
-        ),
-    ] = "nmi",
-    similarity: Annotated[
-        str,
-        Choice(
-            label="Similarity",
-            help="What the rough shift is searched for and check points are matched by; see "
-            "coregister.",
-            choices=SIMILARITIES,
-            advanced=True,
-        ),
-    ] = "fused",
+    ratio: LargestRatio = 1.0,
+    gate: Gate = 16.0,
+    refinement: Refinement = "nmi",
+    similarity: CheckSimilarity = "fused",
     search: Search = AUTO,
-    search_rotation: Annotated[
-        float | None,
-        Number(
-            label="Largest rotation",
-            help="How far the input may be turned, either way, against where it claims to lie. By "
-            "default not at all; without georeferencing any rotation.",
-            unit="°",
-            minimum=0,
-            maximum=180,
-            advanced=True,
-        ),
-    ] = None,
+    search_rotation: FreeSearchRotation = None,
     search_scale: SearchScale = 1.0,
     reference_band: ReferenceBand = None,
     input_band: InputBand = None,
@@ -231,7 +181,7 @@ def match_sar_sar(
                 None if ground_mask is None else ground,
             ),
             local,
-            None if refinement == _NO_REFINEMENT else SimilaritySettings(refinement),
+            refinement_settings(refinement),
         )
         turned = 0.0 if here.source.grid.is_georeferenced else 180.0
         rough = rough_search(

@@ -31,6 +31,7 @@ from ..sensor.rpc_fit import RPCFit
 from ..sensor.rpc_tags import rpc_to_tags
 from ..similarity.surface import SimilaritySettings
 from .common import (
+    ChipSize,
     HighPercent,
     LowPercent,
     MatchingPixelSize,
@@ -56,7 +57,6 @@ from .sensor_input import (
     utm_of,
 )
 from .sensor_matching import (
-    ChipSize,
     ImageBand,
     MaskKind,
     SearchRadius,
