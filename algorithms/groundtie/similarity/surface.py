@@ -42,8 +42,6 @@ TREND_PX = 5.0
 _HISTOGRAM_WEIGHT = np.float32(0.75)
 _STRENGTH_WEIGHT = np.float32(0.75)
 
-_ON_EDGES = ("fused", "orientation", "edge-strength")
-
 # A surface that varies by less than this holds nothing but rounding.
 _FLAT = 1e-9
 
@@ -77,6 +75,10 @@ class SimilaritySettings:
         if self.similarity == "fused":
             return "nmi"
         return self.similarity if self.similarity in MEASURES else None
+
+    def counts(self, part: str) -> bool:
+        """Tell whether "orientation" or "edge-strength" enters the similarity."""
+        return self.similarity in ("fused", part)
 
     def bins_for(self, pixels: int) -> int:
         """Return the number of bins for a template of so many pixels."""
@@ -172,9 +174,10 @@ def describe(window: Patch, chip_pixels: int, settings: SimilaritySettings) -> F
     if settings.measure is not None:
         around = window.inner(BORDER_PX - margin)
         bins = to_bins(around.values, around.valid, bin_count, settings.binning)
-    if settings.similarity in _ON_EDGES:
+    if settings.counts("orientation") or settings.counts("edge-strength"):
         fields = orientation_fields(window)
-        strength = edge_strength(fields[0], window.valid).inner(BORDER_PX)
+        if settings.counts("edge-strength"):
+            strength = edge_strength(fields[0], window.valid).inner(BORDER_PX)
         fields = fields[:, inner, inner]
     return Features(window.inner(BORDER_PX), bins, bin_count, margin, fields, strength)
 
@@ -239,9 +242,9 @@ def similarity_surface(
     if settings.measure is not None:
         measured = histogram_surface(template, search, radius, settings, executor)
         parts.append(detrend(measured) * _HISTOGRAM_WEIGHT)
-    if settings.similarity in ("fused", "orientation"):
+    if settings.counts("orientation"):
         parts.append(orientation_surface(template, search))
-    if settings.similarity in ("fused", "edge-strength"):
+    if settings.counts("edge-strength"):
         parts.append(detrend(strength_surface(template, search)) * _STRENGTH_WEIGHT)
     if settings.similarity == "ncc":
         parts.append(detrend(correlate_grey(template.patch, search.patch)))
