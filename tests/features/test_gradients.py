@@ -9,8 +9,8 @@ from groundtie.features.gradients import GRADIENTS, gradient, needs_positive
 from groundtie.features.recursive_filters import (
     average_after,
     average_before,
-    smooth_along,
 )
+from groundtie.speckle.isef import isef_along
 
 SIGNED = tuple(name for name in GRADIENTS if name != "roewa-unsigned")
 
@@ -97,7 +97,7 @@ def test_smoothing_is_symmetric_and_of_unit_sum(axis: int) -> None:
     image = np.random.default_rng(1).normal(5, 1, size=(40, 50)).astype(np.float32)
     weights = 0.5 ** np.abs(np.arange(-40, 41))
     expected = convolve1d(image, weights / weights.sum(), axis, mode="nearest")
-    np.testing.assert_allclose(smooth_along(image, 0.5, axis), expected, rtol=1e-4)
+    np.testing.assert_allclose(isef_along(image, 0.5, axis), expected, rtol=1e-4)
 
 
 def test_only_ratios_need_positive_values() -> None:

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from .recursive_filters import average_after, average_before, smooth_along
+from ..speckle.isef import isef_along
+from .recursive_filters import average_after, average_before
 
 FloatImage = NDArray[np.float32]
 Gradient = tuple[FloatImage, FloatImage]
@@ -68,7 +69,7 @@ def unsigned_log_ratios(image: FloatImage) -> Gradient:
 
 
 def _log_ratio(image: FloatImage, axis: int) -> FloatImage:
-    across = smooth_along(image, _DECAY, 1 - axis)
+    across = isef_along(image, _DECAY, 1 - axis)
     before = _shifted(average_before(across, _DECAY, axis), 1, axis)
     after = _shifted(average_after(across, _DECAY, axis), -1, axis)
     return np.asarray(np.log(np.maximum(after, _TINY) / np.maximum(before, _TINY)))

@@ -1,4 +1,4 @@
-"""Recursive exponential filters: each pass costs the same however far the filter reaches."""
+"""Exponential averages of one side, recursive: however far they reach, they cost the same."""
 
 from __future__ import annotations
 
@@ -34,13 +34,3 @@ def average_after(image: FloatImage, decay: float, axis: int) -> FloatImage:
     """Return the exponentially weighted average of each pixel and all after it (h2)."""
     turned = average_before(np.flip(image, axis), decay, axis)
     return np.flip(turned, axis)
-
-
-def smooth_along(image: FloatImage, decay: float, axis: int) -> FloatImage:
-    """Return an image smoothed by the infinite symmetric exponential filter along one axis.
-
-    Weights are a·b^|x| with a = (1 − b) / (1 + b) (Shen & Castan 1992; thesis S eq 6.2).
-    """
-    both = average_before(image, decay, axis) + average_after(image, decay, axis)
-    own = image * np.float32(1 - decay)
-    return np.asarray((both - own) / np.float32(1 + decay), np.float32)

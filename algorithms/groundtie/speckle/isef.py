@@ -27,8 +27,14 @@ def isef(image: FloatImage, decay: float) -> FloatImage:
     -------
     Smoothed image, float32, shape (h, w).
     """
-    down = _along_rows(np.ascontiguousarray(image, np.float32), decay)
-    turned = np.asarray(cv2.transpose(down), np.float32)
+    return isef_along(isef_along(image, decay, 0), decay, 1)
+
+
+def isef_along(image: FloatImage, decay: float, axis: int) -> FloatImage:
+    """Smooth an image as `isef` does, along one axis: 0 from row to row, 1 along columns."""
+    if axis == 0:
+        return _along_rows(np.ascontiguousarray(image, np.float32), decay)
+    turned = np.asarray(cv2.transpose(np.asarray(image, np.float32)), np.float32)
     return np.asarray(cv2.transpose(_along_rows(turned, decay)), np.float32)
 
 
