@@ -62,6 +62,20 @@ def test_values_are_those_of_the_definition(directions: int) -> None:
     np.testing.assert_allclose(found[0], directly(values, 101, 87, directions), atol=1e-4)
 
 
+def test_patches_of_one_size_lie_on_whole_pixels() -> None:
+    values = image()
+    _, found = HogDescriptor(scaled=False).describe(whole(values), points((101.4, 86.6, 5.0, 0)))
+    np.testing.assert_allclose(found[0], directly(values, 101, 87, 9), atol=1e-4)
+
+
+def test_beyond_the_image_there_is_nothing() -> None:
+    """At a corner, three quarters of the patch see no pixel."""
+    _, found = HogDescriptor(scaled=False).describe(whole(image()), points((0, 0, 2, 0)))
+    cells = found.reshape(3, 3, 9)
+    assert np.abs(cells[:1]).max() == np.abs(cells[:, :1]).max() == 0
+    assert np.linalg.norm(cells[1:, 1:]) == pytest.approx(1, abs=1e-5)
+
+
 def test_inverted_contrast_does_not_count() -> None:
     spots = points((70, 90, 2, 0), (120, 101, 3, 0))
     _, first = HogDescriptor().describe(whole(image()), spots)

@@ -7,10 +7,12 @@ directions, 63 with seven. Dalal & Triggs 2005.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
@@ -18,7 +20,7 @@ from ..similarity.orientation import compress
 from .gradients import FloatImage, Gradient
 from .points import FeaturePoints
 from .sampling import sampled_gradient, square_lattice, unit_rows
-from .scale_space import describe_at_scales
+from .scale_space import describe_at_scales, gradient_at_scale
 
 FloatArray = NDArray[np.float64]
 
@@ -27,6 +29,11 @@ CELLS = 3
 
 # A scaled patch has a sample every so many scales: it is as wide as SURF's descriptor.
 _SAMPLE_SCALES = 0.5
+
+_GRADIENT = "differences"
+
+# So many features are described at a time: their patches fit into the last cache.
+_BLOCK = 64
 
 
 @dataclass(frozen=True)
@@ -41,8 +48,8 @@ class HogDescriptor:
         Whether features keep the image's axes; else each is turned by its own orientation, and
         one with several is repeated.
     scaled
-        Whether the patch grows with the feature; else all have 41 × 41 pixels, and keep their
-        scales only where they are returned.
+        Whether the patch grows with the feature; else all have 41 × 41 pixels, upright ones those
+        nearest to the feature, and keep their scales only where they are returned.
     """
 
     directions: int = 9
@@ -77,32 +84,65 @@ class HogDescriptor:
         self, image: FloatImage, valid: NDArray[np.bool_], found: FeaturePoints
     ) -> tuple[FeaturePoints, FloatImage]:
         """Describe features of an image whose grey values are taken as they are."""
+        if not self.scaled and self.upright:
+            # Half a pixel is little in a patch: on whole pixels, what patches share is found once.
+            fields = gradient_at_scale(image, valid, 1 / _SAMPLE_SCALES, _GRADIENT)
+            return found, self._described_upright(fields, found)
         if not self.scaled:
             found = replace(found, scale_px=np.full(len(found), 1 / _SAMPLE_SCALES))
         return describe_at_scales(
-            image, valid, found, "differences", self.upright, self._described, self.length
+            image, valid, found, _GRADIENT, self.upright, self._described, self.length
         )
 
     def _described(self, fields: Gradient, points: FeaturePoints) -> FloatImage:
         """Return the descriptors of features in pixels of the gradient."""
         lattice = square_lattice(_SAMPLE_SCALES * PATCH_PX / 2, PATCH_PX)
         strength, direction = sampled_gradient(fields, points, lattice)
-        place = direction * np.float32(self.directions / np.pi)
-        weights = _cell_weights()
-        half = np.float32(self.directions / 2)
+        weights = np.kron(_weights_along(), _weights_along())
         values = np.empty((len(points), CELLS * CELLS, self.directions), np.float32)
-        for number in range(self.directions):
-            away = np.abs((place - number + half) % self.directions - half)
-            share = np.maximum(1 - away, 0)
-            share *= strength
+        for number, share in enumerate(self._shares(strength, direction)):
             values[:, :, number] = share @ weights
         return unit_rows(values.reshape(len(points), self.length))
 
+    def _described_upright(self, fields: Gradient, points: FeaturePoints) -> FloatImage:
+        """Return the descriptors of features whose patches are of whole pixels."""
+        along_cols, along_rows = fields
+        strength, angle = np.hypot(along_cols, along_rows), np.arctan2(along_rows, along_cols)
+        reach = PATCH_PX // 2
+        height, width = strength.shape
+        spread = np.zeros((height + 2 * reach, width + 2 * reach, self.directions), np.float32)
+        for number, share in enumerate(self._shares(strength, angle)):
+            spread[reach:-reach, reach:-reach, number] = share
+        cols, rows = np.rint(points.position_px).astype(np.intp).T
+        cols, rows = np.clip(cols, 0, width - 1), np.clip(rows, 0, height - 1)
+        # A patch's row is a row of all directions of its pixels, side by side.
+        length = PATCH_PX * self.directions
+        patch_rows = sliding_window_view(spread.reshape(len(spread), -1), length, axis=1)
+        weights = _weights_along()
+        values = np.empty((len(points), CELLS, CELLS, self.directions), np.float32)
+        for start in range(0, len(points), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            down = rows[block, None] + np.arange(PATCH_PX)
+            patches = patch_rows[down, cols[block, None] * self.directions]
+            in_rows = (weights.T @ patches).reshape(-1, CELLS, PATCH_PX, self.directions)
+            values[block] = weights.T @ in_rows
+        return unit_rows(values.reshape(len(points), self.length))
+
+    def _shares(self, strength: FloatImage, angle: FloatImage) -> Iterator[FloatImage]:
+        """Return, direction by direction, the share that gradients have in it."""
+        place = angle * np.float32(self.directions / np.pi)
+        half = np.float32(self.directions / 2)
+        for number in range(self.directions):
+            # Neighbouring directions share what lies between them.
+            away = np.abs((place - number + half) % self.directions - half)
+            share = np.maximum(1 - away, 0)
+            share *= strength
+            yield share
+
 
 @cache
-def _cell_weights() -> FloatImage:
-    """Return the share of each of the patch's samples in the cells, shape (41², 9)."""
+def _weights_along() -> FloatImage:
+    """Return the share of samples along a side of the patch in the cells, shape (41, 3)."""
     # Cells share their samples with their neighbours, as directions do.
     at = (np.arange(PATCH_PX) + 0.5) * CELLS / PATCH_PX - 0.5
-    along = np.maximum(1 - np.abs(at[:, None] - np.arange(CELLS)), 0)
-    return np.asarray(np.kron(along, along), np.float32)
+    return np.maximum(1 - np.abs(at[:, None] - np.arange(CELLS)), 0).astype(np.float32)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -61,7 +62,7 @@ def describe_at_scales(
     tables = [FeaturePoints.none()]
     descriptors = [np.zeros((0, length), np.float32)]
     owners = [np.zeros(0, int)]
-    layer_of = np.rint(_LAYERS * np.log2(found.scale_px / _FIRST_SCALE_PX)).astype(int)
+    layer_of = _layer_of(found.scale_px)
     layers = [int(layer) for layer in np.unique(layer_of)]
     distance = _distance(valid)
     for layer, level in zip(layers, _scale_space(image, layers), strict=True):
@@ -83,6 +84,33 @@ def describe_at_scales(
             owners.append(block[index])
     order = np.argsort(np.concatenate(owners), kind="stable")
     return FeaturePoints.concatenate(tables).take(order), np.concatenate(descriptors)[order]
+
+
+def gradient_at_scale(
+    image: FloatImage, valid: NDArray[np.bool_], scale_px: float, estimator: str
+) -> Gradient:
+    """Return the gradient at the layer of scale space that is nearest to a scale.
+
+    Parameters
+    ----------
+    image, valid
+        Grey values and which of them count, shape (h, w).
+    scale_px
+        The scale, below twice that of the first octave, whose pixels are the image's.
+    estimator
+        One of `gradients.GRADIENTS`.
+
+    Returns
+    -------
+    Two arrays of shape (h, w), zero where masked pixels are seen.
+    """
+    layer = _layer_of(scale_px)
+    (level,) = _scale_space(image, [layer])
+    return _gradient(level, _distance(valid) > _SEES_SCALES * _scale_of(layer), estimator)
+
+
+def _layer_of(scale_px: Any) -> Any:
+    return np.rint(_LAYERS * np.log2(scale_px / _FIRST_SCALE_PX)).astype(int)
 
 
 def _distance(valid: NDArray[np.bool_]) -> FloatImage:
