@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,8 @@ from groundtie.features import tile_matching
 from groundtie.features.descriptors import Descriptor
 from groundtie.features.detectors import Detector
 from groundtie.features.hybrid import FeatureSearch
-from groundtie.features.tile_matching import FeatureMatcher
+from groundtie.features.points import FeaturePoints
+from groundtie.features.tile_matching import FeatureMatcher, FeatureMatches
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.models import Model
 from groundtie.rasters.pair import Image, ImagePair
@@ -100,6 +101,41 @@ def test_pixels_held_out_of_the_fit_change_nothing_of_it(
     assert found.transform.to_json() == expected.transform.to_json()
     for name, column in vars(expected.points).items():
         np.testing.assert_array_equal(getattr(found.points, name), column, err_msg=name)
+
+
+@dataclass(frozen=True)
+class Astray:
+    """Matches that are off by more the farther right they lie."""
+
+    pair: ImagePair
+    local: LocalSearch
+    most_px: float = 7.0
+    gate_px: float = 16.0
+
+    def match(self, coarse: Model, executor: object, progress: object) -> FeatureMatches:
+        grid = self.pair.grid
+        sides = [np.arange(30.0, size - 30, 12) for size in (grid.width, grid.height)]
+        px = np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)
+        px = px[~self.local.layout.held_out(px)]
+        partner = grid.map_to_pixel(TRUTH(grid.pixel_to_map(px)))
+        partner = partner - (grid.map_to_pixel(coarse(grid.pixel_to_map(px))) - px)
+        partner[:, 0] += self.most_px * px[:, 0] / grid.width
+        both = [
+            FeaturePoints(at, *(np.ones(len(px)) for _ in range(3)), np.zeros(len(px), int))
+            for at in (px, partner)
+        ]
+        return FeatureMatches(*both, np.full(len(px), 0.5), (len(px), len(px)))
+
+
+def test_chips_are_matched_again_where_the_first_model_went_astray(files: TexturedPair) -> None:
+    """Right chips lie up to 7 px off the first model, and are looked for within 4 px of it."""
+    with files.opened() as pair, ThreadPoolExecutor(2) as executor:
+        local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("fused"))
+        search = FeatureSearch(Astray(pair, local), local, NMI)  # type: ignore[arg-type]
+        found = search.estimate(ROUGH, "affine", 0, executor)
+        right = files.grid.map_to_pixel(found.points.reference_xy[found.points.used])[:, 0]
+    assert error_px(found.transform, files) < 0.4
+    assert right.max() > 0.8 * SIZE[0]
 
 
 def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.estimation import Estimate, fit_thin_plate
+from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate, jackknife_spread
 from ..geometry.fitting import fit_model
 from ..geometry.models import Model
+from ..geometry.robust import fit_mixture
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..progress import SILENT, Progress
+from ..rasters.grid import apply_affine
 from ..search.local import LocalSearch
 from ..search.matching import ChipMatcher
 from ..similarity.evidence import find_peak
@@ -31,8 +33,15 @@ FloatArray = NDArray[np.float64]
 # A partner without a rival in its gate is as much nearer than the next as this, at most.
 _LARGEST_SCORE = 10.0
 
-# Chips around matches: how large, how far they are moved, and how many of them at most.
-_CHIP_PX, _CHIP_RADIUS_PX = 81, 4
+# Chips around matches: how large, and how far they are moved: by so many standard deviations of the
+# first model's predictions, within these limits.
+_CHIP_PX = 81
+_CHIP_SIGMAS, _CHIP_RADIUS_PX = 3.0, (4, 12)
+
+# If a tenth of them moves the model by more than this, they are matched again from where it is
+# then: at most so often in all.
+_FAR_PX = 2.5
+_ROUNDS = 3
 
 # Of the matches in each of so many cells a side the best is refined.
 _CHIP_CELLS = 14
@@ -112,14 +121,42 @@ class FeatureSearch:
         fit = self._fit((refined and self.first_kind) or kind, places, coarse, seed)
         require_no_rival(px, partner_px, self.local.prior(coarse), fit.model, area)
         if refined:
-            right = fit.mixture.right
-            px, score = places.px[right], places.score[right]
-            coarse = self.local.on_map(fit_model("affine", px, fit.model(px)))
-            side = float(np.ptp(places.px, axis=0).max()) / _CHIP_CELLS
-            picked = px[best_of_cells(px, score, side, 1)]
-            places = self._refined(picked, coarse, executor, progress.part(0.7, 1.0))
-            fit = self._fit(kind, places, coarse, seed)
+            part = progress.part(0.7, 1.0)
+            places, coarse, fit = self._refined(kind, places, coarse, fit, seed, executor, part)
         return self._estimate(kind, places, coarse, fit)
+
+    def _refined(
+        self,
+        kind: str,
+        matches: _Places,
+        coarse: Model,
+        fit: Fit,
+        seed: int,
+        executor: Executor,
+        progress: Progress,
+    ) -> tuple[_Places, Model, Fit]:
+        """Return chips around features, the model that they were resampled by, and their fit.
+
+        Matches of features with larger errors may have led the first model astray: if chips show
+        it, they are matched again from their own.
+        """
+        claimed_px = apply_affine(self.local.prior(coarse), matches.partner_px)
+        for _ in range(_ROUNDS):
+            first = fit.model
+            residuals = claimed_px - first(matches.px)
+            right = fit_mixture(residuals, matches.window_area, SIGMA_RANGE_PX).right
+            px, score = matches.px[right], matches.score[right]
+            coarse = self.local.on_map(fit_model("affine", px, first(px)))
+            side = float(np.ptp(matches.px, axis=0).max()) / _CHIP_CELLS
+            picked = px[best_of_cells(px, score, side, 1)]
+            reach = _CHIP_SIGMAS * np.quantile(jackknife_spread(fit.fold_models, picked), 0.9)
+            radius = int(np.clip(np.ceil(reach), *_CHIP_RADIUS_PX))
+            chips = self._chips(picked, coarse, radius, executor, progress)
+            fit = self._fit(kind, chips, coarse, seed)
+            moved = np.hypot(*(fit.model(picked) - first(picked)).T)
+            if np.quantile(moved, 0.9) <= _FAR_PX:
+                break
+        return chips, coarse, fit
 
     def _fit(self, kind: str, places: _Places, coarse: Model, seed: int) -> Fit:
         polynomial = AUTO if kind == "tps" else kind
@@ -128,8 +165,8 @@ class FeatureSearch:
             polynomial, places.px, places.partner_px, prior, places.window_area, seed
         )
 
-    def _refined(
-        self, px: FloatArray, model: Model, executor: Executor, progress: Progress
+    def _chips(
+        self, px: FloatArray, model: Model, radius_px: int, executor: Executor, progress: Progress
     ) -> _Places:
         """Return chips around features and where they lie by their similarity."""
         assert self.refinement is not None
@@ -142,13 +179,13 @@ class FeatureSearch:
             self.local.held_out,
         )
         centres = np.unique(np.rint(px).astype(int), axis=0)
-        surfaces = chips.match(centres, _CHIP_PX, _CHIP_RADIUS_PX, executor, progress)
+        surfaces = chips.match(centres, _CHIP_PX, radius_px, executor, progress)
         peaks = [find_peak(surface) for surface in surfaces.both]
         inside = np.array([not peak.at_border for peak in peaks], bool)
         shifts = np.array([peak.shift_px for peak in peaks]).reshape(-1, 2)[inside]
         heights = np.array([peak.height for peak in peaks])[inside]
         where = surfaces.centres[inside].astype(float)
-        return _Places(where, where + shifts, heights, (2 * _CHIP_RADIUS_PX + 1.0) ** 2)
+        return _Places(where, where + shifts, heights, (2 * radius_px + 1.0) ** 2)
 
     def _estimate(self, kind: str, places: _Places, coarse: Model, fit: Fit) -> Estimate:
         pair = self.local.pair

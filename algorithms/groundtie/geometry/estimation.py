@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,11 +52,21 @@ class Estimate:
         at_px
             Where to predict, pixel positions of the matching grid, shape (n, 2).
         """
-        count = len(self.fold_models)
-        if count < 2:
-            return np.full(len(at_px), np.inf)
-        predictions = [model(at_px) for model in self.fold_models]
-        return np.asarray(np.sqrt(np.var(predictions, axis=0).sum(axis=1) * (count - 1)))
+        return jackknife_spread(self.fold_models, at_px)
+
+
+def jackknife_spread(
+    fold_models: Sequence[Callable[[FloatArray], FloatArray]], at_px: FloatArray
+) -> FloatArray:
+    """Return the standard deviation of predictions, shape (n,), at positions, shape (n, 2).
+
+    Infinite for fewer than two models, each of which was fitted without one block of points.
+    """
+    count = len(fold_models)
+    if count < 2:
+        return np.full(len(at_px), np.inf)
+    predictions = [model(at_px) for model in fold_models]
+    return np.asarray(np.sqrt(np.var(predictions, axis=0).sum(axis=1) * (count - 1)))
 
 
 def fit_thin_plate(
