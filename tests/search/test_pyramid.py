@@ -25,6 +25,7 @@ from groundtie.rasters.reading import open_raster
 from groundtie.search.coarse import refine_on_level
 from groundtie.search.layout import lay_out_chips
 from groundtie.search.local import LocalSearch
+from groundtie.search.pose import Pose, PoseFound
 from groundtie.search.pyramid import find_coarse_model
 from groundtie.search.rough import (
     Candidate,
@@ -87,6 +88,16 @@ def test_candidates_on_a_coarser_level_are_in_map_units(
     level = pair.grid.scaled(2)
     found = rough_candidates(pair, level, RoughSearch(140.0), SETTINGS, nothing_held_out, executor)
     assert shift_m(found[0]) == pytest.approx((70, -45), abs=6)
+
+
+def test_low_candidates_of_any_search_are_left_out(pair: ImagePair, executor: Executor) -> None:
+    def poses(*given: object) -> list[PoseFound]:
+        places = ((0.0, 10.0), (20.0, 4.1), (-20.0, 3.9))
+        return [PoseFound(Pose(shift_px=(right, 0.0)), height) for right, height in places]
+
+    rough = RoughSearch(140.0, 10.0, (1.0, 1.0), poses)
+    found = rough_candidates(pair, pair.grid, rough, SETTINGS, nothing_held_out, executor)
+    assert [candidate.height for candidate in found] == [10.0, 4.1]
 
 
 @pytest.mark.parametrize("which", ["reference", "input"])

@@ -118,7 +118,8 @@ def rough_candidates(
     limits = windows.limits(rough.rotation_deg, rough.scale)
     both = windows.reference, windows.input
     found = rough.poses(*both, limits, settings, executor)[:CANDIDATES]
-    return [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in found]
+    high = [one for one in found if one.height > found[0].height * _LOW]
+    return [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in high]
 
 
 def _shifts(
