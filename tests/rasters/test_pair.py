@@ -14,7 +14,7 @@ from scipy.ndimage import binary_erosion
 
 from groundtie.errors import BandError, GeoreferencingError, NoOverlapError, SameFileError
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
-from groundtie.rasters.pair import Image, ImagePair, default_radius_m, make_pair
+from groundtie.rasters.pair import Image, ImagePair, Turn, default_radius_m, make_pair
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import RasterSource, open_raster
 
@@ -122,6 +122,25 @@ def test_the_grid_is_cut_to_what_may_overlap_and_keeps_the_references_lattice(
     assert pair.grid == GRID.window(15, 5, 90, 80)
     # By default the search reaches 200 m, beyond the reference's border.
     assert make_pair(files.image(), files.image(part)).grid == GRID.window(10, 0, 100, 90)
+
+
+@pytest.mark.parametrize(("largest_deg", "scale"), [(0.0, 1.0), (90.0, 1.0), (180.0, 1.4)])
+def test_the_grid_holds_all_that_a_turned_image_may_show(
+    files: Files, largest_deg: float, scale: float
+) -> None:
+    """Without georeferencing images have one centre."""
+    values = [np.arange(w * h, dtype=np.float32).reshape(h, w) for w, h in ((200, 160), (60, 40))]
+    images = [Image(files.open(image, None)) for image in values]
+    pair = make_pair(*images, search_radius_m=5.0, turn=Turn(largest_deg, scale))
+    assert pair.overlap_px == (60, 40)
+    # Turned by all angles up to the largest, the corners reach so far.
+    angle = np.radians(np.arange(0, largest_deg + 1e-9))
+    half = [30 * np.cos(angle) + 20 * np.sin(angle), 30 * np.sin(angle) + 20 * np.cos(angle)]
+    right, down = (scale * np.abs(reach).max() + 5 for reach in half)
+    first = pair.grid.pixel_to_map([[0, 0]])[0]
+    last = pair.grid.pixel_to_map([[pair.grid.width - 1, pair.grid.height - 1]])[0]
+    np.testing.assert_allclose(first, [99.5 - right, 79.5 - down], atol=1.1)
+    np.testing.assert_allclose(last, [99.5 + right, 79.5 + down], atol=1.1)
 
 
 def test_a_pixel_size_that_is_asked_for(files: Files) -> None:

@@ -112,6 +112,22 @@ def test_images_without_georeferencing_may_be_turned_and_larger(tmp_path: Path) 
     assert np.hypot(*off.T).max() < 1.5
 
 
+def test_what_a_coarser_image_shows_is_matched_all_over(tmp_path: Path) -> None:
+    """Without georeferencing, an image of fewer pixels may show just as much."""
+    pair = write_textured_pair(tmp_path, SIZE, shift_on_map(0, 0), noise=0.05)
+    reference = np.kron(pixels(pair.reference)[0], np.ones((2, 2), np.uint16))
+    plain = [
+        write_raster(tmp_path / f"{name}.tif", image)
+        for name, image in (("fine", reference), ("coarse", pixels(pair.input)[0]))
+    ]
+    found = match_optical(*plain, tmp_path / "out.tif", search_scale=2.2)
+    size = np.array(SIZE) * 2
+    assert (np.ptp(found.points.reference_xy, axis=0) > 0.75 * size).all()
+    corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (size - 1.0)
+    off = found.transform(corners) - (corners - 0.5) / 2
+    assert np.hypot(*off.T).max() < 1.0
+
+
 def bright_is_left_out(path: Path, limit: float) -> Path:
     """Write a classifier that leaves out patches with means above a limit."""
     random = np.random.default_rng(0)

@@ -23,6 +23,9 @@ ToPixel = Callable[[FloatArray], FloatArray]
 _EMPTY_PX = 9
 _EMPTY_MARGIN_PX = 5
 
+# Turned images are tried at angles this far apart for what they reach.
+_TURN_STEP_DEG = 5.0
+
 # Pixel sizes nearer than this are the same.
 _SAME_SIZE = 0.02
 
@@ -109,11 +112,31 @@ class ImagePair:
         return _claimed_pixels(self.grid, self.input.source.grid)(xy)
 
 
+@dataclass(frozen=True)
+class Turn:
+    """How far an image may be turned, either way, and how much larger or smaller it may be."""
+
+    largest_deg: float
+    largest_scale: float
+
+    def of(self, outline_px: FloatArray) -> FloatArray:
+        """Return all that an outline, shape (n, 2), reaches about its centre, shape (m, 2)."""
+        finite = outline_px[np.isfinite(outline_px).all(axis=1)]
+        centre = (finite.min(axis=0) + finite.max(axis=0)) / 2
+        steps = int(np.ceil(2 * self.largest_deg / _TURN_STEP_DEG)) + 1
+        angles = np.radians(np.linspace(-self.largest_deg, self.largest_deg, steps))
+        cosine, sine = np.cos(angles), np.sin(angles)
+        turns = np.array([[cosine, -sine], [sine, cosine]])
+        around = self.largest_scale * (finite - centre)
+        return np.asarray(centre + np.einsum("ijk,nj->kni", turns, around).reshape(-1, 2))
+
+
 def make_pair(
     reference: Image,
     input: Image,
     matching_pixel_size_m: float | None = None,
     search_radius_m: float | None = None,
+    turn: Turn | None = None,
 ) -> ImagePair:
     """Put two images on a common matching grid.
 
@@ -125,6 +148,9 @@ def make_pair(
         Pixel size of the matching grid; None: that of the coarser image.
     search_radius_m
         How far the input may lie from where it claims to be; None: as `default_radius_m`.
+    turn
+        How far it may be turned and scaled against what it claims; without georeferencing both
+        images then have one centre. None: not at all.
 
     Raises
     ------
@@ -147,11 +173,15 @@ def make_pair(
     factor = wanted / ref.grid.pixel_size_m
     grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
     outline = _claimed_pixels(inp.grid, ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
+    if turn is not None and not ref.grid.is_georeferenced:
+        outline = outline + np.subtract(ref.grid.centre_px, inp.grid.centre_px)
     outline = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
     overlap = _box(grid, outline, 0.0)
     if overlap is None:
         raise NoOverlapError(f"{ref.path} and {inp.path} do not overlap")
     radius = default_radius_m(grid) if search_radius_m is None else search_radius_m
+    if turn is not None:
+        outline = turn.of(outline)
     reach = _box(grid, outline, radius / grid.pixel_size_m)
     assert reach is not None
     return ImagePair(reference, input, grid.window(*reach), (overlap.width, overlap.height))

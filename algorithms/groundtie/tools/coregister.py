@@ -51,6 +51,7 @@ from .registration import (
     open_image,
     register,
     rough_search,
+    turn_within,
 )
 from .registration_parameters import (
     OUTPUTS,
@@ -214,11 +215,13 @@ def coregister(
     settings = SimilaritySettings(similarity, bins, binning, gpve_order)
     with ExitStack() as stack:
         stack.enter_context(bounded_cache())
+        turn = turn_within(search_rotation, search_scale, search)
         pair = make_pair(
             open_image(stack, reference, reference_band, reference_mask),
             open_image(stack, input, input_band, input_mask),
             matching_pixel_size,
             search_radius,
+            turn,
         )
         for note in ("deciding what takes part", *pair.notes()):
             progress.update(0.0, note)
@@ -237,7 +240,7 @@ def coregister(
             pair, lay_out_chips(pair, chip_size, spacing_px), settings, two_way_px=two_way_error
         )
         radius_m = default_radius_m(pair.grid) if search_radius is None else search_radius
-        rough = rough_search(radius_m, search_rotation, search_scale, search)
+        rough = rough_search(radius_m, turn, search)
         threads = worker_count(workers)
         with ThreadPoolExecutor(threads) as executor:
             result = register(

@@ -55,6 +55,7 @@ from .registration import (
     open_image,
     register,
     rough_search,
+    turn_within,
 )
 from .registration_parameters import (
     OUTPUTS,
@@ -185,7 +186,13 @@ def match_optical(
         there = open_image(stack, reference, reference_band, reference_mask)
         here = open_image(stack, input, input_band, input_mask)
         radius_m = free_radius(here) if search_radius is None else search_radius
-        pair = make_pair(there, here, matching_pixel_size, radius_m)
+        is_free = not here.source.grid.is_georeferenced
+        turn = turn_within(
+            180.0 * is_free if search_rotation is None else search_rotation,
+            (_FREE_SCALE if is_free else 1.0) if search_scale is None else search_scale,
+            search,
+        )
+        pair = make_pair(there, here, matching_pixel_size, radius_m, turn)
         for note in pair.notes():
             progress.update(0.0, note)
         local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings(similarity))
@@ -205,12 +212,8 @@ def match_optical(
             refinement_settings(refinement),
             _FIRST_KIND if kind == AUTO else None,
         )
-        is_free = not here.source.grid.is_georeferenced
         rough = rough_search(
-            default_radius_m(pair.grid) if radius_m is None else radius_m,
-            180.0 * is_free if search_rotation is None else search_rotation,
-            (_FREE_SCALE if is_free else 1.0) if search_scale is None else search_scale,
-            search,
+            default_radius_m(pair.grid) if radius_m is None else radius_m, turn, search
         )
         threads = worker_count(workers)
         with ThreadPoolExecutor(threads) as executor:

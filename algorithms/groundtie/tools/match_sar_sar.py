@@ -58,6 +58,7 @@ from .registration import (
     open_image,
     register,
     rough_search,
+    turn_within,
 )
 from .registration_parameters import (
     OUTPUTS,
@@ -162,7 +163,11 @@ def match_sar_sar(
         there = open_image(stack, reference, reference_band, reference_mask)
         here = open_image(stack, input, input_band, input_mask)
         radius_m = free_radius(here) if search_radius is None else search_radius
-        pair = make_pair(there, here, matching_pixel_size, radius_m)
+        turned = 0.0 if here.source.grid.is_georeferenced else 180.0
+        turn = turn_within(
+            turned if search_rotation is None else search_rotation, search_scale, search
+        )
+        pair = make_pair(there, here, matching_pixel_size, radius_m, turn)
         for note in pair.notes():
             progress.update(0.0, note)
         ground = pair
@@ -183,12 +188,8 @@ def match_sar_sar(
             local,
             refinement_settings(refinement),
         )
-        turned = 0.0 if here.source.grid.is_georeferenced else 180.0
         rough = rough_search(
-            default_radius_m(pair.grid) if radius_m is None else radius_m,
-            turned if search_rotation is None else search_rotation,
-            search_scale,
-            search,
+            default_radius_m(pair.grid) if radius_m is None else radius_m, turn, search
         )
         threads = worker_count(workers)
         with ThreadPoolExecutor(threads) as executor:

@@ -27,7 +27,7 @@ from ..progress import Progress
 from ..quality.report import Report
 from ..quality.verdict import Verdict, judge, refuse
 from ..rasters.atomic import Outputs, writing
-from ..rasters.pair import Image, ImagePair
+from ..rasters.pair import Image, ImagePair, Turn
 from ..rasters.reading import open_raster
 from ..search.local import AUTO, LocalSearch
 from ..search.pose_searches import DEFAULT_SEARCH, SEARCHES
@@ -124,16 +124,19 @@ def free_radius(input: Image) -> float | None:
     return None if grid.is_georeferenced else _FREE_SHARE * max(grid.width, grid.height)
 
 
-def rough_search(
-    radius_m: float, rotation_deg: float, largest_scale: float, name: str
-) -> RoughSearch:
+def turn_within(rotation_deg: float, largest_scale: float, search: str) -> Turn | None:
+    """Return how far the input may be turned and scaled; None: shifts alone are searched for."""
+    shifted = search == AUTO and rotation_deg == 0 and largest_scale == 1
+    return None if shifted else Turn(rotation_deg, largest_scale)
+
+
+def rough_search(radius_m: float, turn: Turn | None, search: str) -> RoughSearch:
     """Return the search of a name within limits; "auto": all shifts, or else rotation steps."""
-    beyond_shifts = rotation_deg > 0 or largest_scale > 1
-    if name == AUTO:
-        poses = SEARCHES[DEFAULT_SEARCH] if beyond_shifts else None
-    else:
-        poses = SEARCHES[name]
-    return RoughSearch(radius_m, rotation_deg, (1 / largest_scale, largest_scale), poses)
+    if turn is None:
+        return RoughSearch(radius_m)
+    poses = SEARCHES[DEFAULT_SEARCH if search == AUTO else search]
+    scale = turn.largest_scale
+    return RoughSearch(radius_m, turn.largest_deg, (1 / scale, scale), poses)
 
 
 def register(
