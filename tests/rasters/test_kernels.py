@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.ndimage import map_coordinates
 
 from groundtie.rasters.kernels import REACH, interpolate
 
@@ -54,7 +55,22 @@ def test_the_lanczos_kernel_is_a_windowed_sinc() -> None:
     np.testing.assert_allclose(impulse_response("lanczos", 0.3)[7:15], expected / expected.sum())
 
 
+@pytest.mark.parametrize("positions", [np.float32, np.float64])
 @pytest.mark.parametrize("method", KERNELS)
-def test_far_outside_there_is_nothing(method: str) -> None:
-    px = np.array([[[-1e9, 1e9, 5, 5]], [[5, 5, -1e9, 1e9]]])
+def test_far_outside_there_is_nothing(method: str, positions: type) -> None:
+    px = np.array([[[-1e9, 1e9, 5, 5]], [[5, 5, -1e9, 1e9]]], positions)
     assert not interpolate(np.ones((10, 10), np.float32), px, method).any()
+
+
+@pytest.mark.parametrize("positions", [np.float32, np.float64])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.complex64])
+def test_bilinear_values_are_scipys(positions: type, dtype: type) -> None:
+    """To 1e-4 pixels, the step of single precision there; beyond the borders all is 0."""
+    random = np.random.default_rng(0)
+    image = random.normal(size=(700, 900)).astype(dtype)
+    px = random.uniform(-3, [[[903]], [[703]]], (2, 60, 500)).astype(positions)
+    found = interpolate(image, px, "bilinear")
+    padded = np.pad(image, 4)
+    expected = map_coordinates(padded, px[::-1].astype(float) + 4, order=1, prefilter=False)
+    assert found.dtype == dtype
+    np.testing.assert_allclose(found, expected, atol=5e-4)

@@ -16,6 +16,7 @@ from groundtie.rasters.warping import (
     METHODS,
     coordinates,
     lattice,
+    lies_within,
     reduction,
     resample,
     sample,
@@ -81,10 +82,10 @@ def test_positions_outside_of_a_projection_are_nowhere() -> None:
 
 def test_a_lattice_knows_whether_it_lies_on_the_image() -> None:
     nodes = lattice(PLANE, lambda xy: xy)
-    assert nodes.lies_within(100, 80)
-    assert not nodes.lies_within(99, 80)
-    assert not lattice(PLANE, lambda xy: xy - 0.6).lies_within(100, 80)
-    assert lattice(PLANE, lambda xy: xy * 0.5 + 10).lies_within(100, 80)
+    assert lies_within(nodes, 100, 80)
+    assert not lies_within(nodes, 99, 80)
+    assert not lies_within(lattice(PLANE, lambda xy: xy - 0.6), 100, 80)
+    assert lies_within(lattice(PLANE, lambda xy: xy * 0.5 + 10), 100, 80)
 
 
 def shifted(image: np.ndarray, dx: float, dy: float, method: str) -> tuple[np.ndarray, np.ndarray]:

@@ -15,6 +15,7 @@ from rpc_models import REAL, camera_rpc, real_tags, to_rasterio, write_dem, writ
 from groundtie.errors import NoOverlapError
 from groundtie.rasters.grid import Grid, reproject
 from groundtie.rasters.reading import open_raster
+from groundtie.sensor import dense as dense_module
 from groundtie.sensor.dense import DenseOrientation
 from groundtie.sensor.orientation import Orientation, orient, sensor_grid
 from groundtie.sensor.rpc_tags import rpc_from_tags
@@ -87,7 +88,12 @@ def test_the_dense_positions_are_the_single_ones(tmp_path: Path, crs: str, pixel
     assert np.abs(dense - single).max() < 2e-3
 
 
-def test_houses_in_a_surface_model_are_seen_by_the_dense_positions(tmp_path: Path) -> None:
+@pytest.mark.parametrize("largest_px", [4096, 50])
+def test_houses_in_a_surface_model_are_seen_by_the_dense_positions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, largest_px: int
+) -> None:
+    """Also where the model is so fine that a tile is worked in parts."""
+    monkeypatch.setattr(dense_module, "_LARGEST_PX", largest_px)
     grid = Grid(Affine(1, 0, 499_000, 0, -1, 5_000_800), UTM, 2000, 1800)
     heights = np.full((1800, 2000), 200, np.float32)
     heights[::37, ::41] += 60  # posts of a metre: no lattice meets them by chance

@@ -22,6 +22,7 @@ from .warping import (
     coordinates,
     inside_window,
     lattice,
+    lies_within,
     reduced_shape,
     reduction,
     resample,
@@ -216,7 +217,7 @@ def _is_covered(warp: _Warp) -> bool:
         return False
     grid = warp.source.grid
     return all(
-        lattice(warp.target.window(*tile), warp.to_input_px).lies_within(grid.width, grid.height)
+        lies_within(lattice(warp.target.window(*tile), warp.to_input_px), grid.width, grid.height)
         for tile in tiles(warp.target)
     )
 

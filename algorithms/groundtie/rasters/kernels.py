@@ -1,7 +1,8 @@
 """Interpolation by a kernel, exact at any position.
 
-OpenCV's `remap` is not used: its cubic kernel (a = -0.75) does not reproduce a ramp, which moves
-the image by up to 0.05 px, and until OpenCV 5 it rounds positions to 1/32 px.
+OpenCV's `remap` is only used for what it does exactly, since OpenCV 5: bilinear interpolation in
+single precision. Before, it rounded positions to 1/32 px; its cubic kernel (a = -0.75) does not
+reproduce a ramp, which moves the image by up to 0.05 px.
 """
 
 from __future__ import annotations
@@ -9,10 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 Weights = Callable[[NDArray[Any]], list[NDArray[Any]]]
+
+_REMAP_IS_EXACT = int(cv2.__version__.split(".")[0]) >= 5
+_REMAP_SIDE = 1 << 15
 
 # Pixels that are worked at a time: what they need stays in the processor's cache.
 _BLOCK_PIXELS = 1 << 14
@@ -63,7 +68,7 @@ _KERNELS: dict[str, Weights] = {"bilinear": _bilinear, "cubic": _cubic, "lanczos
 REACH = {"nearest": 1, "bilinear": 1, "cubic": 2, "lanczos": 4}
 
 
-def interpolate(image: NDArray[Any], px: NDArray[np.float64], method: str) -> NDArray[Any]:
+def interpolate(image: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[Any]:
     """Interpolate an image; beyond its borders it is 0.
 
     Parameters
@@ -71,7 +76,7 @@ def interpolate(image: NDArray[Any], px: NDArray[np.float64], method: str) -> ND
     image
         Shape (h, w), floating-point or complex.
     px
-        Columns and rows of the positions, shape (2, m, n).
+        Columns and rows of the positions, shape (2, m, n); they are worked in their own precision.
     method
         "bilinear", "cubic" or "lanczos".
 
@@ -79,25 +84,49 @@ def interpolate(image: NDArray[Any], px: NDArray[np.float64], method: str) -> ND
     -------
     Shape (m, n), dtype of the image.
     """
+    if method == "bilinear" and _is_for_remap(image, px):
+        return np.asarray(cv2.remap(image, px[0], px[1], cv2.INTER_LINEAR))
     kernel, reach = _KERNELS[method], REACH[method]
+    height, width = image.shape
     # Positions up to a pixel outside, with all that their kernels take.
-    padded = np.pad(image, ((reach, reach + 1), (reach, reach + 1)))
-    width, flat = padded.shape[1], padded.ravel()
-    out = np.empty(px.shape[1:], image.dtype)
-    lines = max(_BLOCK_PIXELS // max(out.shape[1], 1), 1)
-    for first in range(0, len(out), lines):
-        rows = slice(first, first + lines)
-        x = np.clip(px[0, rows], -1, image.shape[1])
-        y = np.clip(px[1, rows], -1, image.shape[0])
-        left, top = np.floor(x), np.floor(y)
-        across = kernel((x - left).astype(image.real.dtype))
-        down = kernel((y - top).astype(image.real.dtype))
-        corner = (top.astype(np.intp) + 1) * width + left.astype(np.intp) + 1
-        total = np.zeros(x.shape, image.dtype)
-        for j in range(2 * reach):
-            line = np.zeros(x.shape, image.dtype)
-            for i in range(2 * reach):
-                line += across[i] * flat.take(corner + (j * width + i))
-            total += down[j] * line
-        out[rows] = total
-    return out
+    padded = np.zeros((height + 2 * reach + 1, width + 2 * reach + 1), image.dtype)
+    padded[reach : reach + height, reach : reach + width] = image
+    flat, stride = padded.ravel(), padded.shape[1]
+    x, y = (np.asarray(axis).ravel() for axis in px)
+    out = np.empty(x.shape, image.dtype)
+    for start in range(0, len(x), _BLOCK_PIXELS):
+        part = slice(start, start + _BLOCK_PIXELS)
+        left, right_share = _split(x[part], width)
+        top, lower_share = _split(y[part], height)
+        across = kernel(right_share.astype(image.real.dtype, copy=False))
+        down = kernel(lower_share.astype(image.real.dtype, copy=False))
+        corner = (top + 1) * stride
+        corner += left + 1
+        total, line, value = out[part], *np.empty((2, len(corner)), image.dtype)
+        for j, weight in enumerate(down):
+            for i, share in enumerate(across):
+                into = value if i else line
+                # Clipping, for which there is no need, is faster than a check.
+                flat[j * stride + i :].take(corner, out=into, mode="clip")
+                into *= share
+                if i:
+                    line += value
+            line *= weight
+            if j:
+                total += line
+            else:
+                total[:] = line
+    return out.reshape(px.shape[1:])
+
+
+def _is_for_remap(image: NDArray[Any], px: NDArray[Any]) -> bool:
+    single = image.dtype == np.float32 and px.dtype == np.float32
+    return _REMAP_IS_EXACT and single and image.size > 0 and max(image.shape) < _REMAP_SIDE
+
+
+def _split(x: NDArray[Any], size: int) -> tuple[NDArray[np.intp], NDArray[Any]]:
+    """Return the pixels left of positions along an axis, and how far right of them they lie."""
+    if x.min() < -1 or x.max() > size:
+        x = np.clip(x, -1, size)
+    left = np.floor(x)
+    return left.astype(np.intp), x - left

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import cv2
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .grid import Grid
 from .kernels import REACH, interpolate
+from .lattice import Lattice, fine_lattice, row_strips
 from .reading import FloatImage, Mask, RasterSource, Window, working_dtype
 
 FloatArray = NDArray[np.float64]
@@ -20,11 +20,16 @@ ToInputPx = Callable[[FloatArray], FloatArray]
 METHODS = tuple(REACH)
 
 # Interpolating between the nodes of the lattice may be wrong by this much.
-_TOLERANCE_PX = 0.01
-_FIRST_STEP = 64
+_TOLERANCE_PX = 0.005
 
 # Positions nearer than this to pixels lie on them: map coordinates have no more digits.
 _ON_PIXELS = 1e-6
+_SPARSE = 61
+
+# Within windows of fewer pixels a side, single precision holds multiples of 1/8192; a sum with this
+# number, in double precision, is one.
+_SINGLE_PX = 2000
+_ROUNDING = 1.5 * 2.0**39
 
 # Stands for positions that are not finite: outside of every image.
 _NOWHERE = -1e9
@@ -44,34 +49,8 @@ class DenseMap(Protocol):
         """Return the input column and row of every pixel of a grid, shape (2, height, width)."""
 
 
-@dataclass(frozen=True)
-class Lattice:
-    """Input positions at the nodes of a lattice in a grid, dense enough to interpolate between.
-
-    Parameters
-    ----------
-    rows, cols
-        Rows and columns of the grid where the nodes are, rising, from first to last.
-    px
-        Input columns and rows at the nodes, shape (2, rows, cols).
-    """
-
-    rows: NDArray[np.int_]
-    cols: NDArray[np.int_]
-    px: FloatArray
-
-    def at(self, rows: NDArray[np.int_], cols: NDArray[np.int_]) -> FloatArray:
-        """Return the input positions, shape (2, rows, cols), at other rows and columns."""
-        return _between(_between(self.px, self.rows, rows, 1), self.cols, cols, 2)
-
-    def lies_within(self, width: int, height: int) -> bool:
-        """Tell whether all positions, also between nodes, lie on pixels of an image."""
-        size = np.array([width, height])[:, None, None]
-        return bool(np.all((self.px > -0.49) & (self.px < size - 0.51)))
-
-
 def lattice(grid: Grid, to_input_px: ToInputPx) -> Lattice:
-    """Evaluate a map at a lattice of pixels, halving its step until interpolation is exact enough.
+    """Return input positions at a lattice of pixels, fine enough to interpolate between.
 
     Parameters
     ----------
@@ -79,20 +58,20 @@ def lattice(grid: Grid, to_input_px: ToInputPx) -> Lattice:
         The pixels in question.
     to_input_px
         Takes map positions of the grid, shape (n, 2), to input pixels (col, row), shape (n, 2).
+        Positions that are not finite become NaN.
     """
-    step = min(_FIRST_STEP, 1 << max(grid.width, grid.height).bit_length())
-    coarse = _evaluate(grid, to_input_px, step)
-    while step > 1:
-        step //= 2
-        fine = _evaluate(grid, to_input_px, step)
-        if not np.isfinite(fine.px).all():
-            fine = _evaluate(grid, to_input_px, 1)
-            return Lattice(fine.rows, fine.cols, np.where(np.isfinite(fine.px), fine.px, _NOWHERE))
-        error = np.abs(coarse.at(fine.rows, fine.cols) - fine.px).max()
-        if error < _TOLERANCE_PX:
-            return fine
-        coarse = fine
-    return coarse
+
+    def finite(xy: FloatArray) -> FloatArray:
+        px = np.asarray(to_input_px(xy), float)
+        return np.where(np.isfinite(px), px, np.nan)
+
+    return fine_lattice(grid, finite, _TOLERANCE_PX)
+
+
+def lies_within(nodes: Lattice, width: int, height: int) -> bool:
+    """Tell whether all positions of a lattice lie on pixels of an image of a size."""
+    low, high = nodes.bounds()
+    return bool(np.all((low > -0.49) & (high < np.array([width, height]) - 0.51)))
 
 
 def coordinates(grid: Grid, to_input_px: ToInputPx) -> FloatArray:
@@ -103,10 +82,12 @@ def coordinates(grid: Grid, to_input_px: ToInputPx) -> FloatArray:
     if isinstance(to_input_px, DenseMap):
         return to_input_px.coordinates(grid)
     nodes = lattice(grid, to_input_px)
-    rows, cols = np.arange(grid.height), np.arange(grid.width)
-    if len(nodes.rows) == grid.height and len(nodes.cols) == grid.width:
-        return nodes.px
-    return nodes.at(rows, cols)
+    px = np.empty((2, grid.height, grid.width))
+    for rows in row_strips(grid.height, grid.width):
+        px[:, rows] = nodes.lines(rows)
+    if np.isnan(nodes.values).any():
+        px[np.isnan(px)] = _NOWHERE
+    return px
 
 
 def resample(
@@ -144,7 +125,8 @@ def resample(
     """
     px = np.asarray(px)
     dtype = image.dtype if dtype is None else dtype
-    if np.abs(px - np.rint(px)).max(initial=0) < _ON_PIXELS:
+    # A few tell mostly, fast, that they do not lie on pixels.
+    if _on_pixels(px[:, ::_SPARSE, ::_SPARSE]) and _on_pixels(px):
         method = "nearest"  # every kernel gives the pixel itself
     if method != "nearest" and valid.all() and _touches_no_border(px, image.shape, method):
         values = interpolate(image.astype(working_dtype(image.dtype), copy=False), px, method)
@@ -252,45 +234,43 @@ def reduced_shape(window: Window, factor: tuple[int, int]) -> tuple[int, int] | 
     return None if factor == (1, 1) else (window.height // factor[1], window.width // factor[0])
 
 
-def inside_window(px: FloatArray, window: Window, factor: tuple[int, int]) -> FloatArray:
-    """Return positions, shape (2, m, n), in the pixels of a window averaged by `factor`."""
-    corner = np.array([window.col, window.row])[:, None, None]
-    step = np.array(factor)[:, None, None]
-    return np.asarray((px - corner + 0.5) / step - 0.5)
+def inside_window(px: FloatArray, window: Window, factor: tuple[int, int]) -> NDArray[Any]:
+    """Return positions, shape (2, m, n), in the pixels of a window averaged by `factor`.
+
+    In windows that are not too large they are rounded to 1/8192 pixel, which single precision
+    holds: so that it serves, and that the same place is the same in another window.
+    """
+    single = max(window.width / factor[0], window.height / factor[1]) < _SINGLE_PX
+    inside = np.empty(px.shape, np.float32 if single else np.float64)
+    corner = (window.col, window.row)
+    for rows in row_strips(*px.shape[1:]):
+        for axis, out, first, step in zip(px, inside, corner, factor, strict=True):
+            local = axis[rows] - (first + (step - 1) / 2)
+            if step > 1:
+                local /= step
+            if single:
+                local += _ROUNDING
+                local -= _ROUNDING
+            out[rows] = local
+    return inside
 
 
-def _evaluate(grid: Grid, to_input_px: ToInputPx, step: int) -> Lattice:
-    rows, cols = (
-        np.unique(np.append(np.arange(0, size, step), size - 1))
-        for size in (grid.height, grid.width)
-    )
-    nodes = np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2)
-    px = np.asarray(to_input_px(grid.pixel_to_map(nodes)), float)
-    return Lattice(rows, cols, px.T.reshape(2, len(rows), len(cols)))
+def _on_pixels(px: NDArray[Any]) -> bool:
+    return bool(np.abs(px - np.rint(px)).max(initial=0) < _ON_PIXELS)
 
 
-def _between(
-    values: FloatArray, nodes: NDArray[np.int_], places: NDArray[np.int_], axis: int
-) -> FloatArray:
-    """Interpolate linearly along an axis, from values at rising nodes to those at places."""
-    if len(nodes) == 1:
-        return np.repeat(values, len(places), axis)
-    left = np.clip(np.searchsorted(nodes, places, side="right") - 1, 0, len(nodes) - 2)
-    share = (places - nodes[left]) / (nodes[left + 1] - nodes[left])
-    low, high = values.take(left, axis), values.take(left + 1, axis)
-    return np.asarray(
-        low + np.expand_dims(share, tuple(range(1, values.ndim - axis))) * (high - low)
-    )
-
-
-def _touches_no_border(px: FloatArray, shape: tuple[int, ...], method: str) -> bool:
+def _touches_no_border(px: NDArray[Any], shape: tuple[int, ...], method: str) -> bool:
     reach = REACH[method]
-    last = np.array(shape[::-1])[:, None, None] - 1
-    return bool(np.all((px >= reach) & (px <= last - reach)))
+    return all(
+        axis.min() >= reach and axis.max() <= size - 1 - reach
+        for axis, size in zip(px, shape[::-1], strict=True)
+    )
 
 
 def _rounded(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return floating-point values, which are lost, in another type."""
     if dtype.kind in "fc" or values.dtype == dtype:
         return values.astype(dtype, copy=False)
     limits = np.iinfo(dtype)
-    return np.clip(np.rint(values), limits.min, limits.max).astype(dtype)
+    np.rint(values, out=values)
+    return np.clip(values, limits.min, limits.max, out=values).astype(dtype)

@@ -82,8 +82,8 @@ def create_like(
         with rasterio.open(path, "w", **profile) as dataset:
             _describe(dataset, source)
             yield dataset
-        check_complete(path)
-        _add_overviews(path, nearest=source.colormap is not None)
+            # Before it is closed: the compression is that of the pixels.
+            _add_overviews(dataset, nearest=source.colormap is not None)
         check_complete(path)
 
 
@@ -208,15 +208,14 @@ def _describe(dataset: Any, source: RasterSource) -> None:
         dataset.units = [band.unit or "" for band in bands]
 
 
-def _add_overviews(path: str | os.PathLike[str], *, nearest: bool) -> None:
-    with rasterio.open(path, "r+") as dataset:
-        factors: list[int] = []
-        size = max(dataset.width, dataset.height)
-        while size > BLOCK:
-            factors.append(2 << len(factors))
-            size = -(-size // 2)
-        if factors:
-            dataset.build_overviews(factors, Resampling.nearest if nearest else Resampling.average)
+def _add_overviews(dataset: Any, *, nearest: bool) -> None:
+    factors: list[int] = []
+    size = max(dataset.width, dataset.height)
+    while size > BLOCK:
+        factors.append(2 << len(factors))
+        size = -(-size // 2)
+    if factors:
+        dataset.build_overviews(factors, Resampling.nearest if nearest else Resampling.average)
 
 
 def _gdal_errors() -> tuple[type[Exception], ...]:

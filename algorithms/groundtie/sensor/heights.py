@@ -6,17 +6,20 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 import rasterio
 from numpy.typing import NDArray
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
-from ..rasters.reading import RasterSource
+from ..rasters.grid import Grid
+from ..rasters.lattice import Lattice
+from ..rasters.reading import FloatImage, RasterSource
 from .smooth_map import Positions
-from .surfaces import RasterSurface, surface_over
+from .surfaces import RasterSurface, SurfacePiece, surface_over
 
 FloatArray = NDArray[np.float64]
 
@@ -31,8 +34,8 @@ DATUMS = (ELLIPSOIDAL, *GEOID_GRIDS)
 
 
 # Takes a smooth function of longitude and latitude, (n, 2) → (n, k), and its largest error; returns
-# its values at all pixels of a grid, k times (h, w).
-OnPixels = Callable[[Positions, float], list[FloatArray]]
+# its values for all pixels of a grid.
+OnNodes = Callable[[Positions, float], Lattice]
 
 # Interpolation between nodes may be wrong by this: pixels of the terrain model, and metres.
 _TOLERANCE_PX = 1e-3
@@ -49,8 +52,23 @@ class Heights(Protocol):
     def at(self, lon_lat: FloatArray) -> FloatArray:
         """Return heights in metres, shape (n,), at longitudes and latitudes; NaN if unknown."""
 
-    def on_pixels(self, on_pixels: OnPixels) -> FloatArray:
-        """Return heights in metres at all pixels of a grid, shape (h, w)."""
+    def on_grid(self, on_nodes: OnNodes) -> HeightsOnGrid | None:
+        """Return the heights at all pixels of a grid; None if none is known."""
+
+
+class HeightsOnGrid(Protocol):
+    """Heights above the ellipsoid at all pixels of a grid."""
+
+    @property
+    def side_px(self) -> float:
+        """How many pixels of a terrain model lie along the grid."""
+
+    @property
+    def bounds_m(self) -> tuple[float, float]:
+        """Bounds that no height exceeds."""
+
+    def lines(self, rows: slice) -> FloatImage:
+        """Return heights in metres at the pixels of some rows; NaN if unknown."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +86,26 @@ class ConstantHeight:
         """Return heights in metres, shape (n,)."""
         return np.full(len(lon_lat), self.height_m)
 
-    def on_pixels(self, on_pixels: OnPixels) -> FloatArray:
-        """Return heights in metres at all pixels of a grid, shape (h, w)."""
-        return on_pixels(lambda lon_lat: self.at(lon_lat)[:, None], _TOLERANCE_M)[0]
+    def on_grid(self, on_nodes: OnNodes) -> HeightsOnGrid | None:
+        """Return the height at all pixels of a grid."""
+        return _ConstantOnGrid(self.height_m, on_nodes(np.zeros_like, _TOLERANCE_M).grid)
+
+
+@dataclass(frozen=True)
+class _ConstantOnGrid:
+    height_m: float
+    grid: Grid
+    side_px: ClassVar[float] = 0.0
+
+    @property
+    def bounds_m(self) -> tuple[float, float]:
+        """The height, twice."""
+        return self.height_m, self.height_m
+
+    def lines(self, rows: slice) -> FloatImage:
+        """Return the height at the pixels of some rows."""
+        lines = len(range(self.grid.height)[rows])
+        return np.full((lines, self.grid.width), self.height_m, np.float32)
 
 
 @dataclass(frozen=True)
@@ -104,13 +139,72 @@ class TerrainHeights:
             heights = heights + self.geoid.at(lon_lat)
         return heights + self.offset_m
 
-    def on_pixels(self, on_pixels: OnPixels) -> FloatArray:
-        """Return heights in metres at all pixels of a grid, shape (h, w)."""
-        heights = self.terrain.at_pixels(*on_pixels(self.terrain.to_px, _TOLERANCE_PX))
-        geoid = self.geoid
-        if geoid is not None:
-            heights += on_pixels(lambda lon_lat: geoid.at(lon_lat)[:, None], _TOLERANCE_M)[0]
-        return heights + self.offset_m if self.offset_m else heights
+    def on_grid(self, on_nodes: OnNodes) -> HeightsOnGrid | None:
+        """Return the heights at all pixels of a grid; None if none is known."""
+        place = on_nodes(self.terrain.to_px, _TOLERANCE_PX)
+        geoid = None
+        if self.geoid is not None:
+            surface = self.geoid
+            geoid = on_nodes(lambda lon_lat: surface.at(lon_lat)[:, None], _TOLERANCE_M)
+        known = place.values[:, np.isfinite(place.values).all(axis=0)].T
+        if not len(known) or (geoid is not None and np.isnan(geoid.values).all()):
+            return None
+        return _TerrainOnGrid(self, known, place, geoid)
+
+
+@dataclass(frozen=True)
+class _TerrainOnGrid:
+    """Heights of a terrain model at all pixels of a grid.
+
+    Parameters
+    ----------
+    heights
+        The model.
+    corners
+        Its pixels between which the grid lies, shape (n, 2).
+    place
+        Where the grid's pixels lie in the model, its columns and rows.
+    geoid
+        Heights of the geoid.
+    """
+
+    heights: TerrainHeights
+    corners: FloatArray
+    place: Lattice
+    geoid: Lattice | None
+
+    @property
+    def side_px(self) -> float:
+        """How many pixels of the model lie along the grid."""
+        return float(np.ptp(self.corners, axis=0).max())
+
+    @cached_property
+    def _piece(self) -> SurfacePiece:
+        return self.heights.terrain.piece(self.corners)
+
+    @cached_property
+    def _local(self) -> Lattice:
+        return self.place.minus(self._piece.corner)
+
+    @property
+    def bounds_m(self) -> tuple[float, float]:
+        """Bounds that no height exceeds."""
+        image, geoid = self._piece.image, self.geoid
+        zero = self.heights.offset_m
+        low, high = (0.0, 0.0) if geoid is None else _range(geoid.values)
+        return zero + float(image.min()) + low, zero + float(image.max()) + high
+
+    def lines(self, rows: slice) -> FloatImage:
+        """Return heights in metres at the pixels of some rows; NaN if unknown."""
+        height = self._piece.at(*self._local.lines(rows))
+        if self.geoid is not None:
+            height += self.geoid.lines(rows)[0]
+        height += self.heights.offset_m
+        return height
+
+
+def _range(values: FloatArray) -> tuple[float, float]:
+    return float(np.nanmin(values)), float(np.nanmax(values))
 
 
 def terrain_heights(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,8 @@ from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
 from ..rasters.grid import reproject
-from ..rasters.reading import RasterSource, Window
+from ..rasters.kernels import interpolate
+from ..rasters.reading import FloatImage, Mask, RasterSource, Window
 from .smooth_map import Positions, smooth_map
 from .voids import fill_voids
 
@@ -20,9 +22,6 @@ LON_LAT = CRS.from_epsg(4326)
 
 # Pixels of the raster that are read at a time, a side.
 _BLOCK = 1024
-
-# Points that are interpolated at a time: what they need stays in the processor's cache.
-_POINTS = 1 << 14
 
 # Voids are filled from the region reduced to at most so many pixels a side.
 _FILL_SIDE = 512
@@ -58,84 +57,86 @@ class RasterSurface:
     source: RasterSource
     to_px: Positions
     region: Window
-    filled: NDArray[np.float32]
+    filled: FloatImage
     void_share: float
 
     def at(self, lon_lat: FloatArray) -> FloatArray:
         """Return the values, shape (n,), at longitudes and latitudes; NaN beyond the raster."""
-        return self.at_pixels(*self.to_px(lon_lat).T)
-
-    def at_pixels(self, cols: FloatArray, rows: FloatArray) -> FloatArray:
-        """Return the values at columns and rows, all of one shape; NaN beyond the raster."""
-        width, height = self.source.grid.width, self.source.grid.height
-        if cols.size == 0:
-            return np.zeros(cols.shape)
-        box = cols.min(), rows.min(), cols.max(), rows.max()
-        if min(box[:2]) >= 0 and box[2] <= width - 1 and box[3] <= height - 1:
-            return self._inside(cols.ravel(), rows.ravel()).reshape(cols.shape)
-        # So that NaN is outside, too.
-        on_it = (cols >= -_MARGIN_PX) & (cols <= width - 1 + _MARGIN_PX)
-        on_it &= (rows >= -_MARGIN_PX) & (rows <= height - 1 + _MARGIN_PX)
-        values = np.full(cols.shape, np.nan)
-        if on_it.any():
-            values[on_it] = self._inside(
-                np.clip(cols[on_it], 0, width - 1), np.clip(rows[on_it], 0, height - 1)
-            )
+        px = self.to_px(lon_lat)
+        values = np.full(len(px), np.nan)
+        for part in _parts(px):
+            piece = self.piece(px[part])
+            values[part] = piece.at(*(px[part] - piece.corner).T)
         return values
 
-    def _inside(self, cols: FloatArray, rows: FloatArray) -> FloatArray:
-        if max(np.ptp(cols), np.ptp(rows)) < 2 * _BLOCK:
-            return self._in_window(cols, rows)
-        values = np.empty(len(cols))
-        block = (cols // _BLOCK).astype(int) + (1 << 20) * (rows // _BLOCK).astype(int)
-        for each in np.unique(block):
-            here = block == each
-            values[here] = self._in_window(cols[here], rows[here])
-        return values
-
-    def _in_window(self, cols: FloatArray, rows: FloatArray) -> FloatArray:
-        left, top = int(cols.min()), int(rows.min())
-        window = Window(left, top, int(cols.max()) + 2 - left, int(rows.max()) + 2 - top)
+    def piece(self, px: FloatArray) -> SurfacePiece:
+        """Return the part of the surface that some of its pixel positions, (n, 2), need."""
+        size = np.array([self.source.grid.width, self.source.grid.height])
+        left, top = np.clip(np.floor(px.min(axis=0)), 0, size - 1).astype(int).tolist()
+        right, bottom = np.clip(np.floor(px.max(axis=0)) + 1, 0, size - 1).astype(int).tolist()
+        window = Window(left, top, right + 1 - left, bottom + 1 - top)
         image, valid = read_heights(self.source, window)
         if not valid.all():
             void_rows, void_cols = np.nonzero(~valid)
             image[void_rows, void_cols] = self._fill_at(void_cols + left, void_rows + top)
-        return _bilinear(image, cols, rows, left, top)
+        return SurfacePiece(image, np.array([left, top], float))
 
-    def _fill_at(self, cols: NDArray[np.int_], rows: NDArray[np.int_]) -> FloatArray:
+    def _fill_at(self, cols: NDArray[np.int_], rows: NDArray[np.int_]) -> FloatImage:
         height, width = self.filled.shape
         x = (cols - self.region.col + 0.5) * width / self.region.width - 0.5
         y = (rows - self.region.row + 0.5) * height / self.region.height - 0.5
-        padded = np.pad(self.filled, ((0, 1), (0, 1)), mode="edge")
-        return _bilinear(padded, np.clip(x, 0, width - 1), np.clip(y, 0, height - 1), 0, 0)
+        inside = np.stack([np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)])
+        return interpolate(self.filled, inside[:, None], "bilinear")[0]
 
 
-def _bilinear(
-    image: NDArray[np.float32], x: FloatArray, y: FloatArray, first_x: int, first_y: int
-) -> FloatArray:
-    """Return values, (n,), of an image whose first pixel lies at (first_x, first_y).
+@dataclass(frozen=True)
+class SurfacePiece:
+    """A part of a surface in memory.
 
-    Positions lie left of its last column and above its last row. Heights are exact to 0.1 mm.
+    Parameters
+    ----------
+    image
+        Its values, without voids.
+    corner
+        Column and row of the raster where it begins, shape (2,).
     """
-    width, flat = np.int32(image.shape[1]), image.ravel()
-    values = np.empty(len(x))
-    for start in range(0, len(x), _POINTS):
-        part = slice(start, start + _POINTS)
-        left, top = x[part].astype(np.int32), y[part].astype(np.int32)
-        right, below = (x[part] - left).astype(np.float32), (y[part] - top).astype(np.float32)
-        corner = (top - np.int32(first_y)) * width + (left - np.int32(first_x))
-        upper, lower = flat.take(corner), flat.take(corner + width)
-        upper += right * (flat.take(corner + np.int32(1)) - upper)
-        lower += right * (flat.take(corner + (width + np.int32(1))) - lower)
-        lower -= upper
-        lower *= below
-        np.add(upper, lower, out=values[part])
-    return values
+
+    image: FloatImage
+    corner: FloatArray
+
+    def at(self, cols: NDArray[Any], rows: NDArray[Any]) -> FloatImage:
+        """Return the values at columns and rows of the piece, any shape; NaN beyond it."""
+        height, width = self.image.shape
+        inside = (
+            cols.min() >= 0
+            and rows.min() >= 0
+            and cols.max() <= width - 1
+            and rows.max() <= height - 1
+        )
+        px = np.stack([np.atleast_2d(cols), np.atleast_2d(rows)])
+        if inside:
+            return interpolate(self.image, px, "bilinear").reshape(cols.shape)
+        # So that NaN is outside, too.
+        on_it = (px[0] >= -_MARGIN_PX) & (px[0] <= width - 1 + _MARGIN_PX)
+        on_it &= (px[1] >= -_MARGIN_PX) & (px[1] <= height - 1 + _MARGIN_PX)
+        last = np.array([width, height])[:, None, None] - 1
+        values = interpolate(self.image, np.where(on_it, np.clip(px, 0, last), 0), "bilinear")
+        values[~on_it] = np.nan
+        return values.reshape(cols.shape)
+
+
+def _parts(px: FloatArray) -> list[NDArray[np.int_]]:
+    """Return which positions, of (n, 2), lie in one block of the raster each; none is NaN."""
+    known = np.flatnonzero(np.isfinite(px[:, 0] + px[:, 1]))
+    if not len(known) or np.ptp(px[known], axis=0).max() < 2 * _BLOCK:
+        return [known] if len(known) else []
+    block = px[known] // _BLOCK @ [1, 1 << 20]
+    return [known[block == each] for each in np.unique(block)]
 
 
 def read_heights(
     source: RasterSource, window: Window, out_shape: tuple[int, int] | None = None
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+) -> tuple[FloatImage, Mask]:
     """Return heights and which of them are valid, as `RasterSource.read`."""
     values, valid = source.read(window, 1, out_shape)
     return values, valid & (values > _LOWEST_M) & (values < _HIGHEST_M)

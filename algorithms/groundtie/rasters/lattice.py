@@ -1,0 +1,123 @@
+"""Smooth functions of the map at all pixels of a grid, by interpolation between nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .grid import Grid
+
+FloatArray = NDArray[np.float64]
+
+# Takes map positions, (n, 2), to values, (n, k).
+MapFunction = Callable[[FloatArray], FloatArray]
+
+_FIRST_STEP = 64
+
+# Pixels that are worked at a time: what they need stays in the processor's cache.
+_PIXELS = 1 << 14
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Values at the centres of cells of step × step pixels, one cell beyond a grid each way.
+
+    Parameters
+    ----------
+    grid
+        The pixels.
+    step
+        Side of a cell in pixels.
+    values
+        Shape (k, rows, cols), any floating-point type.
+    """
+
+    grid: Grid
+    step: int
+    values: NDArray[Any]
+
+    def minus(self, origin: FloatArray) -> Lattice:
+        """Return what is left of the values, in single precision, when `origin`, (k,), is taken."""
+        left = self.values - np.reshape(origin, (-1, 1, 1))
+        return replace(self, values=left.astype(np.float32))
+
+    def bounds(self) -> NDArray[Any]:
+        """Return the least and largest values at pixels, shape (2, k); NaN if not all are known."""
+        rows, cols = (
+            np.unique(np.clip((np.arange(-1, nodes - 1) + 0.5) * self.step - 0.5, 0, side - 1))
+            for nodes, side in zip(
+                self.values.shape[1:], (self.grid.height, self.grid.width), strict=True
+            )
+        )
+        along = self._between(self.values, rows)
+        at = self._between(along.swapaxes(1, 2), cols)
+        return np.stack([at.min(axis=(1, 2)), at.max(axis=(1, 2))])
+
+    def lines(self, rows: slice) -> NDArray[Any]:
+        """Return the values at all pixels of some rows, shape (k, rows, width)."""
+        nodes = self._between(self.values, np.arange(self.grid.height)[rows])
+        count, height, width = nodes.shape
+        # Resizing takes nodes for centres of cells, as they are.
+        whole = cv2.resize(nodes.reshape(-1, width), (width * self.step, count * height))
+        within = slice(self.step, self.step + self.grid.width)
+        return np.asarray(whole.reshape(count, height, -1)[..., within])
+
+    def _between(self, values: NDArray[Any], places: NDArray[Any]) -> NDArray[Any]:
+        """Interpolate values, (k, nodes, m), to rows of pixels: (k, places, m)."""
+        place = (places + 0.5) / self.step + 0.5
+        above = place.astype(int)
+        share = (place - above).astype(values.dtype)[:, None]
+        mixed = values[:, above] * (1 - share) + values[:, above + 1] * share
+        # On a node, the next one does not count, even if it is not known.
+        return np.where(share > 0, mixed, values[:, above])
+
+
+def row_strips(height: int, width: int) -> Iterator[slice]:
+    """Return the rows of an array in parts that are worked in the processor's cache."""
+    lines = max(_PIXELS // width, 1)
+    for first in range(0, height, lines):
+        yield slice(first, min(first + lines, height))
+
+
+def fine_lattice(grid: Grid, function: MapFunction, tolerance: float) -> Lattice:
+    """Evaluate a function at a lattice that is halved until it is right halfway between nodes.
+
+    Parameters
+    ----------
+    grid
+        The pixels.
+    function
+        Smooth; NaN where it has no value. It is asked up to a cell beyond the grid.
+    tolerance
+        Largest error.
+    """
+    step = _FIRST_STEP
+    while step > 1:
+        # With what lies halfway between nodes, in rows, columns and both.
+        finer = _evaluate(grid, function, step, 2)
+        nodes, halfway = finer[:, ::2, ::2], finer[:, 1::2]
+        rows, cols = nodes[:, :-1] + nodes[:, 1:], nodes[..., :-1] + nodes[..., 1:]
+        errors = (
+            halfway[..., ::2] - rows / 2,
+            finer[:, ::2, 1::2] - cols / 2,
+            halfway[..., 1::2] - (cols[:, :-1] + cols[:, 1:]) / 4,
+        )
+        if max(np.abs(error).max() for error in errors) < tolerance or np.isnan(finer).all():
+            return Lattice(grid, step, nodes)
+        step //= 2
+    return Lattice(grid, 1, _evaluate(grid, function, 1, 1))
+
+
+def _evaluate(grid: Grid, function: MapFunction, step: int, parts: int) -> FloatArray:
+    """Return a function at the nodes of a lattice, and in parts between, shape (k, rows, cols)."""
+    rows, cols = (
+        np.arange(-parts, parts * -(-side // step) + 1) * (step / parts) + (step - 1) / 2
+        for side in (grid.height, grid.width)
+    )
+    px = np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2)
+    return function(grid.pixel_to_map(px)).T.reshape(-1, len(rows), len(cols))
