@@ -27,7 +27,7 @@ def nearest(found: FeaturePoints, x: float, y: float) -> FeaturePoints:
 
 
 @pytest.mark.parametrize("name", DETECTORS)
-@pytest.mark.parametrize(("sigma", "octave"), [(3.0, 0), (6.0, 1), (12.0, 2)])
+@pytest.mark.parametrize(("sigma", "octave"), [(3.0, 0), (5.8, 1), (12.0, 2)])
 def test_a_blob_is_found_where_it_is(name: str, sigma: float, octave: int) -> None:
     x, y = 81.3, 76.8
     found = nearest(Detector(name).detect(blob(x, y, sigma)), x, y)
@@ -36,18 +36,29 @@ def test_a_blob_is_found_where_it_is(name: str, sigma: float, octave: int) -> No
     assert found.octave[0] == octave
 
 
-@pytest.mark.parametrize("name", DETECTORS)
-def test_scales_grow_with_the_blob(name: str) -> None:
+# What an image is smoothed by before OpenCV gets it, a Gaussian and the mean of two pixels, and
+# what OpenCV believes instead: half a pixel of its own. Variances in pixels of the image.
+_SMOOTHED = {"sift": (0.0, 0.5**2), "sift-oct": (1.6**2 + 0.5**2, 1.0**2)}
+
+
+@pytest.mark.parametrize("name", _SMOOTHED)
+@pytest.mark.parametrize("sigma", [4.0, 8.0, 12.0])
+def test_scales_are_all_that_an_image_was_smoothed_by(name: str, sigma: float) -> None:
+    found = nearest(Detector(name).detect(blob(80.3, 79.8, sigma)), 80.3, 79.8)
+    # Gaussians of s and of 2^(1/3) s differ most on a blob of 2^(1/6) s.
+    before, believed = _SMOOTHED[name]
+    by_opencv = (sigma**2 + before - believed) / 2 ** (1 / 3)
+    expected = np.sqrt(by_opencv + before - believed) if before else np.sqrt(by_opencv)
+    np.testing.assert_allclose(found.scale_px[0], expected, rtol=0.03)
+
+
+def test_smoothing_before_makes_scales_larger() -> None:
     scales = [
-        nearest(Detector(name).detect(blob(80, 80, sigma)), 80, 80).scale_px[0]
-        for sigma in (4.0, 8.0)
+        nearest(Detector(name).detect(blob(80.3, 79.8, 6.0)), 80.3, 79.8).scale_px[0]
+        for name in DETECTORS
     ]
-    # Gaussians of s and of 2^(1/3) s differ most on a blob between them, which OpenCV calls s;
-    # what is filtered before is a little larger.
-    between = 2 ** (1 / 6)
-    np.testing.assert_allclose(
-        scales, np.array([4.0, 8.0]) / between, rtol=0.12 if name != "sift-isef-oct" else 0.25
-    )
+    assert scales == sorted(scales)
+    assert scales[-1] < 1.25 * scales[0]
 
 
 def test_sift_is_opencv_s_without_its_repetitions_and_offset() -> None:
@@ -63,20 +74,26 @@ def test_sift_is_opencv_s_without_its_repetitions_and_offset() -> None:
 
 
 def test_without_the_first_octave_the_features_of_larger_ones_are_found() -> None:
-    window = whole(radar_image(400, 400))
-    by_opencv = Detector("sift", 0.04).detect(window)
-    found = Detector("sift-oct", 0.02).detect(window)
-    assert found.octave.min() == 0
-    assert found.scale_px.min() > 1.6
-    assert (by_opencv.octave == -1).mean() > 0.6
+    shares = []
+    for seed in range(3):
+        window = whole(radar_image(400, 400, speckle_seed=seed))
+        by_opencv = Detector("sift", 0.04).detect(window)
+        found = Detector("sift-oct", 0.02).detect(window)
+        assert found.octave.min() == 0
+        assert found.scale_px.min() > 1.6
+        assert (by_opencv.octave == -1).mean() > 0.6
+        larger, first = by_opencv.octave >= 1, by_opencv.octave == -1
+        shares.append([share_found(by_opencv.take(which), found) for which in (larger, first)])
+    # Some appear and some vanish with what is rounded on the way.
+    of_larger, of_first = np.mean(shares, axis=0)
+    assert of_larger > 0.8
+    assert of_first < 0.05
 
-    def share_found(of: FeaturePoints) -> float:
-        apart = np.linalg.norm(of.position_px[:, None] - found.position_px[None], axis=2)
-        growth = np.abs(np.log(of.scale_px[:, None] / found.scale_px[None]))
-        return float(((apart < 0.3 * of.scale_px[:, None]) & (growth < 0.25)).any(axis=1).mean())
 
-    assert share_found(by_opencv.take(by_opencv.octave >= 1)) > 0.9
-    assert share_found(by_opencv.take(by_opencv.octave == -1)) < 0.3
+def share_found(of: FeaturePoints, found: FeaturePoints) -> float:
+    apart = np.linalg.norm(of.position_px[:, None] - found.position_px[None], axis=2)
+    growth = np.abs(np.log(of.scale_px[:, None] / found.scale_px[None]))
+    return float(((apart < 0.3 * of.scale_px[:, None]) & (growth < 0.25)).any(axis=1).mean())
 
 
 def test_features_of_two_images_with_other_speckle_are_the_same_beyond_the_first_octave() -> None:

@@ -104,8 +104,7 @@ class FeatureMatcher:
         Returns for a piece of the grid which pixels of the reference must not be seen; None: all
         may be.
     ground
-        The reference with the mask of its level ground; features elsewhere are left out. None: all
-        of it.
+        The images with a mask of level ground; features elsewhere are left out. None: all may be.
     refining
         What tells which features of the reference and of the input may be matched; None: all.
     """
@@ -152,7 +151,11 @@ class FeatureMatcher:
         piece = self.pair.grid.window(*corner, *size)
         hidden = None if self.held_out is None else self.held_out(piece)
         reference = self.pair.reference_patch(piece, hidden)
-        input = self.pair.input_patch(piece, lambda xy: self.pair.claimed_px(coarse(xy)))
+
+        def claimed(xy: FloatArray) -> FloatArray:
+            return self.pair.claimed_px(coarse(xy))
+
+        input = self.pair.input_patch(piece, claimed)
         if hidden is not None:
             # Where a descriptor sees less of the one image, it sees as little of the other.
             input = Patch(input.values, input.valid & ~hidden)
@@ -160,10 +163,12 @@ class FeatureMatcher:
         gate = margin - MARGIN_PX
         around = Window(MARGIN_PX, MARGIN_PX, tile.width + 2 * gate, tile.height + 2 * gate)
         own = self._features(reference, core, self.refining[0])
+        others = self._features(input, around, self.refining[1])
         if self.ground is not None:
             on_ground = self.ground.reference_patch(piece).valid
             own = own.take(seen_whole(own, on_ground, _GROUND_SCALES))
-        others = self._features(input, around, self.refining[1])
+            on_ground = self.ground.input_patch(piece, claimed).valid
+            others = others.take(seen_whole(others, on_ground, _GROUND_SCALES))
         points, descriptors = self.descriptor.describe(reference, own)
         partners, partner_descriptors = self.descriptor.describe(input, others)
         matches = match_near(

@@ -11,8 +11,8 @@ from types import MappingProxyType
 from typing import Annotated, Any
 
 from ..declaration import tool
-from ..kinds import Choice, Distance, Number, VectorIn
-from ..masks.choice import MASKS, NONE
+from ..kinds import Choice, Distance, Number
+from ..masks.choice import NONE
 from ..masks.regions import WIDTH_M
 from ..progress import SILENT, Progress
 from ..rasters.pair import default_radius_m, make_pair
@@ -42,7 +42,7 @@ from .common import (
     Workers,
     worker_count,
 )
-from .masking import MASK_IMAGES, MaskRequest
+from .masking import Mask, MaskImage, MaskLayer, MaskRequest
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import (
     RegistrationFiles,
@@ -117,35 +117,9 @@ def coregister(
     reference_mask: ReferenceMask = None,
     input_mask: InputMask = None,
     matching_pixel_size: MatchingPixelSize = None,
-    mask: Annotated[
-        str,
-        Choice(
-            label="Mask",
-            help="What takes part, for scenes with high buildings, which lean over their "
-            "surroundings: threshold leaves out what shines in the radar image, regions all "
-            "but homogeneous ground: roads, waters, squares; auto chooses by what the image shows.",
-            choices=MASKS,
-            advanced=True,
-        ),
-    ] = NONE,
-    mask_image: Annotated[
-        str,
-        Choice(
-            label="Image that is masked",
-            help="By default the one with the more speckle: the radar's.",
-            choices=MASK_IMAGES,
-            advanced=True,
-        ),
-    ] = AUTO,
-    mask_layer: Annotated[
-        Path | None,
-        VectorIn(
-            label="Layer that is the mask",
-            help="Vector layer of what lies on the ground, as roads and waters: of the reference, "
-            "nothing else takes part. Polygons, and lines as wide as told below.",
-            advanced=True,
-        ),
-    ] = None,
+    mask: Mask = NONE,
+    mask_image: MaskImage = AUTO,
+    mask_layer: MaskLayer = None,
     mask_high_percent: HighPercent = None,
     mask_low_percent: LowPercent = 0.0,
     mask_growth: MaskGrowth = 0.0,

@@ -8,12 +8,24 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from ..errors import ParameterError
+from ..kinds import Choice, VectorIn
 from ..masks import regions, threshold
-from ..masks.choice import AUTO, INPUT, LAYER, NONE, REFERENCE, REGIONS, MaskUsed, choose
+from ..masks.choice import (
+    AUTO,
+    INPUT,
+    LAYER,
+    MASKS,
+    NONE,
+    REFERENCE,
+    REGIONS,
+    MaskUsed,
+    choose,
+)
 from ..masks.layer import read_layer
 from ..masks.radar import is_more_speckled
 from ..masks.regions import GroundRegions, find_ground
@@ -25,6 +37,36 @@ from ..rasters.patch import Patch
 from ..rasters.reading import Window, open_raster
 
 MASK_IMAGES = (AUTO, REFERENCE, INPUT)
+
+Mask = Annotated[
+    str,
+    Choice(
+        label="Mask",
+        help="What takes part, for scenes with high buildings, which lean over their "
+        "surroundings: threshold leaves out what shines in the radar image, regions all "
+        "but homogeneous ground: roads, waters, squares; auto chooses by what the image shows.",
+        choices=MASKS,
+        advanced=True,
+    ),
+]
+MaskImage = Annotated[
+    str,
+    Choice(
+        label="Image that is masked",
+        help="By default the one with the more speckle: the radar's.",
+        choices=MASK_IMAGES,
+        advanced=True,
+    ),
+]
+MaskLayer = Annotated[
+    Path | None,
+    VectorIn(
+        label="Layer that is the mask",
+        help="Vector layer of what lies on the ground, as roads and waters: of the reference, "
+        "nothing else takes part. Polygons, and lines as wide as told below.",
+        advanced=True,
+    ),
+]
 
 
 @dataclass(frozen=True)

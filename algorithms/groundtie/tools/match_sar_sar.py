@@ -19,6 +19,8 @@ from ..features.gradients import GRADIENTS
 from ..features.hybrid import FeatureSearch
 from ..features.tile_matching import FeatureMatcher
 from ..kinds import Choice, Number, RasterIn
+from ..masks.choice import NONE
+from ..masks.regions import WIDTH_M
 from ..progress import SILENT, Progress
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
@@ -26,9 +28,13 @@ from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
 from ..similarity.surface import SimilaritySettings
 from .common import (
+    HighPercent,
     Input,
     InputBand,
     InputMask,
+    LowPercent,
+    MaskGrowth,
+    MaskWidth,
     MatchingPixelSize,
     Output,
     Reference,
@@ -49,6 +55,7 @@ from .feature_parameters import (
     Refinement,
     refinement_settings,
 )
+from .masking import Mask, MaskImage, MaskLayer, MaskRequest
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import (
     RegistrationFiles,
@@ -136,6 +143,13 @@ def match_sar_sar(
     reference_mask: ReferenceMask = None,
     input_mask: InputMask = None,
     matching_pixel_size: MatchingPixelSize = None,
+    mask: Mask = NONE,
+    mask_image: MaskImage = AUTO,
+    mask_layer: MaskLayer = None,
+    mask_high_percent: HighPercent = None,
+    mask_low_percent: LowPercent = 0.0,
+    mask_growth: MaskGrowth = 0.0,
+    mask_width: MaskWidth = WIDTH_M,
     output_grid: OutputGrid = "reference",
     resampling: Resampling = "cubic",
     workers: Workers = None,
@@ -156,6 +170,8 @@ def match_sar_sar(
     started = time.perf_counter()
     if ground_mask is not None and reference_mask is not None:
         raise ParameterError("give ground_mask or reference_mask, not both")
+    if ground_mask is not None and (mask != NONE or mask_layer is not None):
+        raise ParameterError("give ground_mask or another mask, not both")
     files = RegistrationFiles(tie_points, transform, report)
     kind = model_for_grid(model, output_grid)
     with ExitStack() as stack:
@@ -170,7 +186,16 @@ def match_sar_sar(
         pair = make_pair(there, here, matching_pixel_size, radius_m, turn)
         for note in pair.notes():
             progress.update(0.0, note)
-        ground = pair
+        request = MaskRequest(
+            mask,
+            mask_image,
+            mask_high_percent,
+            mask_low_percent,
+            mask_growth,
+            mask_width,
+            mask_layer,
+        )
+        ground, mask_used = request.apply(pair, radius_m, stack, progress.part(0.0, 0.1))
         if ground_mask is not None:
             shown = open_image(stack, reference, reference_band, ground_mask)
             ground = replace(pair, reference=shown)
@@ -183,7 +208,7 @@ def match_sar_sar(
                 ratio,
                 gate,
                 local.held_out,
-                None if ground_mask is None else ground,
+                None if ground is pair else ground,
             ),
             local,
             refinement_settings(refinement),
@@ -194,17 +219,24 @@ def match_sar_sar(
         threads = worker_count(workers)
         with ThreadPoolExecutor(threads) as executor:
             result = register(
-                pair,
+                ground,
                 local,
                 rough,
                 kind,
                 max_error,
                 seed,
                 executor,
-                progress.part(0.0, 0.7),
+                progress.part(0.1, 0.7),
                 features,
             )
         registered = RegisteredOutput(output, output_grid, resampling)
         return deliver(
-            result, registered, files, parameters, started, threads, progress.part(0.7, 1.0)
+            result,
+            registered,
+            files,
+            parameters,
+            started,
+            threads,
+            progress.part(0.7, 1.0),
+            None if ground_mask is not None else mask_used,
         )
