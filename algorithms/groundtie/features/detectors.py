@@ -94,7 +94,8 @@ class Detector:
         if self.name == "sift-isef-oct":
             image = isef(image, _ISEF_DECAY**2)
         blur_px = _FIRST_SIGMA_PX / 2
-        found = self._opencv(cv2.GaussianBlur(to_grey(image, half.valid), (0, 0), blur_px))
+        blurred = cv2.GaussianBlur(to_grey(image, half.valid), (0, 0), blur_px)
+        found = self._opencv(np.asarray(blurred, np.uint8))
         # Variances add up, so the true scale follows from what OpenCV believes.
         more = blur_px**2 + _MEAN_BLUR_PX**2 - _OPENCV_BLUR_PX**2
         scale_px = np.sqrt(found.scale_px**2 + more)

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
+from ..errors import TooFewPointsError
 from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate, jackknife_spread
 from ..geometry.fitting import fit_model
 from ..geometry.models import Model
@@ -79,12 +81,16 @@ class FeatureSearch:
     first_kind
         Kind of the model around which chips refine; a simple one needs few right matches. None:
         as asked for.
+    everywhere
+        Whether chips between the matches are refined with them; and, where too few match, chips
+        alone are.
     """
 
     matcher: FeatureMatcher
     local: LocalSearch
     refinement: SimilaritySettings | None = None
     first_kind: str | None = None
+    everywhere: bool = False
 
     def estimate(
         self, coarse: Model, kind: str, seed: int, executor: Executor, progress: Progress = SILENT
@@ -111,19 +117,33 @@ class FeatureSearch:
         NothingFoundError
             Many of them agree on two.
         """
-        matches = self.matcher.match(coarse, executor, progress.part(0.0, 0.7))
+        try:
+            places, fit = self._match(coarse, kind, seed, executor, progress.part(0.0, 0.7))
+        except TooFewPointsError:
+            if self.refinement is None or not self.everywhere:
+                raise
+            # What "auto" chooses among chips may bend more than matches of features may.
+            chips_kind = "affine" if kind == AUTO else kind
+            return self.local.estimate(coarse, chips_kind, seed, executor, progress.part(0.7, 1.0))
+        if self.refinement is not None:
+            part = progress.part(0.7, 1.0)
+            places, coarse, fit = self._refined(kind, places, coarse, fit, seed, executor, part)
+        return self._estimate(kind, places, coarse, fit)
+
+    def _match(
+        self, coarse: Model, kind: str, seed: int, executor: Executor, progress: Progress
+    ) -> tuple[_Places, Fit]:
+        """Return matches of features, few enough of each place, and the model of most of them."""
+        matches = self.matcher.match(coarse, executor, progress)
         score = 1 / np.maximum(matches.ratio, 1 / _LARGEST_SCORE)
         area = float(np.pi * self.matcher.gate_px**2)
         kept = best_of_cells(matches.reference.position_px, score, _CELL_PX, _PER_CELL)
         px, partner_px = matches.reference.position_px[kept], matches.input.position_px[kept]
         places = _Places(px, partner_px, score[kept], area)
-        refined = self.refinement is not None
-        fit = self._fit((refined and self.first_kind) or kind, places, coarse, seed)
+        first_kind = None if self.refinement is None else self.first_kind
+        fit = self._fit(first_kind or kind, places, coarse, seed)
         require_no_rival(px, partner_px, self.local.prior(coarse), fit.model, area)
-        if refined:
-            part = progress.part(0.7, 1.0)
-            places, coarse, fit = self._refined(kind, places, coarse, fit, seed, executor, part)
-        return self._estimate(kind, places, coarse, fit)
+        return places, fit
 
     def _refined(
         self,
@@ -149,6 +169,9 @@ class FeatureSearch:
             coarse = self.local.on_map(fit_model("affine", px, first(px)))
             side = float(np.ptp(matches.px, axis=0).max()) / _CHIP_CELLS
             picked = px[best_of_cells(px, score, side, 1)]
+            if self.everywhere:
+                between = far_from(picked, self.local.layout.fit_centres, side)
+                picked = np.concatenate([picked, between])
             reach = _CHIP_SIGMAS * np.quantile(jackknife_spread(fit.fold_models, picked), 0.9)
             radius = int(np.clip(np.ceil(reach), *_CHIP_RADIUS_PX))
             chips = self._chips(picked, coarse, radius, executor, progress)
@@ -209,6 +232,12 @@ class FeatureSearch:
             model, fold_models = fit_thin_plate(points, as_claimed, grid, model, _TPS_RADIUS_PX)
         transform = Transform(self.local.on_map(model), as_claimed.crs, as_claimed.input_grid)
         return Estimate(transform, points, fold_models)
+
+
+def far_from(px: FloatArray, others: NDArray[np.int_], reach_px: float) -> FloatArray:
+    """Return those of other positions, shape (m, 2), from which all of `px` are further away."""
+    distance, _ = cKDTree(px).query(others)
+    return others[distance > reach_px].astype(float)
 
 
 def best_of_cells(

@@ -22,6 +22,7 @@ from ..kinds import Choice, Number, RasterIn
 from ..masks.choice import NONE
 from ..masks.regions import WIDTH_M
 from ..progress import SILENT, Progress
+from ..quality.leaning import leaning
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
 from ..search.layout import lay_out_chips
@@ -58,6 +59,7 @@ from .feature_parameters import (
 from .masking import Mask, MaskImage, MaskLayer, MaskRequest
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import (
+    Registration,
     RegistrationFiles,
     RegistrationResult,
     deliver,
@@ -212,6 +214,7 @@ def match_sar_sar(
             ),
             local,
             refinement_settings(refinement),
+            everywhere=True,
         )
         rough = rough_search(
             default_radius_m(pair.grid) if radius_m is None else radius_m, turn, search
@@ -229,6 +232,7 @@ def match_sar_sar(
                 progress.part(0.1, 0.7),
                 features,
             )
+        result = refuse_what_leans(result, max_error)
         registered = RegisteredOutput(output, output_grid, resampling)
         return deliver(
             result,
@@ -240,3 +244,18 @@ def match_sar_sar(
             progress.part(0.7, 1.0),
             None if ground_mask is not None else mask_used,
         )
+
+
+def refuse_what_leans(registration: Registration, max_error_px: float) -> Registration:
+    """Return a registration, refused if it may be that of roofs and canopies."""
+    if not registration.verdict.accepted:
+        return registration
+    assert registration.estimate is not None and registration.check is not None
+    search, grid = registration.search, registration.pair.grid
+    reason = leaning(
+        registration.estimate, registration.check, grid, max_error_px, search.check_radius_px
+    )
+    if reason is None:
+        return registration
+    refused = replace(registration.verdict, accepted=False, reason=reason)
+    return replace(registration, verdict=refused)
