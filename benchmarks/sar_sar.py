@@ -29,7 +29,7 @@ _FREE = "without georeferencing"
 
 # Masks of simulated pairs: the simulator's ground, what the tool finds by itself, none.
 _GROUND, _REGIONS, _NO_MASK = "ground mask", "mask=regions", "no mask"
-_MASKS = (_GROUND, _REGIONS, _NO_MASK)
+MASKS = (_GROUND, _REGIONS, _NO_MASK)
 
 _SIZE_PX = 800
 _LARGE_PX = 2000
@@ -69,7 +69,7 @@ class RealAttempt:
 
 @dataclass(frozen=True)
 class SimulatedAttempt:
-    """A simulated pair, with one of `_MASKS`."""
+    """A simulated pair, with one of `MASKS`."""
 
     simulation: SarPair
     mask: str
@@ -127,7 +127,7 @@ def run(settings: Settings) -> SuiteResult:
     simulated: list[Case] = [
         SimulatedAttempt(simulation, mask, settings.cache)
         for simulation in simulations(1 if settings.quick else settings.seeds)
-        for mask in _MASKS
+        for mask in MASKS
     ]
     outcomes = {
         "real": run_cases(real, settings.jobs),
@@ -141,7 +141,7 @@ def run(settings: Settings) -> SuiteResult:
     large = SimulatedAttempt(SarPair(_LARGE_PX, "rural", 1, 4, True), _GROUND, settings.cache)
     large.simulation.pair(settings.cache)
     outcomes["large"] = run_cases([large], 1)
-    groups = {_group(opposite, mask): [] for mask in _MASKS for opposite in (False, True)}
+    groups = {_group(opposite, mask): [] for mask in MASKS for opposite in (False, True)}
     for outcome in outcomes["simulated"]:
         groups[outcome.group].append(outcome)
     pairs = {
@@ -227,7 +227,7 @@ def other_goals(
     goals = [
         Goal("Crossings: refused", "all", f"{refused} of {len(crossed)}", refused == len(crossed))
     ]
-    for mask in _MASKS:
+    for mask in MASKS:
         for opposite, largest in _LARGEST_ERROR_PX.items():
             own = groups[_group(opposite, mask)]
             good = sum(outcome.error_px <= largest for outcome in accepted(own))

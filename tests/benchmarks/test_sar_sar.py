@@ -11,6 +11,7 @@ from benchmarks import sar_sar
 from benchmarks.accuracy import CORRECT, REFUSED, SILENTLY_WRONG
 from benchmarks.cases import RealCase
 from benchmarks.sar_sar import (
+    MASKS,
     RealAttempt,
     SimulatedAttempt,
     other_goals,
@@ -55,18 +56,21 @@ def test_goals_on_real_pairs() -> None:
 def test_goals_on_simulated_pairs_count_errors_by_orbit() -> None:
     def groups(same_px: float, opposite_px: float) -> dict[str, list[object]]:
         simulated = {
-            SimulatedAttempt(one, masked, Path()).group: [
+            SimulatedAttempt(one, mask, Path()).group: [
                 outcome(CORRECT, opposite_px if one.opposite else same_px)
             ]
             for one in simulations(1)
-            for masked in (True, False)
+            for mask in MASKS
         }
-        assert len(simulated) == 4
+        assert len(simulated) == 2 * len(MASKS)
         return simulated
 
     crossed, large = [outcome(REFUSED)], outcome(CORRECT, seconds=14.0)
     reached = [g.reached for g in other_goals(crossed, groups(0.9, 1.9), large)]  # type: ignore[arg-type]
-    assert reached == [True, True, True, True, None, True]
+    for_each_mask = [True, True, True]
+    assert reached == [True, *for_each_mask * len(MASKS), True]
     slow = outcome(CORRECT, seconds=16.0)
     reached = [g.reached for g in other_goals([outcome()], groups(1.1, 2.1), slow)]  # type: ignore[arg-type]
-    assert reached == [False, False, False, True, None, False]
+    # Too far off for the goal, and not silently wrong.
+    for_each_mask = [False, False, True]
+    assert reached == [False, *for_each_mask * len(MASKS), False]
