@@ -9,6 +9,7 @@ import pytest
 from sklearn.svm import SVC
 
 from groundtie.errors import ParameterError, TooFewPointsError
+from groundtie.features import classifier_training
 from groundtie.features.classifier import KERNELS, read_classifier
 from groundtie.features.classifier_training import Training, left_out_accuracy, train_classifier
 from groundtie.rasters.patch import Patch
@@ -42,10 +43,13 @@ def test_decisions_are_those_of_scikit_learn(kernel: str, tmp_path: Path) -> Non
     )
     scaled = (points.statistics - points.statistics.mean(0)) / points.statistics.std(0)
     machine.fit(scaled, points.kept)
-    # All around the training's points, too.
+    # All around the training's points, too: there, the nearest that it has seen decides.
     others = np.random.default_rng(1).uniform([20, 0], [220, 1000], (400, 2))
+    low, high = points.statistics.min(0), points.statistics.max(0)
+    seen = np.clip(others, low, high)
+    assert (seen != others).any()
     expected = machine.decision_function(
-        (others - points.statistics.mean(0)) / points.statistics.std(0)
+        (seen - points.statistics.mean(0)) / points.statistics.std(0)
     )
     np.testing.assert_allclose(stored.decide(others), expected, atol=1e-6 * np.abs(expected).max())
     assert stored.pixel_size_m == 10.0
@@ -68,13 +72,34 @@ def test_labels_without_meaning_are_told_by_chance() -> None:
     )
 
 
-def test_rare_classes_count_as_much_as_common_ones() -> None:
+def test_rare_classes_count_as_much_as_common_ones_if_they_are_to() -> None:
     points = labelled()
     few = points.take(points.kept | (np.arange(300) >= 280))
-    found = train_classifier(few, "mean-variance", "linear", 1.0, 0)
     others = labelled(seed=5)
-    told = found.decide(others.statistics) < 0
-    assert told[~others.kept].mean() > 0.8
+    met = others.take(others.kept | (np.arange(300) >= 280))
+
+    def wrong(balanced: bool, by: Training) -> tuple[float, float]:
+        found = train_classifier(few, "mean-variance", "linear", 1.0, 0, balanced)
+        told = found.decide(by.statistics) > 0
+        return float((told[~by.kept]).mean()), float((told != by.kept).mean())
+
+    assert wrong(True, others)[0] < 0.2
+    assert wrong(True, others)[0] < wrong(False, others)[0]
+    # As common as they were in the training, fewer are told wrongly without weights.
+    assert wrong(False, met)[1] < wrong(True, met)[1]
+
+
+def test_points_that_are_left_out_of_the_training_still_tell_how_common_a_class_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    points = labelled(400)
+    few = points.take(points.kept | (np.arange(800) >= 740))
+    others = labelled(seed=5).statistics
+    whole = train_classifier(few, "mean-variance", "linear", 1.0, 0).decide(others) > 0
+    monkeypatch.setattr(classifier_training, "_MOST_POINTS", 60)
+    part = train_classifier(few, "mean-variance", "linear", 1.0, 0).decide(others) > 0
+    alike = train_classifier(few, "mean-variance", "linear", 1.0, 0, True).decide(others) > 0
+    assert np.mean(part != whole) < 0.5 * np.mean(alike != whole)
 
 
 def test_a_class_with_too_few_points_is_refused() -> None:

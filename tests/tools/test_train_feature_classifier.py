@@ -19,6 +19,7 @@ from groundtie.errors import (
     VectorLayerError,
 )
 from groundtie.features.classifier import read_classifier
+from groundtie.features.labels import KEPT, LEFT_OUT, UNKNOWN, patch_labels
 from groundtie.rasters.patch import Patch
 
 SIDE = 400
@@ -116,6 +117,19 @@ def test_points_of_a_layer_are_taken_as_they_are(image: Path, tmp_path: Path) ->
     found = train_feature_classifier(image, tmp_path / "c.json", labels=labels)
     assert found.kept + found.left_out == len(px)
     assert min(told(tmp_path / "c.json")) > 0.95
+
+
+def test_a_feature_is_labelled_by_what_its_patch_shows() -> None:
+    labels = np.full((100, 200), KEPT, np.int8)
+    labels[:, 100:] = LEFT_OUT
+    labels[60:, :] = UNKNOWN
+    # 41 columns around 89 have 10 in the cloud, around 90 there are 11: a quarter is 10.25.
+    px = np.array([[89.0, 30.0], [90.0, 30.0], [150.0, 30.0], [30.0, 30.0], [30.0, 70.0]])
+    told = patch_labels(labels, px)
+    np.testing.assert_array_equal(told, [KEPT, LEFT_OUT, LEFT_OUT, KEPT, UNKNOWN])
+    # What is not known, as beyond the image, takes no part.
+    px = np.array([[89.0, 59.0], [90.0, 59.0], [195.0, 3.0], [5.0, 3.0]])
+    np.testing.assert_array_equal(patch_labels(labels, px), [KEPT, LEFT_OUT, LEFT_OUT, KEPT])
 
 
 def test_one_kind_of_labels_is_needed(image: Path, tmp_path: Path) -> None:

@@ -46,6 +46,9 @@ class FeatureClassifier:
         Factor of the kernel.
     mean, spread
         What is taken off the statistics, and what they are divided by, shape (k,).
+    low, high
+        Range of the scaled statistics that it was trained on, shape (k,). Beyond it a polynomial
+        could go anywhere: what lies there is taken to lie at the end of the range.
     vectors
         Support vectors, of scaled statistics, shape (n, k).
     weights
@@ -61,6 +64,8 @@ class FeatureClassifier:
     gamma: float
     mean: FloatArray
     spread: FloatArray
+    low: FloatArray
+    high: FloatArray
     vectors: FloatArray
     weights: FloatArray
     intercept: float
@@ -68,7 +73,7 @@ class FeatureClassifier:
 
     def decide(self, statistics: FloatArray) -> FloatArray:
         """Return for statistics, shape (m, k), values that are positive for what is kept, (m,)."""
-        scaled = (statistics - self.mean) / self.spread
+        scaled = np.clip((statistics - self.mean) / self.spread, self.low, self.high)
         found = np.empty(len(scaled))
         step = max(_BLOCK // len(self.vectors), 1)
         for start in range(0, len(scaled), step):
@@ -99,6 +104,8 @@ class FeatureClassifier:
             "gamma": self.gamma,
             "mean": self.mean.tolist(),
             "spread": self.spread.tolist(),
+            "low": self.low.tolist(),
+            "high": self.high.tolist(),
             "intercept": self.intercept,
             "pixel_size_m": self.pixel_size_m,
             "weights": self.weights.tolist(),
@@ -135,6 +142,8 @@ def _from_json(values: dict[str, Any]) -> FeatureClassifier:
         gamma=float(values["gamma"]),
         mean=np.array(values["mean"], float),
         spread=np.array(values["spread"], float),
+        low=np.array(values["low"], float),
+        high=np.array(values["high"], float),
         vectors=np.array(values["vectors"], float),
         weights=np.array(values["weights"], float),
         intercept=float(values["intercept"]),
@@ -143,11 +152,12 @@ def _from_json(values: dict[str, Any]) -> FeatureClassifier:
     count = len(patch_statistics(found.statistics, _NOTHING, np.zeros((1, 2)))[0])
     if found.vectors.shape != (len(found.weights), count) or len(found.vectors) == 0:
         raise ValueError("support vectors of the wrong shape")
-    if found.mean.shape != (count,) or found.spread.shape != (count,):
+    scaling = found.mean, found.spread, found.low, found.high
+    if any(each.shape != (count,) for each in scaling):
         raise ValueError("scaling of the wrong shape")
     numbers = found.gamma, found.intercept, found.pixel_size_m
-    arrays = found.mean, found.spread, found.vectors, found.weights
-    if not all(np.isfinite(each).all() for each in (*arrays, np.array(numbers))):
+    arrays = *scaling, found.vectors, found.weights, np.array(numbers)
+    if not all(np.isfinite(each).all() for each in arrays):
         raise ValueError("a number is not finite")
     return found
 

@@ -49,9 +49,14 @@ class Training:
 
 
 def train_classifier(
-    labelled: Training, statistics: str, kernel: str, pixel_size_m: float, seed: int
+    labelled: Training,
+    statistics: str,
+    kernel: str,
+    pixel_size_m: float,
+    seed: int,
+    balanced: bool = False,
 ) -> FeatureClassifier:
-    """Train a classifier; both classes count alike, however many points they have.
+    """Train a classifier.
 
     Parameters
     ----------
@@ -61,6 +66,9 @@ def train_classifier(
         See `FeatureClassifier`.
     seed
         Of the choice of points where there are more than are needed.
+    balanced
+        Whether both classes count alike, however many points they have; else each counts by how
+        common it is, as it will be met.
 
     Raises
     ------
@@ -74,21 +82,27 @@ def train_classifier(
     mean = chosen.statistics.mean(axis=0)
     spread = np.maximum(chosen.statistics.std(axis=0), 1e-12)
     gamma = 1 / chosen.statistics.shape[1]
+    weights = {
+        kept: (labelled.kept == kept).sum() / (chosen.kept == kept).sum() for kept in (True, False)
+    }
     machine = SVC(
         C=_COST,
         kernel="poly" if kernel in DEGREE else kernel,
         degree=DEGREE.get(kernel, 1),
         gamma=gamma,
         coef0=OFFSET,
-        class_weight="balanced",
+        class_weight="balanced" if balanced else weights,
     )
-    machine.fit((chosen.statistics - mean) / spread, chosen.kept)
+    scaled = (chosen.statistics - mean) / spread
+    machine.fit(scaled, chosen.kept)
     return FeatureClassifier(
         statistics=statistics,
         kernel=kernel,
         gamma=gamma,
         mean=mean,
         spread=spread,
+        low=scaled.min(axis=0),
+        high=scaled.max(axis=0),
         vectors=np.asarray(machine.support_vectors_, float),
         weights=np.asarray(machine.dual_coef_, float)[0],
         intercept=float(machine.intercept_[0]),
@@ -96,7 +110,9 @@ def train_classifier(
     )
 
 
-def left_out_accuracy(labelled: Training, statistics: str, kernel: str, seed: int) -> float:
+def left_out_accuracy(
+    labelled: Training, statistics: str, kernel: str, seed: int, balanced: bool = False
+) -> float:
     """Return the mean share of both classes that classifiers tell which have not seen them.
 
     Blocks of neighbouring points are left out of the training together; NaN if the points of a
@@ -111,7 +127,7 @@ def left_out_accuracy(labelled: Training, statistics: str, kernel: str, seed: in
     for fold in range(_FOLDS):
         rest, out = labelled.take(folds != fold), labelled.take(folds == fold)
         try:
-            found = train_classifier(rest, statistics, kernel, 1.0, seed)
+            found = train_classifier(rest, statistics, kernel, 1.0, seed, balanced)
         except TooFewPointsError:
             continue
         told.append(found.decide(out.statistics) > 0)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from rasterio.crs import CRS
@@ -19,7 +20,7 @@ from ..rasters.pair import Image
 from ..rasters.reading import RasterSource, Window
 from ..rasters.warping import sample
 from .classifier_training import Training
-from .patch_statistics import patch_statistics
+from .patch_statistics import PATCH_PX, patch_statistics
 from .tile_matching import MARGIN_PX, Detecting, inside, tiles
 
 FloatArray = NDArray[np.float64]
@@ -29,11 +30,20 @@ Labels = NDArray[np.int8]
 KEPT, LEFT_OUT, UNKNOWN = 1, 0, -1
 
 
-class LabelSource(Protocol):
-    """What tells the labels of features, or has labelled points of its own."""
+# A feature's descriptor sees its whole patch: matches are rarely right if more of it than this is
+# to be left out.
+_LARGEST_SHARE = 0.25
 
-    def label(self, piece: Grid, px: FloatArray) -> Labels:
-        """Return the labels of positions (col, row) on a grid, shape (n, 2), shape (n,)."""
+
+class LabelSource(Protocol):
+    """What tells the labels of pixels, or has labelled points of its own."""
+
+    @property
+    def chosen(self) -> bool:
+        """Whether points were chosen: how many each class has tells nothing then."""
+
+    def label(self, piece: Grid) -> Labels:
+        """Return the labels of a grid's pixels, shape (h, w)."""
 
     def points(self, piece: Grid) -> tuple[FloatArray, Labels]:
         """Return points of its own as positions on a grid, shape (m, 2), and their labels."""
@@ -47,7 +57,11 @@ class RasterLabels:
     crs: CRS | None
     left_out: frozenset[str]
 
-    def label(self, piece: Grid, px: FloatArray) -> Labels:
+    @property
+    def chosen(self) -> bool:
+        return False
+
+    def label(self, piece: Grid) -> Labels:
         own = self.source.grid
 
         def to_px(xy: FloatArray) -> FloatArray:
@@ -56,7 +70,7 @@ class RasterLabels:
         values, known = sample(self.source, piece, to_px, "nearest", 1)
         numbers = [float(text) for text in self.left_out]
         labels = np.where(np.isin(values, numbers), LEFT_OUT, KEPT)
-        return _looked_up(np.where(known, labels, UNKNOWN).astype(np.int8), px)
+        return np.where(known, labels, UNKNOWN).astype(np.int8)
 
     def points(self, piece: Grid) -> tuple[FloatArray, Labels]:
         return np.zeros((0, 2)), np.zeros(0, np.int8)
@@ -64,7 +78,7 @@ class RasterLabels:
 
 @dataclass(frozen=True)
 class LayerLabels:
-    """Labels of a vector layer: features in its polygons, and its points.
+    """Labels of a vector layer: pixels in its polygons, and its points.
 
     Parameters
     ----------
@@ -78,9 +92,13 @@ class LayerLabels:
     xy: FloatArray
     labels: Labels
 
-    def label(self, piece: Grid, px: FloatArray) -> Labels:
+    @property
+    def chosen(self) -> bool:
+        return len(self.xy) > 0
+
+    def label(self, piece: Grid) -> Labels:
         if not self.areas:
-            return np.full(len(px), UNKNOWN, np.int8)
+            return np.full((piece.height, piece.width), UNKNOWN, np.int8)
         from rasterio.features import rasterize
 
         drawn = rasterize(
@@ -89,15 +107,34 @@ class LayerLabels:
             transform=piece.transform,
             dtype=np.uint8,
         )
-        return _looked_up(drawn.astype(np.int8) - 1, px)
+        return np.asarray(drawn.astype(np.int8) - 1)
 
     def points(self, piece: Grid) -> tuple[FloatArray, Labels]:
         return piece.map_to_pixel(self.xy), self.labels
 
 
-def _looked_up(image: Labels, px: FloatArray) -> Labels:
+def patch_labels(labels: Labels, px: FloatArray) -> Labels:
+    """Return the labels of features by those of all pixels in their patches.
+
+    Parameters
+    ----------
+    labels
+        Of the pixels, shape (h, w).
+    px
+        Positions (col, row) of n features, shape (n, 2).
+
+    Returns
+    -------
+    Shape (n,): unknown where the feature's own pixel is, and left out where more than a quarter
+    of the known pixels of the patch around it is.
+    """
+    left_out, known = (
+        cv2.blur(which.astype(np.float32), (PATCH_PX, PATCH_PX), borderType=cv2.BORDER_CONSTANT)
+        for which in (labels == LEFT_OUT, labels != UNKNOWN)
+    )
+    told = np.where(left_out > _LARGEST_SHARE * known, LEFT_OUT, KEPT)
     cols, rows = np.rint(px).astype(int).T
-    return np.asarray(image[rows, cols], np.int8)
+    return np.where(labels == UNKNOWN, UNKNOWN, told)[rows, cols].astype(np.int8)
 
 
 def raster_labels(source: RasterSource, image: Image, left_out: Sequence[str]) -> RasterLabels:
@@ -214,7 +251,7 @@ def labelled_points(
         patch = image.read_onto(piece, grid.map_to_pixel)
         found = detector.detect(patch)
         px = found.take(inside(found.position_px, core)).position_px
-        told = labels.label(piece, px)
+        told = patch_labels(labels.label(piece), px)
         own, own_labels = labels.points(piece)
         here = inside(own, core)
         px, told = np.vstack([px, own[here]]), np.concatenate([told, own_labels[here]])

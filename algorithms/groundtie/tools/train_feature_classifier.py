@@ -132,9 +132,10 @@ def train_feature_classifier(
     """Train a classifier that keeps features on clouds, shadows or changes out of the matching.
 
     A support vector machine learns to tell features that are to be kept from others by what the
-    image looks like around them. Features are found in the image and labelled by a raster or by
-    polygons; a layer's points are taken as they are. The classifier is for images of the same
-    kind: the same bands, units and about the same pixel size.
+    image looks like around them. Features are found in the image and labelled by what a raster or
+    polygons say of the patch around them: a quarter of it is enough to be left out. A layer's
+    points are taken as they are, and both their classes count alike. The classifier is for images
+    of the same kind: the same bands, units and about the same pixel size.
     """
     if (labels is None) == (label_raster is None):
         raise ParameterError("give labels or label_raster, one of them")
@@ -154,8 +155,8 @@ def train_feature_classifier(
         points = labelled_points(image, source, detector, statistics, progress.part(0.0, 0.6))
         size_m = image.source.grid.pixel_size_m
     progress.update(0.6, "training")
-    classifier = train_classifier(points, statistics, kernel, size_m, seed)
-    accuracy = left_out_accuracy(points, statistics, kernel, seed)
+    classifier = train_classifier(points, statistics, kernel, size_m, seed, source.chosen)
+    accuracy = left_out_accuracy(points, statistics, kernel, seed, source.chosen)
     with Outputs() as outputs:
         classifier.write(outputs.stage(output))
     return TrainingResult(
