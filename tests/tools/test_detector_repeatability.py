@@ -6,6 +6,7 @@ from pathlib import Path
 
 import cv2
 import pytest
+from brightness_classifiers import bright_is_left_out
 from raster_files import write_raster
 from speckled_pairs import write_speckled_pair
 from textured_pairs import TexturedPair, listing, pixels, shift_on_map
@@ -78,6 +79,25 @@ def test_the_middle_of_a_large_overlap_is_looked_at(
     )
     share = 120**2 / (SIZE[0] * SIZE[1])
     assert part.detections[0] == pytest.approx(share * whole.detections[0], rel=0.3)
+
+
+def test_features_that_a_classifier_leaves_out_are_not_counted(
+    registered: TexturedPair, tmp_path: Path
+) -> None:
+    typical = float(pixels(registered.input)[0].mean())
+    for limit, share in ((0.01 * typical, 0.0), (10 * typical, 1.0)):
+        classifier = bright_is_left_out(tmp_path / "c.json", limit)
+        whole, left = (
+            detector_repeatability(
+                registered.reference,
+                registered.input,
+                tmp_path / "t.csv",
+                variants="sift-oct",
+                input_classifier=chosen,
+            ).evaluations[0]
+            for chosen in (None, classifier)
+        )
+        assert left.detections == (whole.detections[0], share * whole.detections[1])
 
 
 def test_images_without_features_have_a_table_of_zeros(

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from brightness_classifiers import bright_is_left_out
 from raster_files import write_raster
 from textured_pairs import (
     TexturedPair,
@@ -17,7 +18,6 @@ from textured_pairs import (
 
 from groundtie import match_optical
 from groundtie.errors import NotRegisteredError, ParameterError
-from groundtie.features.classifier_training import Training, train_classifier
 from groundtie.features.optical import DESCRIPTORS, DETECTORS
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
@@ -126,16 +126,6 @@ def test_what_a_coarser_image_shows_is_matched_all_over(tmp_path: Path) -> None:
     corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (size - 1.0)
     off = found.transform(corners) - (corners - 0.5) / 2
     assert np.hypot(*off.T).max() < 1.0
-
-
-def bright_is_left_out(path: Path, limit: float) -> Path:
-    """Write a classifier that leaves out patches with means above a limit."""
-    random = np.random.default_rng(0)
-    means = np.concatenate([random.uniform(0, limit, 300), random.uniform(limit, 2 * limit, 300)])
-    statistics = np.column_stack([means, random.uniform(0, 1e5, 600)])
-    labelled = Training(statistics, means < limit, random.uniform(0, 100, (600, 2)))
-    train_classifier(labelled, "mean-variance", "linear", 10.0, 0).write(path)
-    return path
 
 
 def test_features_that_a_classifier_leaves_out_take_no_part(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from brightness_classifiers import bright_is_left_out
 from raster_files import write_raster
 from speckled_pairs import write_speckled_pair
 from textured_pairs import TexturedPair, error_px, listing, pixels, shift_on_map
@@ -47,6 +48,34 @@ def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: 
         for path in (files.reference, tmp_path / "out.tif")
     )
     assert np.corrcoef(reference.ravel(), registered.ravel())[0, 1] > 0.5
+
+
+@pytest.mark.parametrize("image", ["reference", "input"])
+def test_features_that_a_classifier_leaves_out_take_no_part(
+    files: TexturedPair, tmp_path: Path, image: str
+) -> None:
+    """The right half of an image is made brighter than the left one anywhere is."""
+    paths = {"reference": files.reference, "input": files.input}
+    values = pixels(paths[image])[0].astype(float)
+    smooth = values[:, 150:].mean()
+    values[:, 150:] += 4 * smooth
+    grid = files.grid if image == "reference" else files.truth.input_grid
+    paths[image] = write_raster(tmp_path / "bright.tif", values.astype(np.uint16), grid)
+    classifier = bright_is_left_out(tmp_path / "c.json", 2.5 * smooth)
+    found = match_sar_sar(
+        *paths.values(),
+        tmp_path / "out.tif",
+        refinement="none",
+        **{f"{image}_classifier": classifier},
+    )
+    fit = found.points.take(~found.points.is_check)
+    columns = {
+        "reference": files.grid.map_to_pixel(fit.reference_xy)[:, 0],
+        "input": fit.input_px[:, 0],
+    }[image]
+    assert len(columns) > 10
+    assert columns.max() < 160
+    assert error_px(found.transform, files) < 1.0
 
 
 def test_check_points_lie_where_no_feature_was_seen(files: TexturedPair, tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from .gradients import GRADIENTS
 from .matching import match
 from .points import FeaturePoints
 from .repeatability import CLASS_NAMES, Repeatability, classes, overlap_error, repeatability
+from .tile_matching import Refining
 
 FloatArray = NDArray[np.float64]
 
@@ -147,7 +148,12 @@ class Evaluation:
 
 
 def evaluate(
-    variant: Variant, reference: Patch, input: Patch, ratio: float, method: str
+    variant: Variant,
+    reference: Patch,
+    input: Patch,
+    ratio: float,
+    method: str,
+    refining: tuple[Refining | None, Refining | None] = (None, None),
 ) -> Evaluation:
     """Detect, describe and match the features of two registered images.
 
@@ -159,9 +165,14 @@ def evaluate(
         The same place, pixel by pixel.
     ratio, method
         See `matching.match`.
+    refining
+        What tells which features of the reference and of the input take part; None: all.
     """
     started = time.perf_counter()
-    found = variant.detector.detect(reference), variant.detector.detect(input)
+    found = [
+        _detected(variant.detector, patch, own)
+        for patch, own in zip((reference, input), refining, strict=True)
+    ]
     detected = time.perf_counter()
     points, descriptors = variant.descriptor.describe(reference, found[0])
     partners, partner_descriptors = variant.descriptor.describe(input, found[1])
@@ -178,3 +189,8 @@ def evaluate(
         detected - started,
         matched - detected,
     )
+
+
+def _detected(detector: Detector, patch: Patch, refining: Refining | None) -> FeaturePoints:
+    found = detector.detect(patch)
+    return found if refining is None else found.take(refining.keep(patch, found.position_px))

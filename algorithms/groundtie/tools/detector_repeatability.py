@@ -31,6 +31,7 @@ from .common import (
     ReferenceBand,
     ReferenceMask,
 )
+from .feature_parameters import InputClassifier, ReferenceClassifier, classifiers
 from .registration import open_image
 from .repeatability_picture import draw_evaluations
 from .stored_transform import transform_of
@@ -154,6 +155,8 @@ def detector_repeatability(
             advanced=True,
         ),
     ] = METHODS[-1],
+    reference_classifier: ReferenceClassifier = None,
+    input_classifier: InputClassifier = None,
     reference_band: ReferenceBand = None,
     input_band: InputBand = None,
     reference_mask: ReferenceMask = None,
@@ -185,10 +188,11 @@ def detector_repeatability(
         if transform is not None:
             known = transform_of(load_transform(transform), pair.input.source, transform)
         patches = _read(pair, known, size)
+    refining = classifiers(reference_classifier, input_classifier)
     evaluations = []
     for i, variant in enumerate(chosen):
         progress.update(0.1 + 0.8 * i / len(chosen), f"trying {variant.name}")
-        evaluations.append(evaluate(variant, *patches, ratio, method))
+        evaluations.append(evaluate(variant, *patches, ratio, method, refining))
     files = {"output": output, "picture": picture, "numbers": numbers}
     result = RepeatabilityResult(
         tuple(evaluations), {name: str(path) for name, path in files.items() if path is not None}

@@ -6,16 +6,14 @@ import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
 from ..declaration import tool
-from ..features.classifier import FeatureClassifier, read_classifier
 from ..features.hybrid import FeatureSearch
 from ..features.optical import DESCRIPTORS, DETECTORS, optical_descriptor, optical_detector
 from ..features.tile_matching import FeatureMatcher
-from ..kinds import Choice, FileIn, Number
+from ..kinds import Choice, Number
 from ..progress import SILENT, Progress
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
@@ -43,7 +41,10 @@ from .feature_parameters import (
     FreeSearchRotation,
     Gate,
     LargestRatio,
+    PlainInputClassifier,
+    ReferenceClassifier,
     Refinement,
+    classifiers,
     refinement_settings,
 )
 from .registered_output import RegisteredOutput, model_for_grid
@@ -83,15 +84,7 @@ def match_optical(
     input: Input,
     output: Output,
     search_radius: FreeSearchRadius = None,
-    input_classifier: Annotated[
-        Path | None,
-        FileIn(
-            label="Classifier for the input",
-            help="What train_feature_classifier has written; features of the input that it tells "
-            "to leave out, those of clouds for instance, are not matched.",
-            suffixes=(".json",),
-        ),
-    ] = None,
+    input_classifier: PlainInputClassifier = None,
     model: Model = AUTO,
     max_error: MaxError = 3.0,
     tie_points: TiePointsOut = None,
@@ -130,15 +123,7 @@ def match_optical(
             advanced=True,
         ),
     ] = None,
-    reference_classifier: Annotated[
-        Path | None,
-        FileIn(
-            label="Classifier for the reference",
-            help="The same for features of the reference.",
-            suffixes=(".json",),
-            advanced=True,
-        ),
-    ] = None,
+    reference_classifier: ReferenceClassifier = None,
     ratio: LargestRatio = 1.0,
     gate: Gate = 16.0,
     refinement: Refinement = "fused",
@@ -206,7 +191,7 @@ def match_optical(
                 ratio,
                 gate,
                 local.held_out,
-                refining=(_classifier(reference_classifier), _classifier(input_classifier)),
+                refining=classifiers(reference_classifier, input_classifier),
             ),
             local,
             refinement_settings(refinement),
@@ -232,7 +217,3 @@ def match_optical(
         return deliver(
             result, registered, files, parameters, started, threads, progress.part(0.7, 1.0)
         )
-
-
-def _classifier(path: Path | None) -> FeatureClassifier | None:
-    return None if path is None else read_classifier(path)

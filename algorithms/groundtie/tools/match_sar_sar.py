@@ -52,8 +52,11 @@ from .feature_parameters import (
     FreeSearchRadius,
     FreeSearchRotation,
     Gate,
+    InputClassifier,
     LargestRatio,
+    ReferenceClassifier,
     Refinement,
+    classifiers,
     refinement_settings,
 )
 from .masking import Mask, MaskImage, MaskLayer, MaskRequest
@@ -134,6 +137,8 @@ def match_sar_sar(
         ),
     ] = "differences",
     ratio: LargestRatio = 1.0,
+    reference_classifier: ReferenceClassifier = None,
+    input_classifier: InputClassifier = None,
     gate: Gate = 16.0,
     refinement: Refinement = "nmi",
     similarity: CheckSimilarity = "fused",
@@ -211,6 +216,7 @@ def match_sar_sar(
                 gate,
                 local.held_out,
                 None if ground is pair else ground,
+                classifiers(reference_classifier, input_classifier),
             ),
             local,
             refinement_settings(refinement),
