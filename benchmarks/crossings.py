@@ -128,7 +128,7 @@ def run(settings: Settings) -> SuiteResult:
     return SuiteResult(
         "Images that do not belong together",
         goals(outcomes),
-        (counts(outcomes), what_was_accepted(outcomes)),
+        (counts_by_group(outcomes), what_was_accepted(outcomes)),
         [outcome.record() for outcome in outcomes],
     )
 
@@ -145,9 +145,10 @@ def goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
     return (Goal("Accepted", f"0 of at least {_AT_LEAST}", found, reached),)
 
 
-def counts(outcomes: Sequence[Outcome]) -> Table:
+def counts_by_group(outcomes: Sequence[Outcome]) -> Table:
     """Return how many were accepted, by what does not belong together."""
-    groups = [[o for o in outcomes if o.group == group] for group in (CROSSING, *SPECKLE.values())]
+    names = dict.fromkeys(outcome.group for outcome in outcomes)
+    groups = [[o for o in outcomes if o.group == name] for name in names]
     rows = [
         [
             group[0].group,
@@ -157,7 +158,6 @@ def counts(outcomes: Sequence[Outcome]) -> Table:
             f"{np.median([o.seconds for o in group]):.1f}",
         ]
         for group in groups
-        if group
     ]
     return Table("By what is wrong", ("images", "pairs", "accepted", "crashed", "median s"), rows)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 import time
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -14,15 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundtie.errors import TooFewPointsError
-from groundtie.features.classifier import KERNELS
-from groundtie.features.classifier_training import Training, train_classifier
 from groundtie.features.descriptors import Descriptor
 from groundtie.features.detectors import Detector
 from groundtie.features.haar import HaarDescriptor
 from groundtie.features.hog import HogDescriptor
 from groundtie.features.matching import match
-from groundtie.features.patch_statistics import patch_statistics
 from groundtie.features.points import FeaturePoints
 from groundtie.features.surf import SurfDetector
 from groundtie.features.tile_matching import Describing, Detecting
@@ -30,7 +25,6 @@ from groundtie.rasters.patch import Patch
 
 from .accuracy import FloatArray
 from .cases import RealCase
-from .clouds import add_clouds
 from .offsets import Scene, open_offset
 
 # Matches within these distances of the truth count as right (thesis P: 5 px).
@@ -50,12 +44,6 @@ METHODS: dict[str, tuple[Detecting, Describing]] = {
 
 # Shift between the images, in pixels: it is not told to the matching.
 _OFFSET_PX = np.array([3.0, -2.0])
-
-# Share of both images that clouds hide, how often they are drawn, and the method that is refined.
-CLOUD_SHARE = 0.3
-CLOUD_DRAWS = 3
-REFINED = "HOG-81"
-_STATISTICS = "mean-variance"
 
 
 @dataclass(frozen=True)
@@ -114,114 +102,53 @@ class ClearCase:
 
     def run(self, workers: int | None) -> MatchRates:
         """Match by every method, in one thread."""
-        with _patches(self.case) as both:
+        with patches(self.case) as both:
             return MatchRates(tuple(self._rate(both, name) for name in METHODS))
 
     def _rate(self, both: list[Patch], method: str) -> MatchRate:
         started = time.process_time()
-        there, here = (_described(patch, method) for patch in both)
-        found = _matched(there.strongest(), here.strongest())
+        there, here = (described(patch, method) for patch in both)
+        found = matched(there.strongest(), here.strongest())
         seconds = time.process_time() - started
-        return _rate(self.case, method, "", [found], seconds)
+        return rate_of(self.case, method, "", [found], seconds)
 
 
 @dataclass(frozen=True)
-class CloudyCase:
-    """Refinement by classifiers on a pair under simulated clouds, other ones in each image.
-
-    Classifiers are trained on the features of one half, and matches counted in the other one.
-    """
-
-    case: RealCase
-
-    def run(self, workers: int | None) -> MatchRates:
-        """Match without refinement and with every kernel."""
-        found: dict[str, list[_Matched]] = {name: [] for name in ("", *KERNELS)}
-        seed = zlib.crc32(self.case.name.encode())
-        with _patches(self.case) as clear:
-            for draw in range(CLOUD_DRAWS):
-                seeds = seed + 2 * draw, seed + 2 * draw + 1
-                self._add_draw(clear, seeds, found)
-        return MatchRates(
-            tuple(_rate(self.case, REFINED, name, parts, 0.0) for name, parts in found.items())
-        )
-
-    def _add_draw(
-        self, clear: list[Patch], seeds: tuple[int, int], found: dict[str, list[_Matched]]
-    ) -> None:
-        """Add the matches of one draw of clouds, by what refined them."""
-        both, labelled = [], []
-        for patch, own in zip(clear, seeds, strict=True):
-            clouded = add_clouds(patch.values, CLOUD_SHARE, own)
-            image = Patch(clouded.image, patch.valid)
-            features = _described(image, REFINED)
-            px = features.points.position_px
-            cols, rows = np.rint(px).astype(int).T
-            both.append(features)
-            clear_there = ~clouded.hidden[rows, cols]
-            labelled.append(Training(patch_statistics(_STATISTICS, image, px), clear_there, px))
-        middle = clear[0].values.shape[1] / 2
-        for side in (False, True):
-            tested = [(each.px[:, 0] < middle) == side for each in labelled]
-            try:
-                classifiers = {
-                    kernel: [
-                        train_classifier(each.take(~own), _STATISTICS, kernel, 1.0, 0)
-                        for each, own in zip(labelled, tested, strict=True)
-                    ]
-                    for kernel in KERNELS
-                }
-            except TooFewPointsError:
-                continue
-            found[""].append(_matched(*_those(both, tested)))
-            for kernel, machines in classifiers.items():
-                kept = [
-                    own & (machine.decide(each.statistics) > 0)
-                    for own, machine, each in zip(tested, machines, labelled, strict=True)
-                ]
-                found[kernel].append(_matched(*_those(both, kept)))
-
-
-@dataclass(frozen=True)
-class _Features:
+class Features:
     """Features of an image and their descriptors, row by row."""
 
     points: FeaturePoints
     descriptors: NDArray[np.float32]
 
-    def take(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> _Features:
-        return _Features(self.points.take(which), self.descriptors[which])
+    def take(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Features:
+        return Features(self.points.take(which), self.descriptors[which])
 
-    def strongest(self) -> _Features:
+    def strongest(self) -> Features:
         order = np.argsort(-self.points.response, kind="stable")[:MOST_FEATURES]
         return self.take(np.sort(order))
 
 
 @dataclass(frozen=True)
-class _Matched:
+class Matched:
     """How far matches are off, in pixels, and their ratios, shape (n,)."""
 
     errors_px: FloatArray
     ratio: FloatArray
 
 
-def _those(both: list[_Features], which: list[NDArray[np.bool_]]) -> list[_Features]:
-    return [each.take(own).strongest() for each, own in zip(both, which, strict=True)]
-
-
-def _described(patch: Patch, method: str) -> _Features:
+def described(patch: Patch, method: str) -> Features:
     detector, descriptor = METHODS[method]
-    return _Features(*descriptor.describe(patch, detector.detect(patch)))
+    return Features(*descriptor.describe(patch, detector.detect(patch)))
 
 
-def _matched(there: _Features, here: _Features) -> _Matched:
+def matched(there: Features, here: Features) -> Matched:
     matches = match(there.descriptors, here.descriptors, mutual=True, method="exact")
     at, expected = here.points.position_px, there.points.position_px + _OFFSET_PX
-    return _Matched(np.hypot(*(at[matches.second] - expected[matches.first]).T), matches.ratio)
+    return Matched(np.hypot(*(at[matches.second] - expected[matches.first]).T), matches.ratio)
 
 
 @contextmanager
-def _patches(case: RealCase) -> Iterator[list[Patch]]:
+def patches(case: RealCase) -> Iterator[list[Patch]]:
     """Return both images on the reference's grid, the input resampled by the truth but a shift."""
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -234,8 +161,8 @@ def _patches(case: RealCase) -> Iterator[list[Patch]]:
         ]
 
 
-def _rate(
-    case: RealCase, method: str, refinement: str, parts: list[_Matched], seconds: float
+def rate_of(
+    case: RealCase, method: str, refinement: str, parts: list[Matched], seconds: float
 ) -> MatchRate:
     """Return the rates of all parts together; correct@20 is their mean."""
     errors = np.concatenate([part.errors_px for part in parts] or [np.zeros(0)])

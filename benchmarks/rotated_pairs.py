@@ -33,7 +33,7 @@ _SIDE_PX = 256
 _CROSSED = "crossed"
 
 # The other cases that each reference is crossed with: so many places further in the list.
-_STRIDES = (1, 4, 11, 17)
+STRIDES = (1, 4, 11, 17)
 
 # Two cases that show the same place, which no file name tells: seen by eye.
 _SAME_PLACE = {"oi-rotated/80", "oi-rotated/100"}
@@ -113,7 +113,7 @@ def crossed(cases: Sequence[RealCase]) -> list[RotatedCase]:
     pairs = [
         (case, cases[(index + stride) % len(cases)])
         for index, case in enumerate(cases)
-        for stride in _STRIDES
+        for stride in STRIDES
     ]
     return [
         RotatedCase(case, other.input)

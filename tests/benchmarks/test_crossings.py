@@ -16,7 +16,7 @@ from benchmarks.crossings import (
     CROSSING,
     SPECKLE,
     Crossing,
-    counts,
+    counts_by_group,
     crossings,
     goals,
     speckle,
@@ -135,7 +135,7 @@ def test_what_was_accepted_is_named() -> None:
     wrong = outcome(SILENTLY_WRONG, name="a × b", group=CROSSING)
     some = [wrong, outcome(REFUSED, group=CROSSING), outcome(CRASHED, group=CROSSING)]
     assert what_was_accepted(some).rows == [["a × b", "affine", "0.40"]]
-    assert counts(some).rows == [[CROSSING, "3", "1", "1", "1.0"]]
+    assert counts_by_group(some).rows == [[CROSSING, "3", "1", "1", "1.0"]]
 
 
 def test_the_reference_keeps_its_place(cases: dict[str, RealCase], tmp_path: Path) -> None:

@@ -1,0 +1,177 @@
+"""Correct-match rates under simulated clouds, by what keeps their features out (thesis P 5.5)."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundtie.errors import TooFewPointsError
+from groundtie.features.classifier import KERNELS, FeatureClassifier
+from groundtie.features.classifier_training import Training, train_classifier
+from groundtie.features.labels import KEPT, LEFT_OUT, patch_labels
+from groundtie.features.patch_statistics import patch_statistics
+from groundtie.rasters.patch import Patch
+
+from .cases import RealCase
+from .clouds import add_clouds
+from .match_rates import Features, Matched, MatchRates, described, matched, patches, rate_of
+
+# Share of both images that clouds hide, how often they are drawn, and the method that is refined.
+CLOUD_SHARE = 0.3
+CLOUD_DRAWS = 3
+REFINED = "HOG-81"
+
+# What leaves features out: support vector machines with these statistics and kernels, trained on
+# the image's other half; one that was trained on other pairs; and the mask of the clouds itself.
+KERNEL, STATISTICS = "polynomial", "mean-variance"
+TEXTURE, OTHERS, MASK = "polynomial, texture", "polynomial, other pairs", "the mask itself"
+MACHINES = {kernel: (STATISTICS, kernel) for kernel in KERNELS} | {TEXTURE: ("texture", KERNEL)}
+REFINEMENTS = (*MACHINES, OTHERS, MASK)
+
+# So many points of each image and class are passed on to train for other pairs.
+_POINTS = 100
+
+
+@dataclass(frozen=True)
+class Clouded:
+    """An image under clouds: its features, where the clouds leave them, and what is around them."""
+
+    image: Patch
+    features: Features
+    kept: NDArray[np.bool_]
+
+    @property
+    def px(self) -> NDArray[np.float64]:
+        return self.features.points.position_px
+
+    def training(self, statistics: str) -> Training:
+        return Training(patch_statistics(statistics, self.image, self.px), self.kept, self.px)
+
+
+@dataclass(frozen=True)
+class CloudLabels:
+    """Labelled points of a pair under its first clouds, to train for other pairs."""
+
+    name: str
+    labelled: Training
+
+    def line(self) -> str:
+        """Return how many there are."""
+        return f"{self.name}: {len(self.labelled.kept)} labelled points"
+
+
+@dataclass(frozen=True)
+class LabelCase:
+    """Gives the `CloudLabels` of a pair."""
+
+    case: RealCase
+
+    def run(self, workers: int | None) -> CloudLabels:
+        """Label features of both images."""
+        with patches(self.case) as clear:
+            both = _clouded(clear, self.case, 0)
+            return CloudLabels(self.case.name, _joined([_some(each) for each in both]))
+
+
+@dataclass(frozen=True)
+class CloudyCase:
+    """Refinement on a pair under simulated clouds, other ones in each image.
+
+    Classifiers are trained on the features of one half, and matches counted in the other one; and
+    on `others`, points of other pairs.
+    """
+
+    case: RealCase
+    others: Training | None = None
+
+    def run(self, workers: int | None) -> MatchRates:
+        """Match without refinement and with every one."""
+        found: dict[str, list[Matched]] = {name: [] for name in ("", *REFINEMENTS)}
+        foreign = None
+        if self.others is not None:
+            foreign = train_classifier(self.others, STATISTICS, KERNEL, 1.0, 0)
+        with patches(self.case) as clear:
+            for draw in range(CLOUD_DRAWS):
+                both = _clouded(clear, self.case, draw)
+                for name, parts in _matches(both, clear[0].values.shape[1] / 2, foreign):
+                    found[name].append(parts)
+        return MatchRates(
+            tuple(
+                rate_of(self.case, REFINED, name, parts, 0.0)
+                for name, parts in found.items()
+                if parts or not name
+            )
+        )
+
+
+def for_others(labels: Sequence[CloudLabels], name: str) -> Training:
+    """Return the points of all pairs but one."""
+    return _joined([each.labelled for each in labels if each.name != name])
+
+
+def _clouded(clear: Sequence[Patch], case: RealCase, draw: int) -> list[Clouded]:
+    """Return both images under clouds."""
+    seed = zlib.crc32(case.name.encode()) + 2 * draw
+    both = []
+    for number, patch in enumerate(clear):
+        clouded = add_clouds(patch.values, CLOUD_SHARE, seed + number)
+        image = Patch(clouded.image, patch.valid)
+        features = described(image, REFINED)
+        labels = np.where(clouded.hidden, LEFT_OUT, KEPT).astype(np.int8)
+        kept = patch_labels(labels, features.points.position_px) == KEPT
+        both.append(Clouded(image, features, kept))
+    return both
+
+
+def _matches(
+    both: list[Clouded], middle: float, foreign: FeatureClassifier | None
+) -> Iterator[tuple[str, Matched]]:
+    """Return the matches in each half without refinement and with every one."""
+    labelled = {
+        statistics: [each.training(statistics) for each in both]
+        for statistics in (STATISTICS, "texture")
+    }
+    for side in (False, True):
+        tested = [(each.px[:, 0] < middle) == side for each in both]
+        try:
+            told = {
+                name: [
+                    train_classifier(each.take(~own), statistics, kernel, 1.0, 0).decide(
+                        each.statistics
+                    )
+                    > 0
+                    for each, own in zip(labelled[statistics], tested, strict=True)
+                ]
+                for name, (statistics, kernel) in MACHINES.items()
+            }
+        except TooFewPointsError:
+            continue
+        told[""] = [np.ones(len(own), bool) for own in tested]
+        told[MASK] = [each.kept for each in both]
+        if foreign is not None:
+            told[OTHERS] = [foreign.decide(each.statistics) > 0 for each in labelled[STATISTICS]]
+        for name, kept in told.items():
+            those = [
+                each.features.take(own & may).strongest()
+                for each, own, may in zip(both, tested, kept, strict=True)
+            ]
+            yield name, matched(*those)
+
+
+def _some(each: Clouded) -> Training:
+    random = np.random.default_rng(0)
+    classes = [random.permutation(np.nonzero(each.kept == kept)[0]) for kept in (True, False)]
+    return each.training(STATISTICS).take(np.concatenate([own[:_POINTS] for own in classes]))
+
+
+def _joined(parts: Sequence[Training]) -> Training:
+    columns: list[Any] = [
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("statistics", "kept", "px")
+    ]
+    return Training(*columns)
