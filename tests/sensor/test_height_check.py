@@ -76,3 +76,24 @@ def test_residuals_hardly_tell_a_height_error(tmp_path: Path) -> None:
     offset, sigma = told_by_residuals(tmp_path, 0.002)
     assert abs(offset - 40) < 4 * sigma + 1
     assert told_by_residuals(tmp_path, 0.3)[1] > 40
+
+
+def test_an_affine_bias_is_no_height_error(tmp_path: Path) -> None:
+    """Points that a shift was fitted to may show an affine change, which nobody believes."""
+    rpc = camera_rpc(SIZE)
+    image = write_positions(tmp_path / "image.tif", rpc)
+    with open_raster(image, allow_sensor_geometry=True) as source:
+        orientation = orient(source, rpc, UTM, None, height_m=300.0)
+    random = np.random.default_rng(0)
+    px = random.uniform(0, 1, (200, 2)) * SIZE
+    found = px + [5.0, -3.0] + (px - np.array(SIZE) / 2) @ [[1e-3, 0], [-5e-4, 1e-3]]
+    found += random.normal(0, 0.1, px.shape)
+    control = Control(px, found, np.tile(np.eye(2) * 0.1**2, (200, 1, 1)), SIZE)
+    result = check_heights(orientation, SIZE, control, adjust(control, "shift"))
+    assert result.warnings() == []
+
+
+def test_what_cannot_tell_a_datum_is_not_told() -> None:
+    plain = HeightCheck((100, 500), (0, 800), None)
+    assert replace(plain, offset_m=538.0, offset_sigma_m=116.0).warnings() == []
+    assert "+45 ± 5 m" in replace(plain, offset_m=45.0, offset_sigma_m=5.0).warnings()[0]

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import GroundTieError
 from ..rasters.reading import open_raster
 from .adjustment import SMALLEST_SIGMA_PX, Adjustment, Control
-from .bias import design
+from .bias import KINDS, design
 from .heights import ConstantHeight, find_geoid
 from .orientation import FloatArray, Orientation, seen_at
 from .surfaces import surface_over
@@ -24,9 +24,11 @@ from .surfaces import surface_over
 # Ground beyond the RPCs' range of heights by more is worth telling: metres, and share of the scale.
 _BEYOND_M, _BEYOND_SHARE = 10.0, 0.05
 
-# A height offset is told if it is larger than so many standard deviations, and than this.
+# A height offset is told if it is larger than so many standard deviations, and than this. What
+# cannot tell the largest offset of a vertical datum from none tells nothing.
 _SIGMAS = 4.0
 _OFFSET_M = 10.0
+_LARGEST_DATUM_M = 110.0
 
 # Shares of the ground that are left out at both ends of its range.
 _TAIL = 0.01
@@ -90,6 +92,7 @@ class HeightCheck:
         if (
             self.offset_m is not None
             and self.offset_sigma_m is not None
+            and _SIGMAS * self.offset_sigma_m < _LARGEST_DATUM_M
             and abs(self.offset_m) > max(_SIGMAS * self.offset_sigma_m, _OFFSET_M)
         ):
             told.append(
@@ -151,22 +154,27 @@ def _geoid(lon_lat: FloatArray) -> float | None:
 
 def _offset(
     orientation: Orientation, control: Control, adjustment: Adjustment
-) -> tuple[float, float]:
-    """Return what residuals say of a common error of all heights, and its standard deviation."""
+) -> tuple[float, float] | tuple[None, None]:
+    """Return what residuals say of a common error of all heights, and its standard deviation.
+
+    None: nothing. Beside an affine bias, whatever was fitted: what a bias leaves must not look like
+    heights.
+    """
     used = control.take(adjustment.used)
     height = orientation.heights.typical_m
     ground = orientation.rpc.localise(used.expected_px, height)
     slope = orientation.rpc.derivatives(ground, height)[:, :, 2]
-    terms = design(adjustment.bias.kind, used.size, used.expected_px)
-    columns = [np.kron(terms, np.eye(2)), slope.reshape(-1, 1)]
+    terms = np.kron(design(KINDS[-1], used.size, used.expected_px), np.eye(2))
     sigma = max(adjustment.sigma_px, SMALLEST_SIGMA_PX)
     covariance = used.covariance_px2 + sigma**2 * np.eye(2)
     root = np.linalg.cholesky(np.linalg.inv(covariance)).swapaxes(1, 2)
-    full = np.hstack(columns).reshape(len(used), 2, -1)
-    residuals = used.found_px - used.expected_px
-    system = (root @ full).reshape(2 * len(used), -1)
-    known = (root @ residuals[:, :, None]).reshape(-1)
-    scale = np.sqrt((system**2).sum(axis=0))
-    inverse = np.linalg.pinv((system / scale).T @ (system / scale), rcond=1e-15, hermitian=True)
-    found = inverse @ ((system / scale).T @ known) / scale
-    return float(found[-1]), float(np.sqrt(max(inverse[-1, -1], 0.0)) / scale[-1])
+    weighted = (root @ terms.reshape(len(used), 2, -1)).reshape(2 * len(used), -1)
+    by_bias = np.linalg.qr(weighted)[0]
+    by_height = (root @ slope[:, :, None]).ravel()
+    for _ in range(2):  # once is not exact: next to all of it is like a bias
+        by_height = by_height - by_bias @ (by_bias.T @ by_height)
+    found = (root @ (used.found_px - used.expected_px)[:, :, None]).ravel()
+    length = float(np.linalg.norm(by_height))
+    if length == 0:
+        return None, None
+    return float(by_height @ found) / length**2, 1 / length
