@@ -480,3 +480,9 @@ def test_the_summary_is_for_json() -> None:
     assert summary["rmse_px"] == pytest.approx(1)
     assert summary["bias_x_m"] == pytest.approx(10)
     assert summary["std_y_m"] == pytest.approx(0, abs=1e-6)
+
+
+def test_statistics_in_another_unit_are_those_of_its_errors() -> None:
+    errors = np.random.default_rng(0).normal(size=(50, 2))
+    scaled, expected = Statistics.of(errors).scaled(0.5), Statistics.of(0.5 * errors)
+    assert scaled.summary("m", ("x", "y")) == pytest.approx(expected.summary("m", ("x", "y")))

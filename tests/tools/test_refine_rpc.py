@@ -1,13 +1,15 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rasterio
+from html_pages import Page
 from raster_files import full_disk
 from rpc_models import camera_rpc, to_rasterio, write_dem, write_positions
-from rpc_scenes import SIZE, Scene, make_scene
+from rpc_scenes import SIZE, Scene, ground_texture, make_scene
 
 import groundtie
 from groundtie.errors import GroundTieError, NotRegisteredError, OutputError, ParameterError
@@ -34,19 +36,81 @@ def test_a_reference_and_a_terrain_model_make_the_rpcs_right(scene: Scene, tmp_p
         dem=scene.dem,
         dem_datum="ellipsoidal",
         similarity="orientation",
+        mask="auto",
         residuals=tmp_path / "residuals.gpkg",
+        report=tmp_path / "report.html",
     )
     assert scene.error_px(scene.delivered) > 30
     assert scene.error_px(read_rpc(tmp_path / "refined_RPC.TXT")) < 1.0
     assert result.judged.before.rmse > 30
     assert result.judged.after.rmse < 1.5
     assert result.judged.held_out == "check points"
+    assert result.mask is not None
+    assert (result.mask.kind, result.mask.image) == ("none", None)
+    page = Page((tmp_path / "report.html").read_text())
+    sources = [str(image.attributes["src"]) for image in page.all("img")]
+    assert len(sources) == 6 and all(source.startswith("data:image/") for source in sources)
+    assert "Check points confirm the refined RPCs." in page.text
+    assert "The image on the map" in page.text
+    numbers = json.loads((tmp_path / "report.json").read_text())
+    assert numbers["verdict"]["check_rmse_px"] == result.judged.verdict.check_rmse_px
+    assert numbers["bias"]["model"] == result.adjustment.bias.kind
+    assert numbers["parameters"]["mask"] == "auto"
     import fiona
 
     with fiona.open(tmp_path / "residuals.gpkg") as layer:
         rows = [feature["properties"] for feature in layer]
     used = [row["residual_px"] for row in rows if row["state"] == "used"]
     assert np.median(used) < 1.5
+
+
+def test_a_refused_matching_leaves_its_report(scene: Scene, tmp_path: Path) -> None:
+    """The reference shows other ground."""
+    with rasterio.open(scene.reference) as source:
+        profile, side = source.profile, source.width
+    with rasterio.open(tmp_path / "other.tif", "w", **profile) as other:
+        other.write(ground_texture(side, seed=77).astype(profile["dtype"]), 1)
+    with pytest.raises(NotRegisteredError, match="was not matched with"):
+        groundtie.refine_rpc(
+            scene.image,
+            tmp_path / "refined_RPC.TXT",
+            tmp_path / "other.tif",
+            dem=scene.dem,
+            dem_datum="ellipsoidal",
+            similarity="orientation",
+            report=tmp_path / "report.html",
+        )
+    assert "Refused" in [
+        heading.text for heading in Page((tmp_path / "report.html").read_text()).all("h2")
+    ]
+    assert not (tmp_path / "refined_RPC.TXT").exists()
+
+
+@pytest.mark.slow
+def test_a_dense_town_is_matched_by_what_lies_on_the_ground(tmp_path: Path) -> None:
+    """Judged at the scene's own check points on the ground, which the tool has not seen."""
+    groundtie.simulate_sensor(tmp_path, density="urban", shift=30.0, seed=9, size=600)
+    files = {"dem": tmp_path / "dem.tif", "dem_datum": "ellipsoidal"}
+    result = groundtie.refine_rpc(
+        tmp_path / "sensor.tif",
+        tmp_path / "refined_RPC.TXT",
+        tmp_path / "reference.tif",
+        mask="regions",
+        search_radius=60.0,
+        **files,
+    )
+    assert result.mask is not None
+    assert (result.mask.kind, result.mask.image) == ("regions", "reference")
+    assert 0.1 < result.mask.share < 0.5
+    found = groundtie.assess_sensor(
+        tmp_path / "sensor.tif",
+        tmp_path / "check_points.csv",
+        tmp_path / "refined_RPC.TXT",
+        **files,
+    )
+    errors = found.summary()
+    assert errors["before"]["rmse_px"] > 20
+    assert errors["after"]["rmse_px"] < 2
 
 
 def write_points(
@@ -138,10 +202,48 @@ def test_refined_images_orthorectify_to_where_they_belong(tmp_path: Path) -> Non
 
 
 def test_right_rpcs_are_left_alone(tmp_path: Path) -> None:
+    """The report alone is written, and says so."""
     files = write_points(tmp_path, None)
+    before = set(tmp_path.iterdir())
     with pytest.raises(NotRegisteredError, match="not nearer than before"):
-        groundtie.refine_rpc(output=tmp_path / "refined.RPB", dem_datum="ellipsoidal", **files)
-    assert not (tmp_path / "refined.RPB").exists()
+        groundtie.refine_rpc(
+            output=tmp_path / "refined.RPB",
+            dem_datum="ellipsoidal",
+            residuals=tmp_path / "residuals.csv",
+            report=tmp_path / "report.html",
+            **files,
+        )
+    assert {path.name for path in set(tmp_path.iterdir()) - before} == {
+        "report.html",
+        "report.json",
+    }
+    page = Page((tmp_path / "report.html").read_text())
+    assert "Refused" in [heading.text for heading in page.all("h2")]
+    assert "No refined RPCs were written." in page.text
+
+
+def test_the_report_tells_the_errors_before_and_after(tmp_path: Path) -> None:
+    """40 points, measured to 0.2 px along both axes; a shift by (14, -35) is taken out."""
+    files = write_points(tmp_path, bias_of("shift"))
+    result = groundtie.refine_rpc(
+        output=tmp_path / "refined.RPB",
+        dem_datum="ellipsoidal",
+        report=tmp_path / "report.html",
+        **files,
+    )
+    page = Page((tmp_path / "report.html").read_text())
+    before = float(page.numbers["Error before (RMSE)"].split()[0])
+    after = float(page.numbers["Error after (RMSE)"].split()[0])
+    assert before == pytest.approx(np.hypot(14, 35), abs=0.3)
+    assert after == pytest.approx(0.2 * np.sqrt(2), rel=0.3)
+    shift = float(page.numbers["Shift in the middle, column"].split()[0])
+    assert abs(shift) == pytest.approx(14, abs=0.2)
+    cells = [cell.text for cell in page.all("td")]
+    pixels, metres = (float(cells[cells.index(unit) + 1]) for unit in ("px", "m"))
+    assert pixels == before
+    assert metres / pixels == pytest.approx(1.0, rel=0.05)  # of the made-up camera
+    assert len(page.all("img")) == 3
+    assert result.files["report"] == str(tmp_path / "report.html")
 
 
 @pytest.mark.parametrize(

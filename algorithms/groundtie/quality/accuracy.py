@@ -82,6 +82,19 @@ class Statistics:
             (float(std[0]), float(std[1])),
         )
 
+    def scaled(self, factor: float) -> Statistics:
+        """Return the numbers in another unit."""
+        bias, std = ((factor * x, factor * y) for x, y in (self.bias, self.std))
+        return Statistics(
+            factor * self.rmse,
+            factor * self.mean,
+            factor * self.median,
+            factor * self.ce90,
+            factor * self.largest,
+            bias,
+            std,
+        )
+
     def summary(self, unit: str, axes: tuple[str, str]) -> dict[str, float]:
         """Return the numbers by names that end in the unit."""
         values = {

@@ -31,7 +31,7 @@ from .verdict import TOLERANCE_PX, Verdict
 
 _TEMPLATES = Path(__file__).with_name("templates")
 
-_COLOURS = {
+COLOURS = {
     "fit": figures.FIT_COLOUR,
     "check": figures.CHECK_COLOUR,
     "rejected": figures.REJECTED_COLOUR,
@@ -96,7 +96,7 @@ class Report:
             "versions": versions(),
             "seconds": self.seconds,
         }
-        return {name: _plain(value) for name, value in values.items()}
+        return {name: plain(value) for name, value in values.items()}
 
     def write(self, html_path: str | os.PathLike[str], json_path: str | os.PathLike[str]) -> None:
         """Write the page and its numbers.
@@ -107,10 +107,10 @@ class Report:
             A file cannot be written.
         """
         summary = self.summary()
-        _write(html_path, self._page(summary), json_path, summary)
+        write_page(html_path, self._page(summary), json_path, summary)
 
     def _page(self, summary: dict[str, Any]) -> str:
-        return _rendered(
+        return rendered(
             "report.html.j2",
             title=self.title,
             verdict=self.verdict,
@@ -122,7 +122,7 @@ class Report:
             pictures=Comparison.of(self.pair, self.transform),
             residuals=self._residual_figures(),
             tolerance_px=TOLERANCE_PX,
-            colours=_COLOURS,
+            colours=COLOURS,
             surfaces=[_shown_surface(label, surface) for label, surface in self.surfaces],
             parameters=summary["parameters"],
             versions=summary["versions"],
@@ -195,7 +195,7 @@ class AssessmentReport:
             "versions": versions(),
             "seconds": self.seconds,
         }
-        return {name: _plain(value) for name, value in values.items()}
+        return {name: plain(value) for name, value in values.items()}
 
     def write(self, html_path: str | os.PathLike[str], json_path: str | os.PathLike[str]) -> None:
         """Write the page and its numbers.
@@ -207,7 +207,7 @@ class AssessmentReport:
         """
         summary = self.summary()
         parts = {name: errors for name, errors in self.assessment.parts().items() if len(errors)}
-        page = _rendered(
+        page = rendered(
             "assessment.html.j2",
             title=self.title,
             verdict=self.verdict,
@@ -217,13 +217,13 @@ class AssessmentReport:
             model=self.transform.model.kind,
             pictures=self.comparison,
             map=self._error_map(),
-            colours=_COLOURS,
+            colours=COLOURS,
             tolerance_px=TOLERANCE_PX,
             parameters=summary["parameters"],
             versions=summary["versions"],
             seconds=self.seconds,
         )
-        _write(html_path, page, json_path, summary)
+        write_page(html_path, page, json_path, summary)
 
     def _error_map(self) -> dict[str, Any] | None:
         """Return the figure of the errors at all points, over the input."""
@@ -282,7 +282,8 @@ def versions() -> dict[str, str]:
     }
 
 
-def _rendered(template: str, **values: Any) -> str:
+def rendered(template: str, **values: Any) -> str:
+    """Return a page made from one of the templates."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -297,12 +298,19 @@ def _rendered(template: str, **values: Any) -> str:
     return environment.get_template(template).render(**values)
 
 
-def _write(
+def write_page(
     html_path: str | os.PathLike[str],
     page: str,
     json_path: str | os.PathLike[str],
     summary: dict[str, Any],
 ) -> None:
+    """Write a page and its numbers as JSON.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
     with writing(html_path):
         Path(html_path).write_text(page, encoding="utf-8")
     with writing(json_path):
@@ -338,14 +346,14 @@ def _percent(value: float) -> str:
     return f"{value:.0%}".replace("%", " %") if math.isfinite(value) else "–"
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return a value as JSON can carry it: what is not finite is None, what is no value text."""
     if isinstance(value, dict):
-        return {str(name): _plain(part) for name, part in value.items()}
+        return {str(name): plain(part) for name, part in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(part) for part in value]
+        return [plain(part) for part in value]
     if isinstance(value, (np.ndarray, np.generic)):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value if value is None or isinstance(value, (bool, int, str)) else str(value)

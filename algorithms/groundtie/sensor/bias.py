@@ -53,6 +53,11 @@ class Bias:
         """Return the corrections (col, row), shape (n, 2), at image positions of the RPCs."""
         return design(self.kind, self.size, np.asarray(px, float)) @ self.coefficients
 
+    def shift_px(self) -> tuple[list[float], list[float]]:
+        """Return the correction in the middle of the image (col, row), and its sigma, pixels."""
+        sigma = np.sqrt(np.diag(self.covariance))[:2]
+        return self.coefficients[0].tolist(), sigma.tolist()
+
     def sigma_px(self, px: ArrayLike) -> FloatArray:
         """Return the standard deviation of the corrections, shape (n,), in pixels."""
         terms = design(self.kind, self.size, np.asarray(px, float))

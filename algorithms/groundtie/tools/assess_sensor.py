@@ -26,8 +26,8 @@ from .sensor_input import (
     Height,
     RpcFile,
     SensorImage,
+    open_oriented_image,
     open_sensor_image,
-    utm_of,
 )
 
 BEFORE, AFTER = "before", "after"
@@ -115,26 +115,23 @@ def assess_sensor(
     ground = Ground(dem, dem_datum, geoid, height)
     with ExitStack() as stack:
         stack.enter_context(bounded_cache())
-        source, delivered = open_sensor_image(image, rpc, stack)
-        progress.update(0.0, ground.note(delivered))
-        orientation = ground.orientation(source, delivered, utm_of(source, delivered), stack)
-        points = read_control_points(check_points, orientation, source.grid)
+        sensor = open_oriented_image(image, rpc, ground, None, stack, progress)
+        points = read_control_points(check_points, sensor.orientation, sensor.source.grid)
         which = points.points.used
         if (which & points.points.is_check).any():
             which = which & points.points.is_check
         points = points.take(which)
         if len(points) == 0:
             raise TooFewPointsError(f"{check_points} holds no points that are used")
-        errors = {BEFORE: SensorErrors.of(delivered, points)}
+        errors = {BEFORE: SensorErrors.of(sensor.rpc, points)}
         if refined is not None:
             errors[AFTER] = SensorErrors.of(_refined(refined, stack), points)
-        size = source.grid.width, source.grid.height
         written = {"table": table, "picture": picture}
         with Outputs() as outputs:
             if table is not None:
                 write_table(outputs.stage(table), points, errors)
             if picture is not None:
-                draw_vectors(outputs.stage(picture), points, errors, size)
+                draw_vectors(outputs.stage(picture), points, errors, sensor.size)
     files = {name: str(path) for name, path in written.items() if path is not None}
     return SensorAssessment(errors, len(points), files)
 

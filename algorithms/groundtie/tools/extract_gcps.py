@@ -10,7 +10,6 @@ from typing import Annotated, Any
 
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
-from ..errors import NotRegisteredError
 from ..kinds import VectorOut
 from ..masks.choice import NONE, REFERENCE, MaskUsed
 from ..progress import SILENT, Progress
@@ -31,7 +30,7 @@ from .common import (
     Workers,
     worker_count,
 )
-from .ground_control import GroundControl, Matching, match_ground_control, open_reference
+from .ground_control import Matching, match_ground_control, open_reference
 from .masking import MaskRequest
 from .registration_parameters import MaxError
 from .sensor_input import (
@@ -42,7 +41,7 @@ from .sensor_input import (
     Height,
     RpcFile,
     SensorImage,
-    open_sensor_image,
+    open_oriented_image,
 )
 from .sensor_matching import (
     ImageBand,
@@ -135,7 +134,7 @@ def extract_gcps(
     reference_band: ReferenceBand = None,
     reference_mask: ReferenceMask = None,
     mask: MaskKind = NONE,
-    mask_high_percent: HighPercent = 20.0,
+    mask_high_percent: HighPercent = None,
     mask_low_percent: LowPercent = 10.0,
     matching_pixel_size: MatchingPixelSize = None,
     chip_size: ChipSize = None,
@@ -165,25 +164,12 @@ def extract_gcps(
     )
     with ExitStack() as stack:
         stack.enter_context(bounded_cache())
-        source, model = open_sensor_image(image, rpc, stack)
         located = open_reference(reference, reference_band, reference_mask, stack)
-        progress.update(0.0, ground.note(model))
-        orientation = ground.orientation(source, model, located.source.grid.crs, stack)
+        crs = located.source.grid.crs
+        sensor = open_oriented_image(image, rpc, ground, crs, stack, progress)
         with ThreadPoolExecutor(worker_count(workers)) as executor:
-            found = match_ground_control(
-                source, orientation, located, matching, executor, stack, progress
-            )
-        points = accepted_points(found, image, reference)
+            found = match_ground_control(sensor, located, matching, executor, stack, progress)
+        points = found.accepted()
         with Outputs() as outputs:
-            points.write(outputs.stage(output), orientation, source.grid)
-    return GcpResult(points, found.registration.verdict, found.mask, output, ground.note(model))
-
-
-def accepted_points(found: GroundControl, image: Path, reference: Path) -> ControlPoints:
-    """Return the points that were found; raise `NotRegisteredError` if they are refused."""
-    verdict = found.registration.verdict
-    if not verdict.accepted or found.points is None:
-        raise NotRegisteredError(
-            f"{image} was not matched with {reference}: {verdict.reason}", verdict
-        )
-    return found.points
+            points.write(outputs.stage(output), sensor.orientation, sensor.source.grid)
+    return GcpResult(points, found.registration.verdict, found.mask, output, sensor.heights)

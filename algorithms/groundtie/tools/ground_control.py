@@ -13,14 +13,19 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import GeoreferencingError, NothingFoundError, TooFewPointsError
+from ..errors import (
+    GeoreferencingError,
+    NothingFoundError,
+    NotRegisteredError,
+    TooFewPointsError,
+)
 from ..geometry.models import Model
 from ..masks.choice import MaskUsed
 from ..progress import Progress
 from ..quality.verdict import refuse
 from ..rasters.grid import FloatArray
 from ..rasters.pair import Image, ImagePair, default_radius_m, make_pair
-from ..rasters.reading import RasterSource, open_raster
+from ..rasters.reading import open_raster
 from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
 from ..search.pyramid import find_coarse_model
@@ -30,6 +35,7 @@ from ..sensor.orientation import Orientation, sensor_grid
 from ..similarity.surface import SimilaritySettings
 from .masking import MaskRequest
 from .registration import Registration, register
+from .sensor_input import OrientedImage
 
 # A rough shift beyond this, in matching pixels, is put into the RPCs before points are matched: by
 # wrong RPCs the image is projected with the heights of other places.
@@ -95,6 +101,23 @@ class GroundControl:
     points: ControlPoints | None
     mask: MaskUsed
 
+    def accepted(self) -> ControlPoints:
+        """Return the points.
+
+        Raises
+        ------
+        NotRegisteredError
+            They are refused.
+        """
+        pair, verdict = self.registration.pair, self.registration.verdict
+        if not verdict.accepted or self.points is None:
+            raise NotRegisteredError(
+                f"{pair.input.source.path} was not matched with {pair.reference.source.path}: "
+                f"{verdict.reason}",
+                verdict,
+            )
+        return self.points
+
 
 def open_reference(path: Path, band: int | None, mask: Path | None, stack: ExitStack) -> Image:
     """Open a reference image; it needs a CRS, as RPCs lead to longitude and latitude.
@@ -112,8 +135,7 @@ def open_reference(path: Path, band: int | None, mask: Path | None, stack: ExitS
 
 
 def match_ground_control(
-    source: RasterSource,
-    orientation: Orientation,
+    image: OrientedImage,
     reference: Image,
     matching: Matching,
     executor: Executor,
@@ -124,8 +146,8 @@ def match_ground_control(
 
     Parameters
     ----------
-    source, orientation
-        The image, and how it sees the ground, on the reference's map.
+    image
+        The image, located on the reference's map.
     reference
         The image whose georeferencing is right.
     matching
@@ -137,6 +159,7 @@ def match_ground_control(
     progress
         Is told of every step.
     """
+    source, orientation = image.source, image.orientation
 
     def paired(by: Orientation, radius_m: float | None) -> tuple[ImagePair, LocalSearch]:
         located = replace(source, grid=sensor_grid(source, by))

@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any
-
-import numpy as np
 
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
-from ..errors import NotRegisteredError, ParameterError, TooFewPointsError
+from ..errors import ParameterError
 from ..kinds import Choice, FileIn, FileOut, Number, RasterIn, VectorOut
-from ..masks.choice import NONE, REFERENCE
+from ..masks.choice import NONE, REFERENCE, MaskUsed
 from ..progress import SILENT, Progress
-from ..quality.refinement import RefinementVerdict, judge_refinement
-from ..quality.verdict import refuse
-from ..rasters.atomic import Outputs
-from ..rasters.delivery import write_with_geotransform
-from ..rasters.reading import RasterSource, bounded_cache
-from ..sensor.adjustment import AUTO, METHODS, ROBUST, Adjustment, Control, adjust
-from ..sensor.bias import KINDS, fold
-from ..sensor.control_points import SUFFIXES, ControlPoints, read_control_points
-from ..sensor.height_check import HeightCheck, check_heights
-from ..sensor.orientation import Orientation, sensor_grid
-from ..sensor.rpc_files import write_rpc
+from ..quality.refinement import RefinementVerdict
+from ..rasters.reading import bounded_cache
+from ..sensor.adjustment import AUTO, METHODS, ROBUST, Adjustment
+from ..sensor.bias import KINDS
+from ..sensor.control_points import SUFFIXES, read_control_points
+from ..sensor.height_check import HeightCheck
 from ..sensor.rpc_fit import RPCFit
-from ..sensor.rpc_tags import rpc_to_tags
 from ..similarity.surface import SimilaritySettings
 from .common import (
     ChipSize,
@@ -41,9 +36,10 @@ from .common import (
     Workers,
     worker_count,
 )
-from .extract_gcps import accepted_points
 from .ground_control import Matching, match_ground_control, open_reference
 from .masking import MaskRequest
+from .refinement import Fitting, Refinement
+from .refinement_output import IMAGES, Call, RefinementFiles
 from .registration_parameters import MaxError
 from .sensor_input import (
     Dem,
@@ -53,8 +49,7 @@ from .sensor_input import (
     Height,
     RpcFile,
     SensorImage,
-    open_sensor_image,
-    utm_of,
+    open_oriented_image,
 )
 from .sensor_matching import (
     ImageBand,
@@ -63,11 +58,6 @@ from .sensor_matching import (
     Similarity,
     TwoWayError,
 )
-
-_IMAGES = (".tif", ".tiff")
-
-# A bias that is folded in by a new fit may be missed by so much, in pixels.
-_LARGEST_FOLDING_PX = 0.01
 
 
 @dataclass(frozen=True)
@@ -86,6 +76,8 @@ class RefinedRpc:
         What speaks against the heights.
     ground
         Which heights were used, in words.
+    mask
+        Which mask points were matched with; None: they were given.
     files
         What was written, by name.
     """
@@ -95,6 +87,7 @@ class RefinedRpc:
     judged: RefinementVerdict
     heights: HeightCheck
     ground: str
+    mask: MaskUsed | None
     files: dict[str, str]
 
     def summary(self) -> dict[str, Any]:
@@ -105,13 +98,14 @@ class RefinedRpc:
             "left_out_rmse_px": self.adjustment.left_out_rmse_px,
             "folding_residual_px": self.fit.largest_residual_px,
             "heights": {"used": self.ground, **self.heights.summary()},
+            "mask": None if self.mask is None else self.mask.summary(),
             "files": self.files,
         }
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
         verdict, bias = self.judged.verdict, self.adjustment.bias
-        shift, sigma = bias.coefficients[0], np.sqrt(np.diag(bias.covariance))[:2]
+        shift, sigma = bias.shift_px()
         return [
             f"accepted: {verdict.reason}",
             f"model: {bias.kind}, {verdict.fit_points_used} of {verdict.fit_points} points",
@@ -122,6 +116,7 @@ class RefinedRpc:
             f"({verdict.check_ce90_m:.2f} m)",
             f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
             self.ground,
+            *(() if self.mask is None else (self.mask.line(),)),
             *(f"warning: {line}" for line in self.heights.warnings()),
             *(f"{name}: {path}" for name, path in self.files.items()),
         ]
@@ -144,7 +139,7 @@ def refine_rpc(
         FileOut(
             label="Refined RPCs",
             help="The RPCs alone, as _RPC.TXT or .RPB, or a copy of the image (.tif) with them.",
-            suffixes=(".txt", ".rpb", *_IMAGES),
+            suffixes=(".txt", ".rpb", *IMAGES),
         ),
     ],
     reference: Annotated[
@@ -185,6 +180,16 @@ def refine_rpc(
             suffixes=SUFFIXES[:3],
         ),
     ] = None,
+    report: Annotated[
+        Path | None,
+        FileOut(
+            label="Report",
+            help="A page that shows errors before and after and how far to trust them; its numbers "
+            "are put beside it as JSON. It is written for refused RPCs, too.",
+            suffixes=(".html",),
+            advanced=True,
+        ),
+    ] = None,
     similarity: Similarity = "fused",
     blunders: Annotated[
         str,
@@ -214,7 +219,7 @@ def refine_rpc(
     reference_band: ReferenceBand = None,
     reference_mask: ReferenceMask = None,
     mask: MaskKind = NONE,
-    mask_high_percent: HighPercent = 20.0,
+    mask_high_percent: HighPercent = None,
     mask_low_percent: LowPercent = 10.0,
     matching_pixel_size: MatchingPixelSize = None,
     chip_size: ChipSize = None,
@@ -222,6 +227,7 @@ def refine_rpc(
     workers: Workers = None,
     seed: Seed = 0,
     progress: Progress = SILENT,
+    parameters: Mapping[str, Any] = MappingProxyType({}),
 ) -> RefinedRpc:
     """Refine the RPCs of an image by ground control, given or matched in a reference image.
 
@@ -232,6 +238,7 @@ def refine_rpc(
     """
     if (reference is None) == (gcps is None):
         raise ParameterError("give either a reference or ground control points (gcps)")
+    started = time.perf_counter()
     ground = Ground(dem, dem_datum, geoid, height)
     matching = Matching(
         search_radius,
@@ -244,116 +251,36 @@ def refine_rpc(
         seed,
         image_band,
     )
+    fitting = Fitting(model, blunders, largest_residual, max_error, seed)
+    files = RefinementFiles(output, residuals, report)
     with ExitStack() as stack:
         stack.enter_context(bounded_cache())
-        source, delivered = open_sensor_image(image, rpc, stack)
-        progress.update(0.0, ground.note(delivered))
+        located = None
         if reference is not None:
             located = open_reference(reference, reference_band, reference_mask, stack)
-            orientation = ground.orientation(source, delivered, located.source.grid.crs, stack)
+        crs = None if located is None else located.source.grid.crs
+        sensor = open_oriented_image(image, rpc, ground, crs, stack, progress)
+        call, found = Call(parameters, started), None
+        if located is not None:
             with ThreadPoolExecutor(worker_count(workers)) as executor:
-                found = match_ground_control(
-                    source, orientation, located, matching, executor, stack,
-                    progress.part(0.0, 0.9),
-                )  # fmt: skip
-            points = accepted_points(found, image, reference)
-            own_heights = None
+                part = progress.part(0.0, 0.9)
+                found = match_ground_control(sensor, located, matching, executor, stack, part)
+            points = files.points_or_report(found, call)
         else:
             assert gcps is not None
-            orientation = ground.orientation(source, delivered, utm_of(source, delivered), stack)
-            points = read_control_points(gcps, orientation, source.grid)
-            own_heights = None if dem is None else _median_above(points, orientation)
+            points = read_control_points(gcps, sensor.orientation, sensor.source.grid)
         progress.update(0.9, "estimating the bias")
-        adjusted = _Adjusted.of(
-            points, source, orientation, model, blunders, largest_residual, seed
-        )
-        pixel_m = sensor_grid(source, orientation).pixel_size_m
-        judged = judge_refinement(
-            adjusted.control, adjusted.adjustment, adjusted.check, pixel_m, max_error
-        )
-        if not judged.verdict.accepted:
-            raise NotRegisteredError(
-                f"the RPCs of {image} were not refined: {judged.verdict.reason}", judged.verdict
-            )
-        size = source.grid.width, source.grid.height
-        heights = check_heights(
-            orientation, size, adjusted.control, adjusted.adjustment, own_heights
-        )
+        refinement = Refinement.of(points, sensor, fitting)
+        heights = refinement.heights(own_heights=gcps is not None and dem is not None)
         for warning in heights.warnings():
             progress.update(0.9, warning)
-        fit = fold(delivered, adjusted.adjustment.bias)
-        if fit.largest_residual_px > _LARGEST_FOLDING_PX:
-            raise NotRegisteredError(
-                f"the RPCs of {image} cannot take up the bias: they miss it by "
-                f"{fit.largest_residual_px:.3f} px",
-                judged.verdict,
-            )
-        files = {"output": output} | ({} if residuals is None else {"residuals": residuals})
-        with Outputs() as outputs:
-            _write(source, fit, outputs.stage(output), progress.part(0.9, 1.0))
-            if residuals is not None:
-                adjusted.points.write(
-                    outputs.stage(residuals), orientation.with_rpc(fit.rpc), source.grid
-                )
+        fit = files.write(refinement, heights, found, call, progress.part(0.9, 1.0))
     return RefinedRpc(
         fit,
-        adjusted.adjustment,
-        judged,
+        refinement.adjustment,
+        refinement.judged,
         heights,
-        ground.note(delivered),
-        {name: str(path) for name, path in files.items()},
+        sensor.heights,
+        None if found is None else found.mask,
+        files.written(),
     )
-
-
-@dataclass(frozen=True)
-class _Adjusted:
-    """Points, those of the fit and those to check with as the RPCs see them, and the bias."""
-
-    points: ControlPoints
-    control: Control
-    check: Control | None
-    adjustment: Adjustment
-
-    @classmethod
-    def of(
-        cls,
-        points: ControlPoints,
-        source: RasterSource,
-        orientation: Orientation,
-        model: str,
-        method: str,
-        largest_residual_px: float,
-        seed: int,
-    ) -> _Adjusted:
-        """Estimate the bias by the points of the fit that are used."""
-        size = source.grid.width, source.grid.height
-        table = points.points
-        seen = points.seen_by(orientation.rpc, size)
-        fitted = table.used & ~table.is_check
-        checked = table.used & table.is_check
-        control = seen.take(fitted)
-        try:
-            adjustment = adjust(control, model, method, largest_residual_px, seed)
-        except TooFewPointsError as error:
-            raise NotRegisteredError(
-                f"the RPCs of {source.path} were not refined: {error}", refuse(str(error))
-            ) from error
-        blunders = np.zeros(len(table), bool)
-        blunders[np.flatnonzero(fitted)[~adjustment.used]] = True
-        points = points.with_points(table.reject(blunders, "blunder"))
-        return cls(points, control, seen.take(checked) if checked.any() else None, adjustment)
-
-
-def _median_above(points: ControlPoints, orientation: Orientation) -> float | None:
-    """Return how far points that have heights of their own lie above the ground."""
-    above = points.height_m - orientation.heights.at(points.lon_lat)
-    above = above[np.isfinite(above) & points.points.used]
-    return float(np.median(above)) if len(above) else None
-
-
-def _write(source: RasterSource, fit: RPCFit, path: Path, progress: Progress) -> None:
-    if path.suffix.lower() in _IMAGES:
-        tags = rpc_to_tags(fit.rpc)
-        write_with_geotransform(source, source.grid, path, rpc_tags=tags, progress=progress)
-        return
-    write_rpc(path, fit.rpc)

@@ -313,6 +313,32 @@ class RegistrationResult:
         ]
 
 
+def report_on(
+    registration: Registration,
+    parameters: Mapping[str, Any],
+    started: float,
+    mask: MaskUsed | None = None,
+    with_surfaces: bool = True,
+) -> Report:
+    """Return the report on a registration; parameters as `deliver`.
+
+    Without surfaces, its numbers are the same.
+    """
+    pair = registration.pair
+    names = [Path(image.source.path).name for image in (pair.input, pair.reference)]
+    return Report(
+        title=f"{names[0]} registered to {names[1]}",
+        verdict=registration.verdict,
+        pair=pair,
+        mask=mask,
+        points=registration.points,
+        transform=registration.transform,
+        surfaces=registration.extreme_surfaces() if with_surfaces else (),
+        parameters={k: v for k, v in parameters.items() if v is not None},
+        seconds=time.perf_counter() - started,
+    )
+
+
 def deliver(
     registration: Registration,
     output: RegisteredOutput,
@@ -350,18 +376,7 @@ def deliver(
         The registration was refused.
     """
     pair = registration.pair
-    names = [Path(image.source.path).name for image in (pair.input, pair.reference)]
-    page = Report(
-        title=f"{names[0]} registered to {names[1]}",
-        verdict=registration.verdict,
-        pair=pair,
-        mask=mask,
-        points=registration.points,
-        transform=registration.transform,
-        surfaces=registration.extreme_surfaces() if files.report is not None else (),
-        parameters={k: v for k, v in parameters.items() if v is not None},
-        seconds=time.perf_counter() - started,
-    )
+    page = report_on(registration, parameters, started, mask, files.report is not None)
     with accepted_or_refused(registration, page, files) as outputs:
         points, found = registration.accepted()
         files.write_points(points, found, outputs)

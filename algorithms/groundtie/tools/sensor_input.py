@@ -12,6 +12,7 @@ from rasterio.crs import CRS
 
 from ..errors import ParameterError
 from ..kinds import Choice, FileIn, Number, RasterIn
+from ..progress import Progress
 from ..rasters.reading import RasterSource, open_raster
 from ..sensor.heights import DATUMS, declared_datum, find_geoid
 from ..sensor.orientation import Orientation, orient, seen_at
@@ -156,6 +157,52 @@ def open_sensor_image(
     """Open an image in sensor geometry, and return it with its RPCs."""
     source = stack.enter_context(open_raster(image, allow_sensor_geometry=True))
     return source, rpc_of(source, rpc_file)
+
+
+@dataclass(frozen=True)
+class OrientedImage:
+    """An image located by its RPCs and heights, as they were delivered.
+
+    Parameters
+    ----------
+    source
+        The image, open.
+    rpc
+        Its RPCs.
+    orientation
+        How it sees the ground.
+    heights
+        Which heights are used, in words.
+    """
+
+    source: RasterSource
+    rpc: RPC
+    orientation: Orientation
+    heights: str
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.source.grid.width, self.source.grid.height
+
+
+def open_oriented_image(
+    image: Path,
+    rpc_file: Path | None,
+    ground: Ground,
+    crs: CRS | None,
+    stack: ExitStack,
+    progress: Progress,
+) -> OrientedImage:
+    """Open an image in sensor geometry and locate it on a map; by default on that of its UTM zone.
+
+    `progress` is told which heights are used.
+    """
+    source, rpc = open_sensor_image(image, rpc_file, stack)
+    heights = ground.note(rpc)
+    progress.update(0.0, heights)
+    orientation = ground.orientation(source, rpc, crs or utm_of(source, rpc), stack)
+    return OrientedImage(source, rpc, orientation, heights)
 
 
 def utm_of(source: RasterSource, rpc: RPC) -> CRS:
