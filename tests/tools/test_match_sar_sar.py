@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -193,3 +194,33 @@ def test_a_mask_of_the_ground_leaves_no_room_for_another(
             ground_mask=files.reference,
             mask="threshold",
         )
+
+
+def lifted(files: TexturedPair, folder: Path, share: float, by_px: int) -> TexturedPair:
+    """Return a pair of which a share of the rows, in bands, is displaced along columns."""
+    values = pixels(files.input)[0]
+    band = 35
+    rows = np.arange(len(values)) % band < share * band
+    moved = np.where(rows[:, None], np.roll(values, by_px, axis=1), values)
+    return replace(files, input=write_raster(folder / "lifted.tif", moved, files.grid))
+
+
+def test_what_stands_is_not_taken_for_the_ground(files: TexturedPair, tmp_path: Path) -> None:
+    pair = lifted(files, tmp_path, 0.5, 9)
+    with pytest.raises(NotRegisteredError) as refused:
+        match_sar_sar(pair.reference, pair.input, tmp_path / "out.tif")
+    assert not (tmp_path / "out.tif").exists()
+    assert "ground and what stands on it" in str(refused.value)
+
+
+def test_what_leans_is_refused(
+    files: TexturedPair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tool = sys.modules["groundtie.tools.match_sar_sar"]
+    monkeypatch.setattr(tool, "leaning", lambda *_: "roofs")
+    report = tmp_path / "report.html"
+    with pytest.raises(NotRegisteredError, match="roofs"):
+        match_sar_sar(files.reference, files.input, tmp_path / "out.tif", report=report)
+    verdict = json.loads(report.with_suffix(".json").read_text())["verdict"]
+    assert (verdict["accepted"], verdict["reason"]) == (False, "roofs")
+    assert not (tmp_path / "out.tif").exists()
