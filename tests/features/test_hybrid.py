@@ -113,6 +113,7 @@ class Astray:
     local: LocalSearch
     most_px: float = 7.0
     gate_px: float = 16.0
+    wrong_px: float = 0.0
 
     def match(self, coarse: Model, executor: object, progress: object) -> FeatureMatches:
         grid = self.pair.grid
@@ -122,6 +123,8 @@ class Astray:
         partner = grid.map_to_pixel(TRUTH(grid.pixel_to_map(px)))
         partner = partner - (grid.map_to_pixel(coarse(grid.pixel_to_map(px))) - px)
         partner[:, 0] += self.most_px * px[:, 0] / grid.width
+        # Nearly all agree on a wrong place; so few others are no rival.
+        partner[np.arange(len(px)) % 20 > 0, 1] += self.wrong_px
         both = [
             FeaturePoints(at, *(np.ones(len(px)) for _ in range(3)), np.zeros(len(px), int))
             for at in (px, partner)
@@ -138,6 +141,16 @@ def test_chips_are_matched_again_where_the_first_model_went_astray(files: Textur
         right = files.grid.map_to_pixel(found.points.reference_xy[found.points.used])[:, 0]
     assert error_px(found.transform, files) < 0.4
     assert right.max() > 0.8 * SIZE[0]
+
+
+def test_the_rough_model_is_taken_where_features_agree_on_a_wrong_one(files: TexturedPair) -> None:
+    """Nothing is alike 14 px beside the truth."""
+    with files.opened() as pair, ThreadPoolExecutor(2) as executor:
+        local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("fused"))
+        astray = Astray(pair, local, most_px=0.0, wrong_px=14.0)
+        search = FeatureSearch(astray, local, NMI)  # type: ignore[arg-type]
+        found = search.estimate(TRUTH, "affine", 0, executor)
+    assert error_px(found.transform, files) < 0.4
 
 
 def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.MonkeyPatch) -> None:

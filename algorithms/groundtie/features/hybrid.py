@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from ..errors import TooFewPointsError
 from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate, jackknife_spread
 from ..geometry.fitting import fit_model
-from ..geometry.models import Model
+from ..geometry.models import PARAMETERS, Model
 from ..geometry.robust import fit_mixture
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
@@ -157,14 +157,40 @@ class FeatureSearch:
     ) -> tuple[_Places, Model, Fit]:
         """Return chips around features, the model that they were resampled by, and their fit.
 
-        Matches of features with larger errors may have led the first model astray: if chips show
-        it, they are matched again from their own.
+        Features may agree on a wrong model where few match. If chips around it do not agree, the
+        rough model may still be right.
+        """
+        try:
+            return self._in_rounds(kind, matches, coarse, fit, seed, executor, progress)
+        except TooFewPointsError:
+            rough = self.local.prior(coarse)
+            model = fit_model("affine", matches.px, apply_affine(rough, matches.px))
+            # Without models of its folds: nobody knows how far it may be wrong.
+            start = Fit(model, (), fit.mixture)
+            return self._in_rounds(kind, matches, coarse, start, seed, executor, progress)
+
+    def _in_rounds(
+        self,
+        kind: str,
+        matches: _Places,
+        coarse: Model,
+        fit: Fit,
+        seed: int,
+        executor: Executor,
+        progress: Progress,
+    ) -> tuple[_Places, Model, Fit]:
+        """Return what `_refined` does, from a first model.
+
+        Matches with larger errors may have led it astray: if chips show it, they are matched
+        again from their own.
         """
         claimed_px = apply_affine(self.local.prior(coarse), matches.partner_px)
         for _ in range(_ROUNDS):
             first = fit.model
             residuals = claimed_px - first(matches.px)
             right = fit_mixture(residuals, matches.window_area, SIGMA_RANGE_PX).right
+            if 2 * right.sum() <= PARAMETERS["affine"]:
+                raise TooFewPointsError(f"only {right.sum()} of {len(right)} features agree")
             px, score = matches.px[right], matches.score[right]
             coarse = self.local.on_map(fit_model("affine", px, first(px)))
             side = float(np.ptp(matches.px, axis=0).max()) / _CHIP_CELLS
@@ -172,8 +198,9 @@ class FeatureSearch:
             if self.everywhere:
                 between = far_from(picked, self.local.layout.fit_centres, side)
                 picked = np.concatenate([picked, between])
-            reach = _CHIP_SIGMAS * np.quantile(jackknife_spread(fit.fold_models, picked), 0.9)
-            radius = int(np.clip(np.ceil(reach), *_CHIP_RADIUS_PX))
+            reach = _CHIP_SIGMAS * jackknife_spread(fit.fold_models, picked)
+            reach = np.clip(np.ceil(reach), *_CHIP_RADIUS_PX)
+            radius = int(np.quantile(reach, 0.9))
             chips = self._chips(picked, coarse, radius, executor, progress)
             fit = self._fit(kind, chips, coarse, seed)
             moved = np.hypot(*(fit.model(picked) - first(picked)).T)
