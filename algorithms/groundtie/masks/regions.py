@@ -21,6 +21,7 @@ from ..speckle.statistics import estimate_looks, local_statistics
 from .growing import Region, grow_regions
 from .radar import power
 from .scene import Scene, Selection
+from .shade import out_of_shade
 from .shapes import Shape
 from .skeleton import pruned, skeleton
 from .threshold import disc
@@ -111,6 +112,7 @@ def find_ground(
     width_m: float = WIDTH_M,
     high_percent: float = HIGH_PERCENT,
     progress: Progress = SILENT,
+    shade_azimuth_deg: float | None = None,
 ) -> GroundRegions:
     """Find what lies on the ground in a radar image.
 
@@ -124,6 +126,9 @@ def find_ground(
         Percentage of the brightest pixels inside that take no part after all.
     progress
         Is told of every step.
+    shade_azimuth_deg
+        Direction in which the shadows of the other image fall, clockwise from the top: what may
+        lie in them takes no part. None: nothing does.
 
     Raises
     ------
@@ -142,6 +147,8 @@ def find_ground(
     broad = cv2.dilate(lines.astype(np.uint8), disc(max(round(width_m / pixel_m / 2), 1)))
     border = disc(max(round(_BORDER_M / pixel_m), 1))
     part = cv2.dilate(((broad > 0) | wide).astype(np.uint8), border) > 0
+    if shade_azimuth_deg is not None:
+        part = out_of_shade(part, shade_azimuth_deg, pixel_m)
     inside = _smooth(patch)[part & patch.valid]
     high = float(np.percentile(inside, 100 - high_percent)) if inside.size else np.inf
     return GroundRegions(

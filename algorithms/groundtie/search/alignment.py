@@ -31,9 +31,6 @@ _BLURS_PX = (1.5, 0.0)
 _SLOPE_PER_PX = 0.01
 _STEPS = 60
 
-# The background alone reaches about this many robust standard deviations.
-_LEAST_HEIGHT = 3.0
-
 # From simple to flexible, those that "auto" chooses from; see `choose_alignment`.
 CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3")
 
@@ -120,7 +117,8 @@ def align(
     px
         The chips' centres in the matching grid, shape (n, 2).
     surfaces
-        Their similarity, unsupported by neighbours, shape (n, 2 r + 1, 2 r + 1).
+        Their similarity, unsupported by neighbours, by how much each counts, about 1 at its peak;
+        shape (n, 2 r + 1, 2 r + 1).
     prior
         From grid pixels to claimed grid pixels: what the input was resampled by for matching.
     start
@@ -179,13 +177,7 @@ def _left_out_scores(field: _Field, alignment: Alignment) -> FloatArray:
 
 
 def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Affine) -> list[_Field]:
-    """Return the surfaces to look up, from the most to the least blurred.
-
-    Each is divided by its height, so that every chip counts the same: the highest peaks are those
-    of buildings, which lay over and lean.
-    """
-    heights = np.maximum(surfaces.max(axis=(1, 2), keepdims=True), _LEAST_HEIGHT)
-    surfaces = surfaces / heights
+    """Return the surfaces to look up, from the most to the least blurred."""
     fields = []
     for blur in _BLURS_PX:
         blurred = (cv2.GaussianBlur(s, (0, 0), blur) if blur else s for s in surfaces)

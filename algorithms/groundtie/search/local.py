@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from affine import Affine
@@ -20,10 +20,11 @@ from ..rasters.grid import Grid, apply_affine
 from ..rasters.kernels import REACH
 from ..rasters.pair import ImagePair
 from ..similarity.evidence import Evidence, find_peak, find_peak_near
-from ..similarity.surface import SimilaritySettings
-from .alignment import Alignment, align, choose_alignment
+from ..similarity.surface import SimilaritySettings, normalise
+from .alignment import Alignment, Positions, align, choose_alignment
 from .layout import ChipLayout
 from .matching import ChipMatcher, ChipSurfaces
+from .pooled import GroundChips
 from .support import Surfaces, support
 
 FloatArray = NDArray[np.float64]
@@ -38,6 +39,12 @@ _CONSENSUS_PX = 3.0
 
 # If a tenth of the chips is expected to be shifted by more than this, they are matched again.
 _FAR_PX = 2.5
+
+# What they say tells one model from another badly, and linear distortion is common.
+_POOLED_KIND = "affine"
+
+# How often chips with a joint histogram in common are matched again.
+_POOLED_ROUNDS = 2
 
 # A tie point of the fit is the peak within this distance from the aligned model.
 _NEAR_PX = 3
@@ -59,6 +66,8 @@ class LocalSearch:
         Largest shift from the prediction for points of the fit and for check points.
     two_way_px
         Largest distance between a match and its match back for points of the fit.
+    pooled
+        Whether chips share one joint histogram, as those that a mask leaves little of must.
     """
 
     pair: ImagePair
@@ -67,6 +76,7 @@ class LocalSearch:
     fit_radius_px: int = 8
     check_radius_px: int = 12
     two_way_px: float = 2.0
+    pooled: bool = False
 
     def estimate(
         self, coarse: Model, kind: str, seed: int, executor: Executor, progress: Progress = SILENT
@@ -93,8 +103,11 @@ class LocalSearch:
             Too few chips could be matched for the model.
         """
         surfaces, aligned, expected = self._align(coarse, kind, seed, executor, progress)
-        if DEGREE[aligned.model.kind] <= 1 and _lies_far(expected):
-            # Chips near the border of their search windows saw too little: look again, from here.
+        for _ in range(_POOLED_ROUNDS if self.pooled else 1):
+            if DEGREE[aligned.model.kind] > 1 or not (self.pooled or _lies_far(expected)):
+                break
+            # Chips near the border of their search windows saw too little, and what goes with
+            # what is told the better the nearer they lie: look again, from here.
             coarse = self.on_map(aligned.model)
             surfaces, aligned, expected = self._align(coarse, kind, seed, executor, progress)
         points = self._points(surfaces, coarse, expected)
@@ -118,26 +131,42 @@ class LocalSearch:
         Returns the surfaces, the alignment and the shifts that it expects of the chips, (n, 2).
         """
         surfaces = self._match(
-            self.layout.fit_centres, self.fit_radius_px, coarse, True, executor, progress
+            self._fit_centres, self.fit_radius_px, coarse, True, executor, progress
         )
-        centres, both = surfaces.centres, surfaces.both
+        centres, weighed = surfaces.centres, surfaces.weighed
         if len(centres) < 4:
             raise TooFewPointsError(f"only {len(centres)} chips could be matched")
         prior = self.prior(coarse)
-        supported = support(both, centres, _SUPPORT_SPACINGS * self.layout.spacing_px)
-        px = centres.astype(float)
-        shifts = np.array([find_peak(surface).shift_px for surface in supported])
-        first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
-        residual = find_consensus(px, px + shifts, _CONSENSUS_PX, first_kind, seed)
+        residual = self._first_model(surfaces, kind, seed)
 
         def start(at: FloatArray) -> FloatArray:
             return apply_affine(prior, residual(at))
 
+        if self.pooled and kind == AUTO:
+            kind = _POOLED_KIND
         if kind in (AUTO, "tps"):
-            aligned = choose_alignment(centres, both, prior, start)
+            aligned = choose_alignment(centres, weighed, prior, start)
         else:
-            aligned = align(kind, centres, both, prior, start)
+            aligned = align(kind, centres, weighed, prior, start)
+        px = centres.astype(float)
         return surfaces, aligned, apply_affine(~prior, aligned.model(px)) - px
+
+    def _first_model(self, surfaces: ChipSurfaces, kind: str, seed: int) -> Positions:
+        """Return where a first model of degree 1 has grid pixels on the resampled input."""
+        px = surfaces.centres.astype(float)
+        if self.pooled:
+            shift = find_peak(normalise(surfaces.weighed.sum(axis=0))).shift_px
+            return lambda at: at + shift
+        reach = _SUPPORT_SPACINGS * self.layout.spacing_px
+        supported = support(surfaces.both, surfaces.centres, reach)
+        shifts = np.array([find_peak(surface).shift_px for surface in supported])
+        first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
+        return find_consensus(px, px + shifts, _CONSENSUS_PX, first_kind, seed)
+
+    @property
+    def _fit_centres(self) -> NDArray[np.int_]:
+        # All that is not held out counts where there is little of it.
+        return self.layout.tile_centres if self.pooled else self.layout.fit_centres
 
     def on_map(self, model: Model) -> Model:
         """Return a model of the matching grid's pixels as one on the map."""
@@ -150,6 +179,8 @@ class LocalSearch:
         surfaces = self._match(
             self.layout.check_centres, self.check_radius_px, model, False, executor, progress
         )
+        if self.pooled:
+            surfaces = surfaces.together(self.layout.neighbourhoods(surfaces.centres))
         return self._points(surfaces, model, None)
 
     def check_surfaces(self, model: Model, centres: NDArray[np.int_]) -> Surfaces:
@@ -189,15 +220,19 @@ class LocalSearch:
         executor: Executor,
         progress: Progress,
     ) -> ChipSurfaces:
-        matcher = ChipMatcher(
-            self.pair,
-            self.pair.grid,
-            lambda xy: self.pair.claimed_px(model(xy)),
-            self.settings,
-            self.held_out if blind else None,
-        )
+        def to_input_px(xy: FloatArray) -> FloatArray:
+            return self.pair.claimed_px(model(xy))
+
+        grid, held_out = self.pair.grid, self.held_out if blind else None
         chip_px = self.layout.chip_px if blind else self.layout.check_chip_px
-        return matcher.match(centres, chip_px, radius_px, executor, progress)
+        if not self.pooled:
+            matcher = ChipMatcher(self.pair, grid, to_input_px, self.settings, held_out)
+            return matcher.match(centres, chip_px, radius_px, executor, progress)
+        # What goes with what is told by the chips of the fit alone.
+        fit = GroundChips(self.pair, grid, to_input_px, self.held_out)
+        levels = fit.levels(self._fit_centres, self.layout.chip_px, executor, progress)
+        chips = replace(fit, held_out=held_out)
+        return chips.match(levels, centres, chip_px, radius_px, executor, progress)
 
     def prior(self, coarse: Model) -> Affine:
         """Return a model of degree 1 on the map as an affine transform of the grid's pixels."""

@@ -29,6 +29,9 @@ MaskOf = Callable[[Grid], NDArray[np.bool_]]
 # chosen for what it tells: a little of it may be enough.
 _LEAST_VALID, _LEAST_VALID_MASKED = 0.4, 0.1
 
+# The background alone reaches about this many robust standard deviations.
+_LEAST_HEIGHT = 3.0
+
 
 @dataclass(frozen=True)
 class ChipSurfaces:
@@ -43,16 +46,47 @@ class ChipSurfaces:
     backward
         Surfaces of input chips in the reference, turned so that they should peak at the same
         place, same shape.
+    say
+        By how much each chip's surface counts in a fit, shape (n,).
     """
 
     centres: NDArray[np.int_]
     forward: Surfaces
     backward: Surfaces
+    say: FloatArray
 
     @property
     def both(self) -> Surfaces:
         """The evidence of both directions together, in robust standard deviations."""
         return normalise_each(self.forward + self.backward)
+
+    @property
+    def weighed(self) -> Surfaces:
+        """The evidence of both directions, by how much it counts in a fit."""
+        return np.asarray(self.both * self.say[:, None, None], np.float32)
+
+    def together(self, groups: NDArray[np.int_]) -> ChipSurfaces:
+        """Return what groups of chips say together, at their middles.
+
+        Parameters
+        ----------
+        groups
+            The number of each chip's group, shape (n,).
+        """
+        members = [groups == group for group in np.unique(groups)]
+        say = self.say[:, None, None]
+
+        def total(surfaces: Surfaces) -> Surfaces:
+            added = [(surfaces[of] * say[of]).sum(axis=0) for of in members]
+            return normalise_each(np.array(added, np.float32).reshape(-1, *surfaces.shape[1:]))
+
+        middles = [np.rint(self.centres[of].mean(axis=0)) for of in members]
+        return ChipSurfaces(
+            np.array(middles, int).reshape(-1, 2),
+            total(self.forward),
+            total(self.backward),
+            np.array([self.say[of].sum() for of in members]),
+        )
 
     @property
     def radius(self) -> int:
@@ -109,7 +143,8 @@ class ChipMatcher:
             Is told of every chip.
         """
         kept, found = self._run(centres, chip_px, radius_px, executor, progress, both_ways=True)
-        return ChipSurfaces(kept, found[:, 0], found[:, 1])
+        forward, backward = found[:, 0], found[:, 1]
+        return ChipSurfaces(kept, forward, backward, _same_say(normalise_each(forward + backward)))
 
     def match_forward(
         self,
@@ -179,3 +214,11 @@ class ChipMatcher:
         core = chip.inner(BORDER_PX)
         least = _LEAST_VALID_MASKED if self.pair.is_masked else _LEAST_VALID
         return core.valid_share >= least and not core.is_flat
+
+
+def _same_say(surfaces: Surfaces) -> FloatArray:
+    """Return by what surfaces are multiplied so that every chip counts the same in a fit.
+
+    The highest peaks are those of buildings, which lay over and lean.
+    """
+    return 1 / np.maximum(surfaces.max(axis=(1, 2), initial=0.0), _LEAST_HEIGHT).astype(float)

@@ -30,13 +30,17 @@ from ..masks.layer import read_layer
 from ..masks.radar import is_more_speckled
 from ..masks.regions import GroundRegions, find_ground
 from ..masks.scene import Scene, Selection, write_mask
+from ..masks.shade import shade_azimuth_deg
 from ..masks.threshold import Threshold
 from ..progress import Progress
+from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair, default_radius_m
 from ..rasters.patch import Patch
 from ..rasters.reading import Window, open_raster
 
 MASK_IMAGES = (AUTO, REFERENCE, INPUT)
+
+_MIDDLE_PX = 2048
 
 Mask = Annotated[
     str,
@@ -117,26 +121,34 @@ class MaskRequest:
             return pair, MaskUsed(NONE, None, 1.0, "as asked for")
         name, reason = self._image(pair)
         scene = _scene(pair, name, radius_m)
-        kind = self.kind
+        other = _scene(pair, INPUT if name == REFERENCE else REFERENCE, radius_m)
+        kind, find = self.kind, partial(self._ground, scene, other)
         if kind == AUTO:
-            kind, reason = choose(scene, partial(self._ground, scene), progress.part(0.0, 0.5))
+            kind, reason = choose(scene, find, progress.part(0.0, 0.5))
         if kind == NONE:
             return pair, MaskUsed(NONE, None, 1.0, reason)
-        select = self._selection(kind, scene, progress.part(0.5, 0.8))
+        select = self._selection(kind, scene, find, progress.part(0.5, 0.8))
         used = MaskUsed(kind, name, 0.0, reason)
         return _masked(pair, scene, select, used, stack, progress.part(0.8, 1.0))
 
     def _selection(
-        self, kind: str, scene: Scene, progress: Progress
+        self,
+        kind: str,
+        scene: Scene,
+        find: Callable[[Progress], GroundRegions],
+        progress: Progress,
     ) -> Callable[[Window], Selection]:
         if kind == REGIONS:
-            return self._ground(scene, progress).select
+            return find(progress).select
         growth_px = round(self.growth_m / scene.grid.pixel_size_m)
         by_level = Threshold(self._high(threshold.HIGH_PERCENT), self.low_percent, growth_px)
         return by_level.on(scene, progress).select
 
-    def _ground(self, scene: Scene, progress: Progress) -> GroundRegions:
-        return find_ground(scene, self.width_m, self._high(regions.HIGH_PERCENT), progress)
+    def _ground(self, scene: Scene, other: Scene, progress: Progress) -> GroundRegions:
+        shown = other.read(_middle(other.grid))
+        shade = shade_azimuth_deg(shown) if shown.valid.any() else None
+        high = self._high(regions.HIGH_PERCENT)
+        return find_ground(scene, self.width_m, high, progress, shade)
 
     def _by_layer(
         self, pair: ImagePair, radius_m: float | None, stack: ExitStack, progress: Progress
@@ -159,6 +171,12 @@ class MaskRequest:
         if is_more_speckled(pair.reference, pair.input):
             return REFERENCE, "it has the more speckle"
         return INPUT, "it has the more speckle"
+
+
+def _middle(grid: Grid) -> Window:
+    """Return the middle of a grid, of which a direction is told."""
+    width, height = min(grid.width, _MIDDLE_PX), min(grid.height, _MIDDLE_PX)
+    return Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
 
 
 def _masked(

@@ -1,0 +1,138 @@
+"""Chips of ground: what a mask leaves of them is matched by one joint histogram of all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import TooFewPointsError
+from ..progress import SILENT, Progress
+from ..rasters.grid import Grid
+from ..rasters.pair import ImagePair
+from ..rasters.patch import Patch
+from ..similarity.pooled import GreyLevels
+from .matching import ChipSurfaces, MaskOf, ToPixel
+from .support import normalise_each
+
+# Chips with less ground than this say nothing; fewer pixels in all make no joint histogram.
+_LEAST_VALID = 0.02
+_LEAST_PIXELS = 5_000
+
+
+@dataclass(frozen=True)
+class GroundChips:
+    """Chips of a masked pair, the input resampled by what is known already.
+
+    The masked image's chips are the templates: the other image has no mask of its own, and what
+    it shows beside the ground must not take part.
+
+    Parameters
+    ----------
+    pair
+        The images; one of them has a mask.
+    grid
+        Grid on which chips are matched: the matching grid or a coarser level of it.
+    to_input_px
+        From map positions to input pixels, as known so far.
+    held_out
+        Returns for a piece of the grid which pixels of the reference must not be seen; None: all
+        may be.
+    """
+
+    pair: ImagePair
+    grid: Grid
+    to_input_px: ToPixel
+    held_out: MaskOf | None = None
+
+    def levels(
+        self, centres: NDArray[np.int_], chip_px: int, executor: Executor, progress: Progress
+    ) -> GreyLevels:
+        """Return what pairs of grey levels say by chips as they lie on each other now.
+
+        Raises
+        ------
+        TooFewPointsError
+            The mask leaves too few pixels.
+        """
+        pairs = list(self._read_all(centres, chip_px, 0, executor, progress))
+        count = sum(np.count_nonzero(there.valid & here.valid) for there, here in pairs)
+        if count < _LEAST_PIXELS:
+            raise TooFewPointsError(f"the mask leaves only {count} pixels to match")
+        return GreyLevels.of(pairs)
+
+    def match(
+        self,
+        levels: GreyLevels,
+        centres: NDArray[np.int_],
+        chip_px: int,
+        radius_px: int,
+        executor: Executor,
+        progress: Progress = SILENT,
+    ) -> ChipSurfaces:
+        """Return the surfaces of all chips that have enough ground.
+
+        They are matched one way alone, so both ways are the same.
+
+        Parameters
+        ----------
+        levels
+            What pairs of grey levels say.
+        centres
+            Pixel positions (col, row) of the chips' centres in the grid, shape (n, 2).
+        chip_px
+            Side of the chips.
+        radius_px
+            Largest shift.
+        executor
+            Threads to work in.
+        progress
+            Is told of every chip.
+        """
+        turn = 1 if self._forward else -1
+        kept, found = [], []
+        pieces = self._read_all(centres, chip_px, radius_px, executor, progress)
+        for centre, (template, search) in zip(centres, pieces, strict=True):
+            chip = template.inner(radius_px) if radius_px else template
+            if chip.valid_share >= _LEAST_VALID:
+                kept.append(centre)
+                found.append(levels.surface(chip, search)[::turn, ::turn])
+        span = 2 * radius_px + 1
+        nats = np.stack(found) if found else np.zeros((0, span, span), np.float32)
+        shown = normalise_each(nats)
+        # Chips count by what they say, in nats; on average as much as those of other similarities.
+        spread = np.ptp(nats, axis=(1, 2)) / np.maximum(np.ptp(shown, axis=(1, 2)), 1e-9)
+        heights = shown.max(axis=(1, 2), initial=0.0) * spread
+        say = spread / max(float(heights.mean()), 1e-9) if found else spread
+        return ChipSurfaces(np.array(kept, int).reshape(-1, 2), shown, shown, say)
+
+    @property
+    def _forward(self) -> bool:
+        return self.pair.reference.mask is not None
+
+    def _read_all(
+        self,
+        centres: NDArray[np.int_],
+        chip_px: int,
+        radius_px: int,
+        executor: Executor,
+        progress: Progress,
+    ) -> Iterator[tuple[Patch, Patch]]:
+        """Yield the masked image's and the other's window, as wide as searched, of each chip."""
+
+        def read(centre: NDArray[np.int_]) -> tuple[Patch, Patch]:
+            progress.check()
+            side = chip_px + 2 * radius_px
+            corner = centre - chip_px // 2 - radius_px
+            piece = self.grid.window(int(corner[0]), int(corner[1]), side, side)
+            hidden = None if self.held_out is None else self.held_out(piece)
+            reference = self.pair.reference_patch(piece, hidden)
+            input = self.pair.input_patch(piece, self.to_input_px)
+            return (reference, input) if self._forward else (input, reference)
+
+        for i, windows in enumerate(executor.map(read, centres)):
+            progress.update((i + 1) / len(centres))
+            yield windows

@@ -1,0 +1,95 @@
+"""Mutual information of many chips together: one joint histogram says what goes with what.
+
+A mask of the ground leaves little of a chip, too little for a joint histogram of its own. All
+chips together have enough. From the histogram of all of them, where they lie, follows what a pair
+of grey levels says for or against belonging together, log p(a, b) / (p(a) p(b)); its mean is
+mutual information. A chip's similarity at a shift is the sum over its pixels, so that chips add
+up: many that say little each outweigh what draws a few.
+
+Point similarity measures: Rogelj, Kovačič & Gee 2003, doi:10.1016/S1077-3142(03)00116-4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rasters.patch import Patch
+from .binning import bin_edges
+from .surface import Surface
+
+FloatArray = NDArray[np.float32]
+
+BINS = 12
+
+# Counted for every pair of grey levels beforehand, so that none is impossible.
+_UNSEEN = 0.5
+
+# The template's speckle is averaged over so many pixels a side.
+_SMOOTH_PX = 3
+
+
+@dataclass(frozen=True)
+class GreyLevels:
+    """What pairs of grey levels say.
+
+    Parameters
+    ----------
+    template_edges, search_edges
+        Inner edges between grey levels, shape (bins - 1,).
+    evidence
+        log p(a, b) / (p(a) p(b)) of the template's level a and the search window's b, in nats,
+        shape (bins, bins).
+    """
+
+    template_edges: FloatArray
+    search_edges: FloatArray
+    evidence: FloatArray
+
+    @classmethod
+    def of(cls, pairs: Sequence[tuple[Patch, Patch]], bins: int = BINS) -> GreyLevels:
+        """Return what pairs of a template and the piece of the same size it lies on say."""
+        valid = [template.valid & search.valid for template, search in pairs]
+        sides = [
+            np.concatenate([patch.values[v] for patch, v in zip(side, valid, strict=True)])
+            for side in zip(*((smooth(template), search) for template, search in pairs), strict=True)
+        ]
+        edges = [bin_edges(s, np.ones(s.shape, bool), bins, "equal-frequency") for s in sides]
+        levels = [np.searchsorted(e, s, side="right") for e, s in zip(edges, sides, strict=True)]
+        counts = np.bincount(levels[0] * bins + levels[1], minlength=bins * bins) + _UNSEEN
+        joint = counts.reshape(bins, bins) / counts.sum()
+        apart = joint.sum(axis=1, keepdims=True) * joint.sum(axis=0, keepdims=True)
+        return cls(edges[0], edges[1], np.log(joint / apart).astype(np.float32))
+
+    def surface(self, template: Patch, search: Patch) -> Surface:
+        """Return the evidence over shifts, in nats, shape (2 r + 1, 2 r + 1).
+
+        Parameters
+        ----------
+        template
+            The chip; what is not valid takes no part.
+        search
+            A window with the same centre, larger by r on each side; what is not valid says nothing.
+        """
+        template = smooth(template)
+        levels = np.searchsorted(self.template_edges, template.values, side="right")
+        shown = np.searchsorted(self.search_edges, search.values, side="right")
+        total = np.zeros((), np.float32)
+        for level in np.unique(levels[template.valid]):
+            says = np.where(search.valid, self.evidence[level][shown], np.float32(0))
+            there = (template.valid & (levels == level)).astype(np.float32)
+            total = total + cv2.matchTemplate(says, there, cv2.TM_CCORR)
+        span = search.values.shape[0] - template.values.shape[0] + 1
+        return np.broadcast_to(total, (span, span)).astype(np.float32)
+
+
+def smooth(patch: Patch) -> Patch:
+    """Return a patch with its power averaged over what is valid around each pixel."""
+    counts = patch.valid.astype(np.float32)
+    side = (_SMOOTH_PX, _SMOOTH_PX)
+    power = cv2.blur(np.square(patch.values) * counts, side)
+    return Patch(np.sqrt(power / np.maximum(cv2.blur(counts, side), np.float32(1e-6))), patch.valid)
