@@ -22,7 +22,10 @@ _BRIGHT = 4.0
 _DENSE = 0.13
 
 # Regions must cover this share of a scene, and their skeleton be so many times its side.
-_LEAST_GROUND, _LEAST_SKELETON = 0.1, 2.0
+_LEAST_GROUND, _LEAST_SKELETON = 0.04, 2.0
+
+# Chips with less than this share of valid pixels have too few for a joint histogram of their own.
+_LITTLE = 0.4
 
 # What a mask by a vector layer is called.
 LAYER = "layer"
@@ -51,6 +54,11 @@ class MaskUsed:
     share: float
     reason: str
 
+    @property
+    def leaves_little(self) -> bool:
+        """Whether chips of what takes part are too poor to be matched each by itself."""
+        return self.share < _LITTLE
+
     def summary(self) -> dict[str, Any]:
         """Return the mask as values that JSON can carry."""
         return asdict(self)
@@ -78,7 +86,7 @@ def choose(
     """
     share = bright_share(scene, progress.part(0.0, 0.2))
     shine = f"{share:.0%} of the image shines"
-    if share < _DENSE:
+    if not is_dense(share):
         return NONE, f"{shine}: too few buildings to lead astray"
     ground = find(progress.part(0.2, 1.0))
     side_m = float(np.sqrt(scene.grid.width * scene.grid.height)) * scene.grid.pixel_size_m
@@ -86,6 +94,11 @@ def choose(
     if ground.part.mean() < _LEAST_GROUND or ground.skeleton_m < _LEAST_SKELETON * side_m:
         return THRESHOLD, f"{usable} are too little to rely on"
     return REGIONS, f"{usable} are enough to rely on"
+
+
+def is_dense(share: float) -> bool:
+    """Tell whether a radar image with this bright share shows a dense town."""
+    return share >= _DENSE
 
 
 def bright_share(scene: Scene, progress: Progress = SILENT) -> float:

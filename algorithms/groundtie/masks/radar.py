@@ -12,6 +12,11 @@ from ..speckle.statistics import FloatImage, calm_variation2
 # Looked at in the middle of an image, at full resolution: averaging would take speckle away.
 _SAMPLE_PX = 1024
 
+# Relative variance of the power in the calmest windows of radar images, and how many times that of
+# a camera's it is. Measured at pixels of few metres: 0.09 to 0.24, 12 to 300 times; two radar
+# images of one place: 7 times at most.
+_RADAR, _BESIDE_CAMERA = 0.05, 9.0
+
 
 def is_more_speckled(image: Image, other: Image) -> bool:
     """Tell whether an image has more speckle than another.
@@ -22,6 +27,12 @@ def is_more_speckled(image: Image, other: Image) -> bool:
         The images; their grey values are taken for amplitudes.
     """
     return _calm(image) >= _calm(other)
+
+
+def is_radar_and_camera(image: Image, other: Image) -> bool:
+    """Tell whether an image has the speckle of a radar's, and another far less than it."""
+    calm = _calm(image)
+    return calm >= _RADAR and calm >= _BESIDE_CAMERA * _calm(other)
 
 
 def power(patch: Patch) -> FloatImage:

@@ -1,8 +1,9 @@
-"""Where the camera's shadows fall: ground beside tall objects that it shows dark, the radar does not.
+"""The side on which an image's shadows fall, and the ground that is out of them.
 
-Shadows make grey values of one kind of ground differ, always on the same side of what casts them:
-they pull every match of the ground towards the sun's side or away from it. The side is told from
-the image itself: what is dark lies beside what is bright more often on the one than on the other.
+The camera shows ground beside tall objects dark, and the radar does not. Shadows make grey values
+of one kind of ground differ, always on the same side of what casts them, and so pull every match
+of the ground to one side. Which it is, is told from the image itself: dark lies beside bright more
+often on the one side than on the other.
 """
 
 from __future__ import annotations

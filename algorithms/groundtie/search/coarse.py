@@ -95,11 +95,11 @@ def refine_on_level(
         agreeing = int((distances(fitted, px, px + own) < _TOLERANCE_PX).sum())
         alarms = log10_false_alarms(agreeing, len(px), probability, sample)
         if alarms < best.log10_false_alarms:
-            best = CoarseModel(_behind(model, fitted, level), alarms)
+            best = CoarseModel(behind(model, fitted, level), alarms)
     return best
 
 
-def _behind(model: Model, correction: Model, level: Grid) -> Model:
+def behind(model: Model, correction: Model, level: Grid) -> Model:
     """Return the model of degree 1 that first corrects on the level, then applies `model`."""
     centres = level.transform * Affine.translation(0.5, 0.5)
     on_map = correction.on_map(centres)

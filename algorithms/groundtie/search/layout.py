@@ -142,16 +142,6 @@ class ChipLayout:
         centres = np.column_stack([cols.ravel(), rows.ravel()])
         return _middle_pixels(centres, self.check_chip_px)
 
-    @cached_property
-    def tile_centres(self) -> NDArray[np.int_]:
-        """Centres (col, row) of chips that cover the grid side by side, shape (n, 2)."""
-        sides = [
-            np.arange(axis.size // self.chip_px) * self.chip_px + self.chip_px // 2
-            for axis in (self.columns, self.rows)
-        ]
-        cols, rows = np.meshgrid(*sides)
-        return np.column_stack([cols.ravel(), rows.ravel()])
-
     def neighbourhoods(self, centres_px: NDArray[np.int_]) -> NDArray[np.int_]:
         """Return which of the squares of 2 × 2 cells positions (col, row), (n, 2), lie in."""
         col, row = (

@@ -20,11 +20,11 @@ from ..rasters.grid import Grid, apply_affine
 from ..rasters.kernels import REACH
 from ..rasters.pair import ImagePair
 from ..similarity.evidence import Evidence, find_peak, find_peak_near
-from ..similarity.surface import SimilaritySettings, normalise
+from ..similarity.surface import SimilaritySettings
 from .alignment import Alignment, Positions, align, choose_alignment
 from .layout import ChipLayout
 from .matching import ChipMatcher, ChipSurfaces
-from .pooled import GroundChips
+from .pooled import GroundChips, tile_centres
 from .support import Surfaces, support
 
 FloatArray = NDArray[np.float64]
@@ -155,18 +155,24 @@ class LocalSearch:
         """Return where a first model of degree 1 has grid pixels on the resampled input."""
         px = surfaces.centres.astype(float)
         if self.pooled:
-            shift = find_peak(normalise(surfaces.weighed.sum(axis=0))).shift_px
-            return lambda at: at + shift
+            return surfaces.common_shift
         reach = _SUPPORT_SPACINGS * self.layout.spacing_px
         supported = support(surfaces.both, surfaces.centres, reach)
         shifts = np.array([find_peak(surface).shift_px for surface in supported])
         first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
         return find_consensus(px, px + shifts, _CONSENSUS_PX, first_kind, seed)
 
+    def of_ground(self, pair: ImagePair) -> LocalSearch:
+        """Return this search on what a mask of the pair leaves, with one joint histogram."""
+        nmi = replace(self.settings, similarity="nmi")
+        return replace(self, pair=pair, settings=nmi, pooled=True)
+
     @property
     def _fit_centres(self) -> NDArray[np.int_]:
         # All that is not held out counts where there is little of it.
-        return self.layout.tile_centres if self.pooled else self.layout.fit_centres
+        if not self.pooled:
+            return self.layout.fit_centres
+        return tile_centres((self.pair.grid.width, self.pair.grid.height), self.layout.chip_px)
 
     def on_map(self, model: Model) -> Model:
         """Return a model of the matching grid's pixels as one on the map."""
@@ -176,17 +182,23 @@ class LocalSearch:
         self, model: Model, executor: Executor, progress: Progress = SILENT
     ) -> TiePoints:
         """Match the check chips around what a model predicts, each by its own evidence alone."""
+        return self._points(self._match_check(model, executor, progress), model, None)
+
+    def check_surfaces(self, model: Model, centres: NDArray[np.int_]) -> Surfaces:
+        """Return the surfaces of check points, shape (n, 2 r + 1, 2 r + 1), to look at."""
+        with ThreadPoolExecutor(1) as executor:
+            found = self._match_check(model, executor, SILENT)
+        place = {tuple(centre): i for i, centre in enumerate(found.centres)}
+        return found.both[[place[tuple(centre)] for centre in centres]]
+
+    def _match_check(self, model: Model, executor: Executor, progress: Progress) -> ChipSurfaces:
         surfaces = self._match(
             self.layout.check_centres, self.check_radius_px, model, False, executor, progress
         )
         if self.pooled:
-            surfaces = surfaces.together(self.layout.neighbourhoods(surfaces.centres))
-        return self._points(surfaces, model, None)
-
-    def check_surfaces(self, model: Model, centres: NDArray[np.int_]) -> Surfaces:
-        """Return the surfaces of check chips, shape (n, 2 r + 1, 2 r + 1), to look at."""
-        with ThreadPoolExecutor(1) as executor:
-            return self._match(centres, self.check_radius_px, model, False, executor, SILENT).both
+            # A held-out block's ground tells little by itself.
+            return surfaces.together(self.layout.neighbourhoods(surfaces.centres))
+        return surfaces
 
     def held_out(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a grid, of any pixel size, see something of held-out blocks."""

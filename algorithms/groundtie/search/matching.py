@@ -13,10 +13,12 @@ from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
+from ..similarity.evidence import find_peak
 from ..similarity.surface import (
     BORDER_PX,
     SimilaritySettings,
     describe,
+    normalise,
     similarity_surface,
 )
 from .support import Surfaces, normalise_each
@@ -64,6 +66,10 @@ class ChipSurfaces:
     def weighed(self) -> Surfaces:
         """The evidence of both directions, by how much it counts in a fit."""
         return np.asarray(self.both * self.say[:, None, None], np.float32)
+
+    def common_shift(self, px: FloatArray) -> FloatArray:
+        """Return positions moved by the shift that all chips together agree on best."""
+        return px + find_peak(normalise(self.weighed.sum(axis=0))).shift_px
 
     def together(self, groups: NDArray[np.int_]) -> ChipSurfaces:
         """Return what groups of chips say together, at their middles.

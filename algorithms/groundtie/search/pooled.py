@@ -7,20 +7,28 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
+from affine import Affine
 from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
+from ..geometry.models import PARAMETERS, Model
 from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.pooled import GreyLevels
+from .alignment import align
+from .coarse import behind
 from .matching import ChipSurfaces, MaskOf, ToPixel
 from .support import normalise_each
 
 # Chips with less ground than this say nothing; fewer pixels in all make no joint histogram.
 _LEAST_VALID = 0.02
 _LEAST_PIXELS = 5_000
+
+
+# Side of the chips on a level of the pyramid, in pixels of the level.
+_LEVEL_CHIP_PX = 64
 
 
 @dataclass(frozen=True)
@@ -136,3 +144,51 @@ class GroundChips:
         for i, windows in enumerate(executor.map(read, centres)):
             progress.update((i + 1) / len(centres))
             yield windows
+
+
+def refine_on_ground(
+    pair: ImagePair,
+    level: Grid,
+    model: Model,
+    radius_px: int,
+    held_out: MaskOf,
+    executor: Executor,
+) -> Model:
+    """Return a better affine model by all the ground that a level of the pyramid shows.
+
+    Parameters
+    ----------
+    pair
+        The images; one of them has a mask.
+    level
+        The matching grid at reduced resolution.
+    model
+        The misregistration on the map as known so far, of degree 1.
+    radius_px
+        How far it may be wrong, in pixels of the level.
+    held_out
+        Returns for a piece of the grid which pixels of the reference must not be seen.
+    executor
+        Threads to work in.
+
+    Raises
+    ------
+    TooFewPointsError
+        The mask leaves too few pixels.
+    """
+    chips = GroundChips(pair, level, lambda xy: pair.claimed_px(model(xy)), held_out)
+    centres = tile_centres((level.width, level.height), _LEVEL_CHIP_PX)
+    levels = chips.levels(centres, _LEVEL_CHIP_PX, executor, SILENT)
+    found = chips.match(levels, centres, _LEVEL_CHIP_PX, radius_px, executor)
+    if len(found.centres) < PARAMETERS["affine"]:
+        raise TooFewPointsError(f"only {len(found.centres)} chips show any ground")
+    identity = Affine.identity()
+    aligned = align("affine", found.centres, found.weighed, identity, found.common_shift)
+    return behind(model, aligned.model, level)
+
+
+def tile_centres(size: tuple[int, int], chip_px: int) -> NDArray[np.int_]:
+    """Return the centres (col, row) of chips that cover a grid side by side, shape (n, 2)."""
+    sides = [np.arange(length // chip_px) * chip_px + chip_px // 2 for length in size]
+    cols, rows = np.meshgrid(*sides)
+    return np.column_stack([cols.ravel(), rows.ravel()])

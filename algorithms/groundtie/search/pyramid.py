@@ -13,7 +13,9 @@ from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from .coarse import CoarseModel, refine_on_level
 from .local import LocalSearch
-from .rough import RoughSearch, level_factor, rough_candidates
+from .matching import MaskOf
+from .pooled import refine_on_ground
+from .rough import Candidate, RoughSearch, level_factor, rough_candidates
 
 # A candidate that random matches would hardly ever support (log10) needs no rival.
 _CERTAIN = -6.0
@@ -35,6 +37,9 @@ _LEVEL_ERROR_PX, _DISTORTION_PX = 2.0, 4
 
 # Each level is finer than the one before by this at most; the last is the matching grid itself.
 _STEP = 4.0
+
+# Ground alone says too little of chips to look so far: levels are this much finer.
+_GROUND_STEP = 2.0
 
 
 def find_coarse_model(
@@ -64,6 +69,8 @@ def find_coarse_model(
     level = pair.grid if factor == 1 else pair.grid.scaled(factor)
     candidates = rough_candidates(pair, level, rough, search.settings, search.held_out, executor)
     progress.update(0.3)
+    if search.pooled:
+        return _down_on_ground(pair, candidates, factor, search.held_out, executor)
 
     def refine(level: Grid, model: Model, radius_px: int) -> CoarseModel:
         progress.check()
@@ -90,6 +97,28 @@ def find_coarse_model(
             best = finer
         factor = finer_factor
     return best.model
+
+
+def _down_on_ground(
+    pair: ImagePair,
+    candidates: list[Candidate],
+    factor: float,
+    held_out: MaskOf,
+    executor: Executor,
+) -> Model:
+    """Return the model that the ground as a whole agrees on, level by level."""
+    if not candidates:
+        raise NothingFoundError("nothing in common was found")
+    best, *others = candidates
+    if others and others[0].height > _RIVAL_HEIGHT * best.height:
+        raise NothingFoundError("two places match about as well")
+    model = best.model
+    while factor > _GROUND_STEP:
+        factor = factor / _GROUND_STEP
+        radius = int(np.ceil(_LEVEL_ERROR_PX * _GROUND_STEP)) + _DISTORTION_PX
+        level = pair.grid.scaled(factor)
+        model = refine_on_ground(pair, level, model, radius, held_out, executor)
+    return model
 
 
 def _alarms(model: CoarseModel) -> float:

@@ -56,7 +56,9 @@ class GreyLevels:
         valid = [template.valid & search.valid for template, search in pairs]
         sides = [
             np.concatenate([patch.values[v] for patch, v in zip(side, valid, strict=True)])
-            for side in zip(*((smooth(template), search) for template, search in pairs), strict=True)
+            for side in zip(
+                *((smooth(template), search) for template, search in pairs), strict=True
+            )
         ]
         edges = [bin_edges(s, np.ones(s.shape, bool), bins, "equal-frequency") for s in sides]
         levels = [np.searchsorted(e, s, side="right") for e, s in zip(edges, sides, strict=True)]

@@ -11,7 +11,6 @@ from typing import Annotated, Any
 
 from ..declaration import tool
 from ..kinds import Choice, Distance, Number
-from ..masks.choice import NONE
 from ..masks.regions import WIDTH_M
 from ..progress import SILENT, Progress
 from ..rasters.pair import default_radius_m, make_pair
@@ -116,7 +115,7 @@ def coregister(
     reference_mask: ReferenceMask = None,
     input_mask: InputMask = None,
     matching_pixel_size: MatchingPixelSize = None,
-    mask: Mask = NONE,
+    mask: Mask = AUTO,
     mask_image: MaskImage = AUTO,
     mask_layer: MaskLayer = None,
     mask_high_percent: HighPercent = None,
@@ -207,17 +206,20 @@ def coregister(
             mask_width,
             mask_layer,
         )
-        pair, mask_used = request.apply(pair, search_radius, stack, progress.part(0.0, 0.1))
+        shown, mask_used = request.apply(pair, search_radius, stack, progress.part(0.0, 0.05))
+        ground = request.ground(pair, mask_used, search_radius, stack, progress.part(0.05, 0.1))
         spacing_px = None if spacing is None else spacing / pair.grid.pixel_size_m
-        local = LocalSearch(
-            pair, lay_out_chips(pair, chip_size, spacing_px), settings, two_way_px=two_way_error
-        )
+        layout = lay_out_chips(pair, chip_size, spacing_px)
+        local = LocalSearch(shown, layout, settings, two_way_px=two_way_error)
+        if mask_used.leaves_little and settings.measure == "nmi":
+            local = local.of_ground(shown)
+        judging = local if ground is None else local.of_ground(ground)
         radius_m = default_radius_m(pair.grid) if search_radius is None else search_radius
         rough = rough_search(radius_m, turn, search)
         threads = worker_count(workers)
         with ThreadPoolExecutor(threads) as executor:
             result = register(
-                pair,
+                shown,
                 local,
                 rough,
                 kind,
@@ -225,6 +227,7 @@ def coregister(
                 seed,
                 executor,
                 progress.part(0.1, 0.7),
+                judging=judging,
             )
         registered = RegisteredOutput(output, output_grid, resampling)
         return deliver(

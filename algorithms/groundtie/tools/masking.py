@@ -24,17 +24,19 @@ from ..masks.choice import (
     REFERENCE,
     REGIONS,
     MaskUsed,
+    bright_share,
     choose,
+    is_dense,
 )
 from ..masks.layer import read_layer
-from ..masks.radar import is_more_speckled
+from ..masks.radar import is_more_speckled, is_radar_and_camera
 from ..masks.regions import GroundRegions, find_ground
 from ..masks.scene import Scene, Selection, write_mask
 from ..masks.shade import shade_azimuth_deg
 from ..masks.threshold import Threshold
 from ..progress import Progress
 from ..rasters.grid import Grid
-from ..rasters.pair import ImagePair, default_radius_m
+from ..rasters.pair import Image, ImagePair, default_radius_m
 from ..rasters.patch import Patch
 from ..rasters.reading import Window, open_raster
 
@@ -120,6 +122,8 @@ class MaskRequest:
         if self.kind == NONE:
             return pair, MaskUsed(NONE, None, 1.0, "as asked for")
         name, reason = self._image(pair)
+        if self.kind == AUTO and not is_radar_and_camera(*_ordered(pair, name)):
+            return pair, MaskUsed(NONE, None, 1.0, "there is no radar image beside a camera's")
         scene = _scene(pair, name, radius_m)
         other = _scene(pair, INPUT if name == REFERENCE else REFERENCE, radius_m)
         kind, find = self.kind, partial(self._ground, scene, other)
@@ -130,6 +134,41 @@ class MaskRequest:
         select = self._selection(kind, scene, find, progress.part(0.5, 0.8))
         used = MaskUsed(kind, name, 0.0, reason)
         return _masked(pair, scene, select, used, stack, progress.part(0.8, 1.0))
+
+    def ground(
+        self,
+        pair: ImagePair,
+        used: MaskUsed,
+        radius_m: float | None,
+        stack: ExitStack,
+        progress: Progress,
+    ) -> ImagePair | None:
+        """Return a pair with a mask of its ground, if it shows a dense town and has another.
+
+        Where buildings stand close, roofs and walls agree with each other at check points, too:
+        what is on the ground must judge, whatever else took part in the fit.
+
+        Parameters
+        ----------
+        pair
+            The images, with the masks that the user gave.
+        used
+            The mask that was used.
+        radius_m, stack, progress
+            See `apply`.
+
+        Returns
+        -------
+        ImagePair
+            None: no dense town, or nothing but ground takes part already.
+        """
+        name, _ = self._image(pair)
+        if used.kind in (REGIONS, LAYER) or not is_radar_and_camera(*_ordered(pair, name)):
+            return None
+        if not is_dense(bright_share(_scene(pair, name, radius_m), progress.part(0.0, 0.2))):
+            return None
+        regions_of = replace(self, kind=REGIONS, high_percent=None)
+        return regions_of.apply(pair, radius_m, stack, progress.part(0.2, 1.0))[0]
 
     def _selection(
         self,
@@ -171,6 +210,12 @@ class MaskRequest:
         if is_more_speckled(pair.reference, pair.input):
             return REFERENCE, "it has the more speckle"
         return INPUT, "it has the more speckle"
+
+
+def _ordered(pair: ImagePair, name: str) -> tuple[Image, Image]:
+    """Return the image of a name, and the other."""
+    both = pair.reference, pair.input
+    return both if name == REFERENCE else both[::-1]
 
 
 def _middle(grid: Grid) -> Window:

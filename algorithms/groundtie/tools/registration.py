@@ -61,7 +61,7 @@ class Registration:
     pair
         The images; their rasters are open.
     search
-        How tie points were searched for.
+        How check points were searched for.
     estimate
         The transform and the points of its fit; None if there is none.
     check
@@ -149,6 +149,7 @@ def register(
     executor: Executor,
     progress: Progress,
     matching: TiePointMatching | None = None,
+    judging: LocalSearch | None = None,
 ) -> Registration:
     """Register the input of a pair to its reference, and judge the result.
 
@@ -157,7 +158,7 @@ def register(
     pair
         The images.
     search
-        How tie points are searched for; gives the check points, whatever gives those of the fit.
+        How tie points are searched for.
     rough
         How far the input may lie from where it claims to be, and how it is searched for.
     model
@@ -172,19 +173,24 @@ def register(
         Is told of every step.
     matching
         What finds the tie points of the fit; None: `search`, on its chips.
+    judging
+        What finds the check points, whatever finds those of the fit; None: `search`.
     """
-    matching = matching or search
+    matching, judging = matching or search, judging or search
     progress.update(0.0, "searching for the rough shift")
     try:
         coarse = find_coarse_model(pair, search, rough, executor, progress.part(0.0, 0.4))
         progress.update(0.4, "matching tie points")
         estimate = matching.estimate(coarse, model, seed, executor, progress.part(0.4, 0.8))
     except (NothingFoundError, TooFewPointsError) as error:
-        return Registration(pair, search, None, None, refuse(str(error)))
+        return Registration(pair, judging, None, None, refuse(str(error)))
     progress.update(0.8, "checking with points that took no part")
-    check = search.check_points(estimate.transform.model, executor, progress.part(0.8, 1.0))
-    verdict = judge(estimate, check, pair.grid, max_error_px, search.check_radius_px)
-    return Registration(pair, search, estimate, check, verdict)
+    try:
+        check = judging.check_points(estimate.transform.model, executor, progress.part(0.8, 1.0))
+    except TooFewPointsError as error:
+        return Registration(pair, judging, None, None, refuse(str(error)))
+    verdict = judge(estimate, check, pair.grid, max_error_px, judging.check_radius_px)
+    return Registration(pair, judging, estimate, check, verdict)
 
 
 @dataclass(frozen=True)
