@@ -41,9 +41,9 @@ class Setting:
 
 
 SETTINGS: dict[str, Setting] = {
-    "NMI, no mask": Setting({"similarity": "nmi"}),
-    "orientation, no mask": Setting({"similarity": "orientation"}),
-    "fused, no mask": Setting(),
+    "NMI, no mask": Setting({"similarity": "nmi", "mask": "none"}),
+    "orientation, no mask": Setting({"similarity": "orientation", "mask": "none"}),
+    "fused, no mask": Setting({"mask": "none"}),
     "fused, threshold": Setting({"mask": "threshold"}, median_px=1.5),
     "fused, regions": Setting({"mask": "regions"}, median_px=1.0, share_within=0.8),
     "fused, auto": Setting({"mask": "auto"}, median_px=1.0, share_within=0.8),

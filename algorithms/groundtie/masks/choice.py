@@ -17,9 +17,9 @@ NONE, THRESHOLD, REGIONS, AUTO = "none", "threshold", "regions", "auto"
 MASKS = (NONE, THRESHOLD, REGIONS, AUTO)
 
 # Block means above this many times their median shine, and scenes of which more than that share
-# shines are dense towns. Measured shares: real towns up to 10 %, dense cities 16–27 %.
+# shines are dense towns. Measured shares: real towns up to 10 %, simulated dense cities 12–27 %.
 _BRIGHT = 4.0
-_DENSE = 0.13
+_DENSE = 0.11
 
 # Regions must cover this share of a scene, and their skeleton be so many times its side.
 _LEAST_GROUND, _LEAST_SKELETON = 0.04, 2.0

@@ -184,6 +184,11 @@ class LocalSearch:
         """Match the check chips around what a model predicts, each by its own evidence alone."""
         return self._points(self._match_check(model, executor, progress), model, None)
 
+    def common_shift_px(self, model: Model, executor: Executor) -> float:
+        """Return how far from a model's place all check chips together match best."""
+        surfaces = self._match_check(model, executor, SILENT)
+        return float(np.hypot(*surfaces.common_shift(np.zeros(2))))
+
     def check_surfaces(self, model: Model, centres: NDArray[np.int_]) -> Surfaces:
         """Return the surfaces of check points, shape (n, 2 r + 1, 2 r + 1), to look at."""
         with ThreadPoolExecutor(1) as executor:

@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -38,6 +38,9 @@ from .registered_output import RegisteredOutput
 
 # Without georeferencing images may lie this far off each other, as a share of the longer side.
 _FREE_SHARE = 0.25
+
+# What the ground says of a fit that was not made on it: it is itself good to a pixel or two.
+_OFF_GROUND_PX = 1.0
 
 # How many surfaces of the best and of the worst check points a report shows.
 _EXTREMES = 3
@@ -190,6 +193,11 @@ def register(
     except TooFewPointsError as error:
         return Registration(pair, judging, None, None, refuse(str(error)))
     verdict = judge(estimate, check, pair.grid, max_error_px, judging.check_radius_px)
+    if verdict.accepted and judging is not search:
+        off_px = judging.common_shift_px(estimate.transform.model, executor)
+        if off_px > _OFF_GROUND_PX:
+            reason = f"the ground alone matches {off_px:.1f} px elsewhere; give a mask of it"
+            verdict = replace(verdict, accepted=False, reason=reason)
     return Registration(pair, judging, estimate, check, verdict)
 
 
