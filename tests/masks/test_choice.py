@@ -40,7 +40,7 @@ def test_fields_need_no_mask(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("share", "skeleton_m", "expected"),
-    [(0.3, 900.0, "regions"), (0.3, 300.0, "threshold"), (0.05, 900.0, "threshold")],
+    [(0.3, 900.0, "regions"), (0.3, 300.0, "threshold"), (0.03, 900.0, "threshold")],
 )
 def test_dense_towns_get_regions_where_there_are_enough(
     tmp_path: Path, share: float, skeleton_m: float, expected: str

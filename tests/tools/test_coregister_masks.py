@@ -11,8 +11,9 @@ import pytest
 import rasterio
 from tools.conftest import SimulatedFiles
 
-from groundtie.errors import ParameterError
+from groundtie.errors import NotRegisteredError, ParameterError
 from groundtie.tools.coregister import coregister
+from groundtie.tools.simulate import simulate
 
 
 def test_a_threshold_mask_is_used_and_reported(
@@ -84,3 +85,26 @@ def test_a_layer_does_the_same_job(
             mask="threshold",
             mask_layer=layer,
         )
+
+
+@pytest.fixture(scope="module")
+def city(tmp_path_factory: pytest.TempPathFactory) -> SimulatedFiles:
+    """Return a dense city, whose buildings agree 4 px off the ground."""
+    folder = tmp_path_factory.mktemp("city")
+    simulate(folder, 1000, "city", seed=4, changed=10.0)
+    return SimulatedFiles(folder)
+
+
+def test_a_dense_city_is_registered_by_its_ground(city: SimulatedFiles, tmp_path: Path) -> None:
+    result = coregister(city.reference, city.input, tmp_path / "out.tif")
+    mask = result.numbers["mask"]
+    assert (mask["kind"], mask["image"]) == ("regions", "reference")
+    assert mask["share"] < 0.3
+    assert city.error_px(result.transform) < 2
+
+
+def test_its_buildings_alone_are_refused(city: SimulatedFiles, tmp_path: Path) -> None:
+    """They agree with each other at check points, too: only the ground contradicts."""
+    with pytest.raises(NotRegisteredError):
+        coregister(city.reference, city.input, tmp_path / "out.tif", mask="none")
+    assert not (tmp_path / "out.tif").exists()

@@ -133,12 +133,15 @@ def _shifts(
     """Search all shifts, and return the highest peaks of their similarity."""
     reach = radius_px + BORDER_PX
     reference, input = _patches(pair, level, BORDER_PX, reach, held_out, executor)
+    # What a mask leaves of the input is all that can lie under the reference.
+    shown = 1.0 if pair.input.mask is None else input.valid_share
     surface = similarity_surface(
         describe(reference, level.width * level.height, settings),
         describe(input, level.width * level.height, settings),
         radius_px,
         settings,
         executor,
+        MINIMUM_OVERLAP * shown,
     )
     found: list[Candidate] = []
     for _ in range(CANDIDATES):

@@ -216,6 +216,7 @@ def similarity_surface(
     radius: int,
     settings: SimilaritySettings,
     executor: Executor | None = None,
+    least_overlap: float = MINIMUM_OVERLAP,
 ) -> Surface:
     """Return similarity over shifts -radius … radius in robust standard deviations.
 
@@ -231,6 +232,8 @@ def similarity_surface(
         How similarity is measured.
     executor
         Threads to count histograms in; by default the calling one alone.
+    least_overlap
+        Share of the template's valid pixels that must lie on valid ones.
 
     Returns
     -------
@@ -252,4 +255,4 @@ def similarity_surface(
     if template.patch.all_valid and search.patch.all_valid:
         return surface
     overlap = overlap_share(template.patch, search.patch)
-    return np.where(overlap >= MINIMUM_OVERLAP, surface, 0).astype(np.float32)
+    return np.where(overlap >= least_overlap, surface, 0).astype(np.float32)

@@ -193,7 +193,7 @@ class MaskRequest:
         self, pair: ImagePair, radius_m: float | None, stack: ExitStack, progress: Progress
     ) -> tuple[ImagePair, MaskUsed]:
         """Return the pair with the vector layer's mask on the reference, which is in its place."""
-        if self.kind != NONE:
+        if self.kind not in (NONE, AUTO):
             raise ParameterError(f"give either mask={self.kind} or a mask layer")
         assert self.layer is not None
         scene = _scene(pair, REFERENCE, radius_m)

@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+from sklearn.metrics import mutual_info_score
+
+from groundtie.rasters.patch import Patch
+from groundtie.similarity.evidence import find_peak
+from groundtie.similarity.pooled import BINS, GreyLevels, smooth
+from groundtie.similarity.surface import normalise
+
+RADIUS = 8
+
+
+def patch(values: np.ndarray, valid: np.ndarray | None = None) -> Patch:
+    known = np.ones(values.shape, bool) if valid is None else valid
+    return Patch(np.asarray(values, np.float32), known)
+
+
+def ground_chips(
+    count: int, share: float, shift: tuple[int, int] = (0, 0), looks: float = 2.0
+) -> list[tuple[Patch, Patch]]:
+    """Chips of a speckled image of which a mask leaves a share, and the other image around them."""
+    random = np.random.default_rng(3)
+    chips = []
+    for _ in range(count):
+        cover = gaussian_filter(random.normal(size=(60, 60)), 3.0)
+        cover = np.digitize(cover, np.quantile(cover, [0.3, 0.7]))
+        here = np.array([300.0, 120.0, 220.0])[cover] + random.normal(0, 15, cover.shape)
+        power = np.array([1.0, 3.0, 8.0])[cover] * random.gamma(looks, 1 / looks, cover.shape)
+        inside = (slice(RADIUS, -RADIUS),) * 2
+        there = np.roll(np.sqrt(power), (-shift[1], -shift[0]), axis=(0, 1))[inside]
+        chips.append((patch(there, random.random(there.shape) < share), patch(here)))
+    return chips
+
+
+def on_each_other(chips: list[tuple[Patch, Patch]]) -> list[tuple[Patch, Patch]]:
+    return [(template, search.inner(RADIUS)) for template, search in chips]
+
+
+def test_the_mean_evidence_is_mutual_information() -> None:
+    """As scikit-learn has it, of the same grey levels."""
+    chips = on_each_other(ground_chips(40, 1.0))
+    levels = GreyLevels.of(chips)
+    sides = [
+        np.searchsorted(edges, np.concatenate([c.values[c.valid] for c in side]), side="right")
+        for edges, side in (
+            (levels.template_edges, [smooth(template) for template, _ in chips]),
+            (levels.search_edges, [search for _, search in chips]),
+        )
+    ]
+    mean = float(levels.evidence[sides[0], sides[1]].mean())
+    assert mean == pytest.approx(mutual_info_score(*sides), abs=1e-3)
+    assert mean > 0.1
+    for side in sides:
+        assert np.bincount(side, minlength=BINS).min() > 0.9 * side.size / BINS
+
+
+def test_a_surface_adds_up_what_the_pixels_say() -> None:
+    [(template, search)] = ground_chips(1, 0.3)
+    search.valid[10:20, 15:30] = False
+    levels = GreyLevels.of(on_each_other(ground_chips(5, 0.5)))
+    surface = levels.surface(template, search)
+    there = np.searchsorted(levels.template_edges, smooth(template).values, side="right")
+    here = np.searchsorted(levels.search_edges, search.values, side="right")
+    height, width = template.values.shape
+    for row, col in [(0, 0), (8, 8), (3, 16), (16, 1)]:
+        window = np.s_[row : row + height, col : col + width]
+        counted = template.valid & search.valid[window]
+        expected = levels.evidence[there, here[window]][counted].sum()
+        assert surface[row, col] == pytest.approx(expected, rel=1e-4, abs=1e-2)
+
+
+def test_chips_with_little_ground_find_their_place_together() -> None:
+    """What goes with what is told where they lie 2 px off; each has 1 % of its pixels."""
+    chips = ground_chips(100, 0.01, shift=(2, -1))
+    levels = GreyLevels.of(on_each_other(chips))
+    surfaces = np.array([levels.surface(*chip) for chip in chips])
+    together = find_peak(normalise(surfaces.sum(axis=0))).shift_px
+    assert together == pytest.approx((2, -1), abs=0.3)
+    alone = np.array([find_peak(normalise(surface)).shift_px for surface in surfaces])
+    assert np.mean(np.hypot(*(alone - [2, -1]).T) < 1) < 0.7
+
+
+def test_speckle_is_averaged_over_what_is_valid_alone() -> None:
+    values = np.full((9, 9), 3.0)
+    values[:, 5:] = 1000.0
+    ground = np.zeros((9, 9), bool)
+    ground[:, :5] = True
+    np.testing.assert_allclose(smooth(patch(values, ground)).values[ground], 3.0, rtol=1e-5)
