@@ -51,7 +51,7 @@ def test_dense_towns_get_regions_where_there_are_enough(
     scene = scene_of(tmp_path / "a.tif", town.astype(np.float32))
     part = np.zeros(shining.shape, bool)
     part[: round(share * 400)] = True
-    ground = GroundRegions(scene, 1, part, part, part, skeleton_m, np.inf)
+    ground = GroundRegions(scene, 1, part, part, part, skeleton_m, np.inf, part.size)
     kind, reason = choose(scene, lambda _: ground)
     assert kind == expected
     assert f"{skeleton_m:.0f} m of roads" in reason

@@ -116,9 +116,11 @@ def test_another_place_is_refused_or_judged_badly(tmp_path: Path, executor: Exec
 def test_hardly_any_ground_is_said(tmp_path: Path, executor: Executor) -> None:
     little = np.zeros(SIZE[::-1], np.uint8)
     little[:60, :60] = 1
-    with masked(tmp_path, shift_on_map(0, 0), little) as (pair, truth):
-        with pytest.raises(TooFewPointsError, match="leaves only 3600 pixels|leaves only"):
-            search_of(pair).estimate(truth, "auto", 0, executor)
+    with (
+        masked(tmp_path, shift_on_map(0, 0), little) as (pair, truth),
+        pytest.raises(TooFewPointsError, match="the mask leaves only"),
+    ):
+        search_of(pair).estimate(truth, "auto", 0, executor)
 
 
 def test_tiles_cover_the_grid_side_by_side() -> None:

@@ -89,9 +89,9 @@ def choose(
     if not is_dense(share):
         return NONE, f"{shine}: too few buildings to lead astray"
     ground = find(progress.part(0.2, 1.0))
-    side_m = float(np.sqrt(scene.grid.width * scene.grid.height)) * scene.grid.pixel_size_m
     usable = f"{shine}, and {ground.skeleton_m:.0f} m of roads and banks"
-    if ground.part.mean() < _LEAST_GROUND or ground.skeleton_m < _LEAST_SKELETON * side_m:
+    side_m = float(np.sqrt(ground.extent_m2))
+    if ground.share < _LEAST_GROUND or ground.skeleton_m < _LEAST_SKELETON * side_m:
         return THRESHOLD, f"{usable} are too little to rely on"
     return REGIONS, f"{usable} are enough to rely on"
 

@@ -80,6 +80,8 @@ class GroundRegions:
         Grey value above which nothing takes part, of means over 4 × 4 pixels of the scene.
     skeleton_m
         Length of the skeleton.
+    extent_m2
+        Area of the scene's valid pixels.
     """
 
     scene: Scene
@@ -89,6 +91,13 @@ class GroundRegions:
     part: Mask
     skeleton_m: float
     high: float
+    extent_m2: float
+
+    @property
+    def share(self) -> float:
+        """Share of the scene's valid area that takes part."""
+        pixel_m = self.scene.grid.pixel_size_m * self.factor
+        return float(np.count_nonzero(self.part)) * pixel_m**2 / self.extent_m2
 
     def select(self, window: Window) -> Selection:
         """Return which pixels of a window take part."""
@@ -146,13 +155,20 @@ def find_ground(
     progress.update(0.9)
     broad = cv2.dilate(lines.astype(np.uint8), disc(max(round(width_m / pixel_m / 2), 1)))
     border = disc(max(round(_BORDER_M / pixel_m), 1))
-    part = cv2.dilate(((broad > 0) | wide).astype(np.uint8), border) > 0
+    part = (cv2.dilate(((broad > 0) | wide).astype(np.uint8), border) > 0) & patch.valid
     if shade_azimuth_deg is not None:
         part = out_of_shade(part, shade_azimuth_deg, pixel_m)
-    inside = _smooth(patch)[part & patch.valid]
+    inside = _smooth(patch)[part]
     high = float(np.percentile(inside, 100 - high_percent)) if inside.size else np.inf
     return GroundRegions(
-        scene, factor, longs | wide, lines, part, _length_px(lines) * pixel_m, high
+        scene,
+        factor,
+        longs | wide,
+        lines,
+        part,
+        _length_px(lines) * pixel_m,
+        high,
+        np.count_nonzero(patch.valid) * pixel_m**2,
     )
 
 

@@ -40,7 +40,7 @@ from .common import (
     Workers,
     worker_count,
 )
-from .masking import Mask, MaskImage, MaskLayer, MaskRequest
+from .masking import Mask, MaskImage, MaskLayer, MaskRequest, by_what_is_left
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import (
     RegistrationFiles,
@@ -211,8 +211,7 @@ def coregister(
         spacing_px = None if spacing is None else spacing / pair.grid.pixel_size_m
         layout = lay_out_chips(pair, chip_size, spacing_px)
         local = LocalSearch(shown, layout, settings, two_way_px=two_way_error)
-        if mask_used.leaves_little and settings.measure == "nmi":
-            local = local.of_ground(shown)
+        local = by_what_is_left(local, mask_used)
         judging = local if ground is None else local.of_ground(ground)
         radius_m = default_radius_m(pair.grid) if search_radius is None else search_radius
         rough = rough_search(radius_m, turn, search)

@@ -33,7 +33,7 @@ from ..search.rough import RoughSearch
 from ..sensor.control_points import ControlPoints
 from ..sensor.orientation import Orientation, sensor_grid
 from ..similarity.surface import SimilaritySettings
-from .masking import MaskRequest
+from .masking import MaskRequest, by_what_is_left
 from .registration import Registration, register
 from .sensor_input import OrientedImage
 
@@ -161,19 +161,22 @@ def match_ground_control(
     """
     source, orientation = image.source, image.orientation
 
-    def paired(by: Orientation, radius_m: float | None) -> tuple[ImagePair, LocalSearch]:
+    def paired(by: Orientation, radius_m: float | None) -> ImagePair:
         located = replace(source, grid=sensor_grid(source, by))
         pair = make_pair(reference, Image(located, matching.band), matching.pixel_size_m, radius_m)
         if reference_mask is not None:
             pair = replace(pair, reference=replace(pair.reference, mask=reference_mask))
+        return pair
+
+    def search_in(pair: ImagePair) -> LocalSearch:
         layout = lay_out_chips(pair, matching.chip_px)
-        return pair, LocalSearch(pair, layout, matching.settings, two_way_px=matching.two_way_px)
+        local = LocalSearch(pair, layout, matching.settings, two_way_px=matching.two_way_px)
+        return by_what_is_left(local, mask)
 
     reference_mask = reference.mask
-    pair, local = paired(orientation, matching.radius_m)
+    pair = paired(orientation, matching.radius_m)
     pair, mask = matching.mask.apply(pair, matching.radius_m, stack, progress.part(0.0, 0.1))
-    reference_mask = pair.reference.mask
-    local = replace(local, pair=pair)
+    reference_mask, local = pair.reference.mask, search_in(pair)
     radius_m = default_radius_m(pair.grid) if matching.radius_m is None else matching.radius_m
     by = orientation
     progress.update(0.1, "searching for the rough shift")
@@ -187,7 +190,8 @@ def match_ground_control(
     if np.hypot(*shift_px) > _ROUGH_PX:
         by = orientation.with_rpc(orientation.rpc.shifted(shift_px))
         radius_m = _LEFT_PX * pair.grid.pixel_size_m
-        pair, local = paired(by, radius_m)
+        pair = paired(by, radius_m)
+        local = search_in(pair)
     rough = RoughSearch(radius_m)
     registration = register(
         pair,

@@ -39,6 +39,7 @@ from ..rasters.grid import Grid
 from ..rasters.pair import Image, ImagePair, default_radius_m
 from ..rasters.patch import Patch
 from ..rasters.reading import Window, open_raster
+from ..search.local import LocalSearch
 
 MASK_IMAGES = (AUTO, REFERENCE, INPUT)
 
@@ -210,6 +211,13 @@ class MaskRequest:
         if is_more_speckled(pair.reference, pair.input):
             return REFERENCE, "it has the more speckle"
         return INPUT, "it has the more speckle"
+
+
+def by_what_is_left(search: LocalSearch, used: MaskUsed) -> LocalSearch:
+    """Return a search whose chips share a joint histogram, if a mask leaves them too little."""
+    if used.leaves_little and search.settings.measure == "nmi":
+        return search.of_ground(search.pair)
+    return search
 
 
 def _ordered(pair: ImagePair, name: str) -> tuple[Image, Image]:
