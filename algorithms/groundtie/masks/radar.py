@@ -35,6 +35,11 @@ def is_radar_and_camera(image: Image, other: Image) -> bool:
     return calm >= _RADAR and calm >= _BESIDE_CAMERA * _calm(other)
 
 
+def are_both_radar(image: Image, other: Image) -> bool:
+    """Tell whether both images have the speckle of a radar's."""
+    return min(_calm(image), _calm(other)) >= _RADAR
+
+
 def power(patch: Patch) -> FloatImage:
     """Return the power of amplitudes, 0 where invalid."""
     return np.where(patch.valid, patch.values * patch.values, np.float32(0))

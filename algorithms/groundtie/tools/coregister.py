@@ -11,8 +11,10 @@ from typing import Annotated, Any
 
 from ..declaration import tool
 from ..kinds import Choice, Distance, Number
+from ..masks.radar import are_both_radar
 from ..masks.regions import WIDTH_M
 from ..progress import SILENT, Progress
+from ..quality.leaning import CHIPS_MEAN_OVER_SCATTER
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
 from ..search.layout import lay_out_chips
@@ -47,6 +49,7 @@ from .registration import (
     RegistrationResult,
     deliver,
     open_image,
+    refuse_what_leans,
     register,
     rough_search,
     turn_within,
@@ -228,6 +231,8 @@ def coregister(
                 progress.part(0.1, 0.7),
                 judging=judging,
             )
+        if are_both_radar(pair.reference, pair.input):
+            result = refuse_what_leans(result, max_error, CHIPS_MEAN_OVER_SCATTER)
         registered = RegisteredOutput(output, output_grid, resampling)
         return deliver(
             result,

@@ -22,7 +22,7 @@ from ..kinds import Choice, Number, RasterIn
 from ..masks.choice import NONE
 from ..masks.regions import WIDTH_M
 from ..progress import SILENT, Progress
-from ..quality.leaning import leaning
+from ..quality.leaning import FEATURES_MEAN_OVER_SCATTER
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
 from ..search.layout import lay_out_chips
@@ -62,12 +62,12 @@ from .feature_parameters import (
 from .masking import Mask, MaskImage, MaskLayer, MaskRequest
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import (
-    Registration,
     RegistrationFiles,
     RegistrationResult,
     deliver,
     free_radius,
     open_image,
+    refuse_what_leans,
     register,
     rough_search,
     turn_within,
@@ -238,7 +238,7 @@ def match_sar_sar(
                 progress.part(0.1, 0.7),
                 features,
             )
-        result = refuse_what_leans(result, max_error)
+        result = refuse_what_leans(result, max_error, FEATURES_MEAN_OVER_SCATTER)
         registered = RegisteredOutput(output, output_grid, resampling)
         return deliver(
             result,
@@ -250,18 +250,3 @@ def match_sar_sar(
             progress.part(0.7, 1.0),
             None if ground_mask is not None else mask_used,
         )
-
-
-def refuse_what_leans(registration: Registration, max_error_px: float) -> Registration:
-    """Return a registration, refused if it may be that of roofs and canopies."""
-    if not registration.verdict.accepted:
-        return registration
-    assert registration.estimate is not None and registration.check is not None
-    search, grid = registration.search, registration.pair.grid
-    reason = leaning(
-        registration.estimate, registration.check, grid, max_error_px, search.check_radius_px
-    )
-    if reason is None:
-        return registration
-    refused = replace(registration.verdict, accepted=False, reason=reason)
-    return replace(registration, verdict=refused)

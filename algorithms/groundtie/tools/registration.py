@@ -24,6 +24,7 @@ from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..masks.choice import MaskUsed
 from ..progress import Progress
+from ..quality.leaning import leaning
 from ..quality.report import Report
 from ..quality.verdict import Verdict, judge, refuse
 from ..rasters.atomic import Outputs, writing
@@ -199,6 +200,28 @@ def register(
             reason = f"the ground alone matches {off_px:.1f} px elsewhere; give a mask of it"
             verdict = replace(verdict, accepted=False, reason=reason)
     return Registration(pair, judging, estimate, check, verdict)
+
+
+def refuse_what_leans(
+    registration: Registration, max_error_px: float, mean_over_scatter: float
+) -> Registration:
+    """Return a registration, refused if it may be that of roofs and canopies; see `leaning`."""
+    if not registration.verdict.accepted:
+        return registration
+    assert registration.estimate is not None and registration.check is not None
+    search, grid = registration.search, registration.pair.grid
+    reason = leaning(
+        registration.estimate,
+        registration.check,
+        grid,
+        max_error_px,
+        search.check_radius_px,
+        mean_over_scatter,
+    )
+    if reason is None:
+        return registration
+    refused = replace(registration.verdict, accepted=False, reason=reason)
+    return replace(registration, verdict=refused)
 
 
 @dataclass(frozen=True)
