@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from raster_files import write_raster
 
-from groundtie.masks.radar import is_more_speckled
+from groundtie.masks.radar import are_both_radar, is_more_speckled, is_radar_and_camera
 from groundtie.rasters.pair import Image
 from groundtie.rasters.reading import open_raster
 
@@ -30,6 +30,11 @@ def test_speckle_tells_the_radar_from_the_camera(tmp_path: Path, looks: int) -> 
         )
         assert is_more_speckled(one, other)
         assert not is_more_speckled(other, one)
+        # Twenty looks are as calm as a camera's grain.
+        assert is_radar_and_camera(one, other) == (looks < 20)
+        assert not is_radar_and_camera(other, one)
+        assert not are_both_radar(one, other)
+        assert are_both_radar(one, one) == (looks < 20)
 
 
 def test_the_radar_image_of_every_real_pair_is_found(real_data: Path) -> None:

@@ -14,7 +14,7 @@ from quality.test_verdict import (
 )
 
 from groundtie.geometry.tie_points import TiePoints
-from groundtie.quality.leaning import leaning
+from groundtie.quality.leaning import CHIPS_MEAN_OVER_SCATTER, leaning
 
 # Where heights lean: along range, here off the axes of the map.
 RANGE = np.array([np.cos(0.3), np.sin(0.3)])
@@ -76,6 +76,13 @@ def test_matches_that_scatter_in_all_directions_do_not_lean() -> None:
 def test_a_little_scatter_along_a_line_is_let_pass() -> None:
     """Hedges and fields in rows: what is meant is what may move the model by the largest error."""
     assert reason(scatter(16, 0.3), fit_with(leant(100, -0.8, 0.8))) is None
+
+
+def test_chips_scatter_less_than_what_they_show() -> None:
+    estimate, check = estimated(fit_with(leant(100, -1.0, 1.0))), check_points(scatter(16, 0.3))
+    assert leaning(estimate, check, GRID, 3.0, RADIUS) is None
+    found = leaning(estimate, check, GRID, 3.0, RADIUS, CHIPS_MEAN_OVER_SCATTER)
+    assert found is not None and "scatter by 0." in found
 
 
 def test_too_few_matches_tell_nothing() -> None:

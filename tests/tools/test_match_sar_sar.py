@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from raster_files import write_raster
 from speckled_pairs import write_speckled_pair
 from textured_pairs import TexturedPair, error_px, listing, pixels, shift_on_map
 
-from groundtie import match_sar_sar
+from groundtie import coregister, match_sar_sar
 from groundtie.errors import NotRegisteredError, ParameterError
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
@@ -213,14 +214,18 @@ def test_what_stands_is_not_taken_for_the_ground(files: TexturedPair, tmp_path: 
     assert "ground and what stands on it" in str(refused.value)
 
 
+@pytest.mark.parametrize("tool", [match_sar_sar, coregister])
 def test_what_leans_is_refused(
-    files: TexturedPair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    files: TexturedPair,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    tool: Callable[..., object],
 ) -> None:
-    tool = sys.modules["groundtie.tools.match_sar_sar"]
-    monkeypatch.setattr(tool, "leaning", lambda *_: "roofs")
+    shared = sys.modules["groundtie.tools.registration"]
+    monkeypatch.setattr(shared, "leaning", lambda *_: "roofs")
     report = tmp_path / "report.html"
     with pytest.raises(NotRegisteredError, match="roofs"):
-        match_sar_sar(files.reference, files.input, tmp_path / "out.tif", report=report)
+        tool(files.reference, files.input, tmp_path / "out.tif", report=report)
     verdict = json.loads(report.with_suffix(".json").read_text())["verdict"]
     assert (verdict["accepted"], verdict["reason"]) == (False, "roofs")
     assert not (tmp_path / "out.tif").exists()
