@@ -39,17 +39,20 @@ def on_each_other(chips: list[tuple[Patch, Patch]]) -> list[tuple[Patch, Patch]]
     return [(template, search.inner(RADIUS)) for template, search in chips]
 
 
+def levels_of(chips: list[tuple[Patch, Patch]]) -> tuple[GreyLevels, list[np.ndarray]]:
+    """Return what chips on each other say, and their grey values."""
+    sides = [
+        np.concatenate([smooth(template).values[template.valid] for template, _ in chips]),
+        np.concatenate([search.values[template.valid] for template, search in chips]),
+    ]
+    return GreyLevels.of(*sides), sides
+
+
 def test_the_mean_evidence_is_mutual_information() -> None:
     """As scikit-learn has it, of the same grey levels."""
-    chips = on_each_other(ground_chips(40, 1.0))
-    levels = GreyLevels.of(chips)
-    sides = [
-        np.searchsorted(edges, np.concatenate([c.values[c.valid] for c in side]), side="right")
-        for edges, side in (
-            (levels.template_edges, [smooth(template) for template, _ in chips]),
-            (levels.search_edges, [search for _, search in chips]),
-        )
-    ]
+    levels, values = levels_of(on_each_other(ground_chips(40, 1.0)))
+    edges = levels.template_edges, levels.search_edges
+    sides = [np.searchsorted(e, v, side="right") for e, v in zip(edges, values, strict=True)]
     mean = float(levels.evidence[sides[0], sides[1]].mean())
     assert mean == pytest.approx(mutual_info_score(*sides), abs=1e-3)
     assert mean > 0.1
@@ -60,7 +63,7 @@ def test_the_mean_evidence_is_mutual_information() -> None:
 def test_a_surface_adds_up_what_the_pixels_say() -> None:
     [(template, search)] = ground_chips(1, 0.3)
     search.valid[10:20, 15:30] = False
-    levels = GreyLevels.of(on_each_other(ground_chips(5, 0.5)))
+    levels, _ = levels_of(on_each_other(ground_chips(5, 0.5)))
     surface = levels.surface(template, search)
     there = np.searchsorted(levels.template_edges, smooth(template).values, side="right")
     here = np.searchsorted(levels.search_edges, search.values, side="right")
@@ -75,7 +78,7 @@ def test_a_surface_adds_up_what_the_pixels_say() -> None:
 def test_chips_with_little_ground_find_their_place_together() -> None:
     """What goes with what is told where they lie 2 px off; each has 1 % of its pixels."""
     chips = ground_chips(100, 0.01, shift=(2, -1))
-    levels = GreyLevels.of(on_each_other(chips))
+    levels, _ = levels_of(on_each_other(chips))
     surfaces = np.array([levels.surface(*chip) for chip in chips])
     together = find_peak(normalise(surfaces.sum(axis=0))).shift_px
     assert together == pytest.approx((2, -1), abs=0.3)

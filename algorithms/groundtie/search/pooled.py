@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
@@ -16,16 +15,18 @@ from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
-from ..similarity.pooled import GreyLevels
+from ..rasters.reading import FloatImage
+from ..similarity.pooled import GreyLevels, smooth
+from ..similarity.surface import Surface
 from .alignment import align
 from .coarse import behind
 from .matching import ChipSurfaces, MaskOf, ToPixel
 from .support import normalise_each
 
-# Chips with less ground than this say nothing; fewer pixels in all make no joint histogram.
+# Chips with less ground than this say nothing; fewer pixels in all make no joint histogram, and
+# more are not needed for one.
 _LEAST_VALID = 0.02
-_LEAST_PIXELS = 5_000
-
+_LEAST_PIXELS, _MOST_PIXELS = 5_000, 4_000_000
 
 # Side of the chips on a level of the pyramid, in pixels of the level.
 _LEVEL_CHIP_PX = 64
@@ -66,11 +67,19 @@ class GroundChips:
         TooFewPointsError
             The mask leaves too few pixels.
         """
-        pairs = list(self._read_all(centres, chip_px, 0, executor, progress))
-        count = sum(np.count_nonzero(there.valid & here.valid) for there, here in pairs)
+        every = max(len(centres) * chip_px**2 // _MOST_PIXELS, 1)
+
+        def pixels(centre: NDArray[np.int_]) -> FloatImage:
+            progress.check()
+            template, shown = self._windows(centre, chip_px, 0)
+            both = template.valid & shown.valid
+            return np.stack([smooth(template).values[both], shown.values[both]])[:, ::every]
+
+        sample = np.concatenate(list(executor.map(pixels, centres)), axis=1)
+        count = sample.shape[1] * every
         if count < _LEAST_PIXELS:
-            raise TooFewPointsError(f"the mask leaves only {count} pixels to match")
-        return GreyLevels.of(pairs)
+            raise TooFewPointsError(f"the mask leaves only about {count} pixels to match")
+        return GreyLevels.of(sample[0], sample[1])
 
     def match(
         self,
@@ -101,13 +110,21 @@ class GroundChips:
             Is told of every chip.
         """
         turn = 1 if self._forward else -1
+
+        def one(centre: NDArray[np.int_]) -> Surface | None:
+            progress.check()
+            template, search = self._windows(centre, chip_px, radius_px)
+            chip = template.inner(radius_px)
+            if chip.valid_share < _LEAST_VALID:
+                return None
+            return levels.surface(chip, search)[::turn, ::turn]
+
         kept, found = [], []
-        pieces = self._read_all(centres, chip_px, radius_px, executor, progress)
-        for centre, (template, search) in zip(centres, pieces, strict=True):
-            chip = template.inner(radius_px) if radius_px else template
-            if chip.valid_share >= _LEAST_VALID:
-                kept.append(centre)
-                found.append(levels.surface(chip, search)[::turn, ::turn])
+        for i, surface in enumerate(executor.map(one, centres)):
+            progress.update((i + 1) / len(centres))
+            if surface is not None:
+                kept.append(centres[i])
+                found.append(surface)
         span = 2 * radius_px + 1
         nats = np.stack(found) if found else np.zeros((0, span, span), np.float32)
         shown = normalise_each(nats)
@@ -121,29 +138,17 @@ class GroundChips:
     def _forward(self) -> bool:
         return self.pair.reference.mask is not None
 
-    def _read_all(
-        self,
-        centres: NDArray[np.int_],
-        chip_px: int,
-        radius_px: int,
-        executor: Executor,
-        progress: Progress,
-    ) -> Iterator[tuple[Patch, Patch]]:
-        """Yield the masked image's and the other's window, as wide as searched, of each chip."""
-
-        def read(centre: NDArray[np.int_]) -> tuple[Patch, Patch]:
-            progress.check()
-            side = chip_px + 2 * radius_px
-            corner = centre - chip_px // 2 - radius_px
-            piece = self.grid.window(int(corner[0]), int(corner[1]), side, side)
-            hidden = None if self.held_out is None else self.held_out(piece)
-            reference = self.pair.reference_patch(piece, hidden)
-            input = self.pair.input_patch(piece, self.to_input_px)
-            return (reference, input) if self._forward else (input, reference)
-
-        for i, windows in enumerate(executor.map(read, centres)):
-            progress.update((i + 1) / len(centres))
-            yield windows
+    def _windows(
+        self, centre: NDArray[np.int_], chip_px: int, radius_px: int
+    ) -> tuple[Patch, Patch]:
+        """Return the masked image's and the other's window around a chip, as wide as searched."""
+        side = chip_px + 2 * radius_px
+        corner = centre - chip_px // 2 - radius_px
+        piece = self.grid.window(int(corner[0]), int(corner[1]), side, side)
+        hidden = None if self.held_out is None else self.held_out(piece)
+        reference = self.pair.reference_patch(piece, hidden)
+        input = self.pair.input_patch(piece, self.to_input_px)
+        return (reference, input) if self._forward else (input, reference)
 
 
 def refine_on_ground(

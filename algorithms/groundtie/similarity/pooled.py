@@ -11,7 +11,6 @@ Point similarity measures: Rogelj, Kovačič & Gee 2003, doi:10.1016/S1077-3142(
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -51,15 +50,17 @@ class GreyLevels:
     evidence: FloatArray
 
     @classmethod
-    def of(cls, pairs: Sequence[tuple[Patch, Patch]], bins: int = BINS) -> GreyLevels:
-        """Return what pairs of a template and the piece of the same size it lies on say."""
-        valid = [template.valid & search.valid for template, search in pairs]
-        sides = [
-            np.concatenate([patch.values[v] for patch, v in zip(side, valid, strict=True)])
-            for side in zip(
-                *((smooth(template), search) for template, search in pairs), strict=True
-            )
-        ]
+    def of(cls, template: FloatArray, search: FloatArray, bins: int = BINS) -> GreyLevels:
+        """Return what pairs say of which many are known.
+
+        Parameters
+        ----------
+        template, search
+            Grey values of pixels that lie on each other, the template's `smooth`, shape (n,).
+        bins
+            Number of grey levels, equally frequent each.
+        """
+        sides = template, search
         edges = [bin_edges(s, np.ones(s.shape, bool), bins, "equal-frequency") for s in sides]
         levels = [np.searchsorted(e, s, side="right") for e, s in zip(edges, sides, strict=True)]
         counts = np.bincount(levels[0] * bins + levels[1], minlength=bins * bins) + _UNSEEN
