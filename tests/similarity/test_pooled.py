@@ -92,3 +92,12 @@ def test_speckle_is_averaged_over_what_is_valid_alone() -> None:
     ground = np.zeros((9, 9), bool)
     ground[:, :5] = True
     np.testing.assert_allclose(smooth(patch(values, ground)).values[ground], 3.0, rtol=1e-5)
+
+
+def test_what_rounding_leaves_of_nothing_is_no_power() -> None:
+    random = np.random.default_rng(0)
+    ground = np.zeros((72, 72), bool)
+    ground[5:17, 28:39] = True
+    with np.errstate(invalid="raise"):
+        found = smooth(patch(10 ** random.uniform(-3, 4, ground.shape), ground))
+    assert np.isfinite(found.values).all()

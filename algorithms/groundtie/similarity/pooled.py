@@ -94,5 +94,7 @@ def smooth(patch: Patch) -> Patch:
     """Return a patch with its power averaged over what is valid around each pixel."""
     counts = patch.valid.astype(np.float32)
     side = (_SMOOTH_PX, _SMOOTH_PX)
-    power = cv2.blur(np.square(patch.values) * counts, side)
-    return Patch(np.sqrt(power / np.maximum(cv2.blur(counts, side), np.float32(1e-6))), patch.valid)
+    # Running sums leave a little, of either sign, where all is 0.
+    power = np.maximum(cv2.blur(np.square(patch.values) * counts, side), 0)
+    share = np.maximum(cv2.blur(counts, side), np.float32(1e-6))
+    return Patch(np.sqrt(power / share), patch.valid)
