@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +58,7 @@ class ChipSurfaces:
     backward: Surfaces
     say: FloatArray
 
-    @property
+    @cached_property
     def both(self) -> Surfaces:
         """The evidence of both directions together, in robust standard deviations."""
         return normalise_each(self.forward + self.backward)

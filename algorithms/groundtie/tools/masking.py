@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache
 from pathlib import Path
 from typing import Annotated
 
@@ -127,12 +127,13 @@ class MaskRequest:
             return pair, MaskUsed(NONE, None, 1.0, "there is no radar image beside a camera's")
         scene = _scene(pair, name, radius_m)
         other = _scene(pair, INPUT if name == REFERENCE else REFERENCE, radius_m)
-        kind, find = self.kind, partial(self._ground, scene, other)
+        kind = self.kind
+        find = cache(lambda: self._ground(scene, other, progress.part(0.1, 0.7)))
         if kind == AUTO:
-            kind, reason = choose(scene, find, progress.part(0.0, 0.5))
+            kind, reason = choose(scene, lambda _: find(), progress.part(0.0, 0.5))
         if kind == NONE:
             return pair, MaskUsed(NONE, None, 1.0, reason)
-        select = self._selection(kind, scene, find, progress.part(0.5, 0.8))
+        select = self._selection(kind, scene, find, progress.part(0.7, 0.8))
         used = MaskUsed(kind, name, 0.0, reason)
         return _masked(pair, scene, select, used, stack, progress.part(0.8, 1.0))
 
@@ -163,8 +164,11 @@ class MaskRequest:
         ImagePair
             None: no dense town, or nothing but ground takes part already.
         """
+        # Where auto masks nothing, it has looked, and seen no dense town.
+        if used.kind in (REGIONS, LAYER) or (self.kind, used.kind) == (AUTO, NONE):
+            return None
         name, _ = self._image(pair)
-        if used.kind in (REGIONS, LAYER) or not is_radar_and_camera(*_ordered(pair, name)):
+        if not is_radar_and_camera(*_ordered(pair, name)):
             return None
         if not is_dense(bright_share(_scene(pair, name, radius_m), progress.part(0.0, 0.2))):
             return None
@@ -175,11 +179,11 @@ class MaskRequest:
         self,
         kind: str,
         scene: Scene,
-        find: Callable[[Progress], GroundRegions],
+        find: Callable[[], GroundRegions],
         progress: Progress,
     ) -> Callable[[Window], Selection]:
         if kind == REGIONS:
-            return find(progress).select
+            return find().select
         growth_px = round(self.growth_m / scene.grid.pixel_size_m)
         by_level = Threshold(self._high(threshold.HIGH_PERCENT), self.low_percent, growth_px)
         return by_level.on(scene, progress).select
