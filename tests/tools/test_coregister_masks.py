@@ -13,6 +13,7 @@ from tools.conftest import SimulatedFiles
 
 from groundtie.errors import NotRegisteredError, ParameterError
 from groundtie.tools.coregister import coregister
+from groundtie.tools.filter_speckle import filter_speckle
 from groundtie.tools.simulate import simulate
 
 
@@ -97,6 +98,17 @@ def city(tmp_path_factory: pytest.TempPathFactory) -> SimulatedFiles:
 
 def test_a_dense_city_is_registered_by_its_ground(city: SimulatedFiles, tmp_path: Path) -> None:
     result = coregister(city.reference, city.input, tmp_path / "out.tif")
+    mask = result.numbers["mask"]
+    assert (mask["kind"], mask["image"]) == ("regions", "reference")
+    assert mask["share"] < 0.3
+    assert city.error_px(result.transform) < 2
+
+
+def test_so_is_one_whose_speckle_was_filtered(city: SimulatedFiles, tmp_path: Path) -> None:
+    """Nothing but the filter's tag tells that it is a radar's."""
+    filtered = tmp_path / "filtered.tif"
+    filter_speckle(city.reference, filtered)
+    result = coregister(filtered, city.input, tmp_path / "out.tif")
     mask = result.numbers["mask"]
     assert (mask["kind"], mask["image"]) == ("regions", "reference")
     assert mask["share"] < 0.3

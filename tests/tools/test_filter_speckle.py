@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +8,11 @@ import pytest
 import rasterio
 from raster_files import utm_grid, write_raster
 
-from groundtie import filter_speckle
+from groundtie import filter_speckle, warp
 from groundtie.errors import ParameterError, RasterContentError
+from groundtie.geometry.transform import Transform
+from groundtie.rasters.radar_tags import SPECKLE_FILTER, is_known_radar
+from groundtie.rasters.reading import open_raster
 from groundtie.speckle.filters import FILTERS, SpeckleFilter
 
 LOOKS = 4.0
@@ -77,6 +81,20 @@ def test_complex_pixels_become_amplitudes(tmp_path: Path) -> None:
     assert out.dtype == np.float32
     expected = SpeckleFilter("kuan", 7, LOOKS)(image**2, np.ones(SIZE, bool))
     np.testing.assert_allclose(out[0], np.sqrt(expected), rtol=2e-3)
+
+
+def test_the_result_is_known_as_a_radars_even_when_it_was_warped(tmp_path: Path) -> None:
+    path = write_raster(tmp_path / "in.tif", amplitude().astype(np.float32), utm_grid(*SIZE[::-1]))
+    with open_raster(path) as source:
+        assert not is_known_radar(source)
+        as_claimed = Transform.as_claimed(source.grid.crs, source.grid)
+    filter_speckle(path, tmp_path / "out.tif", "gamma-map", 5)
+    (tmp_path / "transform.json").write_text(json.dumps(as_claimed.to_json()))
+    warp(tmp_path / "out.tif", tmp_path / "warped.tif", tmp_path / "transform.json")
+    for name in ("out.tif", "warped.tif"):
+        with open_raster(tmp_path / name) as source:
+            assert is_known_radar(source)
+            assert source.tags[""][SPECKLE_FILTER] == "gamma-map, 5 px"
 
 
 def test_what_cannot_be_is_refused(tmp_path: Path) -> None:

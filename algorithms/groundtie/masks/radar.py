@@ -6,6 +6,7 @@ import numpy as np
 
 from ..rasters.pair import Image
 from ..rasters.patch import Patch
+from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import Window
 from ..speckle.statistics import FloatImage, calm_variation2
 
@@ -18,31 +19,44 @@ _SAMPLE_PX = 1024
 _RADAR, _BESIDE_CAMERA = 0.05, 9.0
 
 
-def is_more_speckled(image: Image, other: Image) -> bool:
-    """Tell whether an image has more speckle than another.
+def is_rather_radar(image: Image, other: Image) -> bool:
+    """Tell whether an image is a radar's rather than another: by metadata, or else by speckle.
 
     Parameters
     ----------
     image, other
         The images; their grey values are taken for amplitudes.
     """
-    return _calm(image) >= _calm(other)
+    known, other_known = _is_known(image), _is_known(other)
+    return known if known != other_known else _calm(image) >= _calm(other)
 
 
 def is_radar_and_camera(image: Image, other: Image) -> bool:
-    """Tell whether an image has the speckle of a radar's, and another far less than it."""
-    calm = _calm(image)
-    return calm >= _RADAR and calm >= _BESIDE_CAMERA * _calm(other)
+    """Tell whether an image is a radar's, and another is not.
+
+    It has the speckle of a radar's, and the other far less than it; or its metadata tell, and the
+    other has no speckle.
+    """
+    if _is_known(other):
+        return False
+    calm, other_calm = _calm(image), _calm(other)
+    if _is_known(image):
+        return other_calm < _RADAR
+    return calm >= _RADAR and calm >= _BESIDE_CAMERA * other_calm
 
 
 def are_both_radar(image: Image, other: Image) -> bool:
-    """Tell whether both images have the speckle of a radar's."""
-    return min(_calm(image), _calm(other)) >= _RADAR
+    """Tell whether both images have the speckle of a radar's, or metadata that tell it."""
+    return all(_is_known(one) or _calm(one) >= _RADAR for one in (image, other))
 
 
 def power(patch: Patch) -> FloatImage:
     """Return the power of amplitudes, 0 where invalid."""
     return np.where(patch.valid, patch.values * patch.values, np.float32(0))
+
+
+def _is_known(image: Image) -> bool:
+    return is_known_radar(image.source, image.band)
 
 
 def _calm(image: Image) -> float:

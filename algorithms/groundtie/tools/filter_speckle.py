@@ -18,6 +18,7 @@ from ..kinds import Choice, Number, RasterOut
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import in_order, tiles
+from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window, bounded_cache, open_raster
 from ..rasters.writing import create_like, fill_value
 from ..speckle.filters import FILTERS, SpeckleFilter
@@ -154,6 +155,8 @@ class _Filtering:
         source, places = self.source, list(tiles(self.source.grid))
         nodata = None if source.is_complex else source.bands[0].nodata
         like = _as_amplitudes(source) if source.is_complex else source
+        # Without its speckle, nothing else tells that it is a radar's.
+        like = with_speckle_filter(like, f"{self.filter.name}, {self.filter.window_px} px")
         with (
             create_like(like, source.grid, path, nodata=nodata, workers=workers) as dataset,
             ThreadPoolExecutor(workers) as pool,

@@ -29,7 +29,7 @@ from ..masks.choice import (
     is_dense,
 )
 from ..masks.layer import read_layer
-from ..masks.radar import is_more_speckled, is_radar_and_camera
+from ..masks.radar import is_radar_and_camera, is_rather_radar
 from ..masks.regions import GroundRegions, find_ground
 from ..masks.scene import Scene, Selection, write_mask
 from ..masks.shade import shade_azimuth_deg
@@ -60,7 +60,7 @@ MaskImage = Annotated[
     str,
     Choice(
         label="Image that is masked",
-        help="By default the one with the more speckle: the radar's.",
+        help="By default the radar's, told by its metadata or its speckle.",
         choices=MASK_IMAGES,
         advanced=True,
     ),
@@ -212,9 +212,8 @@ class MaskRequest:
     def _image(self, pair: ImagePair) -> tuple[str, str]:
         if self.image != AUTO:
             return self.image, "as asked for"
-        if is_more_speckled(pair.reference, pair.input):
-            return REFERENCE, "it has the more speckle"
-        return INPUT, "it has the more speckle"
+        name = REFERENCE if is_rather_radar(pair.reference, pair.input) else INPUT
+        return name, "its metadata or its speckle tell that it is the radar's"
 
 
 def by_what_is_left(search: LocalSearch, used: MaskUsed) -> LocalSearch:
