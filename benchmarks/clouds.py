@@ -1,4 +1,4 @@
-"""Simulated clouds over real images: bright, soft at their borders, with an exact mask."""
+"""Simulated clouds over real images: bright and without colour, soft, with an exact mask."""
 
 from __future__ import annotations
 
@@ -21,24 +21,32 @@ _IS_CLOUD = 0.4
 
 
 @dataclass(frozen=True)
-class Clouded:
-    """An image with clouds, shape (h, w) float32, and which pixels they hide, shape (h, w)."""
+class Clouds:
+    """Clouds over an image: how much they hide, 0 to 1, and how bright they are, shape (h, w)."""
 
-    image: NDArray[np.float32]
-    hidden: NDArray[np.bool_]
+    opacity: NDArray[np.float64]
+    brightness: NDArray[np.float64]
+
+    @property
+    def hidden(self) -> NDArray[np.bool_]:
+        """Which pixels they hide."""
+        return self.opacity > _IS_CLOUD
+
+    def over(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return an image under the clouds, which are as bright in all of its bands."""
+        clouded = image * (1 - self.opacity) + self.brightness * self.opacity
+        return clouded.astype(np.float32)
 
 
-def add_clouds(image: NDArray[np.float32], share: float, seed: int) -> Clouded:
-    """Return an image with clouds over a share of it."""
+def clouds_over(image: NDArray[np.float32], share: float, seed: int) -> Clouds:
+    """Return clouds over a share of a grey image, shape (h, w), and as bright as it is."""
     generator = np.random.default_rng(seed)
     field = fractal(image.shape, _SLOPE, generator)
     opacity = np.clip((field - np.quantile(field, 1 - share)) / _SOFTNESS + 0.5, 0, 1)
     opacity *= _LARGEST_OPACITY
     low, high = np.quantile(image, [0.01, _BRIGHTNESS_QUANTILE])
     texture = fractal(image.shape, 2.4, generator)
-    cloud = high + _UNEVENNESS * (high - low) * texture
-    clouded = image * (1 - opacity) + cloud * opacity
-    return Clouded(clouded.astype(np.float32), opacity > _IS_CLOUD)
+    return Clouds(opacity, high + _UNEVENNESS * (high - low) * texture)
 
 
 def fractal(

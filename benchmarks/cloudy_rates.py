@@ -14,12 +14,21 @@ from groundtie.errors import TooFewPointsError
 from groundtie.features.classifier import KERNELS, FeatureClassifier
 from groundtie.features.classifier_training import Training, train_classifier
 from groundtie.features.labels import KEPT, LEFT_OUT, patch_labels
-from groundtie.features.patch_statistics import patch_statistics
+from groundtie.features.patch_statistics import BAND_RATIOS, NO_BANDS, patch_statistics
 from groundtie.rasters.patch import Patch
 
 from .cases import RealCase
-from .clouds import add_clouds
-from .match_rates import Features, Matched, MatchRates, described, matched, patches, rate_of
+from .clouds import clouds_over
+from .match_rates import (
+    Features,
+    Matched,
+    MatchRates,
+    aligned,
+    described,
+    matched,
+    patches,
+    rate_of,
+)
 
 # Share of both images that clouds hide, how often they are drawn, and the method that is refined.
 CLOUD_SHARE = 0.3
@@ -29,8 +38,12 @@ REFINED = "HOG-81"
 # What leaves features out: support vector machines with these statistics and kernels, trained on
 # the image's other half; one that was trained on other pairs; and the mask of the clouds itself.
 KERNEL, STATISTICS = "polynomial", "mean-variance"
-TEXTURE, OTHERS, MASK = "polynomial, texture", "polynomial, other pairs", "the mask itself"
-MACHINES = {kernel: (STATISTICS, kernel) for kernel in KERNELS} | {TEXTURE: ("texture", KERNEL)}
+BANDS, TEXTURE = "polynomial, band ratios", "polynomial, texture"
+OTHERS, MASK = "polynomial, other pairs", "the mask itself"
+MACHINES = {kernel: (STATISTICS, kernel) for kernel in KERNELS} | {
+    BANDS: (BAND_RATIOS, KERNEL),
+    TEXTURE: ("texture", KERNEL),
+}
 REFINEMENTS = (*MACHINES, OTHERS, MASK)
 
 # So many points of each image and class are passed on to train for other pairs.
@@ -38,10 +51,19 @@ _POINTS = 100
 
 
 @dataclass(frozen=True)
+class Clear:
+    """An image without clouds: its grey values, and all bands, shape (bands, h, w)."""
+
+    grey: Patch
+    bands: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
 class Clouded:
     """An image under clouds: its features, where the clouds leave them, and what is around them."""
 
     image: Patch
+    bands: NDArray[np.float32]
     features: Features
     kept: NDArray[np.bool_]
 
@@ -50,7 +72,9 @@ class Clouded:
         return self.features.points.position_px
 
     def training(self, statistics: str) -> Training:
-        return Training(patch_statistics(statistics, self.image, self.px), self.kept, self.px)
+        bands = self.bands if statistics == BAND_RATIOS else NO_BANDS
+        found = patch_statistics(statistics, self.image, self.px, bands)
+        return Training(found, self.kept, self.px, len(bands))
 
 
 @dataclass(frozen=True)
@@ -73,9 +97,8 @@ class LabelCase:
 
     def run(self, workers: int | None) -> CloudLabels:
         """Label features of both images."""
-        with patches(self.case) as clear:
-            both = _clouded(clear, self.case, 0)
-            return CloudLabels(self.case.name, _joined([_some(each) for each in both]))
+        both = _clouded(_clear(self.case), self.case, 0)
+        return CloudLabels(self.case.name, _joined([_some(each) for each in both]))
 
 
 @dataclass(frozen=True)
@@ -95,11 +118,11 @@ class CloudyCase:
         foreign = None
         if self.others is not None:
             foreign = train_classifier(self.others, STATISTICS, KERNEL, 1.0, 0)
-        with patches(self.case) as clear:
-            for draw in range(CLOUD_DRAWS):
-                both = _clouded(clear, self.case, draw)
-                for name, parts in _matches(both, clear[0].values.shape[1] / 2, foreign):
-                    found[name].append(parts)
+        clear = _clear(self.case)
+        for draw in range(CLOUD_DRAWS):
+            both = _clouded(clear, self.case, draw)
+            for name, parts in _matches(both, clear[0].grey.values.shape[1] / 2, foreign):
+                found[name].append(parts)
         return MatchRates(
             tuple(
                 rate_of(self.case, REFINED, name, parts, 0.0)
@@ -114,17 +137,28 @@ def for_others(labels: Sequence[CloudLabels], name: str) -> Training:
     return _joined([each.labelled for each in labels if each.name != name])
 
 
-def _clouded(clear: Sequence[Patch], case: RealCase, draw: int) -> list[Clouded]:
+def _clear(case: RealCase) -> list[Clear]:
+    """Return both images."""
+    with aligned(case) as pair:
+        images = pair.images
+        bands = (
+            images.reference_bands(images.grid),
+            images.input_bands(images.grid, pair.to_input_px),
+        )
+        return [Clear(*both) for both in zip(patches(pair), bands, strict=True)]
+
+
+def _clouded(clear: Sequence[Clear], case: RealCase, draw: int) -> list[Clouded]:
     """Return both images under clouds."""
     seed = zlib.crc32(case.name.encode()) + 2 * draw
     both = []
-    for number, patch in enumerate(clear):
-        clouded = add_clouds(patch.values, CLOUD_SHARE, seed + number)
-        image = Patch(clouded.image, patch.valid)
+    for number, each in enumerate(clear):
+        clouds = clouds_over(each.grey.values, CLOUD_SHARE, seed + number)
+        image = Patch(clouds.over(each.grey.values), each.grey.valid)
         features = described(image, REFINED)
-        labels = np.where(clouded.hidden, LEFT_OUT, KEPT).astype(np.int8)
+        labels = np.where(clouds.hidden, LEFT_OUT, KEPT).astype(np.int8)
         kept = patch_labels(labels, features.points.position_px) == KEPT
-        both.append(Clouded(image, features, kept))
+        both.append(Clouded(image, clouds.over(each.bands), features, kept))
     return both
 
 
@@ -134,7 +168,7 @@ def _matches(
     """Return the matches in each half without refinement and with every one."""
     labelled = {
         statistics: [each.training(statistics) for each in both]
-        for statistics in (STATISTICS, "texture")
+        for statistics in {statistics for statistics, _ in MACHINES.values()}
     }
     for side in (False, True):
         tested = [(each.px[:, 0] < middle) == side for each in both]

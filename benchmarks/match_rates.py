@@ -25,7 +25,7 @@ from groundtie.rasters.patch import Patch
 
 from .accuracy import FloatArray
 from .cases import RealCase
-from .offsets import Scene, open_offset
+from .offsets import OffsetPair, Scene, open_offset
 
 # Matches within these distances of the truth count as right (thesis P: 5 px).
 LIMITS_PX = (5.0, 1.5)
@@ -102,8 +102,9 @@ class ClearCase:
 
     def run(self, workers: int | None) -> MatchRates:
         """Match by every method, in one thread."""
-        with patches(self.case) as both:
-            return MatchRates(tuple(self._rate(both, name) for name in METHODS))
+        with aligned(self.case) as pair:
+            both = patches(pair)
+        return MatchRates(tuple(self._rate(both, name) for name in METHODS))
 
     def _rate(self, both: list[Patch], method: str) -> MatchRate:
         started = time.process_time()
@@ -148,17 +149,22 @@ def matched(there: Features, here: Features) -> Matched:
 
 
 @contextmanager
-def patches(case: RealCase) -> Iterator[list[Patch]]:
-    """Return both images on the reference's grid, the input resampled by the truth but a shift."""
+def aligned(case: RealCase) -> Iterator[OffsetPair]:
+    """Open a pair on the reference's grid, the input resampled by the truth but a shift."""
     with (
         tempfile.TemporaryDirectory() as folder,
         open_offset(Scene(case, Path(folder)).pair(Path(folder)), _OFFSET_PX) as pair,
     ):
-        grid = pair.images.grid
-        yield [
-            pair.images.reference_patch(grid),
-            pair.images.input_patch(grid, pair.to_input_px),
-        ]
+        yield pair
+
+
+def patches(pair: OffsetPair) -> list[Patch]:
+    """Return the grey values of both images."""
+    images = pair.images
+    return [
+        images.reference_patch(images.grid),
+        images.input_patch(images.grid, pair.to_input_px),
+    ]
 
 
 def rate_of(

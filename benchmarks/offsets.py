@@ -87,7 +87,8 @@ def open_offset(pair: Pair, offset_px: FloatArray) -> Iterator[OffsetPair]:
     assert pair.lattice is not None
     with open_raster(pair.reference) as reference, open_raster(pair.input) as image:
         grid = reference.grid
-        images = ImagePair(Image(reference), Image(image), grid, (grid.width, grid.height))
+        size = grid.width, grid.height
+        images = ImagePair(Image(reference), Image(image), grid, size, grid)
         yield OffsetPair(images, affine_of(pair.lattice), offset_px)
 
 

@@ -12,6 +12,7 @@ from .accuracy import CORRECT, REFUSED, SILENTLY_WRONG
 from .attempt import Outcome, accepted, count
 from .cases import read_cases
 from .cloudy_rates import (
+    BANDS,
     KERNEL,
     MASK,
     OTHERS,
@@ -110,7 +111,7 @@ def goals(
         Goal("HOG-81 above SURF-64, mean", "at least 5 points", f"{gain:+.1f} points", gain >= 5),
         *(
             _refinement_goal(cloudy, name, None if name in (OTHERS, MASK) else "all")
-            for name in (KERNEL, TEXTURE, OTHERS, MASK)
+            for name in (KERNEL, BANDS, TEXTURE, OTHERS, MASK)
         ),
         Goal(
             "registrations correct",

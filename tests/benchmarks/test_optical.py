@@ -14,6 +14,7 @@ from textured_pairs import texture
 from benchmarks.accuracy import CORRECT, REFUSED, SILENTLY_WRONG
 from benchmarks.cases import RealCase, write_image
 from benchmarks.cloudy_rates import (
+    BANDS,
     KERNEL,
     MASK,
     OTHERS,
@@ -116,15 +117,15 @@ def test_tables_hold_the_rates() -> None:
 
 def test_goals_are_reached_or_not() -> None:
     def refined(before: float, after: float) -> list[MatchRate]:
-        names = (KERNEL, TEXTURE, OTHERS, MASK)
+        names = (KERNEL, BANDS, TEXTURE, OTHERS, MASK)
         parts = [rate("a", "HOG-81", after, name) for name in names]
         return [rate("a", "HOG-81", before), *parts]
 
     clear = [rate("a", "SURF-64", 0.2), rate("a", "HOG-81", 0.3)]
     good, refused = outcomes({CORRECT: 9, REFUSED: 1}), outcomes({REFUSED: 3})
     reached = [goal.reached for goal in goals(clear, refined(0.2, 0.3), good, refused)]
-    assert reached == [True, True, True, None, None, True, True, True]
+    assert reached == [True, True, True, True, None, None, True, True, True]
     bad, taken = outcomes({CORRECT: 8, SILENTLY_WRONG: 2}), outcomes({REFUSED: 2, CORRECT: 1})
     same = [rate("a", "SURF-64", 0.2), rate("a", "HOG-81", 0.2)]
     reached = [goal.reached for goal in goals(same, refined(0.3, 0.2), bad, taken)]
-    assert reached == [False, False, False, None, None, False, False, False]
+    assert reached == [False, False, False, False, None, None, False, False, False]

@@ -118,6 +118,28 @@ def test_clouds_in_a_window_are_left_out() -> None:
     assert found.keep(window, px).tolist() == [True, True, False, False]
 
 
+def colours(count: int = 150, seed: int = 0) -> Training:
+    """Return ground and clouds of like grey values; the ground is red."""
+    random = np.random.default_rng(seed)
+    red = np.repeat([0.45, 0.34], count) + random.normal(0, 0.02, 2 * count)
+    grey = np.column_stack([random.normal(120, 20, 2 * count), random.normal(400, 90, 2 * count)])
+    shares = np.column_stack([red, 0.6 * (1 - red), 0.4 * (1 - red)])
+    kept = np.repeat([True, False], count)
+    return Training(np.hstack([grey, shares]), kept, random.uniform(0, SIZE_PX, (300, 2)), 3)
+
+
+def test_what_differs_in_colour_alone_is_told_by_its_bands(tmp_path: Path) -> None:
+    train_classifier(colours(), "band-ratios", "polynomial", 10.0, 0).write(tmp_path / "c.json")
+    stored = read_classifier(tmp_path / "c.json")
+    assert stored.bands == 3
+    window = Patch(np.full((60, 200), 120, np.float32), np.ones((60, 200), bool))
+    bands = np.full((3, 60, 200), 120, np.float32)
+    bands[:, :, :100] *= np.array([1.35, 0.99, 0.66], np.float32)[:, None, None]
+    px = np.array([[40.0, 30.0], [160.0, 30.0]])
+    assert stored.keep(window, px, bands).tolist() == [True, False]
+    assert left_out_accuracy(colours(), "band-ratios", "polynomial", 0) > 0.95
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -130,6 +152,8 @@ def test_clouds_in_a_window_are_left_out() -> None:
         {"mean": [0.0, 0.0, 0.0]},
         {"intercept": "much"},
         {"gamma": float("nan")},
+        {"bands": 3},
+        {"statistics": "band-ratios"},
     ],
 )
 def test_a_file_that_is_none_is_refused(change: dict[str, Any], tmp_path: Path) -> None:

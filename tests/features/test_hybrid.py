@@ -175,7 +175,7 @@ def test_only_features_on_the_ground_are_matched(files: TexturedPair, tmp_path: 
     mask = write_raster(tmp_path / "ground.tif", shown, files.grid)
     with files.opened() as pair, open_raster(mask) as ground, ThreadPoolExecutor(2) as executor:
         masked = replace(pair, reference=Image(pair.reference.source, None, ground))
-        found = FeatureMatcher(pair, ground=masked).match(ROUGH, executor)
+        found = FeatureMatcher(pair, shown=masked).match(ROUGH, executor)
         everywhere = FeatureMatcher(pair).match(ROUGH, executor)
     assert 50 < len(found.reference) < len(everywhere.reference)
     assert found.reference.position_px[:, 0].min() > 99

@@ -46,8 +46,29 @@ def test_texture_adds_skewness_and_what_is_fine() -> None:
         assert 0 < row[3] < np.ptp(pixels)
 
 
+def test_band_ratios_are_the_shares_of_the_bands_in_their_sum() -> None:
+    of = window()
+    bands = np.stack([of.values, 2 * of.values, 300 * (1 + texture(80, 90, 3) ** 2)])
+    bands = bands.astype(np.float32)
+    found = patch_statistics("band-ratios", of, PX, bands)
+    np.testing.assert_allclose(found[:, :2], patch_statistics("mean-variance", of, PX))
+    for row, (x, y) in zip(found, PX, strict=True):
+        means = np.array([around(band, of, x, y).mean() for band in bands])
+        np.testing.assert_allclose(row[2:], means / means.sum(), rtol=1e-5)
+
+
+def test_bands_that_are_black_are_alike() -> None:
+    bands = np.zeros((4, 80, 90), np.float32)
+    found = patch_statistics("band-ratios", window(), PX, bands)
+    np.testing.assert_array_equal(found[:, 2:], np.full((3, 4), 0.25))
+
+
 @pytest.mark.parametrize("name", STATISTICS)
 def test_nothing_has_no_statistics(name: str) -> None:
-    assert len(patch_statistics(name, window(), np.zeros((0, 2)))) == 0
+    bands = np.ones((3, 80, 90), np.float32)
+    some = patch_statistics(name, window(), PX, bands)
+    none = patch_statistics(name, window(), np.zeros((0, 2)), bands)
+    assert none.shape == (0, some.shape[1])
     nothing = Patch(np.zeros((9, 9), np.float32), np.zeros((9, 9), bool))
-    assert np.isfinite(patch_statistics(name, nothing, np.zeros((3, 2)))).all()
+    found = patch_statistics(name, nothing, np.zeros((3, 2)), bands[:, :9, :9])
+    assert np.isfinite(found).all()

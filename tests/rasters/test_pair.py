@@ -143,6 +143,25 @@ def test_the_grid_holds_all_that_a_turned_image_may_show(
     np.testing.assert_allclose(last, [99.5 + right, 79.5 + down], atol=1.1)
 
 
+@pytest.mark.parametrize("turn", [None, Turn(180.0, 1.0)])
+def test_the_surroundings_hold_where_what_is_matched_may_claim_to_lie(
+    files: Files, turn: Turn | None
+) -> None:
+    larger = GRID.window(-300, -200, 700, 600)
+    pair = make_pair(files.image(GRID), files.image(larger), None, 250.0, turn)
+    low, high = pair.grid.map_to_pixel(
+        pair.surroundings.pixel_to_map(
+            [[0, 0], [pair.surroundings.width - 1, pair.surroundings.height - 1]]
+        )
+    )
+    reach = 250.0 / GRID.pixel_size_m
+    assert (low <= -reach).all()
+    assert (high >= [119 + reach, 99 + reach]).all()
+    # What is turned may show the reference with any of its pixels.
+    own = pair.grid.map_to_pixel(larger.pixel_to_map([[0, 0], [699, 599]]))
+    assert ((low <= own[0]) & (high >= own[1])).all() == (turn is not None)
+
+
 def test_a_pixel_size_that_is_asked_for(files: Files) -> None:
     pair = make_pair(files.image(), files.image(), matching_pixel_size_m=25.0)
     assert pair.grid.pixel_size_m == pytest.approx(25)
@@ -239,6 +258,13 @@ def test_complex_images_are_read_as_amplitudes_and_said_to_be(files: Files) -> N
     (note,) = pair.notes()
     assert "image1.tif" in note
     assert "amplitude" in note
+
+
+def test_all_bands_of_an_image(files: Files) -> None:
+    values = np.random.default_rng(0).uniform(1, 99, (4, 100, 120)).astype(np.float32)
+    image = Image(files.open(values, photometric="RGB", alpha="yes"), band=2)
+    found = image.bands_onto(GRID, GRID.map_to_pixel)
+    np.testing.assert_allclose(found, values[:3])
 
 
 def test_bands(files: Files) -> None:

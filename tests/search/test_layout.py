@@ -25,7 +25,9 @@ def laid_out(
     spacing: float | None = None,
     overlap: tuple[int, int] | None = None,
 ) -> ChipLayout:
-    pair = ImagePair(Image(source), Image(source), utm_grid(*size), overlap or size)
+    pair = ImagePair(
+        Image(source), Image(source), utm_grid(*size), overlap or size, utm_grid(*size)
+    )
     return lay_out_chips(pair, chip, spacing)
 
 

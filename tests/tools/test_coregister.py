@@ -14,6 +14,7 @@ import fiona
 import numpy as np
 import pytest
 import rasterio
+from brightness_classifiers import bright_is_left_out
 from raster_files import UTM, utm_grid, write_raster
 from rasterio.crs import CRS
 from rasterio.enums import ColorInterp
@@ -331,6 +332,22 @@ def test_bands_and_masks_say_what_takes_part(textured: TexturedPair, tmp_path: P
     result = registered(pair, tmp_path, input_band=2, input_mask=masked, model="affine")
     assert error_px(result.transform, textured) < 0.3
     assert pixels(tmp_path / "out.tif").shape == (2, *SIZE[::-1])
+
+
+def test_what_a_classifier_leaves_out_takes_no_part(textured: TexturedPair, tmp_path: Path) -> None:
+    """A part of the input shows something else, and is brighter."""
+
+    def clouded(values: np.ndarray) -> np.ndarray:
+        shown = values.copy()
+        shown[:, :80] = 3000 + np.roll(values, 6, axis=1)[:, :80]
+        return shown
+
+    pair = rewritten(textured, tmp_path, input=clouded)
+    classifier = bright_is_left_out(tmp_path / "c.json", 3600)
+    result = registered(pair, tmp_path, input_classifier=classifier, model="affine")
+    assert error_px(result.transform, textured) < 0.3
+    # A third of a chip's pixels may lie where nothing takes part.
+    assert result.points.input_px[result.points.used][:, 0].min() > 60
 
 
 @pytest.mark.parametrize("model", ["rigid", "tps"])

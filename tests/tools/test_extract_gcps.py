@@ -4,8 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from brightness_classifiers import bright_is_left_out
 from raster_files import write_raster
 from rasterio.crs import CRS
+from rpc_models import to_rasterio
 from rpc_scenes import SIZE, Scene, ground_texture, make_scene
 
 import groundtie
@@ -45,6 +47,27 @@ def test_a_mask_by_thresholds_can_be_asked_for(scene: Scene, tmp_path: Path) -> 
     result = call(scene, tmp_path / "gcps.csv", mask="threshold")
     assert result.mask.kind == "threshold"
     assert 0.6 < result.mask.share < 0.8
+
+
+def test_what_a_classifier_leaves_out_of_the_image_takes_no_part(
+    scene: Scene, tmp_path: Path
+) -> None:
+    with open_raster(scene.image, allow_sensor_geometry=True) as source:
+        values = source.read(source.window)[0]
+    half = SIZE[0] // 2
+    values = np.where(np.arange(SIZE[0]) < half, values / 2, 128 + values / 2)
+    values = values.astype(np.uint8)
+    image = write_raster(
+        tmp_path / "bright.tif", values, nodata=0, rpcs=to_rasterio(scene.delivered)
+    )
+    classifier = bright_is_left_out(tmp_path / "c.json", 128)
+    found = call(scene, tmp_path / "g.csv", image=image, image_classifier=classifier).points
+    # Chips whose middles lie just in the bright half still see some of the other one.
+    used = found.points.input_px[found.points.used]
+    assert len(used) > 10
+    assert used[:, 0].max() < half + 40
+    miss = np.hypot(*found.seen_by(scene.truth, SIZE).residuals_px(None).T)[found.points.used]
+    assert np.median(miss) < 0.7
 
 
 def elsewhere(scene: Scene, folder: Path) -> dict[str, Path]:

@@ -18,6 +18,7 @@ from textured_pairs import (
 
 from groundtie import match_optical
 from groundtie.errors import NotRegisteredError, ParameterError
+from groundtie.features.classifier_training import Training, train_classifier
 from groundtie.features.optical import DESCRIPTORS, DETECTORS
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
@@ -126,6 +127,34 @@ def test_what_a_coarser_image_shows_is_matched_all_over(tmp_path: Path) -> None:
     corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (size - 1.0)
     off = found.transform(corners) - (corners - 0.5) / 2
     assert np.hypot(*off.T).max() < 1.0
+
+
+def test_an_image_that_is_turned_is_classified_all_over(tmp_path: Path) -> None:
+    """It may show the reference where, as it claims, it lies far beyond it."""
+    pair = write_textured_pair(tmp_path, SIZE, shift_on_map(0, 0), noise=0.1)
+    values = np.kron(np.rot90(pixels(pair.input)[0]), np.ones((2, 2), np.uint16))
+    plain = [
+        write_raster(tmp_path / f"{name}.tif", image)
+        for name, image in (("plain", pixels(pair.reference)[0]), ("turned", values))
+    ]
+    nothing = bright_is_left_out(tmp_path / "c.json", 60_000)
+    found = match_optical(*plain, tmp_path / "out.tif", input_classifier=nothing)
+    without = match_optical(*plain, tmp_path / "out.tif")
+    used = found.points.input_px[found.points.used]
+    assert (np.ptp(used, axis=0) > 0.7 * np.array(values.shape[::-1])).all()
+    assert len(found.points) > 0.9 * len(without.points)
+
+
+def test_a_classifier_of_other_bands_is_refused(files: TexturedPair, tmp_path: Path) -> None:
+    path = tmp_path / "c.json"
+    random = np.random.default_rng(0)
+    labelled = Training(
+        random.normal(size=(60, 6)), np.repeat([True, False], 30), random.uniform(0, 99, (60, 2)), 4
+    )
+    train_classifier(labelled, "band-ratios", "linear", 10.0, 0).write(path)
+    with pytest.raises(ParameterError, match=r"of 4 bands; .*input.tif has 1"):
+        match_optical(files.reference, files.input, tmp_path / "out.tif", input_classifier=path)
+    assert list(listing(tmp_path)) == ["c.json"]
 
 
 def test_features_that_a_classifier_leaves_out_take_no_part(

@@ -20,6 +20,7 @@ from groundtie.errors import (
 )
 from groundtie.features.classifier import read_classifier
 from groundtie.features.labels import KEPT, LEFT_OUT, UNKNOWN, patch_labels
+from groundtie.features.patch_statistics import STATISTICS
 from groundtie.rasters.patch import Patch
 
 SIDE = 400
@@ -66,12 +67,13 @@ def told(path: Path, seed: int = 20) -> tuple[float, float]:
     values = cloudy_values(seed).astype(np.float32)
     px = np.random.default_rng(0).uniform(25, SIDE - 25, (500, 2))
     px = px[np.abs(px[:, 0] - BORDER) > 25]
-    kept = read_classifier(path).keep(Patch(values, np.ones(values.shape, bool)), px)
+    window = Patch(values, np.ones(values.shape, bool))
+    kept = read_classifier(path).keep(window, px, values[None])
     clear = px[:, 0] < BORDER
     return float(kept[clear].mean()), float((~kept[~clear]).mean())
 
 
-@pytest.mark.parametrize("statistics", ["mean-variance", "texture"])
+@pytest.mark.parametrize("statistics", STATISTICS)
 def test_clouds_of_a_mask_are_learned(image: Path, tmp_path: Path, statistics: str) -> None:
     found = train_feature_classifier(
         image,
@@ -86,6 +88,25 @@ def test_clouds_of_a_mask_are_learned(image: Path, tmp_path: Path, statistics: s
     assert found.accuracy is not None
     assert found.accuracy > 0.9
     assert json.loads((tmp_path / "c.json").read_text())["pixel_size_m"] == 10.0
+
+
+def test_bands_tell_clouds_from_ground_that_is_as_bright(tmp_path: Path) -> None:
+    values = np.repeat(texture(SIDE, SIDE)[None], 3, axis=0) * 100 + 1000
+    values[0, :, :BORDER] += 300
+    values[2, :, :BORDER] -= 300
+    image = write_raster(tmp_path / "image.tif", values.astype(np.uint16), GRID)
+    mask = cloud_mask(tmp_path / "mask.tif")
+    told = [
+        train_feature_classifier(
+            image, tmp_path / f"{name}.json", label_raster=mask, statistics=name
+        ).accuracy
+        for name in ("mean-variance", "band-ratios")
+    ]
+    assert told[0] is not None
+    assert told[1] is not None
+    assert told[0] < 0.7
+    assert told[1] > 0.9
+    assert read_classifier(tmp_path / "band-ratios.json").bands == 3
 
 
 def test_other_values_may_be_left_out(image: Path, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import ParameterError
 from ..rasters.atomic import writing
 from ..rasters.patch import Patch
-from .patch_statistics import STATISTICS, patch_statistics
+from .patch_statistics import BAND_RATIOS, NO_BANDS, STATISTICS, FloatImage, patch_statistics
 
 FloatArray = NDArray[np.float64]
 
@@ -57,6 +57,8 @@ class FeatureClassifier:
         Is added to the weighted sum.
     pixel_size_m
         Pixel size of the image it was trained on.
+    bands
+        How many bands of an image it looks at; 0: at its grey values alone.
     """
 
     statistics: str
@@ -70,6 +72,7 @@ class FeatureClassifier:
     weights: FloatArray
     intercept: float
     pixel_size_m: float
+    bands: int = 0
 
     def decide(self, statistics: FloatArray) -> FloatArray:
         """Return for statistics, shape (m, k), values that are positive for what is kept, (m,)."""
@@ -81,9 +84,17 @@ class FeatureClassifier:
             found[block] = self._kernel(scaled[block]) @ self.weights + self.intercept
         return found
 
-    def keep(self, window: Patch, px: FloatArray) -> NDArray[np.bool_]:
-        """Tell which positions (col, row) of a window, shape (n, 2), may be matched, (n,)."""
-        return np.asarray(self.decide(patch_statistics(self.statistics, window, px)) > 0)
+    def keep(
+        self, window: Patch, px: FloatArray, bands: FloatImage = NO_BANDS
+    ) -> NDArray[np.bool_]:
+        """Tell which positions of a window may be matched, shape (n,).
+
+        Parameters
+        ----------
+        window, px, bands
+            As `patch_statistics` takes them.
+        """
+        return np.asarray(self.decide(patch_statistics(self.statistics, window, px, bands)) > 0)
 
     def _kernel(self, scaled: FloatArray) -> FloatArray:
         products = scaled @ self.vectors.T
@@ -108,6 +119,7 @@ class FeatureClassifier:
             "high": self.high.tolist(),
             "intercept": self.intercept,
             "pixel_size_m": self.pixel_size_m,
+            "bands": self.bands,
             "weights": self.weights.tolist(),
             "vectors": self.vectors.tolist(),
         }
@@ -148,8 +160,12 @@ def _from_json(values: dict[str, Any]) -> FeatureClassifier:
         weights=np.array(values["weights"], float),
         intercept=float(values["intercept"]),
         pixel_size_m=float(values["pixel_size_m"]),
+        bands=int(values["bands"]),
     )
-    count = len(patch_statistics(found.statistics, _NOTHING, np.zeros((1, 2)))[0])
+    if (found.bands > 0) != (found.statistics == BAND_RATIOS):
+        raise ValueError(f"statistics {found.statistics!r} of {found.bands} bands")
+    bands = np.zeros((found.bands, 1, 1), np.float32)
+    count = len(patch_statistics(found.statistics, _NOTHING, np.zeros((1, 2)), bands)[0])
     if found.vectors.shape != (len(found.weights), count) or len(found.vectors) == 0:
         raise ValueError("support vectors of the wrong shape")
     scaling = found.mean, found.spread, found.low, found.high

@@ -37,15 +37,18 @@ class Training:
         Which may be matched, shape (n,).
     px
         Where they lie (col, row), shape (n, 2).
+    bands
+        How many bands the statistics look at; 0: at grey values alone.
     """
 
     statistics: FloatArray
     kept: NDArray[np.bool_]
     px: FloatArray
+    bands: int = 0
 
     def take(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Training:
         """Return the points that the mask or index `which` selects."""
-        return Training(self.statistics[which], self.kept[which], self.px[which])
+        return Training(self.statistics[which], self.kept[which], self.px[which], self.bands)
 
 
 def train_classifier(
@@ -107,6 +110,7 @@ def train_classifier(
         weights=np.asarray(machine.dual_coef_, float)[0],
         intercept=float(machine.intercept_[0]),
         pixel_size_m=pixel_size_m,
+        bands=labelled.bands,
     )
 
 

@@ -13,6 +13,7 @@ from ..errors import ParameterError
 from ..geometry.fitting import fit_model
 from ..geometry.models import PARAMETERS
 from ..rasters.patch import Patch
+from ..rasters.reading import Mask
 from .descriptors import Descriptor
 from .detectors import DETECTORS, Detector
 from .filtering import filter_matches
@@ -20,7 +21,7 @@ from .gradients import GRADIENTS
 from .matching import match
 from .points import FeaturePoints
 from .repeatability import CLASS_NAMES, Repeatability, classes, overlap_error, repeatability
-from .tile_matching import Refining
+from .tile_matching import standing_in
 
 FloatArray = NDArray[np.float64]
 
@@ -153,7 +154,7 @@ def evaluate(
     input: Patch,
     ratio: float,
     method: str,
-    refining: tuple[Refining | None, Refining | None] = (None, None),
+    parts: tuple[Mask, Mask] | None = None,
 ) -> Evaluation:
     """Detect, describe and match the features of two registered images.
 
@@ -165,14 +166,13 @@ def evaluate(
         The same place, pixel by pixel.
     ratio, method
         See `matching.match`.
-    refining
-        What tells which features of the reference and of the input take part; None: all.
+    parts
+        In which parts of the reference and of the input features count, shape (h, w); None: all.
     """
     started = time.perf_counter()
-    found = [
-        _detected(variant.detector, patch, own)
-        for patch, own in zip((reference, input), refining, strict=True)
-    ]
+    found = [variant.detector.detect(patch) for patch in (reference, input)]
+    if parts is not None:
+        found = [standing_in(own, part) for own, part in zip(found, parts, strict=True)]
     detected = time.perf_counter()
     points, descriptors = variant.descriptor.describe(reference, found[0])
     partners, partner_descriptors = variant.descriptor.describe(input, found[1])
@@ -189,8 +189,3 @@ def evaluate(
         detected - started,
         matched - detected,
     )
-
-
-def _detected(detector: Detector, patch: Patch, refining: Refining | None) -> FeaturePoints:
-    found = detector.detect(patch)
-    return found if refining is None else found.take(refining.keep(patch, found.position_px))

@@ -20,7 +20,7 @@ from ..rasters.pair import Image
 from ..rasters.reading import RasterSource, Window
 from ..rasters.warping import sample
 from .classifier_training import Training
-from .patch_statistics import PATCH_PX, patch_statistics
+from .patch_statistics import BAND_RATIOS, NO_BANDS, PATCH_PX, patch_statistics
 from .tile_matching import MARGIN_PX, Detecting, inside, tiles
 
 FloatArray = NDArray[np.float64]
@@ -242,6 +242,7 @@ def labelled_points(
         Is told of every tile.
     """
     grid = image.source.grid
+    looked_at = len(image.source.image_bands) if statistics == BAND_RATIOS else 0
     parts = []
     every = list(tiles(grid))
     for number, tile in enumerate(every):
@@ -256,11 +257,13 @@ def labelled_points(
         here = inside(own, core)
         px, told = np.vstack([px, own[here]]), np.concatenate([told, own_labels[here]])
         px, told = px[told != UNKNOWN], told[told != UNKNOWN]
-        values = patch_statistics(statistics, patch, px)
+        bands = image.bands_onto(piece, grid.map_to_pixel) if looked_at else NO_BANDS
+        values = patch_statistics(statistics, patch, px, bands)
         parts.append(Training(values, told == KEPT, px + corner))
         progress.update((number + 1) / len(every))
     return Training(
         np.concatenate([part.statistics for part in parts]),
         np.concatenate([part.kept for part in parts]),
         np.concatenate([part.px for part in parts]),
+        looked_at,
     )

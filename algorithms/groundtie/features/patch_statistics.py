@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch
 
 FloatArray = NDArray[np.float64]
+FloatImage = NDArray[np.float32]
 Means = Callable[[FloatArray], FloatArray]
 
 PATCH_PX = 41
@@ -20,13 +21,23 @@ PATCH_PX = 41
 _FINE_PX = 5
 
 
-def _mean_and_variance(values: FloatArray, means: Means) -> list[FloatArray]:
+def _mean_and_variance(values: FloatArray, bands: FloatImage, means: Means) -> list[FloatArray]:
     mean = means(values)
     return [mean, np.maximum(means(values**2) - mean**2, 0)]
 
 
-def _texture(values: FloatArray, means: Means) -> list[FloatArray]:
-    mean, variance = _mean_and_variance(values, means)
+def _band_ratios(values: FloatArray, bands: FloatImage, means: Means) -> list[FloatArray]:
+    of_bands = [means(band.astype(np.float64)) for band in bands]
+    together = np.sum(of_bands, axis=0)
+    # Where all is black, all bands are alike.
+    black = np.abs(together) < 1e-9
+    together[black] = 1.0
+    shares = [np.where(black, 1 / len(bands), mean / together) for mean in of_bands]
+    return [*_mean_and_variance(values, bands, means), *shares]
+
+
+def _texture(values: FloatArray, bands: FloatImage, means: Means) -> list[FloatArray]:
+    mean, variance = _mean_and_variance(values, bands, means)
     third = means(values**3) - 3 * mean * variance - mean**3
     skewness = third / np.maximum(variance, 1e-12) ** 1.5
     across, down = (cv2.Sobel(values, cv2.CV_64F, *axis, scale=1 / 8) for axis in ((1, 0), (0, 1)))
@@ -34,23 +45,31 @@ def _texture(values: FloatArray, means: Means) -> list[FloatArray]:
     return [mean, variance, skewness, means(np.hypot(across, down)), means(fine**2)]
 
 
-STATISTICS = MappingProxyType[str, Callable[[FloatArray, Means], list[FloatArray]]](
-    {"mean-variance": _mean_and_variance, "texture": _texture}
+BAND_RATIOS = "band-ratios"
+STATISTICS = MappingProxyType[str, Callable[[FloatArray, FloatImage, Means], list[FloatArray]]](
+    {"mean-variance": _mean_and_variance, BAND_RATIOS: _band_ratios, "texture": _texture}
 )
 
+NO_BANDS: FloatImage = np.zeros((0, 1, 1), np.float32)
 
-def patch_statistics(name: str, window: Patch, px: FloatArray) -> FloatArray:
+
+def patch_statistics(
+    name: str, window: Patch, px: FloatArray, bands: FloatImage = NO_BANDS
+) -> FloatArray:
     """Return statistics of the patches of 41 × 41 pixels around positions.
 
     Parameters
     ----------
     name
-        One of `STATISTICS`: "mean-variance", or "texture", which adds the skewness of the grey
+        One of `STATISTICS`: "mean-variance"; "band-ratios", which adds the share of each band in
+        the sum of all: clouds have no colour; or "texture", which adds the skewness of the grey
         values, the mean strength of gradients and the variance of what is finer than 5 pixels.
     window
         The image; masked pixels do not count.
     px
         Positions (col, row) in the window, shape (n, 2).
+    bands
+        All bands of the window, shape (bands, h, w); only "band-ratios" looks at them.
 
     Returns
     -------
@@ -59,7 +78,8 @@ def patch_statistics(name: str, window: Patch, px: FloatArray) -> FloatArray:
     last = np.array(window.valid.shape)[::-1] - 1
     cols, rows = np.clip(np.rint(px).astype(int), 0, last).T
     if len(px) == 0 or not window.valid.any():
-        return np.zeros((len(px), len(STATISTICS[name](np.zeros((1, 1)), lambda v: v))))
+        nothing = STATISTICS[name](np.zeros((1, 1)), bands[:, :1, :1], lambda v: v)
+        return np.zeros((len(px), len(nothing)))
     # Around the mean, powers of grey values lose no digits.
     centre = float(window.values[window.valid].mean())
     values = np.where(window.valid, window.values - centre, 0.0)
@@ -69,7 +89,7 @@ def patch_statistics(name: str, window: Patch, px: FloatArray) -> FloatArray:
         sums = _sums(np.where(window.valid, of, 0.0))
         return np.asarray(sums[rows, cols] / np.maximum(counts[rows, cols], 1))
 
-    found = np.column_stack(STATISTICS[name](values, means))
+    found = np.column_stack(STATISTICS[name](values, bands, means))
     found[:, 0] += centre
     return found
 

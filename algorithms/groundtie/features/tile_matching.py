@@ -28,8 +28,8 @@ FloatArray = NDArray[np.float64]
 _TILE_PX = 1024
 MARGIN_PX = 64
 
-# A feature stands on the ground if all within so many of its scales is ground.
-_GROUND_SCALES = 1.5
+# A feature stands in a part of an image if all within so many of its scales belongs to it.
+_STANDING_SCALES = 1.5
 
 # More features than this in a tile make matching longer, not better.
 _MOST_PER_TILE = 6000
@@ -47,13 +47,6 @@ class Describing(Protocol):
 
     def describe(self, window: Patch, found: FeaturePoints) -> tuple[FeaturePoints, FloatImage]:
         """Return m features, which may be repeated, and their descriptors, shape (m, k)."""
-
-
-class Refining(Protocol):
-    """What tells which features may be matched."""
-
-    def keep(self, window: Patch, px: FloatArray) -> Mask:
-        """Return for positions (col, row) of a window, shape (n, 2), which may be, (n,)."""
 
 
 @dataclass(frozen=True)
@@ -103,10 +96,9 @@ class FeatureMatcher:
     held_out
         Returns for a piece of the grid which pixels of the reference must not be seen; None: all
         may be.
-    ground
-        The images with a mask of level ground; features elsewhere are left out. None: all may be.
-    refining
-        What tells which features of the reference and of the input may be matched; None: all.
+    shown
+        The images with masks of what may be matched, as level ground; features elsewhere are left
+        out, but those beside see all that is there. None: all may be.
     """
 
     pair: ImagePair
@@ -115,8 +107,7 @@ class FeatureMatcher:
     ratio: float = 1.0
     gate_px: float = GATE_PX
     held_out: MaskOf | None = None
-    ground: ImagePair | None = None
-    refining: tuple[Refining | None, Refining | None] = (None, None)
+    shown: ImagePair | None = None
 
     def match(
         self, coarse: Model, executor: Executor, progress: Progress = SILENT
@@ -162,13 +153,14 @@ class FeatureMatcher:
         core = Window(margin, margin, tile.width, tile.height)
         gate = margin - MARGIN_PX
         around = Window(MARGIN_PX, MARGIN_PX, tile.width + 2 * gate, tile.height + 2 * gate)
-        own = self._features(reference, core, self.refining[0])
-        others = self._features(input, around, self.refining[1])
-        if self.ground is not None:
-            on_ground = self.ground.reference_patch(piece).valid
-            own = own.take(seen_whole(own, on_ground, _GROUND_SCALES))
-            on_ground = self.ground.input_patch(piece, claimed).valid
-            others = others.take(seen_whole(others, on_ground, _GROUND_SCALES))
+        parts: tuple[Mask | None, Mask | None] = None, None
+        if self.shown is not None:
+            parts = (
+                self.shown.reference_patch(piece).valid,
+                self.shown.input_patch(piece, claimed).valid,
+            )
+        own = self._features(reference, core, parts[0])
+        others = self._features(input, around, parts[1])
         points, descriptors = self.descriptor.describe(reference, own)
         partners, partner_descriptors = self.descriptor.describe(input, others)
         matches = match_near(
@@ -186,13 +178,16 @@ class FeatureMatcher:
             (len(own), int(inside(others.position_px, core).sum())),
         )
 
-    def _features(self, patch: Patch, window: Window, refining: Refining | None) -> FeaturePoints:
-        """Return the strongest features in a window of a patch, of those that may be matched."""
+    def _features(self, patch: Patch, window: Window, part: Mask | None) -> FeaturePoints:
+        """Return the strongest features in a window of a patch, of those in a part of it."""
         found = self.detector.detect(patch)
         found = found.take(inside(found.position_px, window))
-        if refining is not None:
-            found = found.take(refining.keep(patch, found.position_px))
-        return found.strongest(_MOST_PER_TILE)
+        return (found if part is None else standing_in(found, part)).strongest(_MOST_PER_TILE)
+
+
+def standing_in(found: FeaturePoints, part: Mask) -> FeaturePoints:
+    """Return the features that stand in a part of an image, shape (h, w)."""
+    return found.take(seen_whole(found, part, _STANDING_SCALES))
 
 
 def inside(px: FloatArray, window: Window) -> Mask:

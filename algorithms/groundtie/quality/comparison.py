@@ -84,7 +84,8 @@ def compare(reference: RasterSource, input: RasterSource, transform: Transform) 
     except NoOverlapError as error:
         raise NoOverlapError(f"{input.path}, as registered, misses {reference.path}") from error
     size = common.width, common.height
-    return Comparison.of(ImagePair(Image(reference), Image(input), common, size), to_input_px)
+    pair = ImagePair(Image(reference), Image(input), common, size, common)
+    return Comparison.of(pair, to_input_px)
 
 
 def _uri(pair: ImagePair, grid: Grid, to_input_px: pictures.ToPixel) -> str:

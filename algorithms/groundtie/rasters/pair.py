@@ -65,6 +65,11 @@ class Image:
             valid = valid & known & (shown != 0)
         return Patch(values, valid)
 
+    def bands_onto(self, grid: Grid, to_px: ToPixel) -> FloatImage:
+        """Return all bands but alpha on a grid, shape (bands, h, w), 0 where one is invalid."""
+        bands = self.source.image_bands
+        return np.stack([sample(self.source, grid, to_px, "cubic", band)[0] for band in bands])
+
 
 @dataclass(frozen=True)
 class ImagePair:
@@ -79,12 +84,16 @@ class ImagePair:
         where the images overlap or may do so within the search radius.
     overlap_px
         Width and height, in matching pixels, of the box in which they overlap as claimed.
+    surroundings
+        The matching lattice as far as either image may show something of the matching grid, where
+        it claims to lie.
     """
 
     reference: Image
     input: Image
     grid: Grid
     overlap_px: tuple[int, int]
+    surroundings: Grid
 
     def reference_patch(self, grid: Grid, hidden: Mask | None = None) -> Patch:
         """Return the reference on a grid in its CRS, masked where it is to be hidden."""
@@ -93,6 +102,14 @@ class ImagePair:
     def input_patch(self, grid: Grid, to_input_px: ToPixel) -> Patch:
         """Return the input on a grid; `to_input_px` takes map positions to input pixels."""
         return self.input.read_onto(grid, to_input_px)
+
+    def reference_bands(self, grid: Grid) -> FloatImage:
+        """Return all bands of the reference on a grid in its CRS, shape (bands, h, w)."""
+        return self.reference.bands_onto(grid, self.reference.source.grid.map_to_pixel)
+
+    def input_bands(self, grid: Grid, to_input_px: ToPixel) -> FloatImage:
+        """Return all bands of the input on a grid; `to_input_px` as `input_patch` takes it."""
+        return self.input.bands_onto(grid, to_input_px)
 
     @property
     def is_masked(self) -> bool:
@@ -173,6 +190,7 @@ def make_pair(
     factor = wanted / ref.grid.pixel_size_m
     grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
     outline = _claimed_pixels(inp.grid, ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
+    claimed = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
     if turn is not None and not ref.grid.is_georeferenced:
         outline = outline + np.subtract(ref.grid.centre_px, inp.grid.centre_px)
     outline = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
@@ -184,7 +202,23 @@ def make_pair(
         outline = turn.of(outline)
     reach = _box(grid, outline, radius / grid.pixel_size_m)
     assert reach is not None
-    return ImagePair(reference, input, grid.window(*reach), (overlap.width, overlap.height))
+    matching, overlap_px = grid.window(*reach), (overlap.width, overlap.height)
+    around = _surroundings(reach, radius / grid.pixel_size_m, None if turn is None else claimed)
+    return ImagePair(reference, input, matching, overlap_px, grid.window(*around))
+
+
+def _surroundings(reach: Window, radius_px: float, claimed_px: FloatArray | None) -> Window:
+    """Return where an image may show something of a window, as far off as it may lie.
+
+    What may be turned shows it anywhere in its claimed outline, shape (n, 2).
+    """
+    low = np.array(reach[:2]) - int(np.ceil(radius_px))
+    high = np.array(reach[:2]) + reach[2:] + int(np.ceil(radius_px))
+    if claimed_px is not None:
+        finite = claimed_px[np.isfinite(claimed_px).all(axis=1)]
+        low = np.minimum(low, np.floor(finite.min(axis=0)).astype(int))
+        high = np.maximum(high, np.ceil(finite.max(axis=0)).astype(int) + 1)
+    return Window(int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1]))
 
 
 def _empty_areas(values: FloatImage, valid: Mask) -> Mask:

@@ -21,6 +21,7 @@ from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
 from ..similarity.binning import BINNINGS
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
+from .classifying import Classifying, InputClassifier, ReferenceClassifier
 from .common import (
     ChipSize,
     GpveOrder,
@@ -125,6 +126,8 @@ def coregister(
     mask_low_percent: LowPercent = 0.0,
     mask_growth: MaskGrowth = 0.0,
     mask_width: MaskWidth = WIDTH_M,
+    reference_classifier: ReferenceClassifier = None,
+    input_classifier: InputClassifier = None,
     chip_size: ChipSize = None,
     spacing: Annotated[
         float | None,
@@ -200,6 +203,8 @@ def coregister(
         )
         for note in ("deciding what takes part", *pair.notes()):
             progress.update(0.0, note)
+        classifying = Classifying(reference_classifier, input_classifier)
+        pair = classifying.apply(pair, stack, progress.part(0.0, 0.02))
         request = MaskRequest(
             mask,
             mask_image,
@@ -209,8 +214,8 @@ def coregister(
             mask_width,
             mask_layer,
         )
-        shown, mask_used = request.apply(pair, search_radius, stack, progress.part(0.0, 0.05))
-        ground = request.ground(pair, mask_used, search_radius, stack, progress.part(0.05, 0.1))
+        shown, mask_used = request.apply(pair, stack, progress.part(0.02, 0.05))
+        ground = request.ground(pair, mask_used, stack, progress.part(0.05, 0.1))
         spacing_px = None if spacing is None else spacing / pair.grid.pixel_size_m
         layout = lay_out_chips(pair, chip_size, spacing_px)
         local = LocalSearch(shown, layout, settings, two_way_px=two_way_error)

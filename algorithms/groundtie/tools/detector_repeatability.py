@@ -22,6 +22,7 @@ from ..rasters.atomic import Outputs, writing
 from ..rasters.pair import ImagePair, make_pair
 from ..rasters.patch import Patch
 from ..rasters.reading import bounded_cache
+from .classifying import Classifying, InputClassifier, ReferenceClassifier
 from .common import (
     Input,
     InputBand,
@@ -31,7 +32,6 @@ from .common import (
     ReferenceBand,
     ReferenceMask,
 )
-from .feature_parameters import InputClassifier, ReferenceClassifier, classifiers
 from .registration import open_image
 from .repeatability_picture import draw_evaluations
 from .stored_transform import transform_of
@@ -187,12 +187,15 @@ def detector_repeatability(
         known = None
         if transform is not None:
             known = transform_of(load_transform(transform), pair.input.source, transform)
-        patches = _read(pair, known, size)
-    refining = classifiers(reference_classifier, input_classifier)
+        classifying = Classifying(reference_classifier, input_classifier)
+        shown = classifying.apply(pair, stack, progress.part(0.0, 0.1))
+        reference_patch, input_patch = _read(shown, known, size)
+        parts = reference_patch.valid, input_patch.valid
+        patches = _both_valid(*_read(pair, known, size))
     evaluations = []
     for i, variant in enumerate(chosen):
         progress.update(0.1 + 0.8 * i / len(chosen), f"trying {variant.name}")
-        evaluations.append(evaluate(variant, *patches, ratio, method, refining))
+        evaluations.append(evaluate(variant, *patches, ratio, method, parts))
     files = {"output": output, "picture": picture, "numbers": numbers}
     result = RepeatabilityResult(
         tuple(evaluations), {name: str(path) for name, path in files.items() if path is not None}
@@ -216,7 +219,11 @@ def _read(pair: ImagePair, transform: Transform | None, largest: int) -> tuple[P
     piece = grid.window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
     reference = pair.reference_patch(piece)
     input = pair.input_patch(piece, pair.claimed_px if transform is None else transform)
-    # Where one image shows nothing, features of the other cannot repeat.
+    return reference, input
+
+
+def _both_valid(reference: Patch, input: Patch) -> tuple[Patch, Patch]:
+    """Return two patches without what one shows alone: features there cannot repeat."""
     both = reference.valid & input.valid
     return Patch(reference.values, both), Patch(input.values, both)
 

@@ -18,6 +18,7 @@ from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache
 from ..sensor.control_points import SUFFIXES, ControlPoints
 from ..similarity.surface import SimilaritySettings
+from .classifying import Classifying, InputClassifier
 from .common import (
     ChipSize,
     HighPercent,
@@ -131,6 +132,7 @@ def extract_gcps(
     geoid: Geoid = None,
     rpc: RpcFile = None,
     image_band: ImageBand = None,
+    image_classifier: InputClassifier = None,
     reference_band: ReferenceBand = None,
     reference_mask: ReferenceMask = None,
     mask: MaskKind = NONE,
@@ -160,6 +162,7 @@ def extract_gcps(
         two_way_error,
         max_error,
         seed,
+        Classifying(None, image_classifier),
         image_band,
     )
     with ExitStack() as stack:

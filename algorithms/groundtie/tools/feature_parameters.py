@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
 from typing import Annotated
 
-from ..features.classifier import FeatureClassifier, read_classifier
-from ..kinds import Choice, Distance, FileIn, Number
+from ..kinds import Choice, Distance, Number
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
 
 _NO_REFINEMENT = "none"
@@ -75,32 +72,6 @@ FreeSearchRotation = Annotated[
         advanced=True,
     ),
 ]
-_INPUT_CLASSIFIER = FileIn(
-    label="Classifier for the input",
-    help="What train_feature_classifier has written; features of the input that it tells to leave "
-    "out, those of clouds for instance, take no part.",
-    suffixes=(".json",),
-    advanced=True,
-)
-InputClassifier = Annotated[Path | None, _INPUT_CLASSIFIER]
-PlainInputClassifier = Annotated[Path | None, replace(_INPUT_CLASSIFIER, advanced=False)]
-ReferenceClassifier = Annotated[
-    Path | None,
-    FileIn(
-        label="Classifier for the reference",
-        help="The same for features of the reference.",
-        suffixes=(".json",),
-        advanced=True,
-    ),
-]
-
-
-def classifiers(
-    reference: Path | None, input: Path | None
-) -> tuple[FeatureClassifier | None, FeatureClassifier | None]:
-    """Return what tells which features of reference and input may be matched; None: all."""
-    there, here = (None if path is None else read_classifier(path) for path in (reference, input))
-    return there, here
 
 
 def refinement_settings(refinement: str) -> SimilaritySettings | None:

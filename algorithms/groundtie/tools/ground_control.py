@@ -21,7 +21,7 @@ from ..errors import (
 )
 from ..geometry.models import Model
 from ..masks.choice import MaskUsed
-from ..progress import Progress
+from ..progress import SILENT, Progress
 from ..quality.verdict import refuse
 from ..rasters.grid import FloatArray
 from ..rasters.pair import Image, ImagePair, default_radius_m, make_pair
@@ -33,6 +33,7 @@ from ..search.rough import RoughSearch
 from ..sensor.control_points import ControlPoints
 from ..sensor.orientation import Orientation, sensor_grid
 from ..similarity.surface import SimilaritySettings
+from .classifying import Classifying
 from .masking import MaskRequest, by_what_is_left
 from .registration import Registration, register
 from .sensor_input import OrientedImage
@@ -68,6 +69,8 @@ class Matching:
         Largest error at check points.
     seed
         Of random samples.
+    classifying
+        Whether a classifier tells what of the image takes part.
     band
         Band of the image that is matched; None: the mean of all.
     """
@@ -80,6 +83,7 @@ class Matching:
     two_way_px: float
     max_error_px: float
     seed: int
+    classifying: Classifying
     band: int | None = None
 
 
@@ -166,7 +170,7 @@ def match_ground_control(
         pair = make_pair(reference, Image(located, matching.band), matching.pixel_size_m, radius_m)
         if reference_mask is not None:
             pair = replace(pair, reference=replace(pair.reference, mask=reference_mask))
-        return pair
+        return matching.classifying.apply(pair, stack, SILENT)
 
     def search_in(pair: ImagePair) -> LocalSearch:
         layout = lay_out_chips(pair, matching.chip_px)
@@ -175,7 +179,7 @@ def match_ground_control(
 
     reference_mask = reference.mask
     pair = paired(orientation, matching.radius_m)
-    pair, mask = matching.mask.apply(pair, matching.radius_m, stack, progress.part(0.0, 0.1))
+    pair, mask = matching.mask.apply(pair, stack, progress.part(0.0, 0.1))
     reference_mask, local = pair.reference.mask, search_in(pair)
     radius_m = default_radius_m(pair.grid) if matching.radius_m is None else matching.radius_m
     by = orientation

@@ -10,8 +10,6 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-
 from ..errors import ParameterError
 from ..kinds import Choice, VectorIn
 from ..masks import regions, threshold
@@ -36,7 +34,7 @@ from ..masks.shade import shade_azimuth_deg
 from ..masks.threshold import Threshold
 from ..progress import Progress
 from ..rasters.grid import Grid
-from ..rasters.pair import Image, ImagePair, default_radius_m
+from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import Window, open_raster
 from ..search.local import LocalSearch
@@ -103,7 +101,7 @@ class MaskRequest:
     layer: Path | None = None
 
     def apply(
-        self, pair: ImagePair, radius_m: float | None, stack: ExitStack, progress: Progress
+        self, pair: ImagePair, stack: ExitStack, progress: Progress
     ) -> tuple[ImagePair, MaskUsed]:
         """Return the pair with the mask on one of its images, and what was done.
 
@@ -111,22 +109,20 @@ class MaskRequest:
         ----------
         pair
             The images, with the masks that the user gave.
-        radius_m
-            Search radius; None: as `default_radius_m`.
         stack
             Keeps the mask's raster until it is closed.
         progress
             Is told of every tile.
         """
         if self.layer is not None:
-            return self._by_layer(pair, radius_m, stack, progress)
+            return self._by_layer(pair, stack, progress)
         if self.kind == NONE:
             return pair, MaskUsed(NONE, None, 1.0, "as asked for")
         name, reason = self._image(pair)
         if self.kind == AUTO and not is_radar_and_camera(*_ordered(pair, name)):
             return pair, MaskUsed(NONE, None, 1.0, "there is no radar image beside a camera's")
-        scene = _scene(pair, name, radius_m)
-        other = _scene(pair, INPUT if name == REFERENCE else REFERENCE, radius_m)
+        scene = scene_of(pair, name)
+        other = scene_of(pair, INPUT if name == REFERENCE else REFERENCE)
         kind = self.kind
         find = cache(lambda: self._ground(scene, other, progress.part(0.1, 0.7)))
         if kind == AUTO:
@@ -134,14 +130,13 @@ class MaskRequest:
         if kind == NONE:
             return pair, MaskUsed(NONE, None, 1.0, reason)
         select = self._selection(kind, scene, find, progress.part(0.7, 0.8))
-        used = MaskUsed(kind, name, 0.0, reason)
-        return _masked(pair, scene, select, used, stack, progress.part(0.8, 1.0))
+        pair, share = masked(pair, name, scene, select, stack, progress.part(0.8, 1.0))
+        return pair, MaskUsed(kind, name, share, reason)
 
     def ground(
         self,
         pair: ImagePair,
         used: MaskUsed,
-        radius_m: float | None,
         stack: ExitStack,
         progress: Progress,
     ) -> ImagePair | None:
@@ -156,7 +151,7 @@ class MaskRequest:
             The images, with the masks that the user gave.
         used
             The mask that was used.
-        radius_m, stack, progress
+        stack, progress
             See `apply`.
 
         Returns
@@ -170,10 +165,10 @@ class MaskRequest:
         name, _ = self._image(pair)
         if not is_radar_and_camera(*_ordered(pair, name)):
             return None
-        if not is_dense(bright_share(_scene(pair, name, radius_m), progress.part(0.0, 0.2))):
+        if not is_dense(bright_share(scene_of(pair, name), progress.part(0.0, 0.2))):
             return None
         regions_of = replace(self, kind=REGIONS, high_percent=None)
-        return regions_of.apply(pair, radius_m, stack, progress.part(0.2, 1.0))[0]
+        return regions_of.apply(pair, stack, progress.part(0.2, 1.0))[0]
 
     def _selection(
         self,
@@ -195,16 +190,16 @@ class MaskRequest:
         return find_ground(scene, self.width_m, high, progress, shade)
 
     def _by_layer(
-        self, pair: ImagePair, radius_m: float | None, stack: ExitStack, progress: Progress
+        self, pair: ImagePair, stack: ExitStack, progress: Progress
     ) -> tuple[ImagePair, MaskUsed]:
         """Return the pair with the vector layer's mask on the reference, which is in its place."""
         if self.kind not in (NONE, AUTO):
             raise ParameterError(f"give either mask={self.kind} or a mask layer")
         assert self.layer is not None
-        scene = _scene(pair, REFERENCE, radius_m)
+        scene = scene_of(pair, REFERENCE)
         select = read_layer(self.layer, scene, self.width_m).select
-        used = MaskUsed(LAYER, REFERENCE, 0.0, f"what {Path(self.layer).name} covers")
-        return _masked(pair, scene, select, used, stack, progress)
+        pair, share = masked(pair, REFERENCE, scene, select, stack, progress)
+        return pair, MaskUsed(LAYER, REFERENCE, share, f"what {Path(self.layer).name} covers")
 
     def _high(self, usual: float) -> float:
         return usual if self.high_percent is None else self.high_percent
@@ -235,30 +230,27 @@ def _middle(grid: Grid) -> Window:
     return Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
 
 
-def _masked(
+def masked(
     pair: ImagePair,
+    name: str,
     scene: Scene,
     select: Callable[[Window], Selection],
-    used: MaskUsed,
     stack: ExitStack,
     progress: Progress,
-) -> tuple[ImagePair, MaskUsed]:
-    """Return the pair with a mask, which is a file until the stack is closed, on one image."""
-    assert used.image is not None
+) -> tuple[ImagePair, float]:
+    """Return a pair with a mask on one image, and the share of it that takes part.
+
+    The mask is a file until the stack is closed.
+    """
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="groundtie-")))
     share = write_mask(scene, folder / "mask.tif", select, progress)
     mask = stack.enter_context(open_raster(folder / "mask.tif"))
-    image = replace(getattr(pair, used.image), mask=mask)
-    return replace(pair, **{used.image: image}), replace(used, share=share)
+    return replace(pair, **{name: replace(getattr(pair, name), mask=mask)}), share
 
 
-def _scene(pair: ImagePair, name: str, radius_m: float | None) -> Scene:
+def scene_of(pair: ImagePair, name: str) -> Scene:
     """Return one image of a pair on the matching lattice, as far as searches may reach."""
-    radius_m = default_radius_m(pair.grid) if radius_m is None else radius_m
-    reach = int(np.ceil(radius_m / pair.grid.pixel_size_m))
-    grid = pair.grid.window(
-        -reach, -reach, pair.grid.width + 2 * reach, pair.grid.height + 2 * reach
-    )
+    grid = pair.surroundings
 
     def read(window: Window) -> Patch:
         piece = grid.window(*window)

@@ -20,6 +20,7 @@ from ..rasters.reading import bounded_cache
 from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
 from ..similarity.surface import SimilaritySettings
+from .classifying import Classifying, PlainInputClassifier, ReferenceClassifier
 from .common import (
     Input,
     InputBand,
@@ -41,10 +42,7 @@ from .feature_parameters import (
     FreeSearchRotation,
     Gate,
     LargestRatio,
-    PlainInputClassifier,
-    ReferenceClassifier,
     Refinement,
-    classifiers,
     refinement_settings,
 )
 from .registered_output import RegisteredOutput, model_for_grid
@@ -180,7 +178,9 @@ def match_optical(
         pair = make_pair(there, here, matching_pixel_size, radius_m, turn)
         for note in pair.notes():
             progress.update(0.0, note)
-        local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings(similarity))
+        classifying = Classifying(reference_classifier, input_classifier)
+        shown = classifying.apply(pair, stack, progress.part(0.0, 0.1))
+        local = LocalSearch(shown, lay_out_chips(pair), SimilaritySettings(similarity))
         features = FeatureSearch(
             FeatureMatcher(
                 pair,
@@ -191,7 +191,7 @@ def match_optical(
                 ratio,
                 gate,
                 local.held_out,
-                refining=classifiers(reference_classifier, input_classifier),
+                None if shown is pair else shown,
             ),
             local,
             refinement_settings(refinement),
@@ -203,14 +203,14 @@ def match_optical(
         threads = worker_count(workers)
         with ThreadPoolExecutor(threads) as executor:
             result = register(
-                pair,
+                shown,
                 local,
                 rough,
                 kind,
                 max_error,
                 seed,
                 executor,
-                progress.part(0.0, 0.7),
+                progress.part(0.1, 0.7),
                 features,
             )
         registered = RegisteredOutput(output, output_grid, resampling)

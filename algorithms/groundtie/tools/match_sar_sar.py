@@ -28,6 +28,7 @@ from ..rasters.reading import bounded_cache
 from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
 from ..similarity.surface import SimilaritySettings
+from .classifying import Classifying, InputClassifier, ReferenceClassifier
 from .common import (
     HighPercent,
     Input,
@@ -52,11 +53,8 @@ from .feature_parameters import (
     FreeSearchRadius,
     FreeSearchRotation,
     Gate,
-    InputClassifier,
     LargestRatio,
-    ReferenceClassifier,
     Refinement,
-    classifiers,
     refinement_settings,
 )
 from .masking import Mask, MaskImage, MaskLayer, MaskRequest
@@ -202,10 +200,12 @@ def match_sar_sar(
             mask_width,
             mask_layer,
         )
-        ground, mask_used = request.apply(pair, radius_m, stack, progress.part(0.0, 0.1))
+        ground, mask_used = request.apply(pair, stack, progress.part(0.0, 0.1))
         if ground_mask is not None:
             shown = open_image(stack, reference, reference_band, ground_mask)
             ground = replace(pair, reference=shown)
+        classifying = Classifying(reference_classifier, input_classifier)
+        ground = classifying.apply(ground, stack, progress.part(0.1, 0.15))
         local = LocalSearch(ground, lay_out_chips(pair), SimilaritySettings(similarity))
         features = FeatureSearch(
             FeatureMatcher(
@@ -216,7 +216,6 @@ def match_sar_sar(
                 gate,
                 local.held_out,
                 None if ground is pair else ground,
-                classifiers(reference_classifier, input_classifier),
             ),
             local,
             refinement_settings(refinement),
@@ -235,7 +234,7 @@ def match_sar_sar(
                 max_error,
                 seed,
                 executor,
-                progress.part(0.1, 0.7),
+                progress.part(0.15, 0.7),
                 features,
             )
         result = refuse_what_leans(result, max_error, FEATURES_MEAN_OVER_SCATTER)

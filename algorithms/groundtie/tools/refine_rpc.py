@@ -25,6 +25,7 @@ from ..sensor.control_points import SUFFIXES, read_control_points
 from ..sensor.height_check import HeightCheck
 from ..sensor.rpc_fit import RPCFit
 from ..similarity.surface import SimilaritySettings
+from .classifying import Classifying, InputClassifier
 from .common import (
     ChipSize,
     HighPercent,
@@ -216,6 +217,7 @@ def refine_rpc(
     geoid: Geoid = None,
     rpc: RpcFile = None,
     image_band: ImageBand = None,
+    image_classifier: InputClassifier = None,
     reference_band: ReferenceBand = None,
     reference_mask: ReferenceMask = None,
     mask: MaskKind = NONE,
@@ -249,6 +251,7 @@ def refine_rpc(
         two_way_error,
         max_error,
         seed,
+        Classifying(None, image_classifier),
         image_band,
     )
     fitting = Fitting(model, blunders, largest_residual, max_error, seed)

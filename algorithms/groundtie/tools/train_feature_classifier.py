@@ -15,7 +15,7 @@ from ..features.classifier import KERNELS
 from ..features.classifier_training import left_out_accuracy, train_classifier
 from ..features.labels import LabelSource, labelled_points, layer_labels, raster_labels
 from ..features.optical import optical_detector
-from ..features.patch_statistics import STATISTICS
+from ..features.patch_statistics import BAND_RATIOS, STATISTICS
 from ..kinds import Band, Choice, FileOut, RasterIn, Text, VectorIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
@@ -72,7 +72,9 @@ def train_feature_classifier(
     ],
     output: Annotated[
         Path,
-        FileOut(label="Classifier", help="For match_optical.", suffixes=(".json",)),
+        FileOut(
+            label="Classifier", help="For the tools that register images.", suffixes=(".json",)
+        ),
     ],
     labels: Annotated[
         Path | None,
@@ -112,10 +114,11 @@ def train_feature_classifier(
         Choice(
             label="Statistics",
             help="What is looked at in the 41 × 41 pixels around a feature: mean and variance of "
-            "the grey values, or these with skewness, gradients and fine detail (texture).",
+            "the grey values, these with the shares of all bands in their sum (band-ratios: clouds "
+            "have no colour), or with skewness, gradients and fine detail (texture).",
             choices=tuple(STATISTICS),
         ),
-    ] = "mean-variance",
+    ] = BAND_RATIOS,
     band: Annotated[
         int | None,
         Band(
