@@ -193,7 +193,7 @@ def test_ci_runs_the_tests_then_the_demo(machine: Machine) -> None:
     machine.add("make", 'read -r line && exit 9; [ "$GROUNDTIE_REQUIRE_QGIS" = 1 ]')
     done = machine.run(".ci/run")
     assert done.returncode == 0, done.stderr
-    assert machine.calls("make") == ["make test", "make demo"]
+    assert machine.calls("make") == ["make test --jobs=2 --output-sync=target", "make demo"]
 
 
 @pytest.mark.parametrize(("failing", "ran"), [("test", 1), ("demo", 2)])
