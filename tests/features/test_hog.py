@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from speckled_pairs import whole
 from textured_pairs import texture
 
+from groundtie.features import hog
 from groundtie.features.hog import HogDescriptor
 from groundtie.features.points import FeaturePoints
 from groundtie.rasters.patch import Patch
@@ -66,6 +67,16 @@ def test_patches_of_one_size_lie_on_whole_pixels() -> None:
     values = image()
     _, found = HogDescriptor(scaled=False).describe(whole(values), points((101.4, 86.6, 5.0, 0)))
     np.testing.assert_allclose(found[0], directly(values, 101, 87, 9), atol=1e-4)
+
+
+def test_it_does_not_matter_in_which_band_of_rows_a_feature_lies() -> None:
+    values = image()
+    border = hog._BAND_ROWS
+    rows = (border + 1, 40, border, border - 1, SIDE - 30)
+    spots = points(*((60 + 10 * k, row, 2.0, 0) for k, row in enumerate(rows)))
+    _, found = HogDescriptor(scaled=False).describe(whole(values), spots)
+    for k, row in enumerate(rows):
+        np.testing.assert_allclose(found[k], directly(values, 60 + 10 * k, row, 9), atol=1e-4)
 
 
 def test_beyond_the_image_there_is_nothing() -> None:

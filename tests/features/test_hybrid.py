@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from affine import Affine
 from raster_files import write_raster
 from speckled_pairs import write_speckled_pair
 from textured_pairs import TexturedPair, error_px, pixels, shift_on_map
@@ -19,8 +20,9 @@ from groundtie.features.points import FeaturePoints
 from groundtie.features.tile_matching import FeatureMatcher, FeatureMatches
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.models import Model
+from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, ImagePair
-from groundtie.rasters.reading import open_raster
+from groundtie.rasters.reading import Window, open_raster
 from groundtie.search.layout import lay_out_chips
 from groundtie.search.local import LocalSearch
 from groundtie.similarity.surface import SimilaritySettings
@@ -167,6 +169,18 @@ def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.M
     assert abs(parts.found[0] - whole.found[0]) < 0.15 * whole.found[0]
     shared = places(whole) & places(parts)
     assert len(shared) > 0.6 * len(places(whole))
+
+
+def test_a_tile_sees_all_that_its_features_see_but_not_far_beyond_the_grid() -> None:
+    grid = Grid(Affine.identity(), None, 3000, 1200)
+    middle, last = Window(1024, 0, 1024, 1024), Window(2048, 1024, 952, 176)
+    far = 16 + tile_matching.MARGIN_PX
+    left, right, down = 1024 - far, 1024 + 2 * far, 1024 + 16 + far
+    assert tile_matching.seen_around(middle, grid, 16) == Window(left, -16, right, down)
+    # To 16 px beyond the last column and the last row.
+    assert tile_matching.seen_around(last, grid, 16) == Window(
+        2048 - far, 1024 - far, 952 + far + 16, 176 + far + 16
+    )
 
 
 def test_only_features_on_the_ground_are_matched(files: TexturedPair, tmp_path: Path) -> None:

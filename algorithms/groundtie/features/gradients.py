@@ -11,7 +11,6 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from ..speckle.isef import isef_along
 from .recursive_filters import average_after, average_before
@@ -108,6 +107,9 @@ def _two_passes(
     axis: int,
 ) -> FloatImage:
     """Return `sign`·(what the pixels before give) + (what the pixels after give), second order."""
+    # Late: few features need it, and this package takes long to import.
+    from scipy.signal import lfilter
+
     decay = np.exp(-_ALPHA)
     recursion = np.array([1, -2 * decay, decay**2], np.float32)
 

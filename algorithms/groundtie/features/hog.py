@@ -32,8 +32,12 @@ _SAMPLE_SCALES = 0.5
 
 _GRADIENT = "differences"
 
-# So many features are described at a time: their patches fit into the last cache.
+_REACH_PX = PATCH_PX // 2
+
+# So many features are described at a time: their patches fit into the last cache. Directions are
+# spread for so many rows of them at a time: what a band needs is soon used again, and found there.
 _BLOCK = 64
+_BAND_ROWS = 128
 
 
 @dataclass(frozen=True)
@@ -106,36 +110,62 @@ class HogDescriptor:
 
     def _described_upright(self, fields: Gradient, points: FeaturePoints) -> FloatImage:
         """Return the descriptors of features whose patches are of whole pixels."""
-        along_cols, along_rows = fields
-        strength, angle = np.hypot(along_cols, along_rows), np.arctan2(along_rows, along_cols)
-        reach = PATCH_PX // 2
-        height, width = strength.shape
-        spread = np.zeros((height + 2 * reach, width + 2 * reach, self.directions), np.float32)
-        for number, share in enumerate(self._shares(strength, angle)):
-            spread[reach:-reach, reach:-reach, number] = share
+        height, width = fields[0].shape
         cols, rows = np.rint(points.position_px).astype(np.intp).T
         cols, rows = np.clip(cols, 0, width - 1), np.clip(rows, 0, height - 1)
+        values = np.empty((len(points), CELLS, CELLS, self.directions), np.float32)
+        for first in range(0, height, _BAND_ROWS):
+            own = np.nonzero((rows >= first) & (rows < first + _BAND_ROWS))[0]
+            if len(own) == 0:
+                continue
+            band = self._band(fields, first)
+            for start in range(0, len(own), _BLOCK):
+                block = own[start : start + _BLOCK]
+                values[block] = self._in_cells(band, cols[block], rows[block] - first)
+        return unit_rows(values.reshape(len(points), self.length))
+
+    def _band(self, fields: Gradient, first: int) -> FloatImage:
+        """Return the share of all directions at the pixels that patches of a band of rows have.
+
+        Shape (rows, columns, directions); patches reach beyond the image, where there is nothing.
+        """
+        height, width = fields[0].shape
+        top, stop = max(first - _REACH_PX, 0), min(first + _BAND_ROWS + _REACH_PX, height)
+        along_cols, along_rows = (field[top:stop] for field in fields)
+        strength = np.sqrt(along_cols * along_cols + along_rows * along_rows)
+        shape = _BAND_ROWS + 2 * _REACH_PX, width + 2 * _REACH_PX, self.directions
+        band = np.zeros(shape, np.float32)
+        inside = band[top - first + _REACH_PX :][: stop - top, _REACH_PX:-_REACH_PX]
+        shares = self._shares(strength, np.arctan2(along_rows, along_cols))
+        for number, share in enumerate(shares):
+            inside[..., number] = share
+        return band
+
+    def _in_cells(
+        self, band: FloatImage, cols: NDArray[np.intp], rows: NDArray[np.intp]
+    ) -> FloatImage:
+        """Return what the cells of patches in a band hold, shape (n, 3, 3, directions)."""
         # A patch's row is a row of all directions of its pixels, side by side.
         length = PATCH_PX * self.directions
-        patch_rows = sliding_window_view(spread.reshape(len(spread), -1), length, axis=1)
+        patch_rows = sliding_window_view(band.reshape(len(band), -1), length, axis=1)
+        down = rows[:, None] + np.arange(PATCH_PX)
+        patches = patch_rows[down, cols[:, None] * self.directions]
         weights = _weights_along()
-        values = np.empty((len(points), CELLS, CELLS, self.directions), np.float32)
-        for start in range(0, len(points), _BLOCK):
-            block = slice(start, start + _BLOCK)
-            down = rows[block, None] + np.arange(PATCH_PX)
-            patches = patch_rows[down, cols[block, None] * self.directions]
-            in_rows = (weights.T @ patches).reshape(-1, CELLS, PATCH_PX, self.directions)
-            values[block] = weights.T @ in_rows
-        return unit_rows(values.reshape(len(points), self.length))
+        in_rows = (weights.T @ patches).reshape(-1, CELLS, PATCH_PX, self.directions)
+        return np.asarray(weights.T @ in_rows)
 
     def _shares(self, strength: FloatImage, angle: FloatImage) -> Iterator[FloatImage]:
         """Return, direction by direction, the share that gradients have in it."""
-        place = angle * np.float32(self.directions / np.pi)
-        half = np.float32(self.directions / 2)
+        count = np.float32(self.directions)
+        place = angle * (count / np.float32(np.pi))
+        # Opposite directions are the same: from the first one to where it comes again.
+        place -= count * np.floor(place / count)
         for number in range(self.directions):
             # Neighbouring directions share what lies between them.
-            away = np.abs((place - number + half) % self.directions - half)
-            share = np.maximum(1 - away, 0)
+            away = np.abs(place - np.float32(number))
+            if number == 0:
+                np.minimum(away, count - place, out=away)
+            share = np.maximum(1 - away, 0, out=away)
             share *= strength
             yield share
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 FloatImage = NDArray[np.float32]
 
@@ -24,6 +23,9 @@ def average_before(image: FloatImage, decay: float, axis: int) -> FloatImage:
     axis
         0: along rows, 1: along columns.
     """
+    # Late: few features need it, and this package takes long to import.
+    from scipy.signal import lfilter
+
     first = np.take(image, [0], axis=axis)
     numerator, denominator = (np.array(c, image.dtype) for c in ([1 - decay], [1, -decay]))
     start = first * image.dtype.type(decay)

@@ -136,10 +136,10 @@ class FeatureMatcher:
         return FeatureMatches.concatenate(parts)
 
     def _match_tile(self, tile: Window, coarse: Model) -> FeatureMatches:
-        margin = MARGIN_PX + int(np.ceil(self.gate_px))
-        corner = tile.col - margin, tile.row - margin
-        size = tile.width + 2 * margin, tile.height + 2 * margin
-        piece = self.pair.grid.window(*corner, *size)
+        gate = int(np.ceil(self.gate_px))
+        area = seen_around(tile, self.pair.grid, gate)
+        corner = area.col, area.row
+        piece = self.pair.grid.window(*area)
         hidden = None if self.held_out is None else self.held_out(piece)
         reference = self.pair.reference_patch(piece, hidden)
 
@@ -150,9 +150,7 @@ class FeatureMatcher:
         if hidden is not None:
             # Where a descriptor sees less of the one image, it sees as little of the other.
             input = Patch(input.values, input.valid & ~hidden)
-        core = Window(margin, margin, tile.width, tile.height)
-        gate = margin - MARGIN_PX
-        around = Window(MARGIN_PX, MARGIN_PX, tile.width + 2 * gate, tile.height + 2 * gate)
+        core = Window(tile.col - area.col, tile.row - area.row, tile.width, tile.height)
         parts: tuple[Mask | None, Mask | None] = None, None
         if self.shown is not None:
             parts = (
@@ -160,7 +158,7 @@ class FeatureMatcher:
                 self.shown.input_patch(piece, claimed).valid,
             )
         own = self._features(reference, core, parts[0])
-        others = self._features(input, around, parts[1])
+        others = self._features(input, widened(core, gate), parts[1])
         points, descriptors = self.descriptor.describe(reference, own)
         partners, partner_descriptors = self.descriptor.describe(input, others)
         matches = match_near(
@@ -188,6 +186,24 @@ class FeatureMatcher:
 def standing_in(found: FeaturePoints, part: Mask) -> FeaturePoints:
     """Return the features that stand in a part of an image, shape (h, w)."""
     return found.take(seen_whole(found, part, _STANDING_SCALES))
+
+
+def widened(window: Window, margin: int) -> Window:
+    """Return a window with a margin on each side."""
+    size = window.width + 2 * margin, window.height + 2 * margin
+    return Window(window.col - margin, window.row - margin, *size)
+
+
+def seen_around(tile: Window, grid: Grid, gate: int) -> Window:
+    """Return what is read for a tile: where partners may lie, and what these see within the grid.
+
+    Further beyond the grid mostly nothing is valid, and all that is done there is done in vain.
+    """
+    seen = widened(tile, gate + MARGIN_PX)
+    most = widened(Window(0, 0, grid.width, grid.height), gate)
+    low = np.maximum(seen[:2], most[:2])
+    high = np.minimum(np.add(seen[:2], seen[2:]), np.add(most[:2], most[2:]))
+    return Window(*low.tolist(), *(high - low).tolist())
 
 
 def inside(px: FloatArray, window: Window) -> Mask:
