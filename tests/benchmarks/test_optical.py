@@ -25,8 +25,9 @@ from benchmarks.cloudy_rates import (
     LabelCase,
     for_others,
 )
+from benchmarks.cloudy_registrations import CloudyRegistration
 from benchmarks.match_rates import METHODS, ClearCase, MatchRate
-from benchmarks.optical import cloud_table, goals, mean_table, pair_table
+from benchmarks.optical import cloud_table, clouded_goal, goals, mean_table, pair_table
 from benchmarks.optical_registrations import FREE_CROSSING, FreeCrossing, crossings
 from benchmarks.optical_speed import REGISTRATION, SURF, Timing, timing_goals, timing_table
 from benchmarks.rotated_pairs import RotatedCase
@@ -79,6 +80,15 @@ def test_points_for_a_pair_are_those_of_all_others(case: RealCase) -> None:
     chosen = for_others(labels, "b")
     assert len(chosen.kept) == 2 * len(one.kept)
     assert one.kept.any() and not one.kept.all()
+
+
+@pytest.mark.parametrize("classified", [False, True])
+def test_an_image_under_clouds_is_registered_or_refused(case: RealCase, classified: bool) -> None:
+    found = CloudyRegistration(case, "match_optical", classified).run(1)
+    assert found.verdict in (CORRECT, REFUSED)
+    assert found.group == f"match_optical, {'classifier' if classified else 'no classifier'}"
+    assert clouded_goal([found]).reached
+    assert not clouded_goal(outcomes({CORRECT: 3, SILENTLY_WRONG: 1})).reached
 
 
 def test_images_of_different_places_are_refused(case: RealCase, tmp_path: Path) -> None:

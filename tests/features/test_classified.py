@@ -27,13 +27,15 @@ def classified(tmp_path: Path) -> ClassifiedScene:
     path = write_raster(tmp_path / "a.tif", values.astype(np.uint16), utm_grid(WIDTH, HEIGHT))
     with open_raster(write_raster(path, values.astype(np.uint16), nodata=0)) as source:
         scene = Scene.of(source)
-    classifier = read_classifier(bright_is_left_out(tmp_path / "c.json", 1500))
+    classifier = read_classifier(bright_is_left_out(tmp_path / "c.json", 1250))
     return ClassifiedScene(scene, lambda window: np.zeros((0, 1, 1), np.float32), classifier)
 
 
-def test_pixels_are_told_by_what_their_surroundings_are_like(classified: ClassifiedScene) -> None:
+def test_what_is_bright_is_masked_and_what_lies_beside_it_is_not(
+    classified: ClassifiedScene,
+) -> None:
     part, valid = classified.select(Window(0, 0, WIDTH, HEIGHT))
-    # Where a patch shows as much of the one as of the other, to a cell.
+    # To a cell: patches of which a quarter is bright are left out, and lie 10 px beside it.
     assert part[30:, : BORDER - 8].all()
     assert not part[:, BORDER + 8 :].any()
     assert not valid[:20, :20].any()

@@ -343,7 +343,7 @@ def test_what_a_classifier_leaves_out_takes_no_part(textured: TexturedPair, tmp_
         return shown
 
     pair = rewritten(textured, tmp_path, input=clouded)
-    classifier = bright_is_left_out(tmp_path / "c.json", 3600)
+    classifier = bright_is_left_out(tmp_path / "c.json", 3300)
     result = registered(pair, tmp_path, input_classifier=classifier, model="affine")
     assert error_px(result.transform, textured) < 0.3
     # A third of a chip's pixels may lie where nothing takes part.

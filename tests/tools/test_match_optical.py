@@ -139,10 +139,8 @@ def test_an_image_that_is_turned_is_classified_all_over(tmp_path: Path) -> None:
     ]
     nothing = bright_is_left_out(tmp_path / "c.json", 60_000)
     found = match_optical(*plain, tmp_path / "out.tif", input_classifier=nothing)
-    without = match_optical(*plain, tmp_path / "out.tif")
     used = found.points.input_px[found.points.used]
     assert (np.ptp(used, axis=0) > 0.7 * np.array(values.shape[::-1])).all()
-    assert len(found.points) > 0.9 * len(without.points)
 
 
 def test_a_classifier_of_other_bands_is_refused(files: TexturedPair, tmp_path: Path) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from ..masks.scene import Scene, Selection
-from ..rasters.reading import Window
+from ..rasters.reading import Mask, Window
 from .classifier import FeatureClassifier
 from .patch_statistics import NO_BANDS, PATCH_PX, FloatImage
 
@@ -16,6 +17,10 @@ from .patch_statistics import NO_BANDS, PATCH_PX, FloatImage
 _CELL_PX = 8
 
 _MARGIN_PX = PATCH_PX // 2
+
+# A patch is left out if a quarter of it is to be, which it is so far beside: what is masked is
+# drawn back by this.
+_BACK_PX = PATCH_PX // 4
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,18 @@ class ClassifiedScene:
 
     def select(self, window: Window) -> Selection:
         """Return which pixels of a window take part, the same whatever the window."""
+        back = _BACK_PX
+        col, row, width, height = window
+        around = Window(col - back, row - back, width + 2 * back, height + 2 * back)
+        kept, shown = self._kept(around)
+        # Nothing is drawn back from where the image ends.
+        masked = (~(kept & shown)).astype(np.uint8)
+        core = cv2.erode(masked, np.ones((2 * back + 1,) * 2, np.uint8))
+        inside = slice(back, back + height), slice(back, back + width)
+        return Selection((core == 0)[inside] & shown[inside], shown[inside])
+
+    def _kept(self, window: Window) -> tuple[Mask, Mask]:
+        """Return which pixels' surroundings the classifier keeps, and which are valid."""
         col, row = (at - at % _CELL_PX for at in window[:2])
         across, down = (
             -(-(at + size - first) // _CELL_PX)
@@ -56,6 +73,6 @@ class ClassifiedScene:
         kept = self.classifier.keep(patch, middles, bands).reshape(down, across)
         pixels = kept.repeat(_CELL_PX, axis=0).repeat(_CELL_PX, axis=1)
         inside = slice(window.row - row, None), slice(window.col - col, None)
-        part = pixels[inside][: window.height, : window.width]
-        shown = patch.valid[_MARGIN_PX:, _MARGIN_PX:][inside][: window.height, : window.width]
-        return Selection(part & shown, shown)
+        shown = patch.valid[_MARGIN_PX:, _MARGIN_PX:]
+        size = slice(window.height), slice(window.width)
+        return pixels[inside][size], shown[inside][size]
