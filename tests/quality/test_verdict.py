@@ -89,6 +89,15 @@ def test_right_points_are_accepted_and_their_error_measured(sigma: float, wrong:
     assert verdict.extrapolated_share < 0.2
 
 
+@pytest.mark.parametrize(("right", "clear"), [(26, True), (22, False)])
+def test_of_a_clear_verdict_two_check_points_of_three_agree(right: int, clear: bool) -> None:
+    """Of 36."""
+    verdict = judged(check_points(np.concatenate([scatter(right, 0.4), fallen(36 - right)])))
+    assert verdict.accepted
+    assert verdict.check_points_agreeing == pytest.approx(right, abs=1)
+    assert verdict.is_clear == clear
+
+
 def test_ce90_holds_ninety_percent_of_the_errors() -> None:
     errors = scatter(4000, 0.8)
     verdict = judged(check_points(errors))

@@ -25,6 +25,7 @@ from groundtie.tools.registration import (
     RegistrationFiles,
     RegistrationResult,
     accepted_or_refused,
+    refuse_what_roofs_may_be,
     register,
 )
 
@@ -167,3 +168,25 @@ def test_a_result_is_lines_for_people_and_json_for_programs(registration: Regist
     assert lines[-1] == "output: out.tif"
     # 10 m pixels, as both units say.
     assert f"RMSE {verdict.check_rmse_px:.2f} px ({10 * verdict.check_rmse_px:.2f} m)" in lines[2]
+
+
+@pytest.mark.parametrize(
+    ("agreeing", "is_town", "accepted"),
+    [(11, True, False), (11, False, True), (18, True, True)],
+)
+def test_few_who_agree_are_not_enough_where_roofs_may(
+    registration: Registration, agreeing: int, is_town: bool, accepted: bool
+) -> None:
+    verdict = replace(registration.verdict, check_points=25, check_points_agreeing=agreeing)
+    judged = refuse_what_roofs_may_be(replace(registration, verdict=verdict), lambda: is_town)
+    assert judged.verdict.accepted == accepted
+    assert accepted or "only 11 of 25 check points agree" in judged.verdict.reason
+
+
+def test_a_town_is_looked_for_only_where_it_matters(registration: Registration) -> None:
+    def look() -> bool:
+        raise AssertionError("both images would be read for nothing")
+
+    many = replace(registration.verdict, check_points=25, check_points_agreeing=24)
+    for judged in (replace(registration, verdict=many), refused(registration)):
+        assert refuse_what_roofs_may_be(judged, look) is judged

@@ -31,6 +31,10 @@ _SIGMA_BEYOND = 1.5
 _FEWEST_CHECK_POINTS = 3
 _SMALLEST_SHARE = 0.25
 
+# From this share on, more agree than roofs alone do. Measured where a dense town was matched whole
+# and a wrong registration accepted: 28 to 56 %; on other scenes as bright: from 72 %.
+_CLEAR_SHARE = 2 / 3
+
 # Check points that agree on another transform within this distance make it a rival, if they are
 # more by so many and by this factor.
 _RIVAL_TOLERANCE_PX = 3.0
@@ -87,6 +91,11 @@ class Verdict:
     def points(self) -> int:
         """How many points the registration rests on: used in the fit, or agreeing with it."""
         return self.fit_points_used + self.check_points_agreeing
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether more check points agree than roofs of a dense town do among themselves."""
+        return self.check_points_agreeing >= _CLEAR_SHARE * self.check_points
 
     @property
     def chance(self) -> float:

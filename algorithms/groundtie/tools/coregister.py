@@ -51,6 +51,7 @@ from .registration import (
     deliver,
     open_image,
     refuse_what_leans,
+    refuse_what_roofs_may_be,
     register,
     rough_search,
     turn_within,
@@ -238,6 +239,10 @@ def coregister(
             )
         if are_both_radar(pair.reference, pair.input):
             result = refuse_what_leans(result, max_error, CHIPS_MEAN_OVER_SCATTER)
+        if ground is None:
+            result = refuse_what_roofs_may_be(
+                result, lambda: request.may_hide_a_town(pair, mask_used, search_radius, SILENT)
+            )
         registered = RegisteredOutput(output, output_grid, resampling)
         return deliver(
             result,

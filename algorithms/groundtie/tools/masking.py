@@ -25,9 +25,10 @@ from ..masks.choice import (
     bright_share,
     choose,
     is_dense,
+    is_perhaps_dense,
 )
 from ..masks.layer import read_layer
-from ..masks.radar import is_radar_and_camera, is_rather_radar
+from ..masks.radar import are_both_radar, is_radar_and_camera, is_rather_radar
 from ..masks.regions import GroundRegions, find_ground
 from ..masks.scene import Scene, Selection, write_mask
 from ..masks.shade import shade_azimuth_deg
@@ -58,7 +59,7 @@ MaskImage = Annotated[
     str,
     Choice(
         label="Image that is masked",
-        help="By default the radar's, told by its metadata or its speckle.",
+        help="The radar's; by default it is told by its metadata or its speckle.",
         choices=MASK_IMAGES,
         advanced=True,
     ),
@@ -119,7 +120,7 @@ class MaskRequest:
         if self.kind == NONE:
             return pair, MaskUsed(NONE, None, 1.0, "as asked for")
         name, reason = self._image(pair)
-        if self.kind == AUTO and not is_radar_and_camera(*_ordered(pair, name)):
+        if self.kind == AUTO and not self._is_radar_beside_camera(pair, name):
             return pair, MaskUsed(NONE, None, 1.0, "there is no radar image beside a camera's")
         scene = scene_of(pair, name)
         other = scene_of(pair, INPUT if name == REFERENCE else REFERENCE)
@@ -163,12 +164,43 @@ class MaskRequest:
         if used.kind in (REGIONS, LAYER) or (self.kind, used.kind) == (AUTO, NONE):
             return None
         name, _ = self._image(pair)
-        if not is_radar_and_camera(*_ordered(pair, name)):
+        if not self._is_radar_beside_camera(pair, name):
             return None
         if not is_dense(bright_share(scene_of(pair, name), progress.part(0.0, 0.2))):
             return None
         regions_of = replace(self, kind=REGIONS, high_percent=None)
         return regions_of.apply(pair, stack, progress.part(0.2, 1.0))[0]
+
+    def may_hide_a_town(
+        self, pair: ImagePair, used: MaskUsed, radius_m: float | None, progress: Progress
+    ) -> bool:
+        """Tell whether a dense town may have been matched whole, if its ground does not judge.
+
+        Without its speckle a radar image is not told from a camera's, and shines less. But it
+        still shines.
+
+        Parameters
+        ----------
+        pair
+            The images, with the masks that the user gave.
+        used
+            The mask that was used.
+        radius_m
+            See `apply`.
+        progress
+            Is told of every step.
+        """
+        if used.kind in (REGIONS, LAYER) or are_both_radar(pair.reference, pair.input):
+            return False
+        name, _ = self._image(pair)
+        names = (name,) if self._is_radar_beside_camera(pair, name) else (REFERENCE, INPUT)
+        return any(
+            is_perhaps_dense(bright_share(_scene(pair, one, radius_m), progress)) for one in names
+        )
+
+    def _is_radar_beside_camera(self, pair: ImagePair, name: str) -> bool:
+        # Whoever names the image knows.
+        return self.image != AUTO or is_radar_and_camera(*_ordered(pair, name))
 
     def _selection(
         self,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -222,6 +222,29 @@ def refuse_what_leans(
         return registration
     refused = replace(registration.verdict, accepted=False, reason=reason)
     return replace(registration, verdict=refused)
+
+
+def refuse_what_roofs_may_be(
+    registration: Registration, may_hide_a_town: Callable[[], bool]
+) -> Registration:
+    """Return a registration, refused if so few check points agree as roofs of a dense town do.
+
+    Parameters
+    ----------
+    registration
+        The registration.
+    may_hide_a_town
+        Tells whether there may be one; asked only where few agree.
+    """
+    verdict = registration.verdict
+    if not verdict.accepted or verdict.is_clear or not may_hide_a_town():
+        return registration
+    reason = (
+        f"only {verdict.check_points_agreeing} of {verdict.check_points} check points agree, as "
+        "roofs may, and an image shines like a radar's of a dense town: if it is one, give "
+        "mask=regions and mask_image"
+    )
+    return replace(registration, verdict=replace(verdict, accepted=False, reason=reason))
 
 
 @dataclass(frozen=True)
