@@ -7,6 +7,7 @@ import pytest
 import rasterio
 from raster_files import write_raster
 
+from groundtie.errors import BandError
 from groundtie.rasters.radar_tags import SPECKLE_FILTER, is_known_radar, with_speckle_filter
 from groundtie.rasters.reading import open_raster
 from groundtie.rasters.writing import create_like
@@ -40,6 +41,8 @@ def test_polarisation_is_of_the_bands_that_are_matched(tmp_path: Path, tag: str)
         assert is_known_radar(source, 1) and is_known_radar(source, 2)
         assert not is_known_radar(source, 3)
         assert not is_known_radar(source)
+        with pytest.raises(BandError, match="no band 4"):
+            is_known_radar(source, 4)
     with open_raster(tagged(tmp_path / "b.tif", "HH", "HV", tag=tag)) as source:
         assert is_known_radar(source)
 

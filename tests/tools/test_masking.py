@@ -75,7 +75,7 @@ def test_what_shines_may_be_a_town(
     expected: bool,
 ) -> None:
     images = pair(reference, input)
-    assert request().may_hide_a_town(images, NO_MASK, None, SILENT) == expected
+    assert request().may_hide_a_town(images, NO_MASK) == expected
 
 
 @pytest.mark.parametrize("kind", ["regions", "layer"])
@@ -83,18 +83,18 @@ def test_a_town_whose_ground_was_matched_hides_nothing(
     pair: Callable[[np.ndarray, np.ndarray], ImagePair], kind: str
 ) -> None:
     used = MaskUsed(kind, "reference", 0.2, "as asked for")
-    assert not request().may_hide_a_town(pair(CALM_TOWN, CALM), used, None, SILENT)
+    assert not request().may_hide_a_town(pair(CALM_TOWN, CALM), used)
 
 
 def test_whoever_names_the_radar_image_is_believed(
     pair: Callable[[np.ndarray, np.ndarray], ImagePair],
 ) -> None:
     images = pair(CALM_TOWN, CALM)
-    assert not request(image="input").may_hide_a_town(images, NO_MASK, None, SILENT)
+    assert not request(image="input").may_hide_a_town(images, NO_MASK)
     with ExitStack() as stack:
-        _, used = request().apply(images, None, stack, SILENT)
+        _, used = request().apply(images, stack, SILENT)
         assert (used.kind, used.reason) == ("none", NO_MASK.reason)
-        _, used = request(image="reference").apply(images, None, stack, SILENT)
+        _, used = request(image="reference").apply(images, stack, SILENT)
         assert (used.kind, used.image) in (("threshold", "reference"), ("regions", "reference"))
-        _, used = request(image="input").apply(images, None, stack, SILENT)
+        _, used = request(image="input").apply(images, stack, SILENT)
         assert used.kind == "none" and "too few buildings" in used.reason

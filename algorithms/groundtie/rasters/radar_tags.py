@@ -36,11 +36,16 @@ def is_known_radar(source: RasterSource, band: int | None = None) -> bool:
         True if the pixels are complex, or the speckle was filtered, or the bands have the
         polarisation of waves that were sent and received. False says nothing: most tools keep
         no such tags.
+
+    Raises
+    ------
+    BandError
+        There is no such band.
     """
     if source.is_complex or SPECKLE_FILTER in source.tags.get("", {}):
         return True
     numbers = source.image_bands if band is None else (band,)
-    return all(_has_polarisation(source.bands[number - 1]) for number in numbers)
+    return all(_has_polarisation(source.band_info(number)) for number in numbers)
 
 
 def _has_polarisation(band: BandInfo) -> bool:

@@ -241,7 +241,7 @@ def coregister(
             result = refuse_what_leans(result, max_error, CHIPS_MEAN_OVER_SCATTER)
         if ground is None:
             result = refuse_what_roofs_may_be(
-                result, lambda: request.may_hide_a_town(pair, mask_used, search_radius, SILENT)
+                result, lambda: request.may_hide_a_town(pair, mask_used)
             )
         registered = RegisteredOutput(output, output_grid, resampling)
         return deliver(

@@ -171,9 +171,7 @@ class MaskRequest:
         regions_of = replace(self, kind=REGIONS, high_percent=None)
         return regions_of.apply(pair, stack, progress.part(0.2, 1.0))[0]
 
-    def may_hide_a_town(
-        self, pair: ImagePair, used: MaskUsed, radius_m: float | None, progress: Progress
-    ) -> bool:
+    def may_hide_a_town(self, pair: ImagePair, used: MaskUsed) -> bool:
         """Tell whether a dense town may have been matched whole, if its ground does not judge.
 
         Without its speckle a radar image is not told from a camera's, and shines less. But it
@@ -185,18 +183,12 @@ class MaskRequest:
             The images, with the masks that the user gave.
         used
             The mask that was used.
-        radius_m
-            See `apply`.
-        progress
-            Is told of every step.
         """
         if used.kind in (REGIONS, LAYER) or are_both_radar(pair.reference, pair.input):
             return False
         name, _ = self._image(pair)
         names = (name,) if self._is_radar_beside_camera(pair, name) else (REFERENCE, INPUT)
-        return any(
-            is_perhaps_dense(bright_share(_scene(pair, one, radius_m), progress)) for one in names
-        )
+        return any(is_perhaps_dense(bright_share(scene_of(pair, one))) for one in names)
 
     def _is_radar_beside_camera(self, pair: ImagePair, name: str) -> bool:
         # Whoever names the image knows.
