@@ -43,7 +43,6 @@ def estimate_of(
     kind: str = "auto",
     refinement: SimilaritySettings | None = None,
     coarse: Model = ROUGH,
-    everywhere: bool = False,
     **matcher: object,
 ) -> Estimate:
     local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("fused"))
@@ -51,7 +50,6 @@ def estimate_of(
         FeatureMatcher(pair, held_out=local.held_out, **matcher),  # type: ignore[arg-type]
         local,
         refinement,
-        everywhere=everywhere,
     )
     with ThreadPoolExecutor(2) as executor:
         return features.estimate(coarse, kind, 0, executor)
@@ -218,23 +216,20 @@ def test_another_place_has_too_few_matches_that_agree(tmp_path: Path) -> None:
     assert found.points.used.sum() < 12
 
 
-def test_chips_between_the_features_take_part_if_they_are_to(files: TexturedPair) -> None:
+def test_chips_between_the_features_take_part(files: TexturedPair) -> None:
     with files.opened() as pair:
         few = Detector(contrast=0.12)
-        alone, everywhere = (
-            estimate_of(pair, "affine", NMI, everywhere=every, detector=few)
-            for every in (False, True)
+        alone, refined = (
+            estimate_of(pair, "affine", refinement, detector=few) for refinement in (None, NMI)
         )
-    assert len(everywhere.points) > 1.5 * len(alone.points)
-    assert error_px(everywhere.transform, files) < 0.4
+    assert len(refined.points) > 1.5 * len(alone.points)
+    assert error_px(refined.transform, files) < 0.4
 
 
 def test_chips_alone_do_where_there_are_no_features(files: TexturedPair) -> None:
     none = Detector(contrast=0.9)
     with files.opened() as pair:
         with pytest.raises(TooFewPointsError):
-            estimate_of(pair, refinement=NMI, detector=none)
-        with pytest.raises(TooFewPointsError):
-            estimate_of(pair, everywhere=True, detector=none)
-        found = estimate_of(pair, refinement=NMI, everywhere=True, detector=none)
+            estimate_of(pair, detector=none)
+        found = estimate_of(pair, refinement=NMI, detector=none)
     assert error_px(found.transform, files) < 0.4

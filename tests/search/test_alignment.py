@@ -11,6 +11,7 @@ from groundtie.geometry.models import DEGREE, Frame, Model
 from groundtie.rasters.grid import apply_affine
 from groundtie.search.alignment import (
     CANDIDATES,
+    LINEAR_CANDIDATES,
     _cubic_weights,
     _fields,
     _model,
@@ -101,6 +102,14 @@ def test_the_simplest_model_that_fits_is_chosen(kind: str, seed: int) -> None:
     assert chosen.model.kind == kind
     assert error_px(chosen.model, kind) < 0.1
     assert set(chosen.left_out_score) == set(CANDIDATES)
+
+
+def test_nothing_is_chosen_but_candidates() -> None:
+    px, prior = centres(), PRIORS[0]
+    bent = surfaces_of("polynomial2", px, prior, 0)
+    chosen = choose_alignment(px, bent, prior, identity(), LINEAR_CANDIDATES)
+    assert set(chosen.left_out_score) == {"translation", "similarity", "affine"}
+    assert chosen.model.kind in chosen.left_out_score
 
 
 def test_left_out_similarity_is_that_of_the_right_chips() -> None:

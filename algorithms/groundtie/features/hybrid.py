@@ -77,20 +77,13 @@ class FeatureSearch:
     local
         Knows the grid and what is held out.
     refinement
-        Similarity by which chips refine the matches; None: they stay where they were found.
-    first_kind
-        Kind of the model around which chips refine; a simple one needs few right matches. None:
-        as asked for.
-    everywhere
-        Whether chips between the matches are refined with them; and, where too few match, chips
-        alone are.
+        Similarity by which chips refine the matches, and others between them; where too few match,
+        chips alone are taken. None: matches stay where they were found.
     """
 
     matcher: FeatureMatcher
     local: LocalSearch
     refinement: SimilaritySettings | None = None
-    first_kind: str | None = None
-    everywhere: bool = False
 
     def estimate(
         self, coarse: Model, kind: str, seed: int, executor: Executor, progress: Progress = SILENT
@@ -120,7 +113,7 @@ class FeatureSearch:
         try:
             places, fit = self._match(coarse, kind, seed, executor, progress.part(0.0, 0.7))
         except TooFewPointsError:
-            if self.refinement is None or not self.everywhere:
+            if self.refinement is None:
                 raise
             # What "auto" chooses among chips may bend more than matches of features may.
             chips_kind = "affine" if kind == AUTO else kind
@@ -140,8 +133,7 @@ class FeatureSearch:
         kept = best_of_cells(matches.reference.position_px, score, _CELL_PX, _PER_CELL)
         px, partner_px = matches.reference.position_px[kept], matches.input.position_px[kept]
         places = _Places(px, partner_px, score[kept], area)
-        first_kind = None if self.refinement is None else self.first_kind
-        fit = self._fit(first_kind or kind, places, coarse, seed)
+        fit = self._fit(kind, places, coarse, seed)
         require_no_rival(px, partner_px, self.local.prior(coarse), fit.model, area)
         return places, fit
 
@@ -195,9 +187,8 @@ class FeatureSearch:
             coarse = self.local.on_map(fit_model("affine", px, first(px)))
             side = float(np.ptp(matches.px, axis=0).max()) / _CHIP_CELLS
             picked = px[best_of_cells(px, score, side, 1)]
-            if self.everywhere:
-                between = far_from(picked, self.local.layout.fit_centres, side)
-                picked = np.concatenate([picked, between])
+            between = far_from(picked, self.local.layout.fit_centres, side)
+            picked = np.concatenate([picked, between])
             reach = _CHIP_SIGMAS * jackknife_spread(fit.fold_models, picked)
             reach = np.clip(np.ceil(reach), *_CHIP_RADIUS_PX)
             radius = int(np.quantile(reach, 0.9))

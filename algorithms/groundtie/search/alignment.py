@@ -7,7 +7,7 @@ with the largest sum of similarities is sought.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -33,6 +33,7 @@ _STEPS = 60
 
 # From simple to flexible, those that "auto" chooses from; see `choose_alignment`.
 CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3")
+LINEAR_CANDIDATES = CANDIDATES[:3]
 
 # Chips for each parameter below which a model is not considered.
 _CHIPS_PER_PARAMETER = 2
@@ -128,18 +129,23 @@ def align(
 
 
 def choose_alignment(
-    px: NDArray[np.int_], surfaces: Surfaces, prior: Affine, start: Positions
+    px: NDArray[np.int_],
+    surfaces: Surfaces,
+    prior: Affine,
+    start: Positions,
+    candidates: Sequence[str] = CANDIDATES,
 ) -> Alignment:
     """Fit the simplest polynomial model that the surfaces justify.
 
     A more flexible model is taken only if it raises the similarity at chips that were left out
-    of its fit by more standard errors than `_STANDARD_ERRORS` asks for. Parameters as `align`.
+    of its fit by more standard errors than `_STANDARD_ERRORS` asks for. Parameters as `align`, and
+    the candidates, from simple to flexible.
     """
     fields = _fields(px, surfaces, prior)
-    chosen = _align(CANDIDATES[0], fields, start)
+    chosen = _align(candidates[0], fields, start)
     kept = _left_out_scores(fields[-1], chosen)
     scores = chosen.left_out_score
-    for kind in CANDIDATES[1:]:
+    for kind in candidates[1:]:
         if len(px) < _CHIPS_PER_PARAMETER * PARAMETERS[kind]:
             break
         tried = _align(kind, fields, start)

@@ -21,7 +21,7 @@ from ..rasters.kernels import REACH
 from ..rasters.pair import ImagePair
 from ..similarity.evidence import Evidence, find_peak, find_peak_near
 from ..similarity.surface import SimilaritySettings
-from .alignment import Alignment, Positions, align, choose_alignment
+from .alignment import CANDIDATES, Alignment, Positions, align, choose_alignment
 from .layout import ChipLayout
 from .matching import ChipMatcher, ChipSurfaces
 from .pooled import GroundChips, tile_centres
@@ -68,6 +68,8 @@ class LocalSearch:
         Largest distance between a match and its match back for points of the fit.
     pooled
         Whether chips share one joint histogram, as those that a mask leaves little of must.
+    candidates
+        What "auto" chooses from, from simple to flexible.
     """
 
     pair: ImagePair
@@ -77,6 +79,7 @@ class LocalSearch:
     check_radius_px: int = 12
     two_way_px: float = 2.0
     pooled: bool = False
+    candidates: tuple[str, ...] = CANDIDATES
 
     def estimate(
         self, coarse: Model, kind: str, seed: int, executor: Executor, progress: Progress = SILENT
@@ -145,7 +148,7 @@ class LocalSearch:
         if self.pooled and kind == AUTO:
             kind = _POOLED_KIND
         if kind in (AUTO, "tps"):
-            aligned = choose_alignment(centres, weighed, prior, start)
+            aligned = choose_alignment(centres, weighed, prior, start, self.candidates)
         else:
             aligned = align(kind, centres, weighed, prior, start)
         px = centres.astype(float)

@@ -44,8 +44,8 @@ Refinement = Annotated[
     str,
     Choice(
         label="Refinement",
-        help="Similarity by which chips around matched features refine their places; none "
-        "leaves them where they were found.",
+        help="Similarity by which chips refine what matched features tell; none takes the "
+        "features as they are.",
         choices=(_NO_REFINEMENT, *SIMILARITIES),
         advanced=True,
     ),

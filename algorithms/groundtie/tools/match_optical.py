@@ -6,10 +6,12 @@ import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Annotated, Any
 
 from ..declaration import tool
+from ..features.guided import GuidedSearch
 from ..features.hybrid import FeatureSearch
 from ..features.optical import DESCRIPTORS, DETECTORS, optical_descriptor, optical_detector
 from ..features.tile_matching import FeatureMatcher
@@ -17,6 +19,7 @@ from ..kinds import Choice, Number
 from ..progress import SILENT, Progress
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
+from ..search.alignment import LINEAR_CANDIDATES
 from ..search.layout import lay_out_chips
 from ..search.local import AUTO, LocalSearch
 from ..similarity.surface import SimilaritySettings
@@ -49,6 +52,7 @@ from .registered_output import RegisteredOutput, model_for_grid
 from .registration import (
     RegistrationFiles,
     RegistrationResult,
+    TiePointMatching,
     deliver,
     free_radius,
     open_image,
@@ -68,9 +72,6 @@ from .registration_parameters import (
 
 # Least contrast of SIFT's features, and least determinant of SURF's, on grey values from 0 to 1.
 _THRESHOLD = {"sift": 0.03, "surf": 0.0004}
-
-# Small images have few matches, enough for this but not to choose a model by.
-_FIRST_KIND = "similarity"
 
 # Without georeferencing, the input may be larger or smaller by this.
 _FREE_SCALE = 2.0
@@ -154,9 +155,9 @@ def match_optical(
     """Register optical images to one another: other bands, dates or sensors, day and night.
 
     A rough shift is searched for on reduced images; features are matched near where it puts them,
-    and refined by chips around them; a robust model is fitted. Parts of the reference are held out
-    of all of this; points in them decide whether the registration is accepted. A refused
-    registration writes no image.
+    and chips all over the images near where features do; a robust model is fitted. Parts of the
+    reference are held out of all of this; points in them decide whether the registration is
+    accepted. A refused registration writes no image.
 
     Images without georeferencing are matched in pixel coordinates and may be turned by any angle
     and scaled by up to 2; distances are then in pixels.
@@ -194,9 +195,13 @@ def match_optical(
                 None if shown is pair else shown,
             ),
             local,
-            refinement_settings(refinement),
-            _FIRST_KIND if kind == AUTO else None,
         )
+        matching: TiePointMatching = features
+        settings = refinement_settings(refinement)
+        if settings is not None:
+            # Polynomials bend along what stands: "auto" chooses among what features choose from.
+            chips = replace(local, settings=settings, candidates=LINEAR_CANDIDATES)
+            matching = GuidedSearch(features, chips)
         rough = rough_search(
             default_radius_m(pair.grid) if radius_m is None else radius_m, turn, search
         )
@@ -211,7 +216,7 @@ def match_optical(
                 seed,
                 executor,
                 progress.part(0.1, 0.7),
-                features,
+                matching,
             )
         registered = RegisteredOutput(output, output_grid, resampling)
         return deliver(

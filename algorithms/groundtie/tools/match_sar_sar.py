@@ -219,7 +219,6 @@ def match_sar_sar(
             ),
             local,
             refinement_settings(refinement),
-            everywhere=True,
         )
         rough = rough_search(
             default_radius_m(pair.grid) if radius_m is None else radius_m, turn, search
