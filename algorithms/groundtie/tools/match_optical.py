@@ -155,9 +155,9 @@ def match_optical(
     """Register optical images to one another: other bands, dates or sensors, day and night.
 
     A rough shift is searched for on reduced images; features are matched near where it puts them,
-    and chips all over the images near where features do; a robust model is fitted. Parts of the
-    reference are held out of all of this; points in them decide whether the registration is
-    accepted. A refused registration writes no image.
+    and chips all over the images near where the model of the features does; the final model is
+    fitted to the chips. Parts of the reference are held out of all of this; points in them decide
+    whether the registration is accepted. A refused registration writes no image.
 
     Images without georeferencing are matched in pixel coordinates and may be turned by any angle
     and scaled by up to 2; distances are then in pixels.
