@@ -98,3 +98,26 @@ def test_whoever_names_the_radar_image_is_believed(
         assert (used.kind, used.image) in (("threshold", "reference"), ("regions", "reference"))
         _, used = request(image="input").apply(images, stack, SILENT)
         assert used.kind == "none" and "too few buildings" in used.reason
+
+
+@pytest.mark.parametrize(
+    ("reference", "image", "kind", "expected"),
+    [
+        # Named, or the ground of it matched: it is a radar's, and has no speckle.
+        (CALM_TOWN, "reference", "none", True),
+        (CALM_TOWN, "reference", "regions", True),
+        (CALM_TOWN, "auto", "none", False),
+        (CALM, "reference", "none", False),
+        (CALM_TOWN, "reference", "layer", False),
+        (speckled(0.25), "auto", "regions", False),
+    ],
+)
+def test_the_ground_of_a_town_is_found_by_its_speckle(
+    pair: Callable[[np.ndarray, np.ndarray], ImagePair],
+    reference: np.ndarray,
+    image: str,
+    kind: str,
+    expected: bool,
+) -> None:
+    used = MaskUsed(kind, "reference", 0.2, "as asked for")
+    assert request(image=image).lacks_speckle(pair(reference, CALM), used) == expected

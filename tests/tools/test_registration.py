@@ -178,7 +178,8 @@ def test_few_who_agree_are_not_enough_where_roofs_may(
     registration: Registration, agreeing: int, is_town: bool, accepted: bool
 ) -> None:
     verdict = replace(registration.verdict, check_points=25, check_points_agreeing=agreeing)
-    judged = refuse_what_roofs_may_be(replace(registration, verdict=verdict), lambda: is_town)
+    given = replace(registration, verdict=verdict)
+    judged = refuse_what_roofs_may_be(given, lambda: False, lambda: is_town)
     assert judged.verdict.accepted == accepted
     assert accepted or "only 11 of 25 check points agree" in judged.verdict.reason
 
@@ -188,5 +189,12 @@ def test_a_town_is_looked_for_only_where_it_matters(registration: Registration) 
         raise AssertionError("both images would be read for nothing")
 
     many = replace(registration.verdict, check_points=25, check_points_agreeing=24)
-    for judged in (replace(registration, verdict=many), refused(registration)):
-        assert refuse_what_roofs_may_be(judged, look) is judged
+    clear, lost = replace(registration, verdict=many), refused(registration)
+    assert refuse_what_roofs_may_be(clear, lambda: False, look) is clear
+    assert refuse_what_roofs_may_be(lost, look, look) is lost
+
+
+def test_ground_that_is_not_found_for_sure_confirms_nothing(registration: Registration) -> None:
+    judged = refuse_what_roofs_may_be(registration, lambda: True, lambda: False)
+    assert registration.verdict.accepted and not judged.verdict.accepted
+    assert "has no speckle" in judged.verdict.reason

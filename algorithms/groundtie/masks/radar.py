@@ -47,7 +47,12 @@ def is_radar_and_camera(image: Image, other: Image) -> bool:
 
 def are_both_radar(image: Image, other: Image) -> bool:
     """Tell whether both images have the speckle of a radar's, or metadata that tell it."""
-    return all(_is_known(one) or _calm(one) >= _RADAR for one in (image, other))
+    return all(_is_known(one) or has_speckle(one) for one in (image, other))
+
+
+def has_speckle(image: Image) -> bool:
+    """Tell whether an image has the speckle of a radar's."""
+    return _calm(image) >= _RADAR
 
 
 def power(patch: Patch) -> FloatImage:
@@ -56,7 +61,7 @@ def power(patch: Patch) -> FloatImage:
 
 
 def _is_known(image: Image) -> bool:
-    return is_known_radar(image.source, image.band)
+    return is_known_radar(image.source)
 
 
 def _calm(image: Image) -> float:

@@ -143,12 +143,6 @@ class RasterSource:
         """Numbers, from 1, of the bands that are not alpha."""
         return tuple(i for i in range(1, self.count + 1) if i != self.alpha_band)
 
-    def band_info(self, number: int) -> BandInfo:
-        """Return what the file says of a band, numbered from 1; `BandError` if it has none."""
-        if not 1 <= number <= self.count:
-            raise BandError(f"{self.path} has no band {number}; it has {self.count}")
-        return self.bands[number - 1]
-
     def read(
         self, window: Window, band: int | None = None, out_shape: tuple[int, int] | None = None
     ) -> tuple[FloatImage, Mask]:
@@ -210,7 +204,8 @@ class RasterSource:
         """
         bands = range(1, self.count + 1) if bands is None else bands
         for number in bands:
-            self.band_info(number)
+            if not 1 <= number <= self.count:
+                raise BandError(f"{self.path} has no band {number}; it has {self.count}")
 
         def native(part: Window) -> tuple[NDArray[Any], Mask]:
             with self._handles.borrow() as dataset:

@@ -239,10 +239,11 @@ def coregister(
             )
         if are_both_radar(pair.reference, pair.input):
             result = refuse_what_leans(result, max_error, CHIPS_MEAN_OVER_SCATTER)
-        if ground is None:
-            result = refuse_what_roofs_may_be(
-                result, lambda: request.may_hide_a_town(pair, mask_used)
-            )
+        result = refuse_what_roofs_may_be(
+            result,
+            lambda: request.lacks_speckle(pair, mask_used),
+            lambda: ground is None and request.may_hide_a_town(pair, mask_used),
+        )
         registered = RegisteredOutput(output, output_grid, resampling)
         return deliver(
             result,

@@ -28,7 +28,7 @@ from ..masks.choice import (
     is_perhaps_dense,
 )
 from ..masks.layer import read_layer
-from ..masks.radar import are_both_radar, is_radar_and_camera, is_rather_radar
+from ..masks.radar import are_both_radar, has_speckle, is_radar_and_camera, is_rather_radar
 from ..masks.regions import GroundRegions, find_ground
 from ..masks.scene import Scene, Selection, write_mask
 from ..masks.shade import shade_azimuth_deg
@@ -189,6 +189,25 @@ class MaskRequest:
         name, _ = self._image(pair)
         names = (name,) if self._is_radar_beside_camera(pair, name) else (REFERENCE, INPUT)
         return any(is_perhaps_dense(bright_share(scene_of(pair, one))) for one in names)
+
+    def lacks_speckle(self, pair: ImagePair, used: MaskUsed) -> bool:
+        """Tell whether a radar image of a dense town lacks what its ground is found by.
+
+        Filters leave no number of looks that tells calm places, and make roofs homogeneous.
+
+        Parameters
+        ----------
+        pair, used
+            See `may_hide_a_town`.
+        """
+        if used.kind == LAYER or pair.is_masked:
+            return False
+        name, _ = self._image(pair)
+        if used.kind != REGIONS and not self._is_radar_beside_camera(pair, name):
+            return False
+        if has_speckle(_ordered(pair, name)[0]):
+            return False
+        return is_perhaps_dense(bright_share(scene_of(pair, name)))
 
     def _is_radar_beside_camera(self, pair: ImagePair, name: str) -> bool:
         # Whoever names the image knows.

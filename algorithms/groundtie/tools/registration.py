@@ -218,33 +218,47 @@ def refuse_what_leans(
         search.check_radius_px,
         mean_over_scatter,
     )
-    if reason is None:
-        return registration
-    refused = replace(registration.verdict, accepted=False, reason=reason)
-    return replace(registration, verdict=refused)
+    return registration if reason is None else _refused(registration, reason)
 
 
 def refuse_what_roofs_may_be(
-    registration: Registration, may_hide_a_town: Callable[[], bool]
+    registration: Registration,
+    lacks_speckle: Callable[[], bool],
+    may_hide_a_town: Callable[[], bool],
 ) -> Registration:
-    """Return a registration, refused if so few check points agree as roofs of a dense town do.
+    """Return a registration, refused if it may be that of the roofs of a dense town.
 
     Parameters
     ----------
     registration
         The registration.
+    lacks_speckle
+        Tells whether there is one, whose ground is not found for sure.
     may_hide_a_town
-        Tells whether there may be one; asked only where few agree.
+        Tells whether there may be one; asked only where so few check points agree as roofs do.
     """
     verdict = registration.verdict
-    if not verdict.accepted or verdict.is_clear or not may_hide_a_town():
+    if not verdict.accepted:
         return registration
-    reason = (
+    if lacks_speckle():
+        return _refused(
+            registration,
+            "the radar image of a dense town has no speckle, by which its ground is found: give it "
+            "unfiltered, or a mask of the ground",
+        )
+    if verdict.is_clear or not may_hide_a_town():
+        return registration
+    return _refused(
+        registration,
         f"only {verdict.check_points_agreeing} of {verdict.check_points} check points agree, as "
-        "roofs may, and an image shines like a radar's of a dense town: if it is one, give "
-        "mask=regions and mask_image"
+        "roofs may, and an image shines like a radar's of a dense town: if it is one, give it "
+        "unfiltered, or a mask of the ground",
     )
-    return replace(registration, verdict=replace(verdict, accepted=False, reason=reason))
+
+
+def _refused(registration: Registration, reason: str) -> Registration:
+    refused = replace(registration.verdict, accepted=False, reason=reason)
+    return replace(registration, verdict=refused)
 
 
 @dataclass(frozen=True)
