@@ -7,9 +7,15 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("GROUNDTIE_DATA") or ROOT.parent / "shared" / "data").resolve()
+
+
+# How long an example takes says nothing where other work runs beside it.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 
 def _has_qgis() -> bool:

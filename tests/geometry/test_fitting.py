@@ -37,7 +37,7 @@ def distort(kind: str, xy: np.ndarray, seed: int = 0) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", POLYNOMIALS)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10_000))
 def test_an_exact_distortion_is_recovered(kind: str, seed: int) -> None:
     xy, elsewhere = places(30, seed), places(30, seed + 1)

@@ -38,7 +38,7 @@ def a_model(kind: str, seed: int = 1, size_m: float = 100.0) -> Model:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10_000))
 def test_there_and_back(kind: str, seed: int) -> None:
     model, xy = a_model(kind, seed), places(20, seed + 1)

@@ -185,7 +185,7 @@ def test_too_few_right_matches_for_the_model() -> None:
         fit_robustly("polynomial3", px, found, np.zeros(8), start, AREA, (0.2, 2.5))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     px=st.lists(st.tuples(st.floats(0, 1e4), st.floats(0, 1e4)), min_size=1, max_size=40),
     shift=st.floats(-1e3, 1e3),

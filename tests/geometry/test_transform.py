@@ -33,7 +33,7 @@ def misregistered(kind: str, crs: CRS | None, grid: Grid) -> Transform:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("crs", "grid"), [(UTM, GRID), (UTM, DEGREES), (None, PLAIN)])
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(px=st.lists(st.tuples(st.floats(0, 400), st.floats(0, 300)), min_size=1, max_size=5))
 def test_pixels_to_the_map_and_back(
     kind: str, crs: CRS | None, grid: Grid, px: list[tuple[float, float]]

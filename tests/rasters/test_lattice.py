@@ -80,7 +80,7 @@ def test_single_precision_serves_for_what_is_left() -> None:
     np.testing.assert_allclose(everywhere(left).reshape(2, -1).T, pixels(grid), atol=1e-4)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(1, 200), st.integers(1, 200), st.integers(0, 10))
 def test_bounds_are_those_of_the_pixels(width: int, height: int, seed: int) -> None:
     a, b, c = np.random.default_rng(seed).normal(size=3)

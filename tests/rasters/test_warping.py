@@ -149,7 +149,7 @@ def test_nodata_never_bleeds(method: str, nodata: float) -> None:
     assert 0.2 < known.mean() < 0.9
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(
     method=st.sampled_from(METHODS),
     seed=st.integers(0, 99),

@@ -48,7 +48,7 @@ CHIPS = st.one_of(st.none(), st.integers(16, 33))
 SPACINGS = st.one_of(st.none(), st.floats(5, 200))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(size=SIZES, chip=CHIPS, spacing=SPACINGS)
 def test_check_chips_share_no_pixel_with_the_fit_nor_leave_the_grid(
     source: RasterSource, size: tuple[int, int], chip: int | None, spacing: float | None
@@ -67,7 +67,7 @@ def test_check_chips_share_no_pixel_with_the_fit_nor_leave_the_grid(
     assert (held_out | ~check).all()
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(size=SIZES, chip=CHIPS, spacing=SPACINGS)
 def test_the_same_share_of_every_cell_is_held_out_and_chips_of_the_fit_reach_all_corners(
     source: RasterSource, size: tuple[int, int], chip: int | None, spacing: float | None
@@ -84,7 +84,7 @@ def test_the_same_share_of_every_cell_is_held_out_and_chips_of_the_fit_reach_all
     assert corners.max(axis=0).tolist() == list(inner)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     size=SIZES,
     px=st.lists(st.tuples(st.floats(-20, 920), st.floats(-20, 920)), min_size=1, max_size=20),

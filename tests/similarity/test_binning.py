@@ -47,7 +47,7 @@ def test_linear_bins_are_those_of_the_thesis(bins: int) -> None:
     assert np.abs(counts - histogram).sum() <= 4
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     bins=st.integers(2, 255),
     binning=st.sampled_from(BINNINGS),

@@ -170,7 +170,7 @@ def test_the_correlation_ratio_knows_functions_of_any_shape() -> None:
     assert correlation_ratio(table.T) == pytest.approx(0.0, abs=1e-12)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(table=TABLES)
 def test_against_entropies_of_scipy_and_scikit_learn(table: np.ndarray) -> None:
     found = float(normalized_mutual_information(table))
@@ -187,7 +187,7 @@ def test_against_entropies_of_scipy_and_scikit_learn(table: np.ndarray) -> None:
 
 
 @each_measure
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(table=TABLES)
 def test_units_order_and_form_of_the_histogram_do_not_matter(name: str, table: np.ndarray) -> None:
     measure: Measure = ALL[name]

@@ -49,7 +49,7 @@ class TestStrips:
 
 
 class TestSmoothNoise:
-    @settings(max_examples=25, deadline=None)
+    @settings(max_examples=25)
     @given(st.integers(1, 59), st.floats(1.0, 40.0))
     def test_strips_join_without_a_seam(self, cut: int, cell_px: float) -> None:
         noise = SmoothNoise.draw((60, 30), cell_px, random_stream(1, Stream.TERRAIN))

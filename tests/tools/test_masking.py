@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from raster_files import utm_grid, write_raster
 
-from groundtie.masks.choice import MaskUsed
 from groundtie.progress import SILENT
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.tools.masking import MaskRequest
 
 SIZE = 400
-NO_MASK = MaskUsed("none", None, 1.0, "there is no radar image beside a camera's")
+NO_RADAR = "there is no radar image beside a camera's"
 
 
 def scene(bright_share: float, noise: float, seed: int = 0) -> np.ndarray:
@@ -75,25 +74,24 @@ def test_what_shines_may_be_a_town(
     expected: bool,
 ) -> None:
     images = pair(reference, input)
-    assert request().may_hide_a_town(images, NO_MASK) == expected
+    assert request().may_hide_a_town(images, "none") == expected
 
 
 @pytest.mark.parametrize("kind", ["regions", "layer"])
 def test_a_town_whose_ground_was_matched_hides_nothing(
     pair: Callable[[np.ndarray, np.ndarray], ImagePair], kind: str
 ) -> None:
-    used = MaskUsed(kind, "reference", 0.2, "as asked for")
-    assert not request().may_hide_a_town(pair(CALM_TOWN, CALM), used)
+    assert not request().may_hide_a_town(pair(CALM_TOWN, CALM), kind)
 
 
 def test_whoever_names_the_radar_image_is_believed(
     pair: Callable[[np.ndarray, np.ndarray], ImagePair],
 ) -> None:
     images = pair(CALM_TOWN, CALM)
-    assert not request(image="input").may_hide_a_town(images, NO_MASK)
+    assert not request(image="input").may_hide_a_town(images, "none")
     with ExitStack() as stack:
         _, used = request().apply(images, stack, SILENT)
-        assert (used.kind, used.reason) == ("none", NO_MASK.reason)
+        assert (used.kind, used.reason) == ("none", NO_RADAR)
         _, used = request(image="reference").apply(images, stack, SILENT)
         assert (used.kind, used.image) in (("threshold", "reference"), ("regions", "reference"))
         _, used = request(image="input").apply(images, stack, SILENT)
@@ -119,5 +117,4 @@ def test_the_ground_of_a_town_is_found_by_its_speckle(
     kind: str,
     expected: bool,
 ) -> None:
-    used = MaskUsed(kind, "reference", 0.2, "as asked for")
-    assert request(image=image).lacks_speckle(pair(reference, CALM), used) == expected
+    assert request(image=image).lacks_speckle(pair(reference, CALM), kind) == expected

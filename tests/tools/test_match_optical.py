@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,9 @@ from groundtie.features.classifier_training import Training, train_classifier
 from groundtie.features.optical import DESCRIPTORS, DETECTORS
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
+from groundtie.quality.verdict import Verdict
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
+from groundtie.tools.masking import MaskRequest
 
 SIZE = (300, 280)
 
@@ -95,6 +98,23 @@ def test_another_place_is_refused_and_leaves_its_report_only(tmp_path: Path) -> 
         )
     assert set(listing(tmp_path)) >= {"report.html", "report.json"}
     assert not (tmp_path / "o.tif").exists()
+
+
+@pytest.mark.parametrize(("radar", "refused"), [(True, True), (False, False)])
+def test_a_radar_image_that_may_show_a_dense_town_is_in_doubt(
+    files: TexturedPair,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    radar: bool,
+    refused: bool,
+) -> None:
+    monkeypatch.setattr(MaskRequest, "sees_radar", lambda *_: radar)
+    monkeypatch.setattr(MaskRequest, "may_hide_a_town", lambda *_: True)
+    monkeypatch.setattr(Verdict, "is_clear", False)
+    expected = pytest.raises(NotRegisteredError, match="as roofs may") if refused else nullcontext()
+    with expected:
+        match_optical(files.reference, files.input, tmp_path / "out.tif")
+    assert (tmp_path / "out.tif").exists() == (not refused)
 
 
 def test_images_without_georeferencing_may_be_turned_and_larger(tmp_path: Path) -> None:

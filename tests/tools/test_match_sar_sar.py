@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from brightness_classifiers import bright_is_left_out
@@ -17,6 +18,7 @@ from groundtie import coregister, match_sar_sar
 from groundtie.errors import NotRegisteredError, ParameterError
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
+from groundtie.quality.verdict import Verdict
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 
 SIZE = (300, 280)
@@ -100,6 +102,22 @@ def test_another_place_is_refused_and_leaves_its_report_only(tmp_path: Path) -> 
         )
     assert set(listing(tmp_path)) >= {"report.html", "report.json"}
     assert not (tmp_path / "o.tif").exists()
+
+
+def test_an_image_that_may_show_a_dense_town_to_a_camera_is_in_doubt(
+    files: TexturedPair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without its speckle, the input may be a camera's."""
+    bright = cv2.blur(pixels(files.input)[0], (7, 7))
+    bright[::8] *= 6
+    calm = write_raster(tmp_path / "in.tif", bright, files.truth.input_grid)
+    found = match_sar_sar(files.reference, calm, tmp_path / "out.tif")
+    assert error_px(found.transform, files) < 1.0
+    monkeypatch.setattr(Verdict, "is_clear", False)
+    with pytest.raises(NotRegisteredError, match="as roofs may"):
+        match_sar_sar(files.reference, calm, tmp_path / "other.tif")
+    # Two radar images are judged by what leans alone.
+    match_sar_sar(files.reference, files.input, tmp_path / "other.tif")
 
 
 def test_images_without_georeferencing_may_be_turned(tmp_path: Path) -> None:

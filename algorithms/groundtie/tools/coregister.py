@@ -205,7 +205,7 @@ def coregister(
         for note in ("deciding what takes part", *pair.notes()):
             progress.update(0.0, note)
         classifying = Classifying(reference_classifier, input_classifier)
-        pair = classifying.apply(pair, stack, progress.part(0.0, 0.02))
+        clear = classifying.apply(pair, stack, progress.part(0.0, 0.02))
         request = MaskRequest(
             mask,
             mask_image,
@@ -215,8 +215,8 @@ def coregister(
             mask_width,
             mask_layer,
         )
-        shown, mask_used = request.apply(pair, stack, progress.part(0.02, 0.05))
-        ground = request.ground(pair, mask_used, stack, progress.part(0.05, 0.1))
+        shown, mask_used = request.apply(clear, stack, progress.part(0.02, 0.05))
+        ground = request.ground(clear, mask_used, stack, progress.part(0.05, 0.1))
         spacing_px = None if spacing is None else spacing / pair.grid.pixel_size_m
         layout = lay_out_chips(pair, chip_size, spacing_px)
         local = LocalSearch(shown, layout, settings, two_way_px=two_way_error)
@@ -241,8 +241,8 @@ def coregister(
             result = refuse_what_leans(result, max_error, CHIPS_MEAN_OVER_SCATTER)
         result = refuse_what_roofs_may_be(
             result,
-            lambda: request.lacks_speckle(pair, mask_used),
-            lambda: ground is None and request.may_hide_a_town(pair, mask_used),
+            lambda: request.lacks_speckle(pair, mask_used.kind),
+            lambda: ground is None and request.may_hide_a_town(clear, mask_used.kind),
         )
         registered = RegisteredOutput(output, output_grid, resampling)
         return deliver(

@@ -171,7 +171,7 @@ class MaskRequest:
         regions_of = replace(self, kind=REGIONS, high_percent=None)
         return regions_of.apply(pair, stack, progress.part(0.2, 1.0))[0]
 
-    def may_hide_a_town(self, pair: ImagePair, used: MaskUsed) -> bool:
+    def may_hide_a_town(self, pair: ImagePair, used: str) -> bool:
         """Tell whether a dense town may have been matched whole, if its ground does not judge.
 
         Without its speckle a radar image is not told from a camera's, and shines less. But it
@@ -182,15 +182,15 @@ class MaskRequest:
         pair
             The images, with the masks that the user gave.
         used
-            The mask that was used.
+            The kind of mask that was used.
         """
-        if used.kind in (REGIONS, LAYER) or are_both_radar(pair.reference, pair.input):
+        if used in (REGIONS, LAYER) or are_both_radar(pair.reference, pair.input):
             return False
         name, _ = self._image(pair)
         names = (name,) if self._is_radar_beside_camera(pair, name) else (REFERENCE, INPUT)
         return any(is_perhaps_dense(bright_share(scene_of(pair, one))) for one in names)
 
-    def lacks_speckle(self, pair: ImagePair, used: MaskUsed) -> bool:
+    def lacks_speckle(self, pair: ImagePair, used: str) -> bool:
         """Tell whether a radar image of a dense town lacks what its ground is found by.
 
         Filters leave no number of looks that tells calm places, and make roofs homogeneous.
@@ -200,14 +200,18 @@ class MaskRequest:
         pair, used
             See `may_hide_a_town`.
         """
-        if used.kind == LAYER or pair.is_masked:
+        if used == LAYER or pair.is_masked:
             return False
         name, _ = self._image(pair)
-        if used.kind != REGIONS and not self._is_radar_beside_camera(pair, name):
+        if used != REGIONS and not self._is_radar_beside_camera(pair, name):
             return False
         if has_speckle(_ordered(pair, name)[0]):
             return False
         return is_perhaps_dense(bright_share(scene_of(pair, name)))
+
+    def sees_radar(self, pair: ImagePair) -> bool:
+        """Tell whether one of the images is a radar's for certain, and the other is not."""
+        return self._is_radar_beside_camera(pair, self._image(pair)[0])
 
     def _is_radar_beside_camera(self, pair: ImagePair, name: str) -> bool:
         # Whoever names the image knows.

@@ -16,6 +16,7 @@ from ..features.hybrid import FeatureSearch
 from ..features.optical import DESCRIPTORS, DETECTORS, optical_descriptor, optical_detector
 from ..features.tile_matching import FeatureMatcher
 from ..kinds import Choice, Number
+from ..masks.choice import NONE
 from ..progress import SILENT, Progress
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
@@ -48,6 +49,7 @@ from .feature_parameters import (
     Refinement,
     refinement_settings,
 )
+from .masking import MaskRequest
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import (
     RegistrationFiles,
@@ -56,6 +58,7 @@ from .registration import (
     deliver,
     free_radius,
     open_image,
+    refuse_what_roofs_may_be,
     register,
     rough_search,
     turn_within,
@@ -218,6 +221,13 @@ def match_optical(
                 progress.part(0.1, 0.7),
                 matching,
             )
+        # One image may be a radar's all the same. Bright optical images are not in doubt.
+        request = MaskRequest(NONE, AUTO, None, 0.0, 0.0)
+        result = refuse_what_roofs_may_be(
+            result,
+            lambda: request.lacks_speckle(pair, NONE),
+            lambda: request.sees_radar(pair) and request.may_hide_a_town(shown, NONE),
+        )
         registered = RegisteredOutput(output, output_grid, resampling)
         return deliver(
             result, registered, files, parameters, started, threads, progress.part(0.7, 1.0)

@@ -66,6 +66,7 @@ from .registration import (
     free_radius,
     open_image,
     refuse_what_leans,
+    refuse_what_roofs_may_be,
     register,
     rough_search,
     turn_within,
@@ -237,6 +238,13 @@ def match_sar_sar(
                 features,
             )
         result = refuse_what_leans(result, max_error, FEATURES_MEAN_OVER_SCATTER)
+        if ground_mask is None:
+            # One image may be a camera's all the same.
+            result = refuse_what_roofs_may_be(
+                result,
+                lambda: request.lacks_speckle(pair, mask_used.kind),
+                lambda: request.may_hide_a_town(pair, mask_used.kind),
+            )
         registered = RegisteredOutput(output, output_grid, resampling)
         return deliver(
             result,
