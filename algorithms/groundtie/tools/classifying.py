@@ -64,7 +64,7 @@ def _classified(
 ) -> ImagePair:
     classifier = read_classifier(path)
     scene = scene_of(pair, name)
-    require_bands(path, classifier, scene.like.path, len(scene.like.image_bands))
+    _require_bands(path, classifier, scene.like.path, len(scene.like.image_bands))
 
     def bands(window: Window) -> FloatImage:
         piece = scene.grid.window(*window)
@@ -78,7 +78,7 @@ def _classified(
     return pair
 
 
-def require_bands(path: Path, classifier: FeatureClassifier, image: str, count: int) -> None:
+def _require_bands(path: Path, classifier: FeatureClassifier, image: str, count: int) -> None:
     """Raise `ParameterError` if a classifier looks at other bands than an image has."""
     if classifier.bands not in (0, count):
         raise ParameterError(
