@@ -14,7 +14,7 @@ from groundtie.geometry.models import PolynomialModel
 from groundtie.geometry.robust import block_folds
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
-from groundtie.quality.verdict import FEWEST_ON_GROUND, Verdict, judge, refuse
+from groundtie.quality.verdict import LOG10_CHANCE_ON_GROUND, Verdict, judge, refuse
 
 GRID = utm_grid(600, 500)
 RADIUS = 16
@@ -173,12 +173,18 @@ def test_three_exact_points_are_enough() -> None:
     assert judged(check_points(np.zeros((3, 2)))).accepted
 
 
-def test_where_the_ground_of_a_town_was_matched_three_points_are_not_enough() -> None:
-    for right, accepted in ((3, False), (4, True)):
-        check = check_points(np.concatenate([np.zeros((right, 2)), [[9.0, 0], [0, -9], [-9, 9]]]))
-        found = judge(estimated(fit_points()), check, GRID, 3.0, RADIUS, FEWEST_ON_GROUND)
-        assert found.accepted == accepted
-        assert judged(check).accepted
+@pytest.mark.parametrize(
+    ("right", "wrong", "accepted"), [(3, 6, False), (4, 5, True), (3, 0, True)]
+)
+def test_where_the_ground_of_a_town_was_matched_three_of_nine_are_not_enough(
+    right: int, wrong: int, accepted: bool
+) -> None:
+    away = 9.0 * np.array([[1, 0], [0, -1], [-1, 1], [1, 1], [-1, 0], [0, 1]])
+    check = check_points(np.concatenate([np.zeros((right, 2)), away[:wrong]]))
+    estimate = estimated(fit_points())
+    found = judge(estimate, check, GRID, 3.0, RADIUS, LOG10_CHANCE_ON_GROUND)
+    assert found.accepted == accepted
+    assert judged(check).accepted
 
 
 def test_fit_points_that_were_all_rejected() -> None:

@@ -31,8 +31,8 @@ _SIGMA_BEYOND = 1.5
 _FEWEST_CHECK_POINTS = 3
 
 # What is left of a dense town's roofs agrees, too, and three points always agree on an affine
-# model: where its ground was matched, more must.
-FEWEST_ON_GROUND = 4
+# model: where its ground was matched, three of nine are not enough.
+LOG10_CHANCE_ON_GROUND = -4.0
 _SMALLEST_SHARE = 0.25
 
 # From this share on, more agree than roofs alone do. Measured where a dense town was matched whole
@@ -124,7 +124,7 @@ def judge(
     grid: Grid,
     max_error_px: float,
     radius_px: int,
-    fewest: int = _FEWEST_CHECK_POINTS,
+    largest_log10_chance: float = LARGEST_LOG10_CHANCE,
 ) -> Verdict:
     """Judge an estimate by check points.
 
@@ -140,8 +140,8 @@ def judge(
         Largest root mean square error at check points, in matching pixels.
     radius_px
         Radius of the search for check points.
-    fewest
-        How many check points must agree at least.
+    largest_log10_chance
+        Logarithm of the chance, that random matches agree as well, which refuses.
     """
     counted = check.take(check.used)
     residuals = counted.residual_on(grid, estimate.transform)
@@ -149,7 +149,7 @@ def judge(
     # Matches without a peak inside their window count as such that do not agree.
     chance = log10_chance(agreeing, len(check), agreement_probability(TOLERANCE_PX, radius_px))
     counts = len(estimate.points), int(estimate.points.used.sum()), len(check), agreeing
-    if chance > LARGEST_LOG10_CHANCE or agreeing < fewest:
+    if chance > largest_log10_chance or agreeing < _FEWEST_CHECK_POINTS:
         why = f"{agreeing} of {len(check)} check points agree, as they may by chance"
         return Verdict(False, why, *counts, log10_chance=chance)
     if agreeing < _SMALLEST_SHARE * len(check):

@@ -26,7 +26,7 @@ from ..masks.choice import MaskUsed
 from ..progress import Progress
 from ..quality.leaning import leaning
 from ..quality.report import Report
-from ..quality.verdict import FEWEST_ON_GROUND, Verdict, judge, refuse
+from ..quality.verdict import LARGEST_LOG10_CHANCE, LOG10_CHANCE_ON_GROUND, Verdict, judge, refuse
 from ..rasters.atomic import Outputs, writing
 from ..rasters.pair import Image, ImagePair, Turn
 from ..rasters.reading import open_raster
@@ -193,8 +193,8 @@ def register(
         check = judging.check_points(estimate.transform.model, executor, progress.part(0.8, 1.0))
     except TooFewPointsError as error:
         return Registration(pair, judging, None, None, refuse(str(error)))
-    more = {"fewest": FEWEST_ON_GROUND} if judging.pooled else {}
-    verdict = judge(estimate, check, pair.grid, max_error_px, judging.check_radius_px, **more)
+    chance = LOG10_CHANCE_ON_GROUND if judging.pooled else LARGEST_LOG10_CHANCE
+    verdict = judge(estimate, check, pair.grid, max_error_px, judging.check_radius_px, chance)
     if verdict.accepted and judging is not search:
         off_px = judging.common_shift_px(estimate.transform.model, executor)
         if off_px > _OFF_GROUND_PX:
