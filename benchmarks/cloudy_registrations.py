@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import rasterio
 from affine import Affine
 from numpy.typing import NDArray
 
@@ -40,7 +41,7 @@ class CloudyRegistration:
     @property
     def group(self) -> str:
         """Return what it is counted with."""
-        return group(self.tool, self.classified)
+        return f"{self.tool}, {'classifier' if self.classified else 'no classifier'}"
 
     def run(self, workers: int | None) -> Outcome:
         """Register the pair and judge the result."""
@@ -64,11 +65,6 @@ class CloudyRegistration:
             )
 
 
-def group(tool: str, classified: bool) -> str:
-    """Return what the registrations of a tool with or without a classifier are counted as."""
-    return f"{tool}, {'classifier' if classified else 'no classifier'}"
-
-
 def _clouds(image: NDArray[Any], case: RealCase, draw: int) -> Clouds:
     grey = image.mean(axis=0, dtype=np.float32)
     return clouds_over(grey, SHARE, zlib.crc32(case.name.encode()) + draw)
@@ -89,8 +85,6 @@ def _classifier(pair: Pair, case: RealCase, folder: Path) -> Path:
 
 def _overwrite(path: Path, values: NDArray[np.float32]) -> None:
     """Replace all bands of a raster of integers, as far as its type reaches."""
-    import rasterio
-
     with rasterio.open(path, "r+") as target:
         limits = np.iinfo(target.dtypes[0])
         rounded = np.clip(np.rint(values), limits.min, limits.max)

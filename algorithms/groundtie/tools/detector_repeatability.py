@@ -189,8 +189,10 @@ def detector_repeatability(
             known = transform_of(load_transform(transform), pair.input.source, transform)
         classifying = Classifying(reference_classifier, input_classifier)
         shown = classifying.apply(pair, stack, progress.part(0.0, 0.1))
-        reference_patch, input_patch = _read(shown, known, size)
-        parts = reference_patch.valid, input_patch.valid
+        parts = None
+        if shown is not pair:
+            reference_part, input_part = _read(shown, known, size)
+            parts = reference_part.valid, input_part.valid
         patches = _both_valid(*_read(pair, known, size))
     evaluations = []
     for i, variant in enumerate(chosen):

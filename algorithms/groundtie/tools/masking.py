@@ -37,6 +37,7 @@ from ..progress import Progress
 from ..rasters.grid import Grid
 from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch
+from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import Window, open_raster
 from ..search.local import LocalSearch
 
@@ -201,6 +202,11 @@ class MaskRequest:
             See `may_hide_a_town`.
         """
         if used == LAYER or pair.is_masked:
+            return False
+        # Else a radar image is told by the very speckle, and need not be read for it.
+        images = pair.reference, pair.input
+        told = self.image != AUTO or any(is_known_radar(image.source) for image in images)
+        if used != REGIONS and not told:
             return False
         name, _ = self._image(pair)
         if used != REGIONS and not self._is_radar_beside_camera(pair, name):
