@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from groundtie.matching.chips import ChipMatcher
 from groundtie.rasters.grid import Grid
-from groundtie.search.matching import ChipMatcher
-from groundtie.similarity.evidence import find_peak
+from groundtie.similarity.peak import find_peak
 from groundtie.similarity.surface import BORDER_PX, SIMILARITIES, SimilaritySettings
 
 from .offsets import OffsetPair, Scene, open_offset

@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from groundtie.features.descriptors import Descriptor
 from groundtie.features.detectors import DETECTORS, Detector
-from groundtie.features.evaluation import Variant, evaluate
 from groundtie.features.matching import GATE_PX, match, match_near
 from groundtie.features.points import FeaturePoints
-from groundtie.features.repeatability import CLASS_NAMES
 from groundtie.geometry.models import Model
 from groundtie.geometry.robust import distances, find_consensus, fit_robustly
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import open_raster
+from groundtie.studies.evaluation import Variant, evaluate
+from groundtie.studies.repeatability import CLASS_NAMES
 
 from .cases import RealCase, write_case
 from .suites import Goal, Table

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from groundtie.search.matching import ChipMatcher, ToPixel
-from groundtie.search.support import Surfaces, support
-from groundtie.similarity.evidence import find_peak
+from groundtie.matching.belief_propagation import Surfaces, support
+from groundtie.matching.chips import ChipMatcher, ToPixel
+from groundtie.similarity.peak import find_peak
 from groundtie.similarity.surface import SimilaritySettings
 
 from .accuracy import FloatArray

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from groundtie.pose.pose import Pose
 from groundtie.rasters.kernels import interpolate
 from groundtie.rasters.patch import Patch
-from groundtie.search.pose import Pose
 
 Image = NDArray[np.float32]
 

@@ -20,7 +20,7 @@ from groundtie.masks.scene import Scene, Selection, write_mask
 from groundtie.masks.threshold import Threshold
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import Window, open_raster
-from groundtie.similarity.evidence import find_peak
+from groundtie.similarity.peak import find_peak
 from groundtie.similarity.surface import SimilaritySettings, describe, similarity_surface
 
 from .city import city

@@ -20,7 +20,7 @@ from groundtie.features.hog import HogDescriptor
 from groundtie.features.matching import match
 from groundtie.features.points import FeaturePoints
 from groundtie.features.surf import SurfDetector
-from groundtie.features.tile_matching import Describing, Detecting
+from groundtie.features.tiles import Describing, Detecting
 from groundtie.rasters.patch import Patch
 
 from .accuracy import FloatArray

@@ -16,15 +16,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from groundtie.pose.pose import Pose, PoseLimits
 from groundtie.rasters.patch import Patch
-from groundtie.search.objective import EFFORT, Effort
-from groundtie.search.pose import Pose, PoseLimits
-from groundtie.search.simplex import nelder_mead, powell
-from groundtie.search.spsa import DISCRETE_EFFORT, discrete_spsa, spsa, spsa_second_order
 from groundtie.similarity.binning import MASKED, to_bins
 from groundtie.similarity.joint_histogram import count_joint_histograms, reach
 from groundtie.similarity.measures import normalized_mutual_information
 from groundtie.similarity.surface import SimilaritySettings, detrend
+from groundtie.studies.objective import EFFORT, Effort
+from groundtie.studies.simplex import nelder_mead, powell
+from groundtie.studies.spsa import DISCRETE_EFFORT, discrete_spsa, spsa, spsa_second_order
 
 from .accuracy import CORRECT_PX
 from .cases import SAR_OPTICAL, RealCase, read_cases, read_image

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from groundtie.search.fourier_mellin import fourier_mellin
-from groundtie.search.phase_correlation import phase_correlation
-from groundtie.search.pose import Pose, PoseLimits, PoseSearch
-from groundtie.search.radon import radon
+from groundtie.pose.phase_correlation import phase_correlation
+from groundtie.pose.pose import Pose, PoseLimits, PoseSearch
 from groundtie.similarity.surface import SimilaritySettings
+from groundtie.studies.fourier_mellin import fourier_mellin
+from groundtie.studies.radon import radon
 
 from .cases import read_image
 from .injected import BLACK, MASKED, WHOLE, Image, Injection, pose_errors, unit_range

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from groundtie.pose.pose import Pose, PoseFound
 from groundtie.rasters.patch import Patch
-from groundtie.search.pose import Pose, PoseFound
 
 # Waves of the ground: how many, and the shortest and longest, in reference pixels.
 _WAVES = 150

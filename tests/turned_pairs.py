@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 from textured_pairs import texture
 
+from groundtie.pose.pose import Pose
 from groundtie.rasters.grid import apply_affine
 from groundtie.rasters.patch import Patch
-from groundtie.search.pose import Pose
 
 # The texture goes on beyond the reference, so that a turned input is filled to its corners.
 _CANVAS_PX = 700

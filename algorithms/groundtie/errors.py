@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .quality.verdict import Verdict
+    from .registration.verdict import Verdict
 
 
 class GroundTieError(Exception):

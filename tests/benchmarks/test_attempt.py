@@ -22,8 +22,8 @@ from benchmarks.cases import RealCase, write_case
 from groundtie.errors import NotRegisteredError
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.transform import Transform
-from groundtie.quality.verdict import Verdict
 from groundtie.rasters.grid import Grid
+from groundtie.registration.verdict import Verdict
 
 SHIFT = (7.0, -3.0)
 

@@ -7,7 +7,7 @@ import pytest
 from posed_windows import window
 
 from benchmarks.injected import BLACK, CORNERS, MASKED, WHOLE, Injection, pose_errors, unit_range
-from groundtie.search.pose import Pose
+from groundtie.pose.pose import Pose
 
 SHAPE = (60, 80)
 # An image of which the reference's window is the middle.

@@ -13,7 +13,7 @@ from benchmarks.attempt import Outcome
 from benchmarks.cases import RealCase
 from benchmarks.rotated_pairs import RotatedCase, crossed, goals, rotated_cases, run
 from benchmarks.suites import Settings
-from groundtie.search.pose import Pose
+from groundtie.pose.pose import Pose
 
 POSE = Pose(40.0, 1.1, (3.0, 2.0))
 KIND = "optical-optical-rotated"

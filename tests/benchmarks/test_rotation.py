@@ -32,7 +32,7 @@ from benchmarks.rotation import (
 )
 from benchmarks.tables import to_markdown
 from benchmarks.thesis_radon import ACTUAL, ESTIMATES, SIZES
-from groundtie.search.pose import Pose, PoseLimits
+from groundtie.pose.pose import Pose, PoseLimits
 
 ONE = Found(
     "hills", SMALL.name, RADON, "fused", WHOLE, 0.0, 12.0, 1.0, 0.05, 0.2, (0.1, 0.3), 50.0, 0.4

@@ -11,9 +11,9 @@ from textured_pairs import texture
 
 from groundtie.features.detectors import Detector
 from groundtie.features.points import FeaturePoints
-from groundtie.features.repeatability import repeatability
 from groundtie.features.surf import SurfDetector
 from groundtie.rasters.patch import Patch
+from groundtie.studies.repeatability import repeatability
 
 FloatArray = NDArray[np.float64]
 

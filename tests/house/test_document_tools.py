@@ -29,7 +29,7 @@ from groundtie.kinds import (
     VectorIn,
     VectorOut,
 )
-from groundtie.quality.verdict import refuse
+from groundtie.registration.verdict import refuse
 from groundtie.tools import load_tools
 from scripts import document_tools
 

@@ -15,7 +15,7 @@ pytest.importorskip("importlinter", reason="import-linter is not packaged by Deb
 ROOT = Path(__file__).resolve().parents[2]
 LINT = "from importlinter.cli import lint_imports_command; lint_imports_command()"
 PACKAGES = (
-    *("tools", "simulation", "quality", "sensor", "features", "search"),
+    *("tools", "simulation", "registration", "sensor", "features", "matching"),
     *("similarity", "masks", "geometry", "rasters", "speckle"),
 )
 
@@ -50,13 +50,13 @@ def write(package: Path, name: str, *lines: str) -> None:
 
 def test_what_the_design_allows_passes(package: Path) -> None:
     write(package, "cli.py", "from .tools import run")
-    write(package, "tools/run.py", "from .. import simulation, quality, search, rasters, errors")
-    write(package, "quality/verdict.py", "from ..search import x", "from ..similarity import y")
+    write(package, "tools/run.py", "from .. import simulation, registration, matching, rasters, errors")
+    write(package, "registration/verdict.py", "from ..matching import x", "from ..similarity import y")
     write(package, "similarity/surface.py", "from ..masks import x", "from ..geometry import y")
     write(package, "simulation/pair.py", "from ..geometry import x", "from ..rasters import y")
     write(package, "rasters/warp.py", "from ..geometry import x", "from ..progress import y")
     write(package, "progress.py", "from .errors import CancelledError")
-    hint = ("from typing import TYPE_CHECKING", "if TYPE_CHECKING:", "    from .quality import x")
+    hint = ("from typing import TYPE_CHECKING", "if TYPE_CHECKING:", "    from .registration import x")
     write(package, "errors.py", *hint)
     done = lint(package)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -67,13 +67,13 @@ def test_what_the_design_allows_passes(package: Path) -> None:
     [
         ("rasters", "similarity"),
         ("geometry", "tools"),
-        ("similarity", "search"),
-        ("quality", "tools"),
+        ("similarity", "matching"),
+        ("registration", "tools"),
         ("tools", "cli"),
-        ("quality", "simulation"),
+        ("registration", "simulation"),
         ("geometry", "simulation"),
         ("simulation", "similarity"),
-        ("simulation", "quality"),
+        ("simulation", "registration"),
     ],
 )
 def test_what_it_does_not_allow_is_found(package: Path, lower: str, higher: str) -> None:

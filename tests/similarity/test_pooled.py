@@ -6,7 +6,7 @@ from scipy.ndimage import gaussian_filter
 from sklearn.metrics import mutual_info_score
 
 from groundtie.rasters.patch import Patch
-from groundtie.similarity.evidence import find_peak
+from groundtie.similarity.peak import find_peak
 from groundtie.similarity.pooled import BINS, GreyLevels, smooth
 from groundtie.similarity.surface import normalise
 

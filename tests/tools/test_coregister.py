@@ -37,8 +37,8 @@ from groundtie.geometry.tie_points import USED
 from groundtie.geometry.transform import Transform
 from groundtie.progress import Progress
 from groundtie.rasters.grid import Grid, reproject
+from groundtie.registration.registration import RegistrationResult
 from groundtie.tools.coregister import coregister
-from groundtie.tools.registration import RegistrationResult
 
 SIZE = (240, 220)
 

@@ -11,9 +11,9 @@ from textured_pairs import TexturedPair, error_px, write_textured_pair
 
 from groundtie.errors import NotRegisteredError, ParameterError
 from groundtie.geometry.models import Frame, Model, PolynomialModel
-from groundtie.search.pose_searches import SEARCHES
+from groundtie.registration.registration import RegistrationResult
+from groundtie.studies.pose_searches import SEARCHES
 from groundtie.tools.coregister import coregister
-from groundtie.tools.registration import RegistrationResult
 
 SIZE = (400, 380)
 

@@ -34,8 +34,8 @@ from groundtie.errors import (
 )
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.progress import Progress
+from groundtie.registration.registration import RegistrationResult
 from groundtie.tools.coregister import coregister
-from groundtie.tools.registration import RegistrationResult
 
 SIZE = (240, 220)
 QUICK: dict[str, Any] = {"similarity": "orientation", "workers": 2}

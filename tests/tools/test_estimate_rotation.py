@@ -18,9 +18,9 @@ from groundtie.declaration import tool_of
 from groundtie.errors import NotRegisteredError, ParameterError, SameFileError
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.transform import load_transform
+from groundtie.pose.pose import Pose
 from groundtie.rasters.grid import apply_affine
-from groundtie.search.pose import Pose
-from groundtie.search.pose_searches import SEARCHES
+from groundtie.studies.pose_searches import SEARCHES
 from groundtie.tools.estimate_rotation import estimate_rotation
 from groundtie.tools.warp import warp
 

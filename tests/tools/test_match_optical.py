@@ -23,9 +23,9 @@ from groundtie.features.classifier_training import Training, train_classifier
 from groundtie.features.optical import DESCRIPTORS, DETECTORS
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
-from groundtie.quality.verdict import Verdict
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
-from groundtie.tools.masking import MaskRequest
+from groundtie.registration.masking import MaskRequest
+from groundtie.registration.verdict import Verdict
 
 SIZE = (300, 280)
 

@@ -18,8 +18,8 @@ from groundtie import coregister, match_sar_sar
 from groundtie.errors import NotRegisteredError, ParameterError
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
-from groundtie.quality.verdict import Verdict
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
+from groundtie.registration.verdict import Verdict
 
 SIZE = (300, 280)
 
@@ -239,7 +239,7 @@ def test_what_leans_is_refused(
     monkeypatch: pytest.MonkeyPatch,
     tool: Callable[..., object],
 ) -> None:
-    shared = sys.modules["groundtie.tools.registration"]
+    shared = sys.modules["groundtie.registration.registration"]
     monkeypatch.setattr(shared, "leaning", lambda *_: "roofs")
     report = tmp_path / "report.html"
     with pytest.raises(NotRegisteredError, match="roofs"):

@@ -27,7 +27,7 @@ from groundtie.progress import Progress
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.similarity.evidence import Evidence
+from groundtie.similarity.peak import Evidence
 from groundtie.similarity.surface import (
     BORDER_PX,
     SimilaritySettings,
@@ -36,8 +36,8 @@ from groundtie.similarity.surface import (
 from groundtie.similarity.surface import (
     similarity_surface as matching_surface,
 )
+from groundtie.studies.window_surface import CHOICES, second_peak
 from groundtie.tools.similarity_surface import SurfaceResult, similarity_surface
-from groundtie.tools.window_surface import CHOICES, second_peak
 
 # The input claims to lie 70 m east and 45 m south of where it is; pixels are 10 m.
 TRUTH_PX = np.array([7.0, 4.5])

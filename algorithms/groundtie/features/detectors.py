@@ -15,8 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.patch import Patch
-from ..search.windows import reduced_patch
+from ..rasters.patch import Patch, reduced_patch
 from ..similarity.orientation import compress
 from ..speckle.isef import isef
 from .points import FeaturePoints

@@ -21,7 +21,7 @@ from ..rasters.reading import RasterSource, Window
 from ..rasters.warping import sample
 from .classifier_training import Training
 from .patch_statistics import BAND_RATIOS, NO_BANDS, PATCH_PX, patch_statistics
-from .tile_matching import MARGIN_PX, Detecting, inside, tiles
+from .tiles import MARGIN_PX, Detecting, inside, tiles
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.int8]

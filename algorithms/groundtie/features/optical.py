@@ -7,7 +7,7 @@ from .detectors import Detector
 from .haar import HaarDescriptor
 from .hog import HogDescriptor
 from .surf import SurfDetector
-from .tile_matching import Describing, Detecting
+from .tiles import Describing, Detecting
 
 DETECTORS = ("sift", "surf")
 DESCRIPTORS = ("hog81", "hog63", "sift", "surf")

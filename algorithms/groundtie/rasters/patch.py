@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+# A mean over a block is valid if the weights of all its pixels sum up to this.
+_ALL_VALID = 0.999
 
 
 @dataclass(frozen=True)
@@ -35,3 +40,18 @@ class Patch:
         """Return this patch without a border on each side."""
         inside = slice(border, -border or None)
         return Patch(self.values[inside, inside], self.valid[inside, inside])
+
+
+def reduced(image: NDArray[Any], factor: int) -> NDArray[Any]:
+    """Return the means over blocks; what is left over at the right and bottom is dropped."""
+    height, width = (n // factor * factor for n in image.shape)
+    size = (width // factor, height // factor)
+    return np.asarray(cv2.resize(image[:height, :width], size, interpolation=cv2.INTER_AREA))
+
+
+def reduced_patch(window: Patch, factor: int) -> Patch:
+    """Return a window's means over blocks; blocks with any masked pixel are masked."""
+    if factor == 1:
+        return window
+    valid = reduced(window.valid.astype(np.float32), factor) > _ALL_VALID
+    return Patch(reduced(np.where(window.valid, window.values, 0), factor), valid)

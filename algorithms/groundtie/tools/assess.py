@@ -10,6 +10,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
+from ..assessment.accuracy import (
+    Assessment,
+    PointErrors,
+    measure_check_points,
+    measure_tie_points,
+)
+from ..assessment.comparison import Comparison, compare
+from ..assessment.consistency import Leg, consistency
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import GeoreferencingError, NotRegisteredError, ParameterError, SameFileError
@@ -17,19 +25,11 @@ from ..geometry.models import KINDS
 from ..geometry.transform import Transform, load_transform
 from ..kinds import Choice, FileIn, FileOut, Number, RasterIn, check_different
 from ..progress import SILENT, Progress
-from ..quality.accuracy import (
-    Assessment,
-    PointErrors,
-    measure_check_points,
-    measure_tie_points,
-)
-from ..quality.comparison import Comparison, compare
-from ..quality.consistency import Leg, consistency
-from ..quality.report import PART_LABELS, AssessmentReport
-from ..quality.verdict import Verdict
 from ..rasters.atomic import Outputs
 from ..rasters.reading import RasterSource, bounded_cache, open_raster
-from .stored_transform import load_stored, transform_of
+from ..registration.stored_transform import load_stored, transform_of
+from ..registration.verdict import Verdict
+from ..report.report import PART_LABELS, AssessmentReport
 
 _TABLES = (".gpkg", ".geojson", ".csv", ".points")
 

@@ -7,28 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+from ..assessment.sensor_accuracy import SensorErrors, draw_vectors, table_lines, write_table
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import TooFewPointsError
 from ..kinds import FileIn, FileOut
 from ..progress import SILENT, Progress
-from ..quality.sensor_accuracy import SensorErrors, draw_vectors, table_lines, write_table
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache
+from ..registration.sensor_input import Ground, open_oriented_image, open_sensor_image
 from ..sensor.control_points import SUFFIXES, read_control_points
 from ..sensor.rpc import RPC
 from ..sensor.rpc_files import read_rpc
-from .sensor_input import (
-    Dem,
-    DemDatum,
-    Geoid,
-    Ground,
-    Height,
-    RpcFile,
-    SensorImage,
-    open_oriented_image,
-    open_sensor_image,
-)
+from .sensor_parameters import Dem, DemDatum, Geoid, Height, RpcFile, SensorImage
 
 BEFORE, AFTER = "before", "after"
 

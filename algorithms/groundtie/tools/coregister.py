@@ -13,15 +13,29 @@ from ..declaration import tool
 from ..kinds import Choice, Distance, Number
 from ..masks.radar import are_both_radar
 from ..masks.regions import WIDTH_M
+from ..matching.layout import lay_out_chips
+from ..matching.local import AUTO, LocalSearch
 from ..progress import SILENT, Progress
-from ..quality.leaning import CHIPS_MEAN_OVER_SCATTER
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
-from ..search.layout import lay_out_chips
-from ..search.local import AUTO, LocalSearch
+from ..registration.classifying import Classifying
+from ..registration.layover import CHIPS_MEAN_OVER_SCATTER
+from ..registration.masking import MaskRequest, by_what_is_left
+from ..registration.registered_output import RegisteredOutput, model_for_grid
+from ..registration.registration import (
+    RegistrationFiles,
+    RegistrationResult,
+    deliver,
+    open_image,
+    refuse_what_leans,
+    refuse_what_roofs_may_be,
+    register,
+    rough_search,
+    turn_within,
+)
 from ..similarity.binning import BINNINGS
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
-from .classifying import Classifying, InputClassifier, ReferenceClassifier
+from .classifier_parameters import InputClassifier, ReferenceClassifier
 from .common import (
     ChipSize,
     GpveOrder,
@@ -43,19 +57,7 @@ from .common import (
     Workers,
     worker_count,
 )
-from .masking import Mask, MaskImage, MaskLayer, MaskRequest, by_what_is_left
-from .registered_output import RegisteredOutput, model_for_grid
-from .registration import (
-    RegistrationFiles,
-    RegistrationResult,
-    deliver,
-    open_image,
-    refuse_what_leans,
-    refuse_what_roofs_may_be,
-    register,
-    rough_search,
-    turn_within,
-)
+from .mask_parameters import Mask, MaskImage, MaskLayer
 from .registration_parameters import (
     OUTPUTS,
     MaxError,

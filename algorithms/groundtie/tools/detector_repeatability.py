@@ -12,9 +12,7 @@ from typing import Annotated, Any
 
 from ..declaration import tool
 from ..errors import ParameterError
-from ..features.evaluation import Evaluation, Variant, evaluate
 from ..features.matching import METHODS
-from ..features.repeatability import CLASS_NAMES
 from ..geometry.transform import Transform, load_transform
 from ..kinds import Choice, FileIn, FileOut, Number, Text
 from ..progress import SILENT, Progress
@@ -22,7 +20,13 @@ from ..rasters.atomic import Outputs, writing
 from ..rasters.pair import ImagePair, make_pair
 from ..rasters.patch import Patch
 from ..rasters.reading import bounded_cache
-from .classifying import Classifying, InputClassifier, ReferenceClassifier
+from ..registration.classifying import Classifying
+from ..registration.registration import open_image
+from ..registration.stored_transform import transform_of
+from ..studies.evaluation import Evaluation, Variant, evaluate
+from ..studies.repeatability import CLASS_NAMES
+from ..studies.repeatability_picture import draw_evaluations
+from .classifier_parameters import InputClassifier, ReferenceClassifier
 from .common import (
     Input,
     InputBand,
@@ -32,9 +36,6 @@ from .common import (
     ReferenceBand,
     ReferenceMask,
 )
-from .registration import open_image
-from .repeatability_picture import draw_evaluations
-from .stored_transform import transform_of
 
 
 @dataclass(frozen=True)

@@ -14,18 +14,18 @@ from ..declaration import tool
 from ..errors import NotRegisteredError, ParameterError
 from ..geometry.transform import Transform
 from ..kinds import Choice, Distance, FileOut, Number
+from ..pose.pose import Pose
+from ..pose.rotation_verdict import PoseVerdict, judge_pose
+from ..pose.rotation_windows import PoseWindows, read_windows
 from ..progress import SILENT, Progress
-from ..quality.verdict import refuse
 from ..rasters.atomic import Outputs, writing
 from ..rasters.pair import Image
 from ..rasters.reading import bounded_cache, open_raster
-from ..search.pose import Pose
-from ..search.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
-from ..search.rotation_verdict import PoseVerdict, judge_pose
-from ..search.rotation_windows import PoseWindows, read_windows
+from ..registration.verdict import refuse
+from ..report.rotation_picture import draw_evidence
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
+from ..studies.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
 from .common import Input, InputBand, Reference, ReferenceBand, TransformOut, Workers, worker_count
-from .rotation_picture import draw_evidence
 
 _AUTO = "auto"
 

@@ -13,12 +13,16 @@ from ..declaration import tool
 from ..kinds import VectorOut
 from ..masks.choice import NONE, REFERENCE, MaskUsed
 from ..progress import SILENT, Progress
-from ..quality.verdict import Verdict
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache
+from ..registration.classifying import Classifying
+from ..registration.ground_control import Matching, match_ground_control, open_reference
+from ..registration.masking import MaskRequest
+from ..registration.sensor_input import Ground, open_oriented_image
+from ..registration.verdict import Verdict
 from ..sensor.control_points import SUFFIXES, ControlPoints
 from ..similarity.surface import SimilaritySettings
-from .classifying import Classifying, InputClassifier
+from .classifier_parameters import InputClassifier
 from .common import (
     ChipSize,
     HighPercent,
@@ -31,19 +35,7 @@ from .common import (
     Workers,
     worker_count,
 )
-from .ground_control import Matching, match_ground_control, open_reference
-from .masking import MaskRequest
 from .registration_parameters import MaxError
-from .sensor_input import (
-    Dem,
-    DemDatum,
-    Geoid,
-    Ground,
-    Height,
-    RpcFile,
-    SensorImage,
-    open_oriented_image,
-)
 from .sensor_matching import (
     ImageBand,
     MaskKind,
@@ -51,6 +43,7 @@ from .sensor_matching import (
     Similarity,
     TwoWayError,
 )
+from .sensor_parameters import Dem, DemDatum, Geoid, Height, RpcFile, SensorImage
 
 
 @dataclass(frozen=True)

@@ -11,20 +11,35 @@ from types import MappingProxyType
 from typing import Annotated, Any
 
 from ..declaration import tool
-from ..features.guided import GuidedSearch
-from ..features.hybrid import FeatureSearch
 from ..features.optical import DESCRIPTORS, DETECTORS, optical_descriptor, optical_detector
-from ..features.tile_matching import FeatureMatcher
 from ..kinds import Choice, Number
 from ..masks.choice import NONE
+from ..matching.alignment import LINEAR_CANDIDATES
+from ..matching.feature_tiles import FeatureMatcher
+from ..matching.guided import GuidedSearch
+from ..matching.hybrid import FeatureSearch
+from ..matching.layout import lay_out_chips
+from ..matching.local import AUTO, LocalSearch
 from ..progress import SILENT, Progress
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
-from ..search.alignment import LINEAR_CANDIDATES
-from ..search.layout import lay_out_chips
-from ..search.local import AUTO, LocalSearch
+from ..registration.classifying import Classifying
+from ..registration.masking import MaskRequest
+from ..registration.registered_output import RegisteredOutput, model_for_grid
+from ..registration.registration import (
+    RegistrationFiles,
+    RegistrationResult,
+    TiePointMatching,
+    deliver,
+    free_radius,
+    open_image,
+    refuse_what_roofs_may_be,
+    register,
+    rough_search,
+    turn_within,
+)
 from ..similarity.surface import SimilaritySettings
-from .classifying import Classifying, PlainInputClassifier, ReferenceClassifier
+from .classifier_parameters import PlainInputClassifier, ReferenceClassifier
 from .common import (
     Input,
     InputBand,
@@ -48,20 +63,6 @@ from .feature_parameters import (
     LargestRatio,
     Refinement,
     refinement_settings,
-)
-from .masking import MaskRequest
-from .registered_output import RegisteredOutput, model_for_grid
-from .registration import (
-    RegistrationFiles,
-    RegistrationResult,
-    TiePointMatching,
-    deliver,
-    free_radius,
-    open_image,
-    refuse_what_roofs_may_be,
-    register,
-    rough_search,
-    turn_within,
 )
 from .registration_parameters import (
     OUTPUTS,

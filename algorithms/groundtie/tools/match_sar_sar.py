@@ -16,19 +16,34 @@ from ..errors import ParameterError
 from ..features.descriptors import Descriptor
 from ..features.detectors import DETECTORS, Detector
 from ..features.gradients import GRADIENTS
-from ..features.hybrid import FeatureSearch
-from ..features.tile_matching import FeatureMatcher
 from ..kinds import Choice, Number, RasterIn
 from ..masks.choice import NONE
 from ..masks.regions import WIDTH_M
+from ..matching.feature_tiles import FeatureMatcher
+from ..matching.hybrid import FeatureSearch
+from ..matching.layout import lay_out_chips
+from ..matching.local import AUTO, LocalSearch
 from ..progress import SILENT, Progress
-from ..quality.leaning import FEATURES_MEAN_OVER_SCATTER
 from ..rasters.pair import default_radius_m, make_pair
 from ..rasters.reading import bounded_cache
-from ..search.layout import lay_out_chips
-from ..search.local import AUTO, LocalSearch
+from ..registration.classifying import Classifying
+from ..registration.layover import FEATURES_MEAN_OVER_SCATTER
+from ..registration.masking import MaskRequest
+from ..registration.registered_output import RegisteredOutput, model_for_grid
+from ..registration.registration import (
+    RegistrationFiles,
+    RegistrationResult,
+    deliver,
+    free_radius,
+    open_image,
+    refuse_what_leans,
+    refuse_what_roofs_may_be,
+    register,
+    rough_search,
+    turn_within,
+)
 from ..similarity.surface import SimilaritySettings
-from .classifying import Classifying, InputClassifier, ReferenceClassifier
+from .classifier_parameters import InputClassifier, ReferenceClassifier
 from .common import (
     HighPercent,
     Input,
@@ -57,20 +72,7 @@ from .feature_parameters import (
     Refinement,
     refinement_settings,
 )
-from .masking import Mask, MaskImage, MaskLayer, MaskRequest
-from .registered_output import RegisteredOutput, model_for_grid
-from .registration import (
-    RegistrationFiles,
-    RegistrationResult,
-    deliver,
-    free_radius,
-    open_image,
-    refuse_what_leans,
-    refuse_what_roofs_may_be,
-    register,
-    rough_search,
-    turn_within,
-)
+from .mask_parameters import Mask, MaskImage, MaskLayer
 from .registration_parameters import (
     OUTPUTS,
     MaxError,

@@ -22,20 +22,11 @@ from ..rasters.grid import Grid
 from ..rasters.reading import bounded_cache, open_raster
 from ..rasters.target_grids import covering_grid, registered_grid
 from ..rasters.writing import write_cog
+from ..registration.sensor_input import Ground, open_sensor_image, utm_of
 from ..sensor.dense import DenseOrientation
 from ..sensor.orientation import Orientation
 from .common import Resampling, Workers, crs_name, worker_count
-from .sensor_input import (
-    Dem,
-    DemDatum,
-    Geoid,
-    Ground,
-    Height,
-    RpcFile,
-    SensorImage,
-    open_sensor_image,
-    utm_of,
-)
+from .sensor_parameters import Dem, DemDatum, Geoid, Height, RpcFile, SensorImage
 
 
 @dataclass(frozen=True)

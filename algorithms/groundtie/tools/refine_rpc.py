@@ -17,15 +17,21 @@ from ..errors import ParameterError
 from ..kinds import Choice, FileIn, FileOut, Number, RasterIn, VectorOut
 from ..masks.choice import NONE, REFERENCE, MaskUsed
 from ..progress import SILENT, Progress
-from ..quality.refinement import RefinementVerdict
 from ..rasters.reading import bounded_cache
+from ..registration.classifying import Classifying
+from ..registration.ground_control import Matching, match_ground_control, open_reference
+from ..registration.masking import MaskRequest
+from ..registration.refinement import Fitting, Refinement
+from ..registration.refinement_output import IMAGES, Call, RefinementFiles
+from ..registration.refinement_verdict import RefinementVerdict
+from ..registration.sensor_input import Ground, open_oriented_image
 from ..sensor.adjustment import AUTO, METHODS, ROBUST, Adjustment
 from ..sensor.bias import KINDS
 from ..sensor.control_points import SUFFIXES, read_control_points
 from ..sensor.height_check import HeightCheck
 from ..sensor.rpc_fit import RPCFit
 from ..similarity.surface import SimilaritySettings
-from .classifying import Classifying, InputClassifier
+from .classifier_parameters import InputClassifier
 from .common import (
     ChipSize,
     HighPercent,
@@ -37,21 +43,7 @@ from .common import (
     Workers,
     worker_count,
 )
-from .ground_control import Matching, match_ground_control, open_reference
-from .masking import MaskRequest
-from .refinement import Fitting, Refinement
-from .refinement_output import IMAGES, Call, RefinementFiles
 from .registration_parameters import MaxError
-from .sensor_input import (
-    Dem,
-    DemDatum,
-    Geoid,
-    Ground,
-    Height,
-    RpcFile,
-    SensorImage,
-    open_oriented_image,
-)
 from .sensor_matching import (
     ImageBand,
     MaskKind,
@@ -59,6 +51,7 @@ from .sensor_matching import (
     Similarity,
     TwoWayError,
 )
+from .sensor_parameters import Dem, DemDatum, Geoid, Height, RpcFile, SensorImage
 
 
 @dataclass(frozen=True)

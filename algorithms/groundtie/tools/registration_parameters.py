@@ -8,9 +8,9 @@ from typing import Annotated
 from ..declaration import Output
 from ..geometry.models import KINDS
 from ..kinds import Choice, FileOut, Number, VectorOut
-from ..search.local import AUTO
-from ..search.pose_searches import SEARCHES
-from .registered_output import OUTPUT_GRIDS
+from ..matching.local import AUTO
+from ..registration.registered_output import OUTPUT_GRIDS
+from ..studies.pose_searches import SEARCHES
 
 Model = Annotated[
     str,

@@ -26,8 +26,9 @@ from ..rasters.pair import Image, ImagePair, make_pair
 from ..rasters.reading import RasterSource, bounded_cache, open_raster
 from ..rasters.writing import BLOCK, check_complete
 from ..similarity.binning import BINNINGS
-from ..similarity.evidence import Evidence, find_peak
+from ..similarity.peak import Evidence, find_peak
 from ..similarity.surface import Surface
+from ..studies.window_surface import CHOICES, GREY_VALUES, SurfaceSettings, Window, second_peak
 from .common import (
     GpveOrder,
     Input,
@@ -41,7 +42,6 @@ from .common import (
     Workers,
     worker_count,
 )
-from .window_surface import CHOICES, GREY_VALUES, SurfaceSettings, Window, second_peak
 
 _DEFAULT_RADIUS_PX, _LARGEST_RADIUS_PX = 20, 100
 

@@ -21,8 +21,8 @@ from ..rasters.delivery import warp_raster
 from ..rasters.grid import Grid, reproject
 from ..rasters.reading import open_raster
 from ..rasters.target_grids import covering_grid, registered_grid
+from ..registration.stored_transform import TiePointFit, load_stored, transform_of
 from .common import Input, Output, Resampling, Workers, crs_name, worker_count
-from .stored_transform import TiePointFit, load_stored, transform_of
 
 FloatArray = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""How good a transform is, whoever made it: errors at points, consistency, comparison."""

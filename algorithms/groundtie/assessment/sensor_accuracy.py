@@ -1,0 +1,122 @@
+"""Errors of RPCs at independent check points, before and after a refinement (S table 5.7)."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+
+from ..rasters.atomic import writing
+from ..rasters.grid import Grid, reproject
+from ..report.figures import CHECK_COLOUR, FIT_COLOUR, round_length
+from ..sensor.control_points import ControlPoints
+from ..sensor.rpc import RPC
+from ..sensor.surfaces import LON_LAT
+from .accuracy import Statistics
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SensorErrors:
+    """By how much RPCs miss points.
+
+    Parameters
+    ----------
+    error_px
+        Where the points are in the image minus where the RPCs see them (col, row), (n, 2).
+    error_m
+        Where the RPCs put what the image shows, at the points' heights, minus where the points
+        are, metres along the axes of the map, (n, 2).
+    """
+
+    error_px: FloatArray
+    error_m: FloatArray
+
+    @classmethod
+    def of(cls, rpc: RPC, points: ControlPoints) -> SensorErrors:
+        """Measure the errors of RPCs."""
+        table = points.points
+        shown = rpc.localise(table.input_px, points.height_m)
+        moved = reproject(shown, LON_LAT, points.crs) - table.reference_xy
+        middle = Affine.translation(*table.reference_xy.mean(axis=0).tolist())
+        here = Grid(middle, points.crs, 1, 1)
+        error_px = table.input_px - rpc.project(points.lon_lat, points.height_m)
+        return cls(error_px, moved * here.metres_per_unit)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the statistics as values that JSON can carry."""
+        return {
+            **Statistics.of(self.error_px).summary("px", ("col", "row")),
+            **Statistics.of(self.error_m).summary("m", ("x", "y")),
+            "mean_absolute_m": np.abs(self.error_m).mean(axis=0).tolist(),
+        }
+
+
+def table_lines(errors: dict[str, SensorErrors]) -> list[str]:
+    """Return the errors of each point, and what there is to say of all, as lines of text."""
+    head = "point" + "".join(f"  {name + ' x':>10}{'y (m)':>9}" for name in errors)
+    lines = [head]
+    count = len(next(iter(errors.values())).error_m)
+
+    def row(label: str, values: list[FloatArray]) -> str:
+        cells = "".join(f"  {x:10.2f}{y:9.2f}" for x, y in values)
+        return f"{label:<5}{cells}"
+
+    for i in range(count):
+        lines.append(row(str(i + 1), [each.error_m[i] for each in errors.values()]))
+    lines.append(row("|mean|", [np.abs(e.error_m).mean(axis=0) for e in errors.values()]))
+    lines.append(row("std", [e.error_m.std(axis=0) for e in errors.values()]))
+    for name, each in errors.items():
+        metres, px = Statistics.of(each.error_m), Statistics.of(each.error_px)
+        lines.append(
+            f"{name}: RMSE {metres.rmse:.2f} m ({px.rmse:.2f} px), CE90 {metres.ce90:.2f} m, "
+            f"largest {metres.largest:.2f} m"
+        )
+    return lines
+
+
+def write_table(path: Path, points: ControlPoints, errors: dict[str, SensorErrors]) -> None:
+    """Write the errors of each point as CSV."""
+    names = ["x", "y", "height_m", "col", "row"]
+    columns = [points.points.reference_xy, points.height_m[:, None], points.points.input_px]
+    for name, each in errors.items():
+        names += [f"{name}_{axis}" for axis in ("x_m", "y_m", "col_px", "row_px")]
+        columns += [each.error_m, each.error_px]
+    with writing(path), path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(names)
+        table.writerows(np.hstack(columns).tolist())
+
+
+def draw_vectors(
+    path: Path, points: ControlPoints, errors: dict[str, SensorErrors], size: tuple[int, int]
+) -> None:
+    """Draw the errors as arrows in the image, before and after side by side, each to its scale."""
+    from matplotlib.figure import Figure  # heavy
+
+    figure = Figure(figsize=(5.0 * len(errors), 5.0 * size[1] / size[0] + 0.8), layout="tight")
+    for i, (name, each) in enumerate(errors.items()):
+        axes = figure.add_subplot(1, len(errors), i + 1)
+        length = np.hypot(*each.error_px.T)
+        unit = round_length(float(np.median(length)))
+        stretch = 0.1 * max(size) / unit
+        col, row = points.points.input_px.T
+        arrows = axes.quiver(
+            col, row, *(each.error_px * stretch).T, angles="xy", scale_units="xy", scale=1,
+            color=FIT_COLOUR if i else CHECK_COLOUR, width=0.006,
+        )  # fmt: skip
+        axes.quiverkey(arrows, 0.85, 1.04, unit * stretch, f"{unit:g} px", coordinates="axes")
+        axes.plot(col, row, ".", color="black", markersize=3)
+        rmse = Statistics.of(each.error_px).rmse
+        axes.set_title(f"{name}: RMSE {rmse:.2f} px", loc="left", fontsize=10)
+        axes.set_xlim(0, size[0])
+        axes.set_ylim(size[1], 0)
+        axes.set_aspect("equal")
+    with writing(path):
+        figure.savefig(path, format="png", dpi=130, metadata={"Software": None})

@@ -1,0 +1,56 @@
+"""Tiles in which features are found, and what finds and describes them there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rasters.grid import Grid
+from ..rasters.patch import Patch
+from ..rasters.reading import Mask, Window
+from .detectors import FloatImage
+from .points import FeaturePoints
+
+FloatArray = NDArray[np.float64]
+
+# Tiles of a grid, and what features near their border see beyond it.
+_TILE_PX = 1024
+MARGIN_PX = 64
+
+
+class Detecting(Protocol):
+    """What finds features."""
+
+    def detect(self, window: Patch) -> FeaturePoints:
+        """Return the features of an image window, upright."""
+
+
+class Describing(Protocol):
+    """What describes features."""
+
+    def describe(self, window: Patch, found: FeaturePoints) -> tuple[FeaturePoints, FloatImage]:
+        """Return m features, which may be repeated, and their descriptors, shape (m, k)."""
+
+
+def widened(window: Window, margin: int) -> Window:
+    """Return a window with a margin on each side."""
+    size = window.width + 2 * margin, window.height + 2 * margin
+    return Window(window.col - margin, window.row - margin, *size)
+
+
+def inside(px: FloatArray, window: Window) -> Mask:
+    """Tell which positions (col, row), shape (n, 2), lie on the pixels of a window."""
+    at = np.rint(px)
+    low = np.array([window.col, window.row])
+    return np.asarray(np.all((at >= low) & (at < low + [window.width, window.height]), axis=1))
+
+
+def tiles(grid: Grid) -> Iterator[Window]:
+    """Return tiles that cover a grid."""
+    for row in range(0, grid.height, _TILE_PX):
+        for col in range(0, grid.width, _TILE_PX):
+            width, height = min(_TILE_PX, grid.width - col), min(_TILE_PX, grid.height - row)
+            yield Window(col, row, width, height)

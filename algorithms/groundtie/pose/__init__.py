@@ -1,0 +1,1 @@
+"""Rotation, scale and shift between two images that georeferencing does not know."""

@@ -1,0 +1,187 @@
+"""Two rasters as windows whose pose is searched for, reduced and with a common claimed centre."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+
+from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
+from ..geometry.fitting import fit_model
+from ..geometry.models import Frame, PolynomialModel
+from ..geometry.transform import Transform
+from ..matching.chips import MaskOf
+from ..rasters.grid import PIXEL_COORDINATES, Grid, apply_affine
+from ..rasters.pair import Image
+from ..rasters.patch import Patch
+from .pose import Pose, PoseLimits
+
+FloatArray = NDArray[np.float64]
+
+# The longer side of windows, in pixels: what is larger is averaged.
+LONGEST_PX = 512
+
+# How far the input may be off by default, as a share of its longer side.
+_DEFAULT_RADIUS_SHARE = 0.25
+
+
+@dataclass(frozen=True)
+class PoseWindows:
+    """Reference and input as their georeferencing claims them to lie: of equal pixels, north up.
+
+    Images without georeferencing are taken to have equal pixels and a common centre.
+
+    Parameters
+    ----------
+    reference, input
+        The windows; they have one centre.
+    reference_grid, input_grid
+        Where their pixels lie on the reference's map.
+    claim
+        Reference map position → input pixel position, as claimed.
+    radius_m
+        How far the input may be off.
+    """
+
+    reference: Patch
+    input: Patch
+    reference_grid: Grid
+    input_grid: Grid
+    claim: Transform
+    radius_m: float
+
+    @property
+    def pixel_m(self) -> float:
+        """Side of the pixels, in metres (in pixels of the images without georeferencing)."""
+        return self.reference_grid.pixel_size_m
+
+    @property
+    def is_georeferenced(self) -> bool:
+        """Whether the images are."""
+        return self.claim.input_grid.is_georeferenced
+
+    def limits(self, rotation_deg: float, scale: tuple[float, float]) -> PoseLimits:
+        """Return the limits of a search in these windows."""
+        return PoseLimits(self.radius_m / self.pixel_m, rotation_deg, scale)
+
+    def transform(self, pose: Pose) -> Transform:
+        """Return the transform between the rasters if the windows have a pose to one another."""
+        shapes = [(grid.height, grid.width) for grid in (self.reference_grid, self.input_grid)]
+        moved = apply_affine(pose.between(shapes[0], shapes[1]), self.reference_grid.outline(4))
+        xy = self.reference_grid.pixel_to_map(self.reference_grid.outline(4))
+        claimed = self.claim.model(self.input_grid.pixel_to_map(moved))
+        model = fit_model("affine", xy, claimed)
+        return Transform(model, self.claim.crs, self.claim.input_grid)
+
+
+def read_windows(
+    reference: Image,
+    input: Image,
+    scale: tuple[float, float],
+    radius_m: float | None = None,
+    held_out: MaskOf | None = None,
+) -> PoseWindows:
+    """Read what two images may have in common.
+
+    Parameters
+    ----------
+    reference, input
+        The images.
+    scale
+        Smallest and largest scale that will be searched for.
+    radius_m
+        How far the input may lie from where it claims to be; None: a quarter of its longer side.
+    held_out
+        Returns for a piece of the grid which pixels of the reference must not be seen; None: all
+        may be.
+
+    Raises
+    ------
+    GeoreferencingError
+        Only one of the images is georeferenced.
+    NoOverlapError
+        They do not show common ground.
+    RasterContentError
+        One of them is constant or has no valid pixel.
+    """
+    claim = _claim(reference, input)
+    own = reference.source.grid
+    frame = _metric_frame(own)
+    low, high = _box(frame, own.pixel_to_map(own.outline()))
+    claimed = claim.inverse(claim.input_grid.outline())
+    if not np.isfinite(claimed).all():
+        raise NoOverlapError(_apart(reference, input))
+    claimed_low, claimed_high = _box(frame, claimed)
+    side = float((claimed_high - claimed_low).max())
+    radius = _DEFAULT_RADIUS_SHARE * side if radius_m is None else radius_m
+    # Wherever it is turned to, the input shows no more of the reference than this.
+    reach = float(np.hypot(*(claimed_high - claimed_low))) / 2 / scale[0] + radius
+    middle = (claimed_low + claimed_high) / 2
+    low, high = np.maximum(low, middle - reach), np.minimum(high, middle + reach)
+    if (high <= low).any() or ((claimed_low > high + radius) | (claimed_high < low - radius)).any():
+        raise NoOverlapError(_apart(reference, input))
+    centre, half = (low + high) / 2, (high - low) / 2
+    needed = float(np.hypot(*half)) * scale[1] + radius
+    around = np.minimum(np.maximum(claimed_high - centre, centre - claimed_low), needed)
+    longest = 2 * max(half.max(), around.max() / np.sqrt(scale[0] * scale[1]))
+    pixel = max(own.pixel_size_m, claim.input_grid.pixel_size_m, longest / LONGEST_PX)
+    grids = [_grid(frame, own, centre, size, pixel) for size in (half, around)]
+    # Larger by their last, incomplete pixels, windows still have one centre.
+    windows = PoseWindows(
+        reference.read_onto(
+            grids[0], own.map_to_pixel, hidden=None if held_out is None else held_out(grids[0])
+        ),
+        input.read_onto(grids[1], claim),
+        grids[0],
+        grids[1],
+        claim,
+        radius,
+    )
+    for image, patch in ((reference, windows.reference), (input, windows.input)):
+        if not patch.valid.any():
+            raise RasterContentError(f"{image.source.path} has no valid pixel to compare")
+        if patch.is_flat:
+            raise RasterContentError(f"{image.source.path} is constant")
+    return windows
+
+
+def _claim(reference: Image, input: Image) -> Transform:
+    ref, inp = reference.source, input.source
+    for one, other in ((ref, inp), (inp, ref)):
+        if one.grid.is_georeferenced and not other.grid.is_georeferenced:
+            raise GeoreferencingError(f"{other.path} has no georeferencing, but {one.path} has")
+        if one.grid.crs is not None and other.grid.crs is None:
+            raise GeoreferencingError(f"{other.path} has no CRS, but {one.path} has")
+    if ref.grid.is_georeferenced:
+        return Transform.as_claimed(ref.grid.crs, inp.grid)
+    apart = np.subtract(inp.grid.centre_px, ref.grid.centre_px)
+    model = PolynomialModel("translation", Frame(Affine.identity()), apart[None])
+    return Transform(model, None, inp.grid)
+
+
+def _metric_frame(grid: Grid) -> Affine:
+    """Return the transform from metres right and down of a grid's centre to its map."""
+    x, y = grid.pixel_to_map([grid.centre_px])[0]
+    across, along = grid.metres_per_unit
+    down = 1 if grid.transform == PIXEL_COORDINATES else -1
+    return Affine(1 / across, 0, x, 0, down / along, y)
+
+
+def _box(frame: Affine, xy: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper limits of map positions, in metres right and down."""
+    metres = apply_affine(~frame, xy)
+    return metres.min(axis=0), metres.max(axis=0)
+
+
+def _grid(frame: Affine, like: Grid, centre: FloatArray, half: FloatArray, pixel: float) -> Grid:
+    """Return the grid of square pixels around a centre that covers a box of half its size."""
+    width, height = np.maximum(np.ceil(2 * half / pixel - 1e-6), 1).astype(int)
+    left, top = centre - np.array([width, height]) * pixel / 2
+    corner = frame * Affine.translation(left, top) * Affine.scale(pixel)
+    return Grid(corner, like.crs, int(width), int(height))
+
+
+def _apart(reference: Image, input: Image) -> str:
+    return f"{reference.source.path} and {input.source.path} do not overlap"

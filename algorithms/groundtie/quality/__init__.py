@@ -1,1 +1,0 @@
-"""Quality: the verdict on a registration, and the report that shows it."""

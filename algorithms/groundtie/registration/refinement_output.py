@@ -1,0 +1,160 @@
+"""The files of a refinement: RPCs or a copy of the image with them, residuals, report."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..assessment.comparison import Comparison
+from ..progress import Progress
+from ..rasters.atomic import Outputs
+from ..rasters.delivery import write_with_geotransform
+from ..rasters.grid import FloatArray
+from ..report.refinement_report import RefinementReport
+from ..sensor.control_points import ControlPoints
+from ..sensor.height_check import HeightCheck
+from ..sensor.orientation import sensor_grid
+from ..sensor.rpc_files import write_rpc
+from ..sensor.rpc_fit import RPCFit
+from ..sensor.rpc_tags import rpc_to_tags
+from .ground_control import GroundControl
+from .refinement import Refinement
+from .registration import report_on
+from .sensor_input import OrientedImage
+
+# Outputs that are copies of the image.
+IMAGES = (".tif", ".tiff")
+
+
+@dataclass(frozen=True)
+class Call:
+    """What a report says of how it was made.
+
+    Parameters
+    ----------
+    parameters
+        What the tool was called with.
+    started
+        When, by `time.perf_counter`.
+    """
+
+    parameters: Mapping[str, Any]
+    started: float
+
+
+@dataclass(frozen=True)
+class RefinementFiles:
+    """The files that are asked for; None: not."""
+
+    output: Path
+    residuals: Path | None
+    report: Path | None
+
+    def written(self) -> dict[str, str]:
+        """Return what is written, by name."""
+        named = {"output": self.output, "residuals": self.residuals, "report": self.report}
+        return {name: str(path) for name, path in named.items() if path is not None}
+
+    def points_or_report(self, found: GroundControl, call: Call) -> ControlPoints:
+        """Return matched points; if they are refused, write the report on that and raise.
+
+        Raises
+        ------
+        NotRegisteredError
+            They are refused.
+        """
+        if not found.registration.verdict.accepted and self.report is not None:
+            page = report_on(found.registration, call.parameters, call.started, found.mask)
+            with Outputs() as outputs:
+                page.write(
+                    outputs.stage(self.report), outputs.stage(self.report.with_suffix(".json"))
+                )
+        return found.accepted()
+
+    def write(
+        self,
+        refinement: Refinement,
+        heights: HeightCheck,
+        found: GroundControl | None,
+        call: Call,
+        progress: Progress,
+    ) -> RPCFit:
+        """Write all files and return the refined RPCs; of a refused refinement the report alone.
+
+        Parameters
+        ----------
+        refinement
+            What was estimated.
+        heights
+            What speaks against the heights.
+        found
+            The matching that the points come from; None: they were given.
+        call
+            For the report.
+        progress
+            Is told of every tile of a copied image.
+
+        Raises
+        ------
+        NotRegisteredError
+            The refinement is refused.
+        """
+        image, accepted = refinement.image, refinement.judged.verdict.accepted
+        with Outputs() as outputs:
+            if self.report is not None:
+                _report(refinement, heights, found, call).write(
+                    outputs.stage(self.report), outputs.stage(self.report.with_suffix(".json"))
+                )
+            if accepted:
+                fit = refinement.accepted()
+                _write_rpcs(image, fit, outputs.stage(self.output), progress)
+                if self.residuals is not None:
+                    by_refined = image.orientation.with_rpc(fit.rpc)
+                    staged = outputs.stage(self.residuals)
+                    refinement.points.write(staged, by_refined, image.source.grid)
+        return refinement.accepted()
+
+
+def _write_rpcs(image: OrientedImage, fit: RPCFit, path: Path, progress: Progress) -> None:
+    source = image.source
+    if path.suffix.lower() in IMAGES:
+        tags = rpc_to_tags(fit.rpc)
+        write_with_geotransform(source, source.grid, path, rpc_tags=tags, progress=progress)
+        return
+    write_rpc(path, fit.rpc)
+
+
+def _report(
+    refinement: Refinement, heights: HeightCheck, found: GroundControl | None, call: Call
+) -> RefinementReport:
+    image = refinement.image
+    return RefinementReport(
+        title=f"RPCs of {Path(image.source.path).name}, refined",
+        judged=refinement.judged,
+        bias=refinement.adjustment.bias,
+        residuals=refinement.residuals(),
+        grid=refinement.grid,
+        pixel_m=sensor_grid(image.source, image.orientation).pixel_size_m,
+        heights=image.heights,
+        warnings=tuple(heights.warnings()),
+        comparison=None if found is None else _compared(refinement, found),
+        mask=None if found is None else found.mask,
+        parameters={k: v for k, v in call.parameters.items() if v is not None},
+        seconds=time.perf_counter() - call.started,
+    )
+
+
+def _compared(refinement: Refinement, found: GroundControl) -> Comparison:
+    """Draw the reference and the image on the map, as delivered and as refined."""
+    pair, image = found.registration.pair, refinement.image
+    delivered = replace(image.source, grid=sensor_grid(image.source, image.orientation))
+    pair = replace(pair, input=replace(pair.input, source=delivered))
+
+    def refined(xy: FloatArray) -> FloatArray:
+        px = image.orientation.to_px(xy)
+        return px + refinement.adjustment.bias(px)
+
+    return Comparison.of(pair, refined)

@@ -1,0 +1,155 @@
+"""What tools for images with RPCs share: their parameters, and the image oriented by them."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rasterio.crs import CRS
+
+from ..errors import ParameterError
+from ..progress import Progress
+from ..rasters.reading import RasterSource, open_raster
+from ..sensor.heights import DATUMS, declared_datum, find_geoid
+from ..sensor.orientation import Orientation, orient, seen_at
+from ..sensor.rpc import RPC
+from ..sensor.rpc_files import rpc_of
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Where heights come from, as a user says it.
+
+    Parameters
+    ----------
+    dem, datum, geoid
+        A terrain model, and what it counts from: a datum's name or a geoid's grid.
+    height_m
+        The height without a terrain model; None: the RPCs' own.
+
+    Raises
+    ------
+    ParameterError
+        They do not go together.
+    """
+
+    dem: Path | None
+    datum: str | None
+    geoid: Path | None
+    height_m: float | None
+
+    def __post_init__(self) -> None:
+        if self.dem is None and (self.datum is not None or self.geoid is not None):
+            raise ParameterError("a vertical datum or geoid goes with a terrain model (dem)")
+        if self.dem is not None and self.height_m is not None:
+            raise ParameterError("give either a terrain model (dem) or one height")
+        if self.dem is not None and (self.datum is None) == (self.geoid is None):
+            raise ParameterError(
+                "say what the heights of the terrain model count from: either dem_datum "
+                f"({', '.join(DATUMS)}) or a geoid grid"
+            )
+
+    def note(self, rpc: RPC) -> str:
+        """Return in words which heights are used."""
+        if self.dem is not None:
+            return f"heights of {self.dem} above {self.datum or self.geoid}"
+        height = rpc.offset[2] if self.height_m is None else self.height_m
+        return f"no terrain model: the height is {height:g} m above the ellipsoid everywhere"
+
+    def orientation(
+        self, source: RasterSource, rpc: RPC, crs: CRS, stack: ExitStack
+    ) -> Orientation:
+        """Return an image's orientation; rasters are opened within `stack`.
+
+        Raises
+        ------
+        ParameterError
+            The terrain model itself names another vertical datum.
+        GeoreferencingError, NoOverlapError, RasterContentError
+            See `orient` and `find_geoid`.
+        """
+
+        def opened(path: Path) -> RasterSource:
+            return stack.enter_context(open_raster(path))
+
+        geoid = self.geoid
+        if geoid is None and self.datum is not None:
+            geoid = find_geoid(self.datum)
+        dem = None if self.dem is None else opened(self.dem)
+        declared = None if dem is None else declared_datum(dem)
+        if declared is not None and self.datum is not None and declared != self.datum:
+            raise ParameterError(
+                f"{self.dem} says that its heights count from {declared}, not {self.datum}"
+            )
+        return orient(
+            source,
+            rpc,
+            crs,
+            dem,
+            None if geoid is None else opened(geoid),
+            self.height_m,
+        )
+
+
+def open_sensor_image(
+    image: Path, rpc_file: Path | None, stack: ExitStack
+) -> tuple[RasterSource, RPC]:
+    """Open an image in sensor geometry, and return it with its RPCs."""
+    source = stack.enter_context(open_raster(image, allow_sensor_geometry=True))
+    return source, rpc_of(source, rpc_file)
+
+
+@dataclass(frozen=True)
+class OrientedImage:
+    """An image located by its RPCs and heights, as they were delivered.
+
+    Parameters
+    ----------
+    source
+        The image, open.
+    rpc
+        Its RPCs.
+    orientation
+        How it sees the ground.
+    heights
+        Which heights are used, in words.
+    """
+
+    source: RasterSource
+    rpc: RPC
+    orientation: Orientation
+    heights: str
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.source.grid.width, self.source.grid.height
+
+
+def open_oriented_image(
+    image: Path,
+    rpc_file: Path | None,
+    ground: Ground,
+    crs: CRS | None,
+    stack: ExitStack,
+    progress: Progress,
+) -> OrientedImage:
+    """Open an image in sensor geometry and locate it on a map; by default on that of its UTM zone.
+
+    `progress` is told which heights are used.
+    """
+    source, rpc = open_sensor_image(image, rpc_file, stack)
+    heights = ground.note(rpc)
+    progress.update(0.0, heights)
+    orientation = ground.orientation(source, rpc, crs or utm_of(source, rpc), stack)
+    return OrientedImage(source, rpc, orientation, heights)
+
+
+def utm_of(source: RasterSource, rpc: RPC) -> CRS:
+    """Return the UTM zone (WGS 84) that an image's centre lies in."""
+    size = source.grid.width, source.grid.height
+    longitude, latitude = np.median(seen_at(rpc, size, rpc.offset[2]), axis=0).tolist()
+    zone = int((longitude + 180) // 6) % 60 + 1
+    return CRS.from_epsg((32600 if latitude >= 0 else 32700) + zone)

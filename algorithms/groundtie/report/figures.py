@@ -1,0 +1,299 @@
+"""The figures of a report: residuals on the map, and errors at check points.
+
+matplotlib takes half a second to import, so only the functions that draw with it import it. They
+use its `Figure` alone, never pyplot, whose state is global: QGIS runs tools in threads.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.tie_points import TiePoints
+from ..geometry.transform import Transform
+from ..rasters.grid import Grid
+from ..registration.verdict import TOLERANCE_PX, Verdict
+from .pictures import data_uri
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# Told apart by people with any colour vision (Okabe & Ito 2008).
+FIT_COLOUR = "#0072b2"
+CHECK_COLOUR = "#d55e00"
+REJECTED_COLOUR = "#7a7a7a"
+
+# The typical residual is that of so many check points at least, and no smaller than this.
+_FEWEST = 3
+_SMALLEST_PX = 0.01
+
+_ROUND_NUMBERS = (1.0, 2.0, 5.0)
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """By how much tie points disagree with a transform, as the verdict counts it.
+
+    Parameters
+    ----------
+    position_px
+        The points in the matching grid (col, row), shape (n, 2).
+    residual_px
+        Found minus predicted position of the input's content, matching pixels, shape (n, 2).
+    is_check
+        Which points were held out of the fit, shape (n,).
+    used
+        Which points were not rejected and have a residual, shape (n,).
+    """
+
+    position_px: FloatArray
+    residual_px: FloatArray
+    is_check: Mask
+    used: Mask
+
+    @classmethod
+    def of(cls, points: TiePoints, transform: Transform, grid: Grid) -> Residuals:
+        """Measure the residuals of points in pixels of the matching grid."""
+        residual = points.residual_on(grid, transform)
+        return cls(
+            grid.map_to_pixel(points.reference_xy),
+            residual,
+            points.is_check,
+            points.used & np.isfinite(residual).all(axis=1),
+        )
+
+    @property
+    def length_px(self) -> FloatArray:
+        """Lengths of the residuals, shape (n,)."""
+        return np.asarray(np.hypot(*self.residual_px.T))
+
+    @property
+    def fit(self) -> Mask:
+        """Which points the fit used, shape (n,)."""
+        return self.used & ~self.is_check
+
+    @property
+    def check(self) -> Mask:
+        """Which points the verdict measured, shape (n,)."""
+        return self.used & self.is_check
+
+    @property
+    def agreeing(self) -> Mask:
+        """Which check points agree with the transform, shape (n,)."""
+        return self.check & (self.length_px <= TOLERANCE_PX)
+
+
+@dataclass(frozen=True)
+class Arrows:
+    """Residuals as arrows on the map.
+
+    Parameters
+    ----------
+    start_px, vector_px
+        Where the arrows begin in the matching grid, and what they span there, shape (n, 2).
+    exaggeration
+        How many times longer than the residuals they are.
+    scale_px
+        Residual that the scale's arrow stands for.
+    """
+
+    start_px: FloatArray
+    vector_px: FloatArray
+    exaggeration: float
+    scale_px: float
+
+
+def residual_arrows(residuals: Residuals, grid: Grid) -> Arrows:
+    """Exaggerate residuals by a round factor so that the typical one is well visible."""
+    side = max(grid.width, grid.height)
+    # A flexible model leaves next to nothing at the points of its own fit.
+    held_out = residuals.agreeing.sum() >= _FEWEST
+    believed = residuals.agreeing if held_out else residuals.used
+    factor = 1.0
+    if believed.any():
+        typical = max(float(np.median(residuals.length_px[believed])), _SMALLEST_PX)
+        factor = max(round_length(0.04 * side / typical), 1.0)
+    return Arrows(
+        residuals.position_px,
+        residuals.residual_px * factor,
+        factor,
+        round_length(0.12 * side / factor),
+    )
+
+
+def error_reach_px(residuals: Residuals, verdict: Verdict) -> float:
+    """Return up to which error the figures of errors reach, in matching pixels.
+
+    As far as needed to see the errors of right matches; without such, to the largest error.
+    """
+    if math.isfinite(verdict.check_ce90_px):
+        return max(1.6 * verdict.check_ce90_px, 1.5 * TOLERANCE_PX)
+    return float(max(residuals.length_px[residuals.check].max(initial=0.0), TOLERANCE_PX) * 1.05)
+
+
+def rayleigh_counts(at_px: FloatArray, width_px: float, verdict: Verdict) -> FloatArray:
+    """Return how many check points per bin the verdict's error explains, at errors, shape (n,).
+
+    Lengths of circular normal errors have a Rayleigh distribution; it is scaled to the number of
+    check points that agree.
+    """
+    variance = verdict.check_rmse_px**2 / 2
+    share_agreeing = 1 - math.exp(-(TOLERANCE_PX**2) / (2 * variance))
+    density = at_px / variance * np.exp(-(at_px**2) / (2 * variance))
+    return np.asarray(density * width_px * verdict.check_points_agreeing / share_agreeing)
+
+
+def svg_uri(figure: Figure) -> str:
+    """Return a figure as the data URI of an SVG without background."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
+    return data_uri("image/svg+xml", buffer.getvalue())
+
+
+def residual_map(residuals: Residuals, grid: Grid) -> Figure:
+    """Draw the points and their exaggerated residuals; the figure's edges are the grid's."""
+    arrows = residual_arrows(residuals, grid)
+    axes = _map_axes(grid)
+    disagreeing = residuals.check & ~residuals.agreeing
+    axes.plot(*residuals.position_px[~residuals.used].T, ".", color=REJECTED_COLOUR, ms=3.5)
+    axes.plot(*residuals.position_px[residuals.fit].T, ".", color=FIT_COLOUR, ms=4)
+    axes.plot(
+        *residuals.position_px[residuals.agreeing].T, "o", color=CHECK_COLOUR, mfc="none", ms=7
+    )
+    axes.plot(*residuals.position_px[disagreeing].T, "x", color=CHECK_COLOUR, ms=6)
+    for which, colour, strength in (
+        (residuals.fit, FIT_COLOUR, 1.0),
+        (disagreeing, CHECK_COLOUR, 0.35),
+        (residuals.agreeing, CHECK_COLOUR, 1.0),
+    ):
+        _draw_arrows(axes, arrows.start_px[which], arrows.vector_px[which], colour, strength)
+    _draw_scale(axes, arrows, grid)
+    return axes.figure
+
+
+def point_map(points: TiePoints, grid: Grid) -> Figure:
+    """Draw where points lie when there is no transform to disagree with."""
+    axes = _map_axes(grid)
+    px = grid.map_to_pixel(points.reference_xy)
+    axes.plot(*px[~points.used].T, ".", color=REJECTED_COLOUR, ms=3.5)
+    axes.plot(*px[points.used & ~points.is_check].T, ".", color=FIT_COLOUR, ms=4)
+    axes.plot(*px[points.used & points.is_check].T, "o", color=CHECK_COLOUR, mfc="none", ms=7)
+    return axes.figure
+
+
+def error_histogram(residuals: Residuals, verdict: Verdict, metres_per_px: float | None) -> Figure:
+    """Draw how many check points have which error, and the curve that the verdict's error means.
+
+    `metres_per_px` adds a scale in metres; None: there are no metres.
+    """
+    axes = _plot_axes(4.8)
+    reach = error_reach_px(residuals, verdict)
+    edges = np.linspace(0, reach, 13)
+    lengths = residuals.length_px[residuals.check]
+    axes.hist(lengths, edges, color=CHECK_COLOUR, alpha=0.45, edgecolor="white")
+    if math.isfinite(verdict.check_rmse_px):
+        at = np.linspace(0, reach, 100)
+        expected = rayleigh_counts(at, float(edges[1]), verdict)
+        axes.plot(at, expected, color="black", lw=1.5, label="Rayleigh curve of the RMSE")
+        axes.axvline(verdict.check_ce90_px, color=FIT_COLOUR, ls="--", lw=1.5, label="CE90")
+        axes.set_ylim(top=1.35 * axes.get_ylim()[1])
+        axes.legend(edgecolor="white", framealpha=1, fontsize=8, loc="upper right")
+    axes.set(xlim=(0, reach), xlabel="error (px)", ylabel="check points")
+    axes.yaxis.get_major_locator().set_params(integer=True)
+    if metres_per_px is not None:
+        scale = metres_per_px
+        top = axes.secondary_xaxis("top", functions=(lambda x: x * scale, lambda x: x / scale))
+        top.set_xlabel("error (m)")
+    _without_frame(axes)
+    return axes.figure
+
+
+def error_scatter(residuals: Residuals, verdict: Verdict) -> Figure:
+    """Draw the check points' residuals around zero and the circle that holds 90 % of them."""
+    from matplotlib.patches import Circle
+
+    axes = _plot_axes(3.9)
+    reach = error_reach_px(residuals, verdict)
+    shown = residuals.check & (residuals.length_px <= reach)
+    axes.axhline(0, color="#bbbbbb", lw=0.8, zorder=0)
+    axes.axvline(0, color="#bbbbbb", lw=0.8, zorder=0)
+    axes.plot(*residuals.residual_px[shown].T, "o", color=CHECK_COLOUR, alpha=0.75, ms=5, mew=0)
+    if math.isfinite(verdict.check_ce90_px):
+        circle = Circle((0, 0), verdict.check_ce90_px, fill=False, ec=FIT_COLOUR, ls="--", lw=1.5)
+        axes.add_patch(circle)
+    # Rows run downwards, as on the map.
+    axes.set(xlim=(-reach, reach), ylim=(reach, -reach), aspect="equal")
+    axes.set(xlabel="to the right (px)", ylabel="downwards (px)")
+    _without_frame(axes)
+    return axes.figure
+
+
+def _plot_axes(width_in: float) -> Any:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width_in, 3.7))
+    # Fixed margins: a layout engine would draw everything twice.
+    figure.subplots_adjust(left=0.65 / width_in, right=1 - 0.15 / width_in, bottom=0.14, top=0.86)
+    return figure.add_subplot()
+
+
+def _map_axes(grid: Grid) -> Any:
+    from matplotlib.figure import Figure
+
+    inches = 8 / max(grid.width, grid.height)
+    axes = Figure(figsize=(grid.width * inches, grid.height * inches)).add_axes((0, 0, 1, 1))
+    axes.set(xlim=(-0.5, grid.width - 0.5), ylim=(grid.height - 0.5, -0.5))
+    axes.set_axis_off()
+    return axes
+
+
+def _draw_arrows(
+    axes: Any, start_px: FloatArray, vector_px: FloatArray, colour: str, strength: float = 1.0
+) -> None:
+    axes.quiver(
+        *start_px.T,
+        *vector_px.T,
+        angles="xy",
+        scale_units="xy",
+        scale=1,
+        units="inches",
+        width=0.022,
+        headwidth=4,
+        headlength=4.5,
+        headaxislength=4.2,
+        minlength=0,
+        color=colour,
+        alpha=strength,
+    )
+
+
+def _draw_scale(axes: Any, arrows: Arrows, grid: Grid) -> None:
+    from matplotlib.patches import Rectangle
+
+    unit = max(grid.width, grid.height) / 100
+    length = arrows.scale_px * arrows.exaggeration
+    left, low = 2 * unit, grid.height - 2 * unit
+    box = Rectangle((left, low), length + 3 * unit, -6 * unit, fc="white", ec="#999999", lw=0.8)
+    axes.add_patch(box)
+    start = np.array([[left + 1.5 * unit, low - 1.5 * unit]])
+    _draw_arrows(axes, start, np.array([[length, 0.0]]), "black")
+    text = f"{arrows.scale_px:g} px"
+    axes.text(left + 1.5 * unit + length / 2, low - 3 * unit, text, ha="center", fontsize=10)
+
+
+def _without_frame(axes: Any) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def round_length(value: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20, … (0.1, 0.2, …) that is not above a value."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    return float(max(n for n in _ROUND_NUMBERS if n * decade <= value * (1 + 1e-9)) * decade)

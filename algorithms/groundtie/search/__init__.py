@@ -1,1 +1,0 @@
-"""Search: from a rough shift to tie points."""

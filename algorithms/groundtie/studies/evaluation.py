@@ -1,0 +1,191 @@
+"""How features of two registered images repeat and match (thesis S 6.6.2)."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ParameterError
+from ..features.descriptors import Descriptor
+from ..features.detectors import DETECTORS, Detector
+from ..features.filtering import filter_matches
+from ..features.gradients import GRADIENTS
+from ..features.matching import match
+from ..features.points import FeaturePoints
+from ..geometry.fitting import fit_model
+from ..geometry.models import PARAMETERS
+from ..matching.feature_tiles import standing_in
+from ..rasters.patch import Patch
+from ..rasters.reading import Mask
+from .repeatability import CLASS_NAMES, Repeatability, classes, overlap_error, repeatability
+
+FloatArray = NDArray[np.float64]
+
+_TURNING = "oriented"
+
+# Matches are fitted by this.
+_MODEL = "affine"
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A detector and a descriptor, and what they are called together."""
+
+    name: str
+    detector: Detector
+    descriptor: Descriptor
+
+    @classmethod
+    def parse(cls, name: str, contrast: float | None = None) -> Variant:
+        """Return the variant of a name: words of detector and gradient, "oriented", joined by +.
+
+        Parameters
+        ----------
+        name
+            For example "sift-oct" or "sift-oct+roewa+oriented".
+        contrast
+            Least contrast of features; None: as fits the detector.
+
+        Raises
+        ------
+        ParameterError
+            No detector or more than one word of a kind is named.
+        """
+        words = name.split("+")
+        detectors = [word for word in words if word in DETECTORS]
+        gradients = [word for word in words if word in GRADIENTS]
+        oriented = words.count(_TURNING)
+        known = len(detectors) + len(gradients) + oriented
+        if known < len(words) or len(detectors) != 1 or len(gradients) > 1 or oriented > 1:
+            raise ParameterError(
+                f"{name!r} is no variant: name a detector ({', '.join(DETECTORS)}), and at most "
+                f"one gradient ({', '.join(GRADIENTS)}) and {_TURNING!r}, joined by +"
+            )
+        estimator = gradients[0] if gradients else GRADIENTS[0]
+        descriptor = Descriptor(estimator, upright=not oriented)
+        return cls(name, Detector(detectors[0], contrast), descriptor)
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """How well matches agree on an affine model.
+
+    Parameters
+    ----------
+    matches
+        Their number.
+    std_px
+        Standard deviation of their residuals along columns and rows; NaN for too few matches.
+    by_class
+        Matches in each class of overlap error (see `repeatability.CLASS_NAMES`), shape (5,).
+    """
+
+    matches: int
+    std_px: tuple[float, float]
+    by_class: NDArray[np.int_]
+
+    @classmethod
+    def of(cls, first: FeaturePoints, second: FeaturePoints) -> Consistency:
+        """Return the consistency of features that match, row by row."""
+        px, partner_px = first.position_px, second.position_px
+        std = np.full(2, np.nan)
+        if len(first) > PARAMETERS[_MODEL] // 2:
+            residuals = partner_px - fit_model(_MODEL, px, partner_px)(px)
+            std = residuals.std(axis=0)
+        by_class = classes(overlap_error(first, second))
+        return cls(len(first), (float(std[0]), float(std[1])), by_class)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the values as JSON can carry them."""
+        known = np.isfinite(self.std_px).all()
+        return {
+            "matches": self.matches,
+            "std_px": list(self.std_px) if known else None,
+            "by_class": dict(zip(CLASS_NAMES, self.by_class.tolist(), strict=True)),
+        }
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What a variant finds in two registered images.
+
+    Parameters
+    ----------
+    variant
+        Its name.
+    detections
+        Features of the reference and of the input.
+    repeated
+        How many of them correspond.
+    matched, filtered
+        Matches by the descriptors alone, and those that filtered matching leaves.
+    detecting_s, matching_s
+        Seconds for finding, and for describing and matching.
+    """
+
+    variant: str
+    detections: tuple[int, int]
+    repeated: Repeatability
+    matched: Consistency
+    filtered: Consistency
+    detecting_s: float
+    matching_s: float
+
+    def summary(self) -> dict[str, Any]:
+        """Return the values as JSON can carry them."""
+        return {
+            "variant": self.variant,
+            "detections": list(self.detections),
+            "repeatability": dict(zip(CLASS_NAMES, self.repeated.scores.tolist(), strict=True)),
+            "matched": self.matched.summary(),
+            "filtered": self.filtered.summary(),
+            "detecting_s": self.detecting_s,
+            "matching_s": self.matching_s,
+        }
+
+
+def evaluate(
+    variant: Variant,
+    reference: Patch,
+    input: Patch,
+    ratio: float,
+    method: str,
+    parts: tuple[Mask, Mask] | None = None,
+) -> Evaluation:
+    """Detect, describe and match the features of two registered images.
+
+    Parameters
+    ----------
+    variant
+        How.
+    reference, input
+        The same place, pixel by pixel.
+    ratio, method
+        See `matching.match`.
+    parts
+        In which parts of the reference and of the input features count, shape (h, w); None: all.
+    """
+    started = time.perf_counter()
+    found = [variant.detector.detect(patch) for patch in (reference, input)]
+    if parts is not None:
+        found = [standing_in(own, part) for own, part in zip(found, parts, strict=True)]
+    detected = time.perf_counter()
+    points, descriptors = variant.descriptor.describe(reference, found[0])
+    partners, partner_descriptors = variant.descriptor.describe(input, found[1])
+    matches = match(descriptors, partner_descriptors, ratio, method=method)
+    matched = time.perf_counter()
+    first, second = points.take(matches.first), partners.take(matches.second)
+    kept = filter_matches(first.position_px, second.position_px, _MODEL)
+    return Evaluation(
+        variant.name,
+        (len(found[0]), len(found[1])),
+        repeatability(*found),
+        Consistency.of(first, second),
+        Consistency.of(first.take(kept), second.take(kept)),
+        detected - started,
+        matched - detected,
+    )

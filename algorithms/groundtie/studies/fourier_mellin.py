@@ -1,0 +1,209 @@
+"""Fourier–Mellin: rotation and scale from magnitude spectra, then the shift.
+
+Thesis P section 3.3.1; Chen, Defrise & Deconinck 1994, doi:10.1109/34.387491; Reddy & Chatterji
+1996, doi:10.1109/83.506761. The magnitude of a spectrum does not change with a shift, turns with
+the image, and shrinks as the image grows; on axes of angle and log frequency, both are shifts.
+Unlike P's 22 steps: spectra are made alike at all frequencies, peaks are found between the bins,
+several are tried, and rotation, scale and shift are found again on what both windows show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Executor
+from dataclasses import replace
+
+import numpy as np
+import scipy.fft
+
+from ..pose.phase_correlation import gaussian_peak, shift_left, shifts_at, whitened
+from ..pose.polar import ANGLE_STEP_DEG, ANGLES, evened, half_turns, log_power
+from ..pose.pose import Pose, PoseFound, PoseLimits
+from ..pose.windows import (
+    SAME_DEG,
+    SAME_LOG_SCALE,
+    Image,
+    Shared,
+    aligned,
+    apodise,
+    distinct,
+    structure,
+    texture,
+)
+from ..rasters.kernels import interpolate
+from ..rasters.patch import Patch, reduced_patch
+from ..similarity.surface import SimilaritySettings, Surface, normalise
+
+# A spectrum is given at so many log frequencies between two frequencies in cycles per pixel.
+_FREQUENCIES = 256
+_RANGE = (0.015, 0.4)
+_LOG_STEP = float(np.log(_RANGE[1] / _RANGE[0]) / (_FREQUENCIES - 1))
+
+# Detail of the correlation that is kept: standard deviation, in cycles per bin.
+_BAND = 0.1
+
+# Magnitudes of the cross-power spectrum are raised to 1 less this: 1 is phase correlation, which
+# is exact, 0 a plain correlation, which endures more difference between the images.
+_WHITENING = 0.5
+
+# Candidates of rotation and scale: how many are tried.
+CANDIDATES = 20
+
+# Candidates are tried on windows reduced to about this length, in pixels, …
+_TRIAL_SIDE_PX = 128
+# … until one is so high that the others need no trial. Wrong ones were below 33.
+_CLEAR_HEIGHT = 60.0
+
+# How many candidates are aligned and returned at most, and which share of the best one's height
+# they have at least.
+RETURNED = 2
+WORTH_ALIGNING = 0.5
+
+# How often, and how far, rotation and scale are corrected on what both windows show.
+_CORRECTIONS = 2
+_CORRECTION = PoseLimits(0.0, 2.0, (0.95, 1.05))
+
+
+def spectrum(image: Image, side: int) -> Image:
+    """Return the log power of an apodised image's spectrum on angles and log frequencies.
+
+    Parameters
+    ----------
+    image
+        Shape (h, w).
+    side
+        Sides of the square that it is padded to.
+
+    Returns
+    -------
+    Shape (angles, frequencies).
+    """
+    power = log_power(scipy.fft.fftshift(scipy.fft.rfft2(image, (side, side)), axes=0))
+    angle = np.pi * np.arange(ANGLES)[:, None] / ANGLES
+    frequency = side * np.geomspace(*_RANGE, _FREQUENCIES)
+    px = np.stack([np.sin(angle) * frequency, side // 2 - np.cos(angle) * frequency])
+    return evened(interpolate(power, px, "bilinear"))
+
+
+def spectra(
+    reference: Patch, input: Patch, settings: SimilaritySettings, disc: bool
+) -> tuple[Image, Image]:
+    """Return the spectra of two windows at the same frequencies."""
+    windows = (reference, input)
+    side = scipy.fft.next_fast_len(max(max(w.values.shape) for w in windows), real=True)
+    first, second = (
+        spectrum(apodise(texture(window, settings), window.valid, disc), side) for window in windows
+    )
+    return first, second
+
+
+def correlate_spectra(reference: Image, input: Image) -> Surface:
+    """Return the correlation of two spectra over all turns, normalised.
+
+    Rows are rotations (see `_rotations`), columns logarithms of the scale; the middle is none.
+    """
+    fading = np.sqrt(np.hanning(_FREQUENCIES + 2)[1:-1]).astype(np.float32)
+    shape = (ANGLES, scipy.fft.next_fast_len(2 * _FREQUENCIES))
+    # The reference at a bin further on looks like the input: an input that is turned
+    # counter-clockwise has its spectrum at smaller angles, a larger one at lower frequencies.
+    first, second = (scipy.fft.fft2(s * fading, shape) for s in (reference, input))
+    down, across = (np.exp(-(scipy.fft.fftfreq(n) ** 2) / (2 * _BAND**2)) for n in shape)
+    weights = (down[:, None] * across).astype(np.float32)
+    cross = whitened(first * second.conj(), _WHITENING) * weights
+    return normalise(scipy.fft.fftshift(scipy.fft.ifft2(cross).real).astype(np.float32))
+
+
+def turns(surface: Surface, limits: PoseLimits, count: int) -> Iterator[Pose]:
+    """Yield the most likely rotations and scales within limits, best first.
+
+    Rotations come in pairs that are half a turn apart, if both are within the limits.
+    """
+    rows, cols = surface.shape
+    rotation = (np.arange(rows) - rows // 2) * ANGLE_STEP_DEG
+    log_scale = (np.arange(cols) - cols // 2) * _LOG_STEP
+    low, high = np.log(limits.scale)
+    allowed = (np.abs(rotation) <= limits.rotation_deg + ANGLE_STEP_DEG / 2)[:, None] & (
+        (log_scale >= low - _LOG_STEP / 2) & (log_scale <= high + _LOG_STEP / 2)
+    )
+    searched = np.where(allowed, surface, -np.inf)
+    same = round(SAME_DEG / ANGLE_STEP_DEG)
+    near_rows, near_cols = np.arange(-same, same + 1), round(SAME_LOG_SCALE / _LOG_STEP)
+    for _ in range(count):
+        row, col = (int(i) for i in np.unravel_index(searched.argmax(), searched.shape))
+        if searched[row, col] <= 0:
+            return
+        degrees = rotation[row] + ANGLE_STEP_DEG * gaussian_peak(surface[:, col], row)
+        scale = np.exp(log_scale[col] + _LOG_STEP * gaussian_peak(surface[row], col))
+        yield from half_turns(float(degrees), float(scale), limits)
+        searched[(row + near_rows) % rows, max(col - near_cols, 0) : col + near_cols + 1] = -np.inf
+
+
+def left(both: Shared, settings: SimilaritySettings) -> PoseFound | None:
+    """Return what rotation, scale and shift are left between the parts that two windows share."""
+    surface = correlate_spectra(*spectra(both.reference, both.input, settings, disc=False))
+    shift = shift_left(both, settings)
+    if shift is None:
+        return None
+    turn = next(turns(surface, _CORRECTION, 1), Pose())
+    return replace(shift, pose=replace(turn, shift_px=shift.pose.shift_px))
+
+
+def try_turns(
+    reference: Patch,
+    input: Patch,
+    poses: Iterable[Pose],
+    limits: PoseLimits,
+    settings: SimilaritySettings,
+) -> list[PoseFound]:
+    """Return the best shift at each of some rotations and scales, best first.
+
+    Windows are reduced. No more poses are tried after one of `_CLEAR_HEIGHT`, but for its other
+    half turn.
+    """
+    factor = max(round(min(reference.values.shape) / _TRIAL_SIDE_PX), 1)
+    fixed = structure(reduced_patch(reference, factor), settings)
+    small = reduced_patch(input, factor)
+    found: list[PoseFound] = []
+    for pose in poses:
+        trials = shifts_at(fixed, small, pose, limits.radius_px / factor, settings, 1)
+        for trial in trials:
+            right, down = (factor * shift for shift in trial.pose.shift_px)
+            found.append(replace(trial, pose=replace(pose, shift_px=(right, down))))
+        if found and found[-1].height >= _CLEAR_HEIGHT:
+            break
+    return distinct(found, WORTH_ALIGNING)
+
+
+def fourier_mellin(
+    reference: Patch,
+    input: Patch,
+    limits: PoseLimits,
+    settings: SimilaritySettings,
+    executor: Executor | None = None,
+) -> list[PoseFound]:
+    """Search for rotation, scale and shift by Fourier–Mellin; a `PoseSearch`.
+
+    Parameters
+    ----------
+    reference, input
+        The windows.
+    limits
+        Within which rotation, scale and shift are searched for.
+    settings
+        "ncc" compares grey values; all else has its spectra made of their logarithms, and its
+        shift found on orientation fields.
+    executor
+        Threads to align the candidates in.
+    """
+    if reference.is_flat or input.is_flat:
+        return []
+    surface = correlate_spectra(*spectra(reference, input, settings, disc=True))
+    tried = turns(surface, limits, CANDIDATES)
+    found = try_turns(reference, input, tried, limits, settings)[:RETURNED]
+
+    def align(one: PoseFound) -> PoseFound:
+        for _ in range(_CORRECTIONS):
+            one = aligned(reference, input, one, limits, lambda both: left(both, settings))
+        return aligned(reference, input, one, limits, lambda both: shift_left(both, settings))
+
+    return distinct((executor.map if executor else map)(align, found))

@@ -1,0 +1,116 @@
+"""How well a detector finds the same features in two registered images (thesis S 6.6.2).
+
+Mikolajczyk et al. 2005: features are circles as large as their scale; two correspond if their
+circles overlap enough, after both were scaled so that the first's radius is 30 pixels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..features.points import FeaturePoints
+
+FloatArray = NDArray[np.float64]
+
+# Overlap errors up to these limits make the classes; the last one is all above.
+CLASS_LIMITS = (0.1, 0.2, 0.3, 0.4)
+CLASS_NAMES = ("0–10 %", "10–20 %", "20–30 %", "30–40 %", "> 40 %")
+
+NORMAL_RADIUS_PX = 30.0
+
+# Circles whose centres are further apart, in radii, overlap by less than any limit allows.
+_REACH = 0.5
+
+
+def overlap_error(
+    first: FeaturePoints, second: FeaturePoints, radius_px: float = NORMAL_RADIUS_PX
+) -> FloatArray:
+    """Return 1 − intersection / union of the circles of paired features, shape (n,).
+
+    Parameters
+    ----------
+    first, second
+        n features each, in the pixels of the first image.
+    radius_px
+        Radius to which the first circle is scaled, and the second with it.
+    """
+    grow = radius_px / first.scale_px
+    # Positions keep their distance: only the regions are normalised, as Mikolajczyk et al. do.
+    apart = np.hypot(*(second.position_px - first.position_px).T)
+    a, b = np.full(len(first), radius_px), second.scale_px * grow
+    shared = _lens(a, b, apart)
+    return np.asarray(1 - shared / (np.pi * (a**2 + b**2) - shared))
+
+
+def _lens(a: FloatArray, b: FloatArray, apart: FloatArray) -> FloatArray:
+    """Return the area that circles of radii a and b share, their centres `apart`."""
+    inside = np.pi * np.minimum(a, b) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at_a = np.arccos(np.clip((apart**2 + a**2 - b**2) / (2 * apart * a), -1, 1))
+        at_b = np.arccos(np.clip((apart**2 + b**2 - a**2) / (2 * apart * b), -1, 1))
+    corners = (-apart + a + b) * (apart + a - b) * (apart - a + b) * (apart + a + b)
+    partly = a**2 * at_a + b**2 * at_b - 0.5 * np.sqrt(np.maximum(corners, 0))
+    return np.where(apart >= a + b, 0.0, np.where(apart <= np.abs(a - b), inside, partly))
+
+
+def classes(errors: FloatArray) -> NDArray[np.int_]:
+    """Return how many overlap errors fall into each of `CLASS_NAMES`, shape (5,)."""
+    return np.bincount(np.searchsorted(CLASS_LIMITS, errors), minlength=len(CLASS_NAMES))
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Correspondences of two sets of features by class of their overlap error.
+
+    Parameters
+    ----------
+    counts
+        Correspondences in each of `CLASS_NAMES`, shape (5,); the last one is of features without.
+    possible
+        Features in the smaller of both sets.
+    """
+
+    counts: NDArray[np.int_]
+    possible: int
+
+    @property
+    def scores(self) -> FloatArray:
+        """Correspondences in each class over those that were possible, shape (5,)."""
+        return self.counts / max(self.possible, 1)
+
+
+def repeatability(first: FeaturePoints, second: FeaturePoints) -> Repeatability:
+    """Return how many features correspond, each at most once, by the class of their overlap error.
+
+    Pairs are made from the smallest overlap error to the largest; features that are left, or
+    overlap by less than the largest class limit allows, count as the last class.
+
+    Parameters
+    ----------
+    first, second
+        Features in the pixels of the first image.
+    """
+    possible = min(len(first), len(second))
+    if possible == 0:
+        return Repeatability(np.zeros(len(CLASS_NAMES), int), 0)
+    pairs = cKDTree(first.position_px).query_ball_tree(
+        cKDTree(second.position_px), _REACH * NORMAL_RADIUS_PX
+    )
+    one = np.repeat(np.arange(len(first)), [len(p) for p in pairs])
+    other = np.concatenate([np.asarray(p, int) for p in pairs])
+    errors = overlap_error(first.take(one), second.take(other))
+    overlapping = np.nonzero(errors <= CLASS_LIMITS[-1])[0]
+    order = overlapping[np.argsort(errors[overlapping], kind="stable")]
+    free_one, free_other = np.ones(len(first), bool), np.ones(len(second), bool)
+    kept = []
+    for pair in order:
+        if free_one[one[pair]] and free_other[other[pair]]:
+            free_one[one[pair]] = free_other[other[pair]] = False
+            kept.append(pair)
+    counts = classes(errors[kept])
+    counts[-1] = possible - len(kept)
+    return Repeatability(counts, possible)

@@ -1,0 +1,271 @@
+"""Simultaneous perturbation stochastic approximation (SPSA): climbing with two looks a step.
+
+First order: Spall 1992, 1998 (doi:10.1109/7.705889), thesis S eq 4.1–4.4. Second order: Spall 2000
+(doi:10.1109/TAC.2000.880982), for registration Cole-Rhodes et al. 2003
+(doi:10.1109/TIP.2003.819237). Discrete: thesis S 4.4.2.
+
+One number must be known beforehand that nobody knows: how steep the similarity is. NMI changes by
+some thousandths. So slopes are divided by their own root mean square so far, and gains are pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ParameterError
+from ..pose.pose import PoseFound, PoseLimits
+from ..rasters.patch import Patch
+from ..similarity.surface import SimilaritySettings
+from .objective import (
+    EFFORT,
+    Counted,
+    Effort,
+    Place,
+    PoseSpace,
+    bin_pair,
+    search_by_climbing,
+    spread_px,
+)
+
+FloatArray = NDArray[np.float64]
+Measure = Callable[[FloatArray], float]
+
+# Spall's exponents: the least that still converge.
+ALPHA, GAMMA = 0.602, 0.101
+
+# A climb ends after so many evaluations without a change (thesis S 4.4.1): without more than what
+# the usual slope rises in so many pixels.
+PATIENCE = 40
+_CHANGE_PX = 0.05
+
+# Ends of climbs that are the same place, in pixels: at the latest perturbation they cannot be
+# told apart.
+_SAME_PX = 1.0
+
+
+@dataclass(frozen=True)
+class Gains:
+    """How far SPSA steps and looks: a_k = a ((1 + A) / (k + 1 + A))^α and c_k = c / (k + 1)^γ.
+
+    Parameters
+    ----------
+    step_px
+        a: the first step on a slope of the usual steepness.
+    look_px
+        c: how far from the place the first two looks are, in every dimension.
+    steady
+        A: for about so many steps their length hardly falls.
+    """
+
+    step_px: float = 3.0
+    look_px: float = 2.0
+    steady: float = 5.0
+
+    def step(self, k: int) -> float:
+        """Return a_k."""
+        return self.step_px * ((1 + self.steady) / (k + 1 + self.steady)) ** ALPHA
+
+    def look(self, k: int) -> float:
+        """Return c_k."""
+        return self.look_px / (k + 1) ** GAMMA
+
+
+DISCRETE, DISCRETE_EFFORT = Gains(), Effort(agreeing=4)
+CONTINUOUS = Gains(look_px=1.0)
+
+
+class _Slopes:
+    """What the looks so far say: the slopes' root mean square, and for second order the Hessian."""
+
+    def __init__(self, dimensions: int) -> None:
+        self.steps = 0
+        self._squares = 0.0
+        self._hessian = np.zeros((dimensions, dimensions))
+
+    def add(self, slope: float) -> None:
+        self.steps += 1
+        self._squares += slope**2
+
+    def add_hessian(self, hessian: FloatArray) -> None:
+        self._hessian += (hessian - self._hessian) / self.steps
+
+    @property
+    def usual(self) -> float:
+        return float(np.sqrt(self._squares / max(self.steps, 1)))
+
+    def newton(self, gradient: FloatArray, step_px: float) -> FloatArray:
+        """Return the uphill step of second order; where nothing is curved, that of first order.
+
+        Eigenvalues of the Hessian are taken by their size, so that saddles are left uphill, too.
+        """
+        values, vectors = np.linalg.eigh(self._hessian)
+        curvature = np.hypot(values, self.usual / step_px)
+        return np.asarray(vectors @ ((vectors.T @ gradient) / curvature))
+
+
+def climb_first_order(
+    similarity: Counted, space: PoseSpace, start: Place, rng: np.random.Generator, gains: Gains
+) -> Place:
+    """Return the best place found from a start by SPSA of first order.
+
+    In a space of aligned grids (`PoseSpace.origin`) this is discrete SPSA: looks and steps are
+    rounded to whole pixels (thesis S 4.4.2).
+    """
+
+    def uphill(look: Measure, at: FloatArray, slopes: _Slopes) -> FloatArray:
+        k = slopes.steps
+        c, signs = gains.look(k), rng.choice([-1.0, 1.0], at.size)
+        slope = (look(at + c * signs) - look(at - c * signs)) / (2 * c)
+        slopes.add(slope)
+        return gains.step(k) * slope / (slopes.usual or 1.0) * signs
+
+    return _climb(similarity, space, start, rng, uphill)
+
+
+def climb_second_order(
+    similarity: Counted, space: PoseSpace, start: Place, rng: np.random.Generator, gains: Gains
+) -> Place:
+    """Return the best place found from a start by SPSA of second order: four looks a step."""
+
+    def uphill(look: Measure, at: FloatArray, slopes: _Slopes) -> FloatArray:
+        k = slopes.steps
+        c, signs, others = gains.look(k), *rng.choice([-1.0, 1.0], (2, at.size))
+        ahead, behind = at + c * signs, at - c * signs
+        high, low = look(ahead), look(behind)
+        slope = (high - low) / (2 * c)
+        slopes.add(slope)
+        bend = (look(ahead + c * others) - high - look(behind + c * others) + low) / (2 * c**2)
+        product = bend * np.outer(signs, others)
+        slopes.add_hessian((product + product.T) / 2)
+        if slopes.usual == 0:
+            return np.zeros(at.size)
+        return gains.step(k) / gains.step_px * slopes.newton(slope * signs, gains.step_px)
+
+    return _climb(similarity, space, start, rng, uphill)
+
+
+def _climb(
+    similarity: Counted,
+    space: PoseSpace,
+    start: Place,
+    rng: np.random.Generator,
+    uphill: Callable[[Measure, FloatArray, _Slopes], FloatArray],
+) -> Place:
+    """Step uphill until `PATIENCE` evaluations have changed the best value by next to nothing."""
+    best, mark, waited = start, similarity(start), 0
+    slopes = _Slopes(len(start))
+
+    def settle(values: FloatArray) -> Place:
+        if space.origin is None:
+            return space.settle(values)
+        # Up or down by chance: steps are as long in all dimensions, and plain rounding would
+        # never leave the squares of one colour of the chessboard.
+        return space.settle(values + rng.uniform(-0.5, 0.5, values.size))
+
+    def look(values: FloatArray) -> float:
+        nonlocal best, mark, waited
+        place = settle(values)
+        value = similarity(place)
+        best = max(best, place, key=similarity)
+        waited += 1
+        if value > mark + _CHANGE_PX * slopes.usual:
+            mark, waited = value, 0
+        return value
+
+    at = np.array(start)
+    while waited < PATIENCE:
+        at = np.array(settle(at + uphill(look, at, slopes)))
+        look(at)
+    return best
+
+
+def spsa(
+    reference: Patch,
+    input: Patch,
+    limits: PoseLimits,
+    settings: SimilaritySettings,
+    executor: Executor | None = None,
+    *,
+    effort: Effort = EFFORT,
+    gains: Gains = CONTINUOUS,
+) -> list[PoseFound]:
+    """Search for a pose by SPSA of first order (see `pose.PoseSearch`).
+
+    Parameters
+    ----------
+    reference, input, limits, settings
+        As in `pose.PoseSearch`; the similarity must be one of joint histograms.
+    executor
+        Not used: every evaluation depends on those before.
+    effort
+        Where and how often to start.
+    gains
+        How far to step and look.
+    """
+    return _search(climb_first_order, reference, input, limits, settings, effort, gains)
+
+
+def spsa_second_order(
+    reference: Patch,
+    input: Patch,
+    limits: PoseLimits,
+    settings: SimilaritySettings,
+    executor: Executor | None = None,
+    *,
+    effort: Effort = EFFORT,
+    gains: Gains = CONTINUOUS,
+) -> list[PoseFound]:
+    """Search for a pose by SPSA of second order; parameters as of `spsa`."""
+    return _search(climb_second_order, reference, input, limits, settings, effort, gains)
+
+
+def discrete_spsa(
+    reference: Patch,
+    input: Patch,
+    limits: PoseLimits,
+    settings: SimilaritySettings,
+    executor: Executor | None = None,
+    *,
+    effort: Effort = DISCRETE_EFFORT,
+    gains: Gains = DISCRETE,
+) -> list[PoseFound]:
+    """Search for a shift of whole pixels by discrete SPSA (thesis S 4.4.2).
+
+    Parameters as of `spsa`. Only histograms at aligned grids are counted: shifts are whole pixels
+    between the windows' pixels. Where their sizes are even in one and odd in the other, the shift
+    of their centres ends in a half.
+
+    Raises
+    ------
+    ParameterError
+        Rotation or scale are searched for as well, or pixels differ in size.
+    """
+    if limits.rotation_deg != 0 or limits.scale != (1.0, 1.0):
+        raise ParameterError("discrete SPSA searches for shifts alone")
+    pair = bin_pair(reference, input, settings)
+    if pair is None:
+        return []
+    space = PoseSpace(limits, spread_px(reference.values.shape), pair.origin)
+    return search_by_climbing(pair, space, partial(climb_first_order, gains=gains), effort, 0.0)
+
+
+def _search(
+    climb: Callable[..., Place],
+    reference: Patch,
+    input: Patch,
+    limits: PoseLimits,
+    settings: SimilaritySettings,
+    effort: Effort,
+    gains: Gains,
+) -> list[PoseFound]:
+    pair = bin_pair(reference, input, settings)
+    if pair is None:
+        return []
+    space = PoseSpace(limits, spread_px(reference.values.shape))
+    return search_by_climbing(pair, space, partial(climb, gains=gains), effort, _SAME_PX)

@@ -1,0 +1,65 @@
+"""Parameters of the tools for images with RPCs, declared once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from ..kinds import Choice, FileIn, Number, RasterIn
+from ..sensor.heights import DATUMS
+
+SensorImage = Annotated[
+    Path,
+    RasterIn(
+        label="Image with RPCs",
+        help="An image in the geometry of its sensor. Its RPCs are in its tags or in a file beside "
+        "it that GDAL finds (_RPC.TXT, .RPB, DIMAP).",
+    ),
+]
+Dem = Annotated[
+    Path | None,
+    RasterIn(
+        label="Terrain model",
+        help="Heights of the ground, in any CRS; voids are filled from their rims. Without it, "
+        "one height holds everywhere.",
+    ),
+]
+DemDatum = Annotated[
+    str | None,
+    Choice(
+        label="Vertical datum",
+        help="What the heights of the terrain model count from: the ellipsoid, as RPCs do, or a "
+        "geoid (SRTM: EGM96; Copernicus: EGM2008). Taking one for the other moves heights by "
+        "up to 100 m.",
+        choices=DATUMS,
+    ),
+]
+Geoid = Annotated[
+    Path | None,
+    RasterIn(
+        label="Geoid grid",
+        help="Heights of another geoid above the ellipsoid, in place of a vertical datum by name.",
+        advanced=True,
+    ),
+]
+Height = Annotated[
+    float | None,
+    Number(
+        label="Height",
+        help="Height above the ellipsoid that holds everywhere without a terrain model; by "
+        "default the RPCs' own.",
+        unit="m",
+        minimum=-1000,
+        maximum=10_000,
+        advanced=True,
+    ),
+]
+RpcFile = Annotated[
+    Path | None,
+    FileIn(
+        label="RPC file",
+        help="RPCs to use in place of the image's own: _RPC.TXT, .RPB or the RPC XML of DIMAP 2.",
+        suffixes=(".txt", ".rpb", ".xml"),
+        advanced=True,
+    ),
+]

@@ -1,0 +1,195 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from affine import Affine
+from scipy.ndimage import gaussian_filter
+from scipy.optimize import check_grad
+
+from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.models import DEGREE, Frame, Model
+from groundtie.matching.alignment import (
+    CANDIDATES,
+    LINEAR_CANDIDATES,
+    _cubic_weights,
+    _fields,
+    _model,
+    _starting,
+    align,
+    choose_alignment,
+)
+from groundtie.rasters.grid import apply_affine
+
+RADIUS = 8
+SPAN = 2 * RADIUS + 1
+SIZE = np.array([600.0, 500.0])
+PEAK_SIGMA = 1.4
+PEAK_HEIGHT = 12.0
+
+
+def centres() -> np.ndarray:
+    cols, rows = np.meshgrid(np.linspace(30, 570, 15), np.linspace(30, 470, 13))
+    return np.round(np.column_stack([cols.ravel(), rows.ravel()])).astype(int)
+
+
+def distortion(kind: str, px: np.ndarray) -> np.ndarray:
+    """Where the input claims grid pixels to be: a misregistration of a kind, up to 6 px."""
+    middle = SIZE / 2
+    off = np.asarray(px, float) - middle
+    u, v = (off / middle.max()).T
+    turn = np.deg2rad(0.5)
+    rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    bent = {
+        "translation": off,
+        "rigid": off @ rotation,
+        "similarity": 1.006 * off @ rotation,
+        "affine": off @ (np.eye(2) + [[0.008, -0.006], [-0.007, -0.009]]),
+        "polynomial2": off + 2.0 * np.column_stack([u * v + u**2, v**2 - u * v]),
+        "polynomial3": off + 2.5 * np.column_stack([u**3 - v**2 * u, v**3 + u**2 * v - u]),
+    }
+    return middle + bent[kind] + [1.7, -1.2]
+
+
+def surfaces_of(
+    kind: str, px: np.ndarray, prior: Affine, seed: int, wrong: float = 0.4
+) -> np.ndarray:
+    """Surfaces that peak where chips lie, over a correlated background; many peak elsewhere."""
+    rng = np.random.default_rng(seed)
+    shifts = apply_affine(~prior, distortion(kind, px)) - px
+    assert np.abs(shifts).max() < RADIUS - 1
+    lost = rng.random(len(px)) < wrong
+    shifts[lost] = rng.uniform(-RADIUS, RADIUS, (lost.sum(), 2))
+    y, x = np.mgrid[-RADIUS : RADIUS + 1, -RADIUS : RADIUS + 1]
+    surfaces = []
+    for dx, dy in shifts:
+        noise = gaussian_filter(rng.normal(size=(SPAN, SPAN)), 1.0, mode="wrap")
+        peak = np.exp(-((x - dx) ** 2 + (y - dy) ** 2) / (2 * PEAK_SIGMA**2))
+        surfaces.append(PEAK_HEIGHT * peak + noise / noise.std())
+    return np.array(surfaces, np.float32)
+
+
+def identity() -> Model:
+    return _model("translation", Frame.around(np.array([[0.0, 0.0], SIZE])), np.zeros(2))
+
+
+def error_px(model: Model, kind: str) -> float:
+    cols, rows = np.meshgrid(np.linspace(30, 570, 12), np.linspace(30, 470, 12))
+    px = np.column_stack([cols.ravel(), rows.ravel()])
+    return float(np.sqrt(((model(px) - distortion(kind, px)) ** 2).sum(axis=1).mean()))
+
+
+PRIORS = [Affine.identity(), Affine(1.003, 0.002, 1.0, -0.001, 0.998, -0.5)]
+
+
+@pytest.mark.parametrize("kind", DEGREE)
+@pytest.mark.parametrize("prior", PRIORS, ids=["plain", "resampled"])
+def test_the_model_behind_the_surfaces_is_found(kind: str, prior: Affine) -> None:
+    px = centres()
+    found = align(kind, px, surfaces_of(kind, px, prior, seed=0), prior, identity())
+    assert found.model.kind == kind
+    assert error_px(found.model, kind) < 0.1
+    assert set(found.left_out_score) == {kind}
+    assert len(found.fold_models) == 5
+    for model in found.fold_models:
+        assert 0 < error_px(model, kind) < 0.3
+
+
+@pytest.mark.parametrize("kind", CANDIDATES)
+@pytest.mark.parametrize("seed", range(2))
+def test_the_simplest_model_that_fits_is_chosen(kind: str, seed: int) -> None:
+    px = centres()
+    chosen = choose_alignment(px, surfaces_of(kind, px, PRIORS[1], seed), PRIORS[1], identity())
+    assert chosen.model.kind == kind
+    assert error_px(chosen.model, kind) < 0.1
+    assert set(chosen.left_out_score) == set(CANDIDATES)
+
+
+def test_nothing_is_chosen_but_candidates() -> None:
+    px, prior = centres(), PRIORS[0]
+    bent = surfaces_of("polynomial2", px, prior, 0)
+    chosen = choose_alignment(px, bent, prior, identity(), LINEAR_CANDIDATES)
+    assert set(chosen.left_out_score) == {"translation", "similarity", "affine"}
+    assert chosen.model.kind in chosen.left_out_score
+
+
+def test_left_out_similarity_is_that_of_the_right_chips() -> None:
+    """At the model's place a wrong chip's surface is background, which is 0 on average."""
+    px = centres()
+    scores = []
+    for wrong in (0.0, 0.5):
+        surfaces = surfaces_of("translation", px, PRIORS[0], 1, wrong)
+        found = align("translation", px, surfaces, PRIORS[0], identity())
+        scores.append(found.left_out_score["translation"])
+    assert scores[1] / scores[0] == pytest.approx(0.5, abs=0.1)
+
+
+def test_few_chips_take_no_model_of_many_parameters() -> None:
+    px = centres()[::25]
+    assert len(px) == 8
+    prior = Affine.identity()
+    chosen = choose_alignment(px, surfaces_of("translation", px, prior, 0, 0), prior, identity())
+    assert set(chosen.left_out_score) == {"translation", "similarity"}
+
+
+def test_surfaces_without_peaks_leave_a_finite_model() -> None:
+    px = centres()
+    flat = np.zeros((len(px), SPAN, SPAN), np.float32)
+    found = choose_alignment(px, flat, Affine.identity(), identity())
+    assert found.model.kind == "translation"
+    np.testing.assert_allclose(found.model(px), px, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["rigid", "similarity", "affine", "polynomial3"])
+def test_the_slope_that_the_search_follows_is_that_of_the_similarity(kind: str) -> None:
+    px = centres()[::3]
+    prior = PRIORS[1]
+    field = _fields(px, surfaces_of(kind, px, prior, 2), prior)[-1]
+    frame = Frame.around(field.px)
+    rng = np.random.default_rng(0)
+
+    def similarity(claimed: np.ndarray) -> float:
+        return float(field.scores(claimed.reshape(-1, 2))[0].sum())
+
+    def slope(claimed: np.ndarray) -> np.ndarray:
+        return field.scores(claimed.reshape(-1, 2))[1].ravel()
+
+    start = apply_affine(prior, field.px + rng.uniform(-4, 4, field.px.shape)).ravel()
+    size = np.linalg.norm(slope(start))
+    assert check_grad(similarity, slope, start, epsilon=1e-6) < 1e-3 * size
+    parameters = _starting(kind, frame, field.px, identity())
+    np.testing.assert_allclose(_model(kind, frame, parameters)(px), px, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["rigid", "similarity", "affine", "polynomial2"])
+def test_parameters_of_a_model_are_found_again(kind: str) -> None:
+    px = centres().astype(float)
+    frame = Frame.around(px)
+    model = fit_model(kind, px, distortion(kind, px))
+    again = _model(kind, frame, _starting(kind, frame, px, model))
+    np.testing.assert_allclose(again(px), distortion(kind, px), atol=0.01)
+
+
+def test_the_spline_looks_up_the_surface_itself() -> None:
+    """At whole shifts it gives the surface's values, up to the chip's weight; beyond, nothing."""
+    px = centres()[:4]
+    surfaces = surfaces_of("translation", px, Affine.identity(), 0)
+    field = _fields(px, surfaces, Affine.identity())[-1]
+    weights = field.scores(field.px)[0] / surfaces[:, RADIUS, RADIUS]
+    assert (weights > 0).all()
+    for dx, dy in ((3, -5), (-6, 6), (1, 1)):
+        values = field.scores(field.px + [dx, dy])[0]
+        expected = weights * surfaces[:, RADIUS + dy, RADIUS + dx]
+        np.testing.assert_allclose(values, expected, atol=1e-4)
+    values, slopes = field.scores(field.px + [RADIUS + 3, 0])
+    assert not values.any()
+    assert not slopes.any()
+
+
+def test_cubic_weights_sum_to_one_and_their_slopes_to_nothing() -> None:
+    t = np.linspace(0, 0.999, 50)
+    weights, slopes = _cubic_weights(t)
+    np.testing.assert_allclose(weights.sum(axis=1), 1)
+    np.testing.assert_allclose(slopes.sum(axis=1), 0, atol=1e-12)
+    np.testing.assert_allclose(weights @ [-1, 0, 1, 2], t, atol=1e-12)
+    numeric = np.gradient(weights, t, axis=0, edge_order=2)
+    np.testing.assert_allclose(slopes[1:-1], numeric[1:-1], atol=1e-3)

@@ -1,0 +1,88 @@
+"""The promise of the verdict: what is held out of the fit changes nothing of the fit."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from raster_files import write_raster
+from textured_pairs import TexturedPair, shift_on_map, write_textured_pair
+
+from groundtie.geometry.estimation import Estimate
+from groundtie.geometry.tie_points import TiePoints
+from groundtie.matching.layout import lay_out_chips
+from groundtie.matching.local import LocalSearch
+from groundtie.matching.pyramid import find_coarse_model
+from groundtie.matching.rough import RoughSearch
+from groundtie.progress import SILENT
+from groundtie.rasters.pair import ImagePair
+from groundtie.similarity.surface import SimilaritySettings
+
+
+def search_of(pair: ImagePair, similarity: str) -> LocalSearch:
+    return LocalSearch(pair, lay_out_chips(pair), SimilaritySettings(similarity))
+
+
+def registered(files: TexturedPair, kind: str, similarity: str) -> tuple[Estimate, TiePoints]:
+    with files.opened() as pair, ThreadPoolExecutor(2) as executor:
+        search = search_of(pair, similarity)
+        coarse = find_coarse_model(pair, search, RoughSearch(200.0), executor, SILENT)
+        assert coarse is not None
+        estimate = search.estimate(coarse, kind, 0, executor)
+        return estimate, search.check_points(estimate.transform.model, executor)
+
+
+def spoiled(files: TexturedPair, folder: Path, emptied: bool) -> TexturedPair:
+    """Return the pair with a reference that shows noise or zeros wherever it is held out."""
+    with files.opened() as pair:
+        search = search_of(pair, "fused")
+        grid = pair.reference.source.grid
+        cols, rows = np.meshgrid(np.arange(float(grid.width)), np.arange(float(grid.height)))
+        px = pair.grid.map_to_pixel(
+            grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
+        )
+        held_out = search.layout.held_out(px).reshape(cols.shape)
+    values = files.reference_values
+    noise = np.random.default_rng(9).integers(1, 60_000, values.shape, dtype=np.uint16)
+    values = np.where(held_out, 0 if emptied else noise, values).astype(np.uint16)
+    assert 0.15 < held_out.mean() < 0.4
+    path = write_raster(folder / "reference.tif", values, files.grid)
+    return replace(files, reference=path, reference_values=values)
+
+
+@pytest.mark.parametrize(
+    ("size", "ratio", "kind", "similarity", "emptied"),
+    [
+        ((300, 280), 1.0, "auto", "fused", False),
+        ((300, 280), 1.0, "affine", "fused", True),
+        ((640, 240), 1.0, "affine", "fused", False),  # the rough search is at a coarser level
+        # the matching grid is coarser than the reference
+        ((400, 390), 1.6, "affine", "fused", False),
+        ((503, 501), 2.0, "affine", "nmi", False),
+        ((250, 240), 0.6, "tps", "orientation", False),
+    ],
+)
+def test_pixels_held_out_of_the_fit_change_nothing_of_it(
+    tmp_path: Path,
+    size: tuple[int, int],
+    ratio: float,
+    kind: str,
+    similarity: str,
+    emptied: bool,
+) -> None:
+    model = shift_on_map(60.0, -45.0)
+    files = write_textured_pair(tmp_path, size, model, input_pixel_ratio=ratio)
+    (tmp_path / "spoiled").mkdir()
+    estimate, check = registered(files, kind, similarity)
+    blind, misled = registered(spoiled(files, tmp_path / "spoiled", emptied), kind, similarity)
+    assert blind.transform.to_json() == estimate.transform.to_json()
+    for name, values in vars(estimate.points).items():
+        np.testing.assert_array_equal(getattr(blind.points, name), values, err_msg=name)
+    assert [m.to_json() for m in blind.fold_models] == [m.to_json() for m in estimate.fold_models]
+    # These pixels are all that the check points see.
+    theirs = check.residual_px(estimate.transform)
+    assert not np.array_equal(misled.residual_px(blind.transform), theirs)
+    assert len(misled) == 0 or misled.score.mean() < 0.6 * check.score.mean()

@@ -1,0 +1,236 @@
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from affine import Affine
+from raster_files import write_raster
+from speckled_pairs import write_speckled_pair
+from textured_pairs import TexturedPair, error_px, pixels, shift_on_map
+
+from groundtie.errors import TooFewPointsError
+from groundtie.features import tiles
+from groundtie.features.descriptors import Descriptor
+from groundtie.features.detectors import Detector
+from groundtie.features.points import FeaturePoints
+from groundtie.geometry.estimation import Estimate
+from groundtie.geometry.models import Model
+from groundtie.matching import feature_tiles
+from groundtie.matching.feature_tiles import FeatureMatcher, FeatureMatches
+from groundtie.matching.hybrid import FeatureSearch
+from groundtie.matching.layout import lay_out_chips
+from groundtie.matching.local import LocalSearch
+from groundtie.rasters.grid import Grid
+from groundtie.rasters.pair import Image, ImagePair
+from groundtie.rasters.reading import Window, open_raster
+from groundtie.similarity.surface import SimilaritySettings
+
+SIZE = (300, 280)
+NMI = SimilaritySettings("nmi")
+# The truth is 60 m east and 45 m south, pixels are 10 m: the rough model is off by 5 px.
+TRUTH, ROUGH = shift_on_map(60.0, -45.0), shift_on_map(30.0, -5.0)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
+    return write_speckled_pair(tmp_path_factory.mktemp("speckled"), SIZE, TRUTH)
+
+
+def estimate_of(
+    pair: ImagePair,
+    kind: str = "auto",
+    refinement: SimilaritySettings | None = None,
+    coarse: Model = ROUGH,
+    **matcher: object,
+) -> Estimate:
+    local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("fused"))
+    features = FeatureSearch(
+        FeatureMatcher(pair, held_out=local.held_out, **matcher),  # type: ignore[arg-type]
+        local,
+        refinement,
+    )
+    with ThreadPoolExecutor(2) as executor:
+        return features.estimate(coarse, kind, 0, executor)
+
+
+@pytest.mark.parametrize("kind", ["auto", "affine", "polynomial2", "tps"])
+@pytest.mark.parametrize("refinement", [None, NMI])
+def test_a_misregistration_is_recovered(
+    files: TexturedPair, kind: str, refinement: SimilaritySettings | None
+) -> None:
+    with files.opened() as pair:
+        found = estimate_of(pair, kind, refinement)
+    # A spline sways with each of its points.
+    assert error_px(found.transform, files) < (0.6 if kind == "tps" else 0.4)
+    assert found.points.used.sum() > 15
+    assert not found.points.is_check.any()
+    residuals = found.points.take(found.points.used).residual_px(found.transform)
+    assert np.median(np.hypot(*residuals.T)) < 1.0
+    if kind != "auto":
+        assert found.transform.model.kind == kind
+
+
+@pytest.mark.parametrize("detector", ["sift", "sift-isef-oct"])
+@pytest.mark.parametrize("gradient", ["recursive", "roewa"])
+def test_other_detectors_and_gradients_find_it_too(
+    files: TexturedPair, detector: str, gradient: str
+) -> None:
+    with files.opened() as pair:
+        found = estimate_of(pair, detector=Detector(detector), descriptor=Descriptor(gradient))
+    assert error_px(found.transform, files) < 0.5
+
+
+@pytest.mark.parametrize("emptied", [False, True])
+@pytest.mark.parametrize("refinement", [None, NMI])
+def test_pixels_held_out_of_the_fit_change_nothing_of_it(
+    files: TexturedPair, tmp_path: Path, emptied: bool, refinement: SimilaritySettings | None
+) -> None:
+    with files.opened() as pair:
+        layout = lay_out_chips(pair)
+        size = pair.grid.width, pair.grid.height
+        px = np.stack(np.meshgrid(*(np.arange(float(n)) for n in size)), -1).reshape(-1, 2)
+        held_out = layout.held_out(px).reshape(size[::-1])
+        expected = estimate_of(pair, "affine", refinement)
+    values = pixels(files.reference)[0]
+    assert held_out.shape == values.shape and 0.15 < held_out.mean() < 0.4
+    noise = np.random.default_rng(9).integers(1, 60_000, values.shape, dtype=np.uint16)
+    values = np.where(held_out, 0 if emptied else noise, values).astype(np.uint16)
+    spoiled = replace(files, reference=write_raster(tmp_path / "r.tif", values, files.grid))
+    with spoiled.opened() as pair:
+        found = estimate_of(pair, "affine", refinement)
+    assert found.transform.to_json() == expected.transform.to_json()
+    for name, column in vars(expected.points).items():
+        np.testing.assert_array_equal(getattr(found.points, name), column, err_msg=name)
+
+
+@dataclass(frozen=True)
+class Astray:
+    """Matches that are off by more the farther right they lie."""
+
+    pair: ImagePair
+    local: LocalSearch
+    most_px: float = 7.0
+    gate_px: float = 16.0
+    wrong_px: float = 0.0
+
+    def match(self, coarse: Model, executor: object, progress: object) -> FeatureMatches:
+        grid = self.pair.grid
+        sides = [np.arange(30.0, size - 30, 12) for size in (grid.width, grid.height)]
+        px = np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)
+        px = px[~self.local.layout.held_out(px)]
+        partner = grid.map_to_pixel(TRUTH(grid.pixel_to_map(px)))
+        partner = partner - (grid.map_to_pixel(coarse(grid.pixel_to_map(px))) - px)
+        partner[:, 0] += self.most_px * px[:, 0] / grid.width
+        # Nearly all agree on a wrong place; so few others are no rival.
+        partner[np.arange(len(px)) % 20 > 0, 1] += self.wrong_px
+        both = [
+            FeaturePoints(at, *(np.ones(len(px)) for _ in range(3)), np.zeros(len(px), int))
+            for at in (px, partner)
+        ]
+        return FeatureMatches(*both, np.full(len(px), 0.5), (len(px), len(px)))
+
+
+def test_chips_are_matched_again_where_the_first_model_went_astray(files: TexturedPair) -> None:
+    """Right chips lie up to 7 px off the first model, and are looked for within 4 px of it."""
+    with files.opened() as pair, ThreadPoolExecutor(2) as executor:
+        local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("fused"))
+        search = FeatureSearch(Astray(pair, local), local, NMI)  # type: ignore[arg-type]
+        found = search.estimate(ROUGH, "affine", 0, executor)
+        right = files.grid.map_to_pixel(found.points.reference_xy[found.points.used])[:, 0]
+    assert error_px(found.transform, files) < 0.4
+    assert right.max() > 0.8 * SIZE[0]
+
+
+def test_the_rough_model_is_taken_where_features_agree_on_a_wrong_one(files: TexturedPair) -> None:
+    """Nothing is alike 14 px beside the truth."""
+    with files.opened() as pair, ThreadPoolExecutor(2) as executor:
+        local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("fused"))
+        astray = Astray(pair, local, most_px=0.0, wrong_px=14.0)
+        search = FeatureSearch(astray, local, NMI)  # type: ignore[arg-type]
+        found = search.estimate(TRUTH, "affine", 0, executor)
+    assert error_px(found.transform, files) < 0.4
+
+
+def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.MonkeyPatch) -> None:
+    with files.opened() as pair, ThreadPoolExecutor(2) as executor:
+        whole = FeatureMatcher(pair).match(ROUGH, executor)
+        monkeypatch.setattr(tiles, "_TILE_PX", 128)
+        parts = FeatureMatcher(pair).match(ROUGH, executor)
+
+    def places(matches: feature_tiles.FeatureMatches) -> set[tuple[float, ...]]:
+        both = np.hstack([matches.reference.position_px, matches.input.position_px])
+        return {tuple(row) for row in np.rint(both)}
+
+    # Each tile stretches its own grey values.
+    assert abs(parts.found[0] - whole.found[0]) < 0.15 * whole.found[0]
+    shared = places(whole) & places(parts)
+    assert len(shared) > 0.6 * len(places(whole))
+
+
+def test_a_tile_sees_all_that_its_features_see_but_not_far_beyond_the_grid() -> None:
+    grid = Grid(Affine.identity(), None, 3000, 1200)
+    middle, last = Window(1024, 0, 1024, 1024), Window(2048, 1024, 952, 176)
+    far = 16 + tiles.MARGIN_PX
+    left, right, down = 1024 - far, 1024 + 2 * far, 1024 + 16 + far
+    assert feature_tiles.seen_around(middle, grid, 16) == Window(left, -16, right, down)
+    # To 16 px beyond the last column and the last row.
+    assert feature_tiles.seen_around(last, grid, 16) == Window(
+        2048 - far, 1024 - far, 952 + far + 16, 176 + far + 16
+    )
+
+
+def test_only_features_on_the_ground_are_matched(files: TexturedPair, tmp_path: Path) -> None:
+    shown = np.zeros((SIZE[1], SIZE[0]), np.uint8)
+    shown[:, 100:] = 1
+    mask = write_raster(tmp_path / "ground.tif", shown, files.grid)
+    with files.opened() as pair, open_raster(mask) as ground, ThreadPoolExecutor(2) as executor:
+        masked = replace(pair, reference=Image(pair.reference.source, None, ground))
+        found = FeatureMatcher(pair, shown=masked).match(ROUGH, executor)
+        everywhere = FeatureMatcher(pair).match(ROUGH, executor)
+    assert 50 < len(found.reference) < len(everywhere.reference)
+    assert found.reference.position_px[:, 0].min() > 99
+
+
+def test_a_rough_model_that_is_off_by_more_than_the_gate_finds_nothing_right(
+    files: TexturedPair,
+) -> None:
+    far = shift_on_map(60.0 + 400.0, -45.0)
+    with files.opened() as pair:
+        try:
+            found = estimate_of(pair, "affine", coarse=far)
+        except TooFewPointsError:
+            return
+    # What agrees then agrees by chance: a small part.
+    assert found.points.used.mean() < 0.35
+
+
+def test_another_place_has_too_few_matches_that_agree(tmp_path: Path) -> None:
+    other = write_speckled_pair(tmp_path, SIZE, TRUTH, input_seed=77)
+    with other.opened() as pair:
+        try:
+            found = estimate_of(pair, "affine", ratio=0.6)
+        except TooFewPointsError:
+            return
+    assert found.points.used.sum() < 12
+
+
+def test_chips_between_the_features_take_part(files: TexturedPair) -> None:
+    with files.opened() as pair:
+        few = Detector(contrast=0.12)
+        alone, refined = (
+            estimate_of(pair, "affine", refinement, detector=few) for refinement in (None, NMI)
+        )
+    assert len(refined.points) > 1.5 * len(alone.points)
+    assert error_px(refined.transform, files) < 0.4
+
+
+def test_chips_alone_do_where_there_are_no_features(files: TexturedPair) -> None:
+    none = Detector(contrast=0.9)
+    with files.opened() as pair:
+        with pytest.raises(TooFewPointsError):
+            estimate_of(pair, detector=none)
+        found = estimate_of(pair, refinement=NMI, detector=none)
+    assert error_px(found.transform, files) < 0.4

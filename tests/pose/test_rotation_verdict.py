@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from turned_pairs import patch, turned_pair
+
+from groundtie.pose.pose import Pose, PoseFound, PoseLimits
+from groundtie.pose.rotation_steps import rotation_steps
+from groundtie.pose.rotation_verdict import LEAST_HEIGHT, LEAST_RIVAL_RATIO, judge_pose
+from groundtie.rasters.patch import Patch
+from groundtie.similarity.surface import SimilaritySettings
+
+TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
+ANY = PoseLimits(30, 180, (0.8, 1.25))
+
+
+def candidates(*heights: float) -> list[PoseFound]:
+    return [PoseFound(Pose(30.0 * i), height) for i, height in enumerate(heights)]
+
+
+@pytest.fixture(scope="module")
+def windows() -> tuple[Patch, Patch]:
+    return turned_pair(TRUTH)
+
+
+class TestWhatAnExhaustiveSearchFound:
+    def test_a_pose_that_stands_out(self, windows: tuple[Patch, Patch]) -> None:
+        verdict = judge_pose(*windows, ANY, candidates(12.0, 4.0), exhaustive=True)
+        assert verdict.accepted
+        assert verdict.summary() == {
+            "accepted": True,
+            "reason": "no other pose matches nearly as well",
+            "height": 12.0,
+            "rival_ratio": 3.0,
+        }
+
+    def test_a_rival(self, windows: tuple[Patch, Patch]) -> None:
+        found = candidates(12.0, 12.0 / LEAST_RIVAL_RATIO + 0.1)
+        verdict = judge_pose(*windows, ANY, found, exhaustive=True)
+        assert not verdict.accepted
+        assert "another pose" in verdict.reason
+
+    def test_no_higher_than_chance(self, windows: tuple[Patch, Patch]) -> None:
+        found = candidates(LEAST_HEIGHT - 0.1, 1.0)
+        verdict = judge_pose(*windows, ANY, found, exhaustive=True)
+        assert not verdict.accepted
+        assert "chance" in verdict.reason
+
+    @pytest.mark.parametrize("heights", [(), (30.0,)])
+    def test_nothing_to_compare_with(
+        self, windows: tuple[Patch, Patch], heights: tuple[float, ...]
+    ) -> None:
+        verdict = judge_pose(*windows, ANY, candidates(*heights), exhaustive=True)
+        assert not verdict.accepted
+        assert verdict.rival_ratio is None
+
+
+class TestWhatAnotherSearchFound:
+    @pytest.mark.parametrize(
+        ("pose", "accepted"),
+        [
+            (TRUTH, True),
+            (replace(TRUTH, rotation_deg=50.5, shift_px=(4.6, -6.5)), True),
+            (replace(TRUTH, rotation_deg=54.0), False),
+            (replace(TRUTH, shift_px=(14.0, -6.0)), False),
+            (replace(TRUTH, rotation_deg=-130.0), False),
+            (Pose(), False),
+        ],
+    )
+    def test_only_the_right_pose_is_accepted(
+        self, windows: tuple[Patch, Patch], executor: Executor, pose: Pose, accepted: bool
+    ) -> None:
+        found = [PoseFound(pose, 99.0)]
+        verdict = judge_pose(*windows, ANY, found, exhaustive=False, executor=executor)
+        assert verdict.accepted == accepted
+        assert accepted or "prefers" in verdict.reason
+
+    def test_a_pose_that_the_limits_hid(
+        self, windows: tuple[Patch, Patch], executor: Executor
+    ) -> None:
+        limits = PoseLimits(30, 10, (1.0, 1.0))
+        found = rotation_steps(*windows, limits, SimilaritySettings(), executor)
+        verdict = judge_pose(*windows, limits, found, exhaustive=True, executor=executor)
+        assert not verdict.accepted
+        assert "prefers 50" in verdict.reason or "prefers 49" in verdict.reason
+
+
+@pytest.mark.parametrize("seed", [20, 21, 22])
+def test_two_places_are_refused(seed: int, executor: Executor) -> None:
+    windows = turned_pair(TRUTH, seed=seed, input_seed=seed + 100)
+    found = rotation_steps(*windows, ANY, SimilaritySettings(), executor)
+    assert not judge_pose(*windows, ANY, found, exhaustive=True).accepted
+
+
+def test_windows_without_content_are_refused() -> None:
+    flat = patch(np.ones((50, 50)))
+    verdict = judge_pose(flat, flat, ANY, [PoseFound(Pose(), 9.0)], exhaustive=False)
+    assert not verdict.accepted
+    assert "too little" in verdict.reason

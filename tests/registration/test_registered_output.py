@@ -1,0 +1,106 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from affine import Affine
+from raster_files import UTM, utm_grid
+from rasterio.crs import CRS
+from textured_pairs import TexturedPair, pixels, shift_on_map
+
+from groundtie.errors import ParameterError
+from groundtie.geometry.models import KINDS, Frame, PolynomialModel
+from groundtie.geometry.transform import Transform
+from groundtie.progress import SILENT
+from groundtie.rasters.atomic import Outputs
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
+from groundtie.registration.registered_output import (
+    OUTPUT_GRIDS,
+    RegisteredOutput,
+    model_for_grid,
+    moved_grid,
+)
+
+GRID = utm_grid(200, 150)
+
+
+def test_untouched_pixels_allow_a_shift_only() -> None:
+    for grid in ("reference", "input"):
+        for model in ("auto", *KINDS):
+            assert model_for_grid(model, grid) == model
+    assert model_for_grid("auto", "untouched") == "translation"
+    assert model_for_grid("translation", "untouched") == "translation"
+    for model in set(KINDS) - {"translation"}:
+        with pytest.raises(ParameterError, match=f"not {model}"):
+            model_for_grid(model, "untouched")
+
+
+def test_the_moved_grid_puts_every_pixel_where_the_transform_does() -> None:
+    transform = Transform(shift_on_map(37.0, -12.5), UTM, GRID)
+    moved = moved_grid(transform)
+    px = GRID.outline(5)
+    np.testing.assert_allclose(moved.pixel_to_map(px), transform.inverse(px), atol=1e-6)
+    assert moved == GRID.shifted(-37.0, 12.5)
+
+
+def test_a_shift_in_another_crs_that_is_one_there_too() -> None:
+    """Within a small scene a shift in UTM is one in degrees, to a twentieth of a pixel."""
+    degrees = Grid(Affine(1e-4, 0, 9.0, 0, -1e-4, 45.1), CRS.from_epsg(4326), 100, 100)
+    transform = Transform(shift_on_map(50.0, 20.0), UTM, degrees)
+    moved = moved_grid(transform)
+    px = degrees.outline(3)
+    expected = reproject(transform.inverse(px), UTM, degrees.crs)
+    np.testing.assert_allclose(moved.pixel_to_map(px), expected, atol=5e-6)
+
+
+def test_a_shift_that_is_none_in_the_inputs_crs_is_an_error() -> None:
+    """Over a whole degree, a hundred kilometres east are not everywhere as many degrees."""
+    wide = Grid(Affine(0.01, 0, 8.0, 0, -0.01, 50.0), CRS.from_epsg(4326), 300, 300)
+    with pytest.raises(ParameterError, match="untouched is not possible"):
+        moved_grid(Transform(shift_on_map(1e5, 0.0), UTM, wide))
+
+
+def test_a_turn_is_no_shift() -> None:
+    frame = Frame.around(GRID.pixel_to_map(GRID.outline()))
+    turn = PolynomialModel("rigid", frame, np.array([[0, 0], [0, 0.02], [-0.02, 0]]))
+    with pytest.raises(ParameterError):
+        moved_grid(Transform(turn, UTM, GRID))
+
+
+def test_images_without_georeferencing_move_in_pixels() -> None:
+    plain = Grid(PIXEL_COORDINATES, None, 50, 40)
+    moved = moved_grid(Transform(shift_on_map(3.0, -2.0), None, plain))
+    np.testing.assert_allclose(moved.pixel_to_map([[0, 0]]), [[-3, 2]])
+
+
+@pytest.mark.parametrize("grid", OUTPUT_GRIDS)
+def test_ground_lies_where_the_truth_says_on_every_grid(
+    textured: TexturedPair, tmp_path: Path, grid: str
+) -> None:
+    output = RegisteredOutput(tmp_path / "out.tif", grid, "cubic")
+    with textured.opened() as pair, Outputs() as outputs:
+        output.write(pair, textured.truth, outputs, 2, SILENT)
+    with rasterio.open(output.path) as out, rasterio.open(textured.reference) as reference:
+        assert out.crs == reference.crs
+        # The same ground in both: the textures are opposite, up to their noise.
+        near = Grid(out.transform, out.crs, out.width, out.height)
+    px = np.stack(np.meshgrid(np.arange(40, 200, 3), np.arange(40, 180, 3)), -1).reshape(-1, 2)
+    there = np.rint(near.map_to_pixel(textured.grid.pixel_to_map(px))).astype(int)
+    shown = pixels(output.path)[0][there[:, 1], there[:, 0]].astype(float)
+    expected = textured.reference_values[px[:, 1], px[:, 0]].astype(float)
+    # Half a pixel of rounding on the untouched grid costs some of it.
+    assert np.corrcoef(shown, expected)[0, 1] < -0.8
+
+
+def test_the_rows_of_a_grid_are_moved_and_no_pixel_changed(
+    textured: TexturedPair, tmp_path: Path
+) -> None:
+    output = RegisteredOutput(tmp_path / "out.tif", "untouched", "cubic")
+    with textured.opened() as pair, Outputs() as outputs:
+        output.write(pair, textured.truth, outputs, 1, SILENT)
+    np.testing.assert_array_equal(pixels(output.path), pixels(textured.input))
+    with rasterio.open(output.path) as out:
+        expected = textured.truth.input_grid.shifted(-70.0, 45.0).transform
+        assert out.transform.almost_equals(expected, 1e-6)

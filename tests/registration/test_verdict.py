@@ -1,0 +1,227 @@
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from raster_files import UTM, utm_grid
+
+from groundtie.geometry.chance import agreement_probability, log10_chance
+from groundtie.geometry.estimation import Estimate
+from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.models import PolynomialModel
+from groundtie.geometry.robust import block_folds
+from groundtie.geometry.tie_points import TiePoints
+from groundtie.geometry.transform import Transform
+from groundtie.registration.verdict import LOG10_CHANCE_ON_GROUND, Verdict, judge, refuse
+
+GRID = utm_grid(600, 500)
+RADIUS = 16
+TRUTH = Transform.as_claimed(UTM, GRID)
+
+
+def points(px: np.ndarray, error_px: np.ndarray, *, check: bool) -> TiePoints:
+    """Return points of an image that is registered already, with errors of their matches."""
+    count = len(px)
+    return TiePoints(
+        reference_xy=GRID.pixel_to_map(px),
+        input_px=px + error_px,
+        score=np.full(count, 8.0),
+        covariance_px2=np.tile(0.04 * np.eye(2), (count, 1, 1)),
+        two_way_error_px=np.zeros(count),
+        is_check=np.full(count, check),
+        state=np.full(count, "used"),
+    )
+
+
+def fit_points(within: tuple[float, float] = (1.0, 1.0), sigma: float = 0.3) -> TiePoints:
+    rng = np.random.default_rng(1)
+    cols, rows = np.meshgrid(np.linspace(20, 579, 9), np.linspace(20, 479, 8))
+    px = np.column_stack([cols.ravel(), rows.ravel()]) * within
+    return points(px, sigma * rng.normal(size=px.shape), check=False)
+
+
+def estimated(fit: TiePoints, kind: str = "affine") -> Estimate:
+    """Fit a model to points as the search does: on the map, and in pixels without each block."""
+    px, claimed_px = GRID.map_to_pixel(fit.reference_xy), fit.input_px
+    on_map = fit_model(kind, fit.reference_xy, GRID.pixel_to_map(claimed_px))
+    folds = block_folds(px)
+    left_out = [fit_model(kind, px[folds != f], claimed_px[folds != f]) for f in np.unique(folds)]
+    return Estimate(Transform(on_map, UTM, GRID), fit, tuple(left_out))
+
+
+def check_points(error_px: np.ndarray) -> TiePoints:
+    rng = np.random.default_rng(2)
+    px = rng.uniform([30, 30], [570, 470], (len(error_px), 2))
+    return points(px, error_px, check=True)
+
+
+def scatter(count: int, sigma: float, seed: int = 3) -> np.ndarray:
+    return sigma * np.random.default_rng(seed).normal(size=(count, 2))
+
+
+def fallen(count: int, seed: int = 4) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-RADIUS, RADIUS, (count, 2))
+
+
+def judged(check: TiePoints, estimate: Estimate | None = None, max_error: float = 3.0) -> Verdict:
+    return judge(estimate or estimated(fit_points()), check, GRID, max_error, RADIUS)
+
+
+@pytest.mark.parametrize("sigma", [0.2, 0.7, 1.2])
+@pytest.mark.parametrize("wrong", [0.0, 0.5])
+def test_right_points_are_accepted_and_their_error_measured(sigma: float, wrong: float) -> None:
+    count = 72
+    errors = scatter(count, sigma)
+    errors[: int(wrong * count)] = fallen(int(wrong * count))
+    verdict = judged(check_points(errors))
+    assert verdict.accepted
+    assert verdict.reason == "check points confirm the registration"
+    # RMSE of both axes and the radius of 90 % of a circular normal distribution.
+    assert verdict.check_rmse_px == pytest.approx(math.sqrt(2) * sigma, rel=0.2)
+    assert verdict.check_ce90_px == pytest.approx(2.1460 * sigma, rel=0.2)
+    assert verdict.check_ce90_px == pytest.approx(1.5174 * verdict.check_rmse_px, rel=1e-3)
+    assert verdict.check_rmse_m == pytest.approx(10 * verdict.check_rmse_px)
+    assert verdict.check_ce90_m == pytest.approx(10 * verdict.check_ce90_px)
+    assert (verdict.fit_points, verdict.check_points) == (72, count)
+    assert verdict.points == verdict.fit_points_used + verdict.check_points_agreeing
+    assert verdict.extrapolated_share < 0.2
+
+
+@pytest.mark.parametrize(("right", "clear"), [(26, True), (22, False)])
+def test_of_a_clear_verdict_two_check_points_of_three_agree(right: int, clear: bool) -> None:
+    """Of 36."""
+    verdict = judged(check_points(np.concatenate([scatter(right, 0.4), fallen(36 - right)])))
+    assert verdict.accepted
+    assert verdict.check_points_agreeing == pytest.approx(right, abs=1)
+    assert verdict.is_clear == clear
+
+
+def test_ce90_holds_ninety_percent_of_the_errors() -> None:
+    errors = scatter(4000, 0.8)
+    verdict = judged(check_points(errors))
+    assert (np.hypot(*errors.T) < verdict.check_ce90_px).mean() == pytest.approx(0.9, abs=0.02)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_random_points_are_refused(seed: int) -> None:
+    verdict = judged(check_points(fallen(72, seed)))
+    assert not verdict.accepted
+    assert "of 72 check points agree" in verdict.reason
+    assert math.isnan(verdict.check_rmse_px)
+    assert 0.001 < verdict.chance <= 1
+
+
+@pytest.mark.parametrize("bias", [(5.0, 0.0), (-3.6, 3.6), (0.0, -4.0)])
+def test_a_bias_is_refused(bias: tuple[float, float]) -> None:
+    verdict = judged(check_points(scatter(72, 0.4) + bias))
+    assert not verdict.accepted
+
+
+def test_a_bias_within_the_tolerance_counts_as_error() -> None:
+    """1.2 px off and a largest error of 1 px: the points agree, but not well enough."""
+    check = check_points(scatter(72, 0.3) + [1.2, 0])
+    verdict = judged(check, max_error=1.0)
+    assert not verdict.accepted
+    assert "above 1 px" in verdict.reason
+    assert verdict.check_rmse_px == pytest.approx(math.hypot(1.2, 0.3 * math.sqrt(2)), rel=0.15)
+    assert judged(check, max_error=3.0).accepted
+
+
+def test_points_in_one_corner_do_not_hold_the_rest() -> None:
+    estimate = estimated(fit_points(within=(0.15, 0.15), sigma=0.5), "polynomial2")
+    verdict = judged(check_points(scatter(72, 0.3)), estimate)
+    assert not verdict.accepted
+    # Either it varies too much over the overlap, or check points far from the corner disagree.
+    assert "do not hold the model" in verdict.reason or "check points agree" in verdict.reason
+
+
+def test_a_shift_of_points_in_one_corner_is_accepted_and_the_rest_said_to_be_extrapolated() -> None:
+    estimate = estimated(fit_points(within=(0.3, 0.3)), "translation")
+    verdict = judged(check_points(scatter(72, 0.3)), estimate)
+    assert verdict.accepted
+    # The hull of the points covers 0.3² of (579 - 20) × (479 - 20) px.
+    hull = 0.09 * (579 - 20) * (479 - 20)
+    assert verdict.extrapolated_share == pytest.approx(1 - hull / (600 * 500), abs=1e-6)
+    assert verdict.spread_px < 0.2
+
+
+def test_the_chance_counts_all_check_points_but_only_those_that_agree() -> None:
+    errors = fallen(40)
+    errors[:12] = 0.0
+    far = np.hypot(*errors.T) > 2
+    check = check_points(errors)
+    check = check.reject(far & (np.arange(40) > 30), "no peak")
+    verdict = judged(check)
+    assert verdict.check_points == 40
+    assert verdict.check_points_agreeing == int((~far).sum())
+    probability = agreement_probability(2.0, RADIUS)
+    expected = log10_chance(int((~far).sum()), 40, probability)
+    assert verdict.log10_chance == pytest.approx(expected, abs=1e-9)
+    assert verdict.chance == pytest.approx(10**expected)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_few_check_points_confirm_nothing(count: int) -> None:
+    verdict = judged(check_points(np.zeros((count, 2))))
+    assert not verdict.accepted
+    assert verdict.check_points == count
+
+
+def test_three_exact_points_are_enough() -> None:
+    assert judged(check_points(np.zeros((3, 2)))).accepted
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "accepted"), [(3, 6, False), (4, 5, True), (3, 0, True)]
+)
+def test_where_the_ground_of_a_town_was_matched_three_of_nine_are_not_enough(
+    right: int, wrong: int, accepted: bool
+) -> None:
+    away = 9.0 * np.array([[1, 0], [0, -1], [-1, 1], [1, 1], [-1, 0], [0, 1]])
+    check = check_points(np.concatenate([np.zeros((right, 2)), away[:wrong]]))
+    estimate = estimated(fit_points())
+    found = judge(estimate, check, GRID, 3.0, RADIUS, LOG10_CHANCE_ON_GROUND)
+    assert found.accepted == accepted
+    assert judged(check).accepted
+
+
+def test_fit_points_that_were_all_rejected() -> None:
+    """The model may come from surfaces; a hull of no points covers nothing."""
+    estimate = estimated(fit_points())
+    none = estimate.points.reject(np.ones(len(estimate.points), bool), "two-way error")
+    verdict = judged(
+        check_points(scatter(30, 0.3)), Estimate(estimate.transform, none, estimate.fold_models)
+    )
+    assert verdict.fit_points_used == 0
+    assert verdict.extrapolated_share == 1.0
+
+
+def test_summaries_are_json_whatever_happened() -> None:
+    exact = judged(check_points(np.zeros((400, 2))))
+    # A probability of 10^-775 is no number of the machine's, but not a reason to fail either.
+    assert exact.log10_chance == pytest.approx(400 * math.log10(4 * math.pi / 33**2), rel=1e-6)
+    assert exact.chance == 0.0
+    one_fold = estimated(fit_points())
+    one_fold = Estimate(one_fold.transform, one_fold.points, one_fold.fold_models[:1])
+    unheld = judged(check_points(np.zeros((30, 2))), one_fold)
+    assert not unheld.accepted
+    for verdict in (exact, judged(check_points(fallen(72))), refuse("nothing", 7), unheld):
+        summary = json.loads(json.dumps(verdict.summary(), allow_nan=False))
+        assert summary["accepted"] is verdict.accepted
+        assert summary["reason"] == verdict.reason
+        assert summary["points"] == verdict.points
+        assert set(summary) == set(vars(verdict)) | {"points", "chance"}
+    assert refuse("nothing", 7).summary()["check_rmse_px"] is None
+    assert refuse("nothing", 7).fit_points == 7
+
+
+def test_what_the_model_predicts_is_judged_not_what_the_input_claims() -> None:
+    """The input claims to lie 80 m off; the model knows it, so that its points agree."""
+    shift = PolynomialModel("translation", TRUTH.model.frame, np.array([[80.0, -50.0]]))
+    fit = fit_points()
+    moved = Estimate(Transform(shift, UTM, GRID), fit, estimated(fit).fold_models)
+    off = check_points(scatter(40, 0.3) + [8.0, 5.0])
+    assert judged(off, moved).accepted
+    assert not judged(check_points(scatter(40, 0.3)), moved).accepted
