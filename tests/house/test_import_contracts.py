@@ -50,13 +50,23 @@ def write(package: Path, name: str, *lines: str) -> None:
 
 def test_what_the_design_allows_passes(package: Path) -> None:
     write(package, "cli.py", "from .tools import run")
-    write(package, "tools/run.py", "from .. import simulation, registration, matching, rasters, errors")
-    write(package, "registration/verdict.py", "from ..matching import x", "from ..similarity import y")
+    write(
+        package,
+        "tools/run.py",
+        "from .. import simulation, registration, matching, rasters, errors",
+    )
+    write(
+        package, "registration/verdict.py", "from ..matching import x", "from ..similarity import y"
+    )
     write(package, "similarity/surface.py", "from ..masks import x", "from ..geometry import y")
     write(package, "simulation/pair.py", "from ..geometry import x", "from ..rasters import y")
     write(package, "rasters/warp.py", "from ..geometry import x", "from ..progress import y")
     write(package, "progress.py", "from .errors import CancelledError")
-    hint = ("from typing import TYPE_CHECKING", "if TYPE_CHECKING:", "    from .registration import x")
+    hint = (
+        "from typing import TYPE_CHECKING",
+        "if TYPE_CHECKING:",
+        "    from .registration import x",
+    )
     write(package, "errors.py", *hint)
     done = lint(package)
     assert done.returncode == 0, done.stdout + done.stderr
