@@ -1,25 +1,26 @@
-"""From a rough shift to a model of degree 1, level by level of the image pyramid."""
+"""A better model of degree 1 from the chips of one level of the image pyramid."""
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
 
+from ..context import Context
+from ..errors import TooFewPointsError
 from ..geometry.chance import agreement_probability, log10_false_alarms
-from ..geometry.fitting import fit_model
-from ..geometry.models import Model
+from ..geometry.models import PARAMETERS, Model
 from ..geometry.robust import distances, find_consensus
-from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
-from ..rasters.pair import ImagePair
 from ..similarity.peak import find_peak
-from ..similarity.surface import SimilaritySettings
+from .alignment import align
 from .belief_propagation import support
-from .chips import ChipMatcher, MaskOf
+from .chips import ChipMatcher
+from .frames import compose
+from .matcher import Places
+from .pooled import PooledHistogramMatcher
 
 FloatArray = NDArray[np.float64]
 
@@ -27,6 +28,9 @@ FloatArray = NDArray[np.float64]
 _TOLERANCE_PX = 2.0
 _CHIPS_PER_SIDE = 7
 _CHIP_RANGE_PX = (48, 80)
+
+# Side of the chips with a joint histogram in common.
+_POOLED_CHIP_PX = 64
 
 # Simple models are preferred unless the data speak for others: each has its number of
 # hypotheses counted against it.
@@ -45,41 +49,27 @@ class CoarseModel:
     log10_false_alarms: float
 
 
-def refine_on_level(
-    pair: ImagePair,
-    level: Grid,
-    model: Model,
-    radius_px: int,
-    settings: SimilaritySettings,
-    held_out: MaskOf,
-    executor: Executor,
-    progress: Progress = SILENT,
+def fit_level(
+    matcher: ChipMatcher, level: Grid, model: Model, radius_px: int, context: Context
 ) -> CoarseModel:
     """Match large chips on a level around a model, and fit a model of degree 1 to them.
 
     Parameters
     ----------
-    pair
-        The images.
+    matcher
+        Matches the chips.
     level
         The matching grid at reduced resolution.
     model
         The misregistration on the map as known so far.
     radius_px
         How far it may be wrong, in pixels of the level.
-    settings
-        How similarity is measured.
-    held_out
-        Returns for a piece of the grid which pixels of the reference must not be seen.
-    executor
-        Threads to work in.
-    progress
-        Is told of every chip.
+    context
+        Threads and progress.
     """
     chip = int(np.clip(min(level.width, level.height) / 5, *_CHIP_RANGE_PX))
-    matcher = ChipMatcher(pair, level, lambda xy: pair.claimed_px(model(xy)), settings, held_out)
-    centres = _regular_centres(level, chip)
-    centres, surfaces = matcher.match_forward(centres, chip, radius_px, executor, progress)
+    places = Places(level, _regular_centres(level, chip), chip)
+    centres, surfaces = matcher.match_forward(model, places, radius_px, context)
     if len(centres) < 4:
         return CoarseModel(model, np.inf)
     step = (np.array([level.width, level.height]) - chip) / (_CHIPS_PER_SIDE - 1)
@@ -91,22 +81,35 @@ def refine_on_level(
     found = px + _peaks(supported)
     for kind, sample in _SAMPLE_OF.items():
         fitted = find_consensus(px, found, _TOLERANCE_PX, kind)
-        # Supported peaks are not independent; only those that stand alone are counted.
+        # Peaks after belief propagation are not independent; only the chips' own are counted.
         agreeing = int((distances(fitted, px, px + own) < _TOLERANCE_PX).sum())
         alarms = log10_false_alarms(agreeing, len(px), probability, sample)
         if alarms < best.log10_false_alarms:
-            best = CoarseModel(behind(model, fitted, level), alarms)
+            best = CoarseModel(compose(model, fitted, level), alarms)
     return best
 
 
-def behind(model: Model, correction: Model, level: Grid) -> Model:
-    """Return the model of degree 1 that first corrects on the level, then applies `model`."""
-    centres = level.transform * Affine.translation(0.5, 0.5)
-    on_map = correction.on_map(centres)
-    corners = level.pixel_to_map(
-        [[0, 0], [level.width, 0], [0, level.height], [level.width, level.height]]
-    )
-    return fit_model("affine", corners, model(on_map(corners)))
+def fit_level_pooled(
+    matcher: PooledHistogramMatcher, level: Grid, model: Model, radius_px: int, context: Context
+) -> Model:
+    """Return a better affine model by all that a mask leaves on a level of the pyramid.
+
+    Parameters as `fit_level`.
+
+    Raises
+    ------
+    TooFewPointsError
+        The mask leaves too few pixels.
+    """
+    coarser = replace(matcher, pooled_chip_px=_POOLED_CHIP_PX)
+    places = Places.tiles(level, _POOLED_CHIP_PX)
+    found = coarser.match(model, places, radius_px, context)
+    if len(found.centres) < PARAMETERS["affine"]:
+        raise TooFewPointsError(f"only {len(found.centres)} chips show any ground")
+    shift = found.common_shift_px
+    identity = Affine.identity()
+    aligned = align("affine", found.centres, found.weighted, identity, lambda px: px + shift)
+    return compose(model, aligned.model, level)
 
 
 def _regular_centres(level: Grid, chip: int) -> NDArray[np.int_]:

@@ -1,18 +1,19 @@
-"""The rough shift or pose: candidates from one search over a reduced image."""
+"""The coarse shift or pose: candidates from one exhaustive search over a reduced image."""
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from affine import Affine
 
+from ..context import Context
 from ..errors import RasterContentError
 from ..geometry.fitting import fit_model
+from ..geometry.limits import SearchLimits
 from ..geometry.models import Frame, Model, PolynomialModel
 from ..geometry.transform import Transform
-from ..pose.pose import PoseSearch
+from ..pose.rotation_steps import rotation_steps
 from ..pose.rotation_windows import read_windows
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
@@ -20,7 +21,7 @@ from ..rasters.patch import Patch
 from ..similarity.correlation import MINIMUM_OVERLAP
 from ..similarity.peak import find_peak
 from ..similarity.surface import BORDER_PX, SimilaritySettings, describe, similarity_surface
-from .chips import MaskOf
+from .matcher import MaskOf
 
 # The longer side of the reduced image, in pixels, and how many candidates are kept.
 LEVEL_SIDE_PX = 512
@@ -37,28 +38,6 @@ _BINS = 8
 
 
 @dataclass(frozen=True)
-class RoughSearch:
-    """How far the input may lie from where it claims to be, and how it is searched for.
-
-    Parameters
-    ----------
-    radius_m
-        Largest shift, in metres.
-    rotation_deg
-        Largest rotation, either way.
-    scale
-        Smallest and largest scale of the input against what it claims.
-    poses
-        What searches for rotation, scale and shift; None: shifts alone, each of them.
-    """
-
-    radius_m: float
-    rotation_deg: float = 0.0
-    scale: tuple[float, float] = (1.0, 1.0)
-    poses: PoseSearch | None = None
-
-
-@dataclass(frozen=True)
 class Candidate:
     """A model of degree 1 on the map by which the images may match, and its peak's height."""
 
@@ -72,17 +51,17 @@ def shift_model(dx: float, dy: float) -> Model:
 
 
 def level_factor(grid: Grid) -> float:
-    """Return how much coarser than the matching grid the level of the rough search is."""
+    """Return how much coarser than the matching grid the level of the coarse search is."""
     return max(max(grid.width, grid.height) / LEVEL_SIDE_PX, 1.0)
 
 
-def rough_candidates(
+def coarse_candidates(
     pair: ImagePair,
     level: Grid,
-    rough: RoughSearch,
+    limits: SearchLimits,
     settings: SimilaritySettings,
     held_out: MaskOf,
-    executor: Executor,
+    context: Context,
 ) -> list[Candidate]:
     """Return the best shifts or poses, best first, within the limits of a search.
 
@@ -92,32 +71,29 @@ def rough_candidates(
         The images.
     level
         The matching grid at reduced resolution.
-    rough
-        What is searched for, and how.
+    limits
+        How far the input may lie from its nominal place, in metres.
     settings
         How similarity is measured.
     held_out
         Returns for a piece of the grid which pixels of the reference must not be seen.
-    executor
-        Threads to work in.
+    context
+        Threads.
 
     Raises
     ------
     RasterContentError
         One of the images is constant or has no valid pixel where they overlap.
     """
-    # The true place may lie a pixel of the level further than the whole pixels say.
-    radius_px = int(np.ceil(rough.radius_m / level.pixel_size_m)) + 1
-    # Farther off too little of the images overlaps.
-    radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.width, level.height)))
     if settings.bins is None:
         settings = replace(settings, bins=_BINS)
-    if rough.poses is None:
-        return _shifts(pair, level, radius_px, settings, held_out, executor)
-    windows = read_windows(pair.reference, pair.input, rough.scale, rough.radius_m, held_out)
-    limits = windows.limits(rough.rotation_deg, rough.scale)
-    both = windows.reference, windows.input
-    found = rough.poses(*both, limits, settings, executor)[:CANDIDATES]
+    if limits.is_shift:
+        return _shifts(pair, level, limits.radius, settings, held_out, context)
+    windows = read_windows(pair.reference, pair.input, limits.scale, limits.radius, held_out)
+    pose_limits = windows.limits(limits.rotation_deg, limits.scale)
+    found = rotation_steps(
+        windows.reference, windows.input, pose_limits, settings, context.executor
+    )[:CANDIDATES]
     high = [one for one in found if one.height > found[0].height * _LOW]
     return [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in high]
 
@@ -125,23 +101,27 @@ def rough_candidates(
 def _shifts(
     pair: ImagePair,
     level: Grid,
-    radius_px: int,
+    radius_m: float,
     settings: SimilaritySettings,
     held_out: MaskOf,
-    executor: Executor,
+    context: Context,
 ) -> list[Candidate]:
     """Search all shifts, and return the highest peaks of their similarity."""
+    # The true place may lie a pixel of the level further than whole pixels show.
+    radius_px = int(np.ceil(radius_m / level.pixel_size_m)) + 1
+    # Farther off too little of the images overlaps.
+    radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.width, level.height)))
     reach = radius_px + BORDER_PX
-    reference, input = _patches(pair, level, BORDER_PX, reach, held_out, executor)
+    reference, input = _patches(pair, level, BORDER_PX, reach, held_out, context)
     # What a mask leaves of the input is all that can lie under the reference.
-    shown = 1.0 if pair.input.mask is None else input.valid_share
+    valid = 1.0 if pair.input.mask is None else input.valid_share
     surface = similarity_surface(
         describe(reference, level.width * level.height, settings),
         describe(input, level.width * level.height, settings),
         radius_px,
         settings,
-        executor,
-        MINIMUM_OVERLAP * shown,
+        context.executor,
+        MINIMUM_OVERLAP * valid,
     )
     found: list[Candidate] = []
     for _ in range(CANDIDATES):
@@ -159,14 +139,14 @@ def _shifts(
 
 
 def _patches(
-    pair: ImagePair, level: Grid, border: int, reach: int, held_out: MaskOf, executor: Executor
+    pair: ImagePair, level: Grid, border: int, reach: int, held_out: MaskOf, context: Context
 ) -> tuple[Patch, Patch]:
     """Return the reference with a border around the level, and the input with a wider one."""
     template, search = (
         level.window(-more, -more, level.width + 2 * more, level.height + 2 * more)
         for more in (border, reach)
     )
-    reading = executor.submit(pair.reference_patch, template, held_out(template))
+    reading = context.executor.submit(pair.reference_patch, template, held_out(template))
     input = pair.input_patch(search, pair.claimed_px)
     reference = reading.result()
     for image, patch in ((pair.reference, reference), (pair.input, input)):
