@@ -34,7 +34,7 @@ def tie_points(px: np.ndarray, claimed_px: np.ndarray, variance: float = 0.05) -
         input_px=claimed_px,
         score=np.full(count, 8.0),
         covariance_px2=np.tile(variance * np.eye(2), (count, 1, 1)),
-        two_way_error_px=np.zeros(count),
+        forward_backward_error_px=np.zeros(count),
         is_check=np.zeros(count, bool),
         state=np.full(count, "used"),
     )
@@ -107,7 +107,7 @@ def test_rejected_points_take_no_part_in_the_spline() -> None:
     claimed = bent(px)
     which = np.arange(len(px)) % 5 == 0
     spoiled = claimed + np.where(which[:, None], 2.0, 0.0)
-    rejected = tie_points(px, spoiled).reject(which, "two-way error")
+    rejected = tie_points(px, spoiled).reject(which, "forward–backward error")
     model, _ = fit_thin_plate(rejected, AS_CLAIMED, GRID, IDENTITY, 3)
     clean, _ = fit_thin_plate(
         tie_points(px[~which], claimed[~which]), AS_CLAIMED, GRID, IDENTITY, 3

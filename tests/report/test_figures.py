@@ -47,7 +47,7 @@ def tie_points(
         input_px=TRANSFORM(xy) + error_px / 2,
         score=np.full(count, 8.0),
         covariance_px2=np.tile(np.eye(2) / 10, (count, 1, 1)),
-        two_way_error_px=np.zeros(count),
+        forward_backward_error_px=np.zeros(count),
         is_check=is_check,
         state=np.full(count, "used"),
     )

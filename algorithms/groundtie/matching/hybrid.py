@@ -239,7 +239,7 @@ class FeatureSearch:
             score=places.score,
             covariance_px2=np.broadcast_to(np.eye(2) * sigma**2, (count, 2, 2)).copy(),
             # Partners are each other's nearest.
-            two_way_error_px=np.zeros(count),
+            forward_backward_error_px=np.zeros(count),
             is_check=np.zeros(count, bool),
             state=np.full(count, USED),
         )

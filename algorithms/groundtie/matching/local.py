@@ -64,7 +64,7 @@ class LocalSearch:
         How similarity is measured.
     fit_radius_px, check_radius_px
         Largest shift from the prediction for points of the fit and for check points.
-    two_way_px
+    forward_backward_px
         Largest distance between a match and its match back for points of the fit.
     pooled
         Whether chips share one joint histogram, as those that a mask leaves little of must.
@@ -77,7 +77,7 @@ class LocalSearch:
     settings: SimilaritySettings
     fit_radius_px: int = 8
     check_radius_px: int = 12
-    two_way_px: float = 2.0
+    forward_backward_px: float = 2.0
     pooled: bool = False
     candidates: tuple[str, ...] = CANDIDATES
 
@@ -279,21 +279,21 @@ class LocalSearch:
         found = peaks(surfaces.both)
         centres = surfaces.centres.astype(float)
         there = centres + np.array([peak.shift_px for peak in found]).reshape(-1, 2)
-        two_way = np.hypot(*(shifts(surfaces.forward) - shifts(surfaces.backward)).T)
+        error = np.hypot(*(shifts(surfaces.forward) - shifts(surfaces.backward)).T)
         points = TiePoints(
             reference_xy=grid.pixel_to_map(centres),
             input_px=self.pair.claimed_px(model(grid.pixel_to_map(there))),
             score=np.array([peak.height for peak in found]),
             covariance_px2=np.array([p.covariance_px2 for p in found]).reshape(-1, 2, 2),
-            two_way_error_px=two_way,
+            forward_backward_error_px=error,
             is_check=np.full(len(found), expected_px is None),
             state=np.full(len(found), USED),
         )
         points = points.reject(np.array([peak.at_border for peak in found], bool), "no peak")
         if expected_px is None:
             return points
-        limit = f"two-way error above {self.two_way_px:g} px"
-        return points.reject(points.two_way_error_px > self.two_way_px, limit)
+        limit = f"forward–backward error above {self.forward_backward_px:g} px"
+        return points.reject(points.forward_backward_error_px > self.forward_backward_px, limit)
 
     def _agreeing(self, points: TiePoints, transform: Transform) -> TiePoints:
         """Reject the points of the fit that more likely fell by chance than near the model."""
