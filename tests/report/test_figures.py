@@ -14,11 +14,12 @@ from matplotlib.patches import Circle
 from matplotlib.quiver import Quiver
 from rasterio.crs import CRS
 
+from groundtie.geometry.judging import TOLERANCE_PX
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.grid import Grid
-from groundtie.registration.verdict import TOLERANCE_PX, Verdict, refuse
+from groundtie.registration.verdict import Verdict, refuse
 from groundtie.report import figures
 
 UTM = CRS.from_epsg(32633)
