@@ -31,7 +31,7 @@ def made(crs: CRS | None, grid: Grid, count: int = 12) -> tuple[TiePoints, Trans
     """Points that lie SHIFT away from where the input claims them, but for 0.5 px along rows."""
     rng = np.random.default_rng(0)
     px = rng.uniform(10, 290, (count, 2))
-    claimed = Transform.as_claimed(crs, grid).claimed_xy(px)
+    claimed = Transform.nominal(crs, grid).nominal_xy(px)
     points = TiePoints(
         reference_xy=claimed - SHIFT,
         input_px=px + [0, 0.5],

@@ -19,7 +19,7 @@ from groundtie.registration.verdict import Verdict, judge, refuse
 
 GRID = utm_grid(600, 500)
 RADIUS = 16
-TRUTH = Transform.as_claimed(UTM, GRID)
+TRUTH = Transform.nominal(UTM, GRID)
 
 
 def points(px: np.ndarray, error_px: np.ndarray, *, check: bool) -> TiePoints:

@@ -608,5 +608,5 @@ class TestWithOtherTools:
             input=pair.input, check_points=pair.folder / "check_points.csv"
         ).assessment.check_points
         exact = load_transform(truth)
-        claimed = Transform.as_claimed(exact.crs, exact.input_grid)
+        claimed = Transform.nominal(exact.crs, exact.input_grid)
         assert unregistered.in_pixels.rmse == pytest.approx(pair.error_px(claimed), rel=1e-4)

@@ -153,7 +153,7 @@ def read_tie_points(
 
 def _rows(points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]) -> list[Row]:
     residual = points.residual_px(transform)
-    claimed = transform.claimed_xy(points.input_px)
+    claimed = transform.nominal_xy(points.input_px)
     sigma = np.sqrt(points.covariance_px2[:, [0, 1], [0, 1]])
     numbers = np.column_stack(
         [

@@ -64,7 +64,7 @@ class TiePoints:
 
     def residual_on(self, grid: Grid, transform: Transform) -> FloatArray:
         """Return claimed minus predicted positions in pixels of a grid on the map, (n, 2)."""
-        claimed = grid.map_to_pixel(transform.claimed_xy(self.input_px))
+        claimed = grid.map_to_pixel(transform.nominal_xy(self.input_px))
         return claimed - grid.map_to_pixel(transform.model(self.reference_xy))
 
     def reject(self, which: NDArray[np.bool_], reason: str) -> TiePoints:

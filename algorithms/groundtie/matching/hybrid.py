@@ -244,7 +244,7 @@ class FeatureSearch:
             state=np.full(count, USED),
         )
         points = points.reject(~fit.mixture.right, "disagrees with the model")
-        as_claimed = Transform.as_claimed(grid.crs, pair.input.source.grid)
+        as_claimed = Transform.nominal(grid.crs, pair.input.source.grid)
         model, fold_models = fit.model, fit.fold_models
         if kind == "tps":
             model, fold_models = fit_thin_plate(points, as_claimed, grid, model, _TPS_RADIUS_PX)

@@ -115,7 +115,7 @@ class LocalSearch:
             surfaces, aligned, expected = self._align(coarse, kind, seed, executor, progress)
         points = self._points(surfaces, coarse, expected)
         model, fold_models = aligned.model, aligned.fold_models
-        as_claimed = Transform.as_claimed(self.pair.grid.crs, self.pair.input.source.grid)
+        as_claimed = Transform.nominal(self.pair.grid.crs, self.pair.input.source.grid)
         if kind == "tps":
             model, fold_models = fit_thin_plate(points, as_claimed, self.pair.grid, model, _NEAR_PX)
         transform = Transform(self.on_map(model), as_claimed.crs, as_claimed.input_grid)

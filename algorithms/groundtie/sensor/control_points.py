@@ -100,7 +100,7 @@ class ControlPoints:
         covariance = self.points.covariance_px2
         sigma = np.sqrt(covariance[:, 0, 0] * covariance[:, 1, 1])
         more = {HEIGHT: self.height_m, CORRELATION: covariance[:, 0, 1] / sigma}
-        transform = Transform.as_claimed(self.crs, own)
+        transform = Transform.nominal(self.crs, own)
         write_tie_points(path, self.points, transform, more)
 
     def _gdal_options(self) -> str:
