@@ -99,7 +99,7 @@ class TestComparison:
 
     def test_a_transform_on_another_map(self, opened: Opened) -> None:
         """The transform's map is in degrees, the reference in UTM; nothing is off."""
-        claimed = Transform.as_claimed(LONLAT, GRID)
+        claimed = Transform.nominal(LONLAT, GRID)
         moved = replace(claimed, input_grid=GRID.shifted(*-SHIFT_M))
         found = compare(opened.reference, opened.input, moved)
         assert likeness(grey(found.registered), grey(found.reference)) > 0.99

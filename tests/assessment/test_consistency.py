@@ -99,11 +99,11 @@ class TestTwoWay:
         """Both believe the georeferencing; only the projections differ."""
         lonlat = Grid(Affine(1e-4, 0, 9.002, 0, -1e-4, 45.15), LONLAT, 150, 120)
         found = two_way(
-            Transform.as_claimed(UTM, lonlat), Transform.as_claimed(LONLAT, utm_grid(200, 200))
+            Transform.nominal(UTM, lonlat), Transform.nominal(LONLAT, utm_grid(200, 200))
         )
         assert found.in_pixels.largest < 1e-3
         moved = two_way(
-            Transform.as_claimed(UTM, lonlat), shifted(2e-4, 0, utm_grid(200, 200), LONLAT)
+            Transform.nominal(UTM, lonlat), shifted(2e-4, 0, utm_grid(200, 200), LONLAT)
         )
         assert_near_shift(moved, (-2.0, 0.0))
 

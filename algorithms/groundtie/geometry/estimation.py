@@ -99,7 +99,7 @@ def fit_thin_plate(
     """
     used = points.take(points.used)
     px = grid.map_to_pixel(used.reference_xy)
-    claimed_px = grid.map_to_pixel(as_claimed.claimed_xy(used.input_px))
+    claimed_px = grid.map_to_pixel(as_claimed.nominal_xy(used.input_px))
     if len(used) < 4:
         raise TooFewPointsError(f"only {len(used)} points were matched")
     variances = np.trace(used.covariance_px2, axis1=1, axis2=2) / 2

@@ -38,7 +38,7 @@ _NUMBERS = (
     "dx_px",
     "dy_px",
     "score",
-    "two_way_error_px",
+    "forward_backward_error_px",
     "sigma_x_px",
     "sigma_y_px",
 )
@@ -153,7 +153,7 @@ def read_tie_points(
 
 def _rows(points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]) -> list[Row]:
     residual = points.residual_px(transform)
-    claimed = transform.claimed_xy(points.input_px)
+    claimed = transform.nominal_xy(points.input_px)
     sigma = np.sqrt(points.covariance_px2[:, [0, 1], [0, 1]])
     numbers = np.column_stack(
         [
@@ -163,7 +163,7 @@ def _rows(points: TiePoints, transform: Transform, more: Mapping[str, FloatArray
             np.hypot(*residual.T),
             residual,
             points.score,
-            points.two_way_error_px,
+            points.forward_backward_error_px,
             sigma,
             *more.values(),
         ]

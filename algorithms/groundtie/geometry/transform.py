@@ -25,8 +25,8 @@ FORMAT = "groundtie-transform/1"
 class Transform:
     """Reference map position ↔ input pixel position.
 
-    The model takes a reference map position to where the input claims this ground to be; the
-    input's own georeferencing takes that to a pixel.
+    The model takes a reference map position to its nominal one, where the input's georeferencing
+    places this ground; that georeferencing takes the nominal position to a pixel.
 
     Parameters
     ----------
@@ -43,22 +43,22 @@ class Transform:
     input_grid: Grid
 
     @classmethod
-    def as_claimed(cls, crs: CRS | None, input_grid: Grid) -> Transform:
-        """Return the transform that believes the input's georeferencing."""
+    def nominal(cls, crs: CRS | None, input_grid: Grid) -> Transform:
+        """Return the transform that takes the input's georeferencing as it is."""
         return cls(PolynomialModel.identity(), crs, input_grid)
 
     def __call__(self, xy: ArrayLike) -> FloatArray:
         """Return the input pixels (col, row), centres at integers, of map positions (n, 2)."""
-        claimed = reproject(self.model(xy), self.crs, self.input_grid.crs)
-        return self.input_grid.map_to_pixel(claimed)
+        nominal = reproject(self.model(xy), self.crs, self.input_grid.crs)
+        return self.input_grid.map_to_pixel(nominal)
 
-    def claimed_xy(self, px: ArrayLike) -> FloatArray:
-        """Return where the input claims its pixels (col, row) to be on the reference map."""
+    def nominal_xy(self, px: ArrayLike) -> FloatArray:
+        """Return the nominal reference map positions, shape (n, 2), of input pixels (col, row)."""
         return reproject(self.input_grid.pixel_to_map(px), self.input_grid.crs, self.crs)
 
     def inverse(self, px: ArrayLike) -> FloatArray:
         """Return the reference map positions, shape (n, 2), of input pixels (col, row)."""
-        return self.model.inverse(self.claimed_xy(px))
+        return self.model.inverse(self.nominal_xy(px))
 
     def to_json(self) -> dict[str, Any]:
         """Return the transform as values that JSON can carry."""
@@ -87,12 +87,12 @@ class Transform:
         try:
             if values["format"] != FORMAT:
                 raise TransformFileError(f"not a {FORMAT} file but {values['format']!r}")
-            claimed = values["input"]
+            stored = values["input"]
             grid = Grid(
-                Affine.from_gdal(*claimed["geotransform"]),
-                _crs_from_text(claimed["crs"]),
-                int(claimed["width"]),
-                int(claimed["height"]),
+                Affine.from_gdal(*stored["geotransform"]),
+                _crs_from_text(stored["crs"]),
+                int(stored["width"]),
+                int(stored["height"]),
             )
             return cls(model_from_json(values["model"]), _crs_from_text(values["crs"]), grid)
         except (KeyError, TypeError, ValueError, CRSError) as error:

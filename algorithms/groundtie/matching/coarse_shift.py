@@ -157,7 +157,7 @@ def _patches(
 def _on_map(transform: Transform, level: Grid) -> Model:
     """Return a transform of degree 1 as a model from map positions to claimed ones."""
     xy = level.pixel_to_map(level.outline(4))
-    return fit_model("affine", xy, transform.claimed_xy(transform(xy)))
+    return fit_model("affine", xy, transform.nominal_xy(transform(xy)))
 
 
 def _require_content(path: str, patch: Patch) -> None:

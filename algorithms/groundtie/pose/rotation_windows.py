@@ -155,7 +155,7 @@ def _claim(reference: Image, input: Image) -> Transform:
         if one.grid.crs is not None and other.grid.crs is None:
             raise GeoreferencingError(f"{other.path} has no CRS, but {one.path} has")
     if ref.grid.is_georeferenced:
-        return Transform.as_claimed(ref.grid.crs, inp.grid)
+        return Transform.nominal(ref.grid.crs, inp.grid)
     apart = np.subtract(inp.grid.centre_px, ref.grid.centre_px)
     model = PolynomialModel("translation", Frame(Affine.identity()), apart[None])
     return Transform(model, None, inp.grid)

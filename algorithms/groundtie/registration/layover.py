@@ -13,9 +13,9 @@ import numpy as np
 
 from ..geometry.chance import log10_false_alarms
 from ..geometry.estimation import Estimate
+from ..geometry.judging import LARGEST_LOG10_CHANCE, TOLERANCE_PX
 from ..geometry.tie_points import TiePoints
 from ..rasters.grid import FloatArray, Grid
-from .verdict import LARGEST_LOG10_CHANCE, TOLERANCE_PX
 
 # Points lie on a line if they are no further from it, in matching pixels.
 _LINE_PX = 1.0

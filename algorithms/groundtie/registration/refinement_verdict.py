@@ -12,23 +12,23 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..assessment.accuracy import Statistics
 from ..geometry.chance import agreement_probability, log10_chance
+from ..geometry.judging import (
+    CE90_FACTOR,
+    FEWEST_CHECK_POINTS,
+    LARGEST_LOG10_CHANCE,
+    SMALLEST_INLIER_SHARE,
+    TOLERANCE_PX,
+    sigma_range_px,
+)
 from ..geometry.robust import fit_mixture
 from ..sensor.adjustment import Adjustment, Control
 from ..sensor.bias import Bias
-from .verdict import LARGEST_LOG10_CHANCE, TOLERANCE_PX, Verdict
+from .verdict import Verdict
 
 FloatArray = NDArray[np.float64]
 
 # Control must spread over so much of each side of the image.
 _SMALLEST_EXTENT = 0.25
-
-# Held-out points that agree are at least so many, and this share of all.
-_FEWEST_POINTS = 3
-_SMALLEST_SHARE = 0.25
-
-# Standard deviation that right points may turn out to have: see `verdict.judge`.
-_SMALLEST_SIGMA_PX = 0.1
-_SIGMA_BEYOND = 1.5
 
 # Wrong points lie within this distance at least, in pixels.
 _LEAST_REACH_PX = 50
@@ -94,7 +94,7 @@ def judge_refinement(
     max_error_px
         Largest root mean square error at held-out points.
     """
-    if check is None or len(check) < _FEWEST_POINTS:
+    if check is None or len(check) < FEWEST_CHECK_POINTS:
         held_out, before, after = (
             "points left out in turn",
             control.residuals_px(None),
@@ -108,21 +108,20 @@ def judge_refinement(
         )
     length = np.hypot(*after.T)
     reach = max(int(np.ceil(length.max(initial=0.0))), _LEAST_REACH_PX)
-    sigmas = _SMALLEST_SIGMA_PX, _SIGMA_BEYOND * max_error_px / math.sqrt(2)
-    mixture = fit_mixture(after, (2 * reach + 1) ** 2, sigmas)
+    mixture = fit_mixture(after, (2 * reach + 1) ** 2, sigma_range_px(max_error_px))
     right = mixture.right
     agreeing = int((length <= max(TOLERANCE_PX, max_error_px)).sum())
     probability = agreement_probability(max(TOLERANCE_PX, max_error_px), reach)
     chance = log10_chance(agreeing, len(after), probability)
     rmse = mixture.sigma * math.sqrt(2)
-    ce90 = mixture.sigma * math.sqrt(-2 * math.log(0.1))
+    ce90 = mixture.sigma * CE90_FACTOR
     spread = _spread_px(adjustment, control.size)
     extent = _extent(control.found_px[adjustment.used], control.size)
     worse = _rms(before[right]) <= _rms(after[right])
     reasons = (
-        (chance > LARGEST_LOG10_CHANCE or agreeing < _FEWEST_POINTS,
+        (chance > LARGEST_LOG10_CHANCE or agreeing < FEWEST_CHECK_POINTS,
          f"{agreeing} of {len(after)} {held_out} agree, as they may by chance"),
-        (agreeing < _SMALLEST_SHARE * len(after),
+        (agreeing < SMALLEST_INLIER_SHARE * len(after),
          f"only {agreeing} of {len(after)} {held_out} agree"),
         (extent < _SMALLEST_EXTENT,
          f"the control points spread over {100 * extent:.0f} % of a side of the image only"),

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..errors import NothingFoundError, NotRegisteredError, SameFileError, TooFewPointsError
 from ..geometry.estimation import Estimate
+from ..geometry.judging import LARGEST_LOG10_CHANCE, LOG10_CHANCE_ON_GROUND
 from ..geometry.models import Model
 from ..geometry.tie_point_files import write_tie_points
 from ..geometry.tie_points import TiePoints
@@ -35,7 +36,7 @@ from ..similarity.surface import Surface
 from ..studies.pose_searches import DEFAULT_SEARCH, SEARCHES
 from .layover import leaning
 from .registered_output import RegisteredOutput
-from .verdict import LARGEST_LOG10_CHANCE, LOG10_CHANCE_ON_GROUND, Verdict, judge, refuse
+from .verdict import Verdict, judge, refuse
 
 # Without georeferencing images may lie this far off each other, as a share of the longer side.
 _FREE_SHARE = 0.25

@@ -74,7 +74,7 @@ def load_stored(
 
 def _fit(points: StoredTiePoints, kind: str, input_grid: Grid) -> Model:
     """Fit a model in metres, so that rigid ones preserve shapes also on maps in degrees."""
-    claimed = Transform.as_claimed(points.crs, input_grid).claimed_xy(points.input_px)
+    claimed = Transform.nominal(points.crs, input_grid).nominal_xy(points.input_px)
     taken = points.used & ~points.is_check
     centre = points.reference_xy[taken].mean(axis=0) if taken.any() else np.zeros(2)
     here = Grid(Affine.translation(*(centre - 0.5)), points.crs, 1, 1)

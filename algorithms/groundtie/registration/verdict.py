@@ -11,29 +11,17 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.estimation import Estimate
+from ..geometry.judging import (
+    CE90_FACTOR,
+    FEWEST_CHECK_POINTS,
+    LARGEST_LOG10_CHANCE,
+    SMALLEST_INLIER_SHARE,
+    TOLERANCE_PX,
+    sigma_range_px,
+)
 from ..geometry.robust import distances, find_consensus, fit_mixture
 from ..geometry.tie_points import TiePoints
 from ..rasters.grid import FloatArray, Grid
-
-# A check point agrees with the model within this distance, in matching pixels.
-TOLERANCE_PX = 2.0
-
-# Chance agreement must be less likely than this (log10).
-LARGEST_LOG10_CHANCE = -3.0
-
-# Standard deviation that right check points may turn out to have: at least so many pixels, and
-# at most so many times what the largest error allows, so that errors above it are still seen.
-_SMALLEST_SIGMA_PX = 0.1
-_SIGMA_BEYOND = 1.5
-
-# Fewer check points that agree measure nothing: at least so many, and this share of all. In dense
-# cities roofs that lay over agree with each other at some places, more often than by chance.
-_FEWEST_CHECK_POINTS = 3
-
-# What is left of a dense town's roofs agrees, too, and three points always agree on an affine
-# model: where its ground was matched, three of nine are not enough.
-LOG10_CHANCE_ON_GROUND = -4.0
-_SMALLEST_SHARE = 0.25
 
 # From this share on, more agree than roofs alone do. Measured where a dense town was matched whole
 # and a wrong registration accepted: 28 to 56 %; on other scenes as bright: from 72 %.
@@ -44,9 +32,6 @@ _CLEAR_SHARE = 2 / 3
 _RIVAL_TOLERANCE_PX = 3.0
 _RIVAL_POINTS = 3
 _RIVAL_SHARE = 1.25
-
-# 90 % of a circular normal distribution lies within this many standard deviations of an axis.
-_CE90 = math.sqrt(-2 * math.log(0.1))
 
 _LATTICE = 9
 
@@ -75,6 +60,10 @@ class Verdict:
         Standard deviation of the model's predictions over the overlap (root mean square).
     extrapolated_share
         Share of the overlap outside of the hull of the points that were used.
+    rule
+        Name of the rule that decided; empty where none is named.
+    advice
+        What to try next, in a sentence; empty where there is nothing to try.
     """
 
     accepted: bool
@@ -90,6 +79,8 @@ class Verdict:
     log10_chance: float = 0.0
     spread_px: float = math.nan
     extrapolated_share: float = math.nan
+    rule: str = ""
+    advice: str = ""
 
     @property
     def points(self) -> int:
@@ -149,21 +140,21 @@ def judge(
     # Matches without a peak inside their window count as such that do not agree.
     chance = log10_chance(agreeing, len(check), agreement_probability(TOLERANCE_PX, radius_px))
     counts = len(estimate.points), int(estimate.points.used.sum()), len(check), agreeing
-    if chance > largest_log10_chance or agreeing < _FEWEST_CHECK_POINTS:
+    if chance > largest_log10_chance or agreeing < FEWEST_CHECK_POINTS:
         why = f"{agreeing} of {len(check)} check points agree, as they may by chance"
         return Verdict(False, why, *counts, log10_chance=chance)
-    if agreeing < _SMALLEST_SHARE * len(check):
+    if agreeing < SMALLEST_INLIER_SHARE * len(check):
         why = f"only {agreeing} of {len(check)} check points agree"
         return Verdict(False, why, *counts, log10_chance=chance)
     on_another = _agreeing_on_another(grid.map_to_pixel(counted.reference_xy), residuals)
     if on_another:
         why = f"{on_another} of {len(check)} check points agree on another transform"
         return Verdict(False, why, *counts, log10_chance=chance)
-    sigmas = _SMALLEST_SIGMA_PX, _SIGMA_BEYOND * max_error_px / math.sqrt(2)
-    sigma = fit_mixture(residuals, (2 * radius_px + 1) ** 2, sigmas).sigma
+    area = (2 * radius_px + 1) ** 2
+    sigma = fit_mixture(residuals, area, sigma_range_px(max_error_px)).sigma
     lattice = _lattice(grid)
     spread = float(np.sqrt(np.mean(estimate.spread_px(lattice) ** 2)))
-    rmse, ce90 = sigma * math.sqrt(2), sigma * _CE90
+    rmse, ce90 = sigma * math.sqrt(2), sigma * CE90_FACTOR
     reason = "check points confirm the registration"
     accepted = True
     if rmse > max_error_px:

@@ -295,7 +295,7 @@ class _Files:
         crs = input.grid.crs if reference is None else reference.grid.crs
         if (crs is None) != (input.grid.crs is None):
             raise GeoreferencingError(f"only one of {input.path} and the reference has a CRS")
-        return Transform.as_claimed(crs, input.grid)
+        return Transform.nominal(crs, input.grid)
 
     def measure(self, found: Transform, max_error_px: float | None) -> Assessment:
         """Measure a transform by all evidence there is."""

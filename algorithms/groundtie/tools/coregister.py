@@ -163,10 +163,10 @@ def coregister(
         ),
     ] = "equal-frequency",
     gpve_order: GpveOrder = 4,
-    two_way_error: Annotated[
+    forward_backward_error: Annotated[
         float,
         Number(
-            label="Largest two-way error",
+            label="Largest forward–backward error",
             help="A tie point is rejected if the match back misses its start by more.",
             unit="px",
             minimum=0,
@@ -221,7 +221,7 @@ def coregister(
         ground = request.ground(clear, mask_used, stack, progress.part(0.05, 0.1))
         spacing_px = None if spacing is None else spacing / pair.grid.pixel_size_m
         layout = lay_out_chips(pair, chip_size, spacing_px)
-        local = LocalSearch(shown, layout, settings, two_way_px=two_way_error)
+        local = LocalSearch(shown, layout, settings, forward_backward_px=forward_backward_error)
         local = by_what_is_left(local, mask_used)
         judging = local if ground is None else local.of_ground(ground)
         radius_m = default_radius_m(pair.grid) if search_radius is None else search_radius

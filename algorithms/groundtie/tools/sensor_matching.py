@@ -45,10 +45,10 @@ MaskKind = Annotated[
         advanced=True,
     ),
 ]
-TwoWayError = Annotated[
+ForwardBackwardError = Annotated[
     float,
     Number(
-        label="Largest two-way error",
+        label="Largest forward–backward error",
         help="A point is rejected if the match back misses its start by more.",
         unit="px",
         minimum=0,
