@@ -18,7 +18,7 @@ from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..similarity.peak import find_peak
 from ..similarity.surface import SimilaritySettings
-from .belief_propagation import support
+from .belief_propagation import propagate
 from .chips import ChipMatcher, MaskOf
 
 FloatArray = NDArray[np.float64]
@@ -83,7 +83,7 @@ def refine_on_level(
     if len(centres) < 4:
         return CoarseModel(model, np.inf)
     step = (np.array([level.width, level.height]) - chip) / (_CHIPS_PER_SIDE - 1)
-    supported = support(surfaces, centres, 1.5 * float(step.max()))
+    supported = propagate(surfaces, centres, 1.5 * float(step.max()))
     own = _peaks(surfaces)
     px = centres.astype(float)
     best = CoarseModel(model, np.inf)

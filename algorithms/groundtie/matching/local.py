@@ -19,10 +19,10 @@ from ..progress import SILENT, Progress
 from ..rasters.grid import Grid, apply_affine
 from ..rasters.kernels import REACH
 from ..rasters.pair import ImagePair
-from ..similarity.peak import Evidence, find_peak, find_peak_near
+from ..similarity.peak import Peak, find_peak, find_peak_near
 from ..similarity.surface import SimilaritySettings
 from .alignment import CANDIDATES, Alignment, Positions, align, choose_alignment
-from .belief_propagation import Surfaces, support
+from .belief_propagation import Surfaces, propagate
 from .chips import ChipMatcher, ChipSurfaces
 from .layout import ChipLayout
 from .pooled import GroundChips, tile_centres
@@ -160,7 +160,7 @@ class LocalSearch:
         if self.pooled:
             return surfaces.common_shift
         reach = _SUPPORT_SPACINGS * self.layout.spacing_px
-        supported = support(surfaces.both, surfaces.centres, reach)
+        supported = propagate(surfaces.both, surfaces.centres, reach)
         shifts = np.array([find_peak(surface).shift_px for surface in supported])
         first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
         return find_consensus(px, px + shifts, _CONSENSUS_PX, first_kind, seed)
@@ -266,7 +266,7 @@ class LocalSearch:
     ) -> TiePoints:
         """Return the surfaces' peaks: near the expected shifts, or anywhere for check points."""
 
-        def peaks(of: Surfaces) -> list[Evidence]:
+        def peaks(of: Surfaces) -> list[Peak]:
             if expected_px is None:
                 return [find_peak(surface) for surface in of]
             pairs = zip(of, expected_px, strict=True)
