@@ -27,7 +27,7 @@ from groundtie.progress import Progress
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.similarity.peak import Evidence
+from groundtie.similarity.peak import Peak
 from groundtie.similarity.surface import (
     BORDER_PX,
     SimilaritySettings,
@@ -238,8 +238,8 @@ def bump(peaks: list[tuple[float, float, float]], radius: int = 12) -> np.ndarra
     return total.astype(np.float32)
 
 
-def evidence_at(x: float, y: float, height: float) -> Evidence:
-    return Evidence((x, y), height, np.eye(2), False)
+def evidence_at(x: float, y: float, height: float) -> Peak:
+    return Peak((x, y), height, np.eye(2), False)
 
 
 def test_the_second_peak() -> None:

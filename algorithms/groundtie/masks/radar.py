@@ -8,7 +8,7 @@ from ..rasters.pair import Image
 from ..rasters.patch import Patch
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import Window
-from ..speckle.statistics import FloatImage, calm_variation2
+from ..speckle.statistics import FloatImage, homogeneous_variation2
 
 # Looked at in the middle of an image, at full resolution: averaging would take speckle away.
 _SAMPLE_PX = 1024
@@ -69,4 +69,4 @@ def _calm(image: Image) -> float:
     width, height = min(grid.width, _SAMPLE_PX), min(grid.height, _SAMPLE_PX)
     middle = Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
     patch = Patch(*image.source.read(middle, image.band))
-    return calm_variation2(power(patch), patch.valid)
+    return homogeneous_variation2(power(patch), patch.valid)

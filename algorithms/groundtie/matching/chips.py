@@ -16,7 +16,7 @@ from ..rasters.patch import Patch
 from ..similarity.peak import find_peak
 from ..similarity.surface import BORDER_PX, SimilaritySettings, describe, similarity_surface
 from .alignment import Positions
-from .belief_propagation import Surfaces, normalise_each, support
+from .belief_propagation import Surfaces, normalise_each, propagate
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 
@@ -104,7 +104,7 @@ class ChipMatcher:
         """Return a first model of degree 1: the consensus of peaks after belief propagation."""
         px = surfaces.centres.astype(float)
         reach = _NEIGHBOUR_SPACINGS * layout.spacing_px
-        supported = support(surfaces.combined, surfaces.centres, reach)
+        supported = propagate(surfaces.combined, surfaces.centres, reach)
         shifts = np.array([find_peak(surface).shift_px for surface in supported])
         first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
         return find_consensus(px, px + shifts, _CONSENSUS_PX, first_kind, seed)
@@ -159,7 +159,7 @@ class ChipMatcher:
         reference = self.pair.reference_patch(piece, hidden)
         if not self._can_be_matched(reference.inner(radius_px), "reference", centre):
             return None
-        input = self.pair.input_patch(piece, lambda xy: self.pair.claimed_px(model(xy)))
+        input = self.pair.input_patch(piece, lambda xy: self.pair.nominal_px(model(xy)))
         if not self._can_be_matched(input.inner(radius_px), "input", centre):
             return None
         reference_chip = describe(reference, chip_px**2, self.settings)

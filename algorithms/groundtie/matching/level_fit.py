@@ -16,7 +16,7 @@ from ..geometry.robust import distances, find_consensus
 from ..rasters.grid import Grid
 from ..similarity.peak import find_peak
 from .alignment import align
-from .belief_propagation import support
+from .belief_propagation import propagate
 from .chips import ChipMatcher
 from .frames import compose
 from .matcher import Places
@@ -73,7 +73,7 @@ def fit_level(
     if len(centres) < 4:
         return CoarseModel(model, np.inf)
     step = (np.array([level.width, level.height]) - chip) / (_CHIPS_PER_SIDE - 1)
-    supported = support(surfaces, centres, 1.5 * float(step.max()))
+    supported = propagate(surfaces, centres, 1.5 * float(step.max()))
     own = _peaks(surfaces)
     px = centres.astype(float)
     best = CoarseModel(model, np.inf)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ..errors import ParameterError
 from ..masks import regions, threshold
+from ..masks.cast_shadow import shadow_azimuth_deg
 from ..masks.choice import (
     AUTO,
     INPUT,
@@ -28,7 +29,6 @@ from ..masks.layer import read_layer
 from ..masks.radar import are_both_radar, has_speckle, is_radar_and_camera, is_rather_radar
 from ..masks.regions import GroundRegions, find_ground
 from ..masks.scene import Scene, Selection, write_mask
-from ..masks.shade import shade_azimuth_deg
 from ..masks.threshold import Threshold
 from ..matching.local import LocalSearch
 from ..progress import Progress
@@ -205,7 +205,7 @@ class MaskRequest:
 
     def _ground(self, scene: Scene, other: Scene, progress: Progress) -> GroundRegions:
         shown = other.read(_middle(other.grid))
-        shade = shade_azimuth_deg(shown) if shown.valid.any() else None
+        shade = shadow_azimuth_deg(shown) if shown.valid.any() else None
         high = self._high(regions.HIGH_PERCENT)
         return find_ground(scene, self.width_m, high, progress, shade)
 

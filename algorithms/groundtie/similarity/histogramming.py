@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
+from ..rasters.kernels import bspline_weights
 from ..rasters.patch import Patch
 from ..rasters.warping import resample
 from .binning import MASKED, bin_edges
@@ -293,21 +294,10 @@ def _neighbours(position: FloatArray, size: int, order: int) -> tuple[NDArray[np
     """
     start = position - order / 2
     first = np.floor(start)
-    weights = _spline(start - first, order)
+    weights = bspline_weights(order, start - first)
     first = np.clip(first, -order - 1, size) + 2
     pixels = first.astype(np.intp) + np.arange(order)[:, None]
     return np.clip(pixels, 0, size + 1), weights
-
-
-def _spline(fraction: FloatArray, order: int) -> FloatArray:
-    """Return the B-spline of an order at j + 1 - fraction for j = 0 … order - 1 (de Boor)."""
-    weights = np.zeros((order, fraction.size))
-    weights[0] = 1
-    for n in range(2, order + 1):
-        for j in reversed(range(n)):
-            before = (n - 1 - j + fraction) * weights[j - 1] if j else 0
-            weights[j] = ((j + 1 - fraction) * weights[j] + before) / (n - 1)
-    return weights
 
 
 @functools.lru_cache(maxsize=4)

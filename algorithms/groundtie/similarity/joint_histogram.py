@@ -22,6 +22,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from ..rasters.kernels import bspline_weights
 from .binning import MASKED
 
 FloatArray = NDArray[np.float32]
@@ -51,12 +52,11 @@ def kernel(order: int, offset: float) -> NDArray[np.float64]:
     `offset` is within ±0.5. Order n is degree n - 1: 2 is linear (PVI), 4 is cubic.
     """
     far = support(order)
-    x = np.arange(-far, far + 1)[:, None] - offset
-    # Schoenberg's sum of truncated powers: one-sided differences of x^(n - 1) / (n - 1)!
-    knots = np.arange(order + 1)
-    signed = [(-1) ** k * math.comb(order, k) for k in range(order + 1)]
-    powers = np.maximum(order / 2 - np.abs(x) - knots, 0.0) ** (order - 1)
-    return np.asarray(powers @ signed / math.factorial(order - 1))
+    start = offset - order / 2
+    first = math.floor(start)
+    weights = np.zeros(2 * far + 1)
+    weights[far + first + 1 :][:order] = bspline_weights(order, start - first)
+    return weights
 
 
 @dataclass(frozen=True)

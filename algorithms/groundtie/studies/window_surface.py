@@ -30,7 +30,7 @@ from ..similarity.measures import (
     renyi_mutual_information,
     tsallis_mutual_information,
 )
-from ..similarity.peak import Evidence, find_peak
+from ..similarity.peak import Peak, find_peak
 from ..similarity.surface import BORDER_PX, SIMILARITIES, SimilaritySettings, Surface
 
 GREY_VALUES = "grey-values"
@@ -210,7 +210,7 @@ class SurfaceSettings:
         )
 
 
-def second_peak(evidence: Surface, first: Evidence) -> Evidence | None:
+def second_peak(evidence: Surface, first: Peak) -> Peak | None:
     """Return the highest peak of a surface that lies apart from the first one."""
     radius = evidence.shape[0] // 2
     rows, cols = np.nonzero(evidence >= maximum_filter(evidence, 3, mode="nearest"))

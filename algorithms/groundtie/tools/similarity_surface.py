@@ -26,7 +26,7 @@ from ..rasters.pair import Image, ImagePair, make_pair
 from ..rasters.reading import RasterSource, bounded_cache, open_raster
 from ..rasters.writing import BLOCK, check_complete
 from ..similarity.binning import BINNINGS
-from ..similarity.peak import Evidence, find_peak
+from ..similarity.peak import Peak, find_peak
 from ..similarity.surface import Surface
 from ..studies.window_surface import CHOICES, GREY_VALUES, SurfaceSettings, Window, second_peak
 from .common import (
@@ -74,8 +74,8 @@ class SurfaceResult:
     values: Surface
     evidence: Surface
     grid: Grid
-    peak: Evidence
-    second: Evidence | None
+    peak: Peak
+    second: Peak | None
     chip_px: int
     files: dict[str, str]
 
@@ -102,7 +102,7 @@ class SurfaceResult:
             "files": self.files,
         }
 
-    def _told(self, peak: Evidence) -> dict[str, Any]:
+    def _told(self, peak: Peak) -> dict[str, Any]:
         centre = np.array(self.grid.centre_px)
         x, y = self.grid.pixel_to_map([centre + peak.shift_px])[0]
         col, row = np.rint(centre + peak.shift_px).astype(int)
