@@ -198,7 +198,7 @@ class PointErrors:
         largest = max(_SIGMA_BEYOND * allowed / math.sqrt(2), _SMALLEST_SIGMA_PX)
         sigmas = _SMALLEST_SIGMA_PX, largest
         counted = np.zeros(len(self), bool)
-        counted[which] = fit_mixture(errors, area, sigmas).right
+        counted[which] = fit_mixture(errors, area, sigmas).inliers
         return replace(self, counted=counted)
 
     def summary(self) -> dict[str, Any]:

@@ -105,7 +105,7 @@ def fit_thin_plate(
     variances = np.trace(used.covariance_px2, axis1=1, axis2=2) / 2
     area = (2 * radius_px + 1) ** 2
     model, mixture = fit_robustly("tps", px, claimed_px, variances, start, area, SIGMA_RANGE_PX)
-    weights = np.where(mixture.right, 1 / (mixture.sigma**2 + variances), 0.0)
+    weights = np.where(mixture.inliers, 1 / (mixture.sigma**2 + variances), 0.0)
     folds = block_folds(px)
     fold_models = [
         fit_model("tps", px, claimed_px, np.where(folds == fold, 0.0, weights), Frame.around(px))

@@ -44,7 +44,7 @@ class Mixture:
     sigma: float
 
     @property
-    def right(self) -> NDArray[np.bool_]:
+    def inliers(self) -> NDArray[np.bool_]:
         """Which matches are more likely right than wrong."""
         return np.asarray(self.probability > 0.5)
 
@@ -161,7 +161,7 @@ def fit_robustly(
     model = start
     for _ in range(_FIT_STEPS):
         mixture = fit_mixture(claimed_xy - model(xy), window_area, sigma_range)
-        weights = np.where(mixture.right, mixture.probability, 0.0)
+        weights = np.where(mixture.inliers, mixture.probability, 0.0)
         weights = weights * mixture.sigma**2 / (mixture.sigma**2 + variances)
         previous, model = model, fit_model(kind, xy, claimed_xy, weights, Frame.around(xy))
         if np.abs(model(xy) - previous(xy)).max() < 1e-4 * sigma_range[0]:

@@ -108,10 +108,10 @@ def fit_matches(
     if kind == AUTO:
         kind = _choose(px, claimed_px, start, window_area)
     model, mixture = _fit(kind, px, claimed_px, start, window_area)
-    right = int(mixture.right.sum())
+    right = int(mixture.inliers.sum())
     if 2 * right <= PARAMETERS[kind]:
         raise TooFewPointsError(f"only {right} of {len(px)} features agree with a model")
-    weights = np.where(mixture.right, mixture.probability, 0.0)
+    weights = np.where(mixture.inliers, mixture.probability, 0.0)
     folds = block_folds(px)
     fold_models = tuple(
         fit_model(kind, px, claimed_px, np.where(folds == fold, 0.0, weights), Frame.around(px))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..features.descriptors import Descriptor
 from ..features.detectors import Detector, seen_whole
 from ..features.matching import GATE_PX, match_near
-from ..features.points import FeaturePoints
+from ..features.keypoints import Keypoints
 from ..features.tiles import MARGIN_PX, Describing, Detecting, inside, tiles, widened
 from ..geometry.models import Model
 from ..progress import SILENT, Progress
@@ -45,8 +45,8 @@ class FeatureMatches:
         How many features each image has.
     """
 
-    reference: FeaturePoints
-    input: FeaturePoints
+    reference: Keypoints
+    input: Keypoints
     ratio: FloatArray
     found: tuple[int, int]
 
@@ -54,8 +54,8 @@ class FeatureMatches:
     def concatenate(cls, parts: list[FeatureMatches]) -> FeatureMatches:
         """Return the matches of all tiles."""
         return cls(
-            FeaturePoints.concatenate([part.reference for part in parts]),
-            FeaturePoints.concatenate([part.input for part in parts]),
+            Keypoints.concatenate([part.reference for part in parts]),
+            Keypoints.concatenate([part.input for part in parts]),
             np.concatenate([part.ratio for part in parts]),
             (sum(part.found[0] for part in parts), sum(part.found[1] for part in parts)),
         )
@@ -158,14 +158,14 @@ class FeatureMatcher:
             (len(own), int(inside(others.position_px, core).sum())),
         )
 
-    def _features(self, patch: Patch, window: Window, part: Mask | None) -> FeaturePoints:
+    def _features(self, patch: Patch, window: Window, part: Mask | None) -> Keypoints:
         """Return the strongest features in a window of a patch, of those in a part of it."""
         found = self.detector.detect(patch)
         found = found.take(inside(found.position_px, window))
-        return (found if part is None else standing_in(found, part)).strongest(_MOST_PER_TILE)
+        return (found if part is None else lying_in(found, part)).strongest(_MOST_PER_TILE)
 
 
-def standing_in(found: FeaturePoints, part: Mask) -> FeaturePoints:
+def lying_in(found: Keypoints, part: Mask) -> Keypoints:
     """Return the features that stand in a part of an image, shape (h, w)."""
     return found.take(seen_whole(found, part, _STANDING_SCALES))
 

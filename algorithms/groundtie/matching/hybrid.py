@@ -180,7 +180,7 @@ class FeatureSearch:
         for _ in range(_ROUNDS):
             first = fit.model
             residuals = claimed_px - first(matches.px)
-            right = fit_mixture(residuals, matches.window_area, SIGMA_RANGE_PX).right
+            right = fit_mixture(residuals, matches.window_area, SIGMA_RANGE_PX).inliers
             if 2 * right.sum() <= PARAMETERS["affine"]:
                 raise TooFewPointsError(f"only {right.sum()} of {len(right)} features agree")
             px, score = matches.px[right], matches.score[right]
@@ -243,7 +243,7 @@ class FeatureSearch:
             is_check=np.zeros(count, bool),
             state=np.full(count, USED),
         )
-        points = points.reject(~fit.mixture.right, "disagrees with the model")
+        points = points.reject(~fit.mixture.inliers, "disagrees with the model")
         as_claimed = Transform.as_claimed(grid.crs, pair.input.source.grid)
         model, fold_models = fit.model, fit.fold_models
         if kind == "tps":

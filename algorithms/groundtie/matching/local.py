@@ -301,7 +301,7 @@ class LocalSearch:
         residuals = points.take(used).residual_on(self.pair.grid, transform)
         mixture = fit_mixture(residuals, (2 * _NEAR_PX + 1) ** 2, SIGMA_RANGE_PX)
         wrong = np.zeros(len(points), bool)
-        wrong[used] = ~mixture.right
+        wrong[used] = ~mixture.inliers
         return points.reject(wrong, "disagrees with the model")
 
 

@@ -110,7 +110,7 @@ def judge_refinement(
     reach = max(int(np.ceil(length.max(initial=0.0))), _LEAST_REACH_PX)
     sigmas = _SMALLEST_SIGMA_PX, _SIGMA_BEYOND * max_error_px / math.sqrt(2)
     mixture = fit_mixture(after, (2 * reach + 1) ** 2, sigmas)
-    right = mixture.right
+    right = mixture.inliers
     agreeing = int((length <= max(TOLERANCE_PX, max_error_px)).sum())
     probability = agreement_probability(max(TOLERANCE_PX, max_error_px), reach)
     chance = log10_chance(agreeing, len(after), probability)

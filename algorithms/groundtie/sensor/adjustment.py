@@ -234,8 +234,8 @@ def _without_improbable(control: Control, kind: str, seed: int) -> tuple[NDArray
     used, sigma = np.zeros(len(control), bool), _SIGMA_RANGE_PX[0]
     for _ in range(_STEPS):
         mixture = fit_mixture(residuals, (2 * reach) ** 2, _SIGMA_RANGE_PX)
-        same = np.array_equal(used, mixture.right)
-        used, sigma = mixture.right, _excess(control.take(mixture.right), mixture.sigma)
+        same = np.array_equal(used, mixture.inliers)
+        used, sigma = mixture.inliers, _excess(control.take(mixture.inliers), mixture.sigma)
         if same or used.sum() < TERMS[kind]:
             break
         residuals = control.residuals_px(_fit(control.take(used), kind, sigma))
