@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from groundtie.features.descriptors import Descriptor
 from groundtie.features.detectors import DETECTORS, Detector
-from groundtie.features.matching import GATE_PX, match, match_near
 from groundtie.features.keypoints import Keypoints
+from groundtie.features.matching import GATE_PX, match, match_near
 from groundtie.geometry.models import Model
 from groundtie.geometry.robust import distances, find_consensus, fit_robustly
 from groundtie.rasters.pair import Image, ImagePair, make_pair

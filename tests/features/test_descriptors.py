@@ -12,8 +12,8 @@ from textured_pairs import texture
 from groundtie.features.descriptors import LENGTH, Descriptor
 from groundtie.features.detectors import Detector
 from groundtie.features.gradients import GRADIENTS
-from groundtie.features.matching import match
 from groundtie.features.keypoints import Keypoints
+from groundtie.features.matching import match
 from groundtie.rasters.patch import Patch
 
 _REAL = ("so-fields", "ss-ponds", "ss-yellow-b", "oo-lakes")

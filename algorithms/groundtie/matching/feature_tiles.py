@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..features.descriptors import Descriptor
 from ..features.detectors import Detector, seen_whole
-from ..features.matching import GATE_PX, match_near
 from ..features.keypoints import Keypoints
+from ..features.matching import GATE_PX, match_near
 from ..features.tiles import MARGIN_PX, Describing, Detecting, inside, tiles, widened
 from ..geometry.models import Model
 from ..progress import SILENT, Progress

@@ -14,8 +14,8 @@ from ..features.descriptors import Descriptor
 from ..features.detectors import DETECTORS, Detector
 from ..features.filtering import filter_matches
 from ..features.gradients import GRADIENTS
-from ..features.matching import match
 from ..features.keypoints import Keypoints
+from ..features.matching import match
 from ..geometry.fitting import fit_model
 from ..geometry.models import PARAMETERS
 from ..matching.feature_tiles import lying_in
