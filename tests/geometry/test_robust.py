@@ -2,14 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from groundtie.errors import TooFewPointsError
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.models import KINDS, Model
 from groundtie.geometry.robust import (
-    block_folds,
     distances,
     find_consensus,
     fit_mixture,
@@ -183,36 +180,3 @@ def test_too_few_right_matches_for_the_model() -> None:
     start = find_consensus(px, found, 3.0, "translation")
     with pytest.raises(TooFewPointsError, match="polynomial3"):
         fit_robustly("polynomial3", px, found, np.zeros(8), start, AREA, (0.2, 2.5))
-
-
-@settings(max_examples=60)
-@given(
-    px=st.lists(st.tuples(st.floats(0, 1e4), st.floats(0, 1e4)), min_size=1, max_size=40),
-    shift=st.floats(-1e3, 1e3),
-)
-def test_folds_are_numbered_and_move_with_the_points(
-    px: list[tuple[float, float]], shift: float
-) -> None:
-    folds = block_folds(np.array(px))
-    assert folds.shape == (len(px),)
-    assert ((folds >= 0) & (folds < 5)).all()
-    same = np.unique(np.array(px), axis=0)
-    assert len(np.unique(folds)) <= len(same)
-
-
-def test_neighbours_share_a_fold_and_each_line_holds_all() -> None:
-    cols, rows = np.meshgrid(np.arange(50.0), np.arange(50.0))
-    folds = block_folds(np.column_stack([cols.ravel(), rows.ravel()])).reshape(50, 50)
-    blocks = folds.reshape(5, 10, 5, 10).transpose(0, 2, 1, 3).reshape(25, 100)
-    # The last row and column of the extent belong to the last blocks: all blocks but those are
-    # of 10 points a side, give or take one.
-    assert (blocks == np.median(blocks, axis=1)[:, None]).mean() > 0.8
-    table = folds[5::10, 5::10]
-    for line in (*table, *table.T):
-        assert sorted(line) == [0, 1, 2, 3, 4]
-    assert np.bincount(folds.ravel()).min() > 400
-
-
-def test_points_on_one_spot_or_line_have_folds() -> None:
-    assert block_folds(np.ones((4, 2))).tolist() == [0, 0, 0, 0]
-    assert len(np.unique(block_folds(np.column_stack([np.arange(20.0), np.ones(20)])))) == 5

@@ -10,8 +10,8 @@ from raster_files import UTM, utm_grid
 from groundtie.geometry.chance import agreement_probability, log10_chance
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.model_choice import block_folds
 from groundtie.geometry.models import PolynomialModel
-from groundtie.geometry.robust import block_folds
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.registration.verdict import LOG10_CHANCE_ON_GROUND, Verdict, judge, refuse

@@ -125,10 +125,10 @@ class FeatureMatcher:
         hidden = None if self.held_out is None else self.held_out(piece)
         reference = self.pair.reference_patch(piece, hidden)
 
-        def claimed(xy: FloatArray) -> FloatArray:
+        def nominal(xy: FloatArray) -> FloatArray:
             return self.pair.claimed_px(coarse(xy))
 
-        input = self.pair.input_patch(piece, claimed)
+        input = self.pair.input_patch(piece, nominal)
         if hidden is not None:
             # Where a descriptor sees less of the one image, it sees as little of the other.
             input = Patch(input.values, input.valid & ~hidden)
@@ -137,7 +137,7 @@ class FeatureMatcher:
         if self.shown is not None:
             parts = (
                 self.shown.reference_patch(piece).valid,
-                self.shown.input_patch(piece, claimed).valid,
+                self.shown.input_patch(piece, nominal).valid,
             )
         own = self._features(reference, core, parts[0])
         others = self._features(input, widened(core, gate), parts[1])
