@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from groundtie.features.descriptors import Descriptor
 from groundtie.features.detectors import DETECTORS, Detector
+from groundtie.features.keypoints import Keypoints
 from groundtie.features.matching import GATE_PX, match, match_near
-from groundtie.features.points import FeaturePoints
 from groundtie.geometry.models import Model
 from groundtie.geometry.robust import distances, find_consensus, fit_robustly
 from groundtie.rasters.pair import Image, ImagePair, make_pair
@@ -89,7 +89,7 @@ class TurnCount:
     turned: int
 
 
-_Described = tuple[FeaturePoints, NDArray[np.float32]]
+_Described = tuple[Keypoints, NDArray[np.float32]]
 
 
 def registered(case: RealCase) -> tuple[Patch, Patch]:
@@ -102,7 +102,7 @@ def registered(case: RealCase) -> tuple[Patch, Patch]:
             return pair.reference_patch(grid), pair.input_patch(grid, pair.claimed_px)
 
 
-def _right(first: FeaturePoints, second: FeaturePoints, limit_px: float) -> np.ndarray:
+def _right(first: Keypoints, second: Keypoints, limit_px: float) -> np.ndarray:
     return np.hypot(*(second.position_px - first.position_px).T) <= limit_px
 
 
@@ -159,9 +159,7 @@ def count_chain(case: RealCase) -> ChainCount:
     )
 
 
-def _counts(
-    first: FeaturePoints, second: FeaturePoints, model: Model, limit_px: float
-) -> tuple[int, int]:
+def _counts(first: Keypoints, second: Keypoints, model: Model, limit_px: float) -> tuple[int, int]:
     """Return how many matches that agree with a model are right, and how many agree."""
     kept = distances(model, first.position_px, second.position_px) <= _RANSAC_PX
     return int((_right(first, second, limit_px) & kept).sum()), int(kept.sum())

@@ -17,8 +17,8 @@ from groundtie.features.descriptors import Descriptor
 from groundtie.features.detectors import Detector
 from groundtie.features.haar import HaarDescriptor
 from groundtie.features.hog import HogDescriptor
+from groundtie.features.keypoints import Keypoints
 from groundtie.features.matching import match
-from groundtie.features.points import FeaturePoints
 from groundtie.features.surf import SurfDetector
 from groundtie.features.tiles import Describing, Detecting
 from groundtie.rasters.patch import Patch
@@ -118,7 +118,7 @@ class ClearCase:
 class Features:
     """Features of an image and their descriptors, row by row."""
 
-    points: FeaturePoints
+    points: Keypoints
     descriptors: NDArray[np.float32]
 
     def take(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Features:

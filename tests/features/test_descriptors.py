@@ -12,14 +12,14 @@ from textured_pairs import texture
 from groundtie.features.descriptors import LENGTH, Descriptor
 from groundtie.features.detectors import Detector
 from groundtie.features.gradients import GRADIENTS
+from groundtie.features.keypoints import Keypoints
 from groundtie.features.matching import match
-from groundtie.features.points import FeaturePoints
 from groundtie.rasters.patch import Patch
 
 _REAL = ("so-fields", "ss-ponds", "ss-yellow-b", "oo-lakes")
 
 
-def by_opencv(image: NDArray[np.uint8], upright: bool) -> tuple[FeaturePoints, NDArray[np.float32]]:
+def by_opencv(image: NDArray[np.uint8], upright: bool) -> tuple[Keypoints, NDArray[np.float32]]:
     """Return OpenCV's features beyond the first octave, and its descriptors of unit length."""
     sift = cv2.SIFT.create()
     points = [point for point in sift.detect(image, None) if (point.octave & 0xFF) < 128]
@@ -29,7 +29,7 @@ def by_opencv(image: NDArray[np.uint8], upright: bool) -> tuple[FeaturePoints, N
     points, raw = sift.compute(image, points)
     # Its directions run from columns towards negative rows.
     theirs = raw.reshape(-1, 16, 8)[:, :, -np.arange(8) % 8].reshape(-1, LENGTH)
-    found = FeaturePoints(
+    found = Keypoints(
         np.array([point.pt for point in points]),
         np.array([point.size / 2 for point in points]),
         np.deg2rad([point.angle for point in points]),
@@ -98,7 +98,7 @@ def test_a_shift_of_the_image_changes_no_descriptor(estimator: str, upright: boo
     # By whole pixels of the octaves in use.
     moved, there = descriptor.describe(whole(image[24:236, 32:240]), inner.moved((8, 16)))
 
-    def key(of: FeaturePoints) -> NDArray[np.float64]:
+    def key(of: Keypoints) -> NDArray[np.float64]:
         turn = of.orientation_rad
         return np.column_stack([of.position_px, np.cos(turn), np.sin(turn)])
 
@@ -124,7 +124,7 @@ def test_descriptors_are_of_unit_length_and_flat_ones_zero(estimator: str) -> No
 
 
 def test_no_features_have_no_descriptors() -> None:
-    points, rows = Descriptor().describe(whole(radar_image(60, 60)), FeaturePoints.none())
+    points, rows = Descriptor().describe(whole(radar_image(60, 60)), Keypoints.none())
     assert len(points) == 0 and rows.shape == (0, LENGTH)
 
 

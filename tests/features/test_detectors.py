@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from speckled_pairs import radar_image, whole
 
 from groundtie.features.detectors import DETECTORS, Detector, to_grey
-from groundtie.features.points import FeaturePoints
+from groundtie.features.keypoints import Keypoints
 from groundtie.rasters.patch import Patch
 
 FloatImage = NDArray[np.float32]
@@ -22,7 +22,7 @@ def blob(x: float, y: float, sigma: float, side: int = 160) -> Patch:
     return whole(image)
 
 
-def nearest(found: FeaturePoints, x: float, y: float) -> FeaturePoints:
+def nearest(found: Keypoints, x: float, y: float) -> Keypoints:
     return found.take([int(np.argmin(np.hypot(*(found.position_px - [x, y]).T)))])
 
 
@@ -90,7 +90,7 @@ def test_without_the_first_octave_the_features_of_larger_ones_are_found() -> Non
     assert of_first < 0.05
 
 
-def share_found(of: FeaturePoints, found: FeaturePoints) -> float:
+def share_found(of: Keypoints, found: Keypoints) -> float:
     apart = np.linalg.norm(of.position_px[:, None] - found.position_px[None], axis=2)
     growth = np.abs(np.log(of.scale_px[:, None] / found.scale_px[None]))
     return float(((apart < 0.3 * of.scale_px[:, None]) & (growth < 0.25)).any(axis=1).mean())

@@ -9,16 +9,16 @@ from speckled_pairs import whole
 from textured_pairs import texture
 
 from groundtie.features.haar import LENGTH, HaarDescriptor
-from groundtie.features.points import FeaturePoints
+from groundtie.features.keypoints import Keypoints
 from groundtie.rasters.patch import Patch
 
 SIDE = 200
 
 
-def points(*rows: tuple[float, float, float, float]) -> FeaturePoints:
+def points(*rows: tuple[float, float, float, float]) -> Keypoints:
     """Return features from columns, rows, scales and orientations."""
     table = np.array(rows, float)
-    return FeaturePoints(
+    return Keypoints(
         table[:, :2], table[:, 2], table[:, 3], np.ones(len(table)), np.zeros(len(table), int)
     )
 
@@ -98,6 +98,6 @@ def test_masked_pixels_tell_nothing() -> None:
 
 
 def test_no_features_have_no_descriptors() -> None:
-    found, values = HaarDescriptor().describe(whole(image()), FeaturePoints.none())
+    found, values = HaarDescriptor().describe(whole(image()), Keypoints.none())
     assert len(found) == 0
     assert values.shape == (0, LENGTH)

@@ -10,7 +10,7 @@ from speckled_pairs import whole
 from textured_pairs import texture
 
 from groundtie.features.detectors import Detector
-from groundtie.features.points import FeaturePoints
+from groundtie.features.keypoints import Keypoints
 from groundtie.features.surf import SurfDetector
 from groundtie.rasters.patch import Patch
 from groundtie.studies.repeatability import repeatability
@@ -104,7 +104,7 @@ def repeated(detector: SurfDetector | Detector, change: str) -> float:
     )
 
 
-def inner(found: FeaturePoints, elsewhere: FloatArray) -> FeaturePoints:
+def inner(found: Keypoints, elsewhere: FloatArray) -> Keypoints:
     """Return the features that lie well inside both images."""
     both = np.hstack([found.position_px, elsewhere])
     return found.take(np.all((both > 40) & (both < SIDE - 40), axis=1))

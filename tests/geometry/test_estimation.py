@@ -7,8 +7,8 @@ from raster_files import UTM, utm_grid
 from groundtie.errors import TooFewPointsError
 from groundtie.geometry.estimation import Estimate, fit_thin_plate
 from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.model_choice import block_folds
 from groundtie.geometry.models import Frame, Model, PolynomialModel
-from groundtie.geometry.robust import block_folds
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 

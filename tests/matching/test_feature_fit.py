@@ -40,8 +40,8 @@ def test_a_shift_is_found_among_three_times_as_many_wrong_matches(kind: str) -> 
     fit = fit_matches(kind, px, partner, Affine.identity(), AREA, 0)
     assert error_px(fit, Affine.identity(), SHIFT) < 0.3
     right = np.arange(len(px)) < 60
-    assert fit.mixture.right[right].mean() > 0.9
-    assert fit.mixture.right[~right].mean() < 0.1
+    assert fit.mixture.inliers[right].mean() > 0.9
+    assert fit.mixture.inliers[~right].mean() < 0.1
     assert len(fit.fold_models) == 5
 
 

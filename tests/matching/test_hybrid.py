@@ -15,7 +15,7 @@ from groundtie.errors import TooFewPointsError
 from groundtie.features import tiles
 from groundtie.features.descriptors import Descriptor
 from groundtie.features.detectors import Detector
-from groundtie.features.points import FeaturePoints
+from groundtie.features.keypoints import Keypoints
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.models import Model
 from groundtie.matching import feature_tiles
@@ -127,7 +127,7 @@ class Astray:
         # Nearly all agree on a wrong place; so few others are no rival.
         partner[np.arange(len(px)) % 20 > 0, 1] += self.wrong_px
         both = [
-            FeaturePoints(at, *(np.ones(len(px)) for _ in range(3)), np.zeros(len(px), int))
+            Keypoints(at, *(np.ones(len(px)) for _ in range(3)), np.zeros(len(px), int))
             for at in (px, partner)
         ]
         return FeatureMatches(*both, np.full(len(px), 0.5), (len(px), len(px)))

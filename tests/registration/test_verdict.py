@@ -11,8 +11,8 @@ from groundtie.geometry.chance import agreement_probability, log10_chance
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.judging import LOG10_CHANCE_ON_GROUND
+from groundtie.geometry.model_choice import block_folds
 from groundtie.geometry.models import PolynomialModel
-from groundtie.geometry.robust import block_folds
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.registration.verdict import Verdict, judge, refuse

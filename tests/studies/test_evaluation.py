@@ -7,13 +7,13 @@ from speckled_pairs import radar_image, whole
 from groundtie.errors import ParameterError
 from groundtie.features.descriptors import Descriptor
 from groundtie.features.detectors import Detector
-from groundtie.features.points import FeaturePoints
+from groundtie.features.keypoints import Keypoints
 from groundtie.studies.evaluation import Consistency, Variant, evaluate
 
 
-def points(px: np.ndarray) -> FeaturePoints:
+def points(px: np.ndarray) -> Keypoints:
     count = len(px)
-    return FeaturePoints(
+    return Keypoints(
         np.asarray(px, float),
         np.full(count, 2.0),
         np.zeros(count),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress, is_logarithmic
 from .gradients import FloatImage, Gradient, needs_positive
-from .points import FeaturePoints
+from .keypoints import Keypoints
 from .sampling import sampled_gradient, square_lattice, unit_rows
 from .scale_space import describe_at_scales
 
@@ -56,7 +56,7 @@ class Descriptor:
     estimator: str = "differences"
     upright: bool = True
 
-    def describe(self, window: Patch, found: FeaturePoints) -> tuple[FeaturePoints, FloatImage]:
+    def describe(self, window: Patch, found: Keypoints) -> tuple[Keypoints, FloatImage]:
         """Return the features, oriented if they are to be, and what is around them.
 
         Parameters
@@ -79,8 +79,8 @@ class Descriptor:
         return self.describe_image(image, window.valid, found)
 
     def describe_image(
-        self, image: FloatImage, valid: NDArray[np.bool_], found: FeaturePoints
-    ) -> tuple[FeaturePoints, FloatImage]:
+        self, image: FloatImage, valid: NDArray[np.bool_], found: Keypoints
+    ) -> tuple[Keypoints, FloatImage]:
         """Describe features of an image whose grey values are taken as they are."""
         return describe_at_scales(
             image, valid, found, self.estimator, self.upright, _described, LENGTH
@@ -100,7 +100,7 @@ def _cell_weights() -> tuple[FloatArray, FloatImage]:
     return lattice * _CELL_SCALES, weights.astype(np.float32)
 
 
-def _described(fields: Gradient, points: FeaturePoints) -> FloatImage:
+def _described(fields: Gradient, points: Keypoints) -> FloatImage:
     """Return the descriptors of features, shape (n, 128)."""
     lattice, weights = _cell_weights()
     strength, direction = sampled_gradient(fields, points, lattice)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch, reduced_patch
 from ..similarity.orientation import compress
 from ..speckle.isef import isef
-from .points import FeaturePoints
+from .keypoints import Keypoints
 
 FloatImage = NDArray[np.float32]
 ByteImage = NDArray[np.uint8]
@@ -71,23 +71,23 @@ class Detector:
     name: str = "sift-oct"
     contrast: float | None = None
 
-    def detect(self, window: Patch) -> FeaturePoints:
+    def detect(self, window: Patch) -> Keypoints:
         """Return the features of an image window, upright, each position and scale once.
 
         Grey values are compressed to a logarithmic scale first, on which speckle is alike
         everywhere.
         """
         if window.is_flat:
-            return FeaturePoints.none()
+            return Keypoints.none()
         found = (
             self._detect_all(window) if self.name == "sift" else self._detect_from_second(window)
         )
         return found.take(seen_whole(found, window.valid))
 
-    def _detect_all(self, window: Patch) -> FeaturePoints:
+    def _detect_all(self, window: Patch) -> Keypoints:
         return self._opencv(to_grey(compress(window), window.valid))
 
-    def _detect_from_second(self, window: Patch) -> FeaturePoints:
+    def _detect_from_second(self, window: Patch) -> Keypoints:
         half = reduced_patch(window, 2)
         image = compress(half)
         if self.name == "sift-isef-oct":
@@ -101,9 +101,9 @@ class Detector:
         # The first half-sized pixel is the mean of the first two.
         position_px = 2 * found.position_px + 0.5
         none = np.zeros(len(found))
-        return FeaturePoints(position_px, 2 * scale_px, none, found.response, found.octave + 1)
+        return Keypoints(position_px, 2 * scale_px, none, found.response, found.octave + 1)
 
-    def _opencv(self, grey: ByteImage) -> FeaturePoints:
+    def _opencv(self, grey: ByteImage) -> Keypoints:
         contrast = _CONTRAST[self.name] if self.contrast is None else self.contrast
         sift = cv2.SIFT.create(0, _LAYERS, contrast, _EDGE_RATIO, _FIRST_SIGMA_PX)
         rows = [(*k.pt, k.size, k.response, k.octave) for k in sift.detect(grey, None)]
@@ -112,7 +112,7 @@ class Detector:
         # The octave is the lowest byte, a signed number.
         octave = (table[:, 4].astype(int) & 0xFF).astype(np.uint8).astype(np.int8).astype(int)
         position = table[:, :2] - _OPENCV_OFFSET_PX
-        return FeaturePoints(position, table[:, 2] / 2, np.zeros(len(table)), table[:, 3], octave)
+        return Keypoints(position, table[:, 2] / 2, np.zeros(len(table)), table[:, 3], octave)
 
 
 def to_grey(image: FloatImage, valid: NDArray[np.bool_]) -> ByteImage:
@@ -128,7 +128,7 @@ def to_grey(image: FloatImage, valid: NDArray[np.bool_]) -> ByteImage:
 
 
 def seen_whole(
-    found: FeaturePoints, valid: NDArray[np.bool_], scales: float = _SEES_SCALES
+    found: Keypoints, valid: NDArray[np.bool_], scales: float = _SEES_SCALES
 ) -> NDArray[np.bool_]:
     """Tell which features have nothing masked within so many of their scales.
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .box_hessian import FloatImage, IntegralImage, integral_image
-from .points import FeaturePoints
+from .keypoints import Keypoints
 
 FloatArray = NDArray[np.float64]
 
@@ -60,8 +60,8 @@ class HaarDescriptor:
     upright: bool = True
 
     def describe(
-        self, window: Patch, found: FeaturePoints, executor: Executor | None = None
-    ) -> tuple[FeaturePoints, FloatImage]:
+        self, window: Patch, found: Keypoints, executor: Executor | None = None
+    ) -> tuple[Keypoints, FloatImage]:
         """Return the features, oriented if they are to be, and what is around them.
 
         Parameters
@@ -84,14 +84,14 @@ class HaarDescriptor:
         sums = _Sums(integral_image(compress(window)), masked)
         blocks = [found.take(slice(at, at + _BLOCK)) for at in range(0, len(found), _BLOCK)]
 
-        def one(points: FeaturePoints) -> tuple[FeaturePoints, FloatImage]:
+        def one(points: Keypoints) -> tuple[Keypoints, FloatImage]:
             if not self.upright:
-                points = points.turned(_orientations(sums, points))
+                points = points.with_orientation(_orientations(sums, points))
             return points, _described(sums, points)
 
         done = list(map(one, blocks) if executor is None else executor.map(one, blocks))
         return (
-            FeaturePoints.concatenate([FeaturePoints.none(), *(points for points, _ in done)]),
+            Keypoints.concatenate([Keypoints.none(), *(points for points, _ in done)]),
             np.concatenate([np.zeros((0, LENGTH), np.float32), *(values for _, values in done)]),
         )
 
@@ -101,7 +101,7 @@ def _counts(mask: NDArray[np.bool_]) -> IntegralImage:
 
 
 def _wavelets(
-    sums: _Sums, points: FeaturePoints, lattice: FloatArray, half_scales: float
+    sums: _Sums, points: Keypoints, lattice: FloatArray, half_scales: float
 ) -> tuple[FloatImage, FloatImage]:
     """Return Haar wavelets on a lattice around each feature.
 
@@ -146,7 +146,7 @@ def _wavelets(
     return along.astype(np.float32), across.astype(np.float32)
 
 
-def _described(sums: _Sums, points: FeaturePoints) -> FloatImage:
+def _described(sums: _Sums, points: Keypoints) -> FloatImage:
     """Return the descriptors of features, shape (n, 64)."""
     side = np.arange(CELLS * _SAMPLES) - (CELLS * _SAMPLES - 1) / 2
     x, y = np.meshgrid(side, side)
@@ -160,7 +160,7 @@ def _described(sums: _Sums, points: FeaturePoints) -> FloatImage:
     return np.asarray(raw / np.maximum(length, 1e-12), np.float32)
 
 
-def _orientations(sums: _Sums, points: FeaturePoints) -> FloatArray:
+def _orientations(sums: _Sums, points: Keypoints) -> FloatArray:
     """Return the direction in which most wavelets of a sector of 60° point, shape (n,)."""
     side = np.arange(-_REACH_SCALES, _REACH_SCALES + 1)
     x, y = np.meshgrid(side, side)
@@ -168,7 +168,7 @@ def _orientations(sums: _Sums, points: FeaturePoints) -> FloatArray:
     squared = (lattice**2).sum(axis=1)
     lattice, squared = lattice[squared < _REACH_SCALES**2], squared[squared < _REACH_SCALES**2]
     window = np.exp(-squared / (2 * _ORIENTATION_WINDOW_SCALES**2)).astype(np.float32)
-    upright = points.turned(np.zeros(len(points)))
+    upright = points.with_orientation(np.zeros(len(points)))
     along_cols, along_rows = _wavelets(sums, upright, lattice, _ORIENTATION_HALF_SCALES)
     direction = np.arctan2(along_rows, along_cols)
     bins = np.floor(direction * (_BINS / (2 * np.pi))).astype(np.intp) % _BINS

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .gradients import FloatImage, Gradient
-from .points import FeaturePoints
+from .keypoints import Keypoints
 from .sampling import sampled_gradient, square_lattice, unit_rows
 from .scale_space import describe_at_scales, gradient_at_scale
 
@@ -65,7 +65,7 @@ class HogDescriptor:
         """How many values a descriptor has."""
         return CELLS * CELLS * self.directions
 
-    def describe(self, window: Patch, found: FeaturePoints) -> tuple[FeaturePoints, FloatImage]:
+    def describe(self, window: Patch, found: Keypoints) -> tuple[Keypoints, FloatImage]:
         """Return the features, oriented if they are to be, and what is around them.
 
         Parameters
@@ -85,8 +85,8 @@ class HogDescriptor:
         return self.describe_image(compress(window), window.valid, found)
 
     def describe_image(
-        self, image: FloatImage, valid: NDArray[np.bool_], found: FeaturePoints
-    ) -> tuple[FeaturePoints, FloatImage]:
+        self, image: FloatImage, valid: NDArray[np.bool_], found: Keypoints
+    ) -> tuple[Keypoints, FloatImage]:
         """Describe features of an image whose grey values are taken as they are."""
         if not self.scaled and self.upright:
             # Half a pixel is little in a patch: on whole pixels, what patches share is found once.
@@ -98,7 +98,7 @@ class HogDescriptor:
             image, valid, found, _GRADIENT, self.upright, self._described, self.length
         )
 
-    def _described(self, fields: Gradient, points: FeaturePoints) -> FloatImage:
+    def _described(self, fields: Gradient, points: Keypoints) -> FloatImage:
         """Return the descriptors of features in pixels of the gradient."""
         lattice = square_lattice(_SAMPLE_SCALES * PATCH_PX / 2, PATCH_PX)
         strength, direction = sampled_gradient(fields, points, lattice)
@@ -108,7 +108,7 @@ class HogDescriptor:
             values[:, :, number] = share @ weights
         return unit_rows(values.reshape(len(points), self.length))
 
-    def _described_upright(self, fields: Gradient, points: FeaturePoints) -> FloatImage:
+    def _described_upright(self, fields: Gradient, points: Keypoints) -> FloatImage:
         """Return the descriptors of features whose patches are of whole pixels."""
         height, width = fields[0].shape
         cols, rows = np.rint(points.position_px).astype(np.intp).T

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .gradients import FloatImage, Gradient
-from .points import FeaturePoints
+from .keypoints import Keypoints
 
 FloatArray = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def square_lattice(half: float, count: int) -> FloatArray:
 
 
 def sampled_gradient(
-    fields: Gradient, points: FeaturePoints, lattice: FloatArray
+    fields: Gradient, points: Keypoints, lattice: FloatArray
 ) -> tuple[FloatImage, FloatImage]:
     """Return strength and direction of the gradient on a lattice around each feature.
 
@@ -64,12 +64,12 @@ def unit_rows(rows: FloatImage) -> FloatImage:
     return np.asarray(rows / np.maximum(length, 1e-12), np.float32)
 
 
-def oriented(fields: Gradient, points: FeaturePoints) -> tuple[FeaturePoints, NDArray[np.int_]]:
+def oriented(fields: Gradient, points: Keypoints) -> tuple[Keypoints, NDArray[np.int_]]:
     """Return features once for each of their orientations, and which of `points` each one is."""
     half = _REACH_WIDTHS * _ORIENTATION_SCALES
     lattice = square_lattice(half, _ORIENTATION_SAMPLES)
     lattice = lattice[np.hypot(*lattice.T) <= half]
-    upright = points.turned(np.zeros(len(points)))
+    upright = points.with_orientation(np.zeros(len(points)))
     strength, direction = sampled_gradient(fields, upright, lattice)
     window = np.exp(-(lattice**2).sum(axis=1) / (2 * _ORIENTATION_SCALES**2))
     bins = np.rint(direction * (_BINS / (2 * np.pi))).astype(int) % _BINS
@@ -87,4 +87,4 @@ def oriented(fields: Gradient, points: FeaturePoints) -> tuple[FeaturePoints, ND
     index, at = np.nonzero(peaks)
     low, top, high = before[index, at], smooth[index, at], after[index, at]
     place = at + 0.5 * (low - high) / (low - 2 * top + high)
-    return points.take(index).turned(place * (2 * np.pi / _BINS)), index
+    return points.take(index).with_orientation(place * (2 * np.pi / _BINS)), index

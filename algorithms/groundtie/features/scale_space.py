@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .gradients import FloatImage, Gradient, gradient
-from .points import FeaturePoints
+from .keypoints import Keypoints
 from .sampling import oriented
 
-Describe = Callable[[Gradient, FeaturePoints], FloatImage]
+Describe = Callable[[Gradient, Keypoints], FloatImage]
 
 # Scale space: layers an octave, the first scale, and how much an image is blurred as it is.
 _LAYERS = 3
@@ -34,12 +34,12 @@ _BLOCK = 512
 def describe_at_scales(
     image: FloatImage,
     valid: NDArray[np.bool_],
-    found: FeaturePoints,
+    found: Keypoints,
     estimator: str,
     upright: bool,
     describe: Describe,
     length: int,
-) -> tuple[FeaturePoints, FloatImage]:
+) -> tuple[Keypoints, FloatImage]:
     """Return features, oriented if they are to be, and their descriptors.
 
     Parameters
@@ -59,7 +59,7 @@ def describe_at_scales(
     length
         How many values a descriptor has.
     """
-    tables = [FeaturePoints.none()]
+    tables = [Keypoints.none()]
     descriptors = [np.zeros((0, length), np.float32)]
     owners = [np.zeros(0, int)]
     layer_of = _layer_of(found.scale_px)
@@ -80,10 +80,10 @@ def describe_at_scales(
             if not upright:
                 local, index = oriented(fields, local)
             descriptors.append(describe(fields, local))
-            tables.append(points.take(index).turned(local.orientation_rad))
+            tables.append(points.take(index).with_orientation(local.orientation_rad))
             owners.append(block[index])
     order = np.argsort(np.concatenate(owners), kind="stable")
-    return FeaturePoints.concatenate(tables).take(order), np.concatenate(descriptors)[order]
+    return Keypoints.concatenate(tables).take(order), np.concatenate(descriptors)[order]
 
 
 def gradient_at_scale(

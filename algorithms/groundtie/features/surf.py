@@ -17,7 +17,7 @@ from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .box_hessian import FloatImage, determinants, integral_image, sigma_of
 from .detectors import seen_whole, to_grey
-from .points import FeaturePoints
+from .keypoints import Keypoints
 
 FloatArray = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class SurfDetector:
     threshold: float = 0.0004
     octaves: int = _OCTAVES
 
-    def detect(self, window: Patch, executor: Executor | None = None) -> FeaturePoints:
+    def detect(self, window: Patch, executor: Executor | None = None) -> Keypoints:
         """Return the features of an image window, upright.
 
         Parameters
@@ -57,15 +57,15 @@ class SurfDetector:
             Threads to work in; None: this one.
         """
         if window.is_flat:
-            return FeaturePoints.none()
+            return Keypoints.none()
         grey = to_grey(compress(window), window.valid)
         found = self.detect_image(grey.astype(np.float32) / np.float32(255), executor)
         return found.take(seen_whole(found, window.valid))
 
-    def detect_image(self, image: FloatImage, executor: Executor | None = None) -> FeaturePoints:
+    def detect_image(self, image: FloatImage, executor: Executor | None = None) -> Keypoints:
         """Return the features of an image with grey values from 0 to 1, shape (h, w)."""
         integral = integral_image(image)
-        tables = [FeaturePoints.none()]
+        tables = [Keypoints.none()]
         for octave in range(self.octaves):
             sides = octave_sides(octave)
             if max(sides) > min(image.shape):
@@ -74,7 +74,7 @@ class SurfDetector:
             for middle in (1, 2):
                 three = layers[middle - 1 : middle + 2]
                 tables.append(_peaks(three, sides, middle, octave, self.threshold))
-        return FeaturePoints.concatenate(tables)
+        return Keypoints.concatenate(tables)
 
 
 def octave_sides(octave: int) -> tuple[int, ...]:
@@ -86,7 +86,7 @@ def octave_sides(octave: int) -> tuple[int, ...]:
 
 def _peaks(
     layers: list[FloatImage], sides: tuple[int, ...], middle: int, octave: int, threshold: float
-) -> FeaturePoints:
+) -> Keypoints:
     """Return the peaks of the middle one of three layers, among their neighbours in all three."""
     around = np.ones((3, 3), np.uint8)
     highest = np.maximum.reduce([cv2.dilate(layer, around) for layer in layers])
@@ -100,7 +100,7 @@ def _peaks(
     position = 2**octave * (np.column_stack([cols, rows]) + offset[:, :2])
     side = sides[middle] + offset[:, 2] * (sides[1] - sides[0])
     count = len(position)
-    return FeaturePoints(position, sigma_of(side), np.zeros(count), height, np.full(count, octave))
+    return Keypoints(position, sigma_of(side), np.zeros(count), height, np.full(count, octave))
 
 
 def _vertices(

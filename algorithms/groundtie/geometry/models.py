@@ -1,7 +1,7 @@
 """Models of the misregistration: maps of the plane onto itself.
 
 A model takes a position on the reference map to the place where the input's own georeferencing
-claims this ground to lie. Both are in reference map units. Thesis S eq 3.27–3.32, P eq 2.2–2.7.
+has this ground. Both are in reference map units. Thesis S eq 3.27–3.32, P eq 2.2–2.7.
 """
 
 from __future__ import annotations
@@ -102,12 +102,12 @@ class Model(ABC):
         """Return the model as values that JSON can carry."""
 
     def __call__(self, xy: ArrayLike) -> FloatArray:
-        """Return the claimed positions, shape (n, 2), of reference map positions `xy`."""
+        """Return the nominal positions, shape (n, 2), of reference map positions `xy`."""
         uv = self.frame.enter(xy)
         return self.frame.leave(uv + self.displacement(uv))
 
     def inverse(self, xy: ArrayLike) -> FloatArray:
-        """Return the reference map positions, shape (n, 2), of claimed positions `xy`.
+        """Return the reference map positions, shape (n, 2), of nominal positions `xy`.
 
         By Newton's method with a numerical Jacobian.
         """

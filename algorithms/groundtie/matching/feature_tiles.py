@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..features.descriptors import Descriptor
 from ..features.detectors import Detector, seen_whole
+from ..features.keypoints import Keypoints
 from ..features.matching import GATE_PX, match_near
-from ..features.points import FeaturePoints
 from ..features.tiles import MARGIN_PX, Describing, Detecting, inside, tiles, widened
 from ..geometry.models import Model
 from ..progress import SILENT, Progress
@@ -45,8 +45,8 @@ class FeatureMatches:
         How many features each image has.
     """
 
-    reference: FeaturePoints
-    input: FeaturePoints
+    reference: Keypoints
+    input: Keypoints
     ratio: FloatArray
     found: tuple[int, int]
 
@@ -54,8 +54,8 @@ class FeatureMatches:
     def concatenate(cls, parts: list[FeatureMatches]) -> FeatureMatches:
         """Return the matches of all tiles."""
         return cls(
-            FeaturePoints.concatenate([part.reference for part in parts]),
-            FeaturePoints.concatenate([part.input for part in parts]),
+            Keypoints.concatenate([part.reference for part in parts]),
+            Keypoints.concatenate([part.input for part in parts]),
             np.concatenate([part.ratio for part in parts]),
             (sum(part.found[0] for part in parts), sum(part.found[1] for part in parts)),
         )
@@ -125,10 +125,10 @@ class FeatureMatcher:
         hidden = None if self.held_out is None else self.held_out(piece)
         reference = self.pair.reference_patch(piece, hidden)
 
-        def claimed(xy: FloatArray) -> FloatArray:
+        def nominal(xy: FloatArray) -> FloatArray:
             return self.pair.claimed_px(coarse(xy))
 
-        input = self.pair.input_patch(piece, claimed)
+        input = self.pair.input_patch(piece, nominal)
         if hidden is not None:
             # Where a descriptor sees less of the one image, it sees as little of the other.
             input = Patch(input.values, input.valid & ~hidden)
@@ -137,7 +137,7 @@ class FeatureMatcher:
         if self.shown is not None:
             parts = (
                 self.shown.reference_patch(piece).valid,
-                self.shown.input_patch(piece, claimed).valid,
+                self.shown.input_patch(piece, nominal).valid,
             )
         own = self._features(reference, core, parts[0])
         others = self._features(input, widened(core, gate), parts[1])
@@ -158,14 +158,14 @@ class FeatureMatcher:
             (len(own), int(inside(others.position_px, core).sum())),
         )
 
-    def _features(self, patch: Patch, window: Window, part: Mask | None) -> FeaturePoints:
+    def _features(self, patch: Patch, window: Window, part: Mask | None) -> Keypoints:
         """Return the strongest features in a window of a patch, of those in a part of it."""
         found = self.detector.detect(patch)
         found = found.take(inside(found.position_px, window))
-        return (found if part is None else standing_in(found, part)).strongest(_MOST_PER_TILE)
+        return (found if part is None else lying_in(found, part)).strongest(_MOST_PER_TILE)
 
 
-def standing_in(found: FeaturePoints, part: Mask) -> FeaturePoints:
+def lying_in(found: Keypoints, part: Mask) -> Keypoints:
     """Return the features that stand in a part of an image, shape (h, w)."""
     return found.take(seen_whole(found, part, _STANDING_SCALES))
 

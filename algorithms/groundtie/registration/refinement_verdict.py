@@ -109,7 +109,7 @@ def judge_refinement(
     length = np.hypot(*after.T)
     reach = max(int(np.ceil(length.max(initial=0.0))), _LEAST_REACH_PX)
     mixture = fit_mixture(after, (2 * reach + 1) ** 2, sigma_range_px(max_error_px))
-    right = mixture.right
+    right = mixture.inliers
     agreeing = int((length <= max(TOLERANCE_PX, max_error_px)).sum())
     probability = agreement_probability(max(TOLERANCE_PX, max_error_px), reach)
     chance = log10_chance(agreeing, len(after), probability)

@@ -12,7 +12,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class FeaturePoints:
+class Keypoints:
     """A table of features, one row a feature.
 
     Parameters
@@ -39,7 +39,7 @@ class FeaturePoints:
     octave: NDArray[np.int_]
 
     @classmethod
-    def none(cls) -> FeaturePoints:
+    def none(cls) -> Keypoints:
         """Return an empty table."""
         nothing = np.zeros(0)
         return cls(np.zeros((0, 2)), nothing, nothing, nothing, np.zeros(0, int))
@@ -47,19 +47,19 @@ class FeaturePoints:
     def __len__(self) -> int:
         return len(self.position_px)
 
-    def take(self, which: Any) -> FeaturePoints:
+    def take(self, which: Any) -> Keypoints:
         """Return the rows that the index or mask `which` selects."""
-        return FeaturePoints(**{name: getattr(self, name)[which] for name in _FIELDS})
+        return Keypoints(**{name: getattr(self, name)[which] for name in _FIELDS})
 
-    def moved(self, by_px: ArrayLike) -> FeaturePoints:
+    def moved(self, by_px: ArrayLike) -> Keypoints:
         """Return the features with positions (col, row) moved by `by_px`."""
         return replace(self, position_px=self.position_px + np.asarray(by_px, float))
 
-    def turned(self, orientation_rad: FloatArray) -> FeaturePoints:
+    def with_orientation(self, orientation_rad: FloatArray) -> Keypoints:
         """Return the features with other orientations, shape (n,)."""
         return replace(self, orientation_rad=orientation_rad)
 
-    def strongest(self, count: int) -> FeaturePoints:
+    def strongest(self, count: int) -> Keypoints:
         """Return at most so many features: those with the largest response, in their order."""
         if len(self) <= count:
             return self
@@ -67,9 +67,9 @@ class FeaturePoints:
         return self.take(np.sort(np.argsort(-self.response, kind="stable")[:count]))
 
     @classmethod
-    def concatenate(cls, tables: list[FeaturePoints]) -> FeaturePoints:
+    def concatenate(cls, tables: list[Keypoints]) -> Keypoints:
         """Return the rows of all tables, one after the other."""
         return cls(**{name: np.concatenate([getattr(t, name) for t in tables]) for name in _FIELDS})
 
 
-_FIELDS = tuple(FeaturePoints.__dataclass_fields__)
+_FIELDS = tuple(Keypoints.__dataclass_fields__)
