@@ -99,7 +99,7 @@ def registered(case: RealCase) -> tuple[Patch, Patch]:
         with open_raster(files.reference) as reference, open_raster(files.input) as input:
             pair: ImagePair = make_pair(Image(reference), Image(input), None, 0.0)
             grid = pair.grid
-            return pair.reference_patch(grid), pair.input_patch(grid, pair.claimed_px)
+            return pair.reference_patch(grid), pair.input_patch(grid, pair.nominal_px)
 
 
 def _right(first: Keypoints, second: Keypoints, limit_px: float) -> np.ndarray:

@@ -27,11 +27,11 @@ def bent(px: np.ndarray) -> np.ndarray:
     return px + 2 * np.column_stack([np.sin(2 * u), np.cos(2 * v) * u])
 
 
-def tie_points(px: np.ndarray, claimed_px: np.ndarray, variance: float = 0.05) -> TiePoints:
+def tie_points(px: np.ndarray, nominal_px: np.ndarray, variance: float = 0.05) -> TiePoints:
     count = len(px)
     return TiePoints(
         reference_xy=GRID.pixel_to_map(px),
-        input_px=claimed_px,
+        input_px=nominal_px,
         score=np.full(count, 8.0),
         covariance_px2=np.tile(variance * np.eye(2), (count, 1, 1)),
         forward_backward_error_px=np.zeros(count),

@@ -45,10 +45,10 @@ def fit_points(within: tuple[float, float] = (1.0, 1.0), sigma: float = 0.3) -> 
 
 def estimated(fit: TiePoints, kind: str = "affine") -> Estimate:
     """Fit a model to points as the search does: on the map, and in pixels without each block."""
-    px, claimed_px = GRID.map_to_pixel(fit.reference_xy), fit.input_px
-    on_map = fit_model(kind, fit.reference_xy, GRID.pixel_to_map(claimed_px))
+    px, nominal_px = GRID.map_to_pixel(fit.reference_xy), fit.input_px
+    on_map = fit_model(kind, fit.reference_xy, GRID.pixel_to_map(nominal_px))
     folds = block_folds(px)
-    left_out = [fit_model(kind, px[folds != f], claimed_px[folds != f]) for f in np.unique(folds)]
+    left_out = [fit_model(kind, px[folds != f], nominal_px[folds != f]) for f in np.unique(folds)]
     return Estimate(Transform(on_map, UTM, GRID), fit, tuple(left_out))
 
 

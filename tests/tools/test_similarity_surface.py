@@ -122,7 +122,7 @@ def test_the_evidence_is_that_of_matching(
     settings = SimilaritySettings(similarity)
     with textured.opened() as pair:
         side = 61 + 2 * (10 + BORDER_PX)
-        claimed = pair.claimed_px
+        claimed = pair.nominal_px
         corner = pair.grid.map_to_pixel(result.grid.pixel_to_map([[10, 10]]))[0] - side // 2
         piece = pair.grid.window(*np.rint(corner).astype(int), side, side)
         there, here = (

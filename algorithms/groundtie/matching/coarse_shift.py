@@ -147,7 +147,7 @@ def _patches(
         for more in (border, reach)
     )
     reading = context.executor.submit(pair.reference_patch, template, held_out(template))
-    input = pair.input_patch(search, pair.claimed_px)
+    input = pair.input_patch(search, pair.nominal_px)
     reference = reading.result()
     for image, patch in ((pair.reference, reference), (pair.input, input)):
         _require_content(image.source.path, patch)
@@ -155,7 +155,7 @@ def _patches(
 
 
 def _on_map(transform: Transform, level: Grid) -> Model:
-    """Return a transform of degree 1 as a model from map positions to claimed ones."""
+    """Return a transform of degree 1 as a model from map positions to nominal ones."""
     xy = level.pixel_to_map(level.outline(4))
     return fit_model("affine", xy, transform.nominal_xy(transform(xy)))
 

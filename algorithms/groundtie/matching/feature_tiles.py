@@ -126,7 +126,7 @@ class FeatureMatcher:
         reference = self.pair.reference_patch(piece, hidden)
 
         def nominal(xy: FloatArray) -> FloatArray:
-            return self.pair.claimed_px(coarse(xy))
+            return self.pair.nominal_px(coarse(xy))
 
         input = self.pair.input_patch(piece, nominal)
         if hidden is not None:

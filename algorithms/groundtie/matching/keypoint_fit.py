@@ -166,7 +166,7 @@ class KeypointFit:
         for _ in range(_ROUNDS):
             first = fit.model
             residuals = nominal_px - first(matches.px)
-            inliers = fit_mixture(residuals, matches.window_area_px2, SIGMA_RANGE_PX).right
+            inliers = fit_mixture(residuals, matches.window_area_px2, SIGMA_RANGE_PX).inliers
             if 2 * inliers.sum() <= PARAMETERS["affine"]:
                 raise TooFewPointsError(f"only {inliers.sum()} of {len(inliers)} features agree")
             px, score = matches.px[inliers], matches.score[inliers]
@@ -202,16 +202,16 @@ class KeypointFit:
         count, sigma = len(matches.px), fit.mixture.sigma
         points = TiePoints(
             reference_xy=grid.pixel_to_map(matches.px),
-            input_px=pair.claimed_px(coarse(grid.pixel_to_map(matches.partner_px))),
+            input_px=pair.nominal_px(coarse(grid.pixel_to_map(matches.partner_px))),
             score=matches.score,
             covariance_px2=np.broadcast_to(np.eye(2) * sigma**2, (count, 2, 2)).copy(),
             # Partners are each other's nearest.
-            two_way_error_px=np.zeros(count),
+            forward_backward_error_px=np.zeros(count),
             is_check=np.zeros(count, bool),
             state=np.full(count, USED),
         )
-        points = points.reject(~fit.mixture.right, "disagrees with the model")
-        nominal = Transform.as_claimed(grid.crs, pair.input.source.grid)
+        points = points.reject(~fit.mixture.inliers, "disagrees with the model")
+        nominal = Transform.nominal(grid.crs, pair.input.source.grid)
         model, fold_models = fit.model, fit.fold_models
         if kind == "tps":
             model, fold_models = fit_thin_plate(points, nominal, grid, model, _TPS_RADIUS_PX)

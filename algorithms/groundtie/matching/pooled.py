@@ -155,5 +155,5 @@ class PooledHistogramMatcher:
         corner = centre - places.chip_px // 2 - radius_px
         piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
         reference = self.pair.reference_patch(piece, self.held_out(piece) if blind else None)
-        input = self.pair.input_patch(piece, lambda xy: self.pair.claimed_px(model(xy)))
+        input = self.pair.input_patch(piece, lambda xy: self.pair.nominal_px(model(xy)))
         return (reference, input) if self._is_reference_masked else (input, reference)

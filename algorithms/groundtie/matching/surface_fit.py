@@ -16,7 +16,7 @@ from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..rasters.grid import apply_affine
 from ..rasters.pair import ImagePair
-from ..similarity.peak import Evidence, find_peak, find_peak_near
+from ..similarity.peak import Peak, find_peak, find_peak_near
 from .alignment import CANDIDATES, Alignment, Positions, align, choose_alignment
 from .belief_propagation import Surfaces
 from .frames import on_grid, on_map
@@ -38,8 +38,11 @@ FORWARD_BACKWARD_PX = 2.0
 class SurfaceMatcher(Protocol):
     """A matcher (see `matcher`) of chips with surfaces; its parts that a fit depends on."""
 
-    pair: ImagePair
-    rematches: int
+    @property
+    def pair(self) -> ImagePair: ...
+
+    @property
+    def rematches(self) -> int: ...
 
     def match(
         self, model: Model, places: Places, radius_px: int, context: Context
@@ -108,7 +111,7 @@ class SurfaceFit:
             surfaces, aligned, expected = self._align(coarse, kind, context)
         points = fit_points(pair, surfaces, coarse, expected, self.forward_backward_px)
         model, fold_models = aligned.model, aligned.fold_models
-        nominal = Transform.as_claimed(pair.grid.crs, pair.input.source.grid)
+        nominal = Transform.nominal(pair.grid.crs, pair.input.source.grid)
         if kind == "tps":
             model, fold_models = fit_thin_plate(points, nominal, pair.grid, model, _NEAR_PX)
         transform = Transform(on_map(model, pair.grid), nominal.crs, nominal.input_grid)
@@ -156,32 +159,32 @@ def fit_points(
 ) -> TiePoints:
     """Return the surfaces' peaks near expected shifts, shape (n, 2), as points of a fit."""
 
-    def peaks(of: Surfaces) -> list[Evidence]:
+    def peaks(of: Surfaces) -> list[Peak]:
         pairs = zip(of, expected_px, strict=True)
         return [find_peak_near(surface, shift, _NEAR_PX) for surface, shift in pairs]
 
     points = _tie_points(pair, surfaces, model, peaks, is_check=False)
     limit = f"forward–backward error above {forward_backward_px:g} px"
-    return points.reject(points.two_way_error_px > forward_backward_px, limit)
+    return points.reject(points.forward_backward_error_px > forward_backward_px, limit)
 
 
 def check_points(pair: ImagePair, surfaces: ChipSurfaces, model: Model) -> TiePoints:
     """Return the surfaces' peaks, wherever they are, as check points."""
 
-    def peaks(of: Surfaces) -> list[Evidence]:
+    def peaks(of: Surfaces) -> list[Peak]:
         return [find_peak(surface) for surface in of]
 
     return _tie_points(pair, surfaces, model, peaks, is_check=True)
 
 
 class _Peaks(Protocol):
-    def __call__(self, of: Surfaces) -> list[Evidence]: ...
+    def __call__(self, of: Surfaces) -> list[Peak]: ...
 
 
 def _tie_points(
     pair: ImagePair, surfaces: ChipSurfaces, model: Model, peaks: _Peaks, is_check: bool
 ) -> TiePoints:
-    def shifts(of: list[Evidence]) -> FloatArray:
+    def shifts(of: list[Peak]) -> FloatArray:
         return np.array([peak.shift_px for peak in of]).reshape(-1, 2)
 
     grid = pair.grid
@@ -190,10 +193,10 @@ def _tie_points(
     there_and_back = shifts(peaks(surfaces.forward)) - shifts(peaks(surfaces.backward))
     points = TiePoints(
         reference_xy=grid.pixel_to_map(centres),
-        input_px=pair.claimed_px(model(grid.pixel_to_map(centres + shifts(found)))),
+        input_px=pair.nominal_px(model(grid.pixel_to_map(centres + shifts(found)))),
         score=np.array([peak.height for peak in found]),
         covariance_px2=np.array([p.covariance_px2 for p in found]).reshape(-1, 2, 2),
-        two_way_error_px=np.hypot(*there_and_back.T),
+        forward_backward_error_px=np.hypot(*there_and_back.T),
         is_check=np.full(len(found), is_check),
         state=np.full(len(found), USED),
     )
@@ -206,5 +209,5 @@ def _without_outliers(points: TiePoints, transform: Transform, pair: ImagePair) 
     residuals = points.take(used).residual_on(pair.grid, transform)
     mixture = fit_mixture(residuals, (2 * _NEAR_PX + 1) ** 2, SIGMA_RANGE_PX)
     outliers = np.zeros(len(points), bool)
-    outliers[used] = ~mixture.right
+    outliers[used] = ~mixture.inliers
     return points.reject(outliers, "disagrees with the model")

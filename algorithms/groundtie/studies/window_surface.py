@@ -76,7 +76,7 @@ class Window:
         """
         piece = self.grid(self.chip_px // 2 + self.radius_px + BORDER_PX)
         pair = self.pair
-        patches = pair.reference_patch(piece), pair.input_patch(piece, pair.claimed_px)
+        patches = pair.reference_patch(piece), pair.input_patch(piece, pair.nominal_px)
         reaches = (self.radius_px + BORDER_PX, BORDER_PX)
         for image, patch, reach_px in zip(
             (pair.reference, pair.input), patches, reaches, strict=True

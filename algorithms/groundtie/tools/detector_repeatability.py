@@ -221,7 +221,7 @@ def _read(pair: ImagePair, transform: Transform | None, largest: int) -> tuple[P
     width, height = min(grid.width, largest), min(grid.height, largest)
     piece = grid.window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
     reference = pair.reference_patch(piece)
-    input = pair.input_patch(piece, pair.claimed_px if transform is None else transform)
+    input = pair.input_patch(piece, pair.nominal_px if transform is None else transform)
     return reference, input
 
 
