@@ -6,7 +6,6 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
-from affine import Affine
 from numpy.typing import NDArray
 
 from ..geometry.chance import agreement_probability, log10_false_alarms
@@ -101,7 +100,7 @@ def refine_on_level(
 
 def behind(model: Model, correction: Model, level: Grid) -> Model:
     """Return the model of degree 1 that first corrects on the level, then applies `model`."""
-    centres = level.transform * Affine.translation(0.5, 0.5)
+    centres = level.centre_transform
     on_map = correction.on_map(centres)
     corners = level.pixel_to_map(
         [[0, 0], [level.width, 0], [0, level.height], [level.width, level.height]]

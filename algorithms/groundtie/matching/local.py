@@ -179,7 +179,7 @@ class LocalSearch:
 
     def on_map(self, model: Model) -> Model:
         """Return a model of the matching grid's pixels as one on the map."""
-        return model.on_map(self.pair.grid.transform * Affine.translation(0.5, 0.5))
+        return model.on_map(self.pair.grid.centre_transform)
 
     def check_points(
         self, model: Model, executor: Executor, progress: Progress = SILENT
