@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from groundtie.features.haar import HaarDescriptor
 from groundtie.features.surf import SurfDetector
+from groundtie.rasters.grid import compose
 from groundtie.rasters.patch import Patch
 
 from .cases import REFERENCE_TRANSFORM, RealCase, read_image, write_image
@@ -65,7 +66,7 @@ def time_features(case: RealCase) -> list[Timing]:
         timings = [_shortest(SURF, surf)]
     with tempfile.TemporaryDirectory() as folder:
         reference = write_image(images[0], REFERENCE_TRANSFORM, Path(folder) / "reference.tif")
-        claimed = REFERENCE_TRANSFORM * Affine.translation(*_SHIFT_PX)
+        claimed = compose(REFERENCE_TRANSFORM, Affine.translation(*_SHIFT_PX))
         moved = write_image(images[1], claimed, Path(folder) / "input.tif")
         files = [str(reference), str(moved), OUTPUT]
         words = ["-m", "groundtie", "match-optical", *files, "--quiet", "--search-radius", "20"]

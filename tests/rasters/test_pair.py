@@ -13,7 +13,7 @@ from rasterio.enums import ColorInterp
 from scipy.ndimage import binary_erosion
 
 from groundtie.errors import BandError, GeoreferencingError, NoOverlapError, SameFileError
-from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, compose, reproject
 from groundtie.rasters.pair import Image, ImagePair, Turn, default_radius_m, make_pair
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import RasterSource, open_raster
@@ -92,7 +92,7 @@ def test_images_on_one_grid(files: Files) -> None:
         covering(NEXT_ZONE, 10.0),
         utm_grid(60, 50, 20.0),
         utm_grid(240, 200, 5.0),
-        Grid(GRID.transform * Affine.rotation(20), UTM, 150, 120),
+        Grid(compose(GRID.transform, Affine.rotation(20)), UTM, 150, 120),
     ],
     ids=["degrees", "next zone", "coarser", "finer", "rotated"],
 )

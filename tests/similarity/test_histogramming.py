@@ -12,6 +12,7 @@ from affine import Affine
 
 from groundtie.errors import ParameterError
 from groundtie.progress import Progress
+from groundtie.rasters.grid import compose
 from groundtie.rasters.patch import Patch
 from groundtie.similarity import histogramming
 from groundtie.similarity.binning import BINNINGS, MASKED, bin_edges, to_bins
@@ -29,10 +30,10 @@ from groundtie.similarity.measures import MEASURES, normalized_mutual_informatio
 BINS = (5, 6)
 SHAPE, SIZE = (9, 11), (24, 27)
 TURNED = (
-    Affine.translation(5.3, 4.8) * Affine.rotation(17) * Affine.scale(1.2),
+    compose(Affine.translation(5.3, 4.8), Affine.rotation(17), Affine.scale(1.2)),
     Affine(0.8, 0.3, 3.112, -0.2, 1.1, 6.433),
     # Half of the template falls outside.
-    Affine.translation(18.6, 3.25) * Affine.rotation(-30),
+    compose(Affine.translation(18.6, 3.25), Affine.rotation(-30)),
     Affine.translation(-6.4, -4.9),
 )
 
@@ -140,7 +141,7 @@ def test_random_offsets_have_the_weights_as_expectation(
 ) -> None:
     """Mean and spread over seeds: counts of single pixels vary by p (1 - p)."""
     template, image = windows(masked=True, shape=(40, 50), size=(48, 57))
-    to_image = TURNED[0] * Affine.scale(0.8)
+    to_image = compose(TURNED[0], Affine.scale(0.8))
     expected = joint_histogram_under(template, image, to_image, BINS, order)
     monkeypatch.setattr(histogramming, "_EXACT_PIXELS", 0)
     seeds = 200
@@ -248,7 +249,7 @@ def test_two_steps_bilinear() -> None:
     image, _ = grey_pair()
     image = Patch(image.values, np.ones_like(image.valid))
     edges = bin_edges(image.values, image.valid, 6, "linear")
-    to_image = Affine.translation(9.3, 7.8) * Affine.rotation(17)
+    to_image = compose(Affine.translation(9.3, 7.8), Affine.rotation(17))
     expected = np.zeros(BINS)
     for (row, col), own in np.ndenumerate(template):
         x = to_image.a * col + to_image.b * row + to_image.c

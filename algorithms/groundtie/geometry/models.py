@@ -14,7 +14,7 @@ import numpy as np
 from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 
-from ..rasters.grid import apply_affine
+from ..rasters.grid import apply_affine, compose
 
 FloatArray = NDArray[np.float64]
 
@@ -56,11 +56,11 @@ class Frame:
         """Return the frame in which the positions `xy`, shape (n, 2), lie within ±1."""
         low, high = xy.min(axis=0), xy.max(axis=0)
         scale = float(np.max(high - low) / 2) or 1.0
-        return cls(Affine.translation(*((low + high) / 2)) * Affine.scale(scale))
+        return cls(compose(Affine.translation(*((low + high) / 2)), Affine.scale(scale)))
 
     def seen_from(self, affine: Affine) -> Frame:
         """Return this frame when what was the map is a lattice that `affine` takes to the map."""
-        return Frame(affine * self.to_map)
+        return Frame(compose(affine, self.to_map))
 
     def enter(self, xy: ArrayLike) -> FloatArray:
         """Return map positions in this frame."""
