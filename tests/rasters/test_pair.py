@@ -239,7 +239,7 @@ def test_the_same_file_under_two_names(files: Files, tmp_path: Path) -> None:
     image = files.image()
     (tmp_path / "link.tif").symlink_to(image.source.path)
     for name in (image.source.path, str(tmp_path / "link.tif"), str(tmp_path / "." / "image1.tif")):
-        with open_raster(name) as again, pytest.raises(SameFileError, match="same file"):
+        with open_raster(name) as again, pytest.raises(SameFileError, match="same raster"):
             make_pair(image, Image(again))
 
 

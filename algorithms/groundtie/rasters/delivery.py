@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..progress import SILENT, Progress
 from .grid import Grid
-from .reading import Mask, RasterSource, Window
+from .reading import RasterSource
 from .warping import (
     DenseMap,
     ToInputPx,
@@ -28,6 +28,7 @@ from .warping import (
     resample,
     source_window,
 )
+from .windows import Mask, Window
 from .writing import BLOCK, create_like, fill_value, keep_apart
 
 # Tiles are blocks of the file, small enough for those of a small raster to be worked side by side.

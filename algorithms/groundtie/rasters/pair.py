@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -162,15 +161,15 @@ def make_pair(
     Raises
     ------
     SameFileError
-        Both are the same file.
+        Both are the same raster.
     GeoreferencingError
         Only one of them is georeferenced.
     NoOverlapError
         They do not overlap.
     """
     ref, inp = reference.source, input.source
-    if Path(ref.path).resolve() == Path(inp.path).resolve():
-        raise SameFileError(f"reference and input are the same file: {ref.path}")
+    if ref.is_same_as(inp):
+        raise SameFileError(f"reference and input are the same raster: {ref.path}")
     for one, other in ((ref, inp), (inp, ref)):
         if one.grid.is_georeferenced and not other.grid.is_georeferenced:
             raise GeoreferencingError(f"{other.path} has no georeferencing, but {one.path} has")

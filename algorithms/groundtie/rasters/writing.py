@@ -1,4 +1,4 @@
-"""GeoTIFF files that carry over all that the input's file says of its pixels."""
+"""GeoTIFF files that carry over all that the input states of its pixels."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ from rasterio.enums import ColorInterp, Resampling
 
 from ..errors import ParameterError
 from .atomic import writing
+from .bands import BandInfo, fits
 from .grid import PIXEL_COORDINATES, Grid
-from .reading import CACHE_BYTES, BandInfo, RasterSource, fits
+from .reading import CACHE_BYTES, RasterSource
 
 BLOCK = 512
 
@@ -88,8 +89,8 @@ def create_like(
 
 
 def one_band(source: RasterSource, dtype: str) -> RasterSource:
-    """Return a raster, for `create_like`, as one grey band of a dtype that says nothing else."""
-    band = BandInfo(dtype, None, ColorInterp.gray, None, None, 1.0, 0.0, {})
+    """Return a raster, for `create_like`, as one grey band of a dtype without anything else."""
+    band = BandInfo.plain(dtype)
     return replace(source, bands=(band,), has_mask_band=False, colormap=None, tags={})
 
 
