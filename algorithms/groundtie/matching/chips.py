@@ -14,9 +14,9 @@ from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
+from ..similarity.description import BORDER_PX
 from ..similarity.peak import find_peak
 from ..similarity.surface import (
-    BORDER_PX,
     SimilaritySettings,
     describe,
     normalise,

@@ -16,7 +16,7 @@ from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage
-from ..similarity.pooled import GreyLevels, smooth
+from ..similarity.pooled import PooledHistogram, smooth
 from ..similarity.surface import Surface
 from .alignment import align
 from .belief_propagation import normalise_each
@@ -59,7 +59,7 @@ class GroundChips:
 
     def levels(
         self, centres: NDArray[np.int_], chip_px: int, executor: Executor, progress: Progress
-    ) -> GreyLevels:
+    ) -> PooledHistogram:
         """Return what pairs of grey levels say by chips as they lie on each other now.
 
         Raises
@@ -79,11 +79,11 @@ class GroundChips:
         count = sample.shape[1] * every
         if count < _LEAST_PIXELS:
             raise TooFewPointsError(f"the mask leaves only about {count} pixels to match")
-        return GreyLevels.of(sample[0], sample[1])
+        return PooledHistogram.of(sample[0], sample[1])
 
     def match(
         self,
-        levels: GreyLevels,
+        levels: PooledHistogram,
         centres: NDArray[np.int_],
         chip_px: int,
         radius_px: int,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from affine import Affine
 
+from ..context import Context
 from ..errors import RasterContentError
 from ..geometry.fitting import fit_model
 from ..geometry.models import Frame, Model, PolynomialModel
@@ -18,8 +19,9 @@ from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.correlation import MINIMUM_OVERLAP
+from ..similarity.description import BORDER_PX
 from ..similarity.peak import find_peak
-from ..similarity.surface import BORDER_PX, SimilaritySettings, describe, similarity_surface
+from ..similarity.surface import SimilaritySettings, describe, similarity_surface
 from .chips import MaskOf
 
 # The longer side of the reduced image, in pixels, and how many candidates are kept.
@@ -140,7 +142,7 @@ def _shifts(
         describe(input, level.width * level.height, settings),
         radius_px,
         settings,
-        executor,
+        Context(executor),
         MINIMUM_OVERLAP * shown,
     )
     found: list[Candidate] = []

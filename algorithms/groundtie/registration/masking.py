@@ -233,7 +233,7 @@ class MaskRequest:
 
 def by_what_is_left(search: LocalSearch, used: MaskUsed) -> LocalSearch:
     """Return a search whose chips share a joint histogram, if a mask leaves them too little."""
-    if used.leaves_little and search.settings.measure == "nmi":
+    if used.leaves_little and "nmi" in search.settings.measures:
         return search.of_ground(search.pair)
     return search
 

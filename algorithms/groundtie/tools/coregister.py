@@ -33,12 +33,10 @@ from ..registration.registration import (
     rough_search,
     turn_within,
 )
-from ..similarity.binning import BINNINGS
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
 from .classifier_parameters import InputClassifier, ReferenceClassifier
 from .common import (
     ChipSize,
-    GpveOrder,
     HighPercent,
     Input,
     InputBand,
@@ -93,9 +91,7 @@ def coregister(
             label="Similarity",
             help="What tells that two windows show the same place: mutual information (nmi), the "
             "orientation of edges, their strength, all three together (fused), correlation of "
-            "grey values (ncc), which is for images of the same kind only, or another measure on "
-            "joint histograms: Shannon's (mi), Rényi's or Tsallis's information of order 2, "
-            "cluster reward, correlation ratio.",
+            "grey values (ncc), which is for images of the same kind only.",
             choices=SIMILARITIES,
         ),
     ] = "fused",
@@ -153,16 +149,6 @@ def coregister(
             advanced=True,
         ),
     ] = None,
-    binning: Annotated[
-        str,
-        Choice(
-            label="Binning",
-            help="Whether grey levels hold equally many pixels or are equally wide.",
-            choices=BINNINGS,
-            advanced=True,
-        ),
-    ] = "equal-frequency",
-    gpve_order: GpveOrder = 4,
     two_way_error: Annotated[
         float,
         Number(
@@ -193,7 +179,7 @@ def coregister(
     started = time.perf_counter()
     files = RegistrationFiles(tie_points, transform, report)
     kind = model_for_grid(model, output_grid)
-    settings = SimilaritySettings(similarity, bins, binning, gpve_order)
+    settings = SimilaritySettings(similarity, bins)
     with ExitStack() as stack:
         stack.enter_context(bounded_cache())
         turn = turn_within(search_rotation, search_scale, search)
