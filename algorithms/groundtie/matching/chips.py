@@ -14,7 +14,8 @@ from ..geometry.robust import find_consensus
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.peak import find_peak
-from ..similarity.surface import BORDER_PX, SimilaritySettings, describe, similarity_surface
+from ..similarity.description import BORDER_PX
+from ..similarity.surface import SimilaritySettings, describe, similarity_surface
 from .alignment import Positions
 from .belief_propagation import Surfaces, normalise_each, propagate
 from .layout import ChipLayout

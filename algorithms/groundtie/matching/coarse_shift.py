@@ -20,7 +20,8 @@ from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.correlation import MINIMUM_OVERLAP
 from ..similarity.peak import find_peak
-from ..similarity.surface import BORDER_PX, SimilaritySettings, describe, similarity_surface
+from ..similarity.description import BORDER_PX
+from ..similarity.surface import SimilaritySettings, describe, similarity_surface
 from .matcher import MaskOf
 
 # The longer side of the reduced image, in pixels, and how many candidates are kept.
@@ -120,7 +121,7 @@ def _shifts(
         describe(input, level.width * level.height, settings),
         radius_px,
         settings,
-        context.executor,
+        context.quiet(),
         MINIMUM_OVERLAP * valid,
     )
     found: list[Candidate] = []

@@ -18,7 +18,7 @@ from ..geometry.models import Model
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage
-from ..similarity.pooled import GreyLevels, smooth
+from ..similarity.pooled import PooledHistogram, smooth
 from ..similarity.surface import SimilaritySettings, Surface
 from .alignment import Positions
 from .belief_propagation import normalise_each
@@ -79,7 +79,7 @@ class PooledHistogramMatcher:
         TooFewPointsError
             The mask leaves too few pixels.
         """
-        levels = self._levels(model, Places.tiles(places.grid, self.pooled_chip_px), context)
+        histogram = self._histogram(model, Places.tiles(places.grid, self.pooled_chip_px), context)
         order = 1 if self._is_reference_masked else -1
 
         def one(centre: NDArray[np.int_]) -> Surface | None:
@@ -87,7 +87,7 @@ class PooledHistogramMatcher:
             chip = template.inner(radius_px)
             if chip.valid_share < _LEAST_VALID:
                 return None
-            return levels.surface(chip, search)[::order, ::order]
+            return histogram.surface(chip, search)[::order, ::order]
 
         kept, found = [], []
         matched = context.map(one, list(places.centres))
@@ -127,7 +127,7 @@ class PooledHistogramMatcher:
         """Return the surfaces that check points are taken from: sums over neighbouring blocks."""
         return surfaces.summed(layout.neighbourhoods(surfaces.centres))
 
-    def _levels(self, model: Model, places: Places, context: Context) -> GreyLevels:
+    def _histogram(self, model: Model, places: Places, context: Context) -> PooledHistogram:
         """Return the evidence of pairs of grey levels in chips of the fit, as they lie now."""
         every = max(len(places.centres) * places.chip_px**2 // _MOST_PIXELS, 1)
 
@@ -141,7 +141,7 @@ class PooledHistogramMatcher:
         count = sample.shape[1] * every
         if count < _LEAST_PIXELS:
             raise TooFewPointsError(f"the mask leaves only about {count} pixels to match")
-        return GreyLevels.of(sample[0], sample[1])
+        return PooledHistogram.of(sample[0], sample[1])
 
     @property
     def _is_reference_masked(self) -> bool:

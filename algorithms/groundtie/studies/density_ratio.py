@@ -9,7 +9,6 @@ maximum likelihood density ratio estimation", JMLR W&CP 4, 5–20.
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,10 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 from scipy.stats import norm, rankdata
 
-from ..progress import SILENT, Progress
+from ..context import Context
 from ..rasters.patch import Patch
-from .binning import to_bins
-from .joint_histogram import count_joint_histograms
+from ..similarity.binning import to_bins
+from ..similarity.joint_histogram import count_joint_histograms
 from .measures import mutual_information
 
 FloatArray = NDArray[np.float64]
@@ -34,7 +33,7 @@ _FOLDS = 3
 # How near the likelihood of a fit is to its maximum, in nats a pixel; to compare widths or shifts,
 # less will do.
 TOLERANCE, _ROUGH = 1e-5, 1e-3
-# Of surfaces: kernels at every shift, and bins of the histograms that tell the likeliest shift.
+# Of surfaces: kernels at every shift, and bins of the histograms that choose the likeliest shift.
 _SURFACE_KERNELS, _ROUGH_BINS = 100, 16
 _FIRST_STEPS, _LAST_STEPS = 30, 60
 
@@ -165,17 +164,12 @@ def maximum_likelihood_mutual_information(
 
 
 def information_surface(
-    template: Patch,
-    search: Patch,
-    sample: int,
-    seed: int,
-    executor: Executor,
-    progress: Progress = SILENT,
+    template: Patch, search: Patch, sample: int, context: Context
 ) -> NDArray[np.float32]:
     """Return the mutual information of a sample of a template's pixels over all whole shifts.
 
-    The width of the kernels is chosen once, at the shift at which a histogram tells the most
-    information, and is then the same for all.
+    The width of the kernels is chosen once, at the shift of the most informative
+    histogram, and is then the same for all.
 
     Parameters
     ----------
@@ -185,32 +179,29 @@ def information_surface(
         A window with the same centre, larger by the radius on each side.
     sample
         Most pixels that are used; they are the same at all shifts.
-    seed
-        Of the sample and of the cross-validation.
-    executor
-        Threads to work in.
-    progress
-        Is told of every row.
+    context
+        Threads to work in; its progress receives every row, its seed is that of the sample and of
+        the cross-validation.
 
     Returns
     -------
     Array of shape (2 radius + 1, 2 radius + 1).
     """
+    seed = context.seed
     drawn = np.random.default_rng(seed).permutation(np.flatnonzero(template.valid))[:sample]
     rows, cols = np.divmod(drawn, template.values.shape[1])
     span = search.values.shape[0] - template.values.shape[0] + 1
 
     def pairs(dy: int, dx: int) -> tuple[NDArray[Any], NDArray[Any]]:
-        there = rows + dy, cols + dx
-        seen = search.valid[there]
-        return template.values[rows, cols][seen], search.values[there][seen]
+        shifted = rows + dy, cols + dx
+        counted = search.valid[shifted]
+        return template.values[rows, cols][counted], search.values[shifted][counted]
 
     best = _most_informative_shift(template, search)
     x, y = map(normal_scores, pairs(*best))
     width = choose_width(x, y, np.column_stack([x, y])[:_SURFACE_KERNELS], seed)
 
     def row(dy: int) -> list[float]:
-        progress.check()
         return [
             maximum_likelihood_mutual_information(
                 *pairs(dy, dx), width, sample, _SURFACE_KERNELS, seed, _ROUGH
@@ -218,18 +209,14 @@ def information_surface(
             for dx in range(span)
         ]
 
-    found = []
-    for values in executor.map(row, range(span)):
-        found.append(values)
-        progress.update(len(found) / span)
-    return np.array(found, np.float32)
+    return np.array(list(context.map(row, range(span))), np.float32)
 
 
 def _most_informative_shift(template: Patch, search: Patch) -> tuple[int, int]:
     """Return the shift (rows, columns), from 0, of the highest mutual information of histograms."""
-    own, other = (to_bins(p.values, p.valid, _ROUGH_BINS) for p in (template, search))
+    first, second = (to_bins(p.values, p.valid, _ROUGH_BINS) for p in (template, search))
     radius = (search.values.shape[0] - template.values.shape[0]) // 2
-    counts = count_joint_histograms(own, other, (_ROUGH_BINS,) * 2, radius).counts
+    counts = count_joint_histograms(first, second, (_ROUGH_BINS,) * 2, radius).counts
     information = mutual_information(counts)
     dy, dx = np.unravel_index(information.argmax(), information.shape)
     return int(dy), int(dx)

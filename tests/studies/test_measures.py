@@ -9,13 +9,12 @@ from scipy.sparse import coo_matrix
 from scipy.stats import entropy
 from sklearn.metrics import mutual_info_score
 
-from groundtie.similarity.measures import (
-    MEASURES,
-    Measure,
+from groundtie.similarity.measures import HistogramMeasure, normalized_mutual_information
+from groundtie.studies.measures import (
+    HISTOGRAM_MEASURES,
     cluster_reward,
     correlation_ratio,
     mutual_information,
-    normalized_mutual_information,
     renyi_mutual_information,
     tsallis_mutual_information,
 )
@@ -23,7 +22,7 @@ from groundtie.similarity.measures import (
 TABLES = arrays(float, st.tuples(st.integers(2, 8), st.integers(2, 8)), elements=st.integers(0, 99))
 ORDERS = (-1.0, 0.0, 0.5, 0.999, 1.0, 2.0, 5.0)
 ALL = {
-    **MEASURES,
+    **HISTOGRAM_MEASURES,
     **{f"renyi {order:g}": renyi_mutual_information(order) for order in ORDERS},
     **{f"tsallis {order:g}": tsallis_mutual_information(order) for order in ORDERS},
 }
@@ -94,9 +93,9 @@ def test_a_symmetric_channel_in_closed_form(p: float) -> None:
         "cluster-reward": (1 - 2 * p) ** 2,
         "correlation-ratio": (1 - 2 * p) ** 2,
     }
-    assert {name: pytest.approx(float(m(table)), abs=1e-12) for name, m in MEASURES.items()} == (
-        expected
-    )
+    assert {
+        name: pytest.approx(float(m(table)), abs=1e-12) for name, m in HISTOGRAM_MEASURES.items()
+    } == (expected)
 
 
 @pytest.mark.parametrize(
@@ -190,7 +189,7 @@ def test_against_entropies_of_scipy_and_scikit_learn(table: np.ndarray) -> None:
 @settings(max_examples=12)
 @given(table=TABLES)
 def test_units_order_and_form_of_the_histogram_do_not_matter(name: str, table: np.ndarray) -> None:
-    measure: Measure = ALL[name]
+    measure: HistogramMeasure = ALL[name]
     found = float(measure(table))
     assert float(measure(table * 0.25)) == pytest.approx(found, rel=1e-9, abs=1e-9)
     # Cells of a sparse table may be given in several parts, and be in any order.

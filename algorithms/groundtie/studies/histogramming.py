@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator
-from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
@@ -23,14 +22,14 @@ import scipy.sparse
 from affine import Affine
 from numpy.typing import NDArray
 
+from ..context import Context
 from ..errors import ParameterError
-from ..progress import SILENT, Progress
 from ..rasters.kernels import bspline_weights
 from ..rasters.patch import Patch
 from ..rasters.warping import resample
-from .binning import MASKED, bin_edges
-from .joint_histogram import count_joint_histograms, reach
-from .measures import Measure
+from ..similarity.binning import MASKED, bin_edges
+from ..similarity.joint_histogram import ORDER, count_joint_histograms, reach
+from ..similarity.measures import HistogramMeasure
 
 FloatArray = NDArray[np.float64]
 Bins = NDArray[np.uint8] | NDArray[np.uint16]
@@ -84,7 +83,7 @@ def joint_histogram_under(
     image: Bins,
     to_image: Affine,
     counts: tuple[int, int],
-    order: int = 4,
+    order: int = ORDER,
     seed: int = 0,
     sample: NDArray[np.int_] | None = None,
 ) -> FloatArray:
@@ -129,7 +128,7 @@ def joint_histogram_under(
 
 
 def sparse_joint_histogram_under(
-    template: Bins, image: Bins, to_image: Affine, counts: tuple[int, int], order: int = 4
+    template: Bins, image: Bins, to_image: Affine, counts: tuple[int, int], order: int = ORDER
 ) -> Any:
     """Return the joint histogram of `joint_histogram_under` as a sparse matrix, by exact weights.
 
@@ -195,10 +194,9 @@ def measure_surface(
     template: Bins,
     search: Bins,
     counts: tuple[int, int],
-    measure: Measure,
+    measure: HistogramMeasure,
     order: int,
-    executor: Executor,
-    progress: Progress = SILENT,
+    context: Context,
 ) -> NDArray[np.float32]:
     """Return a measure of the joint histogram over all whole shifts.
 
@@ -212,13 +210,11 @@ def measure_surface(
     counts
         Number of bins of template and search window.
     measure
-        What is measured, see `measures`.
+        The measure.
     order
         Order of the B-spline, 2 to 7.
-    executor
-        Threads to count in.
-    progress
-        Is told of every row.
+    context
+        Threads to count in; its progress receives every row.
 
     Returns
     -------
@@ -228,7 +224,6 @@ def measure_surface(
     span = search.shape[0] - template.shape[0] - 2 * margin + 1
 
     def one_by_one(dy: int) -> FloatArray:
-        progress.check()
         shifts = [Affine.translation(margin + dx, margin + dy) for dx in range(span)]
         tables = (
             sparse_joint_histogram_under(template, search, shift, counts, order) for shift in shifts
@@ -238,15 +233,11 @@ def measure_surface(
     volume_bytes = 4 * (span + 2 * margin) ** 2 * counts[0] * counts[1]
     if max(counts) <= MASKED and volume_bytes <= _MOST_VOLUME_BYTES:
         own, other = (np.minimum(bins, MASKED).astype(np.uint8) for bins in (template, search))
-        volume = count_joint_histograms(own, other, counts, span // 2, executor)
-        rows = executor.map(measure, volume.histograms(order))
+        volume = count_joint_histograms(own, other, counts, span // 2, context)
+        rows = context.map(measure, list(volume.histograms(order)))
     else:
-        rows = executor.map(one_by_one, range(span))
-    found = []
-    for row in rows:
-        found.append(row)
-        progress.update(len(found) / span)
-    return np.array(found, np.float32)
+        rows = context.map(one_by_one, range(span))
+    return np.array(list(rows), np.float32)
 
 
 def _places(

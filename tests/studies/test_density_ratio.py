@@ -1,14 +1,13 @@
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from groundtie.context import threads
 from groundtie.progress import Progress
 from groundtie.rasters.patch import Patch
-from groundtie.similarity.density_ratio import (
+from groundtie.studies.density_ratio import (
     WIDTHS,
     choose_width,
     fit_density_ratio,
@@ -16,7 +15,7 @@ from groundtie.similarity.density_ratio import (
     maximum_likelihood_mutual_information,
     normal_scores,
 )
-from groundtie.similarity.measures import mutual_information
+from groundtie.studies.measures import mutual_information
 
 
 def gaussian_pair(rho: float, size: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -172,9 +171,9 @@ def test_a_surface() -> None:
     template, search = shifted_pair()
     told: list[float] = []
     progress = Progress(lambda done, message: told.append(done))
-    with ThreadPoolExecutor(2) as executor:
-        found = information_surface(template, search, 300, 0, executor, progress)
-        again = information_surface(template, search, 300, 0, executor)
+    with threads(2, progress) as context:
+        found = information_surface(template, search, 300, context)
+        again = information_surface(template, search, 300, context.quiet())
     np.testing.assert_array_equal(found, again)
     assert found.shape == (9, 9)
     assert np.unravel_index(found.argmax(), found.shape) == (4 - 2, 4 + 3)
@@ -189,9 +188,9 @@ def test_a_surface() -> None:
 
 def test_a_surface_of_a_template_without_pixels() -> None:
     template, search = shifted_pair()
-    with ThreadPoolExecutor(1) as executor:
+    with threads(1) as context:
         nothing = Patch(template.values, np.zeros_like(template.valid))
-        found = information_surface(nothing, search, 300, 0, executor)
+        found = information_surface(nothing, search, 300, context)
     assert not found.any()
 
 

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import cv2
 import numpy as np
 import pytest
 from affine import Affine
 
+from groundtie.context import threads
 from groundtie.errors import ParameterError
 from groundtie.progress import Progress
 from groundtie.rasters.grid import compose
 from groundtie.rasters.patch import Patch
-from groundtie.similarity import histogramming
 from groundtie.similarity.binning import BINNINGS, MASKED, bin_edges, to_bins
-from groundtie.similarity.histogramming import (
+from groundtie.similarity.joint_histogram import ORDERS, count_joint_histograms, reach
+from groundtie.similarity.measures import normalized_mutual_information
+from groundtie.studies import histogramming
+from groundtie.studies.histogramming import (
     MASKED_LEVEL,
     joint_histogram_under,
     measure_surface,
@@ -24,8 +26,7 @@ from groundtie.similarity.histogramming import (
     to_levels,
     two_step_histogram,
 )
-from groundtie.similarity.joint_histogram import ORDERS, count_joint_histograms, reach
-from groundtie.similarity.measures import MEASURES, normalized_mutual_information
+from groundtie.studies.measures import HISTOGRAM_MEASURES
 
 BINS = (5, 6)
 SHAPE, SIZE = (9, 11), (24, 27)
@@ -222,7 +223,7 @@ def test_measures_of_all_grey_values_are_those_of_a_full_table() -> None:
     both = first.valid & second.valid
     table = np.zeros((count_a, count_b))
     np.add.at(table, (a[both], b[both]), 1)
-    for measure in MEASURES.values():
+    for measure in HISTOGRAM_MEASURES.values():
         assert float(measure(sparse)) == pytest.approx(float(measure(table)), abs=1e-9)
 
 
@@ -285,13 +286,13 @@ def test_surfaces_of_any_measure(monkeypatch: pytest.MonkeyPatch, order: int, ma
     radius, margin = 2, reach(order)
     side = [n + 2 * (radius + margin) for n in SHAPE]
     template, search = windows(masked, size=(side[0], side[1]))
-    measure = MEASURES["tsallis"]
-    with ThreadPoolExecutor(2) as executor:
-        whole = measure_surface(template, search, BINS, measure, order, executor)
+    measure = HISTOGRAM_MEASURES["tsallis"]
+    with threads(2) as context:
+        whole = measure_surface(template, search, BINS, measure, order, context)
         levels = wide(template), wide(search)
-        same = measure_surface(*levels, BINS, measure, order, executor)
+        same = measure_surface(*levels, BINS, measure, order, context)
         monkeypatch.setattr(histogramming, "_MOST_VOLUME_BYTES", 0)
-        one_by_one = measure_surface(*levels, BINS, measure, order, executor)
+        one_by_one = measure_surface(*levels, BINS, measure, order, context)
     np.testing.assert_array_equal(same, whole)
     np.testing.assert_allclose(one_by_one, whole, atol=1e-6)
     for dy, dx in ((-2, -2), (0, 1), (2, -1)):
@@ -306,16 +307,8 @@ def test_surfaces_of_more_bins_than_a_byte_numbers() -> None:
     other, other_count = to_levels(second)
     counts = own_count, other_count
     told: list[float] = []
-    with ThreadPoolExecutor(2) as executor:
-        found = measure_surface(
-            own,
-            other,
-            counts,
-            normalized_mutual_information,
-            4,
-            executor,
-            Progress(lambda done, message: told.append(done)),
-        )
+    with threads(2, Progress(lambda done, message: told.append(done))) as context:
+        found = measure_surface(own, other, counts, normalized_mutual_information, 4, context)
     assert max(counts) > 255 and found.shape == (7, 7)
     assert told == sorted(told) and told[-1] == 1
     expected = gpve_table(own, other, (4, 4), counts)
