@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ..context import Context
 from ..errors import TooFewPointsError
 from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate, jackknife_spread
 from ..geometry.fitting import fit_model
@@ -127,7 +128,7 @@ class FeatureSearch:
         self, coarse: Model, kind: str, seed: int, executor: Executor, progress: Progress
     ) -> tuple[_Places, Fit]:
         """Return matches of features, few enough of each place, and the model of most of them."""
-        matches = self.matcher.match(coarse, executor, progress)
+        matches = self.matcher.match(coarse, Context(executor, progress, seed))
         score = 1 / np.maximum(matches.ratio, 1 / _LARGEST_SCORE)
         area = float(np.pi * self.matcher.gate_px**2)
         kept = best_of_cells(matches.reference.position_px, score, _CELL_PX, _PER_CELL)

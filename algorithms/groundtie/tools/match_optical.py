@@ -11,7 +11,6 @@ from types import MappingProxyType
 from typing import Annotated, Any
 
 from ..declaration import tool
-from ..features.optical import DESCRIPTORS, DETECTORS, optical_descriptor, optical_detector
 from ..kinds import Choice, Number
 from ..masks.choice import NONE
 from ..matching.alignment import LINEAR_CANDIDATES
@@ -39,6 +38,7 @@ from ..registration.registration import (
     turn_within,
 )
 from ..similarity.surface import SimilaritySettings
+from ..studies.optical_variants import DESCRIPTORS, DETECTORS, optical_descriptor, optical_detector
 from .classifier_parameters import PlainInputClassifier, ReferenceClassifier
 from .common import (
     Input,

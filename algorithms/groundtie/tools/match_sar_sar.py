@@ -13,9 +13,6 @@ from typing import Annotated, Any
 
 from ..declaration import tool
 from ..errors import ParameterError
-from ..features.descriptors import Descriptor
-from ..features.detectors import DETECTORS, Detector
-from ..features.gradients import GRADIENTS
 from ..kinds import Choice, Number, RasterIn
 from ..masks.choice import NONE
 from ..masks.regions import WIDTH_M
@@ -43,6 +40,8 @@ from ..registration.registration import (
     turn_within,
 )
 from ..similarity.surface import SimilaritySettings
+from ..studies.gradients import GRADIENTS
+from ..studies.sift_variants import DETECTORS, SiftVariantDescriptor, sift_detector
 from .classifier_parameters import InputClassifier, ReferenceClassifier
 from .common import (
     HighPercent,
@@ -213,8 +212,8 @@ def match_sar_sar(
         features = FeatureSearch(
             FeatureMatcher(
                 pair,
-                Detector(detector, contrast),
-                Descriptor(gradient),
+                sift_detector(detector, contrast),
+                SiftVariantDescriptor(gradient),
                 ratio,
                 gate,
                 local.held_out,
