@@ -10,17 +10,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from groundtie.features.descriptors import Descriptor
-from groundtie.features.detectors import DETECTORS, Detector
 from groundtie.features.keypoints import Keypoints
-from groundtie.features.matching import GATE_PX, match, match_near
+from groundtie.features.matching import GATE_PX, match_near
+from groundtie.features.tiles import Detecting
 from groundtie.geometry.models import Model
 from groundtie.geometry.robust import distances, find_consensus, fit_robustly
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import open_raster
 from groundtie.studies.evaluation import Variant, evaluate
+from groundtie.studies.matching import match
 from groundtie.studies.repeatability import CLASS_NAMES
+from groundtie.studies.sift_variants import DETECTORS, SiftVariantDescriptor, sift_detector
 
 from .cases import RealCase, write_case
 from .suites import Goal, Table
@@ -131,8 +132,8 @@ def count_chain(case: RealCase) -> ChainCount:
     reference, input = registered(case)
     limit = max(case.sigma_px, _RIGHT_PX)
 
-    def described(detector: Detector, upright: bool) -> tuple[_Described, _Described]:
-        descriptor = Descriptor(upright=upright)
+    def described(detector: Detecting, upright: bool) -> tuple[_Described, _Described]:
+        descriptor = SiftVariantDescriptor(upright=upright)
         first, second = (descriptor.describe(p, detector.detect(p)) for p in (reference, input))
         return first, second
 
@@ -142,7 +143,7 @@ def count_chain(case: RealCase) -> ChainCount:
         model = find_consensus(one.position_px, other.position_px, _RANSAC_PX)
         return _counts(one, other, model, limit)
 
-    first, second = described(Detector("sift-oct", _HYBRID_CONTRAST), True)
+    first, second = described(sift_detector("sift-oct", _HYBRID_CONTRAST), True)
     near = match_near(first[1], second[1], first[0].position_px + _OFF_PX, second[0].position_px)
     one, other = first[0].take(near.first), second[0].take(near.second)
     px = one.position_px, other.position_px
@@ -152,7 +153,7 @@ def count_chain(case: RealCase) -> ChainCount:
     hybrid = _counts(one, other, model, limit)
     return ChainCount(
         case.name,
-        by_ransac(*described(Detector("sift"), False)),
+        by_ransac(*described(sift_detector("sift"), False)),
         by_ransac(first, second),
         hybrid,
         (len(near) - hybrid[0]) * (min(limit, _RANSAC_PX) / GATE_PX) ** 2,
@@ -168,7 +169,7 @@ def _counts(first: Keypoints, second: Keypoints, model: Model, limit_px: float) 
 def count_turn(case: RealCase, gradient: str) -> TurnCount:
     """Count right matches of oriented descriptors before and after a quarter turn of the input."""
     reference, input = registered(case)
-    detector, descriptor = Detector("sift-oct"), Descriptor(gradient, upright=False)
+    detector, descriptor = sift_detector("sift-oct"), SiftVariantDescriptor(gradient, upright=False)
     points, rows = descriptor.describe(reference, detector.detect(reference))
     found = []
     for turns in (0, 1):

@@ -1,18 +1,24 @@
-"""The keypoints of the registering tools: what finds and describes them."""
+"""What finds and describes the keypoints of each kind of image.
+
+Chosen among many by `detector_repeatability` and `make bench` (see `studies`).
+"""
 
 from __future__ import annotations
 
-from .descriptors import Descriptor
-from .detectors import Detector
+from .descriptors import SiftDescriptor
+from .detectors import SiftDetector, SiftOctDetector
 from .hog import HogDescriptor
 from .tiles import Describing, Detecting
 
 
 def sar_keypoints() -> tuple[Detecting, Describing]:
-    """Return what matches two SAR images: SIFT without its first octave, which holds speckle."""
-    return Detector("sift-oct", 0.03), Descriptor("differences")
+    """Return the detector and the descriptor of radar images: upright SIFT-OCT (thesis S 6.3)."""
+    return SiftOctDetector(), SiftDescriptor()
 
 
 def optical_keypoints() -> tuple[Detecting, Describing]:
-    """Return what matches optical images: SIFT's keypoints by histograms of oriented gradients."""
-    return Detector("sift", 0.03), HogDescriptor(9, scaled=False)
+    """Return those of optical images: SIFT's keypoints, described by HOG (thesis P 4.3).
+
+    HOG patches are of one size: SIFT's keypoints are too small for patches that grow with them.
+    """
+    return SiftDetector(), HogDescriptor()

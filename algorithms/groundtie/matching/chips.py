@@ -13,8 +13,8 @@ from ..geometry.models import DEGREE, Model
 from ..geometry.robust import find_consensus
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
-from ..similarity.peak import find_peak
 from ..similarity.description import BORDER_PX
+from ..similarity.peak import find_peak
 from ..similarity.surface import SimilaritySettings, describe, similarity_surface
 from .alignment import Positions
 from .belief_propagation import Surfaces, normalise_each, propagate

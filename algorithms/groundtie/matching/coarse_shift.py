@@ -19,8 +19,8 @@ from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.correlation import MINIMUM_OVERLAP
-from ..similarity.peak import find_peak
 from ..similarity.description import BORDER_PX
+from ..similarity.peak import find_peak
 from ..similarity.surface import SimilaritySettings, describe, similarity_surface
 from .matcher import MaskOf
 

@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ParameterError
-from ..features.descriptors import Descriptor
-from ..features.detectors import DETECTORS, Detector
-from ..features.filtering import filter_matches
-from ..features.gradients import GRADIENTS
 from ..features.keypoints import Keypoints
-from ..features.matching import match
+from ..features.tiles import Describing, Detecting
 from ..geometry.fitting import fit_model
 from ..geometry.models import PARAMETERS
 from ..matching.feature_tiles import lying_in
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask
+from .filtering import filter_matches
+from .gradients import GRADIENTS
+from .matching import match
 from .repeatability import CLASS_NAMES, Repeatability, classes, overlap_error, repeatability
+from .sift_variants import DETECTORS, SiftVariantDescriptor, sift_detector
 
 FloatArray = NDArray[np.float64]
 
@@ -36,8 +36,8 @@ class Variant:
     """A detector and a descriptor, and what they are called together."""
 
     name: str
-    detector: Detector
-    descriptor: Descriptor
+    detector: Detecting
+    descriptor: Describing
 
     @classmethod
     def parse(cls, name: str, contrast: float | None = None) -> Variant:
@@ -66,8 +66,8 @@ class Variant:
                 f"one gradient ({', '.join(GRADIENTS)}) and {_TURNING!r}, joined by +"
             )
         estimator = gradients[0] if gradients else GRADIENTS[0]
-        descriptor = Descriptor(estimator, upright=not oriented)
-        return cls(name, Detector(detectors[0], contrast), descriptor)
+        descriptor = SiftVariantDescriptor(estimator, upright=not oriented)
+        return cls(name, sift_detector(detectors[0], contrast), descriptor)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from typing import Annotated, Any
 
 from ..declaration import tool
 from ..errors import ParameterError
-from ..features.matching import METHODS
 from ..geometry.transform import Transform, load_transform
 from ..kinds import Choice, FileIn, FileOut, Number, Text
 from ..progress import SILENT, Progress
@@ -24,6 +23,7 @@ from ..registration.classifying import Classifying
 from ..registration.registration import open_image
 from ..registration.stored_transform import transform_of
 from ..studies.evaluation import Evaluation, Variant, evaluate
+from ..studies.matching import METHODS
 from ..studies.repeatability import CLASS_NAMES
 from ..studies.repeatability_picture import draw_evaluations
 from .classifier_parameters import InputClassifier, ReferenceClassifier

@@ -1,11 +1,10 @@
-"""SURF's features (Bay et al. 2008; thesis P 4.2): blobs, by the Hessian of box filters.
+"""SURF's keypoints (Bay et al. 2008; thesis P 4.2): blobs, by the Hessian of box filters.
 
 SURF's authors held patents, which may still run in some countries.
 """
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from itertools import product
 
@@ -13,11 +12,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..context import Context
+from ..features.detectors import seen_whole, to_grey
+from ..features.keypoints import Keypoints
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .box_hessian import FloatImage, determinants, integral_image, sigma_of
-from .detectors import seen_whole, to_grey
-from .keypoints import Keypoints
 
 FloatArray = NDArray[np.float64]
 
@@ -46,23 +46,23 @@ class SurfDetector:
     threshold: float = 0.0004
     octaves: int = _OCTAVES
 
-    def detect(self, window: Patch, executor: Executor | None = None) -> Keypoints:
+    def detect(self, window: Patch, context: Context | None = None) -> Keypoints:
         """Return the features of an image window, upright.
 
         Parameters
         ----------
         window
             The image; features that see masked pixels are left out.
-        executor
+        context
             Threads to work in; None: this one.
         """
         if window.is_flat:
             return Keypoints.none()
         grey = to_grey(compress(window), window.valid)
-        found = self.detect_image(grey.astype(np.float32) / np.float32(255), executor)
+        found = self.detect_image(grey.astype(np.float32) / np.float32(255), context)
         return found.take(seen_whole(found, window.valid))
 
-    def detect_image(self, image: FloatImage, executor: Executor | None = None) -> Keypoints:
+    def detect_image(self, image: FloatImage, context: Context | None = None) -> Keypoints:
         """Return the features of an image with grey values from 0 to 1, shape (h, w)."""
         integral = integral_image(image)
         tables = [Keypoints.none()]
@@ -70,7 +70,7 @@ class SurfDetector:
             sides = octave_sides(octave)
             if max(sides) > min(image.shape):
                 break
-            layers = determinants(integral, sides, 2**octave, executor)
+            layers = determinants(integral, sides, 2**octave, context)
             for middle in (1, 2):
                 three = layers[middle - 1 : middle + 2]
                 tables.append(_peaks(three, sides, middle, octave, self.threshold))

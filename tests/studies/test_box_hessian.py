@@ -1,15 +1,14 @@
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from textured_pairs import texture
 
-from groundtie.features.box_hessian import determinants, integral_image, sigma_of
-from groundtie.features.surf import octave_sides
+from groundtie.context import threads
+from groundtie.studies.box_hessian import determinants, integral_image, sigma_of
+from groundtie.studies.surf import octave_sides
 
 FloatImage = NDArray[np.float32]
 HEIGHT, WIDTH = 61, 83
@@ -63,8 +62,8 @@ def test_filters_larger_than_the_image_see_nothing() -> None:
 
 def test_threads_change_nothing() -> None:
     integral = integral_image((texture(300, 600) * 20).astype(np.float32))
-    with ThreadPoolExecutor(2) as executor:
-        several = determinants(integral, (9, 15), 1, executor)
+    with threads(2) as context:
+        several = determinants(integral, (9, 15), 1, context)
     for one, other in zip(determinants(integral, (9, 15)), several, strict=True):
         np.testing.assert_array_equal(one, other)
 

@@ -7,13 +7,14 @@ done on strips of rows that stay in the processor's cache.
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from functools import partial
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from ..context import Context
 
 FloatImage = NDArray[np.float32]
 IntegralImage = NDArray[np.float64]
@@ -46,7 +47,7 @@ def determinants(
     integral: IntegralImage,
     sides_px: tuple[int, ...],
     step: int = 1,
-    executor: Executor | None = None,
+    context: Context | None = None,
 ) -> list[FloatImage]:
     """Return the determinant of the Hessian for several filters.
 
@@ -58,7 +59,7 @@ def determinants(
         Sides of the filters: odd multiples of 3.
     step
         Determinants are computed at every so many columns and rows, from the first.
-    executor
+    context
         Threads to work in; None: this one.
 
     Returns
@@ -77,7 +78,7 @@ def determinants(
         for first in range(margin, last + 1, rows):
             strip = slice(first, min(first + rows, last + 1))
             tasks.append(partial(_fill, integral, side, step, strip, out))
-    for _ in map(_call, tasks) if executor is None else executor.map(_call, tasks):
+    for _ in map(_call, tasks) if context is None else context.map(_call, tasks):
         pass
     return found
 

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from speckled_pairs import whole
 from textured_pairs import texture
 
-from groundtie.features.detectors import Detector
+from groundtie.features.detectors import SiftDetector
 from groundtie.features.keypoints import Keypoints
-from groundtie.features.surf import SurfDetector
 from groundtie.rasters.patch import Patch
 from groundtie.studies.repeatability import repeatability
+from groundtie.studies.surf import SurfDetector
 
 FloatArray = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def scene() -> FloatArray:
     return cv2.GaussianBlur(image, (0, 0), 1.2)
 
 
-def repeated(detector: SurfDetector | Detector, change: str) -> float:
+def repeated(detector: SurfDetector | SiftDetector, change: str) -> float:
     """Return the share of features that overlap by at least 60 % in the changed image."""
     shift, angle, scale, gain = CHANGES[change]
     image = scene()
@@ -112,6 +112,6 @@ def inner(found: Keypoints, elsewhere: FloatArray) -> Keypoints:
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_features_repeat_as_those_of_sift_do(change: str) -> None:
-    surf, sift = repeated(SurfDetector(), change), repeated(Detector("sift", 0.03), change)
+    surf, sift = repeated(SurfDetector(), change), repeated(SiftDetector(0.03), change)
     assert surf > sift - 0.1
     assert surf > 0.5

@@ -1,22 +1,23 @@
-"""SURF's descriptor: sums of Haar wavelets around a feature, as 64 numbers (Bay et al. 2008).
+"""SURF's descriptor: sums of Haar wavelets around a keypoint, as 64 numbers (Bay et al. 2008).
 
-Wavelets are looked up in the integral image on a lattice that turns and grows with the feature, for
-all features at once.
+Wavelets are looked up in the integral image on a lattice that rotates and grows with the keypoint,
+for all keypoints at once.
 """
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..context import Context
+from ..features.keypoints import Keypoints
+from ..features.sampling import lattice_around, unit_rows
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .box_hessian import FloatImage, IntegralImage, integral_image
-from .keypoints import Keypoints
 
 FloatArray = NDArray[np.float64]
 
@@ -54,13 +55,13 @@ class HaarDescriptor:
     Parameters
     ----------
     upright
-        Whether features keep the image's axes; else each is turned by its own orientation.
+        Whether features keep the image's axes; else each is rotated by its own orientation.
     """
 
     upright: bool = True
 
     def describe(
-        self, window: Patch, found: Keypoints, executor: Executor | None = None
+        self, window: Patch, found: Keypoints, context: Context | None = None
     ) -> tuple[Keypoints, FloatImage]:
         """Return the features, oriented if they are to be, and what is around them.
 
@@ -70,7 +71,7 @@ class HaarDescriptor:
             The image; wavelets that see masked pixels count as zero.
         found
             Features in it, shape (n,).
-        executor
+        context
             Threads to work in; None: this one.
 
         Returns
@@ -89,7 +90,7 @@ class HaarDescriptor:
                 points = points.with_orientation(_orientations(sums, points))
             return points, _described(sums, points)
 
-        done = list(map(one, blocks) if executor is None else executor.map(one, blocks))
+        done = list(map(one, blocks) if context is None else context.map(one, blocks))
         return (
             Keypoints.concatenate([Keypoints.none(), *(points for points, _ in done)]),
             np.concatenate([np.zeros((0, LENGTH), np.float32), *(values for _, values in done)]),
@@ -121,10 +122,8 @@ def _wavelets(
     Wavelets along and across the features' orientation, shape (n, m) each.
     """
     cosine, sine = np.cos(points.orientation_rad)[:, None], np.sin(points.orientation_rad)[:, None]
-    scale = points.scale_px[:, None]
-    x = points.position_px[:, :1] + scale * (cosine * lattice[:, 0] - sine * lattice[:, 1])
-    y = points.position_px[:, 1:] + scale * (sine * lattice[:, 0] + cosine * lattice[:, 1])
-    half = np.maximum(np.rint(half_scales * scale), 1).astype(np.intp)
+    x, y = lattice_around(points, lattice)
+    half = np.maximum(np.rint(half_scales * points.scale_px[:, None]), 1).astype(np.intp)
     height, width = sums.grey.shape
     # Positions of the integral image are the corners of pixels.
     col, row = np.rint(x + 0.5).astype(np.intp), np.rint(y + 0.5).astype(np.intp)
@@ -155,9 +154,7 @@ def _described(sums: _Sums, points: Keypoints) -> FloatImage:
     both = [window * part for part in _wavelets(sums, points, lattice, _HALF_SCALES)]
     parts = np.stack([*both, *map(np.abs, both)], axis=-1)
     cells = parts.reshape(len(points), CELLS, _SAMPLES, CELLS, _SAMPLES, 4).sum(axis=(2, 4))
-    raw = cells.reshape(len(points), LENGTH)
-    length = np.linalg.norm(raw, axis=1, keepdims=True)
-    return np.asarray(raw / np.maximum(length, 1e-12), np.float32)
+    return unit_rows(cells.reshape(len(points), LENGTH))
 
 
 def _orientations(sums: _Sums, points: Keypoints) -> FloatArray:

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from groundtie.features.filtering import filter_matches
 from groundtie.geometry.fitting import fit_model
+from groundtie.studies.filtering import filter_matches
 
 
 def pairs(wrong: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from speckled_pairs import whole
 from textured_pairs import texture
 
-from groundtie.features.haar import LENGTH, HaarDescriptor
 from groundtie.features.keypoints import Keypoints
 from groundtie.rasters.patch import Patch
+from groundtie.studies.haar import LENGTH, HaarDescriptor
 
 SIDE = 200
 
