@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from affine import Affine
+from groundtie.matching.hybrid import FeatureSearch
+from groundtie.matching.local import LocalSearch
 from raster_files import write_raster
 from speckled_pairs import write_speckled_pair
 from textured_pairs import TexturedPair, error_px, pixels, shift_on_map
@@ -21,9 +23,7 @@ from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.models import Model
 from groundtie.matching import feature_tiles
 from groundtie.matching.feature_tiles import FeatureMatcher, FeatureMatches
-from groundtie.matching.hybrid import FeatureSearch
 from groundtie.matching.layout import lay_out_chips
-from groundtie.matching.local import LocalSearch
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, ImagePair
 from groundtie.rasters.reading import Window, open_raster

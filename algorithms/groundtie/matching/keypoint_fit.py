@@ -113,7 +113,7 @@ class KeypointFit:
 
     def _match(self, coarse: Model, kind: str, context: Context) -> tuple[Correspondences, Fit]:
         """Return matches of keypoints, few enough of each place, and the model of most of them."""
-        matches = self.matcher.match(coarse, context.executor, context.progress)
+        matches = self.matcher.match(coarse, context)
         score = 1 / np.maximum(matches.ratio, 1 / _LARGEST_SCORE)
         area = float(np.pi * self.matcher.gate_px**2)
         everywhere = Correspondences(

@@ -21,7 +21,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, writing
 from ..rasters.pair import Image
 from ..rasters.reading import bounded_cache, open_raster
-from ..registration.verdict import refuse
+from ..registration.verdict import Verdict
 from ..report.rotation_picture import draw_evidence
 from ..similarity.surface import SIMILARITIES, SimilaritySettings
 from ..studies.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
@@ -220,7 +220,7 @@ def estimate_rotation(
                 return result
     raise NotRegisteredError(
         f"no rotation of {input} against {reference} was found: {verdict.reason}",
-        refuse(verdict.reason),
+        Verdict(False, verdict.reason),
     )
 
 

@@ -27,14 +27,13 @@ from .common import (
     GpveOrder,
     Input,
     InputBand,
-    InputMask,
     MatchingPixelSize,
     Reference,
     ReferenceBand,
-    ReferenceMask,
     Seed,
     Workers,
 )
+from .registration_parameters import InputMask, ReferenceMask
 
 
 @tool(
