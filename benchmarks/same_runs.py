@@ -27,7 +27,6 @@ from groundtie.sensor.rpc_files import read_rpc
 
 from .accuracy import FloatArray, lattice
 from .cases import (
-    CRS,
     KINDS,
     REFERENCE_TRANSFORM,
     RealCase,
@@ -100,15 +99,15 @@ class PairRegistration:
         if self.georeferenced:
             pair = write_case(case, draw_shift(case, LARGEST_SHIFT_PX, 0), folder)
             inputs = pair.reference, pair.input
-            grid = Grid(REFERENCE_TRANSFORM, CRS, *size)
+            place = REFERENCE_TRANSFORM
             options += ["--search-radius", f"{search_radius_m(LARGEST_SHIFT_PX):g}"]
         else:
             inputs = case.reference, case.input
-            grid = Grid(PIXEL_COORDINATES, None, *size)
+            place = PIXEL_COORDINATES
         words = [self.tool, *map(str, inputs)]
         if self.tool != "estimate-rotation":
             words.append(str(folder / "registered.tif"))
-        xy = grid.pixel_to_map(lattice(size))
+        xy = Grid(place, None, *size).pixel_to_map(lattice(size))
         return Prepared([*words, *options], inputs, lambda: load_transform(found)(xy))
 
 
