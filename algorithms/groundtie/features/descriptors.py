@@ -2,7 +2,7 @@
 
 Gradients around a feature are sampled on a lattice that turns and grows with it, so where a sample
 lies in the descriptor is the same for all features: its share in the 4 × 4 cells is one constant
-matrix, and all features are described by one product. Lowe 2004; thesis S appendix.
+matrix, and all features are described by one product. [Lowe2004]; [Suri2010] appendix.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""SIFT features of SAR images (thesis S 6.3): with all octaves, or without the first.
+"""SIFT features of SAR images ([Suri2010] 6.3): with all octaves, or without the first.
 
 The first octave of SIFT's scale space, on the image at twice its size, holds most features of a SAR
 image, and most of them are speckle. SIFT-OCT leaves this octave out. OpenCV's SIFT always begins on
@@ -41,7 +41,7 @@ _OPENCV_BLUR_PX = 0.5
 # The mean of two pixels blurs by this, in pixels twice as large.
 _MEAN_BLUR_PX = 0.25
 
-# Decay of the ISEF per pixel, S eq 6.2.
+# Decay of the ISEF per pixel, [Suri2010] eq 6.2.
 _ISEF_DECAY = 0.5
 
 # Share of the pixels that is saturated at either end of the grey values.

@@ -1,4 +1,4 @@
-"""Estimators of the gradient of a SAR image (thesis S 6.4).
+"""Estimators of the gradient of a SAR image ([Suri2010] 6.4).
 
 All return the derivatives along columns and rows. Differences are taken of grey values as they
 are; ratios, for which multiplicative noise is alike in bright and dark areas, of positive ones.
@@ -28,7 +28,7 @@ _TINY = np.float32(1e-6)
 
 
 def simple_differences(image: FloatImage) -> Gradient:
-    """Return differences between the next and the previous pixel (S eq 6.5, 6.6)."""
+    """Return differences between the next and the previous pixel ([Suri2010] eq 6.5, 6.6)."""
     padded = cv2.copyMakeBorder(image, 1, 1, 1, 1, cv2.BORDER_REFLECT_101)
     along_cols = padded[1:-1, 2:] - padded[1:-1, :-2]
     along_rows = padded[2:, 1:-1] - padded[:-2, 1:-1]
@@ -36,7 +36,7 @@ def simple_differences(image: FloatImage) -> Gradient:
 
 
 def recursive_differences(image: FloatImage) -> Gradient:
-    """Return Deriche's recursive differences (S eq 6.7–6.12; Deriche 1987, Paillou 1997).
+    """Return recursive differences [Deriche1987], [Paillou1997], [Suri2010] eq 6.7–6.12.
 
     The derivative filter x·exp(−α|x|) along one axis, its smoothing (α|x| + 1)·exp(−α|x|) along
     the other, both of unit gain.
@@ -50,7 +50,7 @@ def recursive_differences(image: FloatImage) -> Gradient:
 def log_ratios(image: FloatImage) -> Gradient:
     """Return the logarithm of the ratio of exponentially weighted averages, with its sign.
 
-    ROEWA (Fjørtoft et al. 1995; S eq 6.13–6.22), but the average after the pixel over the one
+    ROEWA ([Fjortoft1995]; [Suri2010] eq 6.13–6.22), but the average after the pixel over the one
     before it, not the smaller of both ratios: its logarithm is positive where it gets brighter.
 
     Parameters
@@ -62,7 +62,7 @@ def log_ratios(image: FloatImage) -> Gradient:
 
 
 def unsigned_log_ratios(image: FloatImage) -> Gradient:
-    """Return ROEWA as thesis S has it: strength without a sign, so directions in 0 … 90° only."""
+    """Return ROEWA as in [Suri2010]: strength without a sign, so directions in 0 … 90° only."""
     along_cols, along_rows = log_ratios(image)
     return np.abs(along_cols), np.abs(along_rows)
 

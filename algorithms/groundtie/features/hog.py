@@ -1,8 +1,8 @@
-"""Histograms of oriented gradients as descriptors of features (thesis P 4.3–4.5).
+"""Histograms of oriented gradients as descriptors of features ([Patel2017] 4.3–4.5).
 
 The patch of 41 × 41 samples around a feature is divided into 3 × 3 cells; each has a histogram of
 the directions of gradients, which neither contrast nor its sign changes: 81 values with nine
-directions, 63 with seven. Dalal & Triggs 2005.
+directions, 63 with seven. [Dalal2005].
 """
 
 from __future__ import annotations

@@ -15,10 +15,10 @@ Indices = NDArray[np.intp]
 
 METHODS = ("exact", "kd-tree")
 
-# How far a partner may lie from its predicted place (thesis S 6.9.2).
+# How far a partner may lie from its predicted place ([Suri2010] 6.9.2).
 GATE_PX = 16.0
 
-# The forest of k-d trees, and how many leaves are looked at (best bin first; Beis & Lowe 1997).
+# The forest of k-d trees, and how many leaves are looked at (best bin first [Beis1997]).
 _TREES = 4
 _CHECKS = 64
 
@@ -115,7 +115,7 @@ def match_near(
     """Match features whose partner is known to lie near a predicted place.
 
     Only partners within the gate are compared, which leaves hundreds of times fewer wrong ones
-    than the whole image has; so the ratio need not tell right from wrong (thesis S 6.9).
+    than the whole image has; so the ratio need not tell right from wrong ([Suri2010] 6.9).
 
     Parameters
     ----------

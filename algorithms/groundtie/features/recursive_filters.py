@@ -11,7 +11,7 @@ FloatImage = NDArray[np.float32]
 def average_before(image: FloatImage, decay: float, axis: int) -> FloatImage:
     """Return the exponentially weighted average of each pixel and all before it.
 
-    The causal filter h1 of thesis S eq 6.14, 6.19 and 6.20, (1 − b) bˣ; the first pixel goes on
+    The causal filter h1 of [Suri2010] eq 6.14, 6.19 and 6.20, (1 − b) bˣ; the first pixel goes on
     forever before the image.
 
     Parameters

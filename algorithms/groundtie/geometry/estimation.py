@@ -44,7 +44,7 @@ class Estimate:
     def spread_px(self, at_px: FloatArray) -> FloatArray:
         """Return the standard deviation of predictions, shape (n,), in matching pixels.
 
-        By the jackknife over blocks of neighbouring points (Efron & Tibshirani 1993, chapter 11),
+        By the jackknife over blocks of neighbouring points ([Efron1993], chapter 11),
         so it grows where the points do not hold the model.
 
         Parameters

@@ -1,4 +1,4 @@
-"""Measures of similarity on joint histograms (thesis S 3.3, 2.3.1).
+"""Measures of similarity on joint histograms ([Suri2010] 3.3, 2.3.1).
 
 Every measure takes joint histograms of counts or weights, shape (…, bins A, bins B), or one
 histogram as a sparse matrix, and returns values of shape (…). Where there is nothing to share,
@@ -24,20 +24,20 @@ _NOTHING = 1e-9
 
 
 def mutual_information(histograms: Histograms) -> Values:
-    """Return Shannon's H(A) + H(B) - H(A, B) in nats (thesis S eq 3.19)."""
+    """Return Shannon's H(A) + H(B) - H(A, B) in nats ([Suri2010] eq 3.19)."""
     a, b, ab = map(_entropy, _tables(histograms))
     return np.asarray(a + b - ab)
 
 
 def normalized_mutual_information(histograms: Histograms) -> Values:
-    """Return Studholme's (H(A) + H(B)) / H(A, B), between 1 and 2 (thesis S eq 3.21)."""
+    """Return (H(A) + H(B)) / H(A, B), between 1 and 2 ([Studholme1999]; [Suri2010] eq 3.21)."""
     a, b, ab = map(_entropy, _tables(histograms))
     informative = ab > _NOTHING
     return np.where(informative, (a + b) / np.where(informative, ab, 1.0), 1.0)
 
 
 def renyi_mutual_information(alpha: float) -> Measure:
-    """Return the measure R(A) + R(B) - R(A, B) with Rényi's entropy (thesis S eq 3.15, 3.16).
+    """Return the measure R(A) + R(B) - R(A, B) with Rényi's entropy ([Suri2010] eq 3.15, 3.16).
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def renyi_mutual_information(alpha: float) -> Measure:
 
 
 def tsallis_mutual_information(q: float) -> Measure:
-    """Return the measure S(A) + S(B) + (1 - q) S(A) S(B) - S(A, B) (thesis S eq 3.17, 3.18).
+    """Return the measure S(A) + S(B) + (1 - q) S(A) S(B) - S(A, B) ([Suri2010] eq 3.17, 3.18).
 
     The cross term makes it 0 for independent images, as Tsallis' entropy is not additive. With
     S = (Σ p^q - 1) / (1 - q) all of it is (Σ p_A^q Σ p_B^q - Σ p_AB^q) / (1 - q).
@@ -80,8 +80,7 @@ def cluster_reward(histograms: Histograms) -> Values:
     """Return the index of the cluster reward algorithm, 0 (independent) to 1 (one to one).
 
     (Φ / F - F / N²) / (1 - F / N²) with Φ the sum of the squared joint counts, F² the product of
-    the sums of the squared marginal counts and N the number of pixels: Inglada & Giros 2004,
-    doi:10.1109/TGRS.2004.835294.
+    the sums of the squared marginal counts and N the number of pixels [Inglada2004].
     """
     a, b, ab = (np.square(_shares(table)).sum(axis=-1) for table in _tables(histograms))
     chance = np.sqrt(a * b)
@@ -93,7 +92,7 @@ def cluster_reward(histograms: Histograms) -> Values:
 def correlation_ratio(histograms: Histograms) -> Values:
     """Return which share of A's variance a function of B explains, 0 to 1.
 
-    Roche et al. 1998, doi:10.1007/BFb0056301. The grey value of a bin is its number. A should be
+    Source: [Roche1998]. The grey value of a bin is its number. A should be
     the template: its variance is the same at all shifts. For the other way round transpose the
     histogram.
     """

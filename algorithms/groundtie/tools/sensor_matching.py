@@ -39,7 +39,7 @@ MaskKind = Annotated[
     Choice(
         label="Mask",
         help="What of the radar reference takes no part: nothing; what is brighter or darker than "
-        "thresholds (thesis S, section 5.4.1); all but homogeneous ground, for dense towns "
+        "thresholds; all but homogeneous ground, for dense towns "
         "(regions); auto chooses by what the image shows.",
         choices=MASKS,
         advanced=True,
