@@ -3,8 +3,8 @@
 Sources: [Patel2017] section 3.3.1, [Chen1994], [Reddy1996]. The magnitude of a spectrum does not
 change with a shift, rotates with the image, and shrinks as the image grows; on axes of angle and
 log frequency, both are shifts. Other than in the 22 steps of [Patel2017], spectra are standardised
-at all frequencies, peaks are found between the bins, several are tried, and rotation, scale and shift
-are found again on what both windows show.
+at all frequencies, peaks are found between the bins, several are tried, and rotation, scale and
+shift are found again on what both windows show.
 """
 
 from __future__ import annotations
