@@ -178,7 +178,7 @@ def features(scenes: Scenes) -> Figure:
     """Keypoints of SIFT on a radar image, by octave."""
     values = _band(scenes.speckled() / "reference.tif")[20:110, 60:180]
     window = Patch(values.astype(np.float32), np.ones(values.shape, bool))
-    figure, axes = _canvas(6.6, 2.8, 2)
+    figure, axes = _canvas(5.8, 2.5, 2)
     for each, name in zip(axes, ("sift", "sift-oct"), strict=True):
         found = Detector(name).detect(window)
         first = found.octave < 0
