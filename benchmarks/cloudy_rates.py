@@ -1,4 +1,4 @@
-"""Correct-match rates under simulated clouds, by what keeps their features out (thesis P 5.5)."""
+"""Correct-match rates under simulated clouds, by what masks their features ([Patel2017] 5.5)."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ Peak = tuple[int, int]
 
 RADIUS_PX = 20
 
-# Thesis S table 3.2, without its 256th bin: bins are bytes, and one value stands for "masked".
+# [Suri2010] table 3.2, without its 256th bin: bins are bytes, and one value stands for "masked".
 BINS_RADIUS_PX = 10
 BIN_COUNTS = (8, 16, 32, 64, 128, 255)
 WANTED_BINS = 32
@@ -43,13 +43,13 @@ BINNINGS = ("linear", "equal-frequency")
 NEAREST = 1
 ORDERS = (NEAREST, 4, 7)
 
-# Thesis S table 4.2.
+# [Suri2010] table 4.2.
 SHARES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 WANTED_SHARE = 0.7
 _MASK_BINS = 32
 _BLOCK_PX = 4
 
-# Thesis S table 4.3, from many seeds instead of four.
+# [Suri2010] table 4.3, from many seeds instead of four.
 RUNS = 100
 CONTINUOUS_RUNS = 3
 WANTED_REACHED = 0.9
@@ -157,7 +157,7 @@ def run(settings: Settings) -> SuiteResult:
         [*bins, *masks, *climbs, counting],
         (
             f"Peaks are the highest of all whole shifts (right, down) of ± {BINS_RADIUS_PX} px for "
-            f"bins and ± {RADIUS_PX} px for masks, as in thesis S tables 3.2 and 4.2; "
+            f"bins and ± {RADIUS_PX} px for masks, as in [Suri2010] tables 3.2 and 4.2; "
             "(0, 0) is the truth, which is known to σ. Climbs: one window a pair, whose centre is "
             f"up to {_OFF_CENTRE_PX} px off the truth, seeds drawn evenly from ± {RADIUS_PX} px. "
             "They must reach the peak of the exhaustive search in that window, exactly if "
@@ -174,7 +174,7 @@ def _told(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return records
 
 
-# Bins: thesis S table 3.2.
+# Bins: [Suri2010] table 3.2.
 
 
 def measure_bins(pair: Aligned) -> list[dict[str, Any]]:
@@ -243,11 +243,11 @@ def bins_table(records: Sequence[dict[str, Any]]) -> Table:
     return Table("True peaks, and median distance to the truth, by bins", head, rows)
 
 
-# Masks: thesis S table 4.2.
+# Masks: [Suri2010] table 4.2.
 
 
 def block_mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the mean of every block at each of its pixels (thesis S 4.5)."""
+    """Return the mean of every block at each of its pixels ([Suri2010] 4.5)."""
     height, width = values.shape
     small = cv2.copyMakeBorder(
         values, 0, -height % _BLOCK_PX, 0, -width % _BLOCK_PX, cv2.BORDER_REPLICATE
@@ -339,7 +339,7 @@ def masks_table(records: Sequence[dict[str, Any]]) -> Table:
     return Table("Peaks with the brightest part of the SAR masked, cubic kernel", head, rows)
 
 
-# Climbs: thesis S table 4.3.
+# Climbs: [Suri2010] table 4.3.
 
 
 def measure_climbs(pair: Aligned, quick: bool) -> list[dict[str, Any]]:

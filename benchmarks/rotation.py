@@ -1,4 +1,4 @@
-"""Phase correlation, Fourier–Mellin and Radon: known poses of 20 images, and thesis P's tables."""
+"""Phase correlation, Fourier–Mellin, Radon: known poses of 20 images, tables of [Patel2017]."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ def variants(range_: Range) -> list[tuple[str, float]]:
 
 
 def search_as_thesis(settings: Settings) -> list[Found]:
-    """Search for the poses of thesis P in images of the same sizes, in `ESTIMATES`' order."""
+    """Search for the poses of [Patel2017] in images of the same sizes, in `ESTIMATES`' order."""
     found = []
     for estimates in ESTIMATES:
         name, (columns, rows) = STAND_INS[estimates.image]
@@ -213,7 +213,7 @@ def search_as_thesis(settings: Settings) -> list[Found]:
             found.append(
                 search(
                     estimates.image,
-                    "thesis P",
+                    "[Patel2017]",
                     image,
                     (rows, columns),
                     injection,
@@ -325,7 +325,7 @@ def _median_and_largest(errors: Sequence[float]) -> list[str]:
 
 
 def thesis_table(found: Sequence[Found]) -> Table:
-    """Return thesis P's tables 3.3 and 3.4 as errors, ours beside them; `found` as searched."""
+    """Return [Patel2017] tables 3.3 and 3.4 as errors, beside ours; `found` as searched."""
     rows = []
     for index, estimates in enumerate(ESTIMATES):
         own = found[index * len(ACTUAL) : (index + 1) * len(ACTUAL)]

@@ -32,7 +32,7 @@ from .tables import accuracy_table
 
 HALF_REAL, ROUND_TRIP, BLUNDERS = "half real", "round trip", "blunders"
 RURAL, URBAN = "simulated, hills", "simulated, town"
-# With masks in the reference: thesis S' thresholds, and what it has for dense towns.
+# With masks in the reference: thresholds of [Suri2010], and what it has for dense towns.
 HALF_REAL_MASKED, URBAN_MASKED = "half real, thresholds", "simulated, town, regions"
 MASKS = {HALF_REAL_MASKED: "threshold", URBAN_MASKED: "regions"}
 DENSITY = {RURAL: "rural", URBAN: "urban", URBAN_MASKED: "urban"}

@@ -1,4 +1,4 @@
-"""The suite of rotations: what is drawn, what is judged, and thesis P's figures beside ours."""
+"""The suite of rotations: what is drawn and judged, figures of [Patel2017] beside ours."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ def test_noise() -> None:
 
 @pytest.mark.parametrize("settings", [GREY, FIELD], ids=lambda s: s.similarity)
 def test_masked_corners(settings: SimilaritySettings) -> None:
-    """The corners that a turned image does not fill, as thesis P has them."""
+    """The corners that a turned image does not fill, as in [Patel2017]."""
     truth = Pose(25.0, 1.0, (6.0, -3.0))
     input = window((160, 160), truth)
     rows, cols = np.indices((160, 160)) - 79.5

@@ -1,6 +1,6 @@
 """Errors of a registration at points: those of its fit, those held out, and check points.
 
-Thesis S section 2.5.3: errors at control points only tell how well the model takes up the points
+[Suri2010] section 2.5.3: errors at control points only tell how well the model takes up the points
 that it was fitted to; errors at test points, which took no part in the fit, tell how good it is.
 """
 

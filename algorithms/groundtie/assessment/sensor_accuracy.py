@@ -1,4 +1,4 @@
-"""Errors of RPCs at independent check points, before and after a refinement (S table 5.7)."""
+"""Errors of RPCs at independent check points before and after refinement ([Suri2010] table 5.7)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The hybrid chain's tie points (thesis S 6.9): features near where a rough model puts them.
+"""The hybrid chain's tie points ([Suri2010] 6.9): features near where a rough model puts them.
 
 Mutual information on reduced images has found the rough model; features are matched without a
 limit on the ratio, but only near their prediction. Most of these matches are wrong, and fall

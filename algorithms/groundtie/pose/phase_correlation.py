@@ -1,6 +1,6 @@
 """Phase correlation: the shift between two windows from the phases of their spectra.
 
-Kuglin & Hines 1975; thesis P section 3.3.1, steps 16–21. The cross-power spectrum is divided by
+[Kuglin1975]; [Patel2017] section 3.3.1, steps 16–21. The cross-power spectrum is divided by
 its magnitude, which leaves a peak instead of the broad hill of a plain correlation.
 """
 

@@ -1,4 +1,4 @@
-"""The pose by stepping over rotation and scale, with all shifts at once (thesis P 3.2.2).
+"""The pose by stepping over rotation and scale, with all shifts at once ([Patel2017] 3.2.2).
 
 Coarse to fine: every rotation and scale is tried on small images; the best candidates are tried
 again in finer steps on larger ones, and compared with one another on the way. Similarity is the

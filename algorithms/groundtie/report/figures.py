@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Told apart by people with any colour vision (Okabe & Ito 2008).
+# Told apart by people with any colour vision [Okabe2008].
 FIT_COLOUR = "#0072b2"
 CHECK_COLOUR = "#d55e00"
 REJECTED_COLOUR = "#7a7a7a"

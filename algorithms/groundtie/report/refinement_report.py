@@ -1,4 +1,4 @@
-"""The report on refined RPCs: a table as S 5.7, the errors as arrows, the image on the map."""
+"""The report on refined RPCs: table ([Suri2010] 5.7), errors as arrows, the image on the map."""
 
 from __future__ import annotations
 

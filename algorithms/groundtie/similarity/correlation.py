@@ -89,9 +89,9 @@ def correlate_fields(
 
 
 def correlate_grey(template: Patch, search: Patch) -> NDArray[np.float32]:
-    """Return the normalised cross-correlation of grey values over shifts (thesis S eq 3.2).
+    """Return the normalised cross-correlation of grey values over shifts ([Suri2010] eq 3.2).
 
-    With masks, each shift is normalised by the pixels that are valid in both (Padfield 2012).
+    With masks, each shift is normalised by the pixels that are valid in both [Padfield2012].
     """
     mean = np.float32(search.values[search.valid].mean()) if search.valid.any() else np.float32(0)
     if template.all_valid and search.all_valid:

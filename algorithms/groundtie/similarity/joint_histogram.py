@@ -1,6 +1,6 @@
 """The joint-histogram volume: joint histograms of a template and a search window at all shifts.
 
-The joint histogram of generalised partial volume estimation (GPVE; Chen & Varshney 2003, thesis S
+The joint histogram of generalised partial volume estimation (GPVE; [Chen2003], [Suri2010]
 eq 3.34) at any continuous shift is a B-spline combination of the nearest-neighbour histograms at
 integer shifts, as long as every shift sees the same template pixels:
 

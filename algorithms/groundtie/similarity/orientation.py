@@ -2,8 +2,8 @@
 
 Edges keep their place and direction between a SAR and an optical image when their contrast does
 not keep its sign. Squaring the complex gradient makes opposite directions the same; dividing by
-its magnitude makes weak and strong edges alike (orientation correlation: Fitch et al. 2002;
-normalised gradient fields: Haber & Modersitzki 2006). How strong edges are is evidence of its own:
+its magnitude makes weak and strong edges alike (orientation correlation [Fitch2002];
+normalised gradient fields [Haber2006]). How strong edges are is evidence of its own:
 see `edge_strength`.
 """
 

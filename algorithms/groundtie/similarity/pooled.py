@@ -6,7 +6,7 @@ of grey levels says for or against belonging together, log p(a, b) / (p(a) p(b))
 mutual information. A chip's similarity at a shift is the sum over its pixels, so that chips add
 up: many that say little each outweigh what draws a few.
 
-Point similarity measures: Rogelj, Kovačič & Gee 2003, doi:10.1016/S1077-3142(03)00116-4.
+Source: point similarity measures [Rogelj2003].
 """
 
 from __future__ import annotations

@@ -103,7 +103,7 @@ def estimate_looks(intensity: FloatImage, valid: Mask) -> float:
 
     In a homogeneous area, intensity has the squared coefficient of variation 1 / looks. Windows
     that hold edges or texture vary more, each in its own way: the first of the frequent values is
-    that of the homogeneous ones (after Foucher et al. 2000, doi:10.1109/IGARSS.2000.861621).
+    that of the homogeneous ones (after [Foucher2000]).
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
 """Fourier–Mellin: rotation and scale from magnitude spectra, then the shift.
 
-Thesis P section 3.3.1; Chen, Defrise & Deconinck 1994, doi:10.1109/34.387491; Reddy & Chatterji
-1996, doi:10.1109/83.506761. The magnitude of a spectrum does not change with a shift, turns with
-the image, and shrinks as the image grows; on axes of angle and log frequency, both are shifts.
-Unlike P's 22 steps: spectra are made alike at all frequencies, peaks are found between the bins,
-several are tried, and rotation, scale and shift are found again on what both windows show.
+Sources: [Patel2017] section 3.3.1, [Chen1994], [Reddy1996]. The magnitude of a spectrum does not
+change with a shift, rotates with the image, and shrinks as the image grows; on axes of angle and
+log frequency, both are shifts. Other than in the 22 steps of [Patel2017], spectra are standardised
+at all frequencies, peaks are found between the bins, several are tried, and rotation, scale and
+shift are found again on what both windows show.
 """
 
 from __future__ import annotations

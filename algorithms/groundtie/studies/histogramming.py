@@ -1,11 +1,11 @@
-"""The joint histogram of a template and an image under any affine transform (thesis S 3.4.2).
+"""The joint histogram of a template and an image under any affine transform ([Suri2010] 3.4.2).
 
 * Two-step estimators interpolate the image at each template pixel's place and count one entry; but
   for nearest neighbour, interpolation smooths the image between its pixels and not on them, which
   gives similarity false maxima.
 * One-step estimators spread each template pixel over the bins of the image pixels around its
-  place, with the weights of a B-spline: generalised partial volume estimation (GPVE; Chen &
-  Varshney 2003, S eq 3.34). Order 2 is partial volume interpolation (PVI; Maes et al. 1997), which
+  place, with the weights of a B-spline: generalised partial volume estimation (GPVE;
+  [Chen2003], [Suri2010] eq 3.34). Order 2 is partial volume interpolation (PVI [Maes1997]), which
   has false maxima of its own; from order 4 on there are none.
 
 For shifts alone `joint_histogram` counts many transforms at once.
@@ -55,7 +55,7 @@ def to_levels(
         Grey values.
     bins
         Number of levels, up to 65 535; None: every grey value that occurs is a level of its own,
-        as for S's images of 11 and 16 bits "without binning".
+        as [Suri2010] for images of 11 and 16 bits "without binning".
     binning
         One of `binning.BINNINGS`.
 

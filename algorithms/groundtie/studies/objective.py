@@ -1,7 +1,7 @@
 """The similarity of two windows as a function of their pose, for searches that climb it.
 
 Grey values are sorted into bins once. Whole-pixel shifts of equally large pixels are counted at
-aligned grids, which is cheap (thesis S 4.4.2); any other pose by generalised partial volume
+aligned grids, which is cheap ([Suri2010] 4.4.2); any other pose by generalised partial volume
 estimation.
 """
 

@@ -1,9 +1,9 @@
 """Radon: rotation and shift from projections of the windows.
 
-Thesis P sections 3.3.2–3.3.4. A rotation is a shift of the Radon transform along its angle; the
+[Patel2017] sections 3.3.2–3.3.4. A rotation is a shift of the Radon transform along its angle; the
 spectra of the projections do not change with the image's shift, so the rotation is found on
-them. The shift is then that of the projections onto the rows' and columns' directions (P eq
-3.10–3.12). P's own errors are up to 2° and a few pixels; here the spectra are made alike at all
+them. The shift is then that of the projections onto the rows' and columns' directions (eq
+3.10–3.12). Its own errors are up to 2° and a few pixels; here the spectra are made alike at all
 frequencies, peaks are found between the bins, and all is found again on what both windows show.
 """
 
@@ -167,7 +167,7 @@ def shift_along(
 def shift_by_projections(
     reference: Image | Field, input: Image | Field, reach_px: float, wrap: bool = False
 ) -> PoseFound:
-    """Return the shift of an image by its projections at 0° and 90° (P eq 3.11, 3.12)."""
+    """Return the shift of an image by its projections at 0° and 90° ([Patel2017] eq 3.11, 3.12)."""
     right, height = shift_along(reference.sum(axis=0), input.sum(axis=0), reach_px, wrap)
     down, other = shift_along(reference.sum(axis=1), input.sum(axis=1), reach_px, wrap)
     return PoseFound(Pose(shift_px=(right, down)), min(height, other))

@@ -1,8 +1,7 @@
 """Simultaneous perturbation stochastic approximation (SPSA): climbing with two looks a step.
 
-First order: Spall 1992, 1998 (doi:10.1109/7.705889), thesis S eq 4.1–4.4. Second order: Spall 2000
-(doi:10.1109/TAC.2000.880982), for registration Cole-Rhodes et al. 2003
-(doi:10.1109/TIP.2003.819237). Discrete: thesis S 4.4.2.
+First order: [Spall1992], [Spall1998], [Suri2010] eq 4.1–4.4. Second order: [Spall2000], for
+registration [ColeRhodes2003]. Discrete: [Suri2010] 4.4.2.
 
 One number must be known beforehand that nobody knows: how steep the similarity is. NMI changes by
 some thousandths. So slopes are divided by their own root mean square so far, and gains are pixels.
@@ -39,7 +38,7 @@ Measure = Callable[[FloatArray], float]
 # Spall's exponents: the least that still converge.
 ALPHA, GAMMA = 0.602, 0.101
 
-# A climb ends after so many evaluations without a change (thesis S 4.4.1): without more than what
+# A climb ends after so many evaluations without a change ([Suri2010] 4.4.1): without more than what
 # the usual slope rises in so many pixels.
 PATIENCE = 40
 _CHANGE_PX = 0.05
@@ -115,7 +114,7 @@ def climb_first_order(
     """Return the best place found from a start by SPSA of first order.
 
     In a space of aligned grids (`PoseSpace.origin`) this is discrete SPSA: looks and steps are
-    rounded to whole pixels (thesis S 4.4.2).
+    rounded to whole pixels ([Suri2010] 4.4.2).
     """
 
     def uphill(look: Measure, at: FloatArray, slopes: _Slopes) -> FloatArray:
@@ -235,7 +234,7 @@ def discrete_spsa(
     effort: Effort = DISCRETE_EFFORT,
     gains: Gains = DISCRETE,
 ) -> list[PoseFound]:
-    """Search for a shift of whole pixels by discrete SPSA (thesis S 4.4.2).
+    """Search for a shift of whole pixels by discrete SPSA ([Suri2010] 4.4.2).
 
     Parameters as of `spsa`. Only histograms at aligned grids are counted: shifts are whole pixels
     between the windows' pixels. Where their sizes are even in one and odd in the other, the shift
