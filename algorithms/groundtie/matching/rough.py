@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from affine import Affine
 
+from ..context import Context
 from ..errors import RasterContentError
 from ..geometry.fitting import fit_model
 from ..geometry.models import Frame, Model, PolynomialModel
 from ..geometry.transform import Transform
-from ..pose.pose import PoseSearch
+from ..pose.pose import PoseFound
 from ..pose.rotation_windows import read_windows
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
@@ -55,7 +57,7 @@ class RoughSearch:
     radius_m: float
     rotation_deg: float = 0.0
     scale: tuple[float, float] = (1.0, 1.0)
-    poses: PoseSearch | None = None
+    poses: Callable[..., list[PoseFound]] | None = None
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,7 @@ def rough_candidates(
     windows = read_windows(pair.reference, pair.input, rough.scale, rough.radius_m, held_out)
     limits = windows.limits(rough.rotation_deg, rough.scale)
     both = windows.reference, windows.input
-    found = rough.poses(*both, limits, settings, executor)[:CANDIDATES]
+    found = rough.poses(*both, limits, settings, Context(executor))[:CANDIDATES]
     high = [one for one in found if one.height > found[0].height * _LOW]
     return [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in high]
 
