@@ -1,7 +1,7 @@
 """Masks by grey value: strong scatterers, as walls and double bounces, are masked ([Suri2010] 4.5).
 
-The thresholds stand in the histogram of the block-averaged image, where speckle is less; they are
-applied to the blocks at full resolution.
+The thresholds are percentiles of the block-averaged image, where speckle is less; they are applied
+to the blocks at full resolution.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -230,7 +230,7 @@ def _band_groups(source: RasterSource) -> list[tuple[int, ...]]:
 
 
 def in_order(
-    pool: ThreadPoolExecutor,
+    pool: Executor,
     work: Callable[[Item], Result],
     items: Iterable[Item],
     ahead: int,

@@ -20,7 +20,7 @@ from .statistics import FloatImage, LocalStatistics, Mask, local_statistics
 # Side of tiles that stay, with all that filters need, in the processor's cache.
 _TILE_PX = 256
 
-# Beyond so many windows an exponential filter weighs less than a ten thousandth.
+# Beyond so many windows the weight of an exponential filter is less than a ten thousandth.
 _ISEF_REACH = 3
 
 

@@ -19,7 +19,7 @@ def isef(image: FloatImage, decay: float) -> FloatImage:
     Parameters
     ----------
     image
-        Float32, shape (h, w). Beyond its borders, the values there go on.
+        Float32, shape (h, w). Beyond its borders, the outermost values go on.
     decay
         The b of the formula, 0 to below 1: weight of a pixel over that of its nearer neighbour.
 

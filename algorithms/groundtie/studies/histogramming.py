@@ -34,13 +34,13 @@ from ..similarity.measures import HistogramMeasure
 FloatArray = NDArray[np.float64]
 Bins = NDArray[np.uint8] | NDArray[np.uint16]
 
-# Stands for masked pixels among grey levels of 16 bits, as `binning.MASKED` among those of 8.
+# Value of masked pixels among grey levels of 16 bits, as `binning.MASKED` among those of 8.
 MASKED_LEVEL = np.uint16(65_535)
 
 # Up to so many template pixels every weight is summed up; beyond, that takes too long for a search.
 _EXACT_PIXELS = 20_000
 
-# Histograms of all shifts take no more memory than this together, else each is counted by itself.
+# If histograms of all shifts need more memory than this, each is counted by itself.
 _MOST_VOLUME_BYTES = 150_000_000
 
 
@@ -232,8 +232,8 @@ def measure_surface(
 
     volume_bytes = 4 * (span + 2 * margin) ** 2 * counts[0] * counts[1]
     if max(counts) <= MASKED and volume_bytes <= _MOST_VOLUME_BYTES:
-        own, other = (np.minimum(bins, MASKED).astype(np.uint8) for bins in (template, search))
-        volume = count_joint_histograms(own, other, counts, span // 2, context)
+        first, second = (np.minimum(bins, MASKED).astype(np.uint8) for bins in (template, search))
+        volume = count_joint_histograms(first, second, counts, span // 2, context)
         rows = context.map(measure, list(volume.histograms(order)))
     else:
         rows = context.map(one_by_one, range(span))
@@ -272,7 +272,7 @@ def _contributions(
         start = row * stride
         for col, weight_x in zip(cols, along_x, strict=True):
             weights = None if order == 1 else weight_y * weight_x
-            # Under whole shifts, pixels at the ends of even orders' kernels weigh nothing.
+            # Under whole shifts, pixels at the ends of even orders' kernels have no weight.
             if weights is None or weights.any():
                 yield codes + padded[start + col], weights
 
