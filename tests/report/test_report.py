@@ -24,7 +24,8 @@ from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.verdict import Verdict, refuse
-from groundtie.report.report import Report, versions
+from groundtie.report.page import versions
+from groundtie.report.report import Report
 from groundtie.version import __version__
 
 GRID = utm_grid(160, 120)
@@ -224,7 +225,7 @@ def test_the_verdict_comes_first(page: Page) -> None:
         "Extrapolated": "18 % of the overlap",
     }
     assert [e.text for e in page.all("sup")] == ["14"]
-    assert "90 % of right matches lie within 0.93 px (9.30 m) of where" in page.text
+    assert "90 % of inliers lie within 0.93 px (9.30 m) of where" in page.text
     assert "18 % of the overlap lies outside" in page.text
 
 
@@ -255,16 +256,16 @@ def test_the_correction_is_the_injected_shift(page: Page) -> None:
 
 def test_pictures_before_and_after(page: Page) -> None:
     reference = picture(page, "Overview of the reference image reference.tif").astype(float)
-    claimed = picture(page, "Overview of the input image input.tif where it claims").astype(float)
+    nominal = picture(page, "Overview of the input image input.tif at its nominal").astype(float)
     registered = picture(page, "Overview of the input image input.tif as registered").astype(float)
     inside = np.s_[15:-15, 15:-15]
-    assert reference.shape == claimed.shape == registered.shape == (120, 160)
+    assert reference.shape == nominal.shape == registered.shape == (120, 160)
 
     def likeness(image: np.ndarray) -> float:
         return float(np.corrcoef(image[inside].ravel(), reference[inside].ravel())[0, 1])
 
     assert likeness(registered) > 0.99
-    assert likeness(claimed) < 0.9
+    assert likeness(nominal) < 0.9
 
 
 def test_the_viewer_can_be_used_by_keyboard(page: Page) -> None:
@@ -401,7 +402,7 @@ def test_refused_without_a_transform(pair: ImagePair, tmp_path: Path) -> None:
     assert "No registered image was written: there is no transform." in page.text
     assert set(page.numbers.values()) == {"–", "0 of 0"}
     headings = [e.text for e in page.all("h2")]
-    assert headings == ["Refused", "The images as claimed", "How it was made"]
+    assert headings == ["Refused", "The images at their nominal positions", "How it was made"]
     assert not [e for e in page.all("input") if e.attributes.get("name") == "state"]
     assert len(page.all("img")) == 2
     assert numbers_in(tmp_path)["transform"] is None

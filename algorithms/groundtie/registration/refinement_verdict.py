@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from ..assessment.accuracy import Statistics
+from ..assessment.statistics import Statistics
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.judging import (
     CE90_FACTOR,

@@ -10,14 +10,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
-from ..assessment.accuracy import (
-    Assessment,
-    PointErrors,
-    measure_check_points,
-    measure_tie_points,
-)
+from ..assessment.accuracy import Assessment
 from ..assessment.comparison import Comparison, compare
 from ..assessment.consistency import Leg, consistency
+from ..assessment.measuring import measure_check_points, measure_tie_points
+from ..assessment.point_errors import PointErrors
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import GeoreferencingError, NotRegisteredError, ParameterError, SameFileError
@@ -29,7 +26,7 @@ from ..rasters.atomic import Outputs
 from ..rasters.reading import RasterSource, bounded_cache, open_raster
 from ..registration.stored_transform import load_stored, transform_of
 from ..registration.verdict import Verdict
-from ..report.report import PART_LABELS, AssessmentReport
+from ..report.assessment_report import PART_LABELS, AssessmentReport
 
 _TABLES = (".gpkg", ".geojson", ".csv", ".points")
 
