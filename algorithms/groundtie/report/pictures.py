@@ -30,7 +30,7 @@ _BACKDROP_STRENGTH = 0.4
 
 # What is masked: reddish purple (Okabe & Ito 2008).
 _TINT_BGR = np.array([167.0, 121.0, 204.0])
-_TINT_STRENGTH = 0.45
+_TINT_STRENGTH = 0.3
 
 # A side of the lattice on which an overview follows a transform.
 _NODES = 33
