@@ -42,6 +42,15 @@ class TiePointFit:
     check_points: int
     check_rmse_px: float | None
 
+    def lines(self) -> list[str]:
+        """Return the fit as lines of text."""
+        residuals = f"residuals of {self.rmse_px:.2f} px (RMSE)"
+        lines = [f"fitted to {self.points} tie points with {residuals}"]
+        if self.check_rmse_px is not None:
+            error = f"{self.check_rmse_px:.2f} px (RMSE)"
+            lines.append(f"error at {self.check_points} check points: {error}")
+        return lines
+
 
 def load_stored(
     path: Path, model: str, source: RasterSource
