@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..assessment.point_errors import PointErrors
 from ..errors import NotRegisteredError, TooFewPointsError
 from ..rasters.grid import PIXEL_COORDINATES, Grid
-from ..report.figures import Residuals
 from ..sensor.adjustment import Adjustment, Control, adjust
 from ..sensor.bias import fold
 from ..sensor.control_points import ControlPoints
@@ -99,7 +99,7 @@ class Refinement:
         """The image's pixels."""
         return Grid(PIXEL_COORDINATES, None, *self.image.size)
 
-    def residuals(self) -> Residuals:
+    def residuals(self) -> PointErrors:
         """Return by how much the refined RPCs miss the points, in the image.
 
         Without check points, those are shown for them that points have when they are left out.
@@ -110,7 +110,7 @@ class Refinement:
             held_out, missed = self.control, self.adjustment.left_out_px
         else:
             missed = held_out.residuals_px(bias)
-        return Residuals(
+        return PointErrors(
             np.concatenate([self.control.found_px, held_out.found_px]),
             np.concatenate([fitted, missed]),
             np.repeat([False, True], [len(fitted), len(missed)]),
