@@ -17,9 +17,9 @@ from ..errors import ParameterError, RasterContentError
 from ..kinds import Choice, Number, RasterOut
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
-from ..rasters.delivery import in_order, tiles
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window, bounded_cache, open_raster
+from ..rasters.tiling import in_order, tiles
 from ..rasters.writing import create_like, fill_value
 from ..speckle.filters import FILTERS, SpeckleFilter
 from ..speckle.statistics import estimate_looks
