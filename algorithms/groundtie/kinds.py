@@ -85,6 +85,13 @@ class VectorIn(InputKind):
         return value if _is_gdal_name(value) else super().check(name, value)
 
 
+class MaskIn(InputKind):
+    """A raster, a vector layer or a file that states what of an image takes part."""
+
+    def check(self, name: str, value: Any) -> Any:
+        return value if _is_gdal_name(value) else super().check(name, value)
+
+
 @dataclass(frozen=True, kw_only=True)
 class FileIn(InputKind):
     """Any other file that is read."""

@@ -325,7 +325,7 @@ def tie_points(transform: Transform, error_px: np.ndarray) -> TiePoints:
         input_px=px + error_px,
         score=np.ones(count),
         covariance_px2=np.tile(np.eye(2), (count, 1, 1)),
-        two_way_error_px=np.zeros(count),
+        forward_backward_error_px=np.zeros(count),
         is_check=np.arange(count) % 3 == 0,
         state=np.where(np.arange(count) == 1, "rejected: far", "used"),
     )

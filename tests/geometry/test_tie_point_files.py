@@ -37,7 +37,7 @@ def made(crs: CRS | None, grid: Grid, count: int = 12) -> tuple[TiePoints, Trans
         input_px=px + [0, 0.5],
         score=rng.uniform(5, 20, count),
         covariance_px2=np.tile(np.diag([0.04, 0.09]), (count, 1, 1)),
-        two_way_error_px=rng.uniform(0, 1, count),
+        forward_backward_error_px=rng.uniform(0, 1, count),
         is_check=np.arange(count) % 3 == 0,
         state=np.where(np.arange(count) == 1, "rejected: far, and “odd”", "used"),
     )
@@ -104,7 +104,7 @@ def test_attributes(tmp_path: Path, suffix: str) -> None:
         "dx_px": 0.0,
         "dy_px": 0.5,
         "score": points.score[3],
-        "two_way_error_px": points.two_way_error_px[3],
+        "forward_backward_error_px": points.forward_backward_error_px[3],
         "sigma_x_px": 0.2,
         "sigma_y_px": 0.3,
     }
@@ -127,12 +127,12 @@ def test_geojson_is_in_longitude_and_latitude(tmp_path: Path) -> None:
 
 def test_numbers_that_are_not_finite_become_null(tmp_path: Path) -> None:
     points, transform = made(UTM, GRID)
-    points.two_way_error_px[0] = np.inf
+    points.forward_backward_error_px[0] = np.inf
     for suffix in (".gpkg", ".geojson"):
         path = tmp_path / f"a{suffix}"
         write_tie_points(path, points, transform)
         with fiona.open(path) as layer:
-            assert next(iter(layer))["properties"]["two_way_error_px"] is None
+            assert next(iter(layer))["properties"]["forward_backward_error_px"] is None
 
 
 def test_a_georeferencer_file_of_a_plain_image(tmp_path: Path) -> None:

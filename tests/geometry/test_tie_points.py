@@ -18,7 +18,7 @@ def some_points(count: int = 5) -> TiePoints:
         input_px=px,
         score=np.arange(count, dtype=float),
         covariance_px2=np.tile(np.eye(2), (count, 1, 1)),
-        two_way_error_px=np.zeros(count),
+        forward_backward_error_px=np.zeros(count),
         is_check=np.arange(count) % 2 == 0,
         state=np.array(["used"] * count),
     )

@@ -9,8 +9,8 @@ from raster_files import write_raster
 from textured_pairs import TexturedPair, error_px, pixels, shift_on_map, write_textured_pair
 
 from groundtie.errors import TooFewPointsError
+from groundtie.features.detectors import SiftDetector
 from groundtie.features.hog import HogDescriptor
-from groundtie.features.optical import optical_detector
 from groundtie.geometry.estimation import Estimate
 from groundtie.matching.alignment import LINEAR_CANDIDATES
 from groundtie.matching.feature_tiles import FeatureMatcher
@@ -62,10 +62,7 @@ def estimates(
     with files.opened() as pair, ThreadPoolExecutor(2) as executor:
         local = LocalSearch(pair, lay_out_chips(pair), FUSED, candidates=LINEAR_CANDIDATES)
         matcher = FeatureMatcher(
-            pair,
-            optical_detector("sift", threshold),
-            HogDescriptor(scaled=False),
-            held_out=local.held_out,
+            pair, SiftDetector(threshold), HogDescriptor(), held_out=local.held_out
         )
         features = FeatureSearch(matcher, local)
         guided = GuidedSearch(features, local)

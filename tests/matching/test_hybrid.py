@@ -13,9 +13,10 @@ from textured_pairs import TexturedPair, error_px, pixels, shift_on_map
 
 from groundtie.errors import TooFewPointsError
 from groundtie.features import tiles
-from groundtie.features.descriptors import Descriptor
-from groundtie.features.detectors import Detector
-from groundtie.features.points import FeaturePoints
+from groundtie.features.descriptors import SiftDescriptor
+from groundtie.features.detectors import SiftOctDetector
+from groundtie.features.keypoints import Keypoints
+from groundtie.features.tiles import Describing, Detecting
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.models import Model
 from groundtie.matching import feature_tiles
@@ -27,6 +28,7 @@ from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, ImagePair
 from groundtie.rasters.reading import Window, open_raster
 from groundtie.similarity.surface import SimilaritySettings
+from groundtie.studies.sift_variants import SiftVariantDescriptor, sift_detector
 
 SIZE = (300, 280)
 NMI = SimilaritySettings("nmi")
@@ -44,11 +46,12 @@ def estimate_of(
     kind: str = "auto",
     refinement: SimilaritySettings | None = None,
     coarse: Model = ROUGH,
-    **matcher: object,
+    detector: Detecting = SiftOctDetector(0.075),  # noqa: B008
+    descriptor: Describing = SiftDescriptor(),  # noqa: B008
 ) -> Estimate:
     local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("fused"))
     features = FeatureSearch(
-        FeatureMatcher(pair, held_out=local.held_out, **matcher),  # type: ignore[arg-type]
+        FeatureMatcher(pair, detector, descriptor, held_out=local.held_out),
         local,
         refinement,
     )
@@ -79,7 +82,9 @@ def test_other_detectors_and_gradients_find_it_too(
     files: TexturedPair, detector: str, gradient: str
 ) -> None:
     with files.opened() as pair:
-        found = estimate_of(pair, detector=Detector(detector), descriptor=Descriptor(gradient))
+        found = estimate_of(
+            pair, detector=sift_detector(detector), descriptor=SiftVariantDescriptor(gradient)
+        )
     assert error_px(found.transform, files) < 0.5
 
 
@@ -116,7 +121,7 @@ class Astray:
     gate_px: float = 16.0
     wrong_px: float = 0.0
 
-    def match(self, coarse: Model, executor: object, progress: object) -> FeatureMatches:
+    def match(self, coarse: Model, context: object) -> FeatureMatches:
         grid = self.pair.grid
         sides = [np.arange(30.0, size - 30, 12) for size in (grid.width, grid.height)]
         px = np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)
@@ -127,7 +132,7 @@ class Astray:
         # Nearly all agree on a wrong place; so few others are no rival.
         partner[np.arange(len(px)) % 20 > 0, 1] += self.wrong_px
         both = [
-            FeaturePoints(at, *(np.ones(len(px)) for _ in range(3)), np.zeros(len(px), int))
+            Keypoints(at, *(np.ones(len(px)) for _ in range(3)), np.zeros(len(px), int))
             for at in (px, partner)
         ]
         return FeatureMatches(*both, np.full(len(px), 0.5), (len(px), len(px)))
@@ -219,7 +224,7 @@ def test_another_place_has_too_few_matches_that_agree(tmp_path: Path) -> None:
 
 def test_chips_between_the_features_take_part(files: TexturedPair) -> None:
     with files.opened() as pair:
-        few = Detector(contrast=0.12)
+        few = SiftOctDetector(contrast=0.12)
         alone, refined = (
             estimate_of(pair, "affine", refinement, detector=few) for refinement in (None, NMI)
         )
@@ -228,7 +233,7 @@ def test_chips_between_the_features_take_part(files: TexturedPair) -> None:
 
 
 def test_chips_alone_do_where_there_are_no_features(files: TexturedPair) -> None:
-    none = Detector(contrast=0.9)
+    none = SiftOctDetector(contrast=0.9)
     with files.opened() as pair:
         with pytest.raises(TooFewPointsError):
             estimate_of(pair, detector=none)

@@ -17,7 +17,7 @@ from groundtie.progress import Progress
 from groundtie.rasters import tiling
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.delivery import tiles, warp_raster, write_with_geotransform
-from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
 from groundtie.rasters.reading import open_raster
 
 RNG = np.random.default_rng(0)
@@ -57,13 +57,10 @@ def test_a_known_distortion_is_taken_out(
     small_tiles: None, tmp_path: Path, method: str, workers: int
 ) -> None:
     """The input is a smooth field seen through an affine distortion; the result is the field."""
-    distortion = Affine.translation(7, -3) * Affine.rotation(2, (500_450, 4_999_650))
+    distortion = compose(Affine.translation(7, -3), Affine.rotation(2, (500_450, 4_999_650)))
 
     def to_input_px(xy: np.ndarray) -> np.ndarray:
-        x, y = xy.T
-        moved = np.column_stack(distortion @ (x, y) if hasattr(Affine, "__matmul__") else
-                                distortion * (x, y))  # fmt: skip
-        return GRID.map_to_pixel(moved)
+        return GRID.map_to_pixel(apply_affine(distortion, xy))
 
     cols, rows = np.meshgrid(np.arange(90), np.arange(70))
     claimed = GRID.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))

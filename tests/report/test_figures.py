@@ -14,11 +14,12 @@ from matplotlib.patches import Circle
 from matplotlib.quiver import Quiver
 from rasterio.crs import CRS
 
+from groundtie.geometry.judging import TOLERANCE_PX
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.grid import Grid
-from groundtie.registration.verdict import TOLERANCE_PX, Verdict, refuse
+from groundtie.registration.verdict import Verdict, refuse
 from groundtie.report import figures
 
 UTM = CRS.from_epsg(32633)
@@ -47,7 +48,7 @@ def tie_points(
         input_px=TRANSFORM(xy) + error_px / 2,
         score=np.full(count, 8.0),
         covariance_px2=np.tile(np.eye(2) / 10, (count, 1, 1)),
-        two_way_error_px=np.zeros(count),
+        forward_backward_error_px=np.zeros(count),
         is_check=is_check,
         state=np.full(count, "used"),
     )

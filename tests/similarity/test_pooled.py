@@ -7,7 +7,7 @@ from sklearn.metrics import mutual_info_score
 
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.peak import find_peak
-from groundtie.similarity.pooled import BINS, GreyLevels, smooth
+from groundtie.similarity.pooled import BINS, PooledHistogram, smooth
 from groundtie.similarity.surface import normalise
 
 RADIUS = 8
@@ -39,13 +39,13 @@ def on_each_other(chips: list[tuple[Patch, Patch]]) -> list[tuple[Patch, Patch]]
     return [(template, search.inner(RADIUS)) for template, search in chips]
 
 
-def levels_of(chips: list[tuple[Patch, Patch]]) -> tuple[GreyLevels, list[np.ndarray]]:
+def levels_of(chips: list[tuple[Patch, Patch]]) -> tuple[PooledHistogram, list[np.ndarray]]:
     """Return what chips on each other say, and their grey values."""
     sides = [
         np.concatenate([smooth(template).values[template.valid] for template, _ in chips]),
         np.concatenate([search.values[template.valid] for template, search in chips]),
     ]
-    return GreyLevels.of(*sides), sides
+    return PooledHistogram.of(*sides), sides
 
 
 def test_the_mean_evidence_is_mutual_information() -> None:

@@ -75,7 +75,7 @@ def tie_points(path: Path, transform: Transform, fit_px: Any, check_px: Any) -> 
         input_px=px + np.where(is_check[:, None], check_px, fit_px),
         score=np.ones(30),
         covariance_px2=np.tile(np.eye(2), (30, 1, 1)),
-        two_way_error_px=np.zeros(30),
+        forward_backward_error_px=np.zeros(30),
         is_check=is_check,
         state=np.full(30, "used"),
     )

@@ -17,6 +17,12 @@ from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeoreferencingError, TooFewPointsError, TransformFileError
+from ..geometry.judging import (
+    FEWEST_CHECK_POINTS,
+    SMALLEST_INLIER_SHARE,
+    USUAL_MAX_ERROR_PX,
+    sigma_range_px,
+)
 from ..geometry.robust import fit_mixture
 from ..geometry.tie_point_files import StoredTiePoints, read_tie_points
 from ..geometry.tie_points import USED
@@ -26,17 +32,8 @@ from ..registration.verdict import Verdict
 
 FloatArray = NDArray[np.float64]
 
-# A measurement needs so many points at least, and so large a share of right matches among those
-# held out, as the verdict on a registration does.
-_FEWEST_POINTS = 3
-_SMALLEST_SHARE = 0.25
-
-# Search window of held-out points, in pixels², if residuals do not show a larger one, and the
-# standard deviations that right matches may have, the larger one by the largest error.
+# Search window of held-out points, in pixels², if residuals do not show a larger one.
 _WINDOW_AREA_PX2 = 25.0**2
-_SMALLEST_SIGMA_PX = 0.1
-_SIGMA_BEYOND = 1.5
-_USUAL_MAX_ERROR_PX = 3.0
 
 
 @dataclass(frozen=True)
@@ -194,11 +191,9 @@ class PointErrors:
         if len(errors) == 0:
             return self
         area = max(_WINDOW_AREA_PX2, float(np.ptp(errors, axis=0).prod()))
-        allowed = _USUAL_MAX_ERROR_PX if max_error_px is None else max_error_px
-        largest = max(_SIGMA_BEYOND * allowed / math.sqrt(2), _SMALLEST_SIGMA_PX)
-        sigmas = _SMALLEST_SIGMA_PX, largest
+        sigmas = sigma_range_px(USUAL_MAX_ERROR_PX if max_error_px is None else max_error_px)
         counted = np.zeros(len(self), bool)
-        counted[which] = fit_mixture(errors, area, sigmas).right
+        counted[which] = fit_mixture(errors, area, sigmas).inliers
         return replace(self, counted=counted)
 
     def summary(self) -> dict[str, Any]:
@@ -291,9 +286,9 @@ class Assessment:
         rmse = judged.in_pixels.rmse
         tests = {
             f"the transform cannot place {lost} of {count} {name}": lost > 0,
-            f"{count} {name} are too few to measure anything": count < _FEWEST_POINTS,
+            f"{count} {name} are too few to measure anything": count < FEWEST_CHECK_POINTS,
             f"only {used} of {count} {name} agree": used
-            < max(_FEWEST_POINTS, _SMALLEST_SHARE * count),
+            < max(FEWEST_CHECK_POINTS, SMALLEST_INLIER_SHARE * count),
             f"error at {name} is {rmse:.2f} px, above {max_error_px:g} px": rmse > max_error_px,
         }
         for label, errors in (("two-way", self.two_way), ("three-way", self.three_way)):

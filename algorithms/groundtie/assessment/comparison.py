@@ -51,7 +51,7 @@ class Comparison:
             registered = _uri(pair, grid, positions)
         return cls(
             pictures.jpeg_uri(reference),
-            _uri(pair, grid, pair.claimed_px),
+            _uri(pair, grid, pair.nominal_px),
             registered,
             pictures.jpeg_uri(pictures.backdrop(reference)),
             Path(pair.reference.source.path).name,

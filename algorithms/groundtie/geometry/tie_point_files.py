@@ -38,7 +38,7 @@ _NUMBERS = (
     "dx_px",
     "dy_px",
     "score",
-    "two_way_error_px",
+    "forward_backward_error_px",
     "sigma_x_px",
     "sigma_y_px",
 )
@@ -163,7 +163,7 @@ def _rows(points: TiePoints, transform: Transform, more: Mapping[str, FloatArray
             np.hypot(*residual.T),
             residual,
             points.score,
-            points.two_way_error_px,
+            points.forward_backward_error_px,
             sigma,
             *more.values(),
         ]

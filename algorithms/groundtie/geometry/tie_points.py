@@ -29,7 +29,7 @@ class TiePoints:
         Height of the similarity's peak in robust standard deviations of its surface, shape (n,).
     covariance_px2
         Covariance of the match (x along columns, y along rows) in matching pixels², (n, 2, 2).
-    two_way_error_px
+    forward_backward_error_px
         Distance between the match and its match back, in matching pixels, shape (n,).
     is_check
         True for points that are held out of every fit, shape (n,).
@@ -41,7 +41,7 @@ class TiePoints:
     input_px: FloatArray
     score: FloatArray
     covariance_px2: FloatArray
-    two_way_error_px: FloatArray
+    forward_backward_error_px: FloatArray
     is_check: NDArray[np.bool_]
     state: NDArray[np.str_]
 

@@ -13,7 +13,7 @@ from ..geometry.fitting import fit_model
 from ..geometry.models import Frame, PolynomialModel
 from ..geometry.transform import Transform
 from ..matching.chips import MaskOf
-from ..rasters.grid import PIXEL_COORDINATES, Grid, apply_affine
+from ..rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
 from ..rasters.pair import Image
 from ..rasters.patch import Patch
 from .pose import Pose, PoseLimits
@@ -179,7 +179,7 @@ def _grid(frame: Affine, like: Grid, centre: FloatArray, half: FloatArray, pixel
     """Return the grid of square pixels around a centre that covers a box of half its size."""
     width, height = np.maximum(np.ceil(2 * half / pixel - 1e-6), 1).astype(int)
     left, top = centre - np.array([width, height]) * pixel / 2
-    corner = frame * Affine.translation(left, top) * Affine.scale(pixel)
+    corner = compose(frame, Affine.translation(left, top), Affine.scale(pixel))
     return Grid(corner, like.crs, int(width), int(height))
 
 

@@ -63,7 +63,7 @@ class Matching:
         What of the reference takes part.
     pixel_size_m, chip_px
         As `make_pair` and `lay_out_chips` take them.
-    two_way_px
+    forward_backward_px
         Largest distance between a match and its match back.
     max_error_px
         Largest error at check points.
@@ -80,7 +80,7 @@ class Matching:
     mask: MaskRequest
     pixel_size_m: float | None
     chip_px: int | None
-    two_way_px: float
+    forward_backward_px: float
     max_error_px: float
     seed: int
     classifying: Classifying
@@ -174,7 +174,9 @@ def match_ground_control(
 
     def search_in(pair: ImagePair) -> LocalSearch:
         layout = lay_out_chips(pair, matching.chip_px)
-        local = LocalSearch(pair, layout, matching.settings, two_way_px=matching.two_way_px)
+        local = LocalSearch(
+            pair, layout, matching.settings, forward_backward_px=matching.forward_backward_px
+        )
         return by_what_is_left(local, mask)
 
     reference_mask = reference.mask

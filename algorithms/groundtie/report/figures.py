@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..geometry.judging import FEWEST_CHECK_POINTS, TOLERANCE_PX
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid
-from ..registration.verdict import TOLERANCE_PX, Verdict
+from ..registration.verdict import Verdict
 from .pictures import data_uri
 
 if TYPE_CHECKING:
@@ -31,8 +32,7 @@ FIT_COLOUR = "#0072b2"
 CHECK_COLOUR = "#d55e00"
 REJECTED_COLOUR = "#7a7a7a"
 
-# The typical residual is that of so many check points at least, and no smaller than this.
-_FEWEST = 3
+# The typical residual is no smaller than this.
 _SMALLEST_PX = 0.01
 
 _ROUND_NUMBERS = (1.0, 2.0, 5.0)
@@ -115,7 +115,7 @@ def residual_arrows(residuals: Residuals, grid: Grid) -> Arrows:
     """Exaggerate residuals by a round factor so that the typical one is well visible."""
     side = max(grid.width, grid.height)
     # A flexible model leaves next to nothing at the points of its own fit.
-    held_out = residuals.agreeing.sum() >= _FEWEST
+    held_out = residuals.agreeing.sum() >= FEWEST_CHECK_POINTS
     believed = residuals.agreeing if held_out else residuals.used
     factor = 1.0
     if believed.any():

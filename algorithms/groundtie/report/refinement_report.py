@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..assessment.comparison import Comparison
+from ..geometry.judging import TOLERANCE_PX
 from ..masks.choice import MaskUsed
 from ..rasters.grid import Grid
 from ..registration.refinement_verdict import RefinementVerdict
-from ..registration.verdict import TOLERANCE_PX
 from ..sensor.bias import Bias
 from . import figures
 from .report import COLOURS, plain, rendered, versions, write_page

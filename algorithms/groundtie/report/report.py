@@ -17,13 +17,14 @@ import scipy
 
 from ..assessment.accuracy import Assessment
 from ..assessment.comparison import Comparison
+from ..geometry.judging import TOLERANCE_PX
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..masks.choice import MaskUsed
 from ..rasters.atomic import writing
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
-from ..registration.verdict import TOLERANCE_PX, Verdict
+from ..registration.verdict import Verdict
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
 from ..version import __version__

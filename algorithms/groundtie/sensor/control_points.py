@@ -150,7 +150,7 @@ def read_control_points(path: Path, orientation: Orientation, grid: Grid) -> Con
         input_px=stored.input_px,
         score=np.full(count, np.nan),
         covariance_px2=_covariances(*(stored.more[name] for name in (*_SIGMAS, CORRELATION))),
-        two_way_error_px=np.full(count, np.nan),
+        forward_backward_error_px=np.full(count, np.nan),
         is_check=stored.is_check,
         state=state.astype(str),
     )

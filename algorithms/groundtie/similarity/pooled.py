@@ -33,7 +33,7 @@ _SMOOTH_PX = 3
 
 
 @dataclass(frozen=True)
-class GreyLevels:
+class PooledHistogram:
     """What pairs of grey levels say.
 
     Parameters
@@ -50,7 +50,7 @@ class GreyLevels:
     evidence: FloatArray
 
     @classmethod
-    def of(cls, template: FloatArray, search: FloatArray, bins: int = BINS) -> GreyLevels:
+    def of(cls, template: FloatArray, search: FloatArray, bins: int = BINS) -> PooledHistogram:
         """Return what pairs say of which many are known.
 
         Parameters

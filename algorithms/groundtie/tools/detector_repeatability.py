@@ -12,7 +12,6 @@ from typing import Annotated, Any
 
 from ..declaration import tool
 from ..errors import ParameterError
-from ..features.matching import METHODS
 from ..geometry.transform import Transform, load_transform
 from ..kinds import Choice, FileIn, FileOut, Number, Text
 from ..progress import SILENT, Progress
@@ -24,6 +23,7 @@ from ..registration.classifying import Classifying
 from ..registration.registration import open_image
 from ..registration.stored_transform import transform_of
 from ..studies.evaluation import Evaluation, Variant, evaluate
+from ..studies.matching import METHODS
 from ..studies.repeatability import CLASS_NAMES
 from ..studies.repeatability_picture import draw_evaluations
 from .classifier_parameters import InputClassifier, ReferenceClassifier
@@ -221,7 +221,7 @@ def _read(pair: ImagePair, transform: Transform | None, largest: int) -> tuple[P
     width, height = min(grid.width, largest), min(grid.height, largest)
     piece = grid.window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
     reference = pair.reference_patch(piece)
-    input = pair.input_patch(piece, pair.claimed_px if transform is None else transform)
+    input = pair.input_patch(piece, pair.nominal_px if transform is None else transform)
     return reference, input
 
 

@@ -37,11 +37,11 @@ from .common import (
 )
 from .registration_parameters import MaxError
 from .sensor_matching import (
+    ForwardBackwardError,
     ImageBand,
     MaskKind,
     SearchRadius,
     Similarity,
-    TwoWayError,
 )
 from .sensor_parameters import Dem, DemDatum, Geoid, Height, RpcFile, SensorImage
 
@@ -133,7 +133,7 @@ def extract_gcps(
     mask_low_percent: LowPercent = 10.0,
     matching_pixel_size: MatchingPixelSize = None,
     chip_size: ChipSize = None,
-    two_way_error: TwoWayError = 2.0,
+    forward_backward_error: ForwardBackwardError = 2.0,
     workers: Workers = None,
     seed: Seed = 0,
     progress: Progress = SILENT,
@@ -152,7 +152,7 @@ def extract_gcps(
         MaskRequest(mask, REFERENCE, mask_high_percent, mask_low_percent, 0.0),
         matching_pixel_size,
         chip_size,
-        two_way_error,
+        forward_backward_error,
         max_error,
         seed,
         Classifying(None, image_classifier),

@@ -34,7 +34,7 @@ _LARGEST_AMPLITUDE = 1e18
 
 @dataclass(frozen=True)
 class SpeckleResult:
-    """What `filter_speckle` made, and the equivalent number of looks before and after."""
+    """The filtered image, and the equivalent number of looks before and after."""
 
     output: Path
     filter: str
@@ -109,7 +109,7 @@ def filter_speckle(
         str,
         Choice(
             label="Values",
-            help="What the pixels are. Decibels must be made linear before.",
+            help="Unit of the pixels. Decibels must be made linear before.",
             choices=("amplitude", "intensity"),
         ),
     ] = "amplitude",
@@ -129,7 +129,7 @@ def filter_speckle(
     """Smooth the speckle of a radar image, and keep its edges.
 
     Filters work on intensity: amplitudes are squared before and the root is taken after, so that
-    the mean power stays. Each band is filtered by itself; pixels without data weigh nothing.
+    the mean power stays. Each band is filtered by itself; pixels without data are left out.
     """
     if window % 2 == 0:
         raise ParameterError(f"window must be an odd number, not {window}")
@@ -155,7 +155,7 @@ class _Filtering:
         source, places = self.source, list(tiles(self.source.grid))
         nodata = None if source.is_complex else source.bands[0].nodata
         like = _as_amplitudes(source) if source.is_complex else source
-        # Without its speckle, nothing else tells that it is a radar's.
+        # Without speckle, only the tag identifies it as a radar image.
         like = with_speckle_filter(like, f"{self.filter.name}, {self.filter.window_px} px")
         with (
             create_like(like, source.grid, path, nodata=nodata, workers=workers) as dataset,
@@ -196,7 +196,7 @@ class _Filtering:
             filtered = np.clip(np.rint(filtered), limits.min, limits.max)
         if source.is_complex:
             return filtered
-        # Where nothing is known, the pixel stays what it was.
+        # Without a nodata value, an invalid pixel keeps its value.
         fill = values if source.bands[band - 1].nodata is None else _fill(source, band)
         return np.where(valid, filtered.astype(dtype), fill)
 

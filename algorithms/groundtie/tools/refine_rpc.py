@@ -45,11 +45,11 @@ from .common import (
 )
 from .registration_parameters import MaxError
 from .sensor_matching import (
+    ForwardBackwardError,
     ImageBand,
     MaskKind,
     SearchRadius,
     Similarity,
-    TwoWayError,
 )
 from .sensor_parameters import Dem, DemDatum, Geoid, Height, RpcFile, SensorImage
 
@@ -218,7 +218,7 @@ def refine_rpc(
     mask_low_percent: LowPercent = 10.0,
     matching_pixel_size: MatchingPixelSize = None,
     chip_size: ChipSize = None,
-    two_way_error: TwoWayError = 2.0,
+    forward_backward_error: ForwardBackwardError = 2.0,
     workers: Workers = None,
     seed: Seed = 0,
     progress: Progress = SILENT,
@@ -241,7 +241,7 @@ def refine_rpc(
         MaskRequest(mask, REFERENCE, mask_high_percent, mask_low_percent, 0.0),
         matching_pixel_size,
         chip_size,
-        two_way_error,
+        forward_backward_error,
         max_error,
         seed,
         Classifying(None, image_classifier),
