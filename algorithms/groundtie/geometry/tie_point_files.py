@@ -20,6 +20,7 @@ from rasterio.errors import CRSError
 from ..errors import OutputError, TransformFileError
 from ..rasters.atomic import writing
 from ..rasters.grid import Grid, reproject
+from .tie_point_frames import NUMBERS, TEXTS, tie_point_columns
 from .tie_points import USED, TiePoints
 from .transform import Transform
 
@@ -27,22 +28,7 @@ FloatArray = NDArray[np.float64]
 Row = dict[str, Any]
 
 _LAYER = "tie_points"
-_NUMBERS = (
-    "reference_x",
-    "reference_y",
-    "claimed_x",
-    "claimed_y",
-    "input_col",
-    "input_row",
-    "residual_px",
-    "dx_px",
-    "dy_px",
-    "score",
-    "forward_backward_error_px",
-    "sigma_x_px",
-    "sigma_y_px",
-)
-_TEXTS = ("role", "state", "reference_crs")
+_TEXTS = (*TEXTS, "reference_crs")
 
 # Longitude and latitude, as GeoJSON demands (RFC 7946).
 _GEOJSON_CRS = CRS.from_epsg(4326)
@@ -152,28 +138,11 @@ def read_tie_points(
 
 
 def _rows(points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]) -> list[Row]:
-    residual = points.residual_px(transform)
-    claimed = transform.nominal_xy(points.input_px)
-    sigma = np.sqrt(points.covariance_px2[:, [0, 1], [0, 1]])
-    numbers = np.column_stack(
-        [
-            points.reference_xy,
-            claimed,
-            points.input_px,
-            np.hypot(*residual.T),
-            residual,
-            points.score,
-            points.forward_backward_error_px,
-            sigma,
-            *more.values(),
-        ]
-    )
+    columns = {**tie_point_columns(points, transform), **more}
     texts = {"reference_crs": "" if transform.crs is None else transform.crs.to_string()}
     return [
-        dict(zip((*_NUMBERS, *more), values, strict=True)) | {"role": role, "state": state} | texts
-        for values, role, state in zip(
-            numbers.tolist(), points.role.tolist(), points.state.tolist(), strict=True
-        )
+        dict(zip(columns, values, strict=True)) | texts
+        for values in zip(*(column.tolist() for column in columns.values()), strict=True)
     ]
 
 
@@ -190,7 +159,7 @@ def _write_gpkg(
     from .geopackage import write_layer  # heavy
 
     rows = _rows(points, transform, more)
-    properties = dict.fromkeys((*_NUMBERS, *more), "float") | dict.fromkeys(_TEXTS, "str")
+    properties = dict.fromkeys((*NUMBERS, *more), "float") | dict.fromkeys(_TEXTS, "str")
     records = (
         {
             "type": "Feature",
@@ -221,7 +190,7 @@ def _write_csv(
     path: Path, points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]
 ) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.DictWriter(file, (*_NUMBERS, *more, *_TEXTS), lineterminator="\n")
+        table = csv.DictWriter(file, (*NUMBERS, *more, *_TEXTS), lineterminator="\n")
         table.writeheader()
         table.writerows(_rows(points, transform, more))
 
