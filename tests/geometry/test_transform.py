@@ -49,6 +49,22 @@ def test_a_shift_moves_the_pixels_by_it() -> None:
     np.testing.assert_allclose(transform(xy), [[12, 13], [52, 73], [202, 33]], atol=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["affine", "tps"])
+def test_positions_come_in_arrays_of_any_shape(kind: str) -> None:
+    transform = misregistered(kind, UTM, DEGREES)
+    px = np.random.default_rng(1).uniform(0, 300, (4, 5, 2))
+    for function, positions in (
+        (transform, transform.nominal_xy(px)),
+        (transform.inverse, px),
+        (transform.nominal_xy, px),
+    ):
+        found = function(positions)
+        assert found.shape == (4, 5, 2)
+        np.testing.assert_array_equal(found.reshape(-1, 2), function(positions.reshape(-1, 2)))
+        np.testing.assert_allclose(function(list(positions[1, 2])), found[1, 2], rtol=1e-9)
+        assert function(positions[:0]).shape == (0, 5, 2)
+
+
 def test_nominal_is_the_georeferencing() -> None:
     transform = Transform.nominal(UTM, DEGREES)
     px = np.array([[0.0, 0.0], [399.0, 299.0]])

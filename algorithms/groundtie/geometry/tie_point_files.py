@@ -19,6 +19,7 @@ from ..errors import OutputError, TransformFileError
 from ..rasters.atomic import writing
 from ..rasters.grid import Grid, reproject
 from .georeferencer import Row, positions, read_georeferencer, unmeasured, write_georeferencer
+from .tie_point_frames import NUMBERS, TEXTS, tie_point_columns
 from .tie_points import USED, TiePoints
 from .transform import Transform
 
@@ -26,12 +27,7 @@ FloatArray = NDArray[np.float64]
 
 _SUFFIXES = (".gpkg", ".geojson", ".csv", ".points")
 _LAYER = "tie_points"
-_NUMBERS = (
-    "reference_x", "reference_y", "nominal_x", "nominal_y", "input_col", "input_row",
-    "residual_px", "dx_px", "dy_px", "score", "forward_backward_error_px",
-    "sigma_x_px", "sigma_y_px",
-)  # fmt: skip
-_TEXTS = ("role", "state", "reference_crs")
+_TEXTS = (*TEXTS, "reference_crs")
 
 # Longitude and latitude, as GeoJSON demands (RFC 7946).
 _GEOJSON_CRS = CRS.from_epsg(4326)
@@ -65,7 +61,7 @@ def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform:
         if suffix == ".points":
             write_georeferencer(path, points, transform)
             return
-        rows, numbers = _rows(points, transform), (*_NUMBERS, *points.more)
+        rows, numbers = _rows(points, transform), (*NUMBERS, *points.more)
         if suffix == ".gpkg":
             _write_gpkg(path, rows, numbers, transform.crs)
         elif suffix == ".geojson":
@@ -129,28 +125,11 @@ def _suffix(path: Path, verb: str, error: type[OutputError | TransformFileError]
 
 
 def _rows(points: TiePoints, transform: Transform) -> list[Row]:
-    residual = points.residual_px(transform)
-    numbers = [
-        points.reference_xy,
-        transform.nominal_xy(points.input_px),
-        points.input_px,
-        np.hypot(*residual.T),
-        residual,
-        points.score,
-        points.forward_backward_error_px,
-        np.sqrt(points.covariance_px2[:, [0, 1], [0, 1]]),
-        *points.more.values(),
-    ]
-    names = (*_NUMBERS, *points.more, "role", "state")
-    crs = "" if transform.crs is None else transform.crs.to_string()
+    columns = {**tie_point_columns(points, transform), **points.more}
+    texts = {"reference_crs": "" if transform.crs is None else transform.crs.to_string()}
     return [
-        dict(zip(names, (*values, role, state), strict=True)) | {"reference_crs": crs}
-        for values, role, state in zip(
-            np.column_stack(numbers).tolist(),
-            points.role.tolist(),
-            points.state.tolist(),
-            strict=True,
-        )
+        dict(zip(columns, values, strict=True)) | texts
+        for values in zip(*(column.tolist() for column in columns.values()), strict=True)
     ]
 
 

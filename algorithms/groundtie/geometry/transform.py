@@ -23,7 +23,10 @@ FORMAT = "groundtie-transform/1"
 
 @dataclass(frozen=True)
 class Transform:
-    """Reference map position ↔ input pixel position.
+    """Reference map position ↔ input pixel position, for any number of positions at a time.
+
+    Positions are arrays of shape (..., 2), x before y and column before row, or what numpy makes
+    one of; so is what comes back. One position alone is of shape (2,).
 
     The model takes a reference map position to its nominal one, where the input's georeferencing
     places this ground; that georeferencing takes the nominal position to a pixel.
@@ -48,17 +51,22 @@ class Transform:
         return cls(PolynomialModel.identity(), crs, input_grid)
 
     def __call__(self, xy: ArrayLike) -> FloatArray:
-        """Return the input pixels (col, row), centres at integers, of map positions (n, 2)."""
-        nominal = reproject(self.model(xy), self.crs, self.input_grid.crs)
-        return self.input_grid.map_to_pixel(nominal)
+        """Return the input pixels (col, row), centres at integers, of map positions (..., 2)."""
+        positions = np.asarray(xy, float)
+        moved = self.model(positions.reshape(-1, 2))
+        nominal = reproject(moved, self.crs, self.input_grid.crs)
+        return self.input_grid.map_to_pixel(nominal).reshape(positions.shape)
 
     def nominal_xy(self, px: ArrayLike) -> FloatArray:
-        """Return the nominal reference map positions, shape (n, 2), of input pixels (col, row)."""
-        return reproject(self.input_grid.pixel_to_map(px), self.input_grid.crs, self.crs)
+        """Return the nominal reference map positions of input pixels (col, row), (..., 2)."""
+        positions = np.asarray(px, float)
+        xy = self.input_grid.pixel_to_map(positions.reshape(-1, 2))
+        return reproject(xy, self.input_grid.crs, self.crs).reshape(positions.shape)
 
     def inverse(self, px: ArrayLike) -> FloatArray:
-        """Return the reference map positions, shape (n, 2), of input pixels (col, row)."""
-        return self.model.inverse(self.nominal_xy(px))
+        """Return the reference map positions of input pixels (col, row), (..., 2)."""
+        nominal = self.nominal_xy(px)
+        return self.model.inverse(nominal.reshape(-1, 2)).reshape(nominal.shape)
 
     def to_json(self) -> dict[str, Any]:
         """Return the transform as values that JSON can carry."""

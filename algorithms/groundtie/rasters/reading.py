@@ -82,7 +82,7 @@ class RasterSource:
         self._handles.close()
 
     def is_same_as(self, other: RasterSource) -> bool:
-        """Tell whether both read one and the same raster."""
+        """Return whether both read one and the same raster."""
         return self._handles.identity == other._handles.identity
 
     @property

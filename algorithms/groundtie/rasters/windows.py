@@ -25,6 +25,11 @@ class Window(NamedTuple):
     width: int
     height: int
 
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """Its rows and columns in an array."""
+        return slice(self.row, self.row + self.height), slice(self.col, self.col + self.width)
+
 
 def read_window(
     dataset: Any, source: RasterSource, window: Window, bands: Sequence[int]

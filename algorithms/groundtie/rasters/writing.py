@@ -70,8 +70,8 @@ def create_like(
     OutputError
         The file cannot be written completely.
     """
-    if nodata is not None and not fits(nodata, source.dtype):
-        raise ParameterError(f"pixels of type {source.dtype} cannot hold the nodata value {nodata}")
+    if nodata is not None:
+        require_fit(nodata, source.dtype)
     profile = _profile(source, grid, nodata, interleave or source.interleave or "pixel", workers)
     # A mask inside the file, not beside it.
     options = {
@@ -224,6 +224,12 @@ def _gdal_errors() -> tuple[type[Exception], ...]:
     from rasterio.errors import RasterioError, RasterioIOError
 
     return RasterioError, RasterioIOError, CPLE_BaseError
+
+
+def require_fit(nodata: float, dtype: np.dtype[Any]) -> None:
+    """Raise `ParameterError` if pixels of a type cannot hold a nodata value."""
+    if not fits(nodata, dtype):
+        raise ParameterError(f"pixels of type {dtype} cannot hold the nodata value {nodata}")
 
 
 def fill_value(source: RasterSource, nodata: float | None, band: int) -> Any:
