@@ -1,6 +1,6 @@
 """How well a detector finds the same features in two registered images (thesis S 6.6.2).
 
-Mikolajczyk et al. 2005: features are circles as large as their scale; two correspond if their
+[Mikolajczyk2005]: features are circles as large as their scale; two correspond if their
 circles overlap enough, after both were scaled so that the first's radius is 30 pixels.
 """
 
