@@ -17,6 +17,8 @@ from affine import Affine
 from numpy.typing import NDArray
 from rasterio.errors import NotGeoreferencedWarning
 
+from groundtie.rasters.grid import compose
+
 from .accuracy import FloatArray, Truth
 from .attempt import Pair
 
@@ -125,8 +127,8 @@ def write_case(case: RealCase, shift_px: tuple[float, float], folder: Path) -> P
     every pixel to lie (columns, rows) `shift_px` reference pixels from its place.
     """
     to_input = Affine(*case.matrix.ravel())
-    claimed = REFERENCE_TRANSFORM * _TO_CENTRE * Affine.translation(*shift_px)
-    claimed = claimed * ~to_input * ~_TO_CENTRE
+    shift = Affine.translation(*shift_px)
+    claimed = compose(REFERENCE_TRANSFORM, _TO_CENTRE, shift, ~to_input, ~_TO_CENTRE)
     truth, lattice = case.truths()
     return Pair(
         write_image(read_image(case.reference), REFERENCE_TRANSFORM, folder / "reference.tif"),

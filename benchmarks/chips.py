@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from groundtie.matching.chips import ChipMatcher
 from groundtie.rasters.grid import Grid
+from groundtie.similarity.description import BORDER_PX
 from groundtie.similarity.peak import find_peak
-from groundtie.similarity.surface import BORDER_PX, SIMILARITIES, SimilaritySettings
+from groundtie.similarity.surface import SIMILARITIES, SimilaritySettings
 
 from .offsets import OffsetPair, Scene, open_offset
 

@@ -13,6 +13,8 @@ import rasterio
 from affine import Affine
 from numpy.typing import NDArray
 
+from groundtie.rasters.grid import compose
+
 from .accuracy import CRASHED, REFUSED
 from .attempt import Outcome, Pair, accepted, attempt, count
 from .cases import (
@@ -81,7 +83,7 @@ def _attempt(
 def write_crossing(reference: RealCase, input: RealCase, folder: Path) -> Pair:
     """Write two images with the same centre and the same pixel size."""
     size, other = np.array(image_size(reference.reference)), np.array(image_size(input.input))
-    claimed = REFERENCE_TRANSFORM * Affine.translation(*((size - other) / 2))
+    claimed = compose(REFERENCE_TRANSFORM, Affine.translation(*((size - other) / 2)))
     return Pair(
         write_image(read_image(reference.reference), REFERENCE_TRANSFORM, folder / "reference.tif"),
         write_image(read_image(input.input), claimed, folder / "input.tif"),

@@ -10,17 +10,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from groundtie.features.descriptors import Descriptor
-from groundtie.features.detectors import DETECTORS, Detector
-from groundtie.features.matching import GATE_PX, match, match_near
-from groundtie.features.points import FeaturePoints
+from groundtie.features.keypoints import Keypoints
+from groundtie.features.matching import GATE_PX, match_near
+from groundtie.features.tiles import Detecting
 from groundtie.geometry.models import Model
 from groundtie.geometry.robust import distances, find_consensus, fit_robustly
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import open_raster
 from groundtie.studies.evaluation import Variant, evaluate
+from groundtie.studies.matching import match
 from groundtie.studies.repeatability import CLASS_NAMES
+from groundtie.studies.sift_variants import DETECTORS, SiftVariantDescriptor, sift_detector
 
 from .cases import RealCase, write_case
 from .suites import Goal, Table
@@ -89,7 +90,7 @@ class TurnCount:
     turned: int
 
 
-_Described = tuple[FeaturePoints, NDArray[np.float32]]
+_Described = tuple[Keypoints, NDArray[np.float32]]
 
 
 def registered(case: RealCase) -> tuple[Patch, Patch]:
@@ -99,10 +100,10 @@ def registered(case: RealCase) -> tuple[Patch, Patch]:
         with open_raster(files.reference) as reference, open_raster(files.input) as input:
             pair: ImagePair = make_pair(Image(reference), Image(input), None, 0.0)
             grid = pair.grid
-            return pair.reference_patch(grid), pair.input_patch(grid, pair.claimed_px)
+            return pair.reference_patch(grid), pair.input_patch(grid, pair.nominal_px)
 
 
-def _right(first: FeaturePoints, second: FeaturePoints, limit_px: float) -> np.ndarray:
+def _right(first: Keypoints, second: Keypoints, limit_px: float) -> np.ndarray:
     return np.hypot(*(second.position_px - first.position_px).T) <= limit_px
 
 
@@ -131,8 +132,8 @@ def count_chain(case: RealCase) -> ChainCount:
     reference, input = registered(case)
     limit = max(case.sigma_px, _RIGHT_PX)
 
-    def described(detector: Detector, upright: bool) -> tuple[_Described, _Described]:
-        descriptor = Descriptor(upright=upright)
+    def described(detector: Detecting, upright: bool) -> tuple[_Described, _Described]:
+        descriptor = SiftVariantDescriptor(upright=upright)
         first, second = (descriptor.describe(p, detector.detect(p)) for p in (reference, input))
         return first, second
 
@@ -142,7 +143,7 @@ def count_chain(case: RealCase) -> ChainCount:
         model = find_consensus(one.position_px, other.position_px, _RANSAC_PX)
         return _counts(one, other, model, limit)
 
-    first, second = described(Detector("sift-oct", _HYBRID_CONTRAST), True)
+    first, second = described(sift_detector("sift-oct", _HYBRID_CONTRAST), True)
     near = match_near(first[1], second[1], first[0].position_px + _OFF_PX, second[0].position_px)
     one, other = first[0].take(near.first), second[0].take(near.second)
     px = one.position_px, other.position_px
@@ -152,16 +153,14 @@ def count_chain(case: RealCase) -> ChainCount:
     hybrid = _counts(one, other, model, limit)
     return ChainCount(
         case.name,
-        by_ransac(*described(Detector("sift"), False)),
+        by_ransac(*described(sift_detector("sift"), False)),
         by_ransac(first, second),
         hybrid,
         (len(near) - hybrid[0]) * (min(limit, _RANSAC_PX) / GATE_PX) ** 2,
     )
 
 
-def _counts(
-    first: FeaturePoints, second: FeaturePoints, model: Model, limit_px: float
-) -> tuple[int, int]:
+def _counts(first: Keypoints, second: Keypoints, model: Model, limit_px: float) -> tuple[int, int]:
     """Return how many matches that agree with a model are right, and how many agree."""
     kept = distances(model, first.position_px, second.position_px) <= _RANSAC_PX
     return int((_right(first, second, limit_px) & kept).sum()), int(kept.sum())
@@ -170,7 +169,7 @@ def _counts(
 def count_turn(case: RealCase, gradient: str) -> TurnCount:
     """Count right matches of oriented descriptors before and after a quarter turn of the input."""
     reference, input = registered(case)
-    detector, descriptor = Detector("sift-oct"), Descriptor(gradient, upright=False)
+    detector, descriptor = sift_detector("sift-oct"), SiftVariantDescriptor(gradient, upright=False)
     points, rows = descriptor.describe(reference, detector.detect(reference))
     found = []
     for turns in (0, 1):

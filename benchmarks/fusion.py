@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from groundtie.matching.belief_propagation import Surfaces, support
+from groundtie.matching.belief_propagation import Surfaces, propagate
 from groundtie.matching.chips import ChipMatcher, ToPixel
 from groundtie.similarity.peak import find_peak
 from groundtie.similarity.surface import SimilaritySettings
@@ -123,7 +123,7 @@ class FusionCase:
             distorted,
             share_within(found.forward, shifts),
             share_within(both, shifts),
-            share_within(support(both, found.centres, REACH_PX), shifts),
+            share_within(propagate(both, found.centres, REACH_PX), shifts),
         )
 
 

@@ -170,7 +170,7 @@ def _pixel_size_m(rpc: RPC) -> float:
 def _write_terrain(path: Path, grid: Grid, height_m: float, offset_m: float) -> Path:
     """Write hills around a height, over a grid and a margin."""
     reach = 3 * _RELIEF_M + 200.0
-    left, top = grid.transform * (0, 0)
+    left, top = grid.transform.c, grid.transform.f
     cols = int((grid.width * grid.transform.a + 2 * reach) / _DEM_PIXEL_M) + 2
     rows = int((grid.height * grid.transform.a + 2 * reach) / _DEM_PIXEL_M) + 2
     transform = Affine(_DEM_PIXEL_M, 0, left - reach, 0, -_DEM_PIXEL_M, top + reach)

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundtie.features.descriptors import Descriptor
-from groundtie.features.detectors import Detector
-from groundtie.features.haar import HaarDescriptor
+from groundtie.features.descriptors import SiftDescriptor
+from groundtie.features.detectors import SiftDetector
 from groundtie.features.hog import HogDescriptor
-from groundtie.features.matching import match
-from groundtie.features.points import FeaturePoints
-from groundtie.features.surf import SurfDetector
+from groundtie.features.keypoints import Keypoints
 from groundtie.features.tiles import Describing, Detecting
 from groundtie.rasters.patch import Patch
+from groundtie.studies.haar import HaarDescriptor
+from groundtie.studies.matching import match
+from groundtie.studies.surf import SurfDetector
 
 from .accuracy import FloatArray
 from .cases import RealCase
@@ -36,10 +36,10 @@ MOST_FEATURES = 2000
 
 METHODS: dict[str, tuple[Detecting, Describing]] = {
     "SURF-64": (SurfDetector(), HaarDescriptor()),
-    "HOG-81": (SurfDetector(), HogDescriptor(9, scaled=False)),
-    "HOG-63": (SurfDetector(), HogDescriptor(7, scaled=False)),
-    "SIFT-128": (Detector("sift", 0.03), Descriptor()),
-    "SIFT + HOG-81": (Detector("sift", 0.03), HogDescriptor(9, scaled=False)),
+    "HOG-81": (SurfDetector(), HogDescriptor(9)),
+    "HOG-63": (SurfDetector(), HogDescriptor(7)),
+    "SIFT-128": (SiftDetector(), SiftDescriptor()),
+    "SIFT + HOG-81": (SiftDetector(), HogDescriptor(9)),
 }
 
 # Shift between the images, in pixels: it is not told to the matching.
@@ -118,7 +118,7 @@ class ClearCase:
 class Features:
     """Features of an image and their descriptors, row by row."""
 
-    points: FeaturePoints
+    points: Keypoints
     descriptors: NDArray[np.float32]
 
     def take(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Features:

@@ -7,7 +7,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,9 +16,10 @@ import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
 
-from groundtie.features.haar import HaarDescriptor
-from groundtie.features.surf import SurfDetector
+from groundtie.context import threads
 from groundtie.rasters.patch import Patch
+from groundtie.studies.haar import HaarDescriptor
+from groundtie.studies.surf import SurfDetector
 
 from .cases import REFERENCE_TRANSFORM, RealCase, read_image, write_image
 from .processes import OUTPUT, measure
@@ -56,11 +56,11 @@ def time_features(case: RealCase) -> list[Timing]:
     grey = images[0].mean(axis=0, dtype=np.float32)
     window = Patch(grey, np.ones(grey.shape, bool))
     cv2.setNumThreads(THREADS)
-    with ThreadPoolExecutor(THREADS) as executor:
+    with threads(THREADS) as context:
 
         def surf() -> None:
-            found = SurfDetector().detect(window, executor)
-            HaarDescriptor().describe(window, found, executor)
+            found = SurfDetector().detect(window, context)
+            HaarDescriptor().describe(window, found, context)
 
         timings = [_shortest(SURF, surf)]
     with tempfile.TemporaryDirectory() as folder:

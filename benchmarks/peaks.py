@@ -16,15 +16,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from groundtie.pose.pose import Pose, PoseLimits
+from groundtie.context import threads
+from groundtie.geometry.limits import SearchLimits
+from groundtie.pose.pose import Pose
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.binning import MASKED, to_bins
 from groundtie.similarity.joint_histogram import count_joint_histograms, reach
 from groundtie.similarity.measures import normalized_mutual_information
 from groundtie.similarity.surface import SimilaritySettings, detrend
-from groundtie.studies.objective import EFFORT, Effort
+from groundtie.studies.climbing import ClimbingSearch
 from groundtie.studies.simplex import nelder_mead, powell
-from groundtie.studies.spsa import DISCRETE_EFFORT, discrete_spsa, spsa, spsa_second_order
+from groundtie.studies.spsa import discrete_spsa, spsa, spsa_second_order
 
 from .accuracy import CORRECT_PX
 from .cases import SAR_OPTICAL, RealCase, read_cases, read_image
@@ -61,12 +63,12 @@ CLIMBED = SimilaritySettings("nmi")
 WINDOW_PX, WINDOW_RADIUS_PX, WINDOW_BINS = 1000, 100, 16
 _WANTED_RATIO = 3.0
 
-SEARCHES: dict[str, tuple[Any, Effort]] = {
-    "discrete SPSA": (discrete_spsa, DISCRETE_EFFORT),
-    "SPSA": (spsa, EFFORT),
-    "second-order SPSA": (spsa_second_order, EFFORT),
-    "Powell": (powell, EFFORT),
-    "Nelder–Mead": (nelder_mead, EFFORT),
+SEARCHES: dict[str, ClimbingSearch] = {
+    "discrete SPSA": discrete_spsa,
+    "SPSA": spsa,
+    "second-order SPSA": spsa_second_order,
+    "Powell": powell,
+    "Nelder–Mead": nelder_mead,
 }
 DISCRETE = next(iter(SEARCHES))
 
@@ -350,15 +352,17 @@ def measure_climbs(pair: Aligned, quick: bool) -> list[dict[str, Any]]:
     peak = exhaustive_peak(*windows)
     seeds = rng.integers(-RADIUS_PX, RADIUS_PX + 1, (RUNS, 2)).astype(float)
     records = []
-    for name, (search, effort) in SEARCHES.items():
+    for name, search in SEARCHES.items():
         discrete = name == DISCRETE
         runs = RUNS if discrete and not quick else CONTINUOUS_RUNS
         reached, evaluations, seconds = [], [], []
         for number, (x, y) in enumerate(seeds[:runs].tolist()):
-            own = replace(effort, start=Pose(shift_px=(x, y)), seed=number)
-            started = time.perf_counter()
-            found = search(*windows, PoseLimits(RADIUS_PX), CLIMBED, effort=own)[0]
-            seconds.append(time.perf_counter() - started)
+            effort = replace(search.effort, start=Pose(shift_px=(x, y)))
+            with threads(1, seed=number) as context:
+                started = time.perf_counter()
+                climbing = replace(search, effort=effort)
+                found = climbing(*windows, SearchLimits(RADIUS_PX), CLIMBED, context)[0]
+                seconds.append(time.perf_counter() - started)
             distance_px = np.abs(np.subtract(found.pose.shift_px, peak)).max()
             reached.append(bool(distance_px <= (0 if discrete else _SAME_PX)))
             evaluations.append(found.evaluations)

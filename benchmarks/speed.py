@@ -7,7 +7,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
@@ -18,12 +18,15 @@ import numpy as np
 import rasterio
 from numpy.typing import NDArray
 
+from groundtie.context import threads
 from groundtie.geometry.transform import Transform
 from groundtie.masks.regions import find_ground
 from groundtie.masks.scene import Scene
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import open_raster
-from groundtie.similarity.surface import BORDER_PX, SimilaritySettings, describe, histogram_surface
+from groundtie.similarity.description import BORDER_PX
+from groundtie.similarity.measures import nmi
+from groundtie.similarity.surface import SimilaritySettings, describe
 from groundtie.speckle.filters import FILTERS, SpeckleFilter
 
 from . import rpc_speed
@@ -156,12 +159,12 @@ def read_window(path: Path, size: int) -> NDArray[np.float32]:
 
 
 def _own_surface_seconds(template: NDArray[np.float32], search: NDArray[np.float32]) -> float:
-    settings = SimilaritySettings("nmi", bins=BINS, gpve_order=4)
+    settings = SimilaritySettings("nmi", bins=BINS)
     patches = [Patch(image, np.ones(image.shape, bool)) for image in (template, search)]
-    with ThreadPoolExecutor(THREADS) as executor:
+    with threads(THREADS) as context:
         started = time.perf_counter()
-        features = [describe(patch, WINDOW_PX**2, settings) for patch in patches]
-        histogram_surface(*features, RADIUS_PX, settings, executor)
+        windows = [describe(patch, WINDOW_PX**2, settings) for patch in patches]
+        nmi(*windows, RADIUS_PX, context)
         return time.perf_counter() - started
 
 

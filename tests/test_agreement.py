@@ -1,6 +1,7 @@
 """The command line and the Python function of every tool say the same as its declaration.
 
-QGIS, the third, is compared in tests/qgis/test_agreement.py.
+QGIS, the third, is compared in tests/qgis/test_agreement.py. They differ in one thing: what is
+`optional_in_python` (a registered image, say) must be named where nothing can be returned.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from groundtie.kinds import Band, Choice, Flag, Kind, Number, OutputKind
 from groundtie.tools import load_tools
 
 TOOLS = load_tools()
-ALL = [toys.TOY, *TOOLS]
+ALL = [toys.TOY, toys.RETURNING_TOY, *TOOLS]
 each_tool = pytest.mark.parametrize("tool", ALL, ids=lambda tool: tool.name)
 each_real_tool = pytest.mark.parametrize("tool", TOOLS, ids=lambda tool: tool.name)
 EVERY = [pytest.param(tool, p, id=f"{tool.name}-{p.name}") for tool in ALL for p in tool.parameters]
@@ -81,10 +82,34 @@ def test_the_package_offers_the_function(tool: Tool) -> None:
 def test_python_has_the_same_parameters_with_the_same_defaults(tool: Tool) -> None:
     parameters = inspect.signature(tool.run).parameters
     declared = {
-        p.name: inspect.Parameter.empty if p.required else p.default for p in tool.parameters
+        p.name: inspect.Parameter.empty if p.required_in_python else p.default
+        for p in tool.parameters
     }
     assert {n: p.default for n, p in parameters.items() if n != "progress"} == declared
     assert [name for name in parameters if name != "progress"] == list(declared)
+
+
+@each_tool
+def test_only_outputs_may_be_left_out_in_python_alone(tool: Tool) -> None:
+    for parameter in tool.parameters:
+        if parameter.kind.optional_in_python:
+            assert isinstance(parameter.kind, OutputKind)
+            assert (parameter.required, parameter.default) == (True, None)
+
+
+@each_tool
+def test_the_command_line_needs_what_is_required(
+    tool: Tool, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = call(tool, {})
+    for word in words[1:]:
+        if not word.startswith("--"):
+            at = words.index(word)
+            name = [words[at - 1]] if words[at - 1].startswith("--") else []
+            less = words[: at - len(name)] + words[at + 1 :]
+            assert main(less, tools=[tool]) == 2
+            assert "issing" in capsys.readouterr().err
 
 
 @each_tool

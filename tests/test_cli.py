@@ -231,6 +231,14 @@ def test_quiet_shows_no_progress_on_a_terminal() -> None:
     assert shown[""] == "\r 50% half of it\x1b[K\r100% half of it\x1b[K\r\x1b[K."
 
 
+def test_verbose_writes_the_log_and_no_progress(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(f"-v {GOOD}") == 0
+    assert capsys.readouterr() == ("accepted\nsize 3.0\n", "groundtie.progress: half of it\n")
+    Path("c.tif").unlink()
+    assert run(GOOD) == 0
+    assert capsys.readouterr() == ("accepted\nsize 3.0\n", "")
+
+
 NOISY = f"""
 import ctypes, dataclasses, logging, re, sys, warnings
 import rasterio, toys

@@ -8,12 +8,15 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
+import numpy as np
 import pytest
-from toys import TOY, toy
+import rasterio
+from raster_files import utm_grid, write_raster
+from toys import RETURNING_TOY, TOY, returning_toy, toy
 
 from groundtie.declaration import Output, Parameter, tool, tool_of
 from groundtie.errors import OutputError, ParameterError, SameFileError
-from groundtie.kinds import Flag, Number, RasterIn
+from groundtie.kinds import Flag, Number, RasterIn, RasterOut
 from groundtie.progress import SILENT, Progress
 
 
@@ -156,3 +159,49 @@ def test_a_missing_value_is_named() -> None:
         raster.check(None, "INPUT")
     number = Parameter("n", Number(label="N", help="It."), required=False)
     assert number.check(None, "n") is None
+
+
+class TestResultsInMemory:
+    """What Python's callers may hand over, and leave out."""
+
+    def test_an_output_may_be_left_out_in_python_alone(self) -> None:
+        parameter = RETURNING_TOY.parameter("output")
+        assert parameter.required and not parameter.required_in_python and parameter.positional
+        assert RETURNING_TOY.check({"input": "a.tif"}, in_python=True)["output"] is None
+        with pytest.raises(ParameterError, match=r"^output is missing$"):
+            RETURNING_TOY.check({"input": "a.tif"})
+
+    def test_an_array_is_handed_on_and_shown_by_its_size(self) -> None:
+        values = np.zeros((40, 60))
+        found = returning_toy(values).values
+        assert found["input"].values is values
+        assert found["output"] is None
+        assert found["shown"] == {"input": "array of 60 × 40", "output": None, "factor": 2.0}
+
+    def test_an_open_dataset_is_handed_on_and_shown_by_its_name(self, tmp_path: Path) -> None:
+        path = write_raster(tmp_path / "a.tif", np.zeros((4, 6)), utm_grid(6, 4))
+        with rasterio.open(path) as dataset:
+            found = returning_toy(dataset).values
+            assert found["input"] is dataset
+            assert found["shown"]["input"] == str(path)
+            with pytest.raises(SameFileError, match="output is the same file as input"):
+                returning_toy(dataset, path)
+            with pytest.raises(SameFileError, match="input is the same raster as reference"):
+                toy(path, dataset, tmp_path / "c.tif", 3)
+
+    def test_arrays_of_one_size_are_two_rasters(self, tmp_path: Path) -> None:
+        one, other = np.zeros((40, 60)), np.zeros((40, 60))
+        toy(one, other, tmp_path / "c.tif", 3)
+        with pytest.raises(SameFileError, match="input is the same raster as reference: array of"):
+            toy(one, one, tmp_path / "c.tif", 3)
+
+    def test_what_may_be_left_out_has_no_default(self) -> None:
+        with pytest.raises(TypeError, match="its default must be None"):
+
+            @tool(title="Wrong", group="Toys")
+            def wrong(
+                output: Annotated[
+                    Any, RasterOut(label="Output", help="It.", optional_in_python=True)
+                ] = "a.tif",
+            ) -> Any:
+                """Do nothing."""

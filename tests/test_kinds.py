@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -91,7 +92,13 @@ def test_values_come_out_in_their_proper_type(kind: Kind, value: Any, expected: 
         (Text(**TEXTS), 3, "size must be a text, not 3"),
         (Band(**TEXTS, of="input"), 0, "size must be at least 1, not 0"),
         (RASTER, "", "size must be a path, not ''"),
-        (RASTER, 7, "size must be a path, not 7"),
+        (RASTER, 7, "size must be a path, an open dataset or an array, not 7"),
+        (
+            RASTER,
+            np.zeros(3),
+            "size: an array must have the shape (h, w) or (bands, h, w), not (3,)",
+        ),
+        (VectorIn(**TEXTS), 7, "size must be a path, not 7"),
         (RASTER_OUT, "x.jpg", "size must end in .tif or .tiff: x.jpg"),
         (HTML_OUT, "report", "size must end in .html or .htm: report"),
     ],

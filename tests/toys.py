@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any
 
 from groundtie.cli import main
@@ -125,7 +127,23 @@ def toy(
     return ToyResult(values)
 
 
+@tool(title="Toy that returns", group="Toys")
+def returning_toy(
+    input: Annotated[Any, RasterIn(label="Input", help="What is doubled.")],
+    output: Annotated[
+        Path | None,
+        RasterOut(label="Output", help="What is written.", optional_in_python=True),
+    ] = None,
+    factor: Annotated[float, Number(label="Factor", help="How many times.")] = 2.0,
+    progress: Progress = SILENT,
+    parameters: Mapping[str, Any] = MappingProxyType({}),
+) -> ToyResult:
+    """Do what a tool does that can return its result instead of writing it."""
+    return ToyResult({"input": input, "output": output, "shown": dict(parameters)})
+
+
 TOY: Tool = tool_of(toy)
+RETURNING_TOY: Tool = tool_of(returning_toy)
 
 if __name__ == "__main__":
     sys.exit(main(tools=[TOY]))

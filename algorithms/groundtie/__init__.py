@@ -1,17 +1,22 @@
 """GroundTie registers satellite images to one another, above all SAR and optical ones.
 
-Tools are functions (`coregister`, `warp`, `simulate`, …) that read and write files; see
-`groundtie.tools`. `load_transform` reads the transform that a registration wrote.
+Tools are functions (`coregister`, `warp`, `simulate`, …) of files, arrays (`Raster`) and open
+datasets; see `groundtie.tools`. `load_transform` reads the transform that a registration wrote.
+
+What is decided on the way, and why, goes to `logging` under this package's name: steps at level
+INFO, rejected tie points at DEBUG. Nobody hears it who does not ask.
 """
 
 from __future__ import annotations
 
 import importlib
+import logging
 from typing import TYPE_CHECKING, Any
 
 from .version import __version__
 
 if TYPE_CHECKING:
+    from .arrays import Raster
     from .geometry.transform import load_transform
     from .tools.assess import assess
     from .tools.assess_sensor import assess_sensor
@@ -33,6 +38,7 @@ if TYPE_CHECKING:
     from .tools.warp import warp
 
 __all__ = [
+    "Raster",
     "__version__",
     "assess",
     "assess_sensor",
@@ -56,7 +62,9 @@ __all__ = [
 ]
 
 # Loaded on first use: importing groundtie must stay cheap for the command line's help and QGIS.
-_HOMES = {"load_transform": ".geometry.transform"}
+_HOMES = {"Raster": ".arrays", "load_transform": ".geometry.transform"}
+
+logging.getLogger(__name__).addHandler(logging.NullHandler())
 
 
 def __getattr__(name: str) -> Any:

@@ -81,14 +81,14 @@ def _usage(error: click.ClickException) -> str:
 
 
 def _silence_libraries() -> None:
-    """Keep what GDAL, OpenCV and Python's warnings say off standard error.
+    """Keep the messages of GDAL and OpenCV and Python's warnings off standard error.
 
-    The tools raise errors of their own; who wants the libraries' words says so by `python -W`,
-    `PYTHONWARNINGS`, `CPL_LOG` or `OPENCV_LOG_LEVEL`.
+    The tools raise errors of their own; who wants to see the libraries' asks for it by `python
+    -W`, `PYTHONWARNINGS`, `CPL_LOG` or `OPENCV_LOG_LEVEL`.
     """
-    os.environ.setdefault("CPL_LOG", os.devnull)  # GDAL's words where rasterio does not listen
+    os.environ.setdefault("CPL_LOG", os.devnull)  # GDAL's messages past rasterio
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
-    logging.getLogger().addHandler(logging.NullHandler())  # GDAL's words through rasterio
+    logging.getLogger().addHandler(logging.NullHandler())  # GDAL's messages through rasterio
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
 
@@ -122,7 +122,14 @@ class ToolGroup(click.Group):
             "groundtie",
             help="Register satellite images to one another.",
             invoke_without_command=True,
-            callback=_help_without_command,
+            callback=_before_command,
+            params=[
+                click.Option(
+                    ["-v", "--verbose"],
+                    is_flag=True,
+                    help="Write what is decided, and why, to standard error.",
+                )
+            ],
             context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
         )
         self._names = {_command_name(name): name for name in names}
@@ -143,9 +150,27 @@ def _command_name(tool: str) -> str:
 
 
 @click.pass_context
-def _help_without_command(context: click.Context) -> None:
+def _before_command(context: click.Context, verbose: bool) -> None:
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
+    if verbose:
+        context.with_resource(_log_to(sys.stderr))
+
+
+@contextmanager
+def _log_to(stream: TextIO) -> Iterator[None]:
+    """Write the package's log to a stream, and of the libraries' log what they warn of."""
+    handler = logging.StreamHandler(stream)
+    handler.setFormatter(logging.Formatter("%(name)s: %(message)s"))
+    own, root = logging.getLogger(__package__), logging.getLogger()
+    level = own.level
+    own.setLevel(logging.DEBUG)
+    root.addHandler(handler)
+    try:
+        yield
+    finally:
+        root.removeHandler(handler)
+        own.setLevel(level)
 
 
 class ToolCommand(click.Command):
@@ -168,9 +193,10 @@ class ToolCommand(click.Command):
     def _run(self, as_json: bool, quiet: bool, **values: Any) -> None:
         given = {name: value for name, value in values.items() if value is not None}
         checked = self.tool.check(given, spell=spelled)
-        received = click.get_current_context().obj
+        context = click.get_current_context()
+        received, verbose = context.obj, context.find_root().params["verbose"]
         try:
-            with _reporter(sys.stderr, quiet) as report:
+            with _reporter(sys.stderr, quiet or verbose) as report:
                 progress = Progress(report, is_cancelled=lambda: bool(received))
                 result = self.tool.run(**checked, progress=progress)
         except NotRegisteredError as error:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 from .errors import ParameterError
-from .kinds import Kind, RasterIn, check_different, check_paths
+from .kinds import Kind, RasterIn, check_different, check_paths, plainly
 
 
 class ToolResult(Protocol):
@@ -35,7 +35,11 @@ R = TypeVar("R", bound=ToolResult)
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a tool: name, kind and default (None: chosen from the data, or left out)."""
+    """A parameter of a tool: name, kind and default (None: chosen from the data, or left out).
+
+    `required` is what the command line and QGIS require; Python requires no more, and less where
+    the kind is `optional_in_python`.
+    """
 
     name: str
     kind: Kind
@@ -47,13 +51,18 @@ class Parameter:
         """Whether the command line takes it by position, without an option's name."""
         return self.required and not self.kind.option
 
-    def check(self, value: Any, called: str) -> Any:
+    @property
+    def required_in_python(self) -> bool:
+        """Whether the Python function has no default for it."""
+        return self.required and not self.kind.optional_in_python
+
+    def check(self, value: Any, called: str, *, in_python: bool = False) -> Any:
         """Return `value` in its proper type; raise `ParameterError` if it cannot be right.
 
         `called` is the parameter's name in the error message.
         """
         if value is None:
-            if self.required:
+            if self.required_in_python if in_python else self.required:
                 raise ParameterError(f"{called} is missing")
             return None
         return self.kind.check(called, value)
@@ -97,6 +106,8 @@ class Tool:
         self,
         values: Mapping[str, Any],
         spell: Callable[[Parameter], str] = operator.attrgetter("name"),
+        *,
+        in_python: bool = False,
     ) -> dict[str, Any]:
         """Return `values` completed with defaults and in their proper types.
 
@@ -106,6 +117,8 @@ class Tool:
             Values by the parameters' names; None and what is missing take the default.
         spell
             Gives a parameter the name that error messages call it by.
+        in_python
+            Whether what is `optional_in_python` may be left out.
 
         Raises
         ------
@@ -121,8 +134,8 @@ class Tool:
         if unknown:
             raise ParameterError(f"{self.name} has no parameter {sorted(unknown)[0]}")
         checked = {
-            parameter.name: parameter.check(_value(parameter, values), spell(parameter))
-            for parameter in self.parameters
+            p.name: p.check(_value(p, values), spell(p), in_python=in_python)
+            for p in self.parameters
         }
         check_different(
             {
@@ -142,7 +155,7 @@ def tool(
 
     Its keyword `progress` is handed through unchecked; every other parameter must be annotated
     with a `Kind`. If the function has a keyword `parameters`, it is given the checked values of
-    all parameters by name, for its report; callers do not see this keyword.
+    all parameters by name, as reports show them; callers do not see this keyword.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -152,8 +165,9 @@ def tool(
         def checked(*args: P.args, **kwargs: P.kwargs) -> R:
             bound = signature.bind(*args, **kwargs).arguments
             progress = {key: bound.pop(key) for key in ("progress",) if key in bound}
-            values = declared.check(bound)
-            given = {"parameters": values} if "parameters" in signature.parameters else {}
+            values = declared.check(bound, in_python=True)
+            shown = {name: plainly(value) for name, value in values.items()}
+            given = {"parameters": shown} if "parameters" in signature.parameters else {}
             return cast(Callable[..., R], function)(**values, **given, **progress)
 
         declared = _declare(function, signature, checked, title, group, outputs)
@@ -207,6 +221,13 @@ def _parameters(function: Callable[..., Any], signature: inspect.Signature) -> l
         kinds = [m for m in getattr(hints[name], "__metadata__", ()) if isinstance(m, Kind)]
         if len(kinds) != 1:
             raise TypeError(f"{function.__name__}: parameter {name} has no kind")
-        required = argument.default is inspect.Parameter.empty
-        found.append(Parameter(name, kinds[0], required, None if required else argument.default))
+        found.append(_parameter(name, kinds[0], argument.default))
     return found
+
+
+def _parameter(name: str, kind: Kind, default: Any) -> Parameter:
+    absent = default is inspect.Parameter.empty
+    if kind.optional_in_python and default is not None:
+        raise TypeError(f"parameter {name} is optional in Python: its default must be None")
+    required = absent or kind.optional_in_python
+    return Parameter(name, kind, required, None if absent else default)

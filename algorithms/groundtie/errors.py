@@ -67,7 +67,11 @@ class TooFewPointsError(GroundTieError, ValueError):
 
 
 class NothingFoundError(GroundTieError, ValueError):
-    """No place was found, or more than one, at which the images match."""
+    """No place was found at which the images match."""
+
+
+class AmbiguousPlaceError(NothingFoundError):
+    """More than one place was found at which the images match."""
 
 
 class CancelledError(GroundTieError, RuntimeError):

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .errors import OutputError, ParameterError, SameFileError
+from .errors import GroundTieError, OutputError, ParameterError, SameFileError
 
 # GDAL's own names, such as /vsizip/a.zip/b.tif, HDF5:"a.h5"://b or https://…; C:\\… is a path.
 _GDAL_NAME = re.compile(r"/vsi|[A-Za-z][\w+.-]+:")
@@ -21,13 +21,16 @@ class Kind:
     """What every kind has: a label and a help text.
 
     `advanced` parameters are folded away in dialogs; `option` makes a required parameter an
-    option with a name on the command line instead of a positional argument.
+    option with a name on the command line instead of a positional argument. One that is
+    `optional_in_python` is required by the command line and QGIS, which can only write files;
+    Python's callers may leave it out (its default is None) and go on with what is returned.
     """
 
     label: str
     help: str
     advanced: bool = False
     option: bool = False
+    optional_in_python: bool = False
 
     def check(self, name: str, value: Any) -> Any:
         """Return `value` in the type that tools work with, or raise `ParameterError`."""
@@ -62,14 +65,28 @@ class OutputKind(PathKind):
 
 
 class RasterIn(InputKind):
-    """A raster that is read; GDAL's own names (`/vsi…`, `DRIVER:…`) stay text."""
+    """A raster that is read; GDAL's own names (`/vsi…`, `DRIVER:…`) stay text.
+
+    In Python it may be in memory, too (see `arrays.in_memory`).
+    """
+
+    def check(self, name: str, value: Any) -> Any:
+        if _is_gdal_name(value):
+            return value
+        if isinstance(value, (str, os.PathLike)):
+            return super().check(name, value)
+        return _in_memory(name, value)
+
+
+class VectorIn(InputKind):
+    """A vector layer that is read; GDAL's own names stay text."""
 
     def check(self, name: str, value: Any) -> Any:
         return value if _is_gdal_name(value) else super().check(name, value)
 
 
-class VectorIn(InputKind):
-    """A vector layer that is read; GDAL's own names stay text."""
+class MaskIn(InputKind):
+    """A raster, a vector layer or a file that states what of an image takes part."""
 
     def check(self, name: str, value: Any) -> Any:
         return value if _is_gdal_name(value) else super().check(name, value)
@@ -194,13 +211,41 @@ def _is_gdal_name(value: Any) -> bool:
     return isinstance(value, str) and bool(_GDAL_NAME.match(value)) and not Path(value).exists()
 
 
-def check_different(rasters: Mapping[str, Path | str]) -> None:
-    """Raise `SameFileError` if two of these rasters, given by name, are one and the same."""
-    taken: dict[Path | str, str] = {}
+def _in_memory(name: str, value: Any) -> Any:
+    from .arrays import in_memory  # numpy is not loaded for the command line's help
+
+    try:
+        held = in_memory(value)
+    except GroundTieError as error:
+        raise ParameterError(f"{name}: {error}") from error
+    if held is None:
+        raise ParameterError(f"{name} must be a path, an open dataset or an array, not {value!r}")
+    return held
+
+
+def plainly(value: Any) -> Any:
+    """Return a checked value as reports show it: rasters in memory by what they are called."""
+    in_memory = not isinstance(value, (str, os.PathLike)) and hasattr(value, "crs")
+    return value.name if in_memory else value
+
+
+def _identity(raster: Any) -> Hashable:
+    """Return what is the same for two rasters that are one."""
+    if isinstance(raster, Path):
+        return raster.resolve()
+    if isinstance(raster, str):
+        return raster
+    # An open dataset is where its file is.
+    return getattr(raster, "identity", None) or Path(raster.name).resolve()
+
+
+def check_different(rasters: Mapping[str, Any]) -> None:
+    """Raise `SameFileError` if two of these checked rasters, by name, are one and the same."""
+    taken: dict[Hashable, str] = {}
     for name, raster in rasters.items():
-        other = taken.setdefault(raster.resolve() if isinstance(raster, Path) else raster, name)
+        other = taken.setdefault(_identity(raster), name)
         if other != name:
-            raise SameFileError(f"{name} is the same raster as {other}: {raster}")
+            raise SameFileError(f"{name} is the same raster as {other}: {plainly(raster)}")
 
 
 def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
@@ -218,11 +263,11 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
     OutputError
         An output's folder is missing or cannot be written to, or a folder is a file.
     """
-    taken: dict[Path, str] = {}
+    taken: dict[Hashable, str] = {}
     outputs: list[tuple[str, Path]] = []
     for name, kind, value in values:
-        if isinstance(kind, InputKind) and isinstance(value, Path):
-            taken[value.resolve()] = name
+        if isinstance(kind, InputKind) and value is not None:
+            taken[_identity(value)] = name
         elif isinstance(kind, OutputKind) and value is not None:
             outputs.append((name, value))
         elif isinstance(kind, FolderOut) and value is not None and value.is_file():

@@ -1,11 +1,14 @@
-"""How a running tool tells its progress and learns that it was cancelled."""
+"""How a running tool reports its progress and learns that it was cancelled."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from .errors import CancelledError
+
+_LOG = logging.getLogger(__name__)
 
 
 def _ignore(fraction: float, message: str) -> None:
@@ -36,6 +39,8 @@ class Progress:
     def update(self, fraction: float, message: str = "") -> None:
         """Report `fraction` (0 to 1) of this part as done; raise if the work was cancelled."""
         self.check()
+        if message:
+            _LOG.info(message)
         self.report(self.start + fraction * (self.end - self.start), message)
 
     def check(self) -> None:

@@ -13,6 +13,7 @@ import groundtie
 from benchmarks import sar_pairs
 from benchmarks.attempt import Pair
 from benchmarks.sar_pairs import SarPair
+from groundtie.rasters.grid import apply_affine
 
 SIZE = 300
 
@@ -38,8 +39,9 @@ def correlation(pair: Pair, ground: np.ndarray, moved_px: float = 0.0) -> float:
     rows, cols = np.mgrid[:SIZE, :SIZE]
     truth = groundtie.load_transform(pair.reference.with_name("truth.json"))
     with rasterio.open(pair.reference) as source:
-        x, y = source.transform * (cols.ravel() + 0.5, rows.ravel() + 0.5)
-    px = (truth(np.column_stack([x, y])) + [moved_px, 0]).reshape(SIZE, SIZE, 2)
+        centres = np.column_stack([cols.ravel(), rows.ravel()]) + 0.5
+        xy = apply_affine(source.transform, centres)
+    px = (truth(xy) + [moved_px, 0]).reshape(SIZE, SIZE, 2)
     reference, input = (
         cv2.GaussianBlur(np.log(read(path).astype(np.float32)), (0, 0), 1.5)
         for path in (pair.reference, pair.input)

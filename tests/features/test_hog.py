@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 import pytest
@@ -11,16 +9,16 @@ from textured_pairs import texture
 
 from groundtie.features import hog
 from groundtie.features.hog import HogDescriptor
-from groundtie.features.points import FeaturePoints
+from groundtie.features.keypoints import Keypoints
 from groundtie.rasters.patch import Patch
 
 SIDE = 200
 
 
-def points(*rows: tuple[float, float, float, float]) -> FeaturePoints:
+def points(*rows: tuple[float, float, float, float]) -> Keypoints:
     """Return features from columns, rows, scales and orientations."""
     table = np.array(rows, float)
-    return FeaturePoints(
+    return Keypoints(
         table[:, :2], table[:, 2], table[:, 3], np.ones(len(table)), np.zeros(len(table), int)
     )
 
@@ -57,7 +55,7 @@ def directly(values: NDArray[np.float32], x: int, y: int, directions: int) -> ND
 @pytest.mark.parametrize("directions", [9, 7])
 def test_values_are_those_of_the_definition(directions: int) -> None:
     values = image()
-    descriptor = HogDescriptor(directions, scaled=False)
+    descriptor = HogDescriptor(directions)
     _, found = descriptor.describe(whole(values), points((101, 87, 5.0, 0)))
     assert found.shape == (1, {9: 81, 7: 63}[directions])
     np.testing.assert_allclose(found[0], directly(values, 101, 87, directions), atol=1e-4)
@@ -65,7 +63,7 @@ def test_values_are_those_of_the_definition(directions: int) -> None:
 
 def test_patches_of_one_size_lie_on_whole_pixels() -> None:
     values = image()
-    _, found = HogDescriptor(scaled=False).describe(whole(values), points((101.4, 86.6, 5.0, 0)))
+    _, found = HogDescriptor().describe(whole(values), points((101.4, 86.6, 5.0, 0)))
     np.testing.assert_allclose(found[0], directly(values, 101, 87, 9), atol=1e-4)
 
 
@@ -74,14 +72,14 @@ def test_it_does_not_matter_in_which_band_of_rows_a_feature_lies() -> None:
     border = hog._BAND_ROWS
     rows = (border + 1, 40, border, border - 1, SIDE - 30)
     spots = points(*((60 + 10 * k, row, 2.0, 0) for k, row in enumerate(rows)))
-    _, found = HogDescriptor(scaled=False).describe(whole(values), spots)
+    _, found = HogDescriptor().describe(whole(values), spots)
     for k, row in enumerate(rows):
         np.testing.assert_allclose(found[k], directly(values, 60 + 10 * k, row, 9), atol=1e-4)
 
 
 def test_beyond_the_image_there_is_nothing() -> None:
     """At a corner, three quarters of the patch see no pixel."""
-    _, found = HogDescriptor(scaled=False).describe(whole(image()), points((0, 0, 2, 0)))
+    _, found = HogDescriptor().describe(whole(image()), points((0, 0, 2, 0)))
     cells = found.reshape(3, 3, 9)
     assert np.abs(cells[:1]).max() == np.abs(cells[:, :1]).max() == 0
     assert np.linalg.norm(cells[1:, 1:]) == pytest.approx(1, abs=1e-5)
@@ -92,36 +90,6 @@ def test_inverted_contrast_does_not_count() -> None:
     _, first = HogDescriptor().describe(whole(image()), spots)
     _, second = HogDescriptor().describe(whole(1 - 4 * image()), spots)
     np.testing.assert_allclose(first, second, atol=1e-4)
-
-
-def test_another_place_is_another_descriptor() -> None:
-    _, found = HogDescriptor().describe(whole(image()), points((70, 90, 2, 0), (120, 101, 2, 0)))
-    assert found[0] @ found[1] < 0.95
-    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, rtol=1e-5)
-
-
-def test_scaled_patches_grow_with_the_feature() -> None:
-    values = image()
-    large = cv2.resize(values, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
-    spots, twice = points((70, 90, 3, 0)), points((140.5, 180.5, 6, 0))
-    for scaled, alike in ((True, True), (False, False)):
-        descriptor = HogDescriptor(scaled=scaled)
-        _, first = descriptor.describe(whole(values), spots)
-        _, second = descriptor.describe(whole(large), twice)
-        assert bool(first[0] @ second[0] > 0.98) == alike
-
-
-def test_oriented_descriptors_do_not_mind_quarter_turns() -> None:
-    values = image()
-    spots = points((70, 90, 2, 0), (120, 101, 3, 0))
-    first, one = HogDescriptor(upright=False).describe(whole(values), spots)
-    turned = np.column_stack([spots.position_px[:, 1], SIDE - 1 - spots.position_px[:, 0]])
-    second, other = HogDescriptor(upright=False).describe(
-        whole(np.rot90(values)), replace(spots, position_px=turned)
-    )
-    assert len(first) == len(second)
-    # Features with several orientations come in the order of these, which begins elsewhere.
-    assert (np.max(one @ other.T, axis=1) > 0.999).all()
 
 
 def test_masked_pixels_tell_nothing() -> None:
@@ -137,6 +105,6 @@ def test_masked_pixels_tell_nothing() -> None:
 
 
 def test_no_features_have_no_descriptors() -> None:
-    found, values = HogDescriptor(7).describe(whole(image()), FeaturePoints.none())
+    found, values = HogDescriptor(7).describe(whole(image()), Keypoints.none())
     assert len(found) == 0
     assert values.shape == (0, 63)

@@ -7,13 +7,13 @@ from raster_files import UTM, utm_grid
 from groundtie.errors import TooFewPointsError
 from groundtie.geometry.estimation import Estimate, fit_thin_plate
 from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.model_choice import block_folds
 from groundtie.geometry.models import Frame, Model, PolynomialModel
-from groundtie.geometry.robust import block_folds
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 
 GRID = utm_grid(800, 600)
-AS_CLAIMED = Transform.as_claimed(UTM, GRID)
+NOMINAL = Transform.nominal(UTM, GRID)
 IDENTITY = PolynomialModel.identity()
 
 
@@ -27,14 +27,14 @@ def bent(px: np.ndarray) -> np.ndarray:
     return px + 2 * np.column_stack([np.sin(2 * u), np.cos(2 * v) * u])
 
 
-def tie_points(px: np.ndarray, claimed_px: np.ndarray, variance: float = 0.05) -> TiePoints:
+def tie_points(px: np.ndarray, nominal_px: np.ndarray, variance: float = 0.05) -> TiePoints:
     count = len(px)
     return TiePoints(
         reference_xy=GRID.pixel_to_map(px),
-        input_px=claimed_px,
+        input_px=nominal_px,
         score=np.full(count, 8.0),
         covariance_px2=np.tile(variance * np.eye(2), (count, 1, 1)),
-        two_way_error_px=np.zeros(count),
+        forward_backward_error_px=np.zeros(count),
         is_check=np.zeros(count, bool),
         state=np.full(count, "used"),
     )
@@ -42,7 +42,7 @@ def tie_points(px: np.ndarray, claimed_px: np.ndarray, variance: float = 0.05) -
 
 def spread_of(models: list[Model], at: np.ndarray) -> np.ndarray:
     none = tie_points(np.zeros((0, 2)), np.zeros((0, 2)))
-    return Estimate(AS_CLAIMED, none, tuple(models)).spread_px(at)
+    return Estimate(NOMINAL, none, tuple(models)).spread_px(at)
 
 
 @pytest.mark.parametrize("kind", ["translation", "affine", "polynomial2"])
@@ -92,7 +92,7 @@ def test_the_spline_follows_local_distortion_past_wrong_matches() -> None:
     claimed[wrong] += rng.choice([-3, 3], (wrong.sum(), 2))
     points = tie_points(px, claimed)
     start = fit_model("polynomial3", px, bent(px))
-    model, folds = fit_thin_plate(points, AS_CLAIMED, GRID, start, 3)
+    model, folds = fit_thin_plate(points, NOMINAL, GRID, start, 3)
     at = lattice(9, 7)
     error = np.hypot(*(model(at) - bent(at)).T)
     assert model.kind == "tps"
@@ -107,11 +107,9 @@ def test_rejected_points_take_no_part_in_the_spline() -> None:
     claimed = bent(px)
     which = np.arange(len(px)) % 5 == 0
     spoiled = claimed + np.where(which[:, None], 2.0, 0.0)
-    rejected = tie_points(px, spoiled).reject(which, "two-way error")
-    model, _ = fit_thin_plate(rejected, AS_CLAIMED, GRID, IDENTITY, 3)
-    clean, _ = fit_thin_plate(
-        tie_points(px[~which], claimed[~which]), AS_CLAIMED, GRID, IDENTITY, 3
-    )
+    rejected = tie_points(px, spoiled).reject(which, "forward–backward error")
+    model, _ = fit_thin_plate(rejected, NOMINAL, GRID, IDENTITY, 3)
+    clean, _ = fit_thin_plate(tie_points(px[~which], claimed[~which]), NOMINAL, GRID, IDENTITY, 3)
     np.testing.assert_allclose(model(px), clean(px), atol=1e-6)
 
 
@@ -119,4 +117,4 @@ def test_rejected_points_take_no_part_in_the_spline() -> None:
 def test_too_few_points_for_a_spline(count: int) -> None:
     px = lattice()[:count]
     with pytest.raises(TooFewPointsError, match=rf"only {count} points"):
-        fit_thin_plate(tie_points(px, px), AS_CLAIMED, GRID, IDENTITY, 3)
+        fit_thin_plate(tie_points(px, px), NOMINAL, GRID, IDENTITY, 3)

@@ -2,14 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from groundtie.errors import TooFewPointsError
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.models import KINDS, Model
 from groundtie.geometry.robust import (
-    block_folds,
     distances,
     find_consensus,
     fit_mixture,
@@ -72,10 +69,10 @@ def test_the_mixture_finds_scatter_and_share_of_right_matches(sigma: float, shar
         fell = rng.uniform(-RADIUS - 0.5, RADIUS + 0.5, (400, 2))
         residuals = np.where(right[:, None], sigma * rng.normal(size=(400, 2)), fell)
         mixture = fit_mixture(residuals, AREA, (0.1, 3.0))
-        found.append((mixture.sigma, mixture.probability.mean(), mixture.right[right].mean()))
+        found.append((mixture.sigma, mixture.probability.mean(), mixture.inliers[right].mean()))
         # A wrong match that falls among the right ones cannot be told from them.
         far = np.hypot(*residuals.T) > 4.5 * sigma
-        assert not mixture.right[far & ~right].any()
+        assert not mixture.inliers[far & ~right].any()
     sigmas, shares, kept = np.array(found).T
     assert sigmas.mean() == pytest.approx(sigma, rel=0.1)
     assert shares.mean() == pytest.approx(share, abs=0.04)
@@ -88,14 +85,14 @@ def test_the_mixture_keeps_to_its_range() -> None:
     rng = np.random.default_rng(0)
     exact = fit_mixture(np.zeros((30, 2)), AREA, (0.2, 2.5))
     assert exact.sigma == pytest.approx(0.2)
-    assert exact.right.all()
+    assert exact.inliers.all()
     wide = fit_mixture(rng.normal(size=(300, 2)) * 5, 1e6, (0.2, 2.5))
     assert wide.sigma == pytest.approx(2.5)
     # More wide than right: nothing but chance.
     fallen = fit_mixture(
         rng.uniform(-8, 8, (300, 2)) + 8 * rng.choice([-1, 1], (300, 2)), 900, (0.2, 1.0)
     )
-    assert fallen.right.mean() < 0.1
+    assert fallen.inliers.mean() < 0.1
 
 
 def test_a_second_cluster_does_not_draw_the_first() -> None:
@@ -104,8 +101,8 @@ def test_a_second_cluster_does_not_draw_the_first() -> None:
     residuals = 0.5 * rng.normal(size=(90, 2))
     residuals[60:] += [4.0, 0]
     mixture = fit_mixture(residuals, AREA, (0.2, 2.5))
-    assert mixture.right[:60].mean() > 0.95
-    assert not mixture.right[60:].any()
+    assert mixture.inliers[:60].mean() > 0.95
+    assert not mixture.inliers[60:].any()
     assert mixture.sigma == pytest.approx(np.sqrt((residuals[:60] ** 2).mean()), rel=0.1)
 
 
@@ -157,7 +154,7 @@ def test_a_robust_fit_among_forty_percent_wrong_matches(kind: str, seed: int) ->
     assert model.kind == kind
     # A spline sways with its knots' noise, less than each of them; polynomials average over it.
     assert error_px(model, kind) < (0.4 * np.sqrt(2) if kind == "tps" else 0.2)
-    assert mixture.right[right].mean() > 0.9
+    assert mixture.inliers[right].mean() > 0.9
     # A spline bends towards its knots, so its residuals say too little of their scatter.
     assert kind == "tps" or mixture.sigma == pytest.approx(0.4, rel=0.15)
 
@@ -183,36 +180,3 @@ def test_too_few_right_matches_for_the_model() -> None:
     start = find_consensus(px, found, 3.0, "translation")
     with pytest.raises(TooFewPointsError, match="polynomial3"):
         fit_robustly("polynomial3", px, found, np.zeros(8), start, AREA, (0.2, 2.5))
-
-
-@settings(max_examples=60)
-@given(
-    px=st.lists(st.tuples(st.floats(0, 1e4), st.floats(0, 1e4)), min_size=1, max_size=40),
-    shift=st.floats(-1e3, 1e3),
-)
-def test_folds_are_numbered_and_move_with_the_points(
-    px: list[tuple[float, float]], shift: float
-) -> None:
-    folds = block_folds(np.array(px))
-    assert folds.shape == (len(px),)
-    assert ((folds >= 0) & (folds < 5)).all()
-    same = np.unique(np.array(px), axis=0)
-    assert len(np.unique(folds)) <= len(same)
-
-
-def test_neighbours_share_a_fold_and_each_line_holds_all() -> None:
-    cols, rows = np.meshgrid(np.arange(50.0), np.arange(50.0))
-    folds = block_folds(np.column_stack([cols.ravel(), rows.ravel()])).reshape(50, 50)
-    blocks = folds.reshape(5, 10, 5, 10).transpose(0, 2, 1, 3).reshape(25, 100)
-    # The last row and column of the extent belong to the last blocks: all blocks but those are
-    # of 10 points a side, give or take one.
-    assert (blocks == np.median(blocks, axis=1)[:, None]).mean() > 0.8
-    table = folds[5::10, 5::10]
-    for line in (*table, *table.T):
-        assert sorted(line) == [0, 1, 2, 3, 4]
-    assert np.bincount(folds.ravel()).min() > 400
-
-
-def test_points_on_one_spot_or_line_have_folds() -> None:
-    assert block_folds(np.ones((4, 2))).tolist() == [0, 0, 0, 0]
-    assert len(np.unique(block_folds(np.column_stack([np.arange(20.0), np.ones(20)])))) == 5

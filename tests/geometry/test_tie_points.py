@@ -7,7 +7,7 @@ from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 
 GRID = utm_grid(100, 100)
-AS_CLAIMED = Transform.as_claimed(UTM, GRID)
+NOMINAL = Transform.nominal(UTM, GRID)
 
 
 def some_points(count: int = 5) -> TiePoints:
@@ -18,7 +18,7 @@ def some_points(count: int = 5) -> TiePoints:
         input_px=px,
         score=np.arange(count, dtype=float),
         covariance_px2=np.tile(np.eye(2), (count, 1, 1)),
-        two_way_error_px=np.zeros(count),
+        forward_backward_error_px=np.zeros(count),
         is_check=np.arange(count) % 2 == 0,
         state=np.array(["used"] * count),
     )
@@ -26,7 +26,7 @@ def some_points(count: int = 5) -> TiePoints:
 
 def test_residuals_are_what_was_measured_minus_what_is_predicted() -> None:
     # The map position is 10 m east of where the input claims it, so the prediction is 1 px on.
-    np.testing.assert_allclose(some_points().residual_px(AS_CLAIMED), [[-1, 0]] * 5, atol=1e-6)
+    np.testing.assert_allclose(some_points().residual_px(NOMINAL), [[-1, 0]] * 5, atol=1e-6)
 
 
 def test_rejecting_keeps_the_first_reason() -> None:
@@ -59,5 +59,5 @@ def test_taking_and_joining_rows() -> None:
 def test_no_points_at_all() -> None:
     none = some_points().take(np.zeros(5, bool))
     assert len(none) == 0
-    assert none.residual_px(AS_CLAIMED).shape == (0, 2)
+    assert none.residual_px(NOMINAL).shape == (0, 2)
     assert none.reject(np.zeros(0, bool), "reason").used.shape == (0,)

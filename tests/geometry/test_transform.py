@@ -25,10 +25,10 @@ PLAIN = Grid(PIXEL_COORDINATES, None, 400, 300)
 def misregistered(kind: str, crs: CRS | None, grid: Grid) -> Transform:
     rng = np.random.default_rng(0)
     px = rng.uniform(0, 300, (40, 2))
-    claimed = Transform.as_claimed(crs, grid).claimed_xy(px)
-    centre, size = claimed.mean(axis=0), np.ptp(claimed, axis=0).max()
-    shift = 0.02 * size * np.sin((claimed - centre) / size + [0.3, 1.0])
-    return Transform(fit_model(kind, claimed - shift, claimed), crs, grid)
+    nominal = Transform.nominal(crs, grid).nominal_xy(px)
+    centre, size = nominal.mean(axis=0), np.ptp(nominal, axis=0).max()
+    shift = 0.02 * size * np.sin((nominal - centre) / size + [0.3, 1.0])
+    return Transform(fit_model(kind, nominal - shift, nominal), crs, grid)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -43,14 +43,30 @@ def test_pixels_to_the_map_and_back(
 
 
 def test_a_shift_moves_the_pixels_by_it() -> None:
-    """Ground at x that the input claims to be at x + (20, -30) m is 2 columns and 3 rows on."""
+    """Ground at x whose nominal place is x + (20, -30) m is 2 columns and 3 rows on."""
     xy = GRID.pixel_to_map([[10, 10], [50, 70], [200, 30]])
     transform = Transform(fit_model("translation", xy, xy + [20, -30]), UTM, GRID)
     np.testing.assert_allclose(transform(xy), [[12, 13], [52, 73], [202, 33]], atol=1e-6)
 
 
-def test_as_claimed_believes_the_georeferencing() -> None:
-    transform = Transform.as_claimed(UTM, DEGREES)
+@pytest.mark.parametrize("kind", ["affine", "tps"])
+def test_positions_come_in_arrays_of_any_shape(kind: str) -> None:
+    transform = misregistered(kind, UTM, DEGREES)
+    px = np.random.default_rng(1).uniform(0, 300, (4, 5, 2))
+    for function, positions in (
+        (transform, transform.nominal_xy(px)),
+        (transform.inverse, px),
+        (transform.nominal_xy, px),
+    ):
+        found = function(positions)
+        assert found.shape == (4, 5, 2)
+        np.testing.assert_array_equal(found.reshape(-1, 2), function(positions.reshape(-1, 2)))
+        np.testing.assert_allclose(function(list(positions[1, 2])), found[1, 2], rtol=1e-9)
+        assert function(positions[:0]).shape == (0, 5, 2)
+
+
+def test_nominal_is_the_georeferencing() -> None:
+    transform = Transform.nominal(UTM, DEGREES)
     px = np.array([[0.0, 0.0], [399.0, 299.0]])
     lonlat = DEGREES.pixel_to_map(px)
     np.testing.assert_allclose(transform(reproject(lonlat, DEGREES.crs, UTM)), px, atol=1e-4)
@@ -71,7 +87,7 @@ def test_to_a_file_and_back(tmp_path: Path, kind: str, crs: CRS | None, grid: Gr
 
 
 def damaged(**changes: object) -> str:
-    return json.dumps(Transform.as_claimed(UTM, GRID).to_json() | changes)
+    return json.dumps(Transform.nominal(UTM, GRID).to_json() | changes)
 
 
 @pytest.mark.parametrize(

@@ -19,10 +19,11 @@ def painted(level: np.ndarray, regions: list) -> np.ndarray:
     return numbers
 
 
-def grown(level: np.ndarray, calm: np.ndarray | None = None, smallest: int = 1) -> list:
-    calm = np.zeros(level.shape, np.float32) if calm is None else calm
+def grown(level: np.ndarray, variation2: np.ndarray | None = None, smallest: int = 1) -> list:
+    if variation2 is None:
+        variation2 = np.zeros(level.shape, np.float32)
     valid = np.ones(level.shape, bool)
-    return list(grow_regions(level, calm, valid, 0.5, TOLERANCE, smallest))
+    return list(grow_regions(level, variation2, valid, 0.5, TOLERANCE, smallest))
 
 
 def test_regions_are_the_connected_parts_of_like_level() -> None:
@@ -46,11 +47,11 @@ def test_a_region_ends_where_the_level_leaves_the_tolerance() -> None:
         assert inside.max() - inside.min() <= 2 * TOLERANCE
 
 
-def test_only_calm_places_are_seeds() -> None:
+def test_only_homogeneous_places_are_seeds() -> None:
     level = np.zeros((64, 64), np.float32)
     level[:, 32:] = 10
-    calm = np.where(level > 5, 0.9, 0.1).astype(np.float32)
-    (region,) = grown(level, calm)
+    variation2 = np.where(level > 5, 0.9, 0.1).astype(np.float32)
+    (region,) = grown(level, variation2)
     assert region.level_db == 0 and region.mask.sum() == 64 * 32
 
 
@@ -59,8 +60,8 @@ def test_small_regions_and_invalid_pixels_are_left_out() -> None:
     level[8:16, 8:16] = 20
     valid = np.ones(level.shape, bool)
     valid[40:] = False
-    calm = np.zeros_like(level)
-    regions = list(grow_regions(level, calm, valid, 0.5, TOLERANCE, 100))
+    variation2 = np.zeros_like(level)
+    regions = list(grow_regions(level, variation2, valid, 0.5, TOLERANCE, 100))
     assert (painted(level, regions) > 0).sum() == 40 * 64 - 64
 
 

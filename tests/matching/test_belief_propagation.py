@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from groundtie.matching.belief_propagation import normalise_each, support
+from groundtie.matching.belief_propagation import normalise_each, propagate
 from groundtie.similarity.peak import find_peak
 
 RADIUS = 10
@@ -39,7 +39,7 @@ def smooth_shifts(centres: np.ndarray) -> np.ndarray:
     return 2.5 * np.column_stack([np.sin(x + 0.3) * np.cos(0.7 * y), np.cos(x) * np.sin(0.8 * y)])
 
 
-def right(surfaces: np.ndarray, shifts: np.ndarray, within: float = 1.5) -> np.ndarray:
+def near_truth(surfaces: np.ndarray, shifts: np.ndarray, within: float = 1.5) -> np.ndarray:
     return np.hypot(*(peaks(surfaces) - shifts).T) <= within
 
 
@@ -47,12 +47,12 @@ def test_neighbours_that_agree_lift_weak_peaks() -> None:
     centres = lattice(8, 8)
     shifts = np.column_stack([3 + centres[:, 0] / 200, -2 - centres[:, 1] / 200])
     surfaces = surfaces_peaking_at(shifts, 3.0, 0)
-    alone, supported = (
+    alone, propagated = (
         np.array([find_peak(surface).shift_px for surface in found]) - shifts
-        for found in (surfaces, support(surfaces, centres, REACH))
+        for found in (surfaces, propagate(surfaces, centres, REACH))
     )
     assert np.sqrt(np.mean(alone**2)) > 1.5
-    assert np.sqrt(np.mean(supported**2)) < 0.5
+    assert np.sqrt(np.mean(propagated**2)) < 0.5
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -60,15 +60,15 @@ def test_outliers_in_a_smooth_field_are_recovered(seed: int) -> None:
     centres = lattice(12, 12)
     shifts = smooth_shifts(centres)
     rng = np.random.default_rng(seed)
-    shown = shifts.copy()
+    drawn = shifts.copy()
     outliers = rng.permutation(len(centres))[:40]
-    shown[outliers] = rng.uniform(-RADIUS, RADIUS, (40, 2))
-    surfaces = surfaces_peaking_at(shown, 5.0, seed)
-    found = support(surfaces, centres, REACH)
-    assert right(surfaces, shifts)[outliers].mean() < 0.2
-    assert right(found, shifts, 3.0)[outliers].mean() > 0.95
+    drawn[outliers] = rng.uniform(-RADIUS, RADIUS, (40, 2))
+    surfaces = surfaces_peaking_at(drawn, 5.0, seed)
+    found = propagate(surfaces, centres, REACH)
+    assert near_truth(surfaces, shifts)[outliers].mean() < 0.2
+    assert near_truth(found, shifts, 3.0)[outliers].mean() > 0.95
     others = np.setdiff1d(np.arange(len(centres)), outliers)
-    assert right(found, shifts)[others].mean() > 0.98
+    assert near_truth(found, shifts)[others].mean() > 0.98
 
 
 def test_distortion_of_a_few_chips_is_not_smoothed_away() -> None:
@@ -78,20 +78,20 @@ def test_distortion_of_a_few_chips_is_not_smoothed_away() -> None:
     dome = 4 * np.exp(-0.5 * (from_middle / 1.7) ** 2)
     shifts = np.column_stack([dome, -0.5 * dome])
     surfaces = surfaces_peaking_at(shifts, 6.0, 4)
-    alone, supported = (
+    alone, propagated = (
         np.array([find_peak(surface).shift_px for surface in found]) - shifts
-        for found in (surfaces, support(surfaces, centres, REACH))
+        for found in (surfaces, propagate(surfaces, centres, REACH))
     )
-    assert np.hypot(*supported.T).mean() < np.hypot(*alone.T).mean()
+    assert np.hypot(*propagated.T).mean() < np.hypot(*alone.T).mean()
     # Of the dome at least four fifths remain.
-    assert np.hypot(*supported[from_middle < 1.5].mean(axis=0)) < 0.2 * dome.max()
+    assert np.hypot(*propagated[from_middle < 1.5].mean(axis=0)) < 0.2 * dome.max()
 
 
 def test_a_step_between_two_areas_stays_where_it_is() -> None:
     centres = lattice(10, 8)
     shifts = np.where(centres[:, :1] < 5 * SPACING, [[-6.0, 2.0]], [[5.0, -3.0]])
     surfaces = surfaces_peaking_at(shifts, 7.0, 5)
-    assert right(support(surfaces, centres, REACH), shifts).all()
+    assert near_truth(propagate(surfaces, centres, REACH), shifts).all()
 
 
 def test_evidence_reaches_along_lines_of_chips() -> None:
@@ -102,49 +102,49 @@ def test_evidence_reaches_along_lines_of_chips() -> None:
     shifts = smooth_shifts(centres)
     heights = np.where(np.random.default_rng(6).random(len(centres)) < 0.4, 0.0, 4.5)
     surfaces = surfaces_peaking_at(shifts, heights, 6)
-    found = right(support(surfaces, centres, REACH), shifts, 3.0)
-    assert right(surfaces, shifts, 3.0).mean() < 0.75
+    found = near_truth(propagate(surfaces, centres, REACH), shifts, 3.0)
+    assert near_truth(surfaces, shifts, 3.0).mean() < 0.75
     assert found.mean() > 0.93
 
 
-def test_no_support_reaches_across_gaps() -> None:
+def test_no_message_crosses_gaps() -> None:
     left, far = lattice(4, 4), lattice(4, 4) + [7 * SPACING, 0]
     shifts = np.repeat([[4.0, 4.0], [-5.0, 1.0]], 16, axis=0)
     surfaces = surfaces_peaking_at(shifts, 3.5, 7)
-    together = support(surfaces, np.concatenate([left, far]), REACH)
-    np.testing.assert_allclose(together[:16], support(surfaces[:16], left, REACH), atol=1e-3)
-    np.testing.assert_allclose(together[16:], support(surfaces[16:], far, REACH), atol=1e-3)
+    together = propagate(surfaces, np.concatenate([left, far]), REACH)
+    np.testing.assert_allclose(together[:16], propagate(surfaces[:16], left, REACH), atol=1e-3)
+    np.testing.assert_allclose(together[16:], propagate(surfaces[16:], far, REACH), atol=1e-3)
 
 
 def test_chips_without_neighbours_keep_their_surface() -> None:
     surfaces = surfaces_peaking_at(np.array([[3, 3], [-4, 2], [5, -5], [5, -4]]), 9.0, 1)
     apart = np.array([[0, 0], [100, 0], [0, 100]])
-    np.testing.assert_array_equal(support(surfaces[:3], apart, 50.0), surfaces[:3])
+    np.testing.assert_array_equal(propagate(surfaces[:3], apart, 50.0), surfaces[:3])
     beside = np.array([[0, 0], [100, 0], [0, 100], [20, 100]])
-    found = support(surfaces, beside, 50.0)
+    found = propagate(surfaces, beside, 50.0)
     np.testing.assert_array_equal(found[:2], surfaces[:2])
     assert (found[2:] != surfaces[2:]).any()
-    assert support(surfaces[:0], apart[:0], 50.0).shape == (0, 21, 21)
+    assert propagate(surfaces[:0], apart[:0], 50.0).shape == (0, 21, 21)
 
 
-def test_flat_surfaces_say_nothing_and_are_told() -> None:
+def test_flat_surfaces_send_nothing_and_receive() -> None:
     centres = lattice(5, 1)
     shifts = np.tile([[2.0, -3.0]], (5, 1))
     surfaces = surfaces_peaking_at(shifts, 12.0, 8)
     surfaces[2] = 0
-    found = support(surfaces, centres, REACH)
-    assert right(found, shifts).all()
+    found = propagate(surfaces, centres, REACH)
+    assert near_truth(found, shifts).all()
     flat = np.zeros_like(surfaces)
-    told = support(flat, centres, REACH)
-    # The border cannot be reached from all sides; nothing else tells shifts from each other.
-    assert np.isfinite(told).all()
-    np.testing.assert_allclose(told, told[:, ::-1, ::-1], atol=1e-4)
+    received = propagate(flat, centres, REACH)
+    # The border cannot be reached from all sides; nothing else distinguishes shifts.
+    assert np.isfinite(received).all()
+    np.testing.assert_allclose(received, received[:, ::-1, ::-1], atol=1e-4)
 
 
 def test_two_chips_agree_with_bayes_rule() -> None:
     surfaces = surfaces_peaking_at(np.array([[1, 0], [2, -1]]), 3.0, 9)
-    found = support(surfaces, np.array([[0, 0], [SPACING, 0]]), REACH)
-    # Sum-product is exact on a tree: the sum over all pairs of shifts, the prior shares as said.
+    found = propagate(surfaces, np.array([[0, 0], [SPACING, 0]]), REACH)
+    # Sum-product is exact on a tree: the sum over all pairs of shifts, by the prior shares.
     likely = np.exp(surfaces.astype(float)).reshape(2, -1)
     evidence = 0.7 + 0.3 * likely / likely.mean(axis=1, keepdims=True)
     axis = np.arange(-RADIUS, RADIUS + 1.0)
@@ -157,13 +157,13 @@ def test_two_chips_agree_with_bayes_rule() -> None:
     np.testing.assert_allclose(difference - difference.mean(), 0, atol=2e-3)
 
 
-def test_support_does_not_depend_on_the_order_of_the_chips() -> None:
+def test_beliefs_do_not_depend_on_the_order_of_the_chips() -> None:
     centres = np.random.default_rng(0).integers(0, 200, (20, 2))
     surfaces = surfaces_peaking_at(np.zeros((20, 2)), 3.0, 2)
     order = np.random.default_rng(1).permutation(20)
-    found = support(surfaces, centres, 60.0)
+    found = propagate(surfaces, centres, 60.0)
     np.testing.assert_allclose(
-        support(surfaces[order], centres[order], 60.0), found[order], atol=1e-3
+        propagate(surfaces[order], centres[order], 60.0), found[order], atol=1e-3
     )
 
 
@@ -171,9 +171,9 @@ def test_many_neighbours_do_not_overflow() -> None:
     centres = np.random.default_rng(3).integers(0, 40, (60, 2))
     shifts = np.tile([[-3.0, 6.0]], (60, 1))
     surfaces = surfaces_peaking_at(shifts, 40.0, 3)
-    found = support(surfaces, centres, 60.0)
+    found = propagate(surfaces, centres, 60.0)
     assert np.isfinite(found).all()
-    assert right(found, shifts).all()
+    assert near_truth(found, shifts).all()
 
 
 def test_surfaces_are_normalised_one_by_one() -> None:

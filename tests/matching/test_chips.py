@@ -23,7 +23,7 @@ SHIFT_PX = (7.0, 4.5)
 
 
 def matcher(pair: ImagePair, **more: object) -> ChipMatcher:
-    return ChipMatcher(pair, pair.grid, pair.claimed_px, SETTINGS, **more)
+    return ChipMatcher(pair, pair.grid, pair.nominal_px, SETTINGS, **more)
 
 
 def peaks(surfaces: np.ndarray) -> np.ndarray:

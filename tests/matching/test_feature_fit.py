@@ -6,6 +6,7 @@ from affine import Affine
 
 from groundtie.errors import NothingFoundError, TooFewPointsError
 from groundtie.matching.feature_fit import fit_matches, require_no_rival
+from groundtie.rasters.grid import apply_affine, compose
 
 AREA = np.pi * 16**2
 
@@ -16,7 +17,7 @@ def matches(
     """Return matches with a small misregistration; wrong ones fall anywhere in the gate."""
     rng = np.random.default_rng(seed)
     px = rng.uniform(0, 600, (right + wrong, 2))
-    partner = np.column_stack(truth * px.T)
+    partner = apply_affine(truth, px)
     partner[:, 0] += bend * ((px[:, 1] - 300) / 300) ** 2
     partner += rng.normal(0, 0.4, px.shape)
     angle, reach = rng.uniform(0, 2 * np.pi, wrong), 16 * np.sqrt(rng.random(wrong))
@@ -26,12 +27,12 @@ def matches(
 
 def error_px(fit: object, prior: Affine, truth: Affine) -> float:
     px = np.stack(np.meshgrid(np.linspace(50, 550, 5), np.linspace(50, 550, 5)), -1).reshape(-1, 2)
-    expected = np.column_stack(prior * truth * px.T)
+    expected = apply_affine(compose(prior, truth), px)
     return float(np.sqrt(((fit.model(px) - expected) ** 2).sum(axis=1).mean()))  # type: ignore[attr-defined]
 
 
 SHIFT = Affine.translation(3.2, -4.1)
-LINEAR = Affine.translation(3, -2) * Affine(1.004, 0.006, 0, -0.003, 0.997, 0)
+LINEAR = compose(Affine.translation(3, -2), Affine(1.004, 0.006, 0, -0.003, 0.997, 0))
 
 
 @pytest.mark.parametrize("kind", ["auto", "translation", "rigid", "similarity", "affine"])
@@ -40,8 +41,8 @@ def test_a_shift_is_found_among_three_times_as_many_wrong_matches(kind: str) -> 
     fit = fit_matches(kind, px, partner, Affine.identity(), AREA, 0)
     assert error_px(fit, Affine.identity(), SHIFT) < 0.3
     right = np.arange(len(px)) < 60
-    assert fit.mixture.right[right].mean() > 0.9
-    assert fit.mixture.right[~right].mean() < 0.1
+    assert fit.mixture.inliers[right].mean() > 0.9
+    assert fit.mixture.inliers[~right].mean() < 0.1
     assert len(fit.fold_models) == 5
 
 
@@ -56,7 +57,7 @@ def test_auto_takes_the_simplest_model_that_predicts_best() -> None:
 
 
 def test_the_model_tells_claimed_positions_whatever_the_input_was_resampled_by() -> None:
-    prior = Affine.translation(200, -90) * Affine.rotation(30) * Affine.scale(1.2)
+    prior = compose(Affine.translation(200, -90), Affine.rotation(30), Affine.scale(1.2))
     px, partner = matches(LINEAR)
     fit = fit_matches("affine", px, partner, prior, AREA, 0)
     assert error_px(fit, prior, LINEAR) < 0.4

@@ -5,19 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from groundtie.matching.guided import GuidedSearch
+from groundtie.matching.hybrid import FeatureSearch
+from groundtie.matching.local import LocalSearch
 from raster_files import write_raster
 from textured_pairs import TexturedPair, error_px, pixels, shift_on_map, write_textured_pair
 
 from groundtie.errors import TooFewPointsError
+from groundtie.features.detectors import SiftDetector
 from groundtie.features.hog import HogDescriptor
-from groundtie.features.optical import optical_detector
 from groundtie.geometry.estimation import Estimate
 from groundtie.matching.alignment import LINEAR_CANDIDATES
 from groundtie.matching.feature_tiles import FeatureMatcher
-from groundtie.matching.guided import GuidedSearch
-from groundtie.matching.hybrid import FeatureSearch
 from groundtie.matching.layout import lay_out_chips
-from groundtie.matching.local import LocalSearch
 from groundtie.similarity.surface import SimilaritySettings
 
 SIZE = (400, 380)
@@ -62,10 +62,7 @@ def estimates(
     with files.opened() as pair, ThreadPoolExecutor(2) as executor:
         local = LocalSearch(pair, lay_out_chips(pair), FUSED, candidates=LINEAR_CANDIDATES)
         matcher = FeatureMatcher(
-            pair,
-            optical_detector("sift", threshold),
-            HogDescriptor(scaled=False),
-            held_out=local.held_out,
+            pair, SiftDetector(threshold), HogDescriptor(), held_out=local.held_out
         )
         features = FeatureSearch(matcher, local)
         guided = GuidedSearch(features, local)

@@ -7,29 +7,33 @@ from pathlib import Path
 import numpy as np
 import pytest
 from affine import Affine
+from groundtie.matching.hybrid import FeatureSearch
+from groundtie.matching.local import LocalSearch
 from raster_files import write_raster
 from speckled_pairs import write_speckled_pair
 from textured_pairs import TexturedPair, error_px, pixels, shift_on_map
 
+from groundtie.context import threads
 from groundtie.errors import TooFewPointsError
 from groundtie.features import tiles
-from groundtie.features.descriptors import Descriptor
-from groundtie.features.detectors import Detector
-from groundtie.features.points import FeaturePoints
+from groundtie.features.descriptors import SiftDescriptor
+from groundtie.features.detectors import SiftOctDetector
+from groundtie.features.keypoints import Keypoints
+from groundtie.features.tiles import Describing, Detecting
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.models import Model
 from groundtie.matching import feature_tiles
 from groundtie.matching.feature_tiles import FeatureMatcher, FeatureMatches
-from groundtie.matching.hybrid import FeatureSearch
 from groundtie.matching.layout import lay_out_chips
-from groundtie.matching.local import LocalSearch
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, ImagePair
 from groundtie.rasters.reading import Window, open_raster
 from groundtie.similarity.surface import SimilaritySettings
+from groundtie.studies.sift_variants import SiftVariantDescriptor, sift_detector
 
 SIZE = (300, 280)
 NMI = SimilaritySettings("nmi")
+KEYPOINTS = SiftOctDetector(0.075), SiftDescriptor()
 # The truth is 60 m east and 45 m south, pixels are 10 m: the rough model is off by 5 px.
 TRUTH, ROUGH = shift_on_map(60.0, -45.0), shift_on_map(30.0, -5.0)
 
@@ -44,11 +48,13 @@ def estimate_of(
     kind: str = "auto",
     refinement: SimilaritySettings | None = None,
     coarse: Model = ROUGH,
-    **matcher: object,
+    detector: Detecting = KEYPOINTS[0],
+    descriptor: Describing = KEYPOINTS[1],
+    ratio: float = 1.0,
 ) -> Estimate:
     local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("fused"))
     features = FeatureSearch(
-        FeatureMatcher(pair, held_out=local.held_out, **matcher),  # type: ignore[arg-type]
+        FeatureMatcher(pair, detector, descriptor, ratio, held_out=local.held_out),
         local,
         refinement,
     )
@@ -79,7 +85,9 @@ def test_other_detectors_and_gradients_find_it_too(
     files: TexturedPair, detector: str, gradient: str
 ) -> None:
     with files.opened() as pair:
-        found = estimate_of(pair, detector=Detector(detector), descriptor=Descriptor(gradient))
+        found = estimate_of(
+            pair, detector=sift_detector(detector), descriptor=SiftVariantDescriptor(gradient)
+        )
     assert error_px(found.transform, files) < 0.5
 
 
@@ -116,7 +124,7 @@ class Astray:
     gate_px: float = 16.0
     wrong_px: float = 0.0
 
-    def match(self, coarse: Model, executor: object, progress: object) -> FeatureMatches:
+    def match(self, coarse: Model, context: object) -> FeatureMatches:
         grid = self.pair.grid
         sides = [np.arange(30.0, size - 30, 12) for size in (grid.width, grid.height)]
         px = np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)
@@ -127,7 +135,7 @@ class Astray:
         # Nearly all agree on a wrong place; so few others are no rival.
         partner[np.arange(len(px)) % 20 > 0, 1] += self.wrong_px
         both = [
-            FeaturePoints(at, *(np.ones(len(px)) for _ in range(3)), np.zeros(len(px), int))
+            Keypoints(at, *(np.ones(len(px)) for _ in range(3)), np.zeros(len(px), int))
             for at in (px, partner)
         ]
         return FeatureMatches(*both, np.full(len(px), 0.5), (len(px), len(px)))
@@ -155,10 +163,10 @@ def test_the_rough_model_is_taken_where_features_agree_on_a_wrong_one(files: Tex
 
 
 def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.MonkeyPatch) -> None:
-    with files.opened() as pair, ThreadPoolExecutor(2) as executor:
-        whole = FeatureMatcher(pair).match(ROUGH, executor)
+    with files.opened() as pair, threads(2) as context:
+        whole = FeatureMatcher(pair, *KEYPOINTS).match(ROUGH, context)
         monkeypatch.setattr(tiles, "_TILE_PX", 128)
-        parts = FeatureMatcher(pair).match(ROUGH, executor)
+        parts = FeatureMatcher(pair, *KEYPOINTS).match(ROUGH, context)
 
     def places(matches: feature_tiles.FeatureMatches) -> set[tuple[float, ...]]:
         both = np.hstack([matches.reference.position_px, matches.input.position_px])
@@ -186,10 +194,10 @@ def test_only_features_on_the_ground_are_matched(files: TexturedPair, tmp_path: 
     shown = np.zeros((SIZE[1], SIZE[0]), np.uint8)
     shown[:, 100:] = 1
     mask = write_raster(tmp_path / "ground.tif", shown, files.grid)
-    with files.opened() as pair, open_raster(mask) as ground, ThreadPoolExecutor(2) as executor:
+    with files.opened() as pair, open_raster(mask) as ground, threads(2) as context:
         masked = replace(pair, reference=Image(pair.reference.source, None, ground))
-        found = FeatureMatcher(pair, shown=masked).match(ROUGH, executor)
-        everywhere = FeatureMatcher(pair).match(ROUGH, executor)
+        found = FeatureMatcher(pair, *KEYPOINTS, shown=masked).match(ROUGH, context)
+        everywhere = FeatureMatcher(pair, *KEYPOINTS).match(ROUGH, context)
     assert 50 < len(found.reference) < len(everywhere.reference)
     assert found.reference.position_px[:, 0].min() > 99
 
@@ -219,7 +227,7 @@ def test_another_place_has_too_few_matches_that_agree(tmp_path: Path) -> None:
 
 def test_chips_between_the_features_take_part(files: TexturedPair) -> None:
     with files.opened() as pair:
-        few = Detector(contrast=0.12)
+        few = SiftOctDetector(contrast=0.12)
         alone, refined = (
             estimate_of(pair, "affine", refinement, detector=few) for refinement in (None, NMI)
         )
@@ -228,7 +236,7 @@ def test_chips_between_the_features_take_part(files: TexturedPair) -> None:
 
 
 def test_chips_alone_do_where_there_are_no_features(files: TexturedPair) -> None:
-    none = Detector(contrast=0.9)
+    none = SiftOctDetector(contrast=0.9)
     with files.opened() as pair:
         with pytest.raises(TooFewPointsError):
             estimate_of(pair, detector=none)

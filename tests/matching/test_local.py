@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundtie.matching.local import AUTO, LocalSearch
 from raster_files import write_raster
 from textured_pairs import TexturedPair, everywhere, rms, shift_on_map, write_textured_pair
 
 from groundtie.errors import TooFewPointsError
 from groundtie.geometry.models import KINDS, Model
 from groundtie.matching.layout import lay_out_chips
-from groundtie.matching.local import AUTO, LocalSearch
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.similarity.surface import SimilaritySettings
@@ -64,7 +64,7 @@ def test_tie_points_are_places_in_both_images(
     # What the surfaces say of their peaks' scatter is neither far too bold nor far too modest.
     told = np.sqrt(np.trace(right.covariance_px2, axis1=1, axis2=2).mean())
     assert 0.3 < told / rms(errors) < 6
-    assert (right.two_way_error_px <= search.two_way_px).all()
+    assert (right.forward_backward_error_px <= search.forward_backward_px).all()
     assert (right.score > 3).all()
 
 
@@ -94,18 +94,20 @@ def test_check_surfaces_are_those_of_the_check_points(pair: ImagePair, executor:
     np.testing.assert_allclose(surfaces.max(axis=(1, 2)), check.score[:2], rtol=1e-5)
 
 
-def test_a_strict_two_way_limit_rejects_points(pair: ImagePair, executor: Executor) -> None:
-    strict = search_of(pair, two_way_px=0.05).estimate(COARSE, "translation", 0, executor)
+def test_a_strict_forward_backward_limit_rejects_points(
+    pair: ImagePair, executor: Executor
+) -> None:
+    strict = search_of(pair, forward_backward_px=0.05).estimate(COARSE, "translation", 0, executor)
     rejected = strict.points.take(~strict.points.used)
     assert 0 < strict.points.used.sum() < len(strict.points)
-    assert np.char.find(rejected.state, "two-way error above 0.05 px").max() >= 0
-    assert (strict.points.take(strict.points.used).two_way_error_px <= 0.05).all()
+    assert np.char.find(rejected.state, "forward–backward error above 0.05 px").max() >= 0
+    assert (strict.points.take(strict.points.used).forward_backward_error_px <= 0.05).all()
 
 
 def test_a_model_that_no_point_agrees_with_is_none(pair: ImagePair, executor: Executor) -> None:
     """No match back meets its start to the last digit."""
     with pytest.raises(TooFewPointsError, match="points agree"):
-        search_of(pair, two_way_px=0.0).estimate(COARSE, "affine", 0, executor)
+        search_of(pair, forward_backward_px=0.0).estimate(COARSE, "affine", 0, executor)
 
 
 def test_too_few_chips_with_content(

@@ -17,7 +17,7 @@ CASES = {
     ("check", "used", 0.4): "check1",
     ("check", "used", 2.0): "check2",
     ("check", "used", 9.0): "check3",
-    ("fit", "rejected: two-way error", 0.1): "rejected",
+    ("fit", "rejected: forward–backward error", 0.1): "rejected",
     ("check", "rejected: outlier", 9.0): "rejected",
 }
 

@@ -16,6 +16,7 @@ import rasterio
 from noise_pairs import ORIGIN, POINTS, true_input_px, write_pair, write_raster
 
 from groundtie import load_transform
+from groundtie.rasters.grid import compose
 
 ROOT = Path(__file__).resolve().parents[2]
 # settings that make little work of a small pair
@@ -150,7 +151,7 @@ def truncated(folder: Path, pair: Path) -> Path:
 def elsewhere(folder: Path, pair: Path) -> Path:
     shutil.copy(pair / "input.tif", folder / "elsewhere.tif")
     with rasterio.open(folder / "elsewhere.tif", "r+") as raster:
-        raster.transform = rasterio.Affine.translation(10_000, 0) * raster.transform
+        raster.transform = compose(rasterio.Affine.translation(10_000, 0), raster.transform)
     return folder / "elsewhere.tif"
 
 

@@ -14,10 +14,10 @@ from rasterio.enums import ColorInterp
 
 from groundtie.errors import CancelledError, OutputError, ParameterError, RasterOpenError
 from groundtie.progress import Progress
-from groundtie.rasters import delivery
+from groundtie.rasters import tiling
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.delivery import tiles, warp_raster, write_with_geotransform
-from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
 from groundtie.rasters.reading import open_raster
 
 RNG = np.random.default_rng(0)
@@ -28,7 +28,7 @@ IMAGE = RNG.integers(1, 1000, (70, 90)).astype(np.uint16)
 @pytest.fixture
 def small_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make many tiles of a small image; they are no longer whole blocks of the file."""
-    monkeypatch.setattr(delivery, "_TILE", 32)
+    monkeypatch.setattr(tiling, "_TILE", 32)
 
 
 def warped(path: Path, target: Grid = GRID, d: tuple[float, float] = (0, 0), **more: Any) -> Path:
@@ -57,13 +57,10 @@ def test_a_known_distortion_is_taken_out(
     small_tiles: None, tmp_path: Path, method: str, workers: int
 ) -> None:
     """The input is a smooth field seen through an affine distortion; the result is the field."""
-    distortion = Affine.translation(7, -3) * Affine.rotation(2, (500_450, 4_999_650))
+    distortion = compose(Affine.translation(7, -3), Affine.rotation(2, (500_450, 4_999_650)))
 
     def to_input_px(xy: np.ndarray) -> np.ndarray:
-        x, y = xy.T
-        moved = np.column_stack(distortion @ (x, y) if hasattr(Affine, "__matmul__") else
-                                distortion * (x, y))  # fmt: skip
-        return GRID.map_to_pixel(moved)
+        return GRID.map_to_pixel(apply_affine(distortion, xy))
 
     cols, rows = np.meshgrid(np.arange(90), np.arange(70))
     claimed = GRID.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
@@ -233,7 +230,7 @@ def test_tiles_leave_no_seams(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     path = write_raster(tmp_path / "a.tif", image, utm_grid(230, 200))
     results = []
     for tile in (1024, 16):
-        monkeypatch.setattr(delivery, "_TILE", tile)
+        monkeypatch.setattr(tiling, "_TILE", tile)
         with rasterio.open(warped(path, utm_grid(90, 70, 23.0), (4.4, 3.3))) as dataset:
             results.append((dataset.read(), dataset.read_masks()))
     np.testing.assert_array_equal(results[0][0], results[1][0])
@@ -241,7 +238,7 @@ def test_tiles_leave_no_seams(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_many_bands_are_worked_in_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(delivery, "_TILE_BYTES", 2 * delivery.BLOCK**2 * 2)
+    monkeypatch.setattr(tiling, "_TILE_BYTES", 2 * tiling.BLOCK**2 * 2)
     bands = np.stack([IMAGE + i for i in range(7)])
     path = write_raster(tmp_path / "a.tif", bands, GRID, interleave="pixel")
     with rasterio.open(warped(path, GRID.window(-5, 0, 95, 70))) as dataset:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from raster_files import UTM, utm_grid
 from rasterio.crs import CRS
 
-from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, reproject
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose, reproject
 
 WGS84 = CRS.from_epsg(4326)
 coordinate = st.floats(-1e5, 1e5)
@@ -44,7 +44,7 @@ def test_pixels_to_the_map_and_back(
     origin: tuple[float, float],
     px: list[tuple[float, float]],
 ) -> None:
-    transform = Affine.translation(*origin) * Affine.rotation(turn) * Affine.scale(*size)
+    transform = compose(Affine.translation(*origin), Affine.rotation(turn), Affine.scale(*size))
     grid = Grid(transform, None, 10, 10)
     np.testing.assert_allclose(grid.map_to_pixel(grid.pixel_to_map(px)), px, atol=1e-4)
     np.testing.assert_allclose(grid.pixel_size, size)
@@ -132,3 +132,11 @@ def test_positions_off_the_projection_are_infinite_and_spoil_no_others() -> None
     np.testing.assert_array_equal(np.isinf(found).all(axis=1), outside)
     good = lonlat[~np.array(outside)]
     np.testing.assert_allclose(reproject(found[~np.array(outside)], UTM, WGS84), good, atol=1e-9)
+
+
+def test_of_composed_transforms_the_last_is_applied_first() -> None:
+    move, turn, scale = Affine.translation(3, -7), Affine.rotation(25), Affine.scale(2, 0.5)
+    points = np.array([[0.0, 0.0], [4.0, -1.0], [-2.5, 9.0]])
+    expected = apply_affine(move, apply_affine(turn, apply_affine(scale, points)))
+    np.testing.assert_allclose(apply_affine(compose(move, turn, scale), points), expected)
+    assert compose(move) == move

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import BSpline
 from scipy.ndimage import map_coordinates
 
-from groundtie.rasters.kernels import REACH, interpolate
+from groundtie.rasters.kernels import REACH, bspline_slopes, bspline_weights, interpolate
 
 KERNELS = tuple(method for method in REACH if method != "nearest")
 fraction = st.floats(0, 1, exclude_max=True)
@@ -74,3 +75,20 @@ def test_bilinear_values_are_scipys(positions: type, dtype: type) -> None:
     expected = map_coordinates(padded, px[::-1].astype(float) + 4, order=1, prefilter=False)
     assert found.dtype == dtype
     np.testing.assert_allclose(found, expected, atol=5e-4)
+
+
+@pytest.mark.parametrize("order", [2, 3, 4, 7])
+def test_bsplines_are_scipys(order: int) -> None:
+    fraction = np.linspace(0, 1, 11)
+    basis = BSpline.basis_element(np.arange(order + 1.0), extrapolate=False)
+    place = np.arange(1, order + 1)[:, None] - fraction
+    weights = bspline_weights(order, fraction)
+    np.testing.assert_allclose(weights, np.nan_to_num(basis(place)), atol=1e-12)
+    np.testing.assert_allclose(weights.sum(axis=0), 1)
+
+
+@pytest.mark.parametrize("order", [3, 4, 7])
+def test_slopes_of_bsplines_are_differences_of_their_weights(order: int) -> None:
+    fraction = np.linspace(0.1, 0.9, 9)
+    near, far = (bspline_weights(order, fraction + step) for step in (-1e-6, 1e-6))
+    np.testing.assert_allclose(bspline_slopes(order, fraction), (far - near) / 2e-6, atol=1e-8)

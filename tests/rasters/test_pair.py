@@ -13,7 +13,7 @@ from rasterio.enums import ColorInterp
 from scipy.ndimage import binary_erosion
 
 from groundtie.errors import BandError, GeoreferencingError, NoOverlapError, SameFileError
-from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, compose, reproject
 from groundtie.rasters.pair import Image, ImagePair, Turn, default_radius_m, make_pair
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import RasterSource, open_raster
@@ -58,7 +58,7 @@ def covering(crs: CRS, size: float) -> Grid:
 
 
 def both(pair: ImagePair) -> tuple[Patch, Patch]:
-    return pair.reference_patch(pair.grid), pair.input_patch(pair.grid, pair.claimed_px)
+    return pair.reference_patch(pair.grid), pair.input_patch(pair.grid, pair.nominal_px)
 
 
 def interior(reference: Patch, input: Patch) -> np.ndarray:
@@ -92,7 +92,7 @@ def test_images_on_one_grid(files: Files) -> None:
         covering(NEXT_ZONE, 10.0),
         utm_grid(60, 50, 20.0),
         utm_grid(240, 200, 5.0),
-        Grid(GRID.transform * Affine.rotation(20), UTM, 150, 120),
+        Grid(compose(GRID.transform, Affine.rotation(20)), UTM, 150, 120),
     ],
     ids=["degrees", "next zone", "coarser", "finer", "rotated"],
 )
@@ -190,7 +190,7 @@ def test_images_without_georeferencing_are_matched_in_pixels(files: Files) -> No
     pair = make_pair(Image(files.open(values, None)), Image(files.open(values[5:, 7:], None)))
     assert pair.grid == plain.window(0, 0, 120, 100)
     assert pair.overlap_px == (113, 95)
-    np.testing.assert_allclose(pair.claimed_px(np.array([[3.0, 4.0]])), [[3, 4]])
+    np.testing.assert_allclose(pair.nominal_px(np.array([[3.0, 4.0]])), [[3, 4]])
     reference, input = both(pair)
     np.testing.assert_array_equal(reference.values, values)
     np.testing.assert_array_equal(input.values[:95, :113], values[5:, 7:])
@@ -239,7 +239,7 @@ def test_the_same_file_under_two_names(files: Files, tmp_path: Path) -> None:
     image = files.image()
     (tmp_path / "link.tif").symlink_to(image.source.path)
     for name in (image.source.path, str(tmp_path / "link.tif"), str(tmp_path / "." / "image1.tif")):
-        with open_raster(name) as again, pytest.raises(SameFileError, match="same file"):
+        with open_raster(name) as again, pytest.raises(SameFileError, match="same raster"):
             make_pair(image, Image(again))
 
 
@@ -335,7 +335,7 @@ def test_a_mask_goes_with_the_input_where_it_is_moved(files: Files) -> None:
     pair = make_pair(
         files.image(), Image(files.image().source, None, files.open(hidden, nodata=255))
     )
-    patch = pair.input_patch(pair.grid, lambda xy: pair.claimed_px(xy) + [10, 0])
+    patch = pair.input_patch(pair.grid, lambda xy: pair.nominal_px(xy) + [10, 0])
     assert not patch.valid[:, :30].any()
     assert patch.valid[:, 31:109].all()
 
@@ -344,7 +344,7 @@ def test_patches_of_windows_are_parts_of_the_whole(files: Files) -> None:
     pair = make_pair(files.image(), files.image(covering(NEXT_ZONE, 10.0)))
     piece = pair.grid.window(30, 20, 41, 37)
     for part, whole in zip(
-        (pair.reference_patch(piece), pair.input_patch(piece, pair.claimed_px)),
+        (pair.reference_patch(piece), pair.input_patch(piece, pair.nominal_px)),
         both(pair),
         strict=True,
     ):

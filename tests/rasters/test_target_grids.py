@@ -9,7 +9,7 @@ from raster_files import UTM, utm_grid
 from rasterio.crs import CRS
 
 from groundtie.errors import NoOverlapError
-from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, compose, reproject
 from groundtie.rasters.target_grids import covering_grid, registered_grid
 
 GRID = utm_grid(40, 30)
@@ -37,7 +37,7 @@ def test_a_covering_grid_is_the_smallest_of_the_lattice(
 
 
 def test_the_own_outline_gives_the_same_grid() -> None:
-    turned = Grid(Affine.rotation(30) * Affine.scale(3), None, 17, 9)
+    turned = Grid(compose(Affine.rotation(30), Affine.scale(3)), None, 17, 9)
     for grid in (GRID, turned):
         assert covering_grid(grid, grid.pixel_to_map(grid.outline())).window(0, 0, 1, 1) == (
             grid.window(0, 0, 1, 1)
@@ -67,8 +67,8 @@ def test_a_registered_grid_lines_up_with_the_input() -> None:
 
 
 def test_another_pixel_size_gives_borders_at_its_multiples() -> None:
-    turned = Grid(Affine.translation(500_003, 5e6) * Affine.rotation(20) * Affine.scale(10, -10),
-                  UTM, 40, 30)  # fmt: skip
+    place = compose(Affine.translation(500_003, 5e6), Affine.rotation(20), Affine.scale(10, -10))
+    turned = Grid(place, UTM, 40, 30)
     found = registered_grid(turned, turned.pixel_to_map, UTM, 25.0)
     assert found.pixel_size == (25, 25)
     assert found.transform.c % 25 == 0

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from raster_files import utm_grid, wave_image, waves, write_raster
 
-from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
 from groundtie.rasters.reading import Window, open_raster
 from groundtie.rasters.warping import (
     METHODS,
@@ -57,7 +57,7 @@ def test_a_straight_map_is_evaluated_at_few_places() -> None:
 
     def affine(xy: np.ndarray) -> np.ndarray:
         asked.append(len(xy))
-        return apply_affine(Affine.rotation(3) * Affine.scale(1.1), xy)
+        return apply_affine(compose(Affine.rotation(3), Affine.scale(1.1)), xy)
 
     grid = utm_grid(512, 512)
     px = coordinates(grid, affine)
@@ -201,9 +201,9 @@ def test_reduction_by_pixel_size(map_size: float, expected: tuple[int, int]) -> 
 
 
 def test_reduction_does_not_mind_rotation_nor_infinity() -> None:
-    turned = lambda xy: apply_affine(Affine.rotation(40) * Affine.scale(2, 5), xy)  # noqa: E731
+    turn = compose(Affine.rotation(40), Affine.scale(2, 5))
     assert reduction(PLANE, lambda xy: apply_affine(Affine.rotation(45), xy)) == (1, 1)
-    assert reduction(PLANE, turned) == (4, 4)
+    assert reduction(PLANE, lambda xy: apply_affine(turn, xy)) == (4, 4)
     assert reduction(PLANE, lambda xy: xy * np.inf) == (1, 1)
 
 

@@ -10,15 +10,16 @@ from raster_files import UTM, utm_grid
 from groundtie.geometry.chance import agreement_probability, log10_chance
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.judging import LOG10_CHANCE_ON_GROUND
+from groundtie.geometry.model_choice import block_folds
 from groundtie.geometry.models import PolynomialModel
-from groundtie.geometry.robust import block_folds
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
-from groundtie.registration.verdict import LOG10_CHANCE_ON_GROUND, Verdict, judge, refuse
+from groundtie.registration.verdict import Verdict, judge, refuse
 
 GRID = utm_grid(600, 500)
 RADIUS = 16
-TRUTH = Transform.as_claimed(UTM, GRID)
+TRUTH = Transform.nominal(UTM, GRID)
 
 
 def points(px: np.ndarray, error_px: np.ndarray, *, check: bool) -> TiePoints:
@@ -29,7 +30,7 @@ def points(px: np.ndarray, error_px: np.ndarray, *, check: bool) -> TiePoints:
         input_px=px + error_px,
         score=np.full(count, 8.0),
         covariance_px2=np.tile(0.04 * np.eye(2), (count, 1, 1)),
-        two_way_error_px=np.zeros(count),
+        forward_backward_error_px=np.zeros(count),
         is_check=np.full(count, check),
         state=np.full(count, "used"),
     )
@@ -44,10 +45,10 @@ def fit_points(within: tuple[float, float] = (1.0, 1.0), sigma: float = 0.3) -> 
 
 def estimated(fit: TiePoints, kind: str = "affine") -> Estimate:
     """Fit a model to points as the search does: on the map, and in pixels without each block."""
-    px, claimed_px = GRID.map_to_pixel(fit.reference_xy), fit.input_px
-    on_map = fit_model(kind, fit.reference_xy, GRID.pixel_to_map(claimed_px))
+    px, nominal_px = GRID.map_to_pixel(fit.reference_xy), fit.input_px
+    on_map = fit_model(kind, fit.reference_xy, GRID.pixel_to_map(nominal_px))
     folds = block_folds(px)
-    left_out = [fit_model(kind, px[folds != f], claimed_px[folds != f]) for f in np.unique(folds)]
+    left_out = [fit_model(kind, px[folds != f], nominal_px[folds != f]) for f in np.unique(folds)]
     return Estimate(Transform(on_map, UTM, GRID), fit, tuple(left_out))
 
 
@@ -190,7 +191,7 @@ def test_where_the_ground_of_a_town_was_matched_three_of_nine_are_not_enough(
 def test_fit_points_that_were_all_rejected() -> None:
     """The model may come from surfaces; a hull of no points covers nothing."""
     estimate = estimated(fit_points())
-    none = estimate.points.reject(np.ones(len(estimate.points), bool), "two-way error")
+    none = estimate.points.reject(np.ones(len(estimate.points), bool), "forward–backward error")
     verdict = judged(
         check_points(scatter(30, 0.3)), Estimate(estimate.transform, none, estimate.fold_models)
     )

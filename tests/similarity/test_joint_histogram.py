@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
+from groundtie.context import threads
 from groundtie.similarity import joint_histogram
 from groundtie.similarity.binning import MASKED
 from groundtie.similarity.joint_histogram import (
@@ -101,9 +101,10 @@ def with_numpy(template: np.ndarray, search: np.ndarray, bins: tuple[int, int]) 
 def test_counts_are_those_of_numpy(bins: tuple[int, int], masked: bool) -> None:
     template, search = windows(masked, (12, 9), bins)
     expected = with_numpy(template, search, bins)
-    for executor in (None, ThreadPoolExecutor(2)):
-        volume = count_joint_histograms(template, search, bins, RADIUS, executor)
-        np.testing.assert_array_equal(volume.counts, expected)
+    with threads(2) as context:
+        for where in (None, context):
+            volume = count_joint_histograms(template, search, bins, RADIUS, where)
+            np.testing.assert_array_equal(volume.counts, expected)
     assert volume.margin == MARGIN
 
 
@@ -131,12 +132,12 @@ def test_every_pixel_is_counted_once() -> None:
 
 
 @pytest.mark.parametrize("order", [4, 7])
-def test_turned_images_have_the_histogram_of_the_opposite_shift(order: int) -> None:
+def test_rotated_images_have_the_histogram_of_the_opposite_shift(order: int) -> None:
     template, search = windows(masked=False)
     volume = count_joint_histograms(template, search, BINS, RADIUS)
-    turned = count_joint_histograms(template[::-1, ::-1], search[::-1, ::-1], BINS, RADIUS)
+    rotated = count_joint_histograms(template[::-1, ::-1], search[::-1, ::-1], BINS, RADIUS)
     np.testing.assert_allclose(
-        volume.at((1.3, -0.6), order), turned.at((-1.3, 0.6), order), atol=1e-9
+        volume.at((1.3, -0.6), order), rotated.at((-1.3, 0.6), order), atol=1e-9
     )
 
 

@@ -1,15 +1,15 @@
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, median_filter
 from textured_pairs import texture
 
+from groundtie.context import threads
 from groundtie.rasters.patch import Patch
+from groundtie.similarity.description import BORDER_PX
+from groundtie.similarity.measures import MEASURES, measure, ncc, of_histograms
 from groundtie.similarity.surface import (
-    BORDER_PX,
     SIMILARITIES,
     SimilaritySettings,
     describe,
@@ -17,10 +17,21 @@ from groundtie.similarity.surface import (
     normalise,
     similarity_surface,
 )
+from groundtie.studies.measures import HISTOGRAM_MEASURES
 
 CHIP, RADIUS = 48, 7
 SPAN = 2 * RADIUS + 1
 SIDE = CHIP + 2 * BORDER_PX
+
+# Measures that studies compare are registered here as a new one would be.
+STUDIED = tuple(name for name in HISTOGRAM_MEASURES if name not in SIMILARITIES)
+EVERY = (*SIMILARITIES, *STUDIED)
+
+
+@pytest.fixture(autouse=True)
+def _studied_measures(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in STUDIED:
+        monkeypatch.setitem(MEASURES, name, of_histograms(HISTOGRAM_MEASURES[name]))
 
 
 def patches(
@@ -50,8 +61,8 @@ def inverted(patch: Patch) -> Patch:
 
 
 def surface_of(template: Patch, search: Patch, settings: SimilaritySettings) -> np.ndarray:
-    features = [describe(patch, CHIP**2, settings) for patch in (template, search)]
-    return similarity_surface(features[0], features[1], RADIUS, settings)
+    windows = [describe(patch, CHIP**2, settings) for patch in (template, search)]
+    return similarity_surface(*windows, RADIUS, settings)
 
 
 def peak_of(surface: np.ndarray) -> tuple[int, int]:
@@ -59,7 +70,7 @@ def peak_of(surface: np.ndarray) -> tuple[int, int]:
     return int(col) - RADIUS, int(row) - RADIUS
 
 
-@pytest.mark.parametrize("similarity", SIMILARITIES)
+@pytest.mark.parametrize("similarity", EVERY)
 @pytest.mark.parametrize("shift", [(0, 0), (3, -5), (-6, 1)])
 def test_the_peak_is_where_the_content_lies_further_right_and_down(
     similarity: str, shift: tuple[int, int]
@@ -87,7 +98,7 @@ def test_correlation_of_grey_values_finds_no_inverted_contrast() -> None:
     assert peak_of(surface) != (2, 3)
 
 
-@pytest.mark.parametrize("similarity", SIMILARITIES)
+@pytest.mark.parametrize("similarity", EVERY)
 def test_the_way_back_peaks_at_the_opposite_shift(similarity: str) -> None:
     settings = SimilaritySettings(similarity)
     scene = texture(SIDE + 2 * RADIUS, SIDE + 2 * RADIUS)
@@ -96,16 +107,16 @@ def test_the_way_back_peaks_at_the_opposite_shift(similarity: str) -> None:
     assert peak_of(surface_of(there.inner(RADIUS), here, settings)) == (-4, 2)
 
 
-@pytest.mark.parametrize("similarity", SIMILARITIES)
+@pytest.mark.parametrize("similarity", EVERY)
 def test_surfaces_of_different_places_are_background(similarity: str) -> None:
     template, _ = patches(seed=1)
     _, search = patches(seed=2)
     assert surface_of(template, search, SimilaritySettings(similarity)).max() < 6
 
 
-@pytest.mark.parametrize("similarity", SIMILARITIES)
+@pytest.mark.parametrize("similarity", EVERY)
 @pytest.mark.parametrize("which", ["template", "search"])
-def test_masked_pixels_say_nothing(similarity: str, which: str) -> None:
+def test_masked_pixels_do_not_count(similarity: str, which: str) -> None:
     """What masked pixels hold does not matter; the rest still finds the peak."""
     settings = SimilaritySettings(similarity)
     pair = dict(zip(("template", "search"), patches((3, -2)), strict=True))
@@ -119,7 +130,7 @@ def test_masked_pixels_say_nothing(similarity: str, which: str) -> None:
     assert peak_of(found[0]) == (3, -2)
 
 
-@pytest.mark.parametrize("similarity", SIMILARITIES)
+@pytest.mark.parametrize("similarity", EVERY)
 def test_shifts_with_little_overlap_are_background(similarity: str) -> None:
     template, search = patches((0, 0))
     valid = np.zeros(search.valid.shape, bool)
@@ -131,7 +142,7 @@ def test_shifts_with_little_overlap_are_background(similarity: str) -> None:
     assert surface[:, : RADIUS + 5].any()
 
 
-@pytest.mark.parametrize("similarity", SIMILARITIES)
+@pytest.mark.parametrize("similarity", EVERY)
 def test_windows_without_content_are_finite(similarity: str) -> None:
     template, search = patches()
     settings = SimilaritySettings(similarity)
@@ -144,20 +155,17 @@ def test_windows_without_content_are_finite(similarity: str) -> None:
     assert np.isfinite(surface).all()
 
 
-@pytest.mark.parametrize("order", range(2, 8))
-@pytest.mark.parametrize("binning", ["linear", "equal-frequency"])
-def test_every_order_and_binning_finds_the_peak(order: int, binning: str) -> None:
-    template, search = patches((-2, 4))
-    settings = SimilaritySettings("nmi", None, binning, order)
-    assert peak_of(surface_of(template, inverted(search), settings)) == (-2, 4)
+def test_a_measure_is_registered_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(MEASURES, "ncc")
+    assert measure("ncc")(ncc) is MEASURES["ncc"] is ncc
 
 
 def test_threads_change_nothing() -> None:
     settings = SimilaritySettings("fused")
-    features = [describe(patch, CHIP**2, settings) for patch in patches((1, 1))]
-    with ThreadPoolExecutor(2) as executor:
-        threaded = similarity_surface(features[0], features[1], RADIUS, settings, executor)
-    alone = similarity_surface(features[0], features[1], RADIUS, settings)
+    windows = [describe(patch, CHIP**2, settings) for patch in patches((1, 1))]
+    with threads(2) as context:
+        threaded = similarity_surface(*windows, RADIUS, settings, context)
+    alone = similarity_surface(*windows, RADIUS, settings)
     np.testing.assert_array_equal(threaded, alone)
 
 

@@ -5,15 +5,14 @@ import pytest
 from speckled_pairs import radar_image, whole
 
 from groundtie.errors import ParameterError
-from groundtie.features.descriptors import Descriptor
-from groundtie.features.detectors import Detector
-from groundtie.features.points import FeaturePoints
+from groundtie.features.keypoints import Keypoints
 from groundtie.studies.evaluation import Consistency, Variant, evaluate
+from groundtie.studies.sift_variants import SiftVariantDescriptor, sift_detector
 
 
-def points(px: np.ndarray) -> FeaturePoints:
+def points(px: np.ndarray) -> Keypoints:
     count = len(px)
-    return FeaturePoints(
+    return Keypoints(
         np.asarray(px, float),
         np.full(count, 2.0),
         np.zeros(count),
@@ -23,9 +22,11 @@ def points(px: np.ndarray) -> FeaturePoints:
 
 
 def test_names_of_variants() -> None:
-    assert Variant.parse("sift") == Variant("sift", Detector("sift"), Descriptor())
+    assert Variant.parse("sift") == Variant("sift", sift_detector("sift"), SiftVariantDescriptor())
     assert Variant.parse("oriented+sift-oct+roewa", 0.05) == Variant(
-        "oriented+sift-oct+roewa", Detector("sift-oct", 0.05), Descriptor("roewa", upright=False)
+        "oriented+sift-oct+roewa",
+        sift_detector("sift-oct", 0.05),
+        SiftVariantDescriptor("roewa", upright=False),
     )
 
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from shapely.geometry import Point
 
-from groundtie.features.points import FeaturePoints
+from groundtie.features.keypoints import Keypoints
 from groundtie.studies.repeatability import CLASS_NAMES, classes, overlap_error, repeatability
 
 
-def circles(px: np.ndarray, scale: float | np.ndarray = 2.0) -> FeaturePoints:
+def circles(px: np.ndarray, scale: float | np.ndarray = 2.0) -> Keypoints:
     px = np.asarray(px, float)
     count = len(px)
     scales = np.broadcast_to(np.asarray(scale, float), (count,)).copy()
-    return FeaturePoints(px, scales, np.zeros(count), np.ones(count), np.zeros(count, int))
+    return Keypoints(px, scales, np.zeros(count), np.ones(count), np.zeros(count, int))
 
 
 @pytest.mark.parametrize(
@@ -56,6 +56,6 @@ def test_each_feature_repeats_once_and_the_rest_are_counted_as_missing() -> None
 
 
 def test_no_features_repeat_nothing() -> None:
-    found = repeatability(FeaturePoints.none(), circles([[0, 0]]))
+    found = repeatability(Keypoints.none(), circles([[0, 0]]))
     assert found.possible == 0
     assert found.scores.tolist() == [0] * 5

@@ -120,7 +120,7 @@ def test_impossible_demands_on_tie_points_are_refused(
 ) -> None:
     """No match back meets its start exactly."""
     with pytest.raises(NotRegisteredError, match="points agree"):
-        registered(textured, tmp_path, two_way_error=0.0)
+        registered(textured, tmp_path, forward_backward_error=0.0)
     assert listing(tmp_path) == {}
 
 

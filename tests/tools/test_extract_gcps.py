@@ -12,7 +12,7 @@ from rpc_scenes import SIZE, Scene, ground_texture, make_scene
 
 import groundtie
 from groundtie.errors import GroundTieError, NotRegisteredError
-from groundtie.rasters.grid import Grid
+from groundtie.rasters.grid import Grid, apply_affine
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor.bias import Bias
 
@@ -134,7 +134,7 @@ def test_the_map_may_have_another_crs(scene: Scene, tmp_path: Path) -> None:
     with open_raster(scene.reference) as source:
         values, grid = source.read(source.window)[0], source.grid
     crs = CRS.from_epsg(3035)
-    bounds = (*(grid.transform * (0, grid.height)), *(grid.transform * (grid.width, 0)))
+    bounds = apply_affine(grid.transform, [(0, grid.height), (grid.width, 0)]).ravel()
     transform, width, height = calculate_default_transform(
         grid.crs, crs, grid.width, grid.height, *bounds, resolution=1.0
     )

@@ -87,7 +87,7 @@ def test_the_result_is_known_as_a_radars_even_when_it_was_warped(tmp_path: Path)
     path = write_raster(tmp_path / "in.tif", amplitude().astype(np.float32), utm_grid(*SIZE[::-1]))
     with open_raster(path) as source:
         assert not is_known_radar(source)
-        as_claimed = Transform.as_claimed(source.grid.crs, source.grid)
+        as_claimed = Transform.nominal(source.grid.crs, source.grid)
     filter_speckle(path, tmp_path / "out.tif", "gamma-map", 5)
     (tmp_path / "transform.json").write_text(json.dumps(as_claimed.to_json()))
     warp(tmp_path / "out.tif", tmp_path / "warped.tif", tmp_path / "transform.json")

@@ -14,7 +14,7 @@ from rpc_models import camera_rpc, to_rasterio, write_dem, write_positions
 
 import groundtie
 from groundtie.errors import GroundTieError, OutputError, ParameterError
-from groundtie.rasters.grid import Grid
+from groundtie.rasters.grid import Grid, apply_affine
 from groundtie.sensor.rpc_files import write_rpc
 
 RPC = camera_rpc()
@@ -68,7 +68,7 @@ def test_the_grid_of_a_reference_is_taken(files: dict[str, Path], tmp_path: Path
     grid = Grid(Affine(2, 0, 499_900, 0, -2, 4_999_800), UTM, 90, 70)
     groundtie.orthorectify(**files, dem_datum="ellipsoidal", pixel_size=2.0)
     with rasterio.open(files["output"]) as ortho:
-        x, y = ortho.transform * (ortho.width / 2, ortho.height / 2)
+        (x, y) = apply_affine(ortho.transform, [ortho.width / 2, ortho.height / 2])[0]
     grid = Grid(Affine(2, 0, round(x), 0, -2, round(y)), UTM, 90, 70)
     reference = write_raster(tmp_path / "reference.tif", np.ones((70, 90), np.uint8), grid)
     result = groundtie.orthorectify(

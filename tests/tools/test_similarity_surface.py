@@ -27,17 +27,18 @@ from groundtie.progress import Progress
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.similarity.peak import Evidence
+from groundtie.similarity.description import BORDER_PX
+from groundtie.similarity.peak import Peak
 from groundtie.similarity.surface import (
-    BORDER_PX,
     SimilaritySettings,
     describe,
 )
 from groundtie.similarity.surface import (
     similarity_surface as matching_surface,
 )
+from groundtie.studies.surface_result import SurfaceResult
 from groundtie.studies.window_surface import CHOICES, second_peak
-from groundtie.tools.similarity_surface import SurfaceResult, similarity_surface
+from groundtie.tools.similarity_surface import similarity_surface
 
 # The input claims to lie 70 m east and 45 m south of where it is; pixels are 10 m.
 TRUTH_PX = np.array([7.0, 4.5])
@@ -61,13 +62,13 @@ def test_every_measure_finds_the_shift(
 ) -> None:
     pair = like_contrast(textured, tmp_path) if similarity == "ncc" else textured
     result = surface_of(pair, tmp_path, similarity=similarity)
-    assert result.values.shape == result.evidence.shape == (21, 21)
+    assert result.values.shape == result.deviations.shape == (21, 21)
     error = np.array(result.peak.shift_px) - TRUTH_PX
     # A sample of 500 pixels of the 3721 is noisier.
     assert np.abs(error).max() < (1.5 if similarity == "mlmi" else 0.5)
     assert not result.peak.at_border
     assert result.peak.height > 4
-    # Values are highest where the evidence is: the trend is slow.
+    # Values are highest where the deviations are: the trend is slow.
     best = np.array(np.unravel_index(np.nanargmax(result.values), (21, 21)))[::-1] - 10
     assert np.abs(best - TRUTH_PX).max() <= (2 if similarity == "mlmi" else 1)
     assert result.second_ratio is None or 0 < result.second_ratio < 1
@@ -87,6 +88,7 @@ def test_all_measures_can_be_chosen() -> None:
         {"bins": 64, "binning": "linear"},
         {"bins": 256, "chip_size": 41, "search_radius": 80.0},
         {"gpve_order": 2},
+        {"gpve_order": 7, "binning": "linear"},
         {"matching_pixel_size": 20.0, "search_radius": 160.0},
     ],
 )
@@ -114,7 +116,7 @@ def test_all_grey_values(textured: TexturedPair, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("similarity", ["fused", "nmi", "orientation", "ncc"])
-def test_the_evidence_is_that_of_matching(
+def test_deviations_are_those_of_matching(
     similarity: str, textured: TexturedPair, tmp_path: Path
 ) -> None:
     """The tool shows what `coregister` sees of a chip."""
@@ -122,15 +124,15 @@ def test_the_evidence_is_that_of_matching(
     settings = SimilaritySettings(similarity)
     with textured.opened() as pair:
         side = 61 + 2 * (10 + BORDER_PX)
-        claimed = pair.claimed_px
+        nominal = pair.nominal_px
         corner = pair.grid.map_to_pixel(result.grid.pixel_to_map([[10, 10]]))[0] - side // 2
         piece = pair.grid.window(*np.rint(corner).astype(int), side, side)
-        there, here = (
+        template, search = (
             describe(patch, 61**2, settings)
-            for patch in (pair.reference_patch(piece), pair.input_patch(piece, claimed))
+            for patch in (pair.reference_patch(piece), pair.input_patch(piece, nominal))
         )
-    expected = matching_surface(there.inner(10), here, 10, settings)
-    np.testing.assert_allclose(result.evidence, expected, atol=2e-3)
+    expected = matching_surface(template.inner(10), search, 10, settings)
+    np.testing.assert_allclose(result.deviations, expected, atol=2e-3)
 
 
 def test_files(textured: TexturedPair, tmp_path: Path) -> None:
@@ -141,7 +143,7 @@ def test_files(textured: TexturedPair, tmp_path: Path) -> None:
         assert raster.descriptions == ("nmi", "robust standard deviations")
         assert raster.crs == textured.grid.crs
         np.testing.assert_array_equal(raster.read(1), result.values)
-        np.testing.assert_array_equal(raster.read(2), result.evidence)
+        np.testing.assert_array_equal(raster.read(2), result.deviations)
         assert np.isnan(raster.nodata)
     drawn = cv2.imread(str(picture))
     assert min(drawn.shape[:2]) > 400 and drawn.std() > 10
@@ -162,10 +164,10 @@ def test_the_surface_lies_where_the_windows_centre_would_lie(
         assert raster.xy(10, 10) == pytest.approx((x, y))
         # A shift of 2 px right and 3 px down.
         assert raster.xy(13, 12) == pytest.approx((x + 20, y - 30))
-    told = result.summary()
-    assert (told["window"]["x"], told["window"]["y"]) == pytest.approx((x, y))
-    assert told["peak"]["x"] == pytest.approx(x + 70, abs=5)
-    assert told["peak"]["y"] == pytest.approx(y - 45, abs=5)
+    summary = result.summary()
+    assert (summary["window"]["x"], summary["window"]["y"]) == pytest.approx((x, y))
+    assert summary["peak"]["x"] == pytest.approx(x + 70, abs=5)
+    assert summary["peak"]["y"] == pytest.approx(y - 45, abs=5)
 
 
 def test_the_default_centre_is_the_middle_of_the_overlap(
@@ -197,7 +199,7 @@ def test_masked_pixels_and_shifts_without_overlap(textured: TexturedPair, tmp_pa
         )
         missing = np.isnan(result.values)
         assert missing[-1].all() and not missing[: 25 + 10].any()
-        assert (result.evidence[missing] == 0).all()
+        assert (result.deviations[missing] == 0).all()
         assert np.abs(np.array(result.peak.shift_px) - TRUTH_PX).max() < 1.5
 
 
@@ -210,8 +212,8 @@ def test_images_without_georeferencing(textured: TexturedPair, tmp_path: Path) -
     )
     result = surface_of(plain, tmp_path, search_radius=10.0, centre_x=110.0, centre_y=100.0)
     np.testing.assert_allclose(result.peak.shift_px, TRUTH_PX, atol=0.5)
-    told = result.summary()
-    assert (told["window"]["x"], told["window"]["y"]) == (110.0, 100.0)
+    summary = result.summary()
+    assert (summary["window"]["x"], summary["window"]["y"]) == (110.0, 100.0)
 
 
 def test_bands(textured: TexturedPair, tmp_path: Path) -> None:
@@ -238,20 +240,20 @@ def bump(peaks: list[tuple[float, float, float]], radius: int = 12) -> np.ndarra
     return total.astype(np.float32)
 
 
-def evidence_at(x: float, y: float, height: float) -> Evidence:
-    return Evidence((x, y), height, np.eye(2), False)
+def peak_at(x: float, y: float, height: float) -> Peak:
+    return Peak((x, y), height, np.eye(2), False)
 
 
 def test_the_second_peak() -> None:
     surface = bump([(3.2, -4.1, 9.0), (-6.3, 5.2, 6.0), (8.0, 8.0, 2.0)])
-    second = second_peak(surface, evidence_at(3.2, -4.1, 9.0))
+    second = second_peak(surface, peak_at(3.2, -4.1, 9.0))
     assert second is not None
     np.testing.assert_allclose(second.shift_px, (-6.3, 5.2), atol=0.15)
     assert second.height == pytest.approx(6.0, rel=0.05)
-    assert second_peak(bump([(3.2, -4.1, 9.0)]), evidence_at(3.2, -4.1, 9.0)) is None
+    assert second_peak(bump([(3.2, -4.1, 9.0)]), peak_at(3.2, -4.1, 9.0)) is None
     # What rises towards the border is no peak.
     slope = bump([(0.0, 0.0, 9.0)]) + np.linspace(0, 3, 25, dtype=np.float32)
-    assert second_peak(slope, evidence_at(0.0, 0.0, 9.0)) is None
+    assert second_peak(slope, peak_at(0.0, 0.0, 9.0)) is None
 
 
 def test_a_flank_is_no_second_peak(textured: TexturedPair, tmp_path: Path) -> None:
@@ -345,10 +347,10 @@ class TestBadInput:
         assert capsys.readouterr().err.count("\n") == 1
         assert not listing(self.folder)
         assert main([*called, "100", "--similarity", "nmi", "--json"]) == 0
-        told = json.loads(capsys.readouterr().out)
-        assert told["peak"]["right_px"] == pytest.approx(TRUTH_PX[0], abs=0.5)
+        summary = json.loads(capsys.readouterr().out)
+        assert summary["peak"]["right_px"] == pytest.approx(TRUTH_PX[0], abs=0.5)
         tool = tool_of(similarity_surface)
-        assert tool.outputs[0].value(told) == told["peak"]["right_px"]
+        assert tool.outputs[0].value(summary) == summary["peak"]["right_px"]
 
 
 def test_different_pixel_sizes(tmp_path: Path) -> None:

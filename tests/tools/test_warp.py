@@ -83,7 +83,7 @@ def stored(path: Path, input_grid: Grid = GRID) -> Path:
         input_px=px,
         score=np.ones(30),
         covariance_px2=np.tile(np.eye(2), (30, 1, 1)),
-        two_way_error_px=np.zeros(30),
+        forward_backward_error_px=np.zeros(30),
         is_check=np.arange(30) % 5 == 0,
         state=np.where(np.arange(30) == 7, "rejected: far", "used"),
     )

@@ -1,7 +1,8 @@
 """Registration consistency: how far several transforms that should cancel out do not.
 
-Consistency needs no points, but tells no accuracy: transforms that are wrong in the same way are
-consistent. [Suri2010] eq 2.4 (two-way, after [Holden2000]) and eq 5.2 (three-way).
+Consistency needs no points, but is no measure of accuracy: transforms that are wrong in the same
+way are consistent. Source: [Suri2010] eq 2.4 (two-way, after Holden et al. 2000) and eq 5.2
+(three-way).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from rasterio.crs import CRS
 from ..errors import GeoreferencingError, NoOverlapError
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid, reproject
-from .accuracy import PointErrors
+from .point_errors import PointErrors
 
 FloatArray = NDArray[np.float64]
 

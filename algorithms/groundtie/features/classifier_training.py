@@ -46,6 +46,16 @@ class Training:
     px: FloatArray
     bands: int = 0
 
+    @classmethod
+    def concatenate(cls, parts: list[Training], bands: int) -> Training:
+        """Return the points of all parts."""
+        return cls(
+            np.concatenate([part.statistics for part in parts]),
+            np.concatenate([part.kept for part in parts]),
+            np.concatenate([part.px for part in parts]),
+            bands,
+        )
+
     def take(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Training:
         """Return the points that the mask or index `which` selects."""
         return Training(self.statistics[which], self.kept[which], self.px[which], self.bands)

@@ -1,8 +1,8 @@
-"""SIFT's descriptor on any gradient: what is around a feature, as 128 numbers.
+"""SIFT's descriptor on any gradient: what is around a keypoint, as 128 numbers.
 
-Gradients around a feature are sampled on a lattice that turns and grows with it, so where a sample
-lies in the descriptor is the same for all features: its share in the 4 × 4 cells is one constant
-matrix, and all features are described by one product. [Lowe2004]; [Suri2010] appendix.
+Gradients around a keypoint are sampled on a lattice that rotates and grows with it, so where a
+sample lies in the descriptor is the same for all keypoints: its share in the 4 × 4 cells is one
+constant matrix, and all keypoints are described by one product. Lowe 2004; [Suri2010] appendix.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
-from ..similarity.orientation import compress, is_logarithmic
-from .gradients import FloatImage, Gradient, needs_positive
-from .points import FeaturePoints
+from ..similarity.orientation import compress
+from .gradients import FloatImage, Gradient
+from .keypoints import Keypoints
 from .sampling import sampled_gradient, square_lattice, unit_rows
 from .scale_space import describe_at_scales
 
@@ -36,55 +36,29 @@ _SAMPLES = 4
 # The longest a component may be before the descriptor is normalised again.
 _LARGEST_COMPONENT = 0.2
 
-# Amplitude in nepers, of which decibels are so many.
-_NEPER_PER_DB = np.log(10) / 20
-
 
 @dataclass(frozen=True)
-class Descriptor:
-    """How features are described.
+class SiftDescriptor:
+    """How keypoints are described: all keep the image's axes."""
 
-    Parameters
-    ----------
-    estimator
-        One of `gradients.GRADIENTS`.
-    upright
-        Whether features keep the image's axes; else each is turned by its own orientation, and
-        one with several is repeated.
-    """
-
-    estimator: str = "differences"
-    upright: bool = True
-
-    def describe(self, window: Patch, found: FeaturePoints) -> tuple[FeaturePoints, FloatImage]:
-        """Return the features, oriented if they are to be, and what is around them.
+    def describe(self, window: Patch, found: Keypoints) -> tuple[Keypoints, FloatImage]:
+        """Return the n keypoints and what is around them.
 
         Parameters
         ----------
         window
-            The image; masked pixels tell nothing.
+            The image; masked pixels add nothing.
         found
-            Features in it, shape (n,).
+            Keypoints in it, shape (n,).
 
         Returns
         -------
         points, descriptors
-            m features, m ≥ n unless upright, and their descriptors of unit length (zero where
-            there is no gradient), shape (m, 128) float32: rows and columns of cells, then
-            directions from columns towards rows.
+            The keypoints and their descriptors of unit length (zero where there is no gradient),
+            shape (n, 128) float32: rows and columns of cells, then directions from columns
+            towards rows.
         """
-        image = compress(window)
-        if needs_positive(self.estimator):
-            image = np.exp(image * np.float32(_NEPER_PER_DB) if is_logarithmic(window) else image)
-        return self.describe_image(image, window.valid, found)
-
-    def describe_image(
-        self, image: FloatImage, valid: NDArray[np.bool_], found: FeaturePoints
-    ) -> tuple[FeaturePoints, FloatImage]:
-        """Describe features of an image whose grey values are taken as they are."""
-        return describe_at_scales(
-            image, valid, found, self.estimator, self.upright, _described, LENGTH
-        )
+        return describe_at_scales(compress(window), window.valid, found, sift_rows, LENGTH)
 
 
 @cache
@@ -100,8 +74,8 @@ def _cell_weights() -> tuple[FloatArray, FloatImage]:
     return lattice * _CELL_SCALES, weights.astype(np.float32)
 
 
-def _described(fields: Gradient, points: FeaturePoints) -> FloatImage:
-    """Return the descriptors of features, shape (n, 128)."""
+def sift_rows(fields: Gradient, points: Keypoints) -> FloatImage:
+    """Return the descriptors of keypoints in pixels of a gradient, shape (n, 128)."""
     lattice, weights = _cell_weights()
     strength, direction = sampled_gradient(fields, points, lattice)
     place = direction * np.float32(DIRECTIONS / (2 * np.pi))

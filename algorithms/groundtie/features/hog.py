@@ -1,14 +1,14 @@
-"""Histograms of oriented gradients as descriptors of features ([Patel2017] 4.3–4.5).
+"""Histograms of oriented gradients as descriptors of keypoints ([Patel2017] 4.3–4.5).
 
-The patch of 41 × 41 samples around a feature is divided into 3 × 3 cells; each has a histogram of
+The patch of 41 × 41 pixels around a keypoint is divided into 3 × 3 cells; each has a histogram of
 the directions of gradients, which neither contrast nor its sign changes: 81 values with nine
-directions, 63 with seven. [Dalal2005].
+directions, 63 with seven. Dalal & Triggs 2005.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -18,23 +18,21 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .gradients import FloatImage, Gradient
-from .points import FeaturePoints
-from .sampling import sampled_gradient, square_lattice, unit_rows
-from .scale_space import describe_at_scales, gradient_at_scale
+from .keypoints import Keypoints
+from .sampling import unit_rows
+from .scale_space import gradient_at_scale
 
 FloatArray = NDArray[np.float64]
 
 PATCH_PX = 41
 CELLS = 3
 
-# A scaled patch has a sample every so many scales: it is as wide as SURF's descriptor.
-_SAMPLE_SCALES = 0.5
-
-_GRADIENT = "differences"
+# Scale at which gradients are taken, in pixels.
+_SCALE_PX = 2.0
 
 _REACH_PX = PATCH_PX // 2
 
-# So many features are described at a time: their patches fit into the last cache. Directions are
+# So many keypoints are described at a time: their patches fit into the last cache. Directions are
 # spread for so many rows of them at a time: what a band needs is soon used again, and found there.
 _BLOCK = 64
 _BAND_ROWS = 128
@@ -42,74 +40,44 @@ _BAND_ROWS = 128
 
 @dataclass(frozen=True)
 class HogDescriptor:
-    """How features are described.
+    """How keypoints are described: all have patches of one size that keep the image's axes.
 
     Parameters
     ----------
     directions
         Number of directions from 0° to 180°; descriptors have 9 times as many values.
-    upright
-        Whether features keep the image's axes; else each is turned by its own orientation, and
-        one with several is repeated.
-    scaled
-        Whether the patch grows with the feature; else all have 41 × 41 pixels, upright ones those
-        nearest to the feature, and keep their scales only where they are returned.
     """
 
     directions: int = 9
-    upright: bool = True
-    scaled: bool = True
 
     @property
     def length(self) -> int:
         """How many values a descriptor has."""
         return CELLS * CELLS * self.directions
 
-    def describe(self, window: Patch, found: FeaturePoints) -> tuple[FeaturePoints, FloatImage]:
-        """Return the features, oriented if they are to be, and what is around them.
+    def describe(self, window: Patch, found: Keypoints) -> tuple[Keypoints, FloatImage]:
+        """Return the n keypoints and what is around them.
 
         Parameters
         ----------
         window
-            The image; masked pixels tell nothing.
+            The image; masked pixels add nothing.
         found
-            Features in it, shape (n,).
+            Keypoints in it, shape (n,). Patches lie on the nearest pixels: half a pixel is little
+            in a patch, and what patches share is found once.
 
         Returns
         -------
         points, descriptors
-            m features, m ≥ n unless upright, and their descriptors of unit length (zero where
-            there is no gradient), shape (m, 9 · directions) float32: rows and columns of cells,
-            then directions from columns towards rows.
+            The keypoints and their descriptors of unit length (zero where there is no gradient),
+            shape (n, 9 · directions) float32: rows and columns of cells, then directions from
+            columns towards rows.
         """
-        return self.describe_image(compress(window), window.valid, found)
+        fields = gradient_at_scale(compress(window), window.valid, _SCALE_PX)
+        return found, self._described(fields, found)
 
-    def describe_image(
-        self, image: FloatImage, valid: NDArray[np.bool_], found: FeaturePoints
-    ) -> tuple[FeaturePoints, FloatImage]:
-        """Describe features of an image whose grey values are taken as they are."""
-        if not self.scaled and self.upright:
-            # Half a pixel is little in a patch: on whole pixels, what patches share is found once.
-            fields = gradient_at_scale(image, valid, 1 / _SAMPLE_SCALES, _GRADIENT)
-            return found, self._described_upright(fields, found)
-        if not self.scaled:
-            found = replace(found, scale_px=np.full(len(found), 1 / _SAMPLE_SCALES))
-        return describe_at_scales(
-            image, valid, found, _GRADIENT, self.upright, self._described, self.length
-        )
-
-    def _described(self, fields: Gradient, points: FeaturePoints) -> FloatImage:
-        """Return the descriptors of features in pixels of the gradient."""
-        lattice = square_lattice(_SAMPLE_SCALES * PATCH_PX / 2, PATCH_PX)
-        strength, direction = sampled_gradient(fields, points, lattice)
-        weights = np.kron(_weights_along(), _weights_along())
-        values = np.empty((len(points), CELLS * CELLS, self.directions), np.float32)
-        for number, share in enumerate(self._shares(strength, direction)):
-            values[:, :, number] = share @ weights
-        return unit_rows(values.reshape(len(points), self.length))
-
-    def _described_upright(self, fields: Gradient, points: FeaturePoints) -> FloatImage:
-        """Return the descriptors of features whose patches are of whole pixels."""
+    def _described(self, fields: Gradient, points: Keypoints) -> FloatImage:
+        """Return the descriptors of keypoints."""
         height, width = fields[0].shape
         cols, rows = np.rint(points.position_px).astype(np.intp).T
         cols, rows = np.clip(cols, 0, width - 1), np.clip(rows, 0, height - 1)
@@ -136,7 +104,7 @@ class HogDescriptor:
         shape = _BAND_ROWS + 2 * _REACH_PX, width + 2 * _REACH_PX, self.directions
         band = np.zeros(shape, np.float32)
         inside = band[top - first + _REACH_PX :][: stop - top, _REACH_PX:-_REACH_PX]
-        shares = self._shares(strength, np.arctan2(along_rows, along_cols))
+        shares = directed_shares(strength, np.arctan2(along_rows, along_cols), self.directions)
         for number, share in enumerate(shares):
             inside[..., number] = share
         return band
@@ -150,28 +118,31 @@ class HogDescriptor:
         patch_rows = sliding_window_view(band.reshape(len(band), -1), length, axis=1)
         down = rows[:, None] + np.arange(PATCH_PX)
         patches = patch_rows[down, cols[:, None] * self.directions]
-        weights = _weights_along()
+        weights = weights_along()
         in_rows = (weights.T @ patches).reshape(-1, CELLS, PATCH_PX, self.directions)
         return np.asarray(weights.T @ in_rows)
 
-    def _shares(self, strength: FloatImage, angle: FloatImage) -> Iterator[FloatImage]:
-        """Return, direction by direction, the share that gradients have in it."""
-        count = np.float32(self.directions)
-        place = angle * (count / np.float32(np.pi))
-        # Opposite directions are the same: from the first one to where it comes again.
-        place -= count * np.floor(place / count)
-        for number in range(self.directions):
-            # Neighbouring directions share what lies between them.
-            away = np.abs(place - np.float32(number))
-            if number == 0:
-                np.minimum(away, count - place, out=away)
-            share = np.maximum(1 - away, 0, out=away)
-            share *= strength
-            yield share
+
+def directed_shares(
+    strength: FloatImage, angle: FloatImage, directions: int
+) -> Iterator[FloatImage]:
+    """Return, direction by direction, the share that gradients have in it."""
+    count = np.float32(directions)
+    place = angle * (count / np.float32(np.pi))
+    # Opposite directions are the same: from the first one to where it comes again.
+    place -= count * np.floor(place / count)
+    for number in range(directions):
+        # Neighbouring directions share what lies between them.
+        away = np.abs(place - np.float32(number))
+        if number == 0:
+            np.minimum(away, count - place, out=away)
+        share = np.maximum(1 - away, 0, out=away)
+        share *= strength
+        yield share
 
 
 @cache
-def _weights_along() -> FloatImage:
+def weights_along() -> FloatImage:
     """Return the share of samples along a side of the patch in the cells, shape (41, 3)."""
     # Cells share their samples with their neighbours, as directions do.
     at = (np.arange(PATCH_PX) + 0.5) * CELLS / PATCH_PX - 0.5

@@ -1,4 +1,4 @@
-"""Labelled features of an image, from a raster or a vector layer, to train a classifier with."""
+"""Labelled keypoints of an image, from a raster or a vector layer, to train a classifier with."""
 
 from __future__ import annotations
 
@@ -13,34 +13,34 @@ from numpy.typing import NDArray
 from rasterio.crs import CRS
 from rasterio.warp import transform_geom
 
+from ..context import Context
 from ..errors import GeoreferencingError, ParameterError, VectorLayerError
-from ..progress import SILENT, Progress
 from ..rasters.grid import Grid, reproject
 from ..rasters.pair import Image
 from ..rasters.reading import RasterSource, Window
 from ..rasters.warping import sample
 from .classifier_training import Training
 from .patch_statistics import BAND_RATIOS, NO_BANDS, PATCH_PX, patch_statistics
-from .tiles import MARGIN_PX, Detecting, inside, tiles
+from .tiles import MARGIN_PX, Detecting, inside, tiles, widened
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.int8]
 
-# What a feature is labelled: to be kept, to be left out, or not at all.
+# What a keypoint is labelled: to be kept, to be left out, or not at all.
 KEPT, LEFT_OUT, UNKNOWN = 1, 0, -1
 
 
-# A feature's descriptor sees its whole patch: matches are rarely right if more of it than this is
+# A keypoint's descriptor sees its whole patch: matches are rarely right if more of it than this is
 # to be left out.
 _LARGEST_SHARE = 0.25
 
 
 class LabelSource(Protocol):
-    """What tells the labels of pixels, or has labelled points of its own."""
+    """Labels of pixels, or labelled points."""
 
     @property
     def chosen(self) -> bool:
-        """Whether points were chosen: how many each class has tells nothing then."""
+        """Whether points were chosen: the sizes of the classes mean nothing then."""
 
     def label(self, piece: Grid) -> Labels:
         """Return the labels of a grid's pixels, shape (h, w)."""
@@ -114,27 +114,27 @@ class LayerLabels:
 
 
 def patch_labels(labels: Labels, px: FloatArray) -> Labels:
-    """Return the labels of features by those of all pixels in their patches.
+    """Return the labels of keypoints by those of all pixels in their patches.
 
     Parameters
     ----------
     labels
         Of the pixels, shape (h, w).
     px
-        Positions (col, row) of n features, shape (n, 2).
+        Positions (col, row) of n keypoints, shape (n, 2).
 
     Returns
     -------
-    Shape (n,): unknown where the feature's own pixel is, and left out where more than a quarter
+    Shape (n,): unknown where the keypoint's own pixel is, and left out where more than a quarter
     of the known pixels of the patch around it is.
     """
     left_out, known = (
         cv2.blur(which.astype(np.float32), (PATCH_PX, PATCH_PX), borderType=cv2.BORDER_CONSTANT)
         for which in (labels == LEFT_OUT, labels != UNKNOWN)
     )
-    told = np.where(left_out > _LARGEST_SHARE * known, LEFT_OUT, KEPT)
+    label = np.where(left_out > _LARGEST_SHARE * known, LEFT_OUT, KEPT)
     cols, rows = np.rint(px).astype(int).T
-    return np.where(labels == UNKNOWN, UNKNOWN, told)[rows, cols].astype(np.int8)
+    return np.where(labels == UNKNOWN, UNKNOWN, label)[rows, cols].astype(np.int8)
 
 
 def raster_labels(source: RasterSource, image: Image, left_out: Sequence[str]) -> RasterLabels:
@@ -163,7 +163,7 @@ def layer_labels(
     path
         Any vector file that fiona reads; its first layer is taken.
     field
-        Name of the attribute that tells the class.
+        Name of the attribute of the class.
     left_out
         Values of the attribute that are to be left out; all others are kept.
     grid
@@ -224,46 +224,39 @@ def labelled_points(
     labels: LabelSource,
     detector: Detecting,
     statistics: str,
-    progress: Progress = SILENT,
+    context: Context,
 ) -> Training:
-    """Return labelled features of an image, and labelled points, with what is around them.
+    """Return labelled keypoints of an image, and labelled points, with what is around them.
 
     Parameters
     ----------
     image
         The image; it is read in tiles.
     labels
-        What tells which are to be kept.
+        Which are to be kept.
     detector
-        What finds features.
+        What finds keypoints.
     statistics
         One of `patch_statistics.STATISTICS`.
-    progress
-        Is told of every tile.
+    context
+        Where tiles are looked at.
     """
     grid = image.source.grid
     looked_at = len(image.source.image_bands) if statistics == BAND_RATIOS else 0
-    parts = []
-    every = list(tiles(grid))
-    for number, tile in enumerate(every):
-        corner = tile.col - MARGIN_PX, tile.row - MARGIN_PX
-        piece = grid.window(*corner, tile.width + 2 * MARGIN_PX, tile.height + 2 * MARGIN_PX)
+
+    def look(tile: Window) -> Training:
+        piece = grid.window(*widened(tile, MARGIN_PX))
         core = Window(MARGIN_PX, MARGIN_PX, tile.width, tile.height)
         patch = image.read_onto(piece, grid.map_to_pixel)
         found = detector.detect(patch)
         px = found.take(inside(found.position_px, core)).position_px
-        told = patch_labels(labels.label(piece), px)
-        own, own_labels = labels.points(piece)
-        here = inside(own, core)
-        px, told = np.vstack([px, own[here]]), np.concatenate([told, own_labels[here]])
-        px, told = px[told != UNKNOWN], told[told != UNKNOWN]
+        label = patch_labels(labels.label(piece), px)
+        own, own_label = labels.points(piece)
+        within = inside(own, core)
+        px, label = np.vstack([px, own[within]]), np.concatenate([label, own_label[within]])
+        px, label = px[label != UNKNOWN], label[label != UNKNOWN]
         bands = image.bands_onto(piece, grid.map_to_pixel) if looked_at else NO_BANDS
         values = patch_statistics(statistics, patch, px, bands)
-        parts.append(Training(values, told == KEPT, px + corner))
-        progress.update((number + 1) / len(every))
-    return Training(
-        np.concatenate([part.statistics for part in parts]),
-        np.concatenate([part.kept for part in parts]),
-        np.concatenate([part.px for part in parts]),
-        looked_at,
-    )
+        return Training(values, label == KEPT, px + np.subtract(tile[:2], MARGIN_PX))
+
+    return Training.concatenate(list(context.map(look, list(tiles(grid)))), looked_at)

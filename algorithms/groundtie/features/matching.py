@@ -1,10 +1,9 @@
-"""Which features belong together: by nearest descriptors, their ratio, and where they lie."""
+"""Which keypoints belong together: by nearest descriptors, their ratio, and where they lie."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -13,14 +12,8 @@ FloatArray = NDArray[np.float64]
 Descriptors = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
-METHODS = ("exact", "kd-tree")
-
 # How far a partner may lie from its predicted place ([Suri2010] 6.9.2).
 GATE_PX = 16.0
-
-# The forest of k-d trees, and how many leaves are looked at (best bin first [Beis1997]).
-_TREES = 4
-_CHECKS = 64
 
 # So many distances are held in memory at a time.
 _BLOCK = 4_000_000
@@ -28,7 +21,7 @@ _BLOCK = 4_000_000
 
 @dataclass(frozen=True)
 class Matches:
-    """Features of a first table and their partners in a second one.
+    """Keypoints of a first table and their partners in a second one.
 
     Parameters
     ----------
@@ -67,40 +60,11 @@ class Matches:
 
 @dataclass(frozen=True)
 class Nearest:
-    """For each feature its nearest partner, -1: none, and the distances to it and to the next."""
+    """For each keypoint its nearest partner, -1: none, and the distances to it and to the next."""
 
     index: Indices
     distance: FloatArray
     next_distance: FloatArray
-
-
-def match(
-    first: Descriptors,
-    second: Descriptors,
-    ratio: float = 1.0,
-    mutual: bool = False,
-    method: str = "kd-tree",
-) -> Matches:
-    """Match features by their descriptors alone.
-
-    Parameters
-    ----------
-    first, second
-        Descriptors, shapes (n, k) and (m, k).
-    ratio
-        Largest ratio of the distances to the nearest and to the next partner; at 1 each feature
-        keeps its nearest one.
-    mutual
-        Whether each must be the other's nearest.
-    method
-        "exact", or "kd-tree": approximately, by a forest of k-d trees.
-    """
-    forward = _nearest(first, second, method)
-    found = Matches.of(forward, ratio)
-    if not mutual:
-        return found
-    back = _nearest(second, first, method).index
-    return found.take(back[found.second] == found.first)
 
 
 def match_near(
@@ -112,10 +76,10 @@ def match_near(
     ratio: float = 1.0,
     mutual: bool = True,
 ) -> Matches:
-    """Match features whose partner is known to lie near a predicted place.
+    """Match keypoints whose partner is known to lie near a predicted place.
 
     Only partners within the gate are compared, which leaves hundreds of times fewer wrong ones
-    than the whole image has; so the ratio need not tell right from wrong ([Suri2010] 6.9).
+    than the whole image has; so the ratio need not separate inliers from outliers ([Suri2010] 6.9).
 
     Parameters
     ----------
@@ -127,8 +91,11 @@ def match_near(
         Where the second lie, shape (m, 2).
     gate_px
         How far a partner may lie from there.
-    ratio, mutual
-        See `match`.
+    ratio
+        Largest ratio of the distances to the nearest and to the next partner; at 1 each keypoint
+        keeps its nearest one.
+    mutual
+        Whether each must be the other's nearest.
     """
     pairs = _pairs_within(predicted_px, position_px, gate_px)
     distance = _pair_distances(first, second, pairs)
@@ -137,44 +104,6 @@ def match_near(
         return found
     back = _best_of_each(pairs[:, ::-1], distance, len(second)).index
     return found.take(back[found.second] == found.first)
-
-
-def _nearest(first: Descriptors, second: Descriptors, method: str) -> Nearest:
-    if len(first) == 0 or len(second) == 0:
-        nothing = np.full(len(first), np.inf)
-        return Nearest(np.full(len(first), -1), nothing, nothing)
-    if len(second) == 1:
-        distance = np.linalg.norm(first - second, axis=1).astype(float)
-        return Nearest(np.zeros(len(first), np.intp), distance, np.full(len(first), np.inf))
-    if method == "exact":
-        index, distance = _two_nearest(first, second)
-    else:
-        index, distance = _two_nearest_by_trees(first, second)
-    return Nearest(index, distance[:, 0], distance[:, 1])
-
-
-def _two_nearest(first: Descriptors, second: Descriptors) -> tuple[Indices, FloatArray]:
-    own, other = (first**2).sum(axis=1), (second**2).sum(axis=1)
-    index = np.zeros((len(first), 2), np.intp)
-    squared = np.zeros((len(first), 2))
-    step = max(_BLOCK // len(second), 1)
-    for start in range(0, len(first), step):
-        block = slice(start, start + step)
-        distances = own[block, None] + other - 2 * (first[block] @ second.T)
-        two = np.argpartition(distances, 1, axis=1)[:, :2]
-        values = np.take_along_axis(distances, two, axis=1)
-        order = np.argsort(values, axis=1, kind="stable")
-        index[block] = np.take_along_axis(two, order, axis=1)
-        squared[block] = np.take_along_axis(values, order, axis=1)
-    return index[:, 0], np.sqrt(np.maximum(squared, 0))
-
-
-def _two_nearest_by_trees(first: Descriptors, second: Descriptors) -> tuple[Indices, FloatArray]:
-    # The trees are drawn at random: the same seed, the same result.
-    cv2.setRNGSeed(0)
-    index = cv2.flann.Index(second, {"algorithm": 1, "trees": _TREES})
-    found, squared = index.knnSearch(first, 2, params={"checks": _CHECKS})
-    return found[:, 0].astype(np.intp), np.sqrt(np.asarray(squared, float))
 
 
 def _pairs_within(first: FloatArray, second: FloatArray, reach: float) -> Indices:

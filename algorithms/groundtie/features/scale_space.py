@@ -1,4 +1,4 @@
-"""Gradients of an image at the scales of its features, for whatever describes these."""
+"""Gradients of an image at the scales of its keypoints, for whatever describes these."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .gradients import FloatImage, Gradient, gradient
-from .points import FeaturePoints
-from .sampling import oriented
+from .gradients import FloatImage, Gradient, GradientOperator, differences
+from .keypoints import Keypoints
 
-Describe = Callable[[Gradient, FeaturePoints], FloatImage]
+Describe = Callable[[Gradient, Keypoints], FloatImage]
+Orient = Callable[[Gradient, Keypoints], tuple[Keypoints, NDArray[np.int_]]]
 
 # Scale space: layers an octave, the first scale, and how much an image is blurred as it is.
 _LAYERS = 3
@@ -27,39 +27,39 @@ _SEES_SCALES = 2.5
 # Gradients below this share of the largest value are rounding.
 _ROUNDING = 1e-5
 
-# So many features are described at a time.
+# So many keypoints are described at a time.
 _BLOCK = 512
 
 
 def describe_at_scales(
     image: FloatImage,
     valid: NDArray[np.bool_],
-    found: FeaturePoints,
-    estimator: str,
-    upright: bool,
+    found: Keypoints,
     describe: Describe,
     length: int,
-) -> tuple[FeaturePoints, FloatImage]:
-    """Return features, oriented if they are to be, and their descriptors.
+    gradient: GradientOperator = differences,
+    orient: Orient | None = None,
+) -> tuple[Keypoints, FloatImage]:
+    """Return keypoints and their descriptors.
 
     Parameters
     ----------
     image, valid
         Grey values and which of them count, shape (h, w).
     found
-        Features, shape (n,).
-    estimator
-        One of `gradients.GRADIENTS`.
-    upright
-        Whether features keep the image's axes; else each is turned by its own orientation, and
-        one with several is repeated.
+        Keypoints, shape (n,).
     describe
-        Returns the descriptors, shape (m, k), of m features from the gradient at their scale, in
+        Returns the descriptors, shape (m, k), of m keypoints from the gradient at their scale, in
         whose pixels they are.
     length
         How many values a descriptor has.
+    gradient
+        What estimates the gradient of an image.
+    orient
+        Returns keypoints once for each of their orientations, and which one each is; None: all
+        keep the image's axes.
     """
-    tables = [FeaturePoints.none()]
+    tables = [Keypoints.none()]
     descriptors = [np.zeros((0, length), np.float32)]
     owners = [np.zeros(0, int)]
     layer_of = _layer_of(found.scale_px)
@@ -68,7 +68,7 @@ def describe_at_scales(
     for layer, level in zip(layers, _scale_space(image, layers), strict=True):
         pixel = 2 ** _octave_of(layer)
         seen = distance[::pixel, ::pixel] > _SEES_SCALES * _scale_of(layer)
-        fields = _gradient(level, seen, estimator)
+        fields = _gradient(level, seen, gradient)
         own = np.nonzero(layer_of == layer)[0]
         for start in range(0, len(own), _BLOCK):
             block = own[start : start + _BLOCK]
@@ -77,18 +77,16 @@ def describe_at_scales(
                 points, position_px=points.position_px / pixel, scale_px=points.scale_px / pixel
             )
             index = np.arange(len(block))
-            if not upright:
-                local, index = oriented(fields, local)
+            if orient is not None:
+                local, index = orient(fields, local)
             descriptors.append(describe(fields, local))
-            tables.append(points.take(index).turned(local.orientation_rad))
+            tables.append(points.take(index).with_orientation(local.orientation_rad))
             owners.append(block[index])
     order = np.argsort(np.concatenate(owners), kind="stable")
-    return FeaturePoints.concatenate(tables).take(order), np.concatenate(descriptors)[order]
+    return Keypoints.concatenate(tables).take(order), np.concatenate(descriptors)[order]
 
 
-def gradient_at_scale(
-    image: FloatImage, valid: NDArray[np.bool_], scale_px: float, estimator: str
-) -> Gradient:
+def gradient_at_scale(image: FloatImage, valid: NDArray[np.bool_], scale_px: float) -> Gradient:
     """Return the gradient at the layer of scale space that is nearest to a scale.
 
     Parameters
@@ -97,8 +95,6 @@ def gradient_at_scale(
         Grey values and which of them count, shape (h, w).
     scale_px
         The scale, below twice that of the first octave, whose pixels are the image's.
-    estimator
-        One of `gradients.GRADIENTS`.
 
     Returns
     -------
@@ -106,7 +102,7 @@ def gradient_at_scale(
     """
     layer = _layer_of(scale_px)
     (level,) = _scale_space(image, [layer])
-    return _gradient(level, _distance(valid) > _SEES_SCALES * _scale_of(layer), estimator)
+    return _gradient(level, _distance(valid) > _SEES_SCALES * _scale_of(layer), differences)
 
 
 def _layer_of(scale_px: Any) -> Any:
@@ -150,9 +146,9 @@ def _blurred(image: FloatImage, blur_px: float, wanted_px: float) -> FloatImage:
     return np.asarray(cv2.GaussianBlur(np.ascontiguousarray(image), (0, 0), more), np.float32)
 
 
-def _gradient(level: FloatImage, seen: NDArray[np.bool_], estimator: str) -> Gradient:
+def _gradient(level: FloatImage, seen: NDArray[np.bool_], gradient: GradientOperator) -> Gradient:
     """Return the gradient of a level, zero where masked pixels are seen or all is rounding."""
-    along_cols, along_rows = gradient(level, estimator)
+    along_cols, along_rows = gradient(level)
     least = np.float32(_ROUNDING * np.abs(level).max())
     counts = seen & (along_cols**2 + along_rows**2 > least**2)
     zero = np.float32(0)

@@ -12,7 +12,7 @@ from ..rasters.grid import Grid
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
 from .detectors import FloatImage
-from .points import FeaturePoints
+from .keypoints import Keypoints
 
 FloatArray = NDArray[np.float64]
 
@@ -24,14 +24,14 @@ MARGIN_PX = 64
 class Detecting(Protocol):
     """What finds features."""
 
-    def detect(self, window: Patch) -> FeaturePoints:
+    def detect(self, window: Patch) -> Keypoints:
         """Return the features of an image window, upright."""
 
 
 class Describing(Protocol):
     """What describes features."""
 
-    def describe(self, window: Patch, found: FeaturePoints) -> tuple[FeaturePoints, FloatImage]:
+    def describe(self, window: Patch, found: Keypoints) -> tuple[Keypoints, FloatImage]:
         """Return m features, which may be repeated, and their descriptors, shape (m, k)."""
 
 

@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 from ..errors import TooFewPointsError
 from ..rasters.grid import Grid
 from .fitting import fit_model
+from .model_choice import left_out_blocks
 from .models import Frame, Model
-from .robust import block_folds, fit_robustly
+from .robust import fit_robustly
 from .tie_points import TiePoints
 from .transform import Transform
 
 FloatArray = NDArray[np.float64]
 
-# Standard deviation that right matches may have, in matching pixels.
+# Standard deviation that inliers may have, in matching pixels.
 SIGMA_RANGE_PX = (0.2, 2.5)
 
 
@@ -34,7 +35,7 @@ class Estimate:
         The points of the fit, with those that it rejected.
     fold_models
         The model fitted again without one block of points after the other, from pixel positions
-        of the matching grid to where the input claims them to be, in pixels of this grid.
+        of the matching grid to where the input nominally has them, in pixels of this grid.
     """
 
     transform: Transform
@@ -44,8 +45,8 @@ class Estimate:
     def spread_px(self, at_px: FloatArray) -> FloatArray:
         """Return the standard deviation of predictions, shape (n,), in matching pixels.
 
-        By the jackknife over blocks of neighbouring points ([Efron1993], chapter 11),
-        so it grows where the points do not hold the model.
+        By the jackknife over blocks of neighbouring points (see `jackknife_sigma`), so it grows
+        where the points do not hold the model.
 
         Parameters
         ----------
@@ -62,30 +63,51 @@ def jackknife_spread(
 
     Infinite for fewer than two models, each of which was fitted without one block of points.
     """
-    count = len(fold_models)
+    return jackknife_sigma([model(at_px) for model in fold_models], len(at_px))
+
+
+def jackknife_sigma(estimates: Sequence[FloatArray], size: int) -> FloatArray:
+    """Return the standard deviation, shape (size,), of estimates without one block each, (size, k).
+
+    All of their k axes together; infinite for fewer than two. Source: [Efron1993], chapter 11.
+    """
+    count = len(estimates)
     if count < 2:
-        return np.full(len(at_px), np.inf)
-    predictions = [model(at_px) for model in fold_models]
-    return np.asarray(np.sqrt(np.var(predictions, axis=0).sum(axis=1) * (count - 1)))
+        return np.full(size, np.inf)
+    return np.asarray(np.sqrt(np.var(estimates, axis=0).sum(axis=1) * (count - 1)))
+
+
+def fit_without_blocks(
+    kind: str, px: FloatArray, nominal_px: FloatArray, weights: FloatArray
+) -> tuple[Model, ...]:
+    """Return the models of a kind that leave one block of points after the other out.
+
+    Parameters are those of `fit_model`, in pixels; all models have one frame.
+    """
+    frame = Frame.around(px)
+    return tuple(
+        fit_model(kind, px, nominal_px, np.where(block, 0.0, weights), frame)
+        for block in left_out_blocks(px)
+    )
 
 
 def fit_thin_plate(
-    points: TiePoints, as_claimed: Transform, grid: Grid, start: Model, radius_px: float
+    points: TiePoints, nominal: Transform, grid: Grid, start: Model, radius_px: float
 ) -> tuple[Model, tuple[Model, ...]]:
-    """Fit a thin-plate spline to tie points of which some may be wrong.
+    """Fit a thin-plate spline to tie points of which some may be outliers.
 
     Parameters
     ----------
     points
         Points of the fit.
-    as_claimed
-        The transform that believes the input's georeferencing.
+    nominal
+        The transform by the input's own georeferencing.
     grid
         The matching grid.
     start
         A simpler model of the same, between pixel positions of the grid.
     radius_px
-        How far wrong matches may have fallen from the truth, in matching pixels.
+        How far outliers may have fallen from the truth, in matching pixels.
 
     Returns
     -------
@@ -99,16 +121,11 @@ def fit_thin_plate(
     """
     used = points.take(points.used)
     px = grid.map_to_pixel(used.reference_xy)
-    claimed_px = grid.map_to_pixel(as_claimed.claimed_xy(used.input_px))
+    nominal_px = grid.map_to_pixel(nominal.nominal_xy(used.input_px))
     if len(used) < 4:
         raise TooFewPointsError(f"only {len(used)} points were matched")
     variances = np.trace(used.covariance_px2, axis1=1, axis2=2) / 2
     area = (2 * radius_px + 1) ** 2
-    model, mixture = fit_robustly("tps", px, claimed_px, variances, start, area, SIGMA_RANGE_PX)
-    weights = np.where(mixture.right, 1 / (mixture.sigma**2 + variances), 0.0)
-    folds = block_folds(px)
-    fold_models = [
-        fit_model("tps", px, claimed_px, np.where(folds == fold, 0.0, weights), Frame.around(px))
-        for fold in np.unique(folds)
-    ]
-    return model, tuple(fold_models)
+    model, mixture = fit_robustly("tps", px, nominal_px, variances, start, area, SIGMA_RANGE_PX)
+    weights = np.where(mixture.inliers, 1 / (mixture.sigma**2 + variances), 0.0)
+    return model, fit_without_blocks("tps", px, nominal_px, weights)

@@ -27,7 +27,7 @@ TPS_STIFFNESS = 1e-2
 def fit_model(
     kind: str,
     xy: FloatArray,
-    claimed_xy: FloatArray,
+    nominal_xy: FloatArray,
     weights: FloatArray | None = None,
     frame: Frame | None = None,
 ) -> Model:
@@ -37,8 +37,8 @@ def fit_model(
     ----------
     kind
         One of `models.KINDS`.
-    xy, claimed_xy
-        Positions on the reference map and where the input claims them to be, shape (n, 2).
+    xy, nominal_xy
+        Positions on the reference map and where the input nominally has them, shape (n, 2).
     weights
         Weight of each pair, shape (n,); by default all the same. Zero leaves a pair out.
     frame
@@ -57,13 +57,13 @@ def fit_model(
             f"the {kind} model needs at least {needed} points; there are {taken.sum()}"
         )
     frame = frame or Frame.around(xy[taken])
-    uv, claimed_uv, weights = frame.enter(xy[taken]), frame.enter(claimed_xy[taken]), weights[taken]
+    uv, nominal_uv, weights = frame.enter(xy[taken]), frame.enter(nominal_xy[taken]), weights[taken]
     if kind == "tps":
-        return _fit_thin_plate(frame, uv, claimed_uv - uv, weights)
+        return _fit_thin_plate(frame, uv, nominal_uv - uv, weights)
     if kind in ("rigid", "similarity"):
-        coefficients = _fit_similarity(uv, claimed_uv, weights, scaled=kind == "similarity")
+        coefficients = _fit_similarity(uv, nominal_uv, weights, scaled=kind == "similarity")
     else:
-        coefficients = _solve(monomials(uv, DEGREE[kind]), claimed_uv - uv, weights)
+        coefficients = _solve(monomials(uv, DEGREE[kind]), nominal_uv - uv, weights)
     return PolynomialModel(kind, frame, coefficients)
 
 
@@ -73,17 +73,17 @@ def _solve(design: FloatArray, target: FloatArray, weights: FloatArray) -> Float
 
 
 def _fit_similarity(
-    uv: FloatArray, claimed_uv: FloatArray, weights: FloatArray, *, scaled: bool
+    uv: FloatArray, nominal_uv: FloatArray, weights: FloatArray, *, scaled: bool
 ) -> FloatArray:
     """Rotation, shift and, if `scaled`, scale, in closed form [Umeyama1991], as coefficients."""
     share = (weights / weights.sum())[:, None]
-    centre, claimed_centre = (share * uv).sum(axis=0), (share * claimed_uv).sum(axis=0)
+    centre, nominal_centre = (share * uv).sum(axis=0), (share * nominal_uv).sum(axis=0)
     z = (uv - centre) @ [1, 1j]
-    claimed_z = (claimed_uv - claimed_centre) @ [1, 1j]
-    turn = np.sum(weights * claimed_z * z.conj())
+    nominal_z = (nominal_uv - nominal_centre) @ [1, 1j]
+    turn = np.sum(weights * nominal_z * z.conj())
     turn = turn / np.sum(weights * np.abs(z) ** 2) if scaled else turn / np.abs(turn)
     linear = np.array([[turn.real, turn.imag], [-turn.imag, turn.real]])
-    return np.vstack([claimed_centre - centre @ linear, linear - np.eye(2)])
+    return np.vstack([nominal_centre - centre @ linear, linear - np.eye(2)])
 
 
 def _fit_thin_plate(

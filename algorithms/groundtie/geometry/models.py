@@ -1,8 +1,7 @@
 """Models of the misregistration: maps of the plane onto itself.
 
 A model takes a position on the reference map to the place where the input's own georeferencing
-claims this ground to lie. Both are in reference map units. [Suri2010] eq 3.27–3.32,
-[Patel2017] eq 2.2–2.7.
+has this ground. Both are in reference map units. Thesis S eq 3.27–3.32, P eq 2.2–2.7.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy as np
 from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 
-from ..rasters.grid import apply_affine
+from ..rasters.grid import apply_affine, compose
 
 FloatArray = NDArray[np.float64]
 
@@ -57,11 +56,11 @@ class Frame:
         """Return the frame in which the positions `xy`, shape (n, 2), lie within ±1."""
         low, high = xy.min(axis=0), xy.max(axis=0)
         scale = float(np.max(high - low) / 2) or 1.0
-        return cls(Affine.translation(*((low + high) / 2)) * Affine.scale(scale))
+        return cls(compose(Affine.translation(*((low + high) / 2)), Affine.scale(scale)))
 
     def seen_from(self, affine: Affine) -> Frame:
         """Return this frame when what was the map is a lattice that `affine` takes to the map."""
-        return Frame(affine * self.to_map)
+        return Frame(compose(affine, self.to_map))
 
     def enter(self, xy: ArrayLike) -> FloatArray:
         """Return map positions in this frame."""
@@ -103,12 +102,12 @@ class Model(ABC):
         """Return the model as values that JSON can carry."""
 
     def __call__(self, xy: ArrayLike) -> FloatArray:
-        """Return the claimed positions, shape (n, 2), of reference map positions `xy`."""
+        """Return the nominal positions, shape (n, 2), of reference map positions `xy`."""
         uv = self.frame.enter(xy)
         return self.frame.leave(uv + self.displacement(uv))
 
     def inverse(self, xy: ArrayLike) -> FloatArray:
-        """Return the reference map positions, shape (n, 2), of claimed positions `xy`.
+        """Return the reference map positions, shape (n, 2), of nominal positions `xy`.
 
         By Newton's method with a numerical Jacobian.
         """
@@ -178,7 +177,7 @@ class PolynomialModel(Model):
 
 @dataclass(frozen=True)
 class ThinPlateSpline(Model):
-    """Thin-plate spline: an affine part and bending weights at control points [Bookstein1989].
+    """Thin-plate spline: an affine part and bending weights at control points (Bookstein 1989).
 
     Parameters
     ----------

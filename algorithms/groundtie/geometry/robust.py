@@ -1,4 +1,4 @@
-"""Robust fits: consensus among many wrong matches, then a mixture of right and wrong ones.
+"""Robust fits: consensus among many outliers, then a mixture of inliers and outliers.
 
 Positions are pixel positions of the matching grid here, so that distances are in pixels.
 """
@@ -19,10 +19,9 @@ _SAMPLES = 600
 _MIXTURE_STEPS = 40
 _FIT_STEPS = 15
 
-# Right matches are first thought to scatter by this, in pixels; starting wide would take a second
-# cluster of wrong matches, as layover makes, for the tail of the right ones.
+# Inliers are first thought to scatter by this, in pixels; starting wide would take a second cluster
+# of outliers, as layover makes, for the tail of the inliers.
 _FIRST_SIGMA = 1.0
-FOLDS = 5
 
 # A linear part this far from the identity is no misregistration of georeferenced images.
 _LARGEST_DISTORTION = 0.25
@@ -30,32 +29,32 @@ _LARGEST_DISTORTION = 0.25
 
 @dataclass(frozen=True)
 class Mixture:
-    """Residuals seen as a mixture of right matches and of matches that fell anywhere.
+    """Residuals seen as a mixture of inliers and of outliers, which fell anywhere.
 
     Parameters
     ----------
     probability
-        Of each match to be right, shape (n,).
+        Of each match to be an inlier, shape (n,).
     sigma
-        Standard deviation of right matches along each axis, in the residuals' unit.
+        Standard deviation of inliers along each axis, in the residuals' unit.
     """
 
     probability: FloatArray
     sigma: float
 
     @property
-    def right(self) -> NDArray[np.bool_]:
-        """Which matches are more likely right than wrong."""
+    def inliers(self) -> NDArray[np.bool_]:
+        """Which matches are more likely inliers than outliers."""
         return np.asarray(self.probability > 0.5)
 
 
 def fit_mixture(
     residuals: FloatArray, window_area: float, sigma_range: tuple[float, float]
 ) -> Mixture:
-    """Separate right from wrong matches by expectation maximisation.
+    """Separate inliers from outliers by expectation maximisation.
 
-    Right ones scatter around zero with a circular normal distribution, wrong ones fall evenly
-    over their search window.
+    Inliers scatter around zero with a circular normal distribution, outliers fall evenly over
+    their search window.
 
     Parameters
     ----------
@@ -64,7 +63,7 @@ def fit_mixture(
     window_area
         Area of the search window, in the residuals' unit squared.
     sigma_range
-        Smallest and largest standard deviation of right matches.
+        Smallest and largest standard deviation of inliers.
     """
     if len(residuals) == 0:
         return Mixture(np.zeros(0), sigma_range[1])
@@ -73,8 +72,8 @@ def fit_mixture(
     variance, share = min(max(_FIRST_SIGMA, lowest), highest) ** 2, 0.5
     probability = np.full(len(residuals), share)
     for _ in range(_MIXTURE_STEPS):
-        right = share * np.exp(-squared / (2 * variance)) / (2 * np.pi * variance)
-        probability = right / (right + (1 - share) / window_area)
+        inlier = share * np.exp(-squared / (2 * variance)) / (2 * np.pi * variance)
+        probability = inlier / (inlier + (1 - share) / window_area)
         total = max(float(probability.sum()), 1e-9)
         variance = float((probability * squared).sum() / (2 * total))
         variance = float(np.clip(variance, lowest**2, highest**2))
@@ -84,7 +83,7 @@ def fit_mixture(
 
 def find_consensus(
     xy: FloatArray,
-    claimed_xy: FloatArray,
+    nominal_xy: FloatArray,
     tolerance: float,
     kind: str = "affine",
     seed: int = 0,
@@ -93,7 +92,7 @@ def find_consensus(
 
     Parameters
     ----------
-    xy, claimed_xy
+    xy, nominal_xy
         Pairs of pixel positions, shape (n, 2), n ≥ 3.
     tolerance
         Distance within which a pair agrees, in pixels.
@@ -103,7 +102,7 @@ def find_consensus(
         Of the random samples.
     """
     frame = Frame.around(xy)
-    uv, displacement = frame.enter(xy), frame.enter(claimed_xy) - frame.enter(xy)
+    uv, displacement = frame.enter(xy), frame.enter(nominal_xy) - frame.enter(xy)
     candidates = _sampled_models(uv, displacement, kind, np.random.default_rng(seed))
     design = monomials(uv, 1)
     residuals = displacement[None] - design[None] @ candidates
@@ -111,62 +110,62 @@ def find_consensus(
     cost = np.minimum((residuals**2).sum(axis=2), in_frame**2).sum(axis=1)
     best: Model = PolynomialModel("affine", frame, candidates[cost.argmin()])
     for _ in range(3):
-        agree = distances(best, xy, claimed_xy) < tolerance
+        agree = distances(best, xy, nominal_xy) < tolerance
         if agree.sum() < -(-PARAMETERS[kind] // 2) + 1:
             break
-        best = fit_model(kind, xy, claimed_xy, agree.astype(float), frame)
+        best = fit_model(kind, xy, nominal_xy, agree.astype(float), frame)
     return best
 
 
-def distances(model: Model, xy: FloatArray, claimed_xy: FloatArray) -> FloatArray:
-    """Return the distances between claimed positions and the model's, shape (n,), pixels."""
-    return np.asarray(np.hypot(*(claimed_xy - model(xy)).T))
+def distances(model: Model, xy: FloatArray, nominal_xy: FloatArray) -> FloatArray:
+    """Return the distances between nominal positions and the model's, shape (n,), pixels."""
+    return np.asarray(np.hypot(*(nominal_xy - model(xy)).T))
 
 
 def fit_robustly(
     kind: str,
     xy: FloatArray,
-    claimed_xy: FloatArray,
+    nominal_xy: FloatArray,
     variances: FloatArray,
     start: Model,
     window_area: float,
     sigma_range: tuple[float, float],
 ) -> tuple[Model, Mixture]:
-    """Fit a model to pairs of which many may be wrong.
+    """Fit a model to pairs of which many may be outliers.
 
-    Fits and mixtures (see `fit_mixture`) take turns; each pair weighs by its probability to be
-    right over its variance.
+    Fits and mixtures (see `fit_mixture`) take turns; each pair's weight is its probability to be
+    an inlier over its variance.
 
     Parameters
     ----------
     kind
         One of `models.KINDS`.
-    xy, claimed_xy
+    xy, nominal_xy
         Pairs of positions, shape (n, 2), pixels.
     variances
         Variance of each match along an axis, shape (n,), px²; the mixture's own variance
-        is added, so that no match counts for much more than its model is exact.
+        is added, so that no match has much more weight than its model is exact.
     start
         Model to start from, usually `find_consensus`.
     window_area
         Area of the matches' search window, px².
     sigma_range
-        Smallest and largest standard deviation of right matches, pixels.
+        Smallest and largest standard deviation of inliers, pixels.
 
     Raises
     ------
     TooFewPointsError
-        Fewer right pairs than the model needs.
+        Fewer inliers than the model needs.
     """
     model = start
     for _ in range(_FIT_STEPS):
-        mixture = fit_mixture(claimed_xy - model(xy), window_area, sigma_range)
-        weights = np.where(mixture.right, mixture.probability, 0.0)
+        mixture = fit_mixture(nominal_xy - model(xy), window_area, sigma_range)
+        weights = np.where(mixture.inliers, mixture.probability, 0.0)
         weights = weights * mixture.sigma**2 / (mixture.sigma**2 + variances)
-        previous, model = model, fit_model(kind, xy, claimed_xy, weights, Frame.around(xy))
+        previous, model = model, fit_model(kind, xy, nominal_xy, weights, Frame.around(xy))
         if np.abs(model(xy) - previous(xy)).max() < 1e-4 * sigma_range[0]:
             break
-    return model, fit_mixture(claimed_xy - model(xy), window_area, sigma_range)
+    return model, fit_mixture(nominal_xy - model(xy), window_area, sigma_range)
 
 
 def _sampled_models(
@@ -195,43 +194,8 @@ def _sampled_models(
         well_posed = np.abs(np.linalg.det(design)) > 0.05
         design[~well_posed] = np.eye(3)
         coefficients = np.asarray(np.linalg.solve(design, displacement[picks]), np.float64)
-        # Three places on a line tell a shift only.
+        # Three places on a line determine a shift only.
         coefficients[~well_posed] = 0.0
         coefficients[~well_posed, 0] = displacement[picks[~well_posed, 0]]
     plausible = np.abs(coefficients[:, 1:]).max(axis=(1, 2)) < _LARGEST_DISTORTION
     return np.asarray(coefficients[plausible] if plausible.any() else coefficients * 0)
-
-
-def blocks_of(px: FloatArray) -> NDArray[np.int_]:
-    """Return the column and row of the block that each point lies in, shape (n, 2).
-
-    The points' extent is cut into as many blocks a side as there are folds.
-    """
-    low, high = px.min(axis=0), px.max(axis=0)
-    unit = (px - low) / np.maximum(high - low, 1e-12)
-    return np.minimum((unit * FOLDS).astype(int), FOLDS - 1)
-
-
-def block_folds(px: FloatArray) -> NDArray[np.int_]:
-    """Return fold numbers, shape (n,), such that neighbours share one, for cross-validation.
-
-    Each row and each column of blocks holds every fold once.
-    """
-    block = blocks_of(px)
-    return np.asarray((block[:, 0] + 2 * block[:, 1]) % FOLDS)
-
-
-def standard_errors(rise: FloatArray, px: FloatArray) -> float:
-    """Return the sum of a rise in its standard errors; neighbours rise together, so by blocks.
-
-    Parameters
-    ----------
-    rise
-        By how much something is larger at each point, shape (n,).
-    px
-        Where the points lie, shape (n, 2).
-    """
-    block = blocks_of(px) @ [1, FOLDS]
-    sums = np.array([rise[block == b].sum() for b in np.unique(block)])
-    error = sums.std(ddof=1) * np.sqrt(len(sums)) if len(sums) > 1 else np.inf
-    return float(sums.sum() / max(error, 1e-12))

@@ -23,10 +23,13 @@ FORMAT = "groundtie-transform/1"
 
 @dataclass(frozen=True)
 class Transform:
-    """Reference map position ↔ input pixel position.
+    """Reference map position ↔ input pixel position, for any number of positions at a time.
 
-    The model takes a reference map position to where the input claims this ground to be; the
-    input's own georeferencing takes that to a pixel.
+    Positions are arrays of shape (..., 2), x before y and column before row, or what numpy makes
+    one of; so is what comes back. One position alone is of shape (2,).
+
+    The model takes a reference map position to its nominal one, where the input's georeferencing
+    places this ground; that georeferencing takes the nominal position to a pixel.
 
     Parameters
     ----------
@@ -43,22 +46,27 @@ class Transform:
     input_grid: Grid
 
     @classmethod
-    def as_claimed(cls, crs: CRS | None, input_grid: Grid) -> Transform:
-        """Return the transform that believes the input's georeferencing."""
+    def nominal(cls, crs: CRS | None, input_grid: Grid) -> Transform:
+        """Return the transform that takes the input's georeferencing as it is."""
         return cls(PolynomialModel.identity(), crs, input_grid)
 
     def __call__(self, xy: ArrayLike) -> FloatArray:
-        """Return the input pixels (col, row), centres at integers, of map positions (n, 2)."""
-        claimed = reproject(self.model(xy), self.crs, self.input_grid.crs)
-        return self.input_grid.map_to_pixel(claimed)
+        """Return the input pixels (col, row), centres at integers, of map positions (..., 2)."""
+        positions = np.asarray(xy, float)
+        moved = self.model(positions.reshape(-1, 2))
+        nominal = reproject(moved, self.crs, self.input_grid.crs)
+        return self.input_grid.map_to_pixel(nominal).reshape(positions.shape)
 
-    def claimed_xy(self, px: ArrayLike) -> FloatArray:
-        """Return where the input claims its pixels (col, row) to be on the reference map."""
-        return reproject(self.input_grid.pixel_to_map(px), self.input_grid.crs, self.crs)
+    def nominal_xy(self, px: ArrayLike) -> FloatArray:
+        """Return the nominal reference map positions of input pixels (col, row), (..., 2)."""
+        positions = np.asarray(px, float)
+        xy = self.input_grid.pixel_to_map(positions.reshape(-1, 2))
+        return reproject(xy, self.input_grid.crs, self.crs).reshape(positions.shape)
 
     def inverse(self, px: ArrayLike) -> FloatArray:
-        """Return the reference map positions, shape (n, 2), of input pixels (col, row)."""
-        return self.model.inverse(self.claimed_xy(px))
+        """Return the reference map positions of input pixels (col, row), (..., 2)."""
+        nominal = self.nominal_xy(px)
+        return self.model.inverse(nominal.reshape(-1, 2)).reshape(nominal.shape)
 
     def to_json(self) -> dict[str, Any]:
         """Return the transform as values that JSON can carry."""
@@ -87,12 +95,12 @@ class Transform:
         try:
             if values["format"] != FORMAT:
                 raise TransformFileError(f"not a {FORMAT} file but {values['format']!r}")
-            claimed = values["input"]
+            stored = values["input"]
             grid = Grid(
-                Affine.from_gdal(*claimed["geotransform"]),
-                _crs_from_text(claimed["crs"]),
-                int(claimed["width"]),
-                int(claimed["height"]),
+                Affine.from_gdal(*stored["geotransform"]),
+                _crs_from_text(stored["crs"]),
+                int(stored["width"]),
+                int(stored["height"]),
             )
             return cls(model_from_json(values["model"]), _crs_from_text(values["crs"]), grid)
         except (KeyError, TypeError, ValueError, CRSError) as error:

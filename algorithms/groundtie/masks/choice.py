@@ -16,9 +16,10 @@ from .scene import Scene
 NONE, THRESHOLD, REGIONS, AUTO = "none", "threshold", "regions", "auto"
 MASKS = (NONE, THRESHOLD, REGIONS, AUTO)
 
-# Block means above this many times their median shine, and scenes of which more than that share
-# shines are dense towns. Measured shares: real towns up to 10 %, simulated dense cities 12–27 %.
-_BRIGHT = 4.0
+# Block means above this many times their median are strong scatterers, and scenes with more than
+# that share of them are dense towns. Measured shares: real towns up to 10 %, simulated dense cities
+# 12–27 %.
+_STRONG = 4.0
 _DENSE = 0.11
 
 # Speckle filters dim what is small and bright: of the least of the cities they left 9.5 %.
@@ -73,46 +74,41 @@ class MaskUsed:
         return f"mask: {self.kind}, {self.share:.0%} of the {self.image} take part; {self.reason}"
 
 
-def choose(
-    scene: Scene, find: Callable[[Progress], GroundRegions], progress: Progress = SILENT
-) -> tuple[str, str]:
+def choose(strong_share: float, find: Callable[[], GroundRegions]) -> tuple[str, str]:
     """Return the kind of mask that suits a radar image, and why.
 
     Parameters
     ----------
-    scene
-        Grey values are amplitudes.
+    strong_share
+        Its share of strong scatterers.
     find
         Finds the regions on the ground; called only if the image is a dense town's.
-    progress
-        Is told of every step.
     """
-    share = bright_share(scene, progress.part(0.0, 0.2))
-    shine = f"{share:.0%} of the image shines"
-    if not is_dense(share):
-        return NONE, f"{shine}: too few buildings to lead astray"
-    ground = find(progress.part(0.2, 1.0))
-    usable = f"{shine}, and {ground.skeleton_m:.0f} m of roads and banks"
+    share = f"strong scatterers on {strong_share:.0%} of the image"
+    if not is_dense(strong_share):
+        return NONE, f"{share}: too few buildings to lead astray"
+    ground = find()
+    usable = f"{share}, and {ground.skeleton_m:.0f} m of roads and banks"
     side_m = float(np.sqrt(ground.extent_m2))
     if ground.share < _LEAST_GROUND or ground.skeleton_m < _LEAST_SKELETON * side_m:
         return THRESHOLD, f"{usable} are too little to rely on"
     return REGIONS, f"{usable} are enough to rely on"
 
 
-def is_dense(share: float) -> bool:
-    """Tell whether a radar image with this bright share shows a dense town."""
-    return share >= _DENSE
+def is_dense(strong_share: float) -> bool:
+    """Whether a radar image with this share of strong scatterers shows a dense town."""
+    return strong_share >= _DENSE
 
 
-def is_perhaps_dense(share: float) -> bool:
-    """Tell whether a radar image with this bright share, filtered or not, may show a dense town."""
-    return share >= _PERHAPS_DENSE
+def is_perhaps_dense(strong_share: float) -> bool:
+    """Whether a radar image with this share, filtered or not, may show a dense town."""
+    return strong_share >= _PERHAPS_DENSE
 
 
-def bright_share(scene: Scene, progress: Progress = SILENT) -> float:
+def share_of_strong_scatterers(scene: Scene, progress: Progress = SILENT) -> float:
     """Return the share of an image, 0 to 1, that is brighter than usual by 6 dB or more.
 
-    Means over 4 × 4 pixels are compared with their median.
+    Grey values are amplitudes; means over 4 × 4 pixels are compared with their median.
     """
     parts = [
         part.values[part.valid] ** 2 for part in scene.reduced_strips(threshold.BLOCK_PX, progress)
@@ -120,4 +116,4 @@ def bright_share(scene: Scene, progress: Progress = SILENT) -> float:
     power = np.concatenate(parts)
     if power.size == 0:
         return 0.0
-    return float(np.mean(power > _BRIGHT * np.median(power)))
+    return float(np.mean(power > _STRONG * np.median(power)))

@@ -1,4 +1,4 @@
-"""Region growing: from calm places to all that is as bright and hangs together with them."""
+"""Region growing: from homogeneous seeds to all connected pixels of like brightness."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _TAKEN, _GROWING = 1, 2
 
 @dataclass(frozen=True)
 class Region:
-    """Pixels that hang together: `mask`, shape (height, width) of their bounding box `box`.
+    """Connected pixels: `mask`, shape (height, width) of their bounding box `box`.
 
     `level_db` is their mean.
     """
@@ -34,11 +34,11 @@ def grow_regions(
     level_db: NDArray[np.float32],
     variation2: NDArray[np.float32],
     valid: Mask,
-    calm_variation2: float,
+    seed_variation2: float,
     tolerance_db: float,
     smallest_px: int,
 ) -> Iterator[Region]:
-    """Yield the homogeneous regions of an image, those around the calmest seeds first.
+    """Yield the homogeneous regions of an image, from the most homogeneous seed on.
 
     Region growing [Castleman1996]: a region takes in neighbours that differ from its
     seed by no more than a tolerance. No pixel belongs to two regions.
@@ -48,11 +48,11 @@ def grow_regions(
     level_db
         Smoothed image in decibels, shape (h, w).
     variation2
-        Squared coefficient of variation around each pixel, same shape: the calm are seeds.
+        Squared coefficient of variation around each pixel, same shape.
     valid
         Which pixels may belong to a region, same shape.
-    calm_variation2
-        What varies more is no seed.
+    seed_variation2
+        Pixels of larger variation are no seeds.
     tolerance_db
         Largest difference from the seed.
     smallest_px
@@ -61,7 +61,7 @@ def grow_regions(
     taken = np.pad((~valid).astype(np.uint8), 1, constant_values=_TAKEN)
     flags = 4 | (_GROWING << 8) | cv2.FLOODFILL_MASK_ONLY | cv2.FLOODFILL_FIXED_RANGE
     image = np.ascontiguousarray(level_db, np.float32)
-    for row, col in _seeds(np.where(valid, variation2, np.inf), calm_variation2):
+    for row, col in _seeds(np.where(valid, variation2, np.inf), seed_variation2):
         if taken[row + 1, col + 1]:
             continue
         area, _, _, box = cv2.floodFill(
@@ -77,7 +77,7 @@ def grow_regions(
 
 
 def _seeds(variation2: NDArray[np.float32], largest: float) -> NDArray[np.intp]:
-    """Return rows and columns, shape (n, 2), of the calmest pixel of each square, calmest first."""
+    """Return rows and columns, shape (n, 2), of the least variation in each square, least first."""
     height, width = (side // _SEED_PX for side in variation2.shape)
     squares = variation2[: height * _SEED_PX, : width * _SEED_PX]
     squares = squares.reshape(height, _SEED_PX, width, _SEED_PX).swapaxes(1, 2)

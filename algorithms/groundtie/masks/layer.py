@@ -1,4 +1,4 @@
-"""Masks by a vector layer: roads, waters, squares, as a map has them."""
+"""Masks by a vector layer: roads, waters, squares of a map."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _LINES = ("LineString", "MultiLineString")
 
 @dataclass(frozen=True)
 class LayerMask:
-    """What a vector layer covers of a scene.
+    """The part of a scene that a vector layer covers.
 
     Parameters
     ----------
     scene
-        What is masked.
+        The image.
     areas, lines
         GeoJSON geometries on the scene's map.
     reach_px
@@ -66,14 +66,14 @@ class LayerMask:
 
 
 def read_layer(path: str | os.PathLike[str], scene: Scene, width_m: float) -> LayerMask:
-    """Read a layer's polygons, and its lines as wide as told, as a mask of a scene.
+    """Read a layer's polygons, and its lines of a given width, as a mask of a scene.
 
     Parameters
     ----------
     path
         Any vector file that fiona reads; its first layer is taken.
     scene
-        What is masked.
+        The image.
     width_m
         Width of lines.
 

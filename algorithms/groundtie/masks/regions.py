@@ -1,7 +1,7 @@
 """Masks by regions: what is flat and homogeneous, as roads, waters and fields ([Suri2010] 5.3.2).
 
-Speckle is filtered, regions grow from calm places, their shapes tell ground from roofs, and what
-is long is thinned to its skeleton and broadened by a window again.
+Speckle is filtered, regions grow from homogeneous seeds, their shapes separate ground from roofs,
+and long ones are thinned to their skeleton and broadened by a window again.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
 from ..speckle.filters import SpeckleFilter
 from ..speckle.statistics import estimate_looks, local_statistics
+from .cast_shadow import out_of_shadow
 from .growing import Region, grow_regions
 from .radar import power
 from .scene import Scene, Selection
-from .shade import out_of_shade
 from .shapes import Shape
 from .skeleton import pruned, skeleton
 from .threshold import disc
@@ -31,15 +31,15 @@ from .threshold import disc
 WIDTH_M = 11.0
 HIGH_PERCENT = 10.0
 
-# Larger scenes are looked at with larger pixels.
+# Larger scenes are reduced to larger pixels.
 _MOST_PIXELS = 24_000_000
 
 _FILTER_PX = 7
-_CALM_PX = 9
+_SEED_PX = 9
 
-# A place is calm if it varies little more than speckle alone; a region takes in what differs from
-# its seed by so much.
-_CALM_EXCESS = 1.3
+# Seeds vary little more than speckle alone; a region takes in pixels that differ from its seed by
+# so much.
+_SEED_EXCESS = 1.3
 _TOLERANCE_DB = 2.5
 
 # Regions: long ones from this length and elongation on, others from this area on.
@@ -58,24 +58,24 @@ _LAKE_M2 = 20_000.0
 # Borders are made even by this before they are thinned.
 _EVEN_M = 2.0
 
-# The surroundings up to this distance take part, too: banks and kerbs are on the ground, and all
-# that a homogeneous area can tell. Gaps up to twice as wide close.
+# The surroundings up to this distance take part, too: banks and kerbs are on the ground, and the
+# only structure of a homogeneous area. Gaps up to twice as wide close.
 _BORDER_M = 3.0
 
 
 @dataclass(frozen=True)
 class GroundRegions:
-    """What lies on the ground, on a grid of pixels `factor` times the scene's.
+    """The ground, on a grid of pixels `factor` times the scene's.
 
     Parameters
     ----------
     scene
         The image.
     factor
-        Side of the pixels of what follows, in pixels of the scene.
+        Side of the pixels of the masks, in pixels of the scene.
     regions, skeleton, part
-        Homogeneous regions that were kept; the skeleton of the long ones; what takes part: the
-        skeleton, broadened, and the large regions that are wider. Shape (h, w).
+        Homogeneous regions that were kept; the skeleton of the long ones; the mask: the broadened
+        skeleton and the large regions that are wider. Shape (h, w).
     high
         Grey value above which nothing takes part, of means over 4 × 4 pixels of the scene.
     skeleton_m
@@ -104,16 +104,16 @@ class GroundRegions:
         return self.cut(self.part, window, self.high)
 
     def cut(self, mask: Mask, window: Window, high: float = np.inf) -> Selection:
-        """Return what of one of the masks lies in a window of the scene."""
+        """Return the part of one of the masks that lies in a window of the scene."""
         patch = self.scene.read(window)
         rows = np.arange(window.row, window.row + window.height) // self.factor
         cols = np.arange(window.col, window.col + window.width) // self.factor
         inside = (rows >= 0) & (rows < mask.shape[0]), (cols >= 0) & (cols < mask.shape[1])
-        shown = mask[np.ix_(rows.clip(0, mask.shape[0] - 1), cols.clip(0, mask.shape[1] - 1))]
-        shown = shown & inside[0][:, None] & inside[1] & patch.valid
+        chosen = mask[np.ix_(rows.clip(0, mask.shape[0] - 1), cols.clip(0, mask.shape[1] - 1))]
+        chosen = chosen & inside[0][:, None] & inside[1] & patch.valid
         if np.isfinite(high):
-            shown &= _smooth(patch) <= high
-        return Selection(shown, patch.valid)
+            chosen &= _smooth(patch) <= high
+        return Selection(chosen, patch.valid)
 
 
 def find_ground(
@@ -121,9 +121,9 @@ def find_ground(
     width_m: float = WIDTH_M,
     high_percent: float = HIGH_PERCENT,
     progress: Progress = SILENT,
-    shade_azimuth_deg: float | None = None,
+    shadow_azimuth_deg: float | None = None,
 ) -> GroundRegions:
-    """Find what lies on the ground in a radar image.
+    """Find the ground in a radar image.
 
     Parameters
     ----------
@@ -134,10 +134,10 @@ def find_ground(
     high_percent
         Percentage of the brightest pixels inside that take no part after all.
     progress
-        Is told of every step.
-    shade_azimuth_deg
-        Direction in which the shadows of the other image fall, clockwise from the top: what may
-        lie in them takes no part. None: nothing does.
+        Receives every step.
+    shadow_azimuth_deg
+        Direction in which cast shadows of the other image fall, clockwise from the top: ground
+        that they may reach takes no part. None: there are none.
 
     Raises
     ------
@@ -156,8 +156,8 @@ def find_ground(
     broad = cv2.dilate(lines.astype(np.uint8), disc(max(round(width_m / pixel_m / 2), 1)))
     border = disc(max(round(_BORDER_M / pixel_m), 1))
     part = (cv2.dilate(((broad > 0) | wide).astype(np.uint8), border) > 0) & patch.valid
-    if shade_azimuth_deg is not None:
-        part = out_of_shade(part, shade_azimuth_deg, pixel_m)
+    if shadow_azimuth_deg is not None:
+        part = out_of_shadow(part, shadow_azimuth_deg, pixel_m)
     inside = _smooth(patch)[part]
     high = float(np.percentile(inside, 100 - high_percent)) if inside.size else np.inf
     return GroundRegions(
@@ -179,11 +179,13 @@ def _kept_regions(
     intensity = power(patch)
     looks = estimate_looks(intensity, patch.valid)
     level = _decibels(SpeckleFilter("enhanced-frost", _FILTER_PX, looks)(intensity, patch.valid))
-    calm = local_statistics(intensity, patch.valid, _CALM_PX).variation2
+    variation2 = local_statistics(intensity, patch.valid, _SEED_PX).variation2
     brightest = np.percentile(level[patch.valid], _BRIGHTEST_PERCENT)
     progress.update(0.5)
     smallest = max(int(_SMALLEST_M2 / pixel_m**2), 1)
-    grown = grow_regions(level, calm, patch.valid, _CALM_EXCESS / looks, _TOLERANCE_DB, smallest)
+    grown = grow_regions(
+        level, variation2, patch.valid, _SEED_EXCESS / looks, _TOLERANCE_DB, smallest
+    )
     regions = [region for region in grown if region.level_db <= brightest]
     shadow_db = _darkest_db(regions) + _SHADOW_DB
     longs, wide = np.zeros(level.shape, bool), np.zeros(level.shape, bool)

@@ -12,10 +12,10 @@ import rasterio.windows
 
 from ..progress import SILENT, Progress
 from ..rasters.averaging import area_average
-from ..rasters.delivery import tiles
 from ..rasters.grid import Grid
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask, RasterSource, Window
+from ..rasters.tiling import tiles
 from ..rasters.writing import create_like, one_band
 
 

@@ -1,4 +1,4 @@
-"""Skeletons of regions: lines one pixel wide that keep how the regions hang together."""
+"""Skeletons of regions: lines one pixel wide that keep the regions' connections."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _TABLES = (_removable(False), _removable(True))
 def skeleton(mask: Mask) -> Mask:
     """Thin a mask to lines [Zhang1984].
 
-    Only the border of what is left is looked at, so that each pixel is touched a few times.
+    Only the remaining border is examined, so that each pixel is touched a few times.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Masks by grey value: what shines, as walls and double bounces do, takes no part ([Suri2010] 4.5).
+"""Masks by grey value: strong scatterers, as walls and double bounces, are masked ([Suri2010] 4.5).
 
-The thresholds stand in the histogram of the block-averaged image, where speckle is less; they are
-applied to the blocks at full resolution.
+The thresholds are percentiles of the block-averaged image, where speckle is less; they are applied
+to the blocks at full resolution.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .scene import Scene, Selection, block_means
 # Side of the blocks whose means are compared, in pixels ([Suri2010] 4.5).
 BLOCK_PX = 4
 
-# What is masked unless something else is asked for: 20–30 % served best in [Suri2010].
+# Masked by default: 20–30 % served best in [Suri2010].
 HIGH_PERCENT = 20.0
 
 # Blocks of a scene that its histogram is made from, at most.
@@ -29,14 +29,14 @@ _SAMPLE = 4_000_000
 
 @dataclass(frozen=True)
 class Threshold:
-    """Which shares of a scene's grey values take no part.
+    """Which shares of a scene's grey values are masked.
 
     Parameters
     ----------
     high_percent, low_percent
         Percentage of the brightest and of the darkest blocks.
     grow_px
-        Distance, in pixels, within which a block that takes no part keeps others from it.
+        Distance, in pixels, up to which the surroundings of masked blocks are masked, too.
     """
 
     high_percent: float
@@ -67,7 +67,7 @@ class Threshold:
 
 @dataclass(frozen=True)
 class ThresholdMask:
-    """Tells which pixels of a scene take part: blocks from `low` to `high`, in grey values."""
+    """Selects the blocks of a scene whose mean grey values are `low` to `high`."""
 
     scene: Scene
     low: float

@@ -1,8 +1,8 @@
 """Fitting a model directly to the similarity surfaces of all chips.
 
-Picking a peak for each chip throws away what weak surfaces know, and what draws single chips, as
-layover does, draws their peaks. Summed along a model, surfaces agree on the ground: the model
-with the largest sum of similarities is sought.
+Picking a peak for each chip discards the information of weak surfaces, and what displaces single
+chips, as layover does, displaces their peaks. Summed along a model, surfaces agree on the ground:
+the model with the largest sum of similarities is sought.
 """
 
 from __future__ import annotations
@@ -17,9 +17,16 @@ from numpy.typing import NDArray
 from scipy.ndimage import spline_filter1d
 from scipy.optimize import minimize
 
+from ..errors import TooFewPointsError
+from ..geometry.model_choice import (
+    CHIPS_PER_PARAMETER,
+    Candidate,
+    choose_simplest,
+    left_out_blocks,
+    left_out_scores,
+)
 from ..geometry.models import DEGREE, PARAMETERS, Frame, Model, PolynomialModel, monomials
-from ..geometry.robust import block_folds, standard_errors
-from .chips import Surfaces
+from .belief_propagation import Surfaces
 
 FloatArray = NDArray[np.float64]
 Positions = Callable[[FloatArray], FloatArray]
@@ -35,18 +42,6 @@ _STEPS = 60
 CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3")
 LINEAR_CANDIDATES = CANDIDATES[:3]
 
-# Chips for each parameter below which a model is not considered.
-_CHIPS_PER_PARAMETER = 2
-
-# A more flexible model must raise the similarity by so many standard errors: rotation, scale and
-# shear of a georeferenced image are common, bending is not, and extrapolates badly.
-_STANDARD_ERRORS = {
-    "similarity": 1.0,
-    "affine": 1.0,
-    "polynomial2": 2.0,
-    "polynomial3": 2.0,
-}
-
 
 @dataclass(frozen=True)
 class Alignment:
@@ -55,10 +50,10 @@ class Alignment:
     Parameters
     ----------
     model
-        From pixel positions of the matching grid to where the input claims them to be, in pixels
+        From pixel positions of the matching grid to where the input nominally has them, in pixels
         of the same grid.
     fold_models
-        The same fitted without one block of chips after the other, to tell how the model varies.
+        The same fitted without one block of chips after the other, to infer how the model varies.
     left_out_score
         Mean similarity at chips that were left out of the fit, for the models compared.
     """
@@ -72,7 +67,7 @@ class Alignment:
 class _Field:
     """Surfaces that can be looked up anywhere: B-spline coefficients of blurred surfaces.
 
-    `px` are the chips' centres, (n, 2); `to_shift` takes claimed pixel positions to places on
+    `px` are the chips' centres, (n, 2); `to_shift` takes nominal pixel positions to places on
     the resampled input, whose distance from the centre is the shift.
     """
 
@@ -83,13 +78,13 @@ class _Field:
     def take(self, which: NDArray[np.bool_]) -> _Field:
         return _Field(self.px[which], self.coefficients[which], self.to_shift)
 
-    def scores(self, claimed: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return similarity, (n,), at claimed positions, and its gradient to these, (n, 2)."""
+    def scores(self, nominal: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return similarity, (n,), at nominal positions, and its gradient to these, (n, 2)."""
         t = self.to_shift
         linear = np.array([[t.a, t.b], [t.d, t.e]])
-        shift = claimed @ linear.T + [t.c, t.f] - self.px
+        shift = nominal @ linear.T + [t.c, t.f] - self.px
         radius = self.coefficients.shape[1] // 2
-        # Beyond the window a surface says nothing and pulls nowhere.
+        # Beyond the window a surface is zero, and so is its gradient.
         place = np.clip(shift + radius, 1.0, 2 * radius - 1.001)
         inside = np.all(place == shift + radius, axis=1)
         whole = np.floor(place).astype(int)
@@ -118,14 +113,14 @@ def align(
     px
         The chips' centres in the matching grid, shape (n, 2).
     surfaces
-        Their similarity, unsupported by neighbours, by how much each counts, about 1 at its peak;
-        shape (n, 2 r + 1, 2 r + 1).
+        Their similarity, without that of their neighbours, by the weight of each, about 1 at its
+        peak; shape (n, 2 r + 1, 2 r + 1).
     prior
-        From grid pixels to claimed grid pixels: what the input was resampled by for matching.
+        From grid pixels to nominal grid pixels: what the input was resampled by for matching.
     start
-        What to start from: takes grid pixels, (n, 2), to claimed grid pixels.
+        What to start from: takes grid pixels, (n, 2), to nominal grid pixels.
     """
-    return _align(kind, _fields(px, surfaces, prior), start)
+    return _align(kind, _fields(px, surfaces, prior), start).fitted
 
 
 def choose_alignment(
@@ -135,51 +130,41 @@ def choose_alignment(
     start: Positions,
     candidates: Sequence[str] = CANDIDATES,
 ) -> Alignment:
-    """Fit the simplest polynomial model that the surfaces justify.
+    """Fit the simplest polynomial model that the surfaces justify (see `choose_simplest`).
 
-    A more flexible model is taken only if it raises the similarity at chips that were left out
-    of its fit by more standard errors than `_STANDARD_ERRORS` asks for. Parameters as `align`, and
+    Its score is the similarity at chips that were left out of its fit. Parameters as `align`, and
     the candidates, from simple to flexible.
     """
     fields = _fields(px, surfaces, prior)
-    chosen = _align(candidates[0], fields, start)
-    kept = _left_out_scores(fields[-1], chosen)
-    scores = chosen.left_out_score
-    for kind in candidates[1:]:
-        if len(px) < _CHIPS_PER_PARAMETER * PARAMETERS[kind]:
-            break
-        tried = _align(kind, fields, start)
-        scores = scores | tried.left_out_score
-        left_out = _left_out_scores(fields[-1], tried)
-        if standard_errors(left_out - kept, fields[-1].px) > _STANDARD_ERRORS[kind]:
-            chosen, kept = tried, left_out
-    return Alignment(chosen.model, chosen.fold_models, scores)
+
+    def fit(kind: str) -> Candidate[Alignment]:
+        if kind != candidates[0] and len(px) < CHIPS_PER_PARAMETER * PARAMETERS[kind]:
+            raise TooFewPointsError(f"{len(px)} chips are too few for the {kind} model")
+        return _align(kind, fields, start)
+
+    chosen, fitted = choose_simplest(candidates, fit, fields[-1].px)
+    scores = {kind: mean for each in fitted for kind, mean in each.left_out_score.items()}
+    return replace(chosen, left_out_score=scores)
 
 
-def _align(kind: str, fields: list[_Field], start: Positions) -> Alignment:
+def _align(kind: str, fields: list[_Field], start: Positions) -> Candidate[Alignment]:
     sharp = fields[-1]
     frame = Frame.around(sharp.px)
     parameters = _starting(kind, frame, sharp.px, start)
     for field in fields:
         parameters = _maximise(kind, frame, field, parameters)
-    folds = block_folds(sharp.px)
     models = tuple(
-        _model(kind, frame, _maximise(kind, frame, sharp.take(folds != fold), parameters))
-        for fold in np.unique(folds)
+        _model(kind, frame, _maximise(kind, frame, sharp.take(~block), parameters))
+        for block in left_out_blocks(sharp.px)
     )
-    found = Alignment(_model(kind, frame, parameters), models, {})
-    mean = float(_left_out_scores(sharp, found).sum()) / len(sharp.px)
-    return replace(found, left_out_score={kind: mean})
 
+    def score(model: Model, block: NDArray[np.bool_]) -> FloatArray:
+        part = sharp.take(block)
+        return part.scores(model(part.px))[0]
 
-def _left_out_scores(field: _Field, alignment: Alignment) -> FloatArray:
-    """Return the similarity of each chip by a model that has not seen it, shape (n,)."""
-    folds = block_folds(field.px)
-    scores = np.zeros(len(folds))
-    for fold, model in zip(np.unique(folds), alignment.fold_models, strict=True):
-        part = field.take(folds == fold)
-        scores[folds == fold] = part.scores(model(part.px))[0]
-    return scores
+    scores = left_out_scores(sharp.px, models, score)
+    mean = float(scores.sum()) / len(scores)
+    return Candidate(kind, Alignment(_model(kind, frame, parameters), models, {kind: mean}), scores)
 
 
 def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Affine) -> list[_Field]:
@@ -208,8 +193,8 @@ def _maximise(kind: str, frame: Frame, field: _Field, start: FloatArray) -> Floa
     def cost(parameters: FloatArray) -> tuple[float, FloatArray]:
         # Parameters count in pixels here, so that steps and gradients are of one size.
         coefficients, jacobian = _coefficients(kind, parameters / scale)
-        claimed = field.px + scale * (design @ coefficients)
-        value, slope = field.scores(claimed)
+        nominal = field.px + scale * (design @ coefficients)
+        value, slope = field.scores(nominal)
         return -float(value.sum()), -((design.T @ slope).ravel() @ jacobian)
 
     options = {"gtol": _SLOPE_PER_PX, "maxiter": _STEPS}

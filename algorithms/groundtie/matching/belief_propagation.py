@@ -1,10 +1,12 @@
-"""The support that the similarity surfaces of neighbouring chips give each other.
+"""Belief propagation between the similarity surfaces of neighbouring chips.
 
 Neighbouring places are misregistered by nearly the same shift. Chips are the nodes of a graph,
-their shifts its unknowns, and loopy belief propagation (sum-product; Pearl 1988, Murphy et al.
-1999) tells every chip what all others make likely: each passes on what its own surface and its
-other neighbours say, blurred by how much shifts may differ. A surface without a clear peak passes
-on what it is told, so that evidence reaches across places that have none.
+their shifts its unknowns, and loopy belief propagation (sum-product) passes messages between
+them: what a chip's own surface and its other neighbours make likely, blurred by how much shifts
+may differ. A surface without a clear peak passes messages on, so that they reach across places
+without evidence.
+
+Source: [Pearl1988], [Murphy1999].
 """
 
 from __future__ import annotations
@@ -22,11 +24,11 @@ _Pairs = NDArray[np.intp]
 # Standard deviation of the difference between neighbours' shifts, along each axis.
 _DIFFERENCE_PX = 2.0
 
-# Prior shares of chips whose surface says nothing, and of neighbours that do not belong together.
+# Prior shares of chips without evidence in their surface, and of neighbours that are unrelated.
 _NO_EVIDENCE = 0.7
 _UNRELATED = 0.1
 
-# How often messages are passed: evidence travels that many chips far.
+# How often messages are passed: each travels that many chips far.
 _PASSES = 8
 
 # So many pairs' messages are made at a time: they fit into the processor's cache.
@@ -38,10 +40,10 @@ def normalise_each(surfaces: Surfaces) -> Surfaces:
     return np.stack([normalise(s) for s in surfaces]) if len(surfaces) else surfaces
 
 
-def support(surfaces: Surfaces, centres: NDArray[np.int_], reach_px: float) -> Surfaces:
-    """Add to each surface what its neighbours say, so that weak peaks that agree are found.
+def propagate(surfaces: Surfaces, centres: NDArray[np.int_], reach_px: float) -> Surfaces:
+    """Add to each surface the messages of its neighbours, so that weak peaks that agree are found.
 
-    Supported surfaces are no longer independent of each other: a verdict must not count them.
+    The result's surfaces are not independent of each other: a verdict must not count them.
 
     Parameters
     ----------
@@ -51,7 +53,7 @@ def support(surfaces: Surfaces, centres: NDArray[np.int_], reach_px: float) -> S
         The chips' centres, shape (n, 2).
     reach_px
         Distance up to which chips are neighbours. Their shifts should not differ by more than
-        about 4 px along each axis: what is known of the misregistration is taken out first.
+        about 4 px along each axis: compensate what is known of the misregistration first.
 
     Returns
     -------
@@ -63,18 +65,18 @@ def support(surfaces: Surfaces, centres: NDArray[np.int_], reach_px: float) -> S
         return surfaces
     pairs = cKDTree(centres).query_pairs(reach_px, output_type="ndarray")
     count, span = surfaces.shape[:2]
-    own = _log_evidence(surfaces.reshape(count, -1))
-    supported: Surfaces = own + _messages(own, pairs, span)
+    prior = _log_evidence(surfaces.reshape(count, -1))
+    beliefs: Surfaces = prior + _messages(prior, pairs, span)
     alone = np.bincount(pairs.ravel(), minlength=count) == 0
-    supported[alone] = surfaces[alone].reshape(-1, span * span)
-    return supported.reshape(surfaces.shape)
+    beliefs[alone] = surfaces[alone].reshape(-1, span * span)
+    return beliefs.reshape(surfaces.shape)
 
 
 def _log_evidence(surfaces: Surfaces) -> Surfaces:
-    """Return the log likelihood ratio of each shift being right to the surface saying nothing.
+    """Return the log likelihood ratio of each shift being true to there being no evidence.
 
     For a surface of unit variance, shifts are as likely as the exponential of its values; the
-    share of chips that say nothing keeps the evidence against a shift bounded.
+    share of chips without evidence keeps the evidence against a shift bounded.
 
     Parameters
     ----------
@@ -86,12 +88,12 @@ def _log_evidence(surfaces: Surfaces) -> Surfaces:
     return np.asarray(np.log(likely + np.float32(_NO_EVIDENCE)), np.float32)
 
 
-def _messages(own: Surfaces, pairs: _Pairs, span: int) -> Surfaces:
-    """Return the sum of what each chip is told by its neighbours.
+def _messages(prior: Surfaces, pairs: _Pairs, span: int) -> Surfaces:
+    """Return the sum of the messages that each chip receives.
 
     Parameters
     ----------
-    own
+    prior
         Logarithms of evidence, shape (n, span²).
     pairs
         Indices of neighbours, each pair once, shape (m, 2).
@@ -102,38 +104,40 @@ def _messages(own: Surfaces, pairs: _Pairs, span: int) -> Surfaces:
     -------
     Shape (n, span²).
     """
-    told = np.zeros((2, len(pairs), own.shape[1]), np.float32)
-    to_second, to_first = (_incidence(pairs[:, side], len(own)) for side in (1, 0))
+    received = np.zeros((2, len(pairs), prior.shape[1]), np.float32)
+    to_second, to_first = (_incidence(pairs[:, side], len(prior)) for side in (1, 0))
     kernel = _difference_kernel(span)
-    total: Surfaces = np.zeros_like(own)
+    total: Surfaces = np.zeros_like(prior)
     for _ in range(_PASSES):
-        belief = own + total
+        belief = prior + total
         belief -= belief.max(axis=1, keepdims=True)
         for start in range(0, len(pairs), _BLOCK):
             block = slice(start, start + _BLOCK)
             first, second = pairs[block].T
-            # A chip passes on all that it knows but what it was told by the very neighbour.
-            known = np.stack([belief[first] - told[1, block], belief[second] - told[0, block]])
-            told[:, block] = _pass_on(known, kernel)
-        total = to_second @ told[0] + to_first @ told[1]
+            # A chip's message leaves out what it received from the very neighbour.
+            sent = np.stack(
+                [belief[first] - received[1, block], belief[second] - received[0, block]]
+            )
+            received[:, block] = _blurred(sent, kernel)
+        total = to_second @ received[0] + to_first @ received[1]
     return total
 
 
-def _pass_on(known: Surfaces, kernel: Surfaces) -> Surfaces:
-    """Return what chips make likely for neighbours, as logarithms, 0 where they say nothing.
+def _blurred(sent: Surfaces, kernel: Surfaces) -> Surfaces:
+    """Return messages as neighbours receive them: logarithms, 0 without evidence.
 
     Parameters
     ----------
-    known
-        Logarithms of how likely chips take their shifts to be, shape (2, m, span²).
+    sent
+        Logarithms of how likely each shift of the sender is, shape (2, m, span²).
     kernel
         See `_difference_kernel`.
     """
     span = len(kernel)
-    likely = np.exp(known)
+    likely = np.exp(sent)
     mean = likely.mean(axis=2, keepdims=True)
     along_columns = (likely.reshape(-1, span) @ kernel).reshape(-1, span, span)
-    blurred = np.matmul(kernel, along_columns).reshape(known.shape)
+    blurred = np.matmul(kernel, along_columns).reshape(sent.shape)
     blurred *= np.float32((1 - _UNRELATED) / _UNRELATED) / mean
     return np.asarray(np.log1p(blurred, out=blurred), np.float32)
 

@@ -1,231 +1,197 @@
-"""Similarity surfaces of many chips, both ways."""
+"""Chips that are matched each by its own similarity surface, both ways."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import Executor
-from dataclasses import dataclass
-from functools import cached_property
+import logging
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..progress import SILENT, Progress
-from ..rasters.grid import Grid
+from ..context import Context
+from ..geometry.models import DEGREE, Model
+from ..geometry.robust import find_consensus
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
+from ..similarity.description import BORDER_PX
 from ..similarity.peak import find_peak
-from ..similarity.surface import (
-    BORDER_PX,
-    SimilaritySettings,
-    describe,
-    normalise,
-    similarity_surface,
-)
-from .belief_propagation import Surfaces, normalise_each
+from ..similarity.surface import SimilaritySettings, describe, similarity_surface
+from .alignment import Positions
+from .belief_propagation import Surfaces, normalise_each, propagate
+from .layout import ChipLayout
+from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 
-FloatArray = NDArray[np.float64]
-ToPixel = Callable[[FloatArray], FloatArray]
-MaskOf = Callable[[Grid], NDArray[np.bool_]]
+_log = logging.getLogger(__name__)
 
-# Chips with less valid area than this in either image are not matched. What a mask leaves was
-# chosen for what it tells: a little of it may be enough.
+# Chips with less valid area than this in either image are not matched. A mask leaves what was
+# chosen to be matched: a little of it may be enough.
 _LEAST_VALID, _LEAST_VALID_MASKED = 0.4, 0.1
 
 # The background alone reaches about this many robust standard deviations.
 _LEAST_HEIGHT = 3.0
 
+# Neighbours within this many spacings exchange beliefs.
+_NEIGHBOUR_SPACINGS = 1.5
 
-@dataclass(frozen=True)
-class ChipSurfaces:
-    """Similarity surfaces of chips on a grid.
+# Chips agree with a first model of degree 1 within this, in pixels; local distortion beyond it is
+# left to the alignment.
+_CONSENSUS_PX = 3.0
 
-    Parameters
-    ----------
-    centres
-        Pixel positions (col, row) of the chips in the grid, shape (n, 2).
-    forward
-        Surfaces of reference chips in the input, shape (n, 2 r + 1, 2 r + 1).
-    backward
-        Surfaces of input chips in the reference, turned so that they should peak at the same
-        place, same shape.
-    say
-        By how much each chip's surface counts in a fit, shape (n,).
-    """
-
-    centres: NDArray[np.int_]
-    forward: Surfaces
-    backward: Surfaces
-    say: FloatArray
-
-    @cached_property
-    def both(self) -> Surfaces:
-        """The evidence of both directions together, in robust standard deviations."""
-        return normalise_each(self.forward + self.backward)
-
-    @property
-    def weighed(self) -> Surfaces:
-        """The evidence of both directions, by how much it counts in a fit."""
-        return np.asarray(self.both * self.say[:, None, None], np.float32)
-
-    def common_shift(self, px: FloatArray) -> FloatArray:
-        """Return positions moved by the shift that all chips together agree on best."""
-        return px + find_peak(normalise(self.weighed.sum(axis=0))).shift_px
-
-    def together(self, groups: NDArray[np.int_]) -> ChipSurfaces:
-        """Return what groups of chips say together, at their middles.
-
-        Parameters
-        ----------
-        groups
-            The number of each chip's group, shape (n,).
-        """
-        members = [groups == group for group in np.unique(groups)]
-        say = self.say[:, None, None]
-
-        def total(surfaces: Surfaces) -> Surfaces:
-            added = [(surfaces[of] * say[of]).sum(axis=0) for of in members]
-            return normalise_each(np.array(added, np.float32).reshape(-1, *surfaces.shape[1:]))
-
-        middles = [np.rint(self.centres[of].mean(axis=0)) for of in members]
-        return ChipSurfaces(
-            np.array(middles, int).reshape(-1, 2),
-            total(self.forward),
-            total(self.backward),
-            np.array([self.say[of].sum() for of in members]),
-        )
-
-    @property
-    def radius(self) -> int:
-        """Largest shift."""
-        return self.forward.shape[1] // 2
+# If a tenth of the chips is expected to be shifted by more than this, they are matched again.
+_FAR_PX = 2.5
 
 
 @dataclass(frozen=True)
 class ChipMatcher:
-    """Matches chips of a pair on a grid, the input resampled by what is known already.
+    """Matches chips of a pair, the input resampled by a model.
 
     Parameters
     ----------
     pair
         The images.
-    grid
-        Grid on which chips are matched: the matching grid or a coarser level of it.
-    to_input_px
-        From map positions to input pixels, as known so far.
     settings
         How similarity is measured.
     held_out
-        Returns for a piece of the grid which pixels of the reference must not be seen; None: all
+        Returns for a piece of a grid which pixels of the reference must not be seen; None: all
         may be.
     """
 
     pair: ImagePair
-    grid: Grid
-    to_input_px: ToPixel
     settings: SimilaritySettings
     held_out: MaskOf | None = None
 
-    def match(
-        self,
-        centres: NDArray[np.int_],
-        chip_px: int,
-        radius_px: int,
-        executor: Executor,
-        progress: Progress = SILENT,
-    ) -> ChipSurfaces:
+    rematches = 1
+
+    def seeing_all(self) -> ChipMatcher:
+        """Return this matcher for check chips, which may see what is held out of the fit."""
+        return replace(self, held_out=None)
+
+    def match(self, model: Model, places: Places, radius_px: int, context: Context) -> ChipSurfaces:
         """Return the surfaces, both ways, of all chips that have enough valid pixels.
 
         Parameters
         ----------
-        centres
-            Pixel positions (col, row) of the chips' centres in the grid, shape (n, 2).
-        chip_px
-            Side of the chips.
+        model
+            The misregistration on the map as known so far.
+        places
+            The chips.
         radius_px
-            Largest shift.
-        executor
-            Threads to work in.
-        progress
-            Is told of every chip.
+            Largest shift from where the model predicts a chip.
+        context
+            Threads and progress.
         """
-        kept, found = self._run(centres, chip_px, radius_px, executor, progress, both_ways=True)
+        kept, found = self._run(model, places, radius_px, context, both_ways=True)
         forward, backward = found[:, 0], found[:, 1]
-        return ChipSurfaces(kept, forward, backward, _same_say(normalise_each(forward + backward)))
+        weight = _equal_weight(normalise_each(forward + backward))
+        return ChipSurfaces(kept, forward, backward, weight)
 
     def match_forward(
-        self,
-        centres: NDArray[np.int_],
-        chip_px: int,
-        radius_px: int,
-        executor: Executor,
-        progress: Progress = SILENT,
+        self, model: Model, places: Places, radius_px: int, context: Context
     ) -> tuple[NDArray[np.int_], Surfaces]:
         """Return the centres that could be matched and their surfaces, one way, at half the cost.
 
         Parameters as `match`.
         """
-        kept, found = self._run(centres, chip_px, radius_px, executor, progress, both_ways=False)
+        kept, found = self._run(model, places, radius_px, context, both_ways=False)
         return kept, found[:, 0]
 
+    def fit_places(self, layout: ChipLayout) -> Places:
+        """Return the chips that a fit is made of."""
+        return Places(self.pair.grid, layout.fit_centres, layout.chip_px)
+
+    def first_model(
+        self, surfaces: ChipSurfaces, layout: ChipLayout, kind: str, seed: int
+    ) -> Positions:
+        """Return a first model of degree 1: the consensus of peaks after belief propagation."""
+        px = surfaces.centres.astype(float)
+        reach = _NEIGHBOUR_SPACINGS * layout.spacing_px
+        supported = propagate(surfaces.combined, surfaces.centres, reach)
+        shifts = np.array([find_peak(surface).shift_px for surface in supported])
+        first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
+        return find_consensus(px, px + shifts, _CONSENSUS_PX, first_kind, seed)
+
+    def kind_of(self, kind: str) -> str:
+        """Return the kind of model that is fitted where one is asked for."""
+        return kind
+
+    def is_settled(self, expected_px: FloatArray) -> bool:
+        """Whether expected shifts, shape (n, 2), are so small that matching again is in vain.
+
+        Chips near the border of their search windows have seen too little.
+        """
+        return not np.quantile(np.hypot(*expected_px.T), 0.9) > _FAR_PX
+
+    def for_check(self, surfaces: ChipSurfaces, layout: ChipLayout) -> ChipSurfaces:
+        """Return the surfaces that check points are taken from: each chip's own."""
+        return surfaces
+
     def _run(
-        self,
-        centres: NDArray[np.int_],
-        chip_px: int,
-        radius_px: int,
-        executor: Executor,
-        progress: Progress,
-        *,
-        both_ways: bool,
+        self, model: Model, places: Places, radius_px: int, context: Context, *, both_ways: bool
     ) -> tuple[NDArray[np.int_], Surfaces]:
         """Return the centres that could be matched and surfaces (n, ways, 2 r + 1, 2 r + 1)."""
         kept: list[NDArray[np.int_]] = []
         found: list[Surfaces] = []
 
         def one(centre: NDArray[np.int_]) -> Surfaces | None:
-            progress.check()
-            return self._surfaces(centre, chip_px, radius_px, both_ways)
+            return self._surfaces(model, places, centre, radius_px, both_ways)
 
-        for i, surfaces in enumerate(executor.map(one, centres)):
-            progress.update((i + 1) / len(centres))
+        matched = context.map(one, list(places.centres))
+        for centre, surfaces in zip(places.centres, matched, strict=True):
             if surfaces is not None:
-                kept.append(centres[i])
+                kept.append(centre)
                 found.append(surfaces)
         span = 2 * radius_px + 1
         none = np.zeros((0, 1 + both_ways, span, span), np.float32)
         return np.array(kept, int).reshape(-1, 2), np.stack(found) if found else none
 
     def _surfaces(
-        self, centre: NDArray[np.int_], chip_px: int, radius_px: int, both_ways: bool
+        self,
+        model: Model,
+        places: Places,
+        centre: NDArray[np.int_],
+        radius_px: int,
+        both_ways: bool,
     ) -> Surfaces | None:
-        reach = radius_px + BORDER_PX
+        chip_px, reach = places.chip_px, radius_px + BORDER_PX
         side = chip_px + 2 * reach
         corner = centre - chip_px // 2 - reach
-        piece = self.grid.window(int(corner[0]), int(corner[1]), side, side)
+        piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
         hidden = None if self.held_out is None else self.held_out(piece)
         reference = self.pair.reference_patch(piece, hidden)
-        if not self._can_be_matched(reference.inner(radius_px)):
+        if not self._can_be_matched(reference.inner(radius_px), "reference", centre):
             return None
-        input = self.pair.input_patch(piece, self.to_input_px)
-        if not self._can_be_matched(input.inner(radius_px)):
+        input = self.pair.input_patch(piece, lambda xy: self.pair.nominal_px(model(xy)))
+        if not self._can_be_matched(input.inner(radius_px), "input", centre):
             return None
-        there = describe(reference, chip_px**2, self.settings)
-        here = describe(input, chip_px**2, self.settings)
-        forward = similarity_surface(there.inner(radius_px), here, radius_px, self.settings)
+        reference_chip = describe(reference, chip_px**2, self.settings)
+        input_chip = describe(input, chip_px**2, self.settings)
+        forward = similarity_surface(
+            reference_chip.inner(radius_px), input_chip, radius_px, self.settings
+        )
         if not both_ways:
             return forward[None]
-        backward = similarity_surface(here.inner(radius_px), there, radius_px, self.settings)
+        backward = similarity_surface(
+            input_chip.inner(radius_px), reference_chip, radius_px, self.settings
+        )
         return np.stack([forward, backward[::-1, ::-1]])
 
-    def _can_be_matched(self, chip: Patch) -> bool:
+    def _can_be_matched(self, chip: Patch, image: str, centre: NDArray[np.int_]) -> bool:
         core = chip.inner(BORDER_PX)
         least = _LEAST_VALID_MASKED if self.pair.is_masked else _LEAST_VALID
-        return core.valid_share >= least and not core.is_flat
+        if core.valid_share < least:
+            _log.debug(
+                "chip at %s: only %.0f %% of the %s valid", centre, 100 * core.valid_share, image
+            )
+            return False
+        if core.is_flat:
+            _log.debug("chip at %s: the %s is constant", centre, image)
+            return False
+        return True
 
 
-def _same_say(surfaces: Surfaces) -> FloatArray:
+def _equal_weight(surfaces: Surfaces) -> FloatArray:
     """Return by what surfaces are multiplied so that every chip counts the same in a fit.
 
-    The highest peaks are those of buildings, which lay over and lean.
+    The highest peaks are those of buildings, which are displaced by layover.
     """
     return 1 / np.maximum(surfaces.max(axis=(1, 2), initial=0.0), _LEAST_HEIGHT).astype(float)

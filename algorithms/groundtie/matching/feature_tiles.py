@@ -1,20 +1,19 @@
-"""Features matched all over a pair, tile by tile, near where a rough model puts them."""
+"""Keypoints matched all over a pair, tile by tile, near where a coarse model puts them."""
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features.descriptors import Descriptor
-from ..features.detectors import Detector, seen_whole
+from ..context import Context
+from ..features.detectors import seen_whole
+from ..features.keypoints import Keypoints
 from ..features.matching import GATE_PX, match_near
-from ..features.points import FeaturePoints
 from ..features.tiles import MARGIN_PX, Describing, Detecting, inside, tiles, widened
 from ..geometry.models import Model
-from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
@@ -24,29 +23,29 @@ from .chips import MaskOf
 FloatArray = NDArray[np.float64]
 
 
-# A feature stands in a part of an image if all within so many of its scales belongs to it.
-_STANDING_SCALES = 1.5
+# A keypoint lies in a part of an image if all within so many of its scales belongs to it.
+_INSIDE_SCALES = 1.5
 
-# More features than this in a tile make matching longer, not better.
+# More keypoints than this in a tile make matching longer, not better.
 _MOST_PER_TILE = 6000
 
 
 @dataclass(frozen=True)
 class FeatureMatches:
-    """Pairs of features on the matching grid, the input's resampled by a rough model.
+    """Pairs of keypoints on the matching grid, the input's resampled by a coarse model.
 
     Parameters
     ----------
     reference, input
-        The features, row by row partners.
+        The keypoints, row by row partners.
     ratio
         Distance of the descriptors over that to the next best partner, shape (n,).
     found
-        How many features each image has.
+        How many keypoints each image has.
     """
 
-    reference: FeaturePoints
-    input: FeaturePoints
+    reference: Keypoints
+    input: Keypoints
     ratio: FloatArray
     found: tuple[int, int]
 
@@ -54,8 +53,8 @@ class FeatureMatches:
     def concatenate(cls, parts: list[FeatureMatches]) -> FeatureMatches:
         """Return the matches of all tiles."""
         return cls(
-            FeaturePoints.concatenate([part.reference for part in parts]),
-            FeaturePoints.concatenate([part.input for part in parts]),
+            Keypoints.concatenate([part.reference for part in parts]),
+            Keypoints.concatenate([part.input for part in parts]),
             np.concatenate([part.ratio for part in parts]),
             (sum(part.found[0] for part in parts), sum(part.found[1] for part in parts)),
         )
@@ -63,81 +62,69 @@ class FeatureMatches:
 
 @dataclass(frozen=True)
 class FeatureMatcher:
-    """Matches features of a pair on its matching grid, near where a rough model puts them.
+    """Matches keypoints of a pair on its matching grid, near where a coarse model puts them.
 
     Parameters
     ----------
     pair
         The images.
     detector, descriptor
-        How features are found and described.
+        How keypoints are found and described.
     ratio
         Largest ratio of the distances to the nearest and the next partner.
     gate_px
-        How far a partner may lie from where the rough model puts it.
+        How far a partner may lie from where the coarse model puts it.
     held_out
         Returns for a piece of the grid which pixels of the reference must not be seen; None: all
         may be.
     shown
-        The images with masks of what may be matched, as level ground; features elsewhere are left
-        out, but those beside see all that is there. None: all may be.
+        The images with masks of what may be matched, as level ground; keypoints elsewhere are left
+        out, but those beside see all of the images. None: all may be.
     """
 
     pair: ImagePair
-    detector: Detecting = field(default_factory=Detector)
-    descriptor: Describing = field(default_factory=Descriptor)
+    detector: Detecting
+    descriptor: Describing
     ratio: float = 1.0
     gate_px: float = GATE_PX
     held_out: MaskOf | None = None
     shown: ImagePair | None = None
 
-    def match(
-        self, coarse: Model, executor: Executor, progress: Progress = SILENT
-    ) -> FeatureMatches:
+    def match(self, coarse: Model, context: Context) -> FeatureMatches:
         """Return the matches all over the matching grid.
 
         Parameters
         ----------
         coarse
             The misregistration on the map; it may be wrong by `gate_px`.
-        executor
-            Threads to work in.
-        progress
-            Is told of every tile.
+        context
+            Where tiles are matched.
         """
-        parts_of_grid = list(tiles(self.pair.grid))
-
-        def one(tile: Window) -> FeatureMatches:
-            progress.check()
-            return self._match_tile(tile, coarse)
-
-        parts = []
-        for part in executor.map(one, parts_of_grid):
-            parts.append(part)
-            progress.update(len(parts) / len(parts_of_grid))
-        return FeatureMatches.concatenate(parts)
+        match_tile = partial(self._match_tile, coarse=coarse)
+        parts = context.map(match_tile, list(tiles(self.pair.grid)))
+        return FeatureMatches.concatenate(list(parts))
 
     def _match_tile(self, tile: Window, coarse: Model) -> FeatureMatches:
         gate = int(np.ceil(self.gate_px))
         area = seen_around(tile, self.pair.grid, gate)
         corner = area.col, area.row
         piece = self.pair.grid.window(*area)
-        hidden = None if self.held_out is None else self.held_out(piece)
-        reference = self.pair.reference_patch(piece, hidden)
+        masked = None if self.held_out is None else self.held_out(piece)
+        reference = self.pair.reference_patch(piece, masked)
 
-        def claimed(xy: FloatArray) -> FloatArray:
-            return self.pair.claimed_px(coarse(xy))
+        def nominal_px(xy: FloatArray) -> FloatArray:
+            return self.pair.nominal_px(coarse(xy))
 
-        input = self.pair.input_patch(piece, claimed)
-        if hidden is not None:
+        input = self.pair.input_patch(piece, nominal_px)
+        if masked is not None:
             # Where a descriptor sees less of the one image, it sees as little of the other.
-            input = Patch(input.values, input.valid & ~hidden)
+            input = Patch(input.values, input.valid & ~masked)
         core = Window(tile.col - area.col, tile.row - area.row, tile.width, tile.height)
         parts: tuple[Mask | None, Mask | None] = None, None
         if self.shown is not None:
             parts = (
                 self.shown.reference_patch(piece).valid,
-                self.shown.input_patch(piece, claimed).valid,
+                self.shown.input_patch(piece, nominal_px).valid,
             )
         own = self._features(reference, core, parts[0])
         others = self._features(input, widened(core, gate), parts[1])
@@ -158,16 +145,16 @@ class FeatureMatcher:
             (len(own), int(inside(others.position_px, core).sum())),
         )
 
-    def _features(self, patch: Patch, window: Window, part: Mask | None) -> FeaturePoints:
-        """Return the strongest features in a window of a patch, of those in a part of it."""
+    def _features(self, patch: Patch, window: Window, part: Mask | None) -> Keypoints:
+        """Return the strongest keypoints in a window of a patch, of those in a part of it."""
         found = self.detector.detect(patch)
         found = found.take(inside(found.position_px, window))
-        return (found if part is None else standing_in(found, part)).strongest(_MOST_PER_TILE)
+        return (found if part is None else lying_in(found, part)).strongest(_MOST_PER_TILE)
 
 
-def standing_in(found: FeaturePoints, part: Mask) -> FeaturePoints:
-    """Return the features that stand in a part of an image, shape (h, w)."""
-    return found.take(seen_whole(found, part, _STANDING_SCALES))
+def lying_in(found: Keypoints, part: Mask) -> Keypoints:
+    """Return the keypoints that lie in a part of an image, shape (h, w)."""
+    return found.take(seen_whole(found, part, _INSIDE_SCALES))
 
 
 def seen_around(tile: Window, grid: Grid, gate: int) -> Window:

@@ -1,40 +1,42 @@
-"""Chips of ground: what a mask leaves of them is matched by one joint histogram of all."""
+"""Chips that share one joint histogram, for masks that leave too little of each.
+
+In towns a mask of the ground leaves a few per cent of a chip, too little for a joint histogram of
+its own. All chips of the fit together have one; the log likelihood ratio of its grey-level pairs
+measures how well each chip matches at each shift (see `similarity.pooled`).
+"""
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from affine import Affine
 from numpy.typing import NDArray
 
+from ..context import Context
 from ..errors import TooFewPointsError
-from ..geometry.models import PARAMETERS, Model
-from ..progress import SILENT, Progress
-from ..rasters.grid import Grid
+from ..geometry.models import Model
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage
-from ..similarity.pooled import GreyLevels, smooth
-from ..similarity.surface import Surface
-from .alignment import align
+from ..similarity.pooled import PooledHistogram, smooth
+from ..similarity.surface import SimilaritySettings, Surface
+from .alignment import Positions
 from .belief_propagation import normalise_each
-from .chips import ChipSurfaces, MaskOf, ToPixel
-from .coarse import behind
+from .layout import ChipLayout
+from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 
-# Chips with less ground than this say nothing; fewer pixels in all make no joint histogram, and
+# Chips with less ground than this are left out; fewer pixels in all make no joint histogram, and
 # more are not needed for one.
 _LEAST_VALID = 0.02
 _LEAST_PIXELS, _MOST_PIXELS = 5_000, 4_000_000
 
-# Side of the chips on a level of the pyramid, in pixels of the level.
-_LEVEL_CHIP_PX = 64
+# The evidence of masked chips separates kinds of models badly, and linear distortion is common.
+_AUTO_KIND = "affine"
 
 
 @dataclass(frozen=True)
-class GroundChips:
-    """Chips of a masked pair, the input resampled by what is known already.
+class PooledHistogramMatcher:
+    """Matches chips of a masked pair by a joint histogram of all, the input resampled by a model.
 
     The masked image's chips are the templates: the other image has no mask of its own, and what
     it shows beside the ground must not take part.
@@ -43,157 +45,115 @@ class GroundChips:
     ----------
     pair
         The images; one of them has a mask.
-    grid
-        Grid on which chips are matched: the matching grid or a coarser level of it.
-    to_input_px
-        From map positions to input pixels, as known so far.
+    pooled_chip_px
+        Side of the chips, which cover the grid, that the joint histogram is counted in.
     held_out
-        Returns for a piece of the grid which pixels of the reference must not be seen; None: all
-        may be.
+        Returns for a piece of a grid which pixels of the reference must not be seen.
+    blind
+        Whether chips may not see what is held out; the joint histogram never counts it.
     """
 
     pair: ImagePair
-    grid: Grid
-    to_input_px: ToPixel
-    held_out: MaskOf | None = None
+    pooled_chip_px: int
+    held_out: MaskOf
+    blind: bool = True
 
-    def levels(
-        self, centres: NDArray[np.int_], chip_px: int, executor: Executor, progress: Progress
-    ) -> GreyLevels:
-        """Return what pairs of grey levels say by chips as they lie on each other now.
+    # What the coarse shift is searched for by.
+    settings = SimilaritySettings("nmi")
+
+    # The joint histogram gets the better the nearer chips lie: they are always matched again.
+    rematches = 2
+
+    def seeing_all(self) -> PooledHistogramMatcher:
+        """Return this matcher for check chips, which may see what is held out of the fit."""
+        return replace(self, blind=False)
+
+    def match(self, model: Model, places: Places, radius_px: int, context: Context) -> ChipSurfaces:
+        """Return the surfaces of all chips that have enough ground.
+
+        They are matched one way alone, so both ways are the same. Parameters as
+        `ChipMatcher.match` has them.
 
         Raises
         ------
         TooFewPointsError
             The mask leaves too few pixels.
         """
-        every = max(len(centres) * chip_px**2 // _MOST_PIXELS, 1)
-
-        def pixels(centre: NDArray[np.int_]) -> FloatImage:
-            progress.check()
-            template, shown = self._windows(centre, chip_px, 0)
-            both = template.valid & shown.valid
-            return np.stack([smooth(template).values[both], shown.values[both]])[:, ::every]
-
-        sample = np.concatenate(list(executor.map(pixels, centres)), axis=1)
-        count = sample.shape[1] * every
-        if count < _LEAST_PIXELS:
-            raise TooFewPointsError(f"the mask leaves only about {count} pixels to match")
-        return GreyLevels.of(sample[0], sample[1])
-
-    def match(
-        self,
-        levels: GreyLevels,
-        centres: NDArray[np.int_],
-        chip_px: int,
-        radius_px: int,
-        executor: Executor,
-        progress: Progress = SILENT,
-    ) -> ChipSurfaces:
-        """Return the surfaces of all chips that have enough ground.
-
-        They are matched one way alone, so both ways are the same.
-
-        Parameters
-        ----------
-        levels
-            What pairs of grey levels say.
-        centres
-            Pixel positions (col, row) of the chips' centres in the grid, shape (n, 2).
-        chip_px
-            Side of the chips.
-        radius_px
-            Largest shift.
-        executor
-            Threads to work in.
-        progress
-            Is told of every chip.
-        """
-        turn = 1 if self._forward else -1
+        histogram = self._histogram(model, Places.tiles(places.grid, self.pooled_chip_px), context)
+        order = 1 if self._is_reference_masked else -1
 
         def one(centre: NDArray[np.int_]) -> Surface | None:
-            progress.check()
-            template, search = self._windows(centre, chip_px, radius_px)
+            template, search = self._windows(model, places, centre, radius_px, self.blind)
             chip = template.inner(radius_px)
             if chip.valid_share < _LEAST_VALID:
                 return None
-            return levels.surface(chip, search)[::turn, ::turn]
+            return histogram.surface(chip, search)[::order, ::order]
 
         kept, found = [], []
-        for i, surface in enumerate(executor.map(one, centres)):
-            progress.update((i + 1) / len(centres))
+        matched = context.map(one, list(places.centres))
+        for centre, surface in zip(places.centres, matched, strict=True):
             if surface is not None:
-                kept.append(centres[i])
+                kept.append(centre)
                 found.append(surface)
         span = 2 * radius_px + 1
         nats = np.stack(found) if found else np.zeros((0, span, span), np.float32)
-        shown = normalise_each(nats)
-        # Chips count by what they say, in nats; on average as much as those of other similarities.
-        spread = np.ptp(nats, axis=(1, 2)) / np.maximum(np.ptp(shown, axis=(1, 2)), 1e-9)
-        heights = shown.max(axis=(1, 2), initial=0.0) * spread
-        say = spread / max(float(heights.mean()), 1e-9) if found else spread
-        return ChipSurfaces(np.array(kept, int).reshape(-1, 2), shown, shown, say)
+        normalised = normalise_each(nats)
+        # Chips count by their evidence, in nats; on average as much as those of other similarities.
+        spread = np.ptp(nats, axis=(1, 2)) / np.maximum(np.ptp(normalised, axis=(1, 2)), 1e-9)
+        heights = normalised.max(axis=(1, 2), initial=0.0) * spread
+        weight = spread / max(float(heights.mean()), 1e-9) if found else spread
+        return ChipSurfaces(np.array(kept, int).reshape(-1, 2), normalised, normalised, weight)
+
+    def fit_places(self, layout: ChipLayout) -> Places:
+        """Return the chips that a fit is made of: all over the grid, as there is little in each."""
+        return Places.tiles(self.pair.grid, self.pooled_chip_px)
+
+    def first_model(
+        self, surfaces: ChipSurfaces, layout: ChipLayout, kind: str, seed: int
+    ) -> Positions:
+        """Return a first model: the shift with the highest sum over all chips."""
+        shift = surfaces.common_shift_px
+        return lambda px: px + shift
+
+    def kind_of(self, kind: str) -> str:
+        """Return the kind of model that is fitted where one is asked for."""
+        return _AUTO_KIND if kind == "auto" else kind
+
+    def is_settled(self, expected_px: FloatArray) -> bool:
+        """Whether matching again is in vain: never."""
+        return False
+
+    def for_check(self, surfaces: ChipSurfaces, layout: ChipLayout) -> ChipSurfaces:
+        """Return the surfaces that check points are taken from: sums over neighbouring blocks."""
+        return surfaces.summed(layout.neighbourhoods(surfaces.centres))
+
+    def _histogram(self, model: Model, places: Places, context: Context) -> PooledHistogram:
+        """Return the evidence of pairs of grey levels in chips of the fit, as they lie now."""
+        every = max(len(places.centres) * places.chip_px**2 // _MOST_PIXELS, 1)
+
+        def pixels(centre: NDArray[np.int_]) -> FloatImage:
+            template, search = self._windows(model, places, centre, 0, blind=True)
+            both = template.valid & search.valid
+            return np.stack([smooth(template).values[both], search.values[both]])[:, ::every]
+
+        sampled = list(context.quiet().map(pixels, list(places.centres)))
+        sample = np.concatenate(sampled, axis=1) if sampled else np.zeros((2, 0), np.float32)
+        count = sample.shape[1] * every
+        if count < _LEAST_PIXELS:
+            raise TooFewPointsError(f"the mask leaves only about {count} pixels to match")
+        return PooledHistogram.of(sample[0], sample[1])
 
     @property
-    def _forward(self) -> bool:
+    def _is_reference_masked(self) -> bool:
         return self.pair.reference.mask is not None
 
     def _windows(
-        self, centre: NDArray[np.int_], chip_px: int, radius_px: int
+        self, model: Model, places: Places, centre: NDArray[np.int_], radius_px: int, blind: bool
     ) -> tuple[Patch, Patch]:
         """Return the masked image's and the other's window around a chip, as wide as searched."""
-        side = chip_px + 2 * radius_px
-        corner = centre - chip_px // 2 - radius_px
-        piece = self.grid.window(int(corner[0]), int(corner[1]), side, side)
-        hidden = None if self.held_out is None else self.held_out(piece)
-        reference = self.pair.reference_patch(piece, hidden)
-        input = self.pair.input_patch(piece, self.to_input_px)
-        return (reference, input) if self._forward else (input, reference)
-
-
-def refine_on_ground(
-    pair: ImagePair,
-    level: Grid,
-    model: Model,
-    radius_px: int,
-    held_out: MaskOf,
-    executor: Executor,
-) -> Model:
-    """Return a better affine model by all the ground that a level of the pyramid shows.
-
-    Parameters
-    ----------
-    pair
-        The images; one of them has a mask.
-    level
-        The matching grid at reduced resolution.
-    model
-        The misregistration on the map as known so far, of degree 1.
-    radius_px
-        How far it may be wrong, in pixels of the level.
-    held_out
-        Returns for a piece of the grid which pixels of the reference must not be seen.
-    executor
-        Threads to work in.
-
-    Raises
-    ------
-    TooFewPointsError
-        The mask leaves too few pixels.
-    """
-    chips = GroundChips(pair, level, lambda xy: pair.claimed_px(model(xy)), held_out)
-    centres = tile_centres((level.width, level.height), _LEVEL_CHIP_PX)
-    levels = chips.levels(centres, _LEVEL_CHIP_PX, executor, SILENT)
-    found = chips.match(levels, centres, _LEVEL_CHIP_PX, radius_px, executor)
-    if len(found.centres) < PARAMETERS["affine"]:
-        raise TooFewPointsError(f"only {len(found.centres)} chips show any ground")
-    identity = Affine.identity()
-    aligned = align("affine", found.centres, found.weighed, identity, found.common_shift)
-    return behind(model, aligned.model, level)
-
-
-def tile_centres(size: tuple[int, int], chip_px: int) -> NDArray[np.int_]:
-    """Return the centres (col, row) of chips that cover a grid side by side, shape (n, 2)."""
-    sides = [np.arange(length // chip_px) * chip_px + chip_px // 2 for length in size]
-    cols, rows = np.meshgrid(*sides)
-    return np.column_stack([cols.ravel(), rows.ravel()])
+        side = places.chip_px + 2 * radius_px
+        corner = centre - places.chip_px // 2 - radius_px
+        piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
+        reference = self.pair.reference_patch(piece, self.held_out(piece) if blind else None)
+        input = self.pair.input_patch(piece, lambda xy: self.pair.nominal_px(model(xy)))
+        return (reference, input) if self._is_reference_masked else (input, reference)

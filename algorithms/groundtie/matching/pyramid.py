@@ -1,21 +1,19 @@
-"""Down the image pyramid: from the rough shift to a model that tie points can start from."""
+"""Down the image pyramid: from the coarse shift to a model that tie points can start from."""
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
-
 import numpy as np
 
-from ..errors import NothingFoundError
+from ..context import Context
+from ..errors import AmbiguousPlaceError, NothingFoundError
+from ..geometry.limits import SearchLimits
 from ..geometry.models import Model
-from ..progress import Progress
 from ..rasters.grid import Grid
-from ..rasters.pair import ImagePair
-from .chips import MaskOf
-from .coarse import CoarseModel, refine_on_level
-from .local import LocalSearch
-from .pooled import refine_on_ground
-from .rough import Candidate, RoughSearch, level_factor, rough_candidates
+from .chips import ChipMatcher
+from .coarse_shift import Candidate, coarse_candidates, level_factor
+from .level_fit import CoarseModel, fit_level, fit_level_pooled
+from .matcher import MaskOf
+from .pooled import PooledHistogramMatcher
 
 # A candidate that random matches would hardly ever support (log10) needs no rival.
 _CERTAIN = -6.0
@@ -38,86 +36,88 @@ _LEVEL_ERROR_PX, _DISTORTION_PX = 2.0, 4
 # Each level is finer than the one before by this at most; the last is the matching grid itself.
 _STEP = 4.0
 
-# Ground alone says too little of chips to look so far: levels are this much finer.
-_GROUND_STEP = 2.0
+# Masked chips have too little evidence to look so far: levels are this much finer.
+_POOLED_STEP = 2.0
 
 
 def find_coarse_model(
-    pair: ImagePair, search: LocalSearch, rough: RoughSearch, executor: Executor, progress: Progress
+    matcher: ChipMatcher | PooledHistogramMatcher,
+    held_out: MaskOf,
+    limits: SearchLimits,
+    context: Context,
 ) -> Model:
     """Return a model of degree 1 on the map, from which tie points can be searched for.
 
     Parameters
     ----------
-    pair
-        The images.
-    search
-        Gives the similarity and what is held out.
-    rough
-        How far the input may lie from where it claims to be, and how it is searched for.
-    executor
-        Threads to work in.
-    progress
-        Is told of every step.
+    matcher
+        What tie points are matched by; it sees nothing of what is held out.
+    held_out
+        Returns for a piece of the grid which pixels of the reference must not be seen.
+    limits
+        How far the input may lie from its nominal place, in metres.
+    context
+        Threads and progress.
 
     Raises
     ------
     NothingFoundError
-        No candidate is better than chance, or another place matches about as well.
+        No candidate is better than chance.
+    AmbiguousPlaceError
+        Another place matches about as well.
     """
-    factor = level_factor(pair.grid)
-    level = pair.grid if factor == 1 else pair.grid.scaled(factor)
-    candidates = rough_candidates(pair, level, rough, search.settings, search.held_out, executor)
-    progress.update(0.3)
-    if search.pooled:
-        return _down_on_ground(pair, candidates, factor, search.held_out, executor)
+    grid = matcher.pair.grid
+    factor = level_factor(grid)
+    level = grid if factor == 1 else grid.scaled(factor)
+    candidates = coarse_candidates(matcher.pair, level, limits, matcher.settings, held_out, context)
+    context.update(0.3)
+    if isinstance(matcher, PooledHistogramMatcher):
+        return _descend_pooled(matcher, candidates, factor, context)
+    return _descend(matcher, candidates, factor, context)
 
-    def refine(level: Grid, model: Model, radius_px: int) -> CoarseModel:
-        progress.check()
-        return refine_on_level(
-            pair, level, model, radius_px, search.settings, search.held_out, executor
-        )
 
+def _descend(
+    matcher: ChipMatcher, candidates: list[Candidate], factor: float, context: Context
+) -> Model:
+    """Return the model that chips agree on, level by level."""
+    grid, quiet = matcher.pair.grid, context.quiet()
+    level = grid if factor == 1 else grid.scaled(factor)
     tried: list[CoarseModel] = []
     for candidate in candidates:
         certain = tried and min(_alarms(model) for model in tried) < _CERTAIN
         if certain and candidate.height < _RIVAL_HEIGHT * candidates[0].height:
             break
-        tried.append(refine(level, candidate.model, _RADIUS_PX))
+        tried.append(fit_level(matcher, level, candidate.model, _RADIUS_PX, quiet))
     if not tried or min(map(_alarms, tried)) > _HOPELESS:
         raise NothingFoundError("nothing in common was found")
     best = min(tried, key=_alarms)
     _require_no_rival(best, tried, level)
     while factor > 1:
         finer_factor = max(factor / _STEP, 1.0)
-        finer_level = pair.grid if finer_factor == 1 else pair.grid.scaled(finer_factor)
+        finer_level = grid if finer_factor == 1 else grid.scaled(finer_factor)
         radius = int(np.ceil(_LEVEL_ERROR_PX * factor / finer_factor)) + _DISTORTION_PX
-        finer = refine(finer_level, best.model, radius)
+        finer = fit_level(matcher, finer_level, best.model, radius, quiet)
         if finer.log10_false_alarms < 0:
             best = finer
         factor = finer_factor
     return best.model
 
 
-def _down_on_ground(
-    pair: ImagePair,
-    candidates: list[Candidate],
-    factor: float,
-    held_out: MaskOf,
-    executor: Executor,
+def _descend_pooled(
+    matcher: PooledHistogramMatcher, candidates: list[Candidate], factor: float, context: Context
 ) -> Model:
     """Return the model that the ground as a whole agrees on, level by level."""
     if not candidates:
         raise NothingFoundError("nothing in common was found")
     best, *others = candidates
     if others and others[0].height > _RIVAL_HEIGHT * best.height:
-        raise NothingFoundError("two places match about as well")
+        raise AmbiguousPlaceError("two places match about as well")
     model = best.model
-    while factor > _GROUND_STEP:
-        factor = factor / _GROUND_STEP
-        radius = int(np.ceil(_LEVEL_ERROR_PX * _GROUND_STEP)) + _DISTORTION_PX
-        level = pair.grid.scaled(factor)
-        model = refine_on_ground(pair, level, model, radius, held_out, executor)
+    while factor > _POOLED_STEP:
+        factor = factor / _POOLED_STEP
+        radius = int(np.ceil(_LEVEL_ERROR_PX * _POOLED_STEP)) + _DISTORTION_PX
+        level = matcher.pair.grid.scaled(factor)
+        model = fit_level_pooled(matcher, level, model, radius, context.quiet())
     return model
 
 
@@ -133,4 +133,4 @@ def _require_no_rival(best: CoarseModel, tried: list[CoarseModel], level: Grid) 
         evident = _alarms(other) < min(_RIVAL_EVIDENCE * _alarms(best), _HOPELESS)
         if distance_px > _SAME_PLACE_PX and evident:
             distance = distance_px * level.pixel_size_m
-            raise NothingFoundError(f"two places match about as well, {distance:.0f} m apart")
+            raise AmbiguousPlaceError(f"two places match about as well, {distance:.0f} m apart")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,11 @@ from scipy import sparse
 
 # A larger pixel is valid if at least this share of its area is.
 MIN_VALID_SHARE = 0.5
+
+# Pixels that are held at a time.
+_STRIP_PIXELS = 4_000_000
+
+Lines = Callable[[int, int], tuple[NDArray[Any], NDArray[np.bool_]]]
 
 
 def overlaps(edges: NDArray[np.float64], count: int, dtype: Any = np.float32) -> sparse.csr_matrix:
@@ -76,6 +82,40 @@ def area_average(
     enough = weight >= MIN_VALID_SHARE * area - 1e-6 * area
     means = np.divide(total, weight, out=np.zeros_like(total), where=enough)
     return means.astype(values.dtype, copy=False), enough
+
+
+def average_by_strips(
+    read_lines: Lines, shape: tuple[int, int], out_shape: tuple[int, int]
+) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Average an image to a smaller size without ever holding all of it.
+
+    Parameters
+    ----------
+    read_lines
+        Returns values and validity, shapes (bands, lines, width), of some lines, given the first
+        and their number.
+    shape, out_shape
+        Height and width of the image, and of the result.
+
+    Returns
+    -------
+    means, valid
+        Shapes (bands, *out_shape), as `area_average`.
+    """
+    height, width = shape
+    row_edges = np.linspace(0, height, out_shape[0] + 1)
+    col_edges = np.linspace(0, width, out_shape[1] + 1)
+    lines = max(int(_STRIP_PIXELS / width * out_shape[0] / height), 1)
+    strips = []
+    for first in range(0, out_shape[0], lines):
+        edges = row_edges[first : first + lines + 1]
+        top, bottom = int(np.floor(edges[0])), int(np.ceil(edges[-1]))
+        values, valid = read_lines(top, bottom - top)
+        pairs = zip(values, valid, strict=True)
+        strips.append([area_average(v, ok, edges - top, col_edges) for v, ok in pairs])
+    bands = [zip(*band, strict=True) for band in zip(*strips, strict=True)]
+    images = [(np.concatenate(v), np.concatenate(ok)) for v, ok in bands]
+    return np.stack([v for v, _ in images]), np.stack([ok for _, ok in images])
 
 
 def _sum(down: sparse.csr_matrix, across: sparse.csr_matrix, values: NDArray[Any]) -> NDArray[Any]:

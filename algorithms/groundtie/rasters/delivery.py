@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import rasterio.windows
 from numpy.typing import NDArray
 
+from ..arrays import Raster
 from ..progress import SILENT, Progress
-from .grid import Grid
-from .reading import Mask, RasterSource, Window
+from .grid import PIXEL_COORDINATES, Grid
+from .reading import RasterSource
+from .tiling import band_groups, in_order, tiles
 from .warping import (
     DenseMap,
     ToInputPx,
@@ -28,19 +29,11 @@ from .warping import (
     resample,
     source_window,
 )
-from .writing import BLOCK, create_like, fill_value, keep_apart
-
-# Tiles are blocks of the file, small enough for those of a small raster to be worked side by side.
-_TILE = BLOCK
-
-# What a worker may hold of the result at a time; rasters with many bands are worked in groups.
-_TILE_BYTES = 32_000_000
+from .windows import Mask, Window
+from .writing import create_like, fill_value, keep_apart, require_fit
 
 # Share of the work that is left when all pixels are written: overviews.
 _OVERVIEWS = 0.1
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -53,6 +46,38 @@ class _Warp:
     method: str
     nodata: float | None
     factor: tuple[int, int]
+    groups: tuple[tuple[int, ...], ...]
+
+    @classmethod
+    def of(
+        cls,
+        source: RasterSource,
+        to_input_px: ToInputPx,
+        target: Grid,
+        resampling: str,
+        nodata: float | None,
+    ) -> _Warp:
+        method = "nearest" if source.colormap else resampling
+        nodata = _choose_nodata(source) if nodata is None else nodata
+        if nodata is not None:
+            require_fit(nodata, source.dtype)
+        factor = (1, 1) if method == "nearest" else reduction(target, to_input_px)
+        return cls(source, to_input_px, target, method, nodata, factor, band_groups(source))
+
+    @property
+    def leaves_gaps(self) -> bool:
+        """Whether there may be pixels without data that nothing but a mask can mark."""
+        bare = self.nodata is None and self.source.alpha_band is None
+        return self.source.has_mask_band or (bare and not _is_covered(self))
+
+    def tiles(
+        self, pool: ThreadPoolExecutor, ahead: int, progress: Progress
+    ) -> Iterator[tuple[Window, tuple[int, ...], NDArray[Any], Mask]]:
+        """Yield all tiles in groups of bands: place, bands, and what `tile` returns."""
+        tasks = [(tile, group) for tile in tiles(self.target) for group in self.groups]
+        for i, found in enumerate(in_order(pool, self.tile, tasks, ahead)):
+            yield *tasks[i], *found
+            progress.update((i + 1) / len(tasks))
 
     def tile(self, task: tuple[Window, tuple[int, ...]]) -> tuple[NDArray[Any], Mask]:
         """Return some bands of a tile, (bands, h, w), and the validity of the first, (h, w)."""
@@ -127,29 +152,57 @@ def warp_raster(
     CancelledError
         The user cancelled.
     """
-    method = "nearest" if source.colormap else resampling
-    nodata = _choose_nodata(source) if nodata is None else nodata
-    factor = (1, 1) if method == "nearest" else reduction(target, to_input_px)
-    warp = _Warp(source, to_input_px, target, method, nodata, factor)
-    bare = nodata is None and source.alpha_band is None
-    masked = source.has_mask_band or (bare and not _is_covered(warp))
-    groups = _band_groups(source)
-    interleave = "band" if len(groups) > 1 else None
-    tasks = [(tile, group) for tile in tiles(target) for group in groups]
+    warp = _Warp.of(source, to_input_px, target, resampling, nodata)
+    masked = warp.leaves_gaps
+    interleave = "band" if len(warp.groups) > 1 else None
+    pixels = progress.part(0, 1 - _OVERVIEWS)
     with (
         create_like(
-            source, target, path, nodata=nodata, interleave=interleave, workers=workers
+            source, target, path, nodata=warp.nodata, interleave=interleave, workers=workers
         ) as dataset,
         ThreadPoolExecutor(workers) as pool,
     ):
-        for i, (values, known) in enumerate(in_order(pool, warp.tile, tasks, workers + 1)):
-            tile, group = tasks[i]
+        for tile, group, values, known in warp.tiles(pool, workers + 1, pixels):
             place = rasterio.windows.Window(*tile)
             dataset.write(values, list(group), window=place)
-            if masked and group is groups[0]:
+            if masked and group is warp.groups[0]:
                 dataset.write_mask(known, window=place)
-            progress.update((i + 1) / len(tasks) * (1 - _OVERVIEWS))
     progress.update(1.0)
+
+
+def warp_to_array(
+    source: RasterSource,
+    to_input_px: ToInputPx,
+    target: Grid,
+    resampling: str = "cubic",
+    *,
+    nodata: float | None = None,
+    workers: int = 2,
+    progress: Progress = SILENT,
+) -> Raster:
+    """Resample a raster onto a grid, as `warp_raster` does, into an array.
+
+    Parameters, errors and pixels are those of `warp_raster`; where that writes a mask into its
+    file, the array is a masked one.
+
+    Returns
+    -------
+    Raster
+        Of shape (bands, h, w), dtype of the raster.
+    """
+    warp = _Warp.of(source, to_input_px, target, resampling, nodata)
+    values = np.empty((source.count, target.height, target.width), source.dtype)
+    valid = np.ones(values.shape[1:], bool)
+    with ThreadPoolExecutor(workers) as pool:
+        for tile, group, part, known in warp.tiles(pool, workers + 1, progress):
+            rows, cols = tile.slices
+            values[group[0] - 1 : group[-1], rows, cols] = part
+            if group is warp.groups[0]:
+                valid[rows, cols] = known
+    if warp.leaves_gaps:
+        values = np.ma.MaskedArray(values, np.broadcast_to(~valid, values.shape))
+    located = target.crs is not None or target.transform != PIXEL_COORDINATES
+    return Raster(values, target.transform if located else None, target.crs, warp.nodata)
 
 
 def write_with_geotransform(
@@ -197,13 +250,6 @@ def write_with_geotransform(
     progress.update(1.0)
 
 
-def tiles(grid: Grid) -> Iterator[Window]:
-    """Return the tiles that cover a grid, row by row, each made of whole blocks of the file."""
-    for row in range(0, grid.height, _TILE):
-        for col in range(0, grid.width, _TILE):
-            yield Window(col, row, min(_TILE, grid.width - col), min(_TILE, grid.height - row))
-
-
 def _choose_nodata(source: RasterSource) -> float | None:
     declared = source.bands[source.image_bands[0] - 1].nodata
     if declared is not None or source.alpha_band or source.has_mask_band:
@@ -220,29 +266,3 @@ def _is_covered(warp: _Warp) -> bool:
         lies_within(lattice(warp.target.window(*tile), warp.to_input_px), grid.width, grid.height)
         for tile in tiles(warp.target)
     )
-
-
-def _band_groups(source: RasterSource) -> list[tuple[int, ...]]:
-    most = max(_TILE_BYTES // (_TILE * _TILE * source.dtype.itemsize), 1)
-    numbers = range(1, source.count + 1)
-    return [tuple(numbers[i : i + most]) for i in range(0, source.count, most)]
-
-
-def in_order(
-    pool: ThreadPoolExecutor,
-    work: Callable[[Item], Result],
-    items: Iterable[Item],
-    ahead: int,
-) -> Iterator[Result]:
-    """Work on some items at a time, `ahead` at most, and yield the results in their order."""
-    waiting: deque[Future[Result]] = deque()
-    try:
-        for item in items:
-            waiting.append(pool.submit(work, item))
-            if len(waiting) >= ahead:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
-    finally:
-        for future in waiting:
-            future.cancel()

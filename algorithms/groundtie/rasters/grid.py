@@ -7,8 +7,9 @@ everywhere else (the first pixel's centre is at 0).
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 import rasterio.warp
@@ -46,16 +47,17 @@ class Grid:
     height: int
 
     @cached_property
-    def _centres(self) -> Affine:
-        return self.transform * Affine.translation(0.5, 0.5)
+    def centre_transform(self) -> Affine:
+        """Transform of pixel positions, counted from the first pixel's centre, to the map."""
+        return compose(self.transform, Affine.translation(0.5, 0.5))
 
     def pixel_to_map(self, px: ArrayLike) -> FloatArray:
         """Return the map positions, shape (n, 2), of the pixel positions `px` (col, row)."""
-        return apply_affine(self._centres, px)
+        return apply_affine(self.centre_transform, px)
 
     def map_to_pixel(self, xy: ArrayLike) -> FloatArray:
         """Return the pixel positions (col, row), shape (n, 2), of the map positions `xy`."""
-        return apply_affine(~self._centres, xy)
+        return apply_affine(~self.centre_transform, xy)
 
     def contains(self, px: ArrayLike) -> NDArray[np.bool_]:
         """Tell for each pixel position, shape (n, 2), whether it lies on a pixel of this grid."""
@@ -101,7 +103,7 @@ class Grid:
     def scaled(self, factor: float) -> Grid:
         """Return the grid of pixels `factor` times as large from the same corner, cut to fit."""
         return Grid(
-            self.transform * Affine.scale(factor),
+            compose(self.transform, Affine.scale(factor)),
             self.crs,
             max(int(self.width / factor + 1e-6), 1),
             max(int(self.height / factor + 1e-6), 1),
@@ -111,14 +113,14 @@ class Grid:
         """Return the part of this lattice that starts at a pixel; it may reach beyond the grid."""
         return replace(
             self,
-            transform=self.transform * Affine.translation(col, row),
+            transform=compose(self.transform, Affine.translation(col, row)),
             width=width,
             height=height,
         )
 
     def shifted(self, dx: float, dy: float) -> Grid:
         """Return this grid moved by map units."""
-        return replace(self, transform=Affine.translation(dx, dy) * self.transform)
+        return replace(self, transform=compose(Affine.translation(dx, dy), self.transform))
 
     def outline(self, points_per_side: int = 21) -> FloatArray:
         """Return pixel positions along the outer border, shape (4 n, 2), in order."""
@@ -136,6 +138,15 @@ class Grid:
             ]
         )
         return np.asarray(unit * [self.width, self.height] - 0.5)
+
+
+# The product is `*` in affine 2; affine 3 has `@` and warns of `*`.
+_product = operator.matmul if hasattr(Affine, "__matmul__") else operator.mul
+
+
+def compose(*transforms: Affine) -> Affine:
+    """Return the affine transform that applies the last of `transforms` first."""
+    return reduce(_product, transforms)
 
 
 def apply_affine(transform: Affine, points: ArrayLike) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Interpolation by a kernel, exact at any position.
+"""Interpolation by a kernel, exact at any position, and the weights of B-splines.
 
 OpenCV's `remap` is only used for what it does exactly, since OpenCV 5: bilinear interpolation in
 single precision. Before, it rounded positions to 1/32 px; its cubic kernel (a = -0.75) does not
@@ -66,6 +66,35 @@ _KERNELS: dict[str, Weights] = {"bilinear": _bilinear, "cubic": _cubic, "lanczos
 
 # How many pixels on each side of a position a kernel takes.
 REACH = {"nearest": 1, "bilinear": 1, "cubic": 2, "lanczos": 4}
+
+
+def bspline_weights(order: int, fraction: NDArray[Any] | float) -> NDArray[np.float64]:
+    """Return the weights with which a B-spline takes the pixels around positions (de Boor 1978).
+
+    Parameters
+    ----------
+    order
+        Degree + 1: 2 is linear, 4 cubic.
+    fraction
+        How far position - order / 2 lies beyond a whole number n, 0 to 1, any shape.
+
+    Returns
+    -------
+    Weights of the pixels n + 1 … n + order, shape (order, …); they sum to 1.
+    """
+    fraction = np.asarray(fraction, np.float64)
+    weights = np.zeros((order, *fraction.shape))
+    weights[0] = 1
+    for n in range(2, order + 1):
+        for j in reversed(range(n)):
+            before = (n - 1 - j + fraction) * weights[j - 1] if j else 0
+            weights[j] = ((j + 1 - fraction) * weights[j] + before) / (n - 1)
+    return weights
+
+
+def bspline_slopes(order: int, fraction: NDArray[Any] | float) -> NDArray[np.float64]:
+    """Return the derivatives of `bspline_weights` by the position, shape (order, …)."""
+    return -np.diff(bspline_weights(order - 1, fraction), axis=0, prepend=0, append=0)
 
 
 def interpolate(image: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[Any]:

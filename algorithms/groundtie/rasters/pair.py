@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeoreferencingError, NoOverlapError, SameFileError
+from ..geometry.limits import SearchLimits
 from .grid import Grid, reproject
 from .patch import Patch
 from .reading import FloatImage, Mask, RasterSource, Window
@@ -23,8 +23,11 @@ ToPixel = Callable[[FloatArray], FloatArray]
 _EMPTY_PX = 9
 _EMPTY_MARGIN_PX = 5
 
-# Turned images are tried at angles this far apart for what they reach.
-_TURN_STEP_DEG = 5.0
+# Rotated images are tried at angles this far apart for what they reach.
+_ANGLE_STEP_DEG = 5.0
+
+# For pairs that are not searched.
+_NOWHERE = SearchLimits(0.0)
 
 # Pixel sizes nearer than this are the same.
 _SAME_SIZE = 0.02
@@ -41,7 +44,7 @@ class Image:
     band
         Number of the band, from 1; None: the mean of all bands.
     mask
-        A raster on the same map whose pixels tell which of the image's take part: those with 0
+        A raster on the same map whose pixels state which of the image's take part: those with 0
         or without data do not. None: all that are valid.
     """
 
@@ -53,12 +56,12 @@ class Image:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
         values, valid = sample(self.source, grid, to_px, "cubic", self.band)
         if hidden is not None:
-            # Before anything is told from the values: nothing may be told from these.
+            # Before anything is inferred from the values: nothing may be inferred from these.
             values, valid = np.where(hidden, np.float32(0), values), valid & ~hidden
         if not self.source.says_what_is_valid:
             valid = valid & ~_empty_areas(values, valid)
         if self.mask is not None:
-            own, to_mask = self.source.grid, _claimed_pixels(self.source.grid, self.mask.grid)
+            own, to_mask = self.source.grid, _nominal_pixels(self.source.grid, self.mask.grid)
             shown, known = sample(
                 self.mask, grid, lambda xy: to_mask(own.pixel_to_map(to_px(xy))), "nearest", 1
             )
@@ -83,10 +86,12 @@ class ImagePair:
         The matching grid: the reference's lattice, with pixels as large as the coarser image's,
         where the images overlap or may do so within the search radius.
     overlap_px
-        Width and height, in matching pixels, of the box in which they overlap as claimed.
+        Width and height, in matching pixels, of the box in which they overlap nominally.
     surroundings
-        The matching lattice as far as either image may show something of the matching grid, where
-        it claims to lie.
+        The matching lattice as far as either image may show something of the matching grid, at
+        its nominal place.
+    limits
+        How far the input may lie from its nominal place, in metres.
     """
 
     reference: Image
@@ -94,6 +99,7 @@ class ImagePair:
     grid: Grid
     overlap_px: tuple[int, int]
     surroundings: Grid
+    limits: SearchLimits = _NOWHERE
 
     def reference_patch(self, grid: Grid, hidden: Mask | None = None) -> Patch:
         """Return the reference on a grid in its CRS, masked where it is to be hidden."""
@@ -113,7 +119,7 @@ class ImagePair:
 
     @property
     def is_masked(self) -> bool:
-        """Whether a mask tells what of an image takes part."""
+        """Whether a mask limits what of an image takes part."""
         return self.reference.mask is not None or self.input.mask is not None
 
     def notes(self) -> list[str]:
@@ -124,28 +130,9 @@ class ImagePair:
             if image.source.is_complex
         ]
 
-    def claimed_px(self, xy: FloatArray) -> FloatArray:
-        """Return the input pixels at reference map positions as the input claims, shape (n, 2)."""
-        return _claimed_pixels(self.grid, self.input.source.grid)(xy)
-
-
-@dataclass(frozen=True)
-class Turn:
-    """How far an image may be turned, either way, and how much larger or smaller it may be."""
-
-    largest_deg: float
-    largest_scale: float
-
-    def of(self, outline_px: FloatArray) -> FloatArray:
-        """Return all that an outline, shape (n, 2), reaches about its centre, shape (m, 2)."""
-        finite = outline_px[np.isfinite(outline_px).all(axis=1)]
-        centre = (finite.min(axis=0) + finite.max(axis=0)) / 2
-        steps = int(np.ceil(2 * self.largest_deg / _TURN_STEP_DEG)) + 1
-        angles = np.radians(np.linspace(-self.largest_deg, self.largest_deg, steps))
-        cosine, sine = np.cos(angles), np.sin(angles)
-        turns = np.array([[cosine, -sine], [sine, cosine]])
-        around = self.largest_scale * (finite - centre)
-        return np.asarray(centre + np.einsum("ijk,nj->kni", turns, around).reshape(-1, 2))
+    def nominal_px(self, xy: FloatArray) -> FloatArray:
+        """Return the input pixels at reference map positions of its nominal place, shape (n, 2)."""
+        return _nominal_pixels(self.grid, self.input.source.grid)(xy)
 
 
 def make_pair(
@@ -153,7 +140,8 @@ def make_pair(
     input: Image,
     matching_pixel_size_m: float | None = None,
     search_radius_m: float | None = None,
-    turn: Turn | None = None,
+    rotation_deg: float = 0.0,
+    scale: float = 1.0,
 ) -> ImagePair:
     """Put two images on a common matching grid.
 
@@ -164,23 +152,24 @@ def make_pair(
     matching_pixel_size_m
         Pixel size of the matching grid; None: that of the coarser image.
     search_radius_m
-        How far the input may lie from where it claims to be; None: as `default_radius_m`.
-    turn
-        How far it may be turned and scaled against what it claims; without georeferencing both
-        images then have one centre. None: not at all.
+        How far the input may lie from its nominal place; None: as `default_radius_m`.
+    rotation_deg, scale
+        Largest rotation, either way, and largest scale, either way, against its nominal
+        geotransform. Where they are searched for and there is no georeferencing, both images have
+        one centre.
 
     Raises
     ------
     SameFileError
-        Both are the same file.
+        Both are the same raster.
     GeoreferencingError
         Only one of them is georeferenced.
     NoOverlapError
         They do not overlap.
     """
     ref, inp = reference.source, input.source
-    if Path(ref.path).resolve() == Path(inp.path).resolve():
-        raise SameFileError(f"reference and input are the same file: {ref.path}")
+    if ref.is_same_as(inp):
+        raise SameFileError(f"reference and input are the same raster: {ref.path}")
     for one, other in ((ref, inp), (inp, ref)):
         if one.grid.is_georeferenced and not other.grid.is_georeferenced:
             raise GeoreferencingError(f"{other.path} has no georeferencing, but {one.path} has")
@@ -189,40 +178,53 @@ def make_pair(
     wanted = matching_pixel_size_m or _coarser_m(ref.grid, inp.grid)
     factor = wanted / ref.grid.pixel_size_m
     grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
-    outline = _claimed_pixels(inp.grid, ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
-    claimed = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
-    if turn is not None and not ref.grid.is_georeferenced:
+    radius = default_radius_m(grid) if search_radius_m is None else search_radius_m
+    limits = SearchLimits(radius, rotation_deg, (1 / scale, scale))
+    outline = _nominal_pixels(inp.grid, ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
+    nominal = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
+    if not limits.is_shift and not ref.grid.is_georeferenced:
         outline = outline + np.subtract(ref.grid.centre_px, inp.grid.centre_px)
     outline = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
     overlap = _box(grid, outline, 0.0)
     if overlap is None:
         raise NoOverlapError(f"{ref.path} and {inp.path} do not overlap")
-    radius = default_radius_m(grid) if search_radius_m is None else search_radius_m
-    if turn is not None:
-        outline = turn.of(outline)
+    if not limits.is_shift:
+        outline = _rotated(outline, rotation_deg, scale)
     reach = _box(grid, outline, radius / grid.pixel_size_m)
     assert reach is not None
     matching, overlap_px = grid.window(*reach), (overlap.width, overlap.height)
-    around = _surroundings(reach, radius / grid.pixel_size_m, None if turn is None else claimed)
-    return ImagePair(reference, input, matching, overlap_px, grid.window(*around))
+    around = _surroundings(reach, radius / grid.pixel_size_m, None if limits.is_shift else nominal)
+    return ImagePair(reference, input, matching, overlap_px, grid.window(*around), limits)
 
 
-def _surroundings(reach: Window, radius_px: float, claimed_px: FloatArray | None) -> Window:
+def _rotated(outline_px: FloatArray, largest_deg: float, largest_scale: float) -> FloatArray:
+    """Return all that an outline, shape (n, 2), rotated and scaled reaches about its centre."""
+    finite = outline_px[np.isfinite(outline_px).all(axis=1)]
+    centre = (finite.min(axis=0) + finite.max(axis=0)) / 2
+    steps = int(np.ceil(2 * largest_deg / _ANGLE_STEP_DEG)) + 1
+    angles = np.radians(np.linspace(-largest_deg, largest_deg, steps))
+    cosine, sine = np.cos(angles), np.sin(angles)
+    rotations = np.array([[cosine, -sine], [sine, cosine]])
+    around = largest_scale * (finite - centre)
+    return np.asarray(centre + np.einsum("ijk,nj->kni", rotations, around).reshape(-1, 2))
+
+
+def _surroundings(reach: Window, radius_px: float, nominal_px: FloatArray | None) -> Window:
     """Return where an image may show something of a window, as far off as it may lie.
 
-    What may be turned shows it anywhere in its claimed outline, shape (n, 2).
+    What may be rotated shows it anywhere in its nominal outline, shape (n, 2).
     """
     low = np.array(reach[:2]) - int(np.ceil(radius_px))
     high = np.array(reach[:2]) + reach[2:] + int(np.ceil(radius_px))
-    if claimed_px is not None:
-        finite = claimed_px[np.isfinite(claimed_px).all(axis=1)]
+    if nominal_px is not None:
+        finite = nominal_px[np.isfinite(nominal_px).all(axis=1)]
         low = np.minimum(low, np.floor(finite.min(axis=0)).astype(int))
         high = np.maximum(high, np.ceil(finite.max(axis=0)).astype(int) + 1)
     return Window(int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1]))
 
 
 def _empty_areas(values: FloatImage, valid: Mask) -> Mask:
-    """Tell the pixels of areas that are 0 throughout, and their margin.
+    """Return the pixels of areas that are 0 throughout, and their margin.
 
     What is invalid is 0, too, so that narrow borders are found, but has no margin of its own.
 
@@ -249,7 +251,7 @@ def _coarser_m(reference: Grid, input: Grid) -> float:
     return max(reference.pixel_size_m, input.pixel_size_m)
 
 
-def _claimed_pixels(source: Grid, target: Grid) -> ToPixel:
+def _nominal_pixels(source: Grid, target: Grid) -> ToPixel:
     """Return the function from map positions of `source` to pixels of `target`."""
     return lambda xy: target.map_to_pixel(reproject(xy, source.crs, target.crs))
 

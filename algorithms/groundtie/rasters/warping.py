@@ -9,10 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .bands import working_dtype
 from .grid import Grid
 from .kernels import REACH, interpolate
 from .lattice import Lattice, fine_lattice, row_strips
-from .reading import FloatImage, Mask, RasterSource, Window, working_dtype
+from .reading import FloatImage, RasterSource
+from .windows import Mask, Window
 
 FloatArray = NDArray[np.float64]
 ToInputPx = Callable[[FloatArray], FloatArray]

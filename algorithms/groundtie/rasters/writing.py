@@ -1,4 +1,4 @@
-"""GeoTIFF files that carry over all that the input's file says of its pixels."""
+"""GeoTIFF files that carry over all that the input states of its pixels."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ from rasterio.enums import ColorInterp, Resampling
 
 from ..errors import ParameterError
 from .atomic import writing
+from .bands import BandInfo, fits
 from .grid import PIXEL_COORDINATES, Grid
-from .reading import CACHE_BYTES, BandInfo, RasterSource, fits
+from .reading import CACHE_BYTES, RasterSource
 
 BLOCK = 512
 
@@ -69,8 +70,8 @@ def create_like(
     OutputError
         The file cannot be written completely.
     """
-    if nodata is not None and not fits(nodata, source.dtype):
-        raise ParameterError(f"pixels of type {source.dtype} cannot hold the nodata value {nodata}")
+    if nodata is not None:
+        require_fit(nodata, source.dtype)
     profile = _profile(source, grid, nodata, interleave or source.interleave or "pixel", workers)
     # A mask inside the file, not beside it.
     options = {
@@ -88,8 +89,8 @@ def create_like(
 
 
 def one_band(source: RasterSource, dtype: str) -> RasterSource:
-    """Return a raster, for `create_like`, as one grey band of a dtype that says nothing else."""
-    band = BandInfo(dtype, None, ColorInterp.gray, None, None, 1.0, 0.0, {})
+    """Return a raster, for `create_like`, as one grey band of a dtype without anything else."""
+    band = BandInfo.plain(dtype)
     return replace(source, bands=(band,), has_mask_band=False, colormap=None, tags={})
 
 
@@ -223,6 +224,12 @@ def _gdal_errors() -> tuple[type[Exception], ...]:
     from rasterio.errors import RasterioError, RasterioIOError
 
     return RasterioError, RasterioIOError, CPLE_BaseError
+
+
+def require_fit(nodata: float, dtype: np.dtype[Any]) -> None:
+    """Raise `ParameterError` if pixels of a type cannot hold a nodata value."""
+    if not fits(nodata, dtype):
+        raise ParameterError(f"pixels of type {dtype} cannot hold the nodata value {nodata}")
 
 
 def fill_value(source: RasterSource, nodata: float | None, band: int) -> Any:

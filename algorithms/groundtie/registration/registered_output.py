@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..geometry.transform import FloatArray, Transform
-from ..matching.local import AUTO
+from ..matching.surface_fit import AUTO
 from ..progress import Progress
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster, write_with_geotransform

@@ -1,4 +1,4 @@
-"""Estimating the bias of RPCs from ground control of which some may be wrong."""
+"""Estimating the bias of RPCs from ground control of which some may be blunders."""
 
 from __future__ import annotations
 
@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
-from ..geometry.robust import block_folds, find_consensus, fit_mixture
+from ..geometry.estimation import jackknife_sigma, jackknife_spread
+from ..geometry.model_choice import (
+    CONTROL_PER_PARAMETER,
+    Candidate,
+    choose_simplest,
+    left_out_blocks,
+)
+from ..geometry.robust import find_consensus, fit_mixture
 from .bias import KINDS, TERMS, Bias, design
 
 FloatArray = NDArray[np.float64]
@@ -19,7 +26,7 @@ AUTO = "auto"
 ROBUST, WORST_FIRST = "robust", "worst-first"
 METHODS = (ROBUST, WORST_FIRST)
 
-# Standard deviation that right points may have beyond their own, in pixels.
+# Standard deviation that inliers may have beyond their own, in pixels.
 _SIGMA_RANGE_PX = (0.1, 2.5)
 _STEPS = 30
 
@@ -29,12 +36,8 @@ SMALLEST_SIGMA_PX = 1e-3
 # Points agree with a first model within this, in pixels.
 _CONSENSUS_PX = 3.0
 
-# Wrong points lie anywhere within this distance at least, in pixels.
+# Blunders lie anywhere within this distance at least, in pixels.
 _LEAST_REACH_PX = 50.0
-
-# A model needs so many points for each of its terms; fewer control nothing.
-_POINTS_PER_TERM = 3
-_FEWEST_POINTS = 3
 
 # A model is carried by points that leave it uncertain by less, over the image, in pixels.
 _LARGEST_SIGMA_PX = 1.0
@@ -91,13 +94,13 @@ class Adjustment:
     used
         Which points are not taken for blunders, shape (n,).
     sigma_px
-        Standard deviation, an axis, of right points beyond what their covariances tell.
+        Standard deviation, an axis, of inliers beyond their covariances.
     fold_biases
         The bias estimated again without one block of points after the other.
     left_out_px
         Residuals of the points by an estimate that has not seen them, shape (n, 2).
     left_out_rmse_px
-        For each model that was considered, the root mean square of these, of right points.
+        For each model that was considered, the root mean square of these, of inliers.
     """
 
     bias: Bias
@@ -109,11 +112,7 @@ class Adjustment:
 
     def spread_px(self, px: FloatArray) -> FloatArray:
         """Return how far corrections vary with the points, shape (n,): the blocks' jackknife."""
-        count = len(self.fold_biases)
-        if count < 2:
-            return np.full(len(px), np.inf)
-        values = [bias(px) for bias in self.fold_biases]
-        return np.asarray(np.sqrt(np.var(values, axis=0).sum(axis=1) * (count - 1)))
+        return jackknife_spread(self.fold_biases, px)
 
 
 def adjust(
@@ -146,25 +145,21 @@ def adjust(
     """
     if kind != AUTO:
         return _adjust(control, kind, method, largest_residual_px, seed)
-    found: list[Adjustment] = []
-    failed: list[TooFewPointsError] = []
-    for each in KINDS:
-        try:
-            found.append(_adjust(control, each, method, largest_residual_px, seed))
-        except TooFewPointsError as error:
-            failed.append(error)
-    if not found:
-        raise failed[0]
-    chosen = found[0]
-    for tried in found[1:]:
-        if _is_carried(tried, control) and _is_better(tried, chosen):
-            chosen = tried
-    errors = {kind: rmse for each in found for kind, rmse in each.left_out_rmse_px.items()}
+
+    def fit(each: str) -> Candidate[Adjustment]:
+        tried = _adjust(control, each, method, largest_residual_px, seed)
+        return Candidate(each, tried, _log_likelihoods(tried))
+
+    def is_held(tried: Adjustment, chosen: Adjustment) -> bool:
+        return _is_carried(tried, control) and _is_significant(tried, chosen)
+
+    chosen, fitted = choose_simplest(KINDS, fit, control.expected_px, asked={}, is_held=is_held)
+    errors = {kind: rmse for each in fitted for kind, rmse in each.left_out_rmse_px.items()}
     return replace(chosen, left_out_rmse_px=errors)
 
 
 def _is_carried(tried: Adjustment, control: Control) -> bool:
-    """Tell whether points hold a model all over the image."""
+    """Return whether points hold a model all over the image."""
     corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * control.size
     return bool(
         max(tried.bias.sigma_px(corners).max(), np.median(tried.spread_px(corners)))
@@ -172,31 +167,30 @@ def _is_carried(tried: Adjustment, control: Control) -> bool:
     )
 
 
-def _is_better(tried: Adjustment, chosen: Adjustment) -> bool:
-    """Tell whether points want the terms that a model has and a simpler one has not."""
-    gain = float((_log_likelihoods(tried) - _log_likelihoods(chosen)).sum())
+def _is_significant(tried: Adjustment, chosen: Adjustment) -> bool:
+    """Return whether a term that a model has and a simpler one has not is no noise."""
+    coefficients = tried.bias.coefficients
+    by_points = np.sqrt(np.diag(tried.bias.covariance))
+    folds = [bias.coefficients.reshape(-1, 1) for bias in tried.fold_biases]
+    by_blocks = jackknife_sigma(folds, coefficients.size)  # neighbours err together
+    sigma = np.maximum(by_points, by_blocks).reshape(-1, 2)
     more = slice(len(chosen.bias.coefficients), None)
-    by_points = np.diag(tried.bias.covariance).reshape(-1, 2)
-    count = len(tried.fold_biases)
-    folds = np.array([bias.coefficients for bias in tried.fold_biases])
-    by_blocks = folds.var(axis=0) * (count - 1)  # the jackknife: neighbours err together
-    sigma = np.sqrt(np.maximum(by_points, by_blocks))[more]
-    return gain > 0 and bool((np.abs(tried.bias.coefficients[more]) > _SIGMAS * sigma).any())
+    return bool((np.abs(coefficients[more]) > _SIGMAS * sigma[more]).any())
 
 
 def _log_likelihoods(adjustment: Adjustment) -> FloatArray:
-    """Return the logarithm of the density of each point, right or wrong, shape (n,)."""
+    """Return the logarithm of the density of each point, inlier or blunder, shape (n,)."""
     squared = (adjustment.left_out_px**2).sum(axis=1)
     share = float(np.clip(adjustment.used.mean(), 0.02, 0.98))
     variance = max(float(squared[adjustment.used].mean()) / 2, _SIGMA_RANGE_PX[0] ** 2)
-    right = share * np.exp(-squared / (2 * variance)) / (2 * np.pi * variance)
-    return np.asarray(np.log(right + (1 - share) / (2 * _LEAST_REACH_PX) ** 2))
+    inlier = share * np.exp(-squared / (2 * variance)) / (2 * np.pi * variance)
+    return np.asarray(np.log(inlier + (1 - share) / (2 * _LEAST_REACH_PX) ** 2))
 
 
 def _adjust(
     control: Control, kind: str, method: str, largest_residual_px: float, seed: int
 ) -> Adjustment:
-    needed = max(_FEWEST_POINTS, _POINTS_PER_TERM * TERMS[kind])
+    needed = round(CONTROL_PER_PARAMETER * 2 * TERMS[kind])
     if len(control) < needed:
         raise TooFewPointsError(
             f"the model {kind} needs at least {needed} control points; there are {len(control)}"
@@ -211,22 +205,20 @@ def _adjust(
             f"at least {needed}"
         )
     kept = control.take(used)
-    folds = block_folds(kept.expected_px)
     biases = []
     left_out = control.residuals_px(_fit(kept, kind, sigma))
     inside = np.flatnonzero(used)
-    for each in np.unique(folds):
-        others = folds != each
-        if others.sum() < TERMS[kind]:
+    for block in left_out_blocks(kept.expected_px):
+        if (~block).sum() < TERMS[kind]:
             continue
-        biases.append(_fit(kept.take(others), kind, sigma))
-        left_out[inside[~others]] = kept.take(~others).residuals_px(biases[-1])
+        biases.append(_fit(kept.take(~block), kind, sigma))
+        left_out[inside[block]] = kept.take(block).residuals_px(biases[-1])
     rmse = float(np.sqrt(np.mean((left_out[used] ** 2).sum(axis=1))))
     return Adjustment(_fit(kept, kind, sigma), used, sigma, tuple(biases), left_out, {kind: rmse})
 
 
 def _without_improbable(control: Control, kind: str, seed: int) -> tuple[NDArray[np.bool_], float]:
-    """Return which points are more probably right than wrong, and the spread of the right ones."""
+    """Return which points are more probably inliers than blunders, and the spread of these."""
     first = "translation" if kind == "shift" else "affine"
     start = find_consensus(control.expected_px, control.found_px, _CONSENSUS_PX, first, seed)
     residuals = control.found_px - start(control.expected_px)
@@ -234,8 +226,8 @@ def _without_improbable(control: Control, kind: str, seed: int) -> tuple[NDArray
     used, sigma = np.zeros(len(control), bool), _SIGMA_RANGE_PX[0]
     for _ in range(_STEPS):
         mixture = fit_mixture(residuals, (2 * reach) ** 2, _SIGMA_RANGE_PX)
-        same = np.array_equal(used, mixture.right)
-        used, sigma = mixture.right, _excess(control.take(mixture.right), mixture.sigma)
+        same = np.array_equal(used, mixture.inliers)
+        used, sigma = mixture.inliers, _excess(control.take(mixture.inliers), mixture.sigma)
         if same or used.sum() < TERMS[kind]:
             break
         residuals = control.residuals_px(_fit(control.take(used), kind, sigma))
@@ -259,9 +251,9 @@ def _without_worst(
 
 
 def _excess(control: Control, sigma_px: float) -> float:
-    """Return the standard deviation of points beyond what their covariances tell, an axis."""
-    told = np.trace(control.covariance_px2, axis1=1, axis2=2).mean() / 2 if len(control) else 0.0
-    return float(np.sqrt(max(sigma_px**2 - told, 0.0)))
+    """Return the standard deviation of points beyond their covariances, an axis."""
+    stated = np.trace(control.covariance_px2, axis1=1, axis2=2).mean() / 2 if len(control) else 0.0
+    return float(np.sqrt(max(sigma_px**2 - stated, 0.0)))
 
 
 def _fit(control: Control, kind: str, sigma_px: float) -> Bias:

@@ -100,8 +100,8 @@ class ControlPoints:
         covariance = self.points.covariance_px2
         sigma = np.sqrt(covariance[:, 0, 0] * covariance[:, 1, 1])
         more = {HEIGHT: self.height_m, CORRELATION: covariance[:, 0, 1] / sigma}
-        transform = Transform.as_claimed(self.crs, own)
-        write_tie_points(path, self.points, transform, more)
+        transform = Transform.nominal(self.crs, own)
+        write_tie_points(path, replace(self.points, more=more), transform)
 
     def _gdal_options(self) -> str:
         """Return the used points of the fit as options of gdal_translate."""
@@ -150,7 +150,7 @@ def read_control_points(path: Path, orientation: Orientation, grid: Grid) -> Con
         input_px=stored.input_px,
         score=np.full(count, np.nan),
         covariance_px2=_covariances(*(stored.more[name] for name in (*_SIGMAS, CORRELATION))),
-        two_way_error_px=np.full(count, np.nan),
+        forward_backward_error_px=np.full(count, np.nan),
         is_check=stored.is_check,
         state=state.astype(str),
     )

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import cv2
@@ -22,10 +21,15 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from ..context import Context
+from ..rasters.kernels import bspline_weights
 from .binning import MASKED
 
 FloatArray = NDArray[np.float32]
 ORDERS = (2, 3, 4, 5, 6, 7)
+
+# The cubic B-spline is the first without interpolation artefacts.
+ORDER = 4
 
 # Templates of so many pixels or fewer are counted a row of shifts at a time.
 _CODED_PIXELS = 20_000
@@ -40,7 +44,7 @@ def support(order: int) -> int:
     return (order + 1) // 2
 
 
-def reach(order: int) -> int:
+def reach(order: int = ORDER) -> int:
     """Return how far the kernel of this order reaches at integer shifts, in whole pixels."""
     return (order - 1) // 2
 
@@ -51,12 +55,11 @@ def kernel(order: int, offset: float) -> NDArray[np.float64]:
     `offset` is within ±0.5. Order n is degree n - 1: 2 is linear (PVI), 4 is cubic.
     """
     far = support(order)
-    x = np.arange(-far, far + 1)[:, None] - offset
-    # Schoenberg's sum of truncated powers: one-sided differences of x^(n - 1) / (n - 1)!
-    knots = np.arange(order + 1)
-    signed = [(-1) ** k * math.comb(order, k) for k in range(order + 1)]
-    powers = np.maximum(order / 2 - np.abs(x) - knots, 0.0) ** (order - 1)
-    return np.asarray(powers @ signed / math.factorial(order - 1))
+    start = offset - order / 2
+    first = math.floor(start)
+    weights = np.zeros(2 * far + 1)
+    weights[far + first + 1 :][:order] = bspline_weights(order, start - first)
+    return weights
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ class JointHistogramVolume:
         """How many further shifts there are on each side for the kernel."""
         return (self.counts.shape[0] - 1) // 2 - self.radius
 
-    def histograms(self, order: int) -> FloatArray:
+    def histograms(self, order: int = ORDER) -> FloatArray:
         """Return the GPVE histograms at the integer shifts -radius … radius, float32."""
         near, far = reach(order), support(order)
         self._require(near)
@@ -119,7 +122,7 @@ def count_joint_histograms(
     search: NDArray[np.uint8],
     bins: tuple[int, int],
     radius: int,
-    executor: Executor | None = None,
+    context: Context | None = None,
 ) -> JointHistogramVolume:
     """Count the joint histograms of a template at all integer shifts in its search window.
 
@@ -133,7 +136,7 @@ def count_joint_histograms(
         Number of bins of template and search window.
     radius
         Largest shift for which surfaces are wanted.
-    executor
+    context
         Threads to count in; by default the calling one alone.
     """
     span = search.shape[0] - template.shape[0] + 1
@@ -152,7 +155,9 @@ def count_joint_histograms(
         def store(dy: int) -> None:
             counts[dy] = count_row(dy)[:, : bins[0], : bins[1]]
 
-        _map(executor, store, span)
+        rows = range(span)
+        for _ in map(store, rows) if context is None else context.quiet().map(store, rows):
+            pass
     return JointHistogramVolume(counts, radius)
 
 
@@ -207,16 +212,10 @@ def _count_spectrally(
     planes = np.stack([search == k for k in range(bins[1])]).astype(np.float32)
     spectra = scipy.fft.rfft2(planes, shape, workers=_WORKERS)
     for k in range(bins[0]):
-        own = scipy.fft.rfft2((template == k).astype(np.float32), shape)
-        found = scipy.fft.irfft2(spectra * own.conj(), shape, workers=_WORKERS)
+        spectrum = scipy.fft.rfft2((template == k).astype(np.float32), shape)
+        found = scipy.fft.irfft2(spectra * spectrum.conj(), shape, workers=_WORKERS)
         counts[:, :, k] = found[:, :ny, :nx].transpose(1, 2, 0)
     # Counts are whole numbers; what is left over is rounding, and so is the sign of zero.
     np.rint(counts, out=counts)
     np.abs(counts, out=counts)
     return counts
-
-
-def _map(executor: Executor | None, function: Callable[[int], None], count: int) -> None:
-    run = map if executor is None else executor.map
-    for _ in run(function, range(count)):
-        pass

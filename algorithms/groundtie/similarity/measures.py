@@ -1,113 +1,103 @@
-"""Measures of similarity on joint histograms ([Suri2010] 3.3, 2.3.1).
+"""Measures of similarity: functions of two windows that return surfaces over shifts.
 
-Every measure takes joint histograms of counts or weights, shape (…, bins A, bins B), or one
-histogram as a sparse matrix, and returns values of shape (…). Where there is nothing to share,
-without any pixel or with a constant image, it has the value of independent images.
+To add a measure, write its function in this file below `@measure("its-name")`, and its test. Every
+tool that lets one choose a similarity then offers it, and `similarity_surface` shows it. A measure
+of joint histograms is one line: `measure("name")(of_histograms(function))`. Measures that are only
+compared with these are in `studies.measures`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-Values = NDArray[np.floating]
-Histograms: TypeAlias = Any  # an array, or a sparse matrix of scipy
-Measure = Callable[[Histograms], Values]
+from ..context import Context
+from .correlation import correlate_fields, correlate_grey
+from .description import Description
+from .joint_histogram import count_joint_histograms
 
-# What entropies below this hold is rounding.
+FloatArray = NDArray[np.floating]
+Histograms: TypeAlias = Any  # an array, or a sparse matrix of scipy
+
+# Takes joint histograms of counts or weights, shape (…, bins A, bins B), or one histogram as a
+# sparse matrix, and returns values of shape (…). Where there is nothing to share, without any
+# pixel or with a constant image, it has the value of independent images.
+HistogramMeasure = Callable[[Histograms], FloatArray]
+
+# Takes a template (h, w), a search window with the same centre that is larger by a radius on each
+# side, the radius, and a context to work in. Returns values over shifts, shape (2 radius + 1,
+# 2 radius + 1), or several such surfaces that count the same, shape (n, …).
+Measure = Callable[[Description, Description, int, Context | None], FloatArray]
+
+MEASURES: dict[str, Measure] = {}
+
+# Entropies below this hold rounding only.
 _NOTHING = 1e-9
 
 
-def mutual_information(histograms: Histograms) -> Values:
-    """Return Shannon's H(A) + H(B) - H(A, B) in nats ([Suri2010] eq 3.19)."""
-    a, b, ab = map(_entropy, _tables(histograms))
-    return np.asarray(a + b - ab)
+def measure(name: str) -> Callable[[Measure], Measure]:
+    """Register a measure under a name by which users choose it."""
+
+    def register(function: Measure) -> Measure:
+        MEASURES[name] = function
+        return function
+
+    return register
 
 
-def normalized_mutual_information(histograms: Histograms) -> Values:
-    """Return (H(A) + H(B)) / H(A, B), between 1 and 2 ([Studholme1999]; [Suri2010] eq 3.21)."""
-    a, b, ab = map(_entropy, _tables(histograms))
+def of_histograms(function: HistogramMeasure) -> Measure:
+    """Return the measure of windows that a measure on joint histograms makes."""
+
+    def values(
+        template: Description, search: Description, radius: int, context: Context | None
+    ) -> FloatArray:
+        counts = (template.bin_count, search.bin_count)
+        volume = count_joint_histograms(template.bins, search.bins_around, counts, radius, context)
+        return function(volume.histograms()).astype(np.float32)
+
+    return values
+
+
+def normalized_mutual_information(histograms: Histograms) -> FloatArray:
+    """Return Studholme's (H(A) + H(B)) / H(A, B), between 1 and 2 ([Suri2010] eq 3.21)."""
+    a, b, ab = map(entropy, tables(histograms))
     informative = ab > _NOTHING
     return np.where(informative, (a + b) / np.where(informative, ab, 1.0), 1.0)
 
 
-def renyi_mutual_information(alpha: float) -> Measure:
-    """Return the measure R(A) + R(B) - R(A, B) with Rényi's entropy ([Suri2010] eq 3.15, 3.16).
-
-    Parameters
-    ----------
-    alpha
-        Order of the entropy, any real number; 1 is Shannon's, as the limit. Other than Shannon's,
-        the measure may be negative.
-    """
-    if alpha == 1:
-        return mutual_information
-
-    def measure(histograms: Histograms) -> Values:
-        a, b, ab = (_log_power_sum(table, alpha) for table in _tables(histograms))
-        return np.asarray((a + b - ab) / (1 - alpha))
-
-    return measure
+nmi = measure("nmi")(of_histograms(normalized_mutual_information))
 
 
-def tsallis_mutual_information(q: float) -> Measure:
-    """Return the measure S(A) + S(B) + (1 - q) S(A) S(B) - S(A, B) ([Suri2010] eq 3.17, 3.18).
-
-    The cross term makes it 0 for independent images, as Tsallis' entropy is not additive. With
-    S = (Σ p^q - 1) / (1 - q) all of it is (Σ p_A^q Σ p_B^q - Σ p_AB^q) / (1 - q).
-
-    Parameters
-    ----------
-    q
-        Index of the entropy, any real number; 1 is Shannon's, as the limit.
-    """
-    if q == 1:
-        return mutual_information
-
-    def measure(histograms: Histograms) -> Values:
-        a, b, ab = (np.exp(_log_power_sum(table, q)) for table in _tables(histograms))
-        return np.asarray((a * b - ab) / (1 - q))
-
-    return measure
+@measure("orientation")
+def orientation(
+    template: Description, search: Description, radius: int, context: Context | None = None
+) -> FloatArray:
+    """Return the correlation of the orientation of edges, a surface for each scale."""
+    valid = template.patch.valid, search.patch.valid
+    return correlate_fields(template.fields, search.fields, *valid)
 
 
-def cluster_reward(histograms: Histograms) -> Values:
-    """Return the index of the cluster reward algorithm, 0 (independent) to 1 (one to one).
-
-    (Φ / F - F / N²) / (1 - F / N²) with Φ the sum of the squared joint counts, F² the product of
-    the sums of the squared marginal counts and N the number of pixels [Inglada2004].
-    """
-    a, b, ab = (np.square(_shares(table)).sum(axis=-1) for table in _tables(histograms))
-    chance = np.sqrt(a * b)
-    informative = (chance > 0) & (chance < 1 - _NOTHING)
-    chance = np.where(informative, chance, 0.5)
-    return np.where(informative, (ab / chance - chance) / (1 - chance), 0.0)
+@measure("edge-strength")
+def strength(
+    template: Description, search: Description, radius: int, context: Context | None = None
+) -> FloatArray:
+    """Return the correlation of the strength of edges."""
+    return correlate_grey(template.strength, search.strength)
 
 
-def correlation_ratio(histograms: Histograms) -> Values:
-    """Return which share of A's variance a function of B explains, 0 to 1.
-
-    Source: [Roche1998]. The grey value of a bin is its number. A should be
-    the template: its variance is the same at all shifts. For the other way round transpose the
-    histogram.
-    """
-    a, b, _ = _tables(histograms)
-    levels = np.arange(a.shape[-1], dtype=float)
-    sums = levels @ histograms
-    total = _at_least(a.sum(axis=-1))
-    mean = (sums.sum(axis=-1) / total)[..., None]
-    explained = ((sums - mean * b) ** 2 / _at_least(b)).sum(axis=-1) / total
-    variance = (a * (levels - mean) ** 2).sum(axis=-1) / total
-    informative = variance > _NOTHING
-    return np.where(informative, explained / np.where(informative, variance, 1.0), 0.0)
+@measure("ncc")
+def ncc(
+    template: Description, search: Description, radius: int, context: Context | None = None
+) -> FloatArray:
+    """Return the correlation of grey values."""
+    return correlate_grey(template.patch, search.patch)
 
 
-def _tables(histograms: Histograms) -> tuple[Values, Values, Values]:
+def tables(histograms: Histograms) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the histograms of A and of B and all cells of the joint one, along the last axis."""
     if scipy.sparse.issparse(histograms):
         a, b = (np.asarray(histograms.sum(axis=axis)).ravel() for axis in (1, 0))
@@ -116,42 +106,9 @@ def _tables(histograms: Histograms) -> tuple[Values, Values, Values]:
     return joint.sum(axis=-1), joint.sum(axis=-2), joint.reshape(*joint.shape[:-2], -1)
 
 
-def _at_least(counts: Values) -> Values:
-    """Return counts to divide by: a bin without pixels has a numerator of 0 as well."""
-    return np.where(counts > 0, counts, 1.0)
-
-
-def _shares(table: Values) -> Values:
-    return table / _at_least(table.sum(axis=-1))[..., None]
-
-
-def _entropy(table: Values) -> Values:
+def entropy(table: FloatArray) -> FloatArray:
     """Return Shannon's entropy in nats along the last axis; the table need not be normalised."""
-    total = _at_least(table.sum(axis=-1))
+    count = table.sum(axis=-1)
+    total = np.where(count > 0, count, 1.0)
     plogp = (table * np.log(np.maximum(table, 1e-12))).sum(axis=-1)
     return np.asarray(np.log(total) - plogp / total)
-
-
-def _log_power_sum(table: Values, power: float) -> Values:
-    """Return ln Σ p^power over the occupied cells; 0 for an empty table, as for a constant."""
-    shares = _shares(table.astype(float))
-    occupied = shares > 0
-    exponents = np.where(occupied, power * np.log(np.where(occupied, shares, 1.0)), -np.inf)
-    # Relative to the largest term, which a high power alone would round to 0.
-    largest = exponents.max(axis=-1, keepdims=True, initial=-np.inf)
-    largest = np.where(np.isfinite(largest), largest, 0.0)
-    total = np.exp(exponents - largest).sum(axis=-1)
-    return np.log(np.where(total > 0, total, 1.0)) + largest[..., 0]
-
-
-# Names for those who choose, with the usual orders of the parametrised ones.
-MEASURES: Mapping[str, Measure] = MappingProxyType(
-    {
-        "mi": mutual_information,
-        "nmi": normalized_mutual_information,
-        "renyi": renyi_mutual_information(2.0),
-        "tsallis": tsallis_mutual_information(2.0),
-        "cluster-reward": cluster_reward,
-        "correlation-ratio": correlation_ratio,
-    }
-)

@@ -1,4 +1,4 @@
-"""What a similarity surface says: where its peak lies, how sure and how exact it is."""
+"""The peak of a similarity surface: its sub-pixel position, covariance and height."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PARABOLOID = np.linalg.pinv(np.column_stack([np.ones(9), _X, _Y, _X**2, _X * _Y
 
 
 @dataclass(frozen=True)
-class Evidence:
+class Peak:
     """The peak of a surface of robust standard deviations (see `surface`).
 
     Parameters
@@ -37,8 +37,8 @@ class Evidence:
     at_border: bool
 
 
-def find_peak(surface: Surface) -> Evidence:
-    """Return the evidence of a surface, shape (2 r + 1, 2 r + 1), whose centre is shift 0.
+def find_peak(surface: Surface) -> Peak:
+    """Return the highest peak of a surface, shape (2 r + 1, 2 r + 1), whose centre is shift 0.
 
     The sub-pixel position is the maximum of the paraboloid through the peak's surroundings. For
     a background of unit variance whose correlation has the peak's own shape, the covariance of
@@ -51,19 +51,19 @@ def find_peak(surface: Surface) -> Evidence:
     whole = (float(col - radius), float(row - radius))
     at_border = not (0 < row < surface.shape[0] - 1 and 0 < col < surface.shape[1] - 1)
     if at_border or height <= 0:
-        return Evidence(whole, height, wide, True)
+        return Peak(whole, height, wide, True)
     patch = surface[row - 1 : row + 2, col - 1 : col + 2].ravel().astype(float)
     _, bx, by, axx, axy, ayy = _PARABOLOID @ patch
     hessian = np.array([[2 * axx, axy], [axy, 2 * ayy]])
     if np.linalg.det(hessian) <= 0 or axx >= 0:
-        return Evidence(whole, height, wide, False)
+        return Peak(whole, height, wide, False)
     dx, dy = np.clip(-np.linalg.solve(hessian, [bx, by]), -1, 1)
     shift = (whole[0] + float(dx), whole[1] + float(dy))
-    return Evidence(shift, height, np.linalg.inv(-hessian) / height, False)
+    return Peak(shift, height, np.linalg.inv(-hessian) / height, False)
 
 
-def find_peak_near(surface: Surface, expected_px: ArrayLike, within_px: int) -> Evidence:
-    """Return the evidence of the highest peak near an expected shift.
+def find_peak_near(surface: Surface, expected_px: ArrayLike, within_px: int) -> Peak:
+    """Return the highest peak near an expected shift.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Speckle filters, of intensity images with nodata.
 
-Their names, and what they take for granted of the scene beneath the speckle: `lee` and `kuan` the
+Their names, and what they assume of the scene beneath the speckle: `lee` and `kuan` the
 best linear estimate, `enhanced-frost` an exponential correlation, `gamma-map` a gamma distribution,
 `isef` nothing.
 """
@@ -20,7 +20,7 @@ from .statistics import FloatImage, LocalStatistics, Mask, local_statistics
 # Side of tiles that stay, with all that filters need, in the processor's cache.
 _TILE_PX = 256
 
-# Beyond so many windows an exponential filter weighs less than a ten thousandth.
+# Beyond so many windows the weight of an exponential filter is less than a ten thousandth.
 _ISEF_REACH = 3
 
 
@@ -58,7 +58,7 @@ class SpeckleFilter:
         intensity
             Power of the signal, float32 of shape (h, w).
         valid
-            Which pixels count, shape (h, w); the others weigh nothing.
+            Which pixels count, shape (h, w); the others are left out.
         """
         intensity = np.where(valid, intensity, np.float32(0))
         reach = self.reach_px

@@ -19,7 +19,7 @@ def isef(image: FloatImage, decay: float) -> FloatImage:
     Parameters
     ----------
     image
-        Float32, shape (h, w). Beyond its borders, the values there go on.
+        Float32, shape (h, w). Beyond its borders, the outermost values go on.
     decay
         The b of the formula, 0 to below 1: weight of a pixel over that of its nearer neighbour.
 
@@ -34,12 +34,12 @@ def isef_along(image: FloatImage, decay: float, axis: int) -> FloatImage:
     """Smooth an image as `isef` does, along one axis: 0 from row to row, 1 along columns."""
     if axis == 0:
         return _along_rows(np.ascontiguousarray(image, np.float32), decay)
-    turned = np.asarray(cv2.transpose(np.asarray(image, np.float32)), np.float32)
-    return np.asarray(cv2.transpose(_along_rows(turned, decay)), np.float32)
+    transposed = np.asarray(cv2.transpose(np.asarray(image, np.float32)), np.float32)
+    return np.asarray(cv2.transpose(_along_rows(transposed, decay)), np.float32)
 
 
 def _along_rows(image: FloatImage, decay: float) -> FloatImage:
-    """Smooth from row to row: a pass down, a pass up, less what both count."""
+    """Smooth from row to row: a pass down, a pass up, less the pixel that both count."""
     gain = 1 - decay
     down, up = image.copy(), image.copy()
     # OpenCV writes into the last argument, here a row; each row rests on the one before.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import cv2
@@ -15,18 +14,18 @@ Mask = NDArray[np.bool_]
 # Mean power, squared, below which there is nothing: running sums leave this much behind.
 _NO_POWER = np.float32(1e-30)
 
-# Window in which looks are estimated, and the bins, in octaves of the squared variation, whose
-# fullest tells what is common to all homogeneous areas. No image has less than one look.
+# Window in which looks are estimated, and the bins, in octaves of the squared coefficient of
+# variation; homogeneous areas share the fullest. No image has less than one look.
 _LOOKS_WINDOW_PX = 9
 _BIN_OCTAVES = 0.125
 _OCTAVES = (-14.0, 0.375)
 _PEAK = 0.2
 
-# Window, and share of all windows, by which speckled images are told from others.
-_CALM_WINDOW_PX = 3
-_CALM_SHARE = 0.1
+# Window, and share of the most homogeneous windows, that separate speckled images from others.
+_HOMOGENEOUS_WINDOW_PX = 3
+_HOMOGENEOUS_SHARE = 0.1
 
-# Windows with fewer valid pixels than this share tell nothing of the looks.
+# Windows with a smaller share of valid pixels are left out of the looks' estimate.
 _LEAST_VALID = 0.9
 
 
@@ -135,11 +134,11 @@ def estimate_looks(intensity: FloatImage, valid: Mask) -> float:
     return max(float(1 / np.median(usual[(octave >= low) & (octave < high)])), 1.0)
 
 
-def calm_variation2(intensity: FloatImage, valid: Mask) -> float:
-    """Return the squared coefficient of variation in the calmest tenth of the smallest windows.
+def homogeneous_variation2(intensity: FloatImage, valid: Mask) -> float:
+    """Return the squared coefficient of variation in the most homogeneous tenth of all windows.
 
-    Speckle leaves no window calm, while a camera's noise is far below its signal: of a radar and
-    an optical image, the radar's is larger (measured: on all of 20 real pairs).
+    Speckle is in every window, while a camera's noise is far below its signal: of a radar and an
+    optical image, the radar's value is larger (measured: on all of 20 real pairs).
 
     Parameters
     ----------
@@ -153,16 +152,7 @@ def calm_variation2(intensity: FloatImage, valid: Mask) -> float:
     float
         0 if no window is valid.
     """
-    local = local_statistics(intensity, valid, _CALM_WINDOW_PX)
-    full = window_counts(valid, _CALM_WINDOW_PX) == _CALM_WINDOW_PX**2
-    calm = local.variation2[full & (local.mean > 0)]
-    return float(np.quantile(calm, _CALM_SHARE)) if calm.size else 0.0
-
-
-def speckle_variation2(looks: float, *, amplitude: bool = False) -> float:
-    """Return the squared coefficient of variation of pure speckle, of intensity or amplitude."""
-    if not amplitude:
-        return 1 / looks
-    # Mean of the square root of a gamma variate of mean 1 and shape `looks`.
-    mean = math.exp(math.lgamma(looks + 0.5) - math.lgamma(looks)) / math.sqrt(looks)
-    return 1 / mean**2 - 1
+    local = local_statistics(intensity, valid, _HOMOGENEOUS_WINDOW_PX)
+    full = window_counts(valid, _HOMOGENEOUS_WINDOW_PX) == _HOMOGENEOUS_WINDOW_PX**2
+    variation2 = local.variation2[full & (local.mean > 0)]
+    return float(np.quantile(variation2, _HOMOGENEOUS_SHARE)) if variation2.size else 0.0

@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ParameterError
-from ..features.descriptors import Descriptor
-from ..features.detectors import DETECTORS, Detector
-from ..features.filtering import filter_matches
-from ..features.gradients import GRADIENTS
-from ..features.matching import match
-from ..features.points import FeaturePoints
+from ..features.keypoints import Keypoints
+from ..features.tiles import Describing, Detecting
 from ..geometry.fitting import fit_model
 from ..geometry.models import PARAMETERS
-from ..matching.feature_tiles import standing_in
+from ..matching.feature_tiles import lying_in
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask
+from .filtering import filter_matches
+from .gradients import GRADIENTS
+from .matching import match
 from .repeatability import CLASS_NAMES, Repeatability, classes, overlap_error, repeatability
+from .sift_variants import DETECTORS, SiftVariantDescriptor, sift_detector
 
 FloatArray = NDArray[np.float64]
 
@@ -36,8 +36,8 @@ class Variant:
     """A detector and a descriptor, and what they are called together."""
 
     name: str
-    detector: Detector
-    descriptor: Descriptor
+    detector: Detecting
+    descriptor: Describing
 
     @classmethod
     def parse(cls, name: str, contrast: float | None = None) -> Variant:
@@ -66,8 +66,8 @@ class Variant:
                 f"one gradient ({', '.join(GRADIENTS)}) and {_TURNING!r}, joined by +"
             )
         estimator = gradients[0] if gradients else GRADIENTS[0]
-        descriptor = Descriptor(estimator, upright=not oriented)
-        return cls(name, Detector(detectors[0], contrast), descriptor)
+        descriptor = SiftVariantDescriptor(estimator, upright=not oriented)
+        return cls(name, sift_detector(detectors[0], contrast), descriptor)
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Consistency:
     by_class: NDArray[np.int_]
 
     @classmethod
-    def of(cls, first: FeaturePoints, second: FeaturePoints) -> Consistency:
+    def of(cls, first: Keypoints, second: Keypoints) -> Consistency:
         """Return the consistency of features that match, row by row."""
         px, partner_px = first.position_px, second.position_px
         std = np.full(2, np.nan)
@@ -172,7 +172,7 @@ def evaluate(
     started = time.perf_counter()
     found = [variant.detector.detect(patch) for patch in (reference, input)]
     if parts is not None:
-        found = [standing_in(own, part) for own, part in zip(found, parts, strict=True)]
+        found = [lying_in(own, part) for own, part in zip(found, parts, strict=True)]
     detected = time.perf_counter()
     points, descriptors = variant.descriptor.describe(reference, found[0])
     partners, partner_descriptors = variant.descriptor.describe(input, found[1])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..features.points import FeaturePoints
+from ..features.keypoints import Keypoints
 
 FloatArray = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ _REACH = 0.5
 
 
 def overlap_error(
-    first: FeaturePoints, second: FeaturePoints, radius_px: float = NORMAL_RADIUS_PX
+    first: Keypoints, second: Keypoints, radius_px: float = NORMAL_RADIUS_PX
 ) -> FloatArray:
     """Return 1 − intersection / union of the circles of paired features, shape (n,).
 
@@ -83,7 +83,7 @@ class Repeatability:
         return self.counts / max(self.possible, 1)
 
 
-def repeatability(first: FeaturePoints, second: FeaturePoints) -> Repeatability:
+def repeatability(first: Keypoints, second: Keypoints) -> Repeatability:
     """Return how many features correspond, each at most once, by the class of their overlap error.
 
     Pairs are made from the smallest overlap error to the largest; features that are left, or

@@ -2,39 +2,39 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from ..errors import ParameterError, RasterContentError
-from ..progress import Progress
+from ..context import Context
+from ..errors import NoOverlapError, ParameterError, RasterContentError
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
-from ..similarity import surface as surfaces
 from ..similarity.binning import MASKED
-from ..similarity.correlation import (
-    MINIMUM_OVERLAP,
-    correlate_fields,
-    correlate_grey,
-    overlap_share,
+from ..similarity.correlation import MINIMUM_OVERLAP, overlap_share
+from ..similarity.description import BORDER_PX
+from ..similarity.joint_histogram import ORDER, reach
+from ..similarity.measures import MEASURES, HistogramMeasure
+from ..similarity.peak import Peak, find_peak
+from ..similarity.surface import (
+    SIMILARITIES,
+    SimilaritySettings,
+    Surface,
+    describe,
+    detrend,
+    similarity_surface,
 )
-from ..similarity.density_ratio import information_surface
-from ..similarity.histogramming import measure_surface, to_levels
-from ..similarity.joint_histogram import reach
-from ..similarity.measures import (
-    MEASURES,
-    Measure,
-    renyi_mutual_information,
-    tsallis_mutual_information,
-)
-from ..similarity.peak import Evidence, find_peak
-from ..similarity.surface import BORDER_PX, SIMILARITIES, SimilaritySettings, Surface
+from .density_ratio import information_surface
+from .histogramming import measure_surface, to_levels
+from .measures import HISTOGRAM_MEASURES, renyi_mutual_information, tsallis_mutual_information
 
 GREY_VALUES = "grey-values"
-CHOICES = (*SIMILARITIES, "mlmi")
+_MLMI = "mlmi"
+CHOICES = tuple(dict.fromkeys((*SIMILARITIES, *HISTOGRAM_MEASURES, _MLMI)))
+
+DEFAULT_RADIUS_PX, LARGEST_RADIUS_PX = 20, 100
 
 # A second peak lies further away from the first than this along columns or rows.
 _PEAK_PX = 2
@@ -61,6 +61,35 @@ class Window:
     chip_px: int
     radius_px: int
 
+    @classmethod
+    def at(
+        cls,
+        pair: ImagePair,
+        centre: tuple[float | None, float | None],
+        chip_px: int,
+        radius_m: float | None,
+    ) -> Window:
+        """Return the window at a position on the map, by default the middle of the overlap.
+
+        Raises
+        ------
+        ParameterError
+            Only one coordinate is given, or the radius is not 2 to 100 pixels.
+        NoOverlapError
+            The centre does not lie in the overlap.
+        """
+        x, y = centre
+        if (x is None) != (y is None):
+            raise ParameterError("give both x and y of the centre, or none")
+        px = np.array(pair.grid.centre_px)
+        if x is not None and y is not None:
+            px = pair.grid.map_to_pixel([[x, y]])[0]
+            if not pair.grid.contains(px):
+                raise NoOverlapError(f"the centre {x:.15g}, {y:.15g} does not lie in the overlap")
+        col, row = np.floor(px + 0.5).astype(int)
+        # Even numbers get one more, so that there is a centre.
+        return cls(pair, (int(col), int(row)), chip_px | 1, _radius_px(pair.grid, radius_m))
+
     def grid(self, reach_px: int) -> Grid:
         """Return the piece of the matching grid around the centre, 2 reach + 1 pixels a side."""
         col, row = self.centre_px
@@ -76,16 +105,16 @@ class Window:
         """
         piece = self.grid(self.chip_px // 2 + self.radius_px + BORDER_PX)
         pair = self.pair
-        patches = pair.reference_patch(piece), pair.input_patch(piece, pair.claimed_px)
+        patches = pair.reference_patch(piece), pair.input_patch(piece, pair.nominal_px)
         reaches = (self.radius_px + BORDER_PX, BORDER_PX)
         for image, patch, reach_px in zip(
             (pair.reference, pair.input), patches, reaches, strict=True
         ):
-            seen = patch.inner(reach_px)
+            counted = patch.inner(reach_px)
             what = f"the window of {image.source.path}"
-            if seen.valid_share < MINIMUM_OVERLAP:
+            if counted.valid_share < MINIMUM_OVERLAP:
                 raise RasterContentError(f"{what} holds too few valid pixels: move the centre")
-            if seen.is_flat:
+            if counted.is_flat:
                 raise RasterContentError(f"{what} is constant: there is nothing to match")
         return patches
 
@@ -108,120 +137,128 @@ class SurfaceSettings:
         Orders of Rényi's and of Tsallis' entropy.
     sample
         Pixels that MLMI is estimated from.
-    seed
-        Of that sample.
     """
 
-    similarity: str
-    bins: int | None
-    binning: str
-    gpve_order: int
-    alpha: float
-    q: float
-    sample: int
-    seed: int
+    similarity: str = "fused"
+    bins: int | None = None
+    binning: str = "equal-frequency"
+    gpve_order: int = ORDER
+    alpha: float = 2.0
+    q: float = 2.0
+    sample: int = 1000
 
     def __post_init__(self) -> None:
-        if self.similarity == "fused" and (self.binning == GREY_VALUES or self._bins > MASKED):
+        plain = (self.binning, self.gpve_order) == (SurfaceSettings.binning, ORDER)
+        if self.similarity == "fused" and not (plain and (self.bins or 0) <= MASKED):
             raise ParameterError(
-                f"fused takes up to {MASKED} bins: choose a measure of the histogram for more"
+                f"fused takes up to {MASKED} bins, equally frequent, of order {ORDER}: choose a "
+                "measure of the histogram for others"
             )
         if self.binning == GREY_VALUES and self.bins is not None:
             raise ParameterError(f"{GREY_VALUES} takes all grey values: give no number of bins")
 
-    @property
-    def _bins(self) -> int:
-        return self.bins or 0
-
-    @property
-    def _measure(self) -> Measure:
-        parametrised = {
-            "renyi": renyi_mutual_information(self.alpha),
-            "tsallis": tsallis_mutual_information(self.q),
-        }
-        return parametrised.get(self.similarity) or MEASURES[self.similarity]
-
     def surfaces(
-        self, reference: Patch, input: Patch, window: Window, executor: Executor, progress: Progress
+        self, reference: Patch, input: Patch, radius: int, context: Context
     ) -> tuple[Surface, Surface]:
-        """Return the values of the measure and the evidence in robust standard deviations.
+        """Return the values of the measure, and the surface in robust standard deviations.
 
-        Values are NaN where too few pixels overlap, the evidence is 0.
+        Parameters
+        ----------
+        reference, input
+            Windows of one size with all that shifts and filters reach, see `Window.read`.
+        radius
+            Largest shift, in pixels.
+        context
+            Threads to work in, progress, and the seed of samples.
+
+        Returns
+        -------
+        Two arrays of shape (2 radius + 1, 2 radius + 1). Where too few pixels overlap, values are
+        NaN and deviations 0.
         """
-        radius = window.radius_px
-        template = reference.inner(radius + BORDER_PX)
-        search = input.inner(BORDER_PX)
-        if self.similarity in ("fused", "orientation", "edge-strength"):
-            values, evidence = self._by_edges(reference, input, window, executor)
+        template, search = reference.inner(radius + BORDER_PX), input.inner(BORDER_PX)
+        if self.similarity == _MLMI:
+            values = information_surface(template, search, self.sample, context)
+            deviations = detrend(values)
+        elif self.similarity in HISTOGRAM_MEASURES:
+            values = self._of_histograms(reference, input, radius, context)
+            deviations = detrend(values)
         else:
-            if self.similarity == "ncc":
-                values = correlate_grey(template, search)
-            elif self.similarity == "mlmi":
-                values = information_surface(
-                    template, search, self.sample, self.seed, executor, progress
-                )
-            else:
-                values = self._by_histogram(reference, input, window, executor, progress)
-            evidence = surfaces.detrend(values)
+            values, deviations = self._of_matching(reference, input, radius, context)
         enough = overlap_share(template, search) >= MINIMUM_OVERLAP - 1e-6
         return (
             np.where(enough, values, np.nan).astype(np.float32),
-            np.where(enough, evidence, 0).astype(np.float32),
+            np.where(enough, deviations, 0).astype(np.float32),
         )
 
-    def _by_edges(
-        self, reference: Patch, input: Patch, window: Window, executor: Executor
+    def _of_matching(
+        self, reference: Patch, input: Patch, radius: int, context: Context
     ) -> tuple[Surface, Surface]:
-        pixels, radius = window.chip_px**2, window.radius_px
-        settings = SimilaritySettings(self.similarity, self.bins, self.binning, self.gpve_order)
-        there, here = (surfaces.describe(patch, pixels, settings) for patch in (reference, input))
-        template = there.inner(radius)
-        evidence = surfaces.similarity_surface(template, here, radius, settings, executor)
-        if self.similarity == "fused":
-            return evidence, evidence
-        if self.similarity == "edge-strength":
-            return surfaces.strength_surface(template, here), evidence
-        assert template.fields is not None and here.fields is not None
-        valid = template.patch.valid, here.patch.valid
-        return correlate_fields(template.fields, here.fields, *valid).mean(axis=0), evidence
+        settings = SimilaritySettings(self.similarity, self.bins)
+        pixels = (reference.values.shape[0] - 2 * (radius + BORDER_PX)) ** 2
+        template, search = (describe(patch, pixels, settings) for patch in (reference, input))
+        template = template.inner(radius)
+        deviations = similarity_surface(template, search, radius, settings, context)
+        if self.similarity not in MEASURES:  # a sum of several has no values of its own
+            return deviations, deviations
+        values = MEASURES[self.similarity](template, search, radius, context)
+        return values.reshape(-1, *deviations.shape).mean(axis=0), deviations
 
-    def _by_histogram(
-        self, reference: Patch, input: Patch, window: Window, executor: Executor, progress: Progress
+    def _of_histograms(
+        self, reference: Patch, input: Patch, radius: int, context: Context
     ) -> Surface:
         margin = reach(self.gpve_order)
-        bins = self.bins or SimilaritySettings().bins_for(window.chip_px**2)
-        (own, own_count), (other, other_count) = (
-            to_levels(
-                patch.inner(BORDER_PX - margin),
-                None if self.binning == GREY_VALUES else bins,
-                self.binning,
-            )
+        pixels = (reference.values.shape[0] - 2 * (radius + BORDER_PX)) ** 2
+        bins = SimilaritySettings(bins=self.bins).bins_for(pixels)
+        levels = None if self.binning == GREY_VALUES else bins
+        (first, first_count), (second, second_count) = (
+            to_levels(patch.inner(BORDER_PX - margin), levels, self.binning)
             for patch in (reference, input)
         )
-        inside = slice(window.radius_px + margin, -(window.radius_px + margin))
+        inside = slice(radius + margin, -(radius + margin))
         return measure_surface(
-            own[inside, inside],
-            other,
-            (own_count, other_count),
+            first[inside, inside],
+            second,
+            (first_count, second_count),
             self._measure,
             self.gpve_order,
-            executor,
-            progress,
+            context,
         )
 
+    @property
+    def _measure(self) -> HistogramMeasure:
+        if self.similarity == "renyi":
+            return renyi_mutual_information(self.alpha)
+        if self.similarity == "tsallis":
+            return tsallis_mutual_information(self.q)
+        return HISTOGRAM_MEASURES[self.similarity]
 
-def second_peak(evidence: Surface, first: Evidence) -> Evidence | None:
+
+def _radius_px(grid: Grid, radius_m: float | None) -> int:
+    if radius_m is None:
+        return DEFAULT_RADIUS_PX
+    radius = round(radius_m / grid.pixel_size_m)
+    if not 2 <= radius <= LARGEST_RADIUS_PX:
+        low, high = (n * grid.pixel_size_m for n in (2, LARGEST_RADIUS_PX))
+        raise ParameterError(
+            f"the search radius must be {low:.6g} to {high:.6g} m, 2 to {LARGEST_RADIUS_PX} "
+            f"pixels of the matching grid, not {radius_m:.6g} m"
+        )
+    return radius
+
+
+def second_peak(surface: Surface, first: Peak) -> Peak | None:
     """Return the highest peak of a surface that lies apart from the first one."""
-    radius = evidence.shape[0] // 2
-    rows, cols = np.nonzero(evidence >= maximum_filter(evidence, 3, mode="nearest"))
+    radius = surface.shape[0] // 2
+    rows, cols = np.nonzero(surface >= maximum_filter(surface, 3, mode="nearest"))
     inner = (np.abs(np.stack([rows, cols]) - radius) < radius).all(axis=0)
     away = np.abs(np.stack([cols, rows]) - radius - np.reshape(first.shift_px, (2, 1)))
-    heights = evidence[rows, cols]
+    heights = surface[rows, cols]
     apart = inner & (away.max(axis=0) > _PEAK_PX) & (heights > 0)
     if not apart.any():
         return None
     best = int(np.where(apart, heights, -np.inf).argmax())
     row, col = int(rows[best]), int(cols[best])
-    found = find_peak(evidence[row - 1 : row + 2, col - 1 : col + 2])
+    found = find_peak(surface[row - 1 : row + 2, col - 1 : col + 2])
     shift = found.shift_px[0] + col - radius, found.shift_px[1] + row - radius
     return replace(found, shift_px=shift)

@@ -75,22 +75,6 @@ InputBand = Annotated[
         advanced=True,
     ),
 ]
-ReferenceMask = Annotated[
-    Path | None,
-    RasterIn(
-        label="Mask of the reference",
-        help="Where this raster is 0 or has no data, the reference takes no part.",
-        advanced=True,
-    ),
-]
-InputMask = Annotated[
-    Path | None,
-    RasterIn(
-        label="Mask of the input",
-        help="Where this raster is 0 or has no data, the input takes no part.",
-        advanced=True,
-    ),
-]
 MatchingPixelSize = Annotated[
     float | None,
     Distance(

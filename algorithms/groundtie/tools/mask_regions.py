@@ -69,9 +69,9 @@ def mask_regions(
 ) -> RegionMaskResult:
     """Mask all of a radar image but homogeneous regions on the ground: roads, waters, squares.
 
-    Speckle is filtered, regions grow from calm places, and those stay that are long or large and
-    neither bright nor radar shadow. Long ones are thinned to their skeleton and broadened by a
-    window; what shines inside takes no part. The mask is for `coregister` (reference_mask,
+    Speckle is filtered, regions grow from homogeneous seeds, and those stay that are long or large
+    and neither bright nor radar shadow. Long ones are thinned to their skeleton and broadened by a
+    window; strong scatterers inside are masked. The mask is for `coregister` (reference_mask,
     input_mask), which makes the same one itself with mask=regions.
     """
     high = HIGH_PERCENT if mask_high_percent is None else mask_high_percent

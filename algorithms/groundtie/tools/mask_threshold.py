@@ -1,4 +1,4 @@
-"""Mask the pixels of a radar image that shine, as buildings do."""
+"""Mask the strong scatterers of a radar image, as buildings are."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def mask_threshold(
     band: RadarBand = None,
     progress: Progress = SILENT,
 ) -> ThresholdMaskResult:
-    """Mask the pixels of a radar image that shine, as buildings do.
+    """Mask the strong scatterers of a radar image, as buildings are.
 
     The thresholds are percentiles of the means over blocks of 4 × 4 pixels; whole blocks take
     part or do not. The mask is for `coregister` (reference_mask, input_mask), which makes the

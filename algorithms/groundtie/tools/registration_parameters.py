@@ -7,10 +7,10 @@ from typing import Annotated
 
 from ..declaration import Output
 from ..geometry.models import KINDS
-from ..kinds import Choice, FileOut, Number, VectorOut
-from ..matching.local import AUTO
+from ..kinds import Choice, Distance, FileOut, MaskIn, Number, VectorOut
+from ..masks.choice import MASKS
+from ..matching.surface_fit import AUTO
 from ..registration.registered_output import OUTPUT_GRIDS
-from ..studies.pose_searches import SEARCHES
 
 Model = Annotated[
     str,
@@ -36,7 +36,7 @@ TiePointsOut = Annotated[
     Path | None,
     VectorOut(
         label="Tie points",
-        help="Lines from where the input claims a point to be to where it is.",
+        help="Lines from where a point of the input nominally lies to where it is.",
         suffixes=(".gpkg", ".geojson", ".csv", ".points"),
     ),
 ]
@@ -49,23 +49,54 @@ ReportOut = Annotated[
         suffixes=(".html",),
     ),
 ]
-Search = Annotated[
-    str,
-    Choice(
-        label="Rough search",
-        help="What finds the rough position on a reduced image. By default all shifts are "
-        "tried, and rotation-steps where a rotation or scale is searched for.",
-        choices=(AUTO, *SEARCHES),
-        advanced=True,
+SearchRadius = Annotated[
+    float | None,
+    Distance(
+        label="Search radius",
+        help="How far the input may lie from its right place. By default 100 m or 20 pixels of "
+        "the coarser image, whichever is larger; match_sar_sar and match_optical search a quarter "
+        "of the input's longer side where there is no georeferencing.",
+    ),
+]
+SearchRotation = Annotated[
+    float | None,
+    Number(
+        label="Largest rotation",
+        help="How far the input may be rotated, either way, against its nominal geotransform. By "
+        "default not at all; match_sar_sar and match_optical search any rotation where there is "
+        "no georeferencing.",
+        unit="°",
+        minimum=0,
+        maximum=180,
     ),
 ]
 SearchScale = Annotated[
-    float,
+    float | None,
     Number(
         label="Largest scale",
-        help="By which factor the input may be larger or smaller than it claims.",
+        help="By which factor the input may be larger or smaller than nominal. By default 1; "
+        "match_optical searches up to 2 where there is no georeferencing.",
         minimum=1,
         maximum=4,
+        advanced=True,
+    ),
+]
+MASK_HELP = (
+    "A raster whose zeros take no part, a vector layer of what takes part (polygons, and "
+    "lines as 11 m wide), or a classifier of train_feature_classifier (.json)."
+)
+ReferenceMask = Annotated[
+    Path | None, MaskIn(label="Mask of the reference", help=MASK_HELP, advanced=True)
+]
+InputMask = Annotated[Path | None, MaskIn(label="Mask of the input", help=MASK_HELP, advanced=True)]
+Mask = Annotated[
+    str,
+    Choice(
+        label="Mask of the radar image",
+        help="What takes part in scenes with high buildings, which layover displaces: threshold "
+        "leaves out strong scatterers, regions all but homogeneous ground (roads, waters, "
+        "squares); auto takes regions where a radar image beside a camera's shows a dense town.",
+        choices=MASKS,
         advanced=True,
     ),
 ]

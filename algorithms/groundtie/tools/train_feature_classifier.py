@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+from ..context import threads
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import ParameterError
 from ..features.classifier import KERNELS
 from ..features.classifier_training import left_out_accuracy, train_classifier
+from ..features.detectors import SiftDetector
 from ..features.labels import LabelSource, labelled_points, layer_labels, raster_labels
-from ..features.optical import optical_detector
 from ..features.patch_statistics import BAND_RATIOS, STATISTICS
 from ..kinds import Band, Choice, FileOut, RasterIn, Text, VectorIn
 from ..progress import SILENT, Progress
@@ -154,8 +155,9 @@ def train_feature_classifier(
         else:
             assert label_raster is not None
             source = raster_labels(stack.enter_context(open_raster(label_raster)), image, values)
-        detector = optical_detector("sift", _CONTRAST)
-        points = labelled_points(image, source, detector, statistics, progress.part(0.0, 0.6))
+        detector = SiftDetector(_CONTRAST)
+        with threads(progress=progress.part(0.0, 0.6)) as context:
+            points = labelled_points(image, source, detector, statistics, context)
         size_m = image.source.grid.pixel_size_m
     progress.update(0.6, "training")
     classifier = train_classifier(points, statistics, kernel, size_m, seed, source.chosen)

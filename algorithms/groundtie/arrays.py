@@ -1,0 +1,225 @@
+"""Rasters that are no files: numpy arrays with their place on the map, and xarray's."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+from rasterio.crs import CRS
+from rasterio.errors import CRSError
+
+from .errors import GeoreferencingError, ParameterError
+
+# Types that GDAL or OpenCV do not know, and those that hold their values.
+_HELD_BY = {
+    np.dtype(bool): np.dtype(np.uint8),
+    np.dtype(np.float16): np.dtype(np.float32),
+    np.dtype(np.longdouble): np.dtype(np.float64),
+    np.dtype(np.clongdouble): np.dtype(np.complex128),
+}
+
+
+# Transforms that differ by less at the corners are the same.
+_SAME_PX = 1e-3
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Raster:
+    """An array with its place on the map: what the tools take in place of a raster file.
+
+    Parameters
+    ----------
+    values
+        Pixels, shape (h, w) or (bands, h, w). What a masked array masks holds no data, nor do NaN
+        and infinity.
+    transform
+        Corner-based geotransform, as rasterio's and GDAL's; None: positions are pixels.
+    crs
+        Coordinate reference system, or what `rasterio.crs.CRS.from_user_input` takes for one
+        ("EPSG:32632", 32632); None: local coordinates.
+    nodata
+        Value of pixels that hold no data.
+
+    Raises
+    ------
+    ParameterError
+        The values are no image of numbers, or the transform or CRS is none.
+    GeoreferencingError
+        A CRS without a transform.
+    """
+
+    values: NDArray[Any]
+    transform: Affine | None = None
+    crs: CRS | None = None
+    nodata: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", _pixels(self.values))
+        object.__setattr__(self, "crs", _crs(self.crs))
+        if self.transform is None and self.crs is not None:
+            raise GeoreferencingError("an array with a CRS needs its transform, too")
+        if self.transform is not None and not isinstance(self.transform, Affine):
+            raise ParameterError(
+                f"transform must be an affine.Affine, not {type(self.transform).__name__}"
+            )
+
+    @classmethod
+    def from_xarray(cls, array: Any) -> Raster:
+        """Return an `xarray.DataArray` that rioxarray locates (extra `xarray`) as a raster.
+
+        Raises
+        ------
+        ParameterError
+            rioxarray is not imported, or the array has other dimensions than bands, y and x.
+        """
+        if not hasattr(array, "rio"):
+            raise ParameterError("a DataArray needs rioxarray: install and import it")
+        from rioxarray.exceptions import RioXarrayError
+
+        located = array.rio
+        try:
+            across, down = located.x_dim, located.y_dim
+        except RioXarrayError as error:
+            raise ParameterError(
+                f"an xarray.DataArray needs dimensions y and x: {error}"
+            ) from error
+        others = [dim for dim in array.dims if dim not in (across, down)]
+        if len(others) > 1:
+            raise ParameterError(f"an array has bands, y and x, not {', '.join(map(str, others))}")
+        return cls(
+            array.transpose(*others, down, across).values,
+            _transform_of(array),
+            None if located.crs is None else CRS.from_wkt(located.crs.to_wkt()),
+            located.nodata,
+        )
+
+    def to_xarray(self) -> Any:
+        """Return this raster as an `xarray.DataArray` (extra `xarray`) of (band, y, x) or (y, x).
+
+        What is masked becomes NaN.
+
+        Raises
+        ------
+        ImportError
+            rioxarray is not installed.
+        """
+        import rioxarray  # noqa: F401 (gives arrays their accessor)
+        import xarray
+
+        values = self.values
+        if isinstance(values, np.ma.MaskedArray):
+            held = values.astype(np.result_type(values.dtype, np.float32))
+            values = np.where(np.ma.getmaskarray(values), np.nan, held.data)
+        dims = ("band", "y", "x")[-values.ndim :]
+        place = Affine.identity() if self.transform is None else self.transform
+        coords = {}
+        if place.is_rectilinear:
+            coords = {
+                "x": place.c + place.a * (np.arange(self.width) + 0.5),
+                "y": place.f + place.e * (np.arange(self.height) + 0.5),
+            }
+        array = xarray.DataArray(values, coords, dims).rio.write_transform(place)
+        array = array if self.crs is None else array.rio.write_crs(self.crs)
+        return array if self.nodata is None else array.rio.write_nodata(self.nodata)
+
+    @property
+    def bands(self) -> NDArray[Any]:
+        """The values, shape (bands, h, w)."""
+        return self.values if self.values.ndim == 3 else self.values[None]
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return int(self.values.shape[-1])
+
+    @property
+    def height(self) -> int:
+        """Number of rows."""
+        return int(self.values.shape[-2])
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return f"array of {self.width} × {self.height}"
+
+    @property
+    def identity(self) -> Hashable:
+        """The same for rasters whose pixels are the same memory."""
+        held = np.ma.getdata(self.values)
+        return held.__array_interface__["data"][0], held.shape, held.strides
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        held = np.asarray(self.values, dtype)
+        return held.copy() if copy else held
+
+    def __str__(self) -> str:
+        return self.name
+
+    def __repr__(self) -> str:
+        place = "pixel coordinates" if self.transform is None else self.crs or "no CRS"
+        return f"<Raster {self.values.shape} {self.values.dtype}, {place}>"
+
+
+def in_memory(value: Any) -> Any:
+    """Return what is given for a raster, other than a name, as a `Raster` or an open dataset.
+
+    Parameters
+    ----------
+    value
+        A `Raster`, a numpy array (in pixel coordinates), an `xarray.DataArray` with rioxarray's
+        accessor, or a dataset that rasterio has open. Anything else gives None.
+
+    Raises
+    ------
+    ParameterError
+        It is one of these, but of no use.
+    """
+    if isinstance(value, Raster) or is_dataset(value):
+        return value
+    if isinstance(value, np.ndarray):
+        return Raster(value)
+    if hasattr(value, "dims") and hasattr(value, "coords"):
+        return Raster.from_xarray(value)
+    return None
+
+
+def is_dataset(value: Any) -> bool:
+    """Tell whether rasterio has opened this: a file, a `MemoryFile` or a `WarpedVRT`."""
+    return hasattr(value, "read_masks") and hasattr(value, "nodatavals")
+
+
+def _pixels(values: Any) -> NDArray[Any]:
+    array = np.asanyarray(values)
+    if array.ndim not in (2, 3) or 0 in array.shape:
+        raise ParameterError(
+            f"an array must have the shape (h, w) or (bands, h, w), not {array.shape}"
+        )
+    if array.dtype.kind not in "buifc":
+        raise ParameterError(f"an array must hold numbers, not {array.dtype}")
+    native = array.dtype.newbyteorder("=")
+    return array.astype(_HELD_BY.get(native, native), copy=False)
+
+
+def _transform_of(array: Any) -> Affine | None:
+    """Return the transform of a `DataArray`; None if nothing locates it."""
+    located = array.rio
+    stored = located.transform()
+    if located.x_dim not in array.coords or located.y_dim not in array.coords:
+        return stored if located.crs is not None else None
+    # The stored one is exact, but that of the whole where the array is a part: coordinates
+    # show which.
+    found = located.transform(recalc=True)
+    corners = np.array([[0, 0, 1], [located.width, located.height, 1]])
+    apart = corners @ np.subtract(found[:6], stored[:6]).reshape(2, 3).T
+    return stored if np.abs(apart).max() < _SAME_PX * abs(found.a) else found
+
+
+def _crs(crs: Any) -> CRS | None:
+    try:
+        return None if crs is None else CRS.from_user_input(crs)
+    except (CRSError, TypeError, ValueError) as error:
+        raise ParameterError(f"no coordinate reference system: {crs!r}") from error

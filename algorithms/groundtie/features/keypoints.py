@@ -1,0 +1,75 @@
+"""Features: where they are, how large, which way they point and how strong they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Keypoints:
+    """A table of features, one row a feature.
+
+    Parameters
+    ----------
+    position_px
+        Position (col, row), pixel centres at integers, shape (n, 2).
+    scale_px
+        Characteristic scale: standard deviation of the Gaussian at which the feature stands out
+        most, in pixels, shape (n,).
+    orientation_rad
+        Direction of the gradients around it, from columns towards rows, shape (n,); 0 for upright
+        features.
+    response
+        How far it stands out; larger is stronger, shape (n,).
+    octave
+        Octave of the scale space, shape (n,): -1 on the image at twice its size, 0 on the image
+        itself, 1 at half its size …
+    """
+
+    position_px: FloatArray
+    scale_px: FloatArray
+    orientation_rad: FloatArray
+    response: FloatArray
+    octave: NDArray[np.int_]
+
+    @classmethod
+    def none(cls) -> Keypoints:
+        """Return an empty table."""
+        nothing = np.zeros(0)
+        return cls(np.zeros((0, 2)), nothing, nothing, nothing, np.zeros(0, int))
+
+    def __len__(self) -> int:
+        return len(self.position_px)
+
+    def take(self, which: Any) -> Keypoints:
+        """Return the rows that the index or mask `which` selects."""
+        return Keypoints(**{name: getattr(self, name)[which] for name in _FIELDS})
+
+    def moved(self, by_px: ArrayLike) -> Keypoints:
+        """Return the features with positions (col, row) moved by `by_px`."""
+        return replace(self, position_px=self.position_px + np.asarray(by_px, float))
+
+    def with_orientation(self, orientation_rad: FloatArray) -> Keypoints:
+        """Return the features with other orientations, shape (n,)."""
+        return replace(self, orientation_rad=orientation_rad)
+
+    def strongest(self, count: int) -> Keypoints:
+        """Return at most so many features: those with the largest response, in their order."""
+        if len(self) <= count:
+            return self
+        # Among equals the first are kept.
+        return self.take(np.sort(np.argsort(-self.response, kind="stable")[:count]))
+
+    @classmethod
+    def concatenate(cls, tables: list[Keypoints]) -> Keypoints:
+        """Return the rows of all tables, one after the other."""
+        return cls(**{name: np.concatenate([getattr(t, name) for t in tables]) for name in _FIELDS})
+
+
+_FIELDS = tuple(Keypoints.__dataclass_fields__)

@@ -1,0 +1,43 @@
+"""The numbers by which registrations are accepted or refused, in the one place where they stand.
+
+Agreement is believed where it would be too unlikely by chance. Source: [Moisan2004]; the numbers
+were chosen on the shared pairs, as docs/method-verdict.md has it.
+"""
+
+from __future__ import annotations
+
+import math
+
+# A held-out point agrees with a model within this distance, in matching pixels.
+TOLERANCE_PX = 2.0
+
+# Fewer held-out points that agree measure nothing: at least so many, and this share of all. In
+# dense cities roofs in layover agree with each other at some places, more often than by chance.
+FEWEST_CHECK_POINTS = 3
+SMALLEST_INLIER_SHARE = 0.25
+
+# Chance agreement must be less likely than this (log10).
+LARGEST_LOG10_CHANCE = -3.0
+
+# What is left of a dense town's roofs agrees, too, and three points always agree on an affine
+# model: where its ground was matched, three of nine are not enough.
+LOG10_CHANCE_ON_GROUND = -4.0
+
+# Largest root mean square error that is allowed where nobody asks for another.
+USUAL_MAX_ERROR_PX = 3.0
+
+# 90 % of a circular normal distribution lies within this many standard deviations of an axis.
+CE90_FACTOR = math.sqrt(-2 * math.log(0.1))
+
+_SMALLEST_SIGMA_PX = 0.1
+_SIGMA_BEYOND = 1.5
+
+
+def sigma_range_px(max_error_px: float) -> tuple[float, float]:
+    """Return the standard deviations that held-out inliers may turn out to have, in pixels.
+
+    The larger one is so many times what the largest error allows that errors above it are still
+    seen.
+    """
+    largest = _SIGMA_BEYOND * max_error_px / math.sqrt(2)
+    return _SMALLEST_SIGMA_PX, max(largest, _SMALLEST_SIGMA_PX)

@@ -1,0 +1,174 @@
+"""The choice of a model: the simplest that predicts points well that were left out of its fit.
+
+Neighbouring points err together. So what is left out are blocks of them, one fold after the other,
+and what a more flexible model gains is measured against its scatter between blocks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import TooFewPointsError
+
+FloatArray = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+T = TypeVar("T")
+
+# A more flexible model must raise the left-out scores by so many of their standard errors: by one,
+# as is usual (Hastie et al. 2009, 7.10), but bending, which extrapolates badly, by two. Any shift
+# is better than none. Measured with `make bench`.
+STANDARD_ERRORS = {
+    "translation": 0.0,
+    "similarity": 1.0,
+    "affine": 1.0,
+    "polynomial2": 2.0,
+    "polynomial3": 2.0,
+}
+
+# Points for each parameter below which a model is not considered: chips, of which each has a whole
+# surface; keypoint matches that agree with the model; control points, two coordinates each.
+CHIPS_PER_PARAMETER = 2
+MATCHES_PER_PARAMETER = 3
+CONTROL_PER_PARAMETER = 1.5
+
+_FOLDS = 5
+
+
+@dataclass(frozen=True)
+class Candidate(Generic[T]):
+    """A model that may be chosen.
+
+    Parameters
+    ----------
+    kind
+        One of `models.KINDS` or of `bias.KINDS`.
+    fitted
+        The model, in whatever form its caller has it.
+    scores
+        How well points are predicted without them, larger is better, shape (n,).
+    """
+
+    kind: str
+    fitted: T
+    scores: FloatArray
+
+
+def choose_simplest(
+    kinds: Iterable[str],
+    fit: Callable[[str], Candidate[T]],
+    px: FloatArray,
+    baseline: FloatArray | None = None,
+    asked: Mapping[str, float] = STANDARD_ERRORS,
+    is_held: Callable[[T, T], bool] = lambda tried, chosen: True,
+) -> tuple[T, list[T]]:
+    """Fit models from simple to flexible and choose the simplest that the points justify.
+
+    Parameters
+    ----------
+    kinds
+        From simple to flexible.
+    fit
+        Fits a kind; raises TooFewPointsError where the points are too few for it or disagree.
+    px
+        Where the points lie, shape (n, 2).
+    baseline
+        Scores without any model, shape (n,), which the first one must exceed; None: it need not.
+    asked
+        By how many standard errors a kind must exceed what was chosen before; by default 0.
+    is_held
+        Whether points hold a model that would replace a simpler one, beside its gain.
+
+    Returns
+    -------
+    The chosen model, and all that were fitted.
+
+    Raises
+    ------
+    TooFewPointsError
+        No model could be fitted or exceeds the baseline.
+    """
+    chosen: T | None = None
+    scores = baseline
+    fitted: list[T] = []
+    failure: TooFewPointsError | None = None
+    for kind in kinds:
+        try:
+            tried = fit(kind)
+        except TooFewPointsError as error:
+            failure = failure or error
+            continue
+        fitted.append(tried.fitted)
+        if scores is not None:
+            gains = standard_errors(tried.scores - scores, px) > asked.get(kind, 0.0)
+            if not gains or (chosen is not None and not is_held(tried.fitted, chosen)):
+                continue
+        chosen, scores = tried.fitted, tried.scores
+    if chosen is None:
+        raise failure or TooFewPointsError(f"too few of {len(px)} points agree with a model")
+    return chosen, fitted
+
+
+def left_out_scores(
+    px: FloatArray, models: Iterable[T], score: Callable[[T, Mask], FloatArray]
+) -> FloatArray:
+    """Return each point's score by the model that has not seen its block, shape (n,).
+
+    Parameters
+    ----------
+    px
+        Where the points lie, shape (n, 2).
+    models
+        One for each of `left_out_blocks`.
+    score
+        Returns the scores, shape (m,), of the m points that a mask of shape (n,) selects.
+    """
+    scores = np.zeros(len(px))
+    for model, block in zip(models, left_out_blocks(px), strict=True):
+        scores[block] = score(model, block)
+    return scores
+
+
+def left_out_blocks(px: FloatArray) -> list[Mask]:
+    """Return which points each fold leaves out, shape (n,) each; all are left out once."""
+    folds = block_folds(px)
+    return [folds == fold for fold in np.unique(folds)]
+
+
+def block_folds(px: FloatArray) -> NDArray[np.int_]:
+    """Return fold numbers, shape (n,), such that neighbours share one, for cross-validation.
+
+    Each row and each column of blocks holds every fold once.
+    """
+    block = _blocks_of(px)
+    return np.asarray((block[:, 0] + 2 * block[:, 1]) % _FOLDS)
+
+
+def standard_errors(rise: FloatArray, px: FloatArray) -> float:
+    """Return the sum of a rise in its standard errors; neighbours rise together, so by blocks.
+
+    Parameters
+    ----------
+    rise
+        By how much something is larger at each point, shape (n,).
+    px
+        Where the points lie, shape (n, 2).
+    """
+    block = _blocks_of(px) @ [1, _FOLDS]
+    sums = np.array([rise[block == b].sum() for b in np.unique(block)])
+    error = sums.std(ddof=1) * np.sqrt(len(sums)) if len(sums) > 1 else np.inf
+    return float(sums.sum() / max(error, 1e-12))
+
+
+def _blocks_of(px: FloatArray) -> NDArray[np.int_]:
+    """Return the column and row of the block that each point lies in, shape (n, 2).
+
+    The points' extent is cut into as many blocks a side as there are folds.
+    """
+    low, high = px.min(axis=0), px.max(axis=0)
+    unit = (px - low) / np.maximum(high - low, 1e-12)
+    return np.minimum((unit * _FOLDS).astype(int), _FOLDS - 1)

@@ -1,0 +1,78 @@
+"""Tie points as columns: arrays by their names, or a GeoDataFrame."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .tie_points import TiePoints
+from .transform import Transform
+
+# What is a number, in the order of the columns; what is text comes after.
+NUMBERS = (
+    "reference_x",
+    "reference_y",
+    "nominal_x",
+    "nominal_y",
+    "input_col",
+    "input_row",
+    "residual_px",
+    "dx_px",
+    "dy_px",
+    "score",
+    "forward_backward_error_px",
+    "sigma_x_px",
+    "sigma_y_px",
+)
+TEXTS = ("role", "state")
+
+
+def tie_point_columns(points: TiePoints, transform: Transform) -> dict[str, NDArray[Any]]:
+    """Return the columns that files of tie points have, by name, shape (n,) each.
+
+    Parameters
+    ----------
+    points
+        The points.
+    transform
+        What their residuals refer to, with the CRS of the map and the input's grid.
+    """
+    residual = points.residual_px(transform)
+    sigma = np.sqrt(points.covariance_px2[:, [0, 1], [0, 1]])
+    numbers = np.column_stack(
+        [
+            points.reference_xy,
+            transform.nominal_xy(points.input_px),
+            points.input_px,
+            np.hypot(*residual.T),
+            residual,
+            points.score,
+            points.forward_backward_error_px,
+            sigma,
+        ]
+    )
+    texts = (points.role, points.state)
+    return dict(zip((*NUMBERS, *TEXTS), (*numbers.T, *texts), strict=True))
+
+
+def tie_point_geodataframe(points: TiePoints, transform: Transform) -> Any:
+    """Return tie points as a `geopandas.GeoDataFrame` (extra `geopandas`) in the reference's CRS.
+
+    Geometries are the positions on the reference map; columns as `tie_point_columns`.
+
+    Raises
+    ------
+    ImportError
+        geopandas is not installed.
+    """
+    try:
+        import geopandas
+    except ImportError as error:
+        raise ImportError(
+            "a GeoDataFrame needs geopandas: pip install 'groundtie[geopandas]'"
+        ) from error
+    crs = None if transform.crs is None else transform.crs.to_wkt()
+    places = geopandas.points_from_xy(*points.reference_xy.T)
+    return geopandas.GeoDataFrame(tie_point_columns(points, transform), geometry=places, crs=crs)

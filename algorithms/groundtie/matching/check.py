@@ -1,0 +1,66 @@
+"""Check points: chips in held-out blocks, matched by their own evidence alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..context import Context
+from ..geometry.models import Model
+from ..geometry.tie_points import TiePoints
+from .belief_propagation import Surfaces
+from .layout import ChipLayout
+from .matcher import Places
+from .surface_fit import SurfaceMatcher, check_points
+
+# Largest shift of a check chip from where the model predicts it.
+CHECK_RADIUS_PX = 12
+
+
+@dataclass(frozen=True)
+class Check:
+    """What check chips show.
+
+    Parameters
+    ----------
+    points
+        The check points, in the order of the surfaces.
+    surfaces
+        Their similarity surfaces, shape (n, 2 r + 1, 2 r + 1).
+    common_shift_px
+        Distance between the model and where all check chips together match best.
+    """
+
+    points: TiePoints
+    surfaces: Surfaces
+    common_shift_px: float
+
+
+def check_model(
+    matcher: SurfaceMatcher, layout: ChipLayout, model: Model, context: Context
+) -> Check:
+    """Match the check chips around what a model on the map predicts.
+
+    Parameters
+    ----------
+    matcher
+        What the chips are matched by.
+    layout
+        Where they lie, inside the held-out blocks.
+    model
+        The model that is judged.
+    context
+        Threads and progress.
+
+    Raises
+    ------
+    TooFewPointsError
+        A mask leaves too few pixels to match.
+    """
+    places = Places(matcher.pair.grid, layout.check_centres, layout.check_chip_px)
+    matched = matcher.seeing_all().match(model, places, CHECK_RADIUS_PX, context)
+    surfaces = matcher.for_check(matched, layout)
+    points = check_points(matcher.pair, surfaces, model)
+    shift_px = float(np.hypot(*surfaces.common_shift_px)) if len(points) else np.inf
+    return Check(points, surfaces.combined, shift_px)

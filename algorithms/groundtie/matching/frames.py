@@ -1,0 +1,41 @@
+"""Models on the map and the same models between pixel positions of a grid."""
+
+from __future__ import annotations
+
+from affine import Affine
+
+from ..geometry.fitting import fit_model
+from ..geometry.models import Model
+from ..rasters.grid import Grid
+from ..rasters.grid import compose as composed
+
+
+def on_map(model: Model, grid: Grid) -> Model:
+    """Return a model of a grid's pixel positions as one of map positions."""
+    return model.on_map(composed(grid.transform, Affine.translation(0.5, 0.5)))
+
+
+def on_grid(model: Model, grid: Grid) -> Affine:
+    """Return a model of degree 1 of map positions as an affine transform of a grid's pixels."""
+    origin, right, down = grid.map_to_pixel(model(grid.pixel_to_map([[0, 0], [1, 0], [0, 1]])))
+    along, across = right - origin, down - origin
+    return Affine(along[0], across[0], origin[0], along[1], across[1], origin[1])
+
+
+def compose(model: Model, correction: Model, level: Grid) -> Model:
+    """Return the model of degree 1 on the map that first corrects on a level, then applies `model`.
+
+    Parameters
+    ----------
+    model
+        Of map positions.
+    correction
+        Of pixel positions of the level.
+    level
+        A grid on the map.
+    """
+    corrected = on_map(correction, level)
+    corners = level.pixel_to_map(
+        [[0, 0], [level.width, 0], [0, level.height], [level.width, level.height]]
+    )
+    return fit_model("affine", corners, model(corrected(corners)))

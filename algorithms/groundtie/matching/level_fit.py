@@ -1,0 +1,125 @@
+"""A better model of degree 1 from the chips of one level of the image pyramid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+
+from ..context import Context
+from ..errors import TooFewPointsError
+from ..geometry.chance import agreement_probability, log10_false_alarms
+from ..geometry.models import PARAMETERS, Model
+from ..geometry.robust import distances, find_consensus
+from ..rasters.grid import Grid
+from ..similarity.peak import find_peak
+from .alignment import align
+from .belief_propagation import propagate
+from .chips import ChipMatcher
+from .frames import compose
+from .matcher import Places
+from .pooled import PooledHistogramMatcher
+
+FloatArray = NDArray[np.float64]
+
+# Chips and agreement at every level of the pyramid, in pixels of the level.
+_TOLERANCE_PX = 2.0
+_CHIPS_PER_SIDE = 7
+_CHIP_RANGE_PX = (48, 80)
+
+# Side of the chips with a joint histogram in common.
+_POOLED_CHIP_PX = 64
+
+# Simple models are preferred unless the data speak for others: each has its number of
+# hypotheses counted against it.
+_SAMPLE_OF = {"translation": 1, "similarity": 2, "affine": 3}
+
+
+@dataclass(frozen=True)
+class CoarseModel:
+    """A model of the misregistration on the map, and how likely it is to be none at all.
+
+    `log10_false_alarms` is log10 of the expected number of models that random matches would
+    agree with as well.
+    """
+
+    model: Model
+    log10_false_alarms: float
+
+
+def fit_level(
+    matcher: ChipMatcher, level: Grid, model: Model, radius_px: int, context: Context
+) -> CoarseModel:
+    """Match large chips on a level around a model, and fit a model of degree 1 to them.
+
+    Parameters
+    ----------
+    matcher
+        Matches the chips.
+    level
+        The matching grid at reduced resolution.
+    model
+        The misregistration on the map as known so far.
+    radius_px
+        How far it may be wrong, in pixels of the level.
+    context
+        Threads and progress.
+    """
+    chip = int(np.clip(min(level.width, level.height) / 5, *_CHIP_RANGE_PX))
+    places = Places(level, _regular_centres(level, chip), chip)
+    centres, surfaces = matcher.match_forward(model, places, radius_px, context)
+    if len(centres) < 4:
+        return CoarseModel(model, np.inf)
+    step = (np.array([level.width, level.height]) - chip) / (_CHIPS_PER_SIDE - 1)
+    supported = propagate(surfaces, centres, 1.5 * float(step.max()))
+    own = _peaks(surfaces)
+    px = centres.astype(float)
+    best = CoarseModel(model, np.inf)
+    probability = agreement_probability(_TOLERANCE_PX, radius_px)
+    found = px + _peaks(supported)
+    for kind, sample in _SAMPLE_OF.items():
+        fitted = find_consensus(px, found, _TOLERANCE_PX, kind)
+        # Peaks after belief propagation are not independent; only the chips' own are counted.
+        agreeing = int((distances(fitted, px, px + own) < _TOLERANCE_PX).sum())
+        alarms = log10_false_alarms(agreeing, len(px), probability, sample)
+        if alarms < best.log10_false_alarms:
+            best = CoarseModel(compose(model, fitted, level), alarms)
+    return best
+
+
+def fit_level_pooled(
+    matcher: PooledHistogramMatcher, level: Grid, model: Model, radius_px: int, context: Context
+) -> Model:
+    """Return a better affine model by all that a mask leaves on a level of the pyramid.
+
+    Parameters as `fit_level`.
+
+    Raises
+    ------
+    TooFewPointsError
+        The mask leaves too few pixels.
+    """
+    coarser = replace(matcher, pooled_chip_px=_POOLED_CHIP_PX)
+    places = Places.tiles(level, _POOLED_CHIP_PX)
+    found = coarser.match(model, places, radius_px, context)
+    if len(found.centres) < PARAMETERS["affine"]:
+        raise TooFewPointsError(f"only {len(found.centres)} chips show any ground")
+    shift = found.common_shift_px
+    identity = Affine.identity()
+    aligned = align("affine", found.centres, found.weighted, identity, lambda px: px + shift)
+    return compose(model, aligned.model, level)
+
+
+def _regular_centres(level: Grid, chip: int) -> NDArray[np.int_]:
+    sides = []
+    for size in (level.width, level.height):
+        count = int(np.clip((size - chip) / (chip / 2) + 1, 2, _CHIPS_PER_SIDE))
+        sides.append(np.linspace(chip / 2, size - chip / 2, count))
+    cols, rows = np.meshgrid(*sides)
+    return np.round(np.column_stack([cols.ravel(), rows.ravel()])).astype(int)
+
+
+def _peaks(surfaces: NDArray[np.float32]) -> FloatArray:
+    return np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)

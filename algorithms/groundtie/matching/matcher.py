@@ -1,0 +1,169 @@
+"""The protocol of all matchers, and what they return.
+
+A matcher finds where places of the reference lie in the input, given a model that is nearly right:
+`match(model, places, radius_px, context)`. Three fulfil it: `chips.ChipMatcher` (each chip by its
+own similarity surface), `pooled.PooledHistogramMatcher` (chips that share one joint histogram) and
+`keypoints.KeypointMatcher` (keypoints all over the grid). What they find is a `Correspondences`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..context import Context
+from ..geometry.models import Model
+from ..rasters.grid import Grid
+from ..similarity.peak import find_peak
+from ..similarity.surface import normalise
+from .belief_propagation import Surfaces, normalise_each
+
+FloatArray = NDArray[np.float64]
+ToPixel = Callable[[FloatArray], FloatArray]
+MaskOf = Callable[[Grid], NDArray[np.bool_]]
+
+
+@dataclass(frozen=True)
+class Places:
+    """Square chips of the reference.
+
+    Parameters
+    ----------
+    grid
+        Grid on which they are matched: the matching grid or a coarser level of it.
+    centres
+        Pixel positions (col, row) of their centres in the grid, shape (n, 2).
+    chip_px
+        Their side.
+    """
+
+    grid: Grid
+    centres: NDArray[np.int_]
+    chip_px: int
+
+    @classmethod
+    def tiles(cls, grid: Grid, chip_px: int) -> Places:
+        """Return chips that cover a grid side by side."""
+        sides = [
+            np.arange(length // chip_px) * chip_px + chip_px // 2
+            for length in (grid.width, grid.height)
+        ]
+        cols, rows = np.meshgrid(*sides)
+        return cls(grid, np.column_stack([cols.ravel(), rows.ravel()]), chip_px)
+
+
+@dataclass(frozen=True)
+class Correspondences:
+    """Places of the reference and where they match in the input, as a model resampled it.
+
+    Parameters
+    ----------
+    px
+        Pixel positions (col, row) in the grid, shape (n, 2).
+    partner_px
+        Where they match, in pixels of the same grid, shape (n, 2).
+    score
+        The larger, the better the match, shape (n,).
+    window_area_px2
+        Area over which outliers fall.
+    """
+
+    px: FloatArray
+    partner_px: FloatArray
+    score: FloatArray
+    window_area_px2: float
+
+    def take(self, which: NDArray[np.int_] | NDArray[np.bool_]) -> Correspondences:
+        """Return the rows that the index or mask `which` selects."""
+        return Correspondences(
+            self.px[which], self.partner_px[which], self.score[which], self.window_area_px2
+        )
+
+
+@dataclass(frozen=True)
+class ChipSurfaces:
+    """Similarity surfaces of chips on a grid: all that chips indicate, not their peaks alone.
+
+    Parameters
+    ----------
+    centres
+        Pixel positions (col, row) of the chips in the grid, shape (n, 2).
+    forward
+        Surfaces of reference chips in the input, shape (n, 2 r + 1, 2 r + 1).
+    backward
+        Surfaces of input chips in the reference, turned so that they should peak at the same
+        place, same shape.
+    weight
+        By how much each chip's surface counts in a fit, shape (n,).
+    """
+
+    centres: NDArray[np.int_]
+    forward: Surfaces
+    backward: Surfaces
+    weight: FloatArray
+
+    @cached_property
+    def combined(self) -> Surfaces:
+        """The sum of both directions, in robust standard deviations."""
+        return normalise_each(self.forward + self.backward)
+
+    @property
+    def weighted(self) -> Surfaces:
+        """The sum of both directions, by how much it counts in a fit."""
+        return np.asarray(self.combined * self.weight[:, None, None], np.float32)
+
+    @property
+    def radius_px(self) -> int:
+        """Largest shift."""
+        return self.forward.shape[1] // 2
+
+    @property
+    def common_shift_px(self) -> FloatArray:
+        """The shift (x, y) with the highest sum over all chips."""
+        return np.array(find_peak(normalise(self.weighted.sum(axis=0))).shift_px)
+
+    def correspondences(self) -> Correspondences:
+        """Return the peaks inside their search windows."""
+        peaks = [find_peak(surface) for surface in self.combined]
+        inside = np.array([not peak.at_border for peak in peaks], bool)
+        shifts = np.array([peak.shift_px for peak in peaks]).reshape(-1, 2)[inside]
+        heights = np.array([peak.height for peak in peaks])[inside]
+        px = self.centres[inside].astype(float)
+        return Correspondences(px, px + shifts, heights, (2 * self.radius_px + 1.0) ** 2)
+
+    def summed(self, groups: NDArray[np.int_]) -> ChipSurfaces:
+        """Return the weighted sums of groups of chips, at their middles.
+
+        Parameters
+        ----------
+        groups
+            The number of each chip's group, shape (n,).
+        """
+        members = [groups == group for group in np.unique(groups)]
+        weight = self.weight[:, None, None]
+
+        def total(surfaces: Surfaces) -> Surfaces:
+            added = [(surfaces[of] * weight[of]).sum(axis=0) for of in members]
+            return normalise_each(np.array(added, np.float32).reshape(-1, *surfaces.shape[1:]))
+
+        middles = [np.rint(self.centres[of].mean(axis=0)) for of in members]
+        return ChipSurfaces(
+            np.array(middles, int).reshape(-1, 2),
+            total(self.forward),
+            total(self.backward),
+            np.array([self.weight[of].sum() for of in members]),
+        )
+
+
+class Matcher(Protocol):
+    """What finds where places of the reference lie in the input."""
+
+    def match(
+        self, model: Model, places: Places, radius_px: int, context: Context
+    ) -> Correspondences | ChipSurfaces:
+        """Return the matches of places within a radius of where a model on the map has them."""

@@ -1,0 +1,213 @@
+"""The model that the similarity surfaces of all chips agree on, and the tie points near it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..context import Context
+from ..errors import TooFewPointsError
+from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate
+from ..geometry.models import DEGREE, PARAMETERS, Model
+from ..geometry.robust import fit_mixture
+from ..geometry.tie_points import USED, TiePoints
+from ..geometry.transform import Transform
+from ..rasters.grid import apply_affine
+from ..rasters.pair import ImagePair
+from ..similarity.peak import Peak, find_peak, find_peak_near
+from .alignment import CANDIDATES, Alignment, Positions, align, choose_alignment
+from .belief_propagation import Surfaces
+from .frames import on_grid, on_map
+from .layout import ChipLayout
+from .matcher import ChipSurfaces, FloatArray, Places
+
+AUTO = "auto"
+
+# A tie point of the fit is the peak within this distance from the aligned model.
+_NEAR_PX = 3
+
+# Largest shift of a chip of the fit from where a coarse model predicts it.
+FIT_RADIUS_PX = 8
+
+# Largest distance between a match and its match back for points of the fit.
+FORWARD_BACKWARD_PX = 2.0
+
+
+class SurfaceMatcher(Protocol):
+    """A matcher (see `matcher`) of chips with surfaces; its parts that a fit depends on."""
+
+    @property
+    def pair(self) -> ImagePair: ...
+
+    @property
+    def rematches(self) -> int: ...
+
+    def match(
+        self, model: Model, places: Places, radius_px: int, context: Context
+    ) -> ChipSurfaces: ...
+
+    def fit_places(self, layout: ChipLayout) -> Places: ...
+
+    def first_model(
+        self, surfaces: ChipSurfaces, layout: ChipLayout, kind: str, seed: int
+    ) -> Positions: ...
+
+    def kind_of(self, kind: str) -> str: ...
+
+    def is_settled(self, expected_px: FloatArray) -> bool: ...
+
+    def for_check(self, surfaces: ChipSurfaces, layout: ChipLayout) -> ChipSurfaces: ...
+
+    def seeing_all(self) -> SurfaceMatcher: ...
+
+
+@dataclass(frozen=True)
+class SurfaceFit:
+    """Fits a model to the surfaces of chips.
+
+    Parameters
+    ----------
+    matcher
+        Matches the chips, which see nothing of held-out blocks.
+    layout
+        Where chips lie in the matching grid.
+    candidates
+        What "auto" chooses from, from simple to flexible.
+    forward_backward_px
+        Largest distance between a match and its match back.
+    """
+
+    matcher: SurfaceMatcher
+    layout: ChipLayout
+    candidates: tuple[str, ...] = CANDIDATES
+    forward_backward_px: float = FORWARD_BACKWARD_PX
+
+    def estimate(self, coarse: Model, kind: str, context: Context) -> Estimate:
+        """Match the chips of the fit and fit a model to their surfaces.
+
+        Parameters
+        ----------
+        coarse
+            The misregistration on the map, a model of degree 1; it may be wrong by
+            `FIT_RADIUS_PX`.
+        kind
+            One of `models.KINDS`, or "auto" for the simplest polynomial that the chips justify.
+        context
+            Threads, progress and seed.
+
+        Raises
+        ------
+        TooFewPointsError
+            Too few chips could be matched for the model.
+        """
+        pair = self.matcher.pair
+        surfaces, aligned, expected = self._align(coarse, kind, context)
+        for _ in range(self.matcher.rematches):
+            if DEGREE[aligned.model.kind] > 1 or self.matcher.is_settled(expected):
+                break
+            coarse = on_map(aligned.model, pair.grid)
+            surfaces, aligned, expected = self._align(coarse, kind, context)
+        points = fit_points(pair, surfaces, coarse, expected, self.forward_backward_px)
+        model, fold_models = aligned.model, aligned.fold_models
+        nominal = Transform.nominal(pair.grid.crs, pair.input.source.grid)
+        if kind == "tps":
+            model, fold_models = fit_thin_plate(points, nominal, pair.grid, model, _NEAR_PX)
+        transform = Transform(on_map(model, pair.grid), nominal.crs, nominal.input_grid)
+        inliers = _without_outliers(points, transform, pair)
+        if 2 * inliers.used.sum() < PARAMETERS[transform.model.kind]:
+            raise TooFewPointsError(
+                f"only {inliers.used.sum()} of {len(points)} points agree with a model"
+            )
+        return Estimate(transform, inliers, fold_models)
+
+    def _align(
+        self, coarse: Model, kind: str, context: Context
+    ) -> tuple[ChipSurfaces, Alignment, FloatArray]:
+        """Match the chips of the fit around a model, and align a better one with their surfaces.
+
+        Returns the surfaces, the alignment and the shifts that it expects of the chips, (n, 2).
+        """
+        matcher = self.matcher
+        places = matcher.fit_places(self.layout)
+        surfaces = matcher.match(coarse, places, FIT_RADIUS_PX, context)
+        centres, weighted = surfaces.centres, surfaces.weighted
+        if len(centres) < 4:
+            raise TooFewPointsError(f"only {len(centres)} chips could be matched")
+        prior = on_grid(coarse, matcher.pair.grid)
+        residual = matcher.first_model(surfaces, self.layout, kind, context.seed)
+
+        def start(px: FloatArray) -> FloatArray:
+            return apply_affine(prior, residual(px))
+
+        kind = matcher.kind_of(kind)
+        if kind in (AUTO, "tps"):
+            aligned = choose_alignment(centres, weighted, prior, start, self.candidates)
+        else:
+            aligned = align(kind, centres, weighted, prior, start)
+        px = centres.astype(float)
+        return surfaces, aligned, apply_affine(~prior, aligned.model(px)) - px
+
+
+def fit_points(
+    pair: ImagePair,
+    surfaces: ChipSurfaces,
+    model: Model,
+    expected_px: FloatArray,
+    forward_backward_px: float,
+) -> TiePoints:
+    """Return the surfaces' peaks near expected shifts, shape (n, 2), as points of a fit."""
+
+    def peaks(of: Surfaces) -> list[Peak]:
+        pairs = zip(of, expected_px, strict=True)
+        return [find_peak_near(surface, shift, _NEAR_PX) for surface, shift in pairs]
+
+    points = _tie_points(pair, surfaces, model, peaks, is_check=False)
+    limit = f"forward–backward error above {forward_backward_px:g} px"
+    return points.reject(points.forward_backward_error_px > forward_backward_px, limit)
+
+
+def check_points(pair: ImagePair, surfaces: ChipSurfaces, model: Model) -> TiePoints:
+    """Return the surfaces' peaks, wherever they are, as check points."""
+
+    def peaks(of: Surfaces) -> list[Peak]:
+        return [find_peak(surface) for surface in of]
+
+    return _tie_points(pair, surfaces, model, peaks, is_check=True)
+
+
+class _Peaks(Protocol):
+    def __call__(self, of: Surfaces) -> list[Peak]: ...
+
+
+def _tie_points(
+    pair: ImagePair, surfaces: ChipSurfaces, model: Model, peaks: _Peaks, is_check: bool
+) -> TiePoints:
+    def shifts(of: list[Peak]) -> FloatArray:
+        return np.array([peak.shift_px for peak in of]).reshape(-1, 2)
+
+    grid = pair.grid
+    found = peaks(surfaces.combined)
+    centres = surfaces.centres.astype(float)
+    there_and_back = shifts(peaks(surfaces.forward)) - shifts(peaks(surfaces.backward))
+    points = TiePoints(
+        reference_xy=grid.pixel_to_map(centres),
+        input_px=pair.nominal_px(model(grid.pixel_to_map(centres + shifts(found)))),
+        score=np.array([peak.height for peak in found]),
+        covariance_px2=np.array([p.covariance_px2 for p in found]).reshape(-1, 2, 2),
+        forward_backward_error_px=np.hypot(*there_and_back.T),
+        is_check=np.full(len(found), is_check),
+        state=np.full(len(found), USED),
+    )
+    return points.reject(np.array([peak.at_border for peak in found], bool), "no peak")
+
+
+def _without_outliers(points: TiePoints, transform: Transform, pair: ImagePair) -> TiePoints:
+    """Reject the points of the fit that more likely fell by chance than near the model."""
+    used = points.used
+    residuals = points.take(used).residual_on(pair.grid, transform)
+    mixture = fit_mixture(residuals, (2 * _NEAR_PX + 1) ** 2, SIGMA_RANGE_PX)
+    outliers = np.zeros(len(points), bool)
+    outliers[used] = ~mixture.inliers
+    return points.reject(outliers, "disagrees with the model")

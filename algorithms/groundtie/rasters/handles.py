@@ -1,0 +1,135 @@
+"""What pixels are read from: GDAL's handles of a file, a dataset that is open, or an array."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Hashable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import rasterio
+from numpy.typing import NDArray
+from rasterio.errors import RasterioError, RasterioIOError
+
+from ..arrays import Raster
+from ..errors import RasterOpenError
+
+
+class Handles(Protocol):
+    """Lends something with rasterio's `read` and `read_masks` to one thread at a time."""
+
+    @property
+    def identity(self) -> Hashable:
+        """The same for one and the same raster."""
+
+    def borrow(self) -> contextlib.AbstractContextManager[Any]:
+        """Lend it; what goes wrong while reading with it becomes `RasterOpenError`."""
+
+    def close(self) -> None:
+        """Give up what was opened here."""
+
+
+class FileHandles:
+    """GDAL's handles of one file: each is used by one thread at a time, as GDAL demands."""
+
+    def __init__(self, path: str) -> None:
+        self._path = path
+        self._lock = threading.Lock()
+        self._free: list[Any] = []
+
+    @property
+    def identity(self) -> Hashable:
+        """The file's place."""
+        return Path(self._path).resolve()
+
+    @contextlib.contextmanager
+    def borrow(self) -> Iterator[Any]:
+        """Lend a handle of its own to each thread."""
+        with _reading(self._path):
+            with self._lock:
+                dataset = self._free.pop() if self._free else None
+            dataset = dataset or rasterio.open(self._path, sharing=False)
+            yield dataset
+        with self._lock:
+            self._free.append(dataset)
+
+    def close(self) -> None:
+        """Close the file; reading opens it again."""
+        with self._lock:
+            while self._free:
+                self._free.pop().close()
+
+
+class OpenDataset:
+    """A dataset that the caller has opened, and will close; its threads take turns."""
+
+    def __init__(self, dataset: Any) -> None:
+        self._dataset = dataset
+        self._lock = threading.Lock()
+
+    @property
+    def identity(self) -> Hashable:
+        """The file's place, also where another handle reads it."""
+        return Path(self._dataset.name).resolve()
+
+    @contextlib.contextmanager
+    def borrow(self) -> Iterator[Any]:
+        """Lend the dataset, after others are done with it."""
+        with _reading(self._dataset.name), self._lock:
+            if self._dataset.closed:
+                raise RasterOpenError(f"the dataset is closed: {self._dataset.name}")
+            yield self._dataset
+
+    def close(self) -> None:
+        """Leave the dataset as it is."""
+
+
+class ArrayHandles:
+    """An array, read as rasterio reads files; threads need not take turns."""
+
+    def __init__(self, raster: Raster) -> None:
+        self._bands = raster.bands
+        self.identity = raster.identity
+
+    @contextlib.contextmanager
+    def borrow(self) -> Iterator[ArrayHandles]:
+        """Lend itself."""
+        yield self
+
+    def close(self) -> None:
+        """Leave the array as it is."""
+
+    def read(
+        self,
+        indexes: int | Sequence[int] | None = None,
+        *,
+        window: Any,
+        out_dtype: Any = None,
+    ) -> NDArray[Any]:
+        """Return a copy of one band of a window, (h, w), or of several, (bands, h, w)."""
+        return np.array(np.ma.getdata(self._part(indexes, window)), dtype=out_dtype)
+
+    def read_masks(self, indexes: int, *, window: Any) -> NDArray[np.uint8]:
+        """Return 255 where a band of a window is not masked, else 0; shape (h, w)."""
+        masked = np.ma.getmaskarray(self._part(indexes, window))
+        return np.where(masked, 0, 255).astype(np.uint8)
+
+    def _part(self, indexes: int | Sequence[int] | None, window: Any) -> NDArray[Any]:
+        part = self._bands[(slice(None), *window.toslices())]
+        if indexes is None:
+            return part
+        if isinstance(indexes, int):
+            return part[indexes - 1]
+        return part[[index - 1 for index in indexes]]
+
+
+@contextlib.contextmanager
+def _reading(name: str) -> Iterator[None]:
+    try:
+        yield
+    # RasterioIOError is no RasterioError before rasterio 1.4.
+    except (RasterioError, RasterioIOError) as error:
+        reason = error.__cause__ or error
+        raise RasterOpenError(f"cannot read {name}: {reason}") from error

@@ -1,0 +1,56 @@
+"""Rasters worked tile by tile, so that memory is bounded however large they are."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, Future
+from typing import TypeVar
+
+from .grid import Grid
+from .reading import RasterSource
+from .windows import Window
+from .writing import BLOCK
+
+# Tiles are blocks of the file, small enough for those of a small raster to be worked side by side.
+_TILE = BLOCK
+
+# What a worker may hold of the result at a time; rasters with many bands are worked in groups.
+_TILE_BYTES = 32_000_000
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def tiles(grid: Grid) -> Iterator[Window]:
+    """Return the tiles that cover a grid, row by row, each made of whole blocks of the file."""
+    for row in range(0, grid.height, _TILE):
+        for col in range(0, grid.width, _TILE):
+            yield Window(col, row, min(_TILE, grid.width - col), min(_TILE, grid.height - row))
+
+
+def band_groups(source: RasterSource) -> tuple[tuple[int, ...], ...]:
+    """Return the numbers, from 1, of a raster's bands in groups of which a tile is not too much."""
+    most = max(_TILE_BYTES // (_TILE * _TILE * source.dtype.itemsize), 1)
+    numbers = range(1, source.count + 1)
+    return tuple(tuple(numbers[i : i + most]) for i in range(0, source.count, most))
+
+
+def in_order(
+    pool: Executor,
+    work: Callable[[Item], Result],
+    items: Iterable[Item],
+    ahead: int,
+) -> Iterator[Result]:
+    """Work on some items at a time, `ahead` at most, and yield the results in their order."""
+    waiting: deque[Future[Result]] = deque()
+    try:
+        for item in items:
+            waiting.append(pool.submit(work, item))
+            if len(waiting) >= ahead:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        for future in waiting:
+            future.cancel()

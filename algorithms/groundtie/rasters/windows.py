@@ -1,0 +1,88 @@
+"""Windows of rasters, and which of their pixels are valid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import rasterio.windows
+from numpy.typing import NDArray
+
+from .bands import fits
+
+if TYPE_CHECKING:
+    from .reading import RasterSource
+
+Mask = NDArray[np.bool_]
+
+
+class Window(NamedTuple):
+    """A rectangle of pixels; it may reach beyond the raster."""
+
+    col: int
+    row: int
+    width: int
+    height: int
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """Its rows and columns in an array."""
+        return slice(self.row, self.row + self.height), slice(self.col, self.col + self.width)
+
+
+def read_window(
+    dataset: Any, source: RasterSource, window: Window, bands: Sequence[int]
+) -> tuple[NDArray[Any], Mask]:
+    """Return values and validity of some bands of a window, shapes (bands, h, w).
+
+    Parameters
+    ----------
+    dataset
+        A handle of the raster (see `handles`).
+    source
+        What the raster states of itself.
+    window
+        The window; beyond the raster nothing is valid.
+    bands
+        Numbers of the bands, from 1.
+    """
+    shape = (len(bands), window.height, window.width)
+    left, top = max(window.col, 0), max(window.row, 0)
+    right = min(window.col + window.width, source.grid.width)
+    bottom = min(window.row + window.height, source.grid.height)
+    inside = Window(left, top, right - left, bottom - top)
+    if inside.width <= 0 or inside.height <= 0:
+        return np.zeros(shape, source.dtype), np.zeros(shape, bool)
+    place = rasterio.windows.Window(*inside)
+    values = dataset.read(list(bands), window=place, out_dtype=source.dtype)
+    valid = _validity(dataset, source, place, bands, values)
+    if inside == window:
+        return values, valid
+    padded, padded_valid = np.zeros(shape, source.dtype), np.zeros(shape, bool)
+    rows = slice(top - window.row, bottom - window.row)
+    cols = slice(left - window.col, right - window.col)
+    padded[:, rows, cols], padded_valid[:, rows, cols] = values, valid
+    return padded, padded_valid
+
+
+def _validity(
+    dataset: Any, source: RasterSource, place: Any, bands: Sequence[int], values: NDArray[Any]
+) -> Mask:
+    """Return which of `values` are valid, and set those that are not finite to 0."""
+    valid = np.ones(values.shape, bool)
+    if values.dtype.kind in "fc":
+        valid = np.isfinite(values)
+        values[~valid] = 0
+    for i, number in enumerate(bands):
+        if number == source.alpha_band:
+            valid[i] = values[i] > 0
+            continue
+        nodata = source.bands[number - 1].nodata
+        if nodata is not None and fits(nodata, values.dtype):
+            valid[i] &= values[i] != values.dtype.type(nodata)
+        if source.has_mask_band:
+            valid[i] &= dataset.read_masks(number, window=place) > 0
+        if source.alpha_band is not None:
+            valid[i] &= dataset.read(source.alpha_band, window=place) > 0
+    return valid

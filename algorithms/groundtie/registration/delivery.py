@@ -1,0 +1,208 @@
+"""What a registering tool leaves: the registered image and its files, or a refusal's report."""
+
+from __future__ import annotations
+
+import json
+import weakref
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..context import Context, threads
+from ..errors import NotRegisteredError, SameFileError
+from ..geometry.tie_point_files import write_tie_points
+from ..progress import SILENT, Progress
+from ..rasters.atomic import Outputs, writing
+from .pipeline import OpenPair, open_pair, run
+from .registered_output import RegisteredOutput, model_for_grid
+from .registration import Registration
+from .specification import Specification
+
+
+@dataclass(frozen=True)
+class RegistrationFiles:
+    """The files of a registration; None: not asked for.
+
+    Raises
+    ------
+    SameFileError
+        The transform would be written where the report's numbers go.
+    """
+
+    output: RegisteredOutput | None = None
+    tie_points: Path | None = None
+    transform: Path | None = None
+    report: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.report is not None and self.report.with_suffix(".json") == self.transform:
+            raise SameFileError(
+                f"the transform would be written over the report's numbers: {self.transform}"
+            )
+
+    def named(self) -> dict[str, Path]:
+        """Return what is written, by name."""
+        output = None if self.output is None else self.output.path
+        named = {
+            "output": output,
+            "tie_points": self.tie_points,
+            "transform": self.transform,
+            "report": self.report,
+        }
+        return {name: path for name, path in named.items() if path is not None}
+
+    def write(self, registration: Registration, context: Context) -> None:
+        """Write all files, or those of a refused registration: the report."""
+        with Outputs() as outputs:
+            if self.report is not None:
+                numbers = self.report.with_suffix(".json")
+                registration.page().write(outputs.stage(self.report), outputs.stage(numbers))
+            if not registration.verdict.accepted:
+                return
+            points, transform = registration.accepted()
+            if self.tie_points is not None:
+                write_tie_points(outputs.stage(self.tie_points), points, transform)
+            if self.transform is not None:
+                staged = outputs.stage(self.transform)
+                with writing(staged):
+                    text = json.dumps(transform.to_json(), indent=1)
+                    staged.write_text(text, encoding="utf-8")
+            if self.output is not None:
+                context.update(0.0, "writing the registered image")
+                pair = registration.pair
+                self.output.write(pair, transform, outputs, context.workers, context.progress)
+
+
+@dataclass(frozen=True)
+class Call:
+    """How a registering tool was called, apart from its images: the same for all of them.
+
+    Parameters
+    ----------
+    reference, input
+        What `open_raster` takes.
+    files
+        What is to be written.
+    bands, masks
+        See `pipeline.open_pair`.
+    parameters
+        All of its parameters, for the report.
+    workers
+        Number of threads; None: one per processor.
+    progress
+        Receives every step.
+    """
+
+    reference: Any
+    input: Any
+    files: RegistrationFiles
+    bands: tuple[int | None, int | None] = (None, None)
+    masks: tuple[Any, Any] = (None, None)
+    parameters: Mapping[str, Any] | None = None
+    workers: int | None = None
+    progress: Progress = SILENT
+
+    @classmethod
+    def of(cls, parameters: Mapping[str, Any], progress: Progress) -> Call:
+        """Return the call of a registering tool; see `register_as`."""
+        given = parameters
+        output = None
+        if given["output"] is not None:
+            output = RegisteredOutput(given["output"], given["output_grid"], given["resampling"])
+        return cls(
+            given["reference"],
+            given["input"],
+            RegistrationFiles(output, given["tie_points"], given["transform"], given["report"]),
+            (given["reference_band"], given["input_band"]),
+            (given["reference_mask"], given["input_mask"]),
+            given,
+            given["workers"],
+            progress,
+        )
+
+    def register(self, spec: Specification) -> Registration:
+        """Register as specified, and write the files.
+
+        Raises
+        ------
+        NotRegisteredError
+            The registration was refused.
+        """
+        with threads(self.workers, self.progress) as context, ExitStack() as stack:
+            pair = open_pair(
+                self.reference, self.input, spec, context.part(0.0, 0.02), self.bands, self.masks
+            )
+            opened = stack.enter_context(pair)
+            found = self.run(opened, spec, context.part(0.02, 0.7))
+            return self.deliver(found, context.part(0.7, 1.0), stack.pop_all())
+
+    def run(self, opened: OpenPair, spec: Specification, context: Context) -> Registration:
+        """Register an open pair as specified, whatever the verdict."""
+        return replace(run(opened, spec, context), parameters=self.parameters or {})
+
+    def deliver(
+        self, registration: Registration, context: Context, stack: ExitStack
+    ) -> Registration:
+        """Write what the registration leaves; `stack` keeps its rasters open as long as it lives.
+
+        Raises
+        ------
+        NotRegisteredError
+            It was refused; its report is written.
+        """
+        with stack:
+            self.files.write(registration, context)
+            require_accepted(registration)
+            rasters = stack.pop_all()
+        kept = replace(registration, files=self.files.named(), rasters=rasters)
+        weakref.finalize(kept, rasters.close)
+        return kept
+
+
+def register_as(
+    preset: Specification, parameters: Mapping[str, Any], progress: Progress
+) -> Registration:
+    """Register as a tool does.
+
+    Parameters
+    ----------
+    preset
+        What the tool is made for.
+    parameters
+        The values of its parameters by name: those of `tools.coregister`.
+    progress
+        Receives every step.
+
+    Raises
+    ------
+    NotRegisteredError
+        The registration was refused.
+    """
+    return Call.of(parameters, progress).register(specified(preset, parameters))
+
+
+def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specification:
+    """Return a preset with what a tool was called with."""
+    return replace(
+        preset,
+        model=model_for_grid(parameters["model"], parameters["output_grid"]),
+        max_error_px=parameters["max_error"],
+        search_radius_m=parameters["search_radius"],
+        rotation_deg=parameters["search_rotation"],
+        scale=parameters["search_scale"],
+        mask=parameters["mask"],
+        matching_pixel_size_m=parameters["matching_pixel_size"],
+    )
+
+
+def require_accepted(registration: Registration) -> None:
+    """Raise `NotRegisteredError` if a registration was refused."""
+    if not registration.verdict.accepted:
+        pair, verdict = registration.pair, registration.verdict
+        raise NotRegisteredError(
+            f"{pair.input.source.path} was not registered to {pair.reference.source.path}: "
+            f"{verdict.sentence()}",
+            verdict,
+        )

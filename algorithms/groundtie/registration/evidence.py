@@ -1,0 +1,189 @@
+"""What a verdict rests on: the numbers and facts that the rules of `rules.RULES` read."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from ..errors import GroundTieError
+from ..geometry.chance import agreement_probability, log10_chance
+from ..geometry.estimation import Estimate
+from ..geometry.judging import (
+    CE90_FACTOR,
+    LARGEST_LOG10_CHANCE,
+    TOLERANCE_PX,
+    sigma_range_px,
+)
+from ..geometry.robust import fit_mixture
+from ..geometry.tie_points import TiePoints
+from ..masks.choice import NONE, MaskUsed
+from ..rasters.grid import FloatArray, Grid
+from .scene import SceneInfo
+
+# Stages of a registration, in the order in which their rules are asked.
+SEARCH, AGREEMENT, ERROR, SCENE, REFINEMENT = (
+    "search",
+    "agreement",
+    "error",
+    "scene",
+    "refinement",
+)
+
+_LATTICE = 9
+
+
+@dataclass(frozen=True)
+class SearchEvidence:
+    """That a search or a fit came to no transform at all.
+
+    Parameters
+    ----------
+    failure
+        The error that it ended with.
+    """
+
+    failure: GroundTieError
+
+    stages: ClassVar = (SEARCH,)
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """How points that took no part in a fit agree with it.
+
+    Parameters
+    ----------
+    name
+        What they are called, such as "check points".
+    agreeing, total
+        How many agree with the model, and how many there are.
+    log10_chance
+        log10 of the probability that random matches would agree as well.
+    largest_log10_chance
+        The largest that is accepted.
+    rmse_px
+        Root mean square error of inliers.
+    max_error_px
+        The largest that is accepted.
+    spread_px
+        Standard deviation of the model's predictions (root mean square).
+    area
+        What the predictions are for, such as "the overlap".
+    """
+
+    name: str
+    agreeing: int
+    total: int
+    log10_chance: float
+    largest_log10_chance: float
+    rmse_px: float
+    max_error_px: float
+    spread_px: float
+    area: str
+
+    @property
+    def ce90_px(self) -> float:
+        """Radius within which 90 % of the errors lie."""
+        return self.rmse_px / math.sqrt(2) * CE90_FACTOR
+
+
+@dataclass(frozen=True)
+class RegistrationEvidence:
+    """What is known of a registration that came as far as check points.
+
+    Parameters
+    ----------
+    estimate
+        The transform and the points of the fit.
+    check
+        Check points, searched for around what the transform predicts.
+    grid
+        The matching grid, cut to the overlap.
+    max_error_px
+        Largest root mean square error at check points, in matching pixels.
+    radius_px
+        Radius of the search for check points.
+    largest_log10_chance
+        Largest log10 of the probability that random matches would agree as well.
+    ground_shift_px
+        How far off the ground alone matches better, where it did not take part alone in the fit.
+    is_ground_checked
+        Whether check points were matched on the ground of a dense town.
+    layover_factor
+        How many times what heights scatter matched points by, they displace the model; None: not
+        two radar images.
+    scene
+        What the images are; None: unknown, as in tests of other rules.
+    mask
+        The mask that was used.
+    """
+
+    estimate: Estimate
+    check: TiePoints
+    grid: Grid
+    max_error_px: float
+    radius_px: int
+    largest_log10_chance: float = LARGEST_LOG10_CHANCE
+    ground_shift_px: float = 0.0
+    is_ground_checked: bool = False
+    layover_factor: float | None = None
+    scene: SceneInfo | None = None
+    mask: MaskUsed = field(default_factory=lambda: MaskUsed(NONE, None, 1.0, ""))
+
+    stages: ClassVar = (AGREEMENT, ERROR, SCENE)
+
+    @cached_property
+    def counted(self) -> TiePoints:
+        """Check points with a peak inside their search window."""
+        return self.check.take(self.check.used)
+
+    @cached_property
+    def residuals_px(self) -> FloatArray:
+        """Their residuals, in matching pixels, shape (n, 2)."""
+        return self.counted.residual_on(self.grid, self.estimate.transform)
+
+    @cached_property
+    def held_out(self) -> HeldOut:
+        """How the check points agree; those without a peak count as disagreeing."""
+        agreeing = int((np.hypot(*self.residuals_px.T) <= TOLERANCE_PX).sum())
+        probability = agreement_probability(TOLERANCE_PX, self.radius_px)
+        area = (2 * self.radius_px + 1) ** 2
+        mixture = fit_mixture(self.residuals_px, area, sigma_range_px(self.max_error_px))
+        return HeldOut(
+            "check points",
+            agreeing,
+            len(self.check),
+            log10_chance(agreeing, len(self.check), probability),
+            self.largest_log10_chance,
+            mixture.sigma * math.sqrt(2),
+            self.max_error_px,
+            float(np.sqrt(np.mean(self.estimate.spread_px(_lattice(self.grid)) ** 2))),
+            "the overlap",
+        )
+
+    @property
+    def extrapolated_share(self) -> float:
+        """Share of the overlap outside of the hull of the points that were used."""
+        used = self.estimate.points.take(self.estimate.points.used)
+        size = self.grid.width, self.grid.height
+        return 1 - hull_share(self.grid.map_to_pixel(used.reference_xy), size)
+
+
+def hull_share(px: FloatArray, size: tuple[int, int]) -> float:
+    """Return the share of an image of a size, (width, height), that the hull of points covers."""
+    try:
+        return float(np.clip(ConvexHull(px).volume / (size[0] * size[1]), 0, 1))
+    except (QhullError, ValueError):
+        return 0.0
+
+
+def _lattice(grid: Grid) -> FloatArray:
+    cols, rows = np.meshgrid(
+        np.linspace(0, grid.width - 1, _LATTICE), np.linspace(0, grid.height - 1, _LATTICE)
+    )
+    return np.column_stack([cols.ravel(), rows.ravel()])

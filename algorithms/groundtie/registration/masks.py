@@ -1,0 +1,212 @@
+"""What takes part in a registration: masks that the user gave, and masks of a dense town's ground.
+
+Whatever a mask comes from, a raster, a vector layer, a classifier, thresholds or regions of the
+radar image, it becomes the same thing: a raster that masks one image of the pair.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+from ..context import Context
+from ..errors import ParameterError
+from ..masks import threshold
+from ..masks.cast_shadow import shadow_azimuth_deg
+from ..masks.choice import (
+    AUTO,
+    LAYER,
+    NONE,
+    REGIONS,
+    MaskUsed,
+    choose,
+)
+from ..masks.layer import read_layer
+from ..masks.regions import HIGH_PERCENT, WIDTH_M, GroundRegions, find_ground
+from ..masks.scene import Scene, Selection, write_mask
+from ..masks.threshold import Threshold
+from ..rasters.grid import Grid
+from ..rasters.pair import ImagePair
+from ..rasters.reading import Window, open_raster
+from .classifying import read_scene_classifier
+from .scene import SceneInfo, scene_of
+
+# In which part of an image the direction of cast shadows is looked for.
+_MIDDLE_PX = 2048
+
+_CLASSIFIER_SUFFIX = ".json"
+_VECTOR_SUFFIXES = (".gpkg", ".geojson", ".shp", ".fgb", ".kml", ".gml")
+
+
+@dataclass(frozen=True)
+class Masked:
+    """A pair of which a part takes part.
+
+    Parameters
+    ----------
+    pair
+        The images with all masks: what is matched.
+    used
+        Which mask was made.
+    ground
+        The images with a mask of the ground alone, on which check points are matched where `pair`
+        shows more of a dense town; None: no dense town, or nothing but ground takes part.
+    """
+
+    pair: ImagePair
+    used: MaskUsed
+    ground: ImagePair | None = None
+
+    def on(self, pair: ImagePair) -> Masked:
+        """Return the masks of the reference on another pair with the same reference."""
+        ground = self.ground
+        return Masked(
+            replace(pair, reference=self.pair.reference),
+            self.used,
+            None if ground is None else replace(pair, reference=ground.reference),
+        )
+
+
+def is_raster_mask(mask: Path | str | None) -> bool:
+    """Whether a mask that the user gave is a raster, by the ending of its name."""
+    return mask is not None and Path(mask).suffix.lower() not in (
+        _CLASSIFIER_SUFFIX,
+        *_VECTOR_SUFFIXES,
+    )
+
+
+def with_user_masks(
+    pair: ImagePair, masks: dict[str, Path | None], stack: ExitStack, context: Context
+) -> tuple[ImagePair, MaskUsed | None]:
+    """Return a pair with the vector layers and classifiers that the user gave as masks.
+
+    Parameters
+    ----------
+    pair
+        The images; rasters that the user gave mask them already.
+    masks
+        The masks of the "reference" and of the "input".
+    stack
+        Keeps the masks' rasters until it is closed.
+    context
+        Threads and progress.
+
+    Returns
+    -------
+    pair, used
+        The pair, and the mask that a vector layer made, which is one of the ground; None: none.
+    """
+    used = None
+    for name, mask in masks.items():
+        if mask is None or is_raster_mask(mask):
+            continue
+        scene = scene_of(pair, name)
+        if Path(mask).suffix.lower() == _CLASSIFIER_SUFFIX:
+            select = read_scene_classifier(pair, name, scene, Path(mask)).select
+        else:
+            select = read_layer(mask, scene, WIDTH_M).select
+        pair, share = _masked(pair, name, scene, select, stack, context)
+        if Path(mask).suffix.lower() in _VECTOR_SUFFIXES:
+            used = MaskUsed(LAYER, name, share, f"what {Path(mask).name} covers")
+        context.update(1.0, f"{Path(mask).name} keeps {share:.0%} of the {name}")
+    return pair, used
+
+
+def with_ground_mask(
+    pair: ImagePair, kind: str, scene: SceneInfo, stack: ExitStack, context: Context
+) -> Masked:
+    """Return a pair with the mask of a kind on its radar image.
+
+    Where buildings stand close, roofs and walls agree with each other at check points, too: the
+    ground must confirm whatever else took part in the fit.
+
+    Parameters
+    ----------
+    pair
+        The images, with the masks that the user gave.
+    kind
+        One of `masks.choice.MASKS`.
+    scene
+        What the images are.
+    stack
+        Keeps the masks' rasters until it is closed.
+    context
+        Threads and progress.
+    """
+    if kind == AUTO and not scene.is_radar_and_camera:
+        return Masked(pair, MaskUsed(NONE, None, 1.0, "there is no radar image beside a camera's"))
+    town = _Town(pair, scene, stack, context)
+    reason = "as asked for"
+    is_chosen = kind == AUTO
+    if is_chosen:
+        kind, reason = choose(scene.radar.strong_share, town.regions)
+    if kind == NONE:
+        # Where the choice is no mask, there is no dense town.
+        ground = None if is_chosen or not scene.is_dense_town else town.ground()
+        return Masked(pair, MaskUsed(NONE, None, 1.0, reason), ground)
+    if kind == REGIONS:
+        masked, share = town.masked(town.regions().select)
+        return Masked(masked, MaskUsed(REGIONS, scene.radar_name, share, reason))
+    by_level = Threshold(threshold.HIGH_PERCENT, 0.0, 0).on(town.scene, context.progress)
+    masked, share = town.masked(by_level.select)
+    ground = town.ground() if scene.is_dense_town else None
+    return Masked(masked, MaskUsed(kind, scene.radar_name, share, reason), ground)
+
+
+class _Town:
+    """The radar image of a pair, and its ground, which is found once."""
+
+    def __init__(
+        self, pair: ImagePair, info: SceneInfo, stack: ExitStack, context: Context
+    ) -> None:
+        self._pair, self._info, self._stack, self._context = pair, info, stack, context
+        self.scene: Scene = info.radar.scene
+        self.regions: Callable[[], GroundRegions] = cache(self._find)
+
+    def masked(self, select: Callable[[Window], Selection]) -> tuple[ImagePair, float]:
+        """Return the pair with a mask on the radar image, and the share that takes part."""
+        name = self._info.radar_name
+        return _masked(self._pair, name, self.scene, select, self._stack, self._context)
+
+    def ground(self) -> ImagePair:
+        """Return the pair with a mask of the ground on the radar image."""
+        return self.masked(self.regions().select)[0]
+
+    def _find(self) -> GroundRegions:
+        other = self._info.other.scene
+        middle = other.read(_middle(other.grid))
+        shadow = shadow_azimuth_deg(middle) if middle.valid.any() else None
+        return find_ground(self.scene, WIDTH_M, HIGH_PERCENT, self._context.progress, shadow)
+
+
+def require_one_mask(kind: str, used: MaskUsed | None) -> None:
+    """Raise `ParameterError` if a mask is asked for and a vector layer is given as one, too."""
+    if used is not None and kind not in (NONE, AUTO):
+        raise ParameterError(f"give either mask={kind} or a vector layer as mask")
+
+
+def _middle(grid: Grid) -> Window:
+    width, height = min(grid.width, _MIDDLE_PX), min(grid.height, _MIDDLE_PX)
+    return Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
+
+
+def _masked(
+    pair: ImagePair,
+    name: str,
+    scene: Scene,
+    select: Callable[[Window], Selection],
+    stack: ExitStack,
+    context: Context,
+) -> tuple[ImagePair, float]:
+    """Return a pair with a mask on one image, and the share of it that takes part.
+
+    The mask is a file until the stack is closed.
+    """
+    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="groundtie-")))
+    share = write_mask(scene, folder / "mask.tif", select, context.quiet().progress)
+    mask = stack.enter_context(open_raster(folder / "mask.tif"))
+    return replace(pair, **{name: replace(getattr(pair, name), mask=mask)}), share

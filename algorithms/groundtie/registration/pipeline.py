@@ -1,0 +1,303 @@
+"""The pipeline: inspect → mask → coarse → match → fit → check → rules → result.
+
+`open_pair` opens the images that a specification is about; `run` takes them from there to a judged
+`Registration`. Every tool that registers is a preset of it, so what one refuses, all refuse.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..context import Context
+from ..errors import NothingFoundError, TooFewPointsError
+from ..features.presets import optical_keypoints, sar_keypoints
+from ..geometry.estimation import Estimate
+from ..geometry.judging import LARGEST_LOG10_CHANCE, LOG10_CHANCE_ON_GROUND
+from ..geometry.models import Model
+from ..masks.choice import INPUT, REFERENCE, MaskUsed
+from ..matching.alignment import LINEAR_CANDIDATES
+from ..matching.check import CHECK_RADIUS_PX, Check, check_model
+from ..matching.chips import ChipMatcher
+from ..matching.feature_tiles import FeatureMatcher
+from ..matching.guided_fit import GuidedFit
+from ..matching.held_out import HeldOut
+from ..matching.keypoint_fit import KeypointFit
+from ..matching.pooled import PooledHistogramMatcher
+from ..matching.pyramid import find_coarse_model
+from ..matching.surface_fit import SurfaceFit
+from ..rasters.pair import Image, ImagePair, make_pair
+from ..rasters.reading import bounded_cache, open_raster
+from ..similarity.surface import SimilaritySettings
+from .evidence import RegistrationEvidence, SearchEvidence
+from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
+from .masks import Masked, is_raster_mask, require_one_mask, with_ground_mask, with_user_masks
+from .registration import Registration
+from .scene import SceneInfo
+from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
+from .verdict import judge, judge_search
+
+
+class Fit(Protocol):
+    """What finds tie points near a coarse model, blind to held-out blocks, and fits a model."""
+
+    def estimate(self, coarse: Model, kind: str, context: Context) -> Estimate:
+        """Return the model that tie points agree on; `TooFewPointsError` if none do."""
+
+
+@dataclass(frozen=True)
+class OpenPair:
+    """Two images, open, with the masks that the user gave.
+
+    Parameters
+    ----------
+    images
+        The images without any mask: what keypoints may be described by.
+    pair
+        The images with the user's masks.
+    user_mask
+        The mask that a vector layer made; None: none.
+    stack
+        Keeps rasters open, and takes further masks.
+    started
+        When the work began, by `time.perf_counter`.
+    """
+
+    images: ImagePair
+    pair: ImagePair
+    user_mask: MaskUsed | None
+    stack: ExitStack
+    started: float
+
+
+@contextmanager
+def open_pair(
+    reference: Any,
+    input: Any,
+    spec: Specification,
+    context: Context,
+    bands: tuple[int | None, int | None] = (None, None),
+    masks: tuple[Any, Any] = (None, None),
+) -> Iterator[OpenPair]:
+    """Open two images and the masks that the user gave.
+
+    Parameters
+    ----------
+    reference, input
+        What `open_raster` takes.
+    spec
+        How far the input may lie off, and at which pixel size both are matched.
+    context
+        Threads and progress.
+    bands
+        Numbers of the bands that are matched, from 1; None: the mean of all.
+    masks
+        For each image a raster whose zeros take no part, a vector layer of what takes part, or a
+        classifier; None: all takes part.
+    """
+    started = time.perf_counter()
+    with ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        opened = [
+            Image(stack.enter_context(open_raster(raster)), band)
+            for raster, band in zip((reference, input), bands, strict=True)
+        ]
+        yield pair_images(opened[0], opened[1], spec, context, masks, stack, started)
+
+
+def pair_images(
+    reference: Image,
+    input: Image,
+    spec: Specification,
+    context: Context,
+    masks: tuple[Any, Any],
+    stack: ExitStack,
+    started: float,
+) -> OpenPair:
+    """Put two open images on a common matching grid, and the user's masks on them."""
+    grid = input.source.grid
+    radius_m, rotation_deg, scale = spec.search_radius_m, spec.rotation_deg, spec.scale
+    if not grid.is_georeferenced:
+        if radius_m is None and spec.free.radius_share is not None:
+            radius_m = spec.free.radius_share * max(grid.width, grid.height)
+        rotation_deg = spec.free.rotation_deg if rotation_deg is None else rotation_deg
+        scale = spec.free.scale if scale is None else scale
+    images = make_pair(
+        reference,
+        input,
+        spec.matching_pixel_size_m,
+        radius_m,
+        0.0 if rotation_deg is None else rotation_deg,
+        1.0 if scale is None else scale,
+    )
+    for note in images.notes():
+        context.update(0.0, note)
+    named = dict(zip((REFERENCE, INPUT), masks, strict=True))
+    rasters = {
+        name: stack.enter_context(open_raster(mask))
+        for name, mask in named.items()
+        if is_raster_mask(mask)
+    }
+    pair = replace(
+        images,
+        **{name: replace(getattr(images, name), mask=mask) for name, mask in rasters.items()},
+    )
+    pair, used = with_user_masks(pair, named, stack, context.part(0.0, 0.02))
+    require_one_mask(spec.mask, used)
+    return OpenPair(images, pair, used, stack, started)
+
+
+def run(opened: OpenPair, spec: Specification, context: Context) -> Registration:
+    """Register the input of an open pair to its reference, and judge the result.
+
+    Parameters
+    ----------
+    opened
+        The images.
+    spec
+        How.
+    context
+        Threads, progress and seed.
+    """
+    scene = SceneInfo.of(opened.pair, spec.radar)
+    context.update(0.02, "inspecting the images")
+    masked = mask_pair(opened, spec, scene, context.part(0.02, 0.12))
+    return register(opened, masked, scene, spec, context.part(0.12, 1.0))
+
+
+def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: Context) -> Masked:
+    """Return the pair with all masks: the user's, and that of the radar image if one is needed."""
+    if opened.user_mask is not None:
+        return Masked(opened.pair, opened.user_mask)
+    return with_ground_mask(opened.pair, spec.mask, scene, opened.stack, context)
+
+
+def register(
+    opened: OpenPair, masked: Masked, scene: SceneInfo, spec: Specification, context: Context
+) -> Registration:
+    """Register a pair whose masks and facts are found; parameters as `run` and its stages."""
+    stages = Stages.of(opened.images, masked, spec)
+    result = Registration(masked.pair, spec, scene, masked.used, started=opened.started)
+    try:
+        context.update(0.0, "searching for the coarse shift")
+        coarse = stages.coarse(context.part(0.0, 0.4))
+        context.update(0.4, "matching tie points")
+        estimate = stages.fit.estimate(coarse, spec.model, context.part(0.4, 0.8))
+        context.update(0.8, "checking with points that took no part")
+        check = stages.check(estimate, context.part(0.8, 1.0))
+    except (NothingFoundError, TooFewPointsError) as error:
+        return replace(result, verdict=judge_search(SearchEvidence(error)))
+    evidence = stages.evidence(estimate, check, scene)
+    return replace(result, verdict=judge(evidence), estimate=estimate, check=check)
+
+
+@dataclass(frozen=True)
+class Stages:
+    """The stages of one registration, put together as its specification asks.
+
+    Parameters
+    ----------
+    masked
+        What takes part.
+    spec
+        How it is registered.
+    held_out
+        What only check chips may see.
+    matcher
+        Matches chips of the fit and, on reduced images, the coarse shift.
+    checker
+        Matches check chips: `matcher`, or another on the ground alone.
+    fit
+        Fits the model.
+    """
+
+    masked: Masked
+    spec: Specification
+    held_out: HeldOut
+    matcher: ChipMatcher | PooledHistogramMatcher
+    checker: ChipMatcher | PooledHistogramMatcher
+    fit: Fit
+
+    @classmethod
+    def of(cls, images: ImagePair, masked: Masked, spec: Specification) -> Stages:
+        """Put the stages together; `images` have no masks."""
+        held_out = HeldOut.of(images, spec.chip_px, spec.spacing_px)
+
+        def pooled(pair: ImagePair) -> PooledHistogramMatcher:
+            return PooledHistogramMatcher(pair, held_out.layout.chip_px, held_out)
+
+        settings = SimilaritySettings(spec.similarity)
+        chips = ChipMatcher(masked.pair, settings, held_out)
+        # Chips of which a mask leaves too little share a joint histogram.
+        is_pooled = (
+            spec.matcher == CHIPS
+            and masked.used.leaves_little
+            and spec.similarity in ("fused", "nmi")
+        )
+        matcher = pooled(masked.pair) if is_pooled else chips
+        checker = matcher if masked.ground is None else pooled(masked.ground)
+        fit = _fit(images, masked.pair, matcher, held_out, spec)
+        return cls(masked, spec, held_out, matcher, checker, fit)
+
+    def coarse(self, context: Context) -> Model:
+        """Return the coarse model."""
+        limits = self.masked.pair.limits
+        return find_coarse_model(self.matcher, self.held_out, limits, context)
+
+    def check(self, estimate: Estimate, context: Context) -> Check:
+        """Match the check chips around what an estimate predicts."""
+        model = estimate.transform.model
+        return check_model(self.checker, self.held_out.layout, model, context)
+
+    def evidence(self, estimate: Estimate, check: Check, scene: SceneInfo) -> RegistrationEvidence:
+        """Return what the rules look at."""
+        is_pooled = isinstance(self.checker, PooledHistogramMatcher)
+        is_apart = self.checker is not self.matcher
+        chance = LOG10_CHANCE_ON_GROUND if is_pooled else LARGEST_LOG10_CHANCE
+        is_radar = self.spec.radar == BOTH or scene.are_both_radar
+        factor = (
+            KEYPOINTS_MEAN_OVER_SCATTER
+            if self.spec.matcher == KEYPOINTS
+            else CHIPS_MEAN_OVER_SCATTER
+        )
+        return RegistrationEvidence(
+            estimate,
+            check.points,
+            self.masked.pair.grid,
+            self.spec.max_error_px,
+            CHECK_RADIUS_PX,
+            chance - float(np.log10(self.spec.tries)),
+            check.common_shift_px if is_apart else 0.0,
+            is_apart,
+            factor if is_radar else None,
+            scene,
+            self.masked.used,
+        )
+
+
+def _fit(
+    images: ImagePair,
+    pair: ImagePair,
+    matcher: ChipMatcher | PooledHistogramMatcher,
+    held_out: HeldOut,
+    spec: Specification,
+) -> Fit:
+    """Return what fits the model, by the name of the specification's matcher."""
+    layout = held_out.layout
+    if spec.matcher == CHIPS:
+        return SurfaceFit(matcher, layout)
+    presets = {KEYPOINTS: sar_keypoints, GUIDED_CHIPS: optical_keypoints}
+    detector, descriptor = presets[spec.matcher]()
+    masked = None if pair is images else pair
+    keypoints = FeatureMatcher(images, detector, descriptor, held_out=held_out, shown=masked)
+    chips = ChipMatcher(pair, SimilaritySettings(spec.refinement), held_out)
+    if spec.matcher == KEYPOINTS:
+        return KeypointFit(keypoints, SurfaceFit(matcher, layout), chips)
+    # Polynomials bend along elevated objects: "auto" chooses among what keypoints choose from.
+    fit = SurfaceFit(chips, layout, LINEAR_CANDIDATES)
+    return GuidedFit(KeypointFit(keypoints, SurfaceFit(matcher, layout)), fit)

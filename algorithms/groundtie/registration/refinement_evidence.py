@@ -1,0 +1,154 @@
+"""What a verdict on refined RPCs rests on: points that took no part, before and after."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ..geometry.chance import agreement_probability, log10_chance
+from ..geometry.judging import (
+    FEWEST_CHECK_POINTS,
+    LARGEST_LOG10_CHANCE,
+    TOLERANCE_PX,
+    sigma_range_px,
+)
+from ..geometry.robust import fit_mixture
+from ..rasters.grid import FloatArray
+from ..sensor.adjustment import Adjustment, Control
+from .evidence import AGREEMENT, ERROR, REFINEMENT, HeldOut, hull_share
+
+CHECK_POINTS, LEFT_OUT = "check points", "points left out in turn"
+
+# Outliers lie within this distance at least, in pixels.
+_LEAST_REACH_PX = 50
+
+_NODES = 9
+
+
+@dataclass(frozen=True)
+class RefinementEvidence:
+    """What is known of refined RPCs.
+
+    Parameters
+    ----------
+    held_out
+        How points that took no part agree with the refined RPCs.
+    before_px, after_px
+        Errors at those of them that are inliers, by the RPCs as delivered and as refined, shape
+        (n, 2).
+    extent
+        Share of the sides of the image that control spreads over, the smaller one.
+    extrapolated_share
+        Share of the image outside of the hull of the control.
+    control_points, control_points_used
+        How many points the fit had, and how many of them it used.
+    pixel_m
+        Side of an image pixel on the ground.
+    folding_px
+        By how much RPCs with the bias folded in miss it.
+    """
+
+    held_out: HeldOut
+    before_px: FloatArray
+    after_px: FloatArray
+    extent: float
+    extrapolated_share: float
+    control_points: int
+    control_points_used: int
+    pixel_m: float
+    folding_px: float
+
+    stages: ClassVar = (AGREEMENT, ERROR, REFINEMENT)
+
+    @property
+    def rms_before_px(self) -> float:
+        """Root mean square error by the RPCs as delivered; infinite without inliers."""
+        return _rms(self.before_px)
+
+    @property
+    def rms_after_px(self) -> float:
+        """Root mean square error by the refined RPCs; infinite without inliers."""
+        return _rms(self.after_px)
+
+    @classmethod
+    def of(
+        cls,
+        control: Control,
+        adjustment: Adjustment,
+        check: Control | None,
+        pixel_m: float,
+        max_error_px: float,
+        folding_px: float = 0.0,
+    ) -> RefinementEvidence:
+        """Measure a bias that was estimated.
+
+        Parameters
+        ----------
+        control
+            The points of the fit.
+        adjustment
+            What was fitted to them.
+        check
+            Points that took no part; None: there are none, so that each point of the fit is
+            judged by a fit without it and its neighbours.
+        pixel_m
+            Side of an image pixel on the ground.
+        max_error_px
+            Largest root mean square error at held-out points.
+        folding_px
+            By how much RPCs with the bias folded in miss it.
+        """
+        if check is None or len(check) < FEWEST_CHECK_POINTS:
+            name, before = LEFT_OUT, control.residuals_px(None)
+            after = adjustment.left_out_px
+        else:
+            name, before = CHECK_POINTS, check.residuals_px(None)
+            after = check.residuals_px(adjustment.bias)
+        length = np.hypot(*after.T)
+        reach = max(int(np.ceil(length.max(initial=0.0))), _LEAST_REACH_PX)
+        mixture = fit_mixture(after, (2 * reach + 1) ** 2, sigma_range_px(max_error_px))
+        tolerance = max(TOLERANCE_PX, max_error_px)
+        agreeing = int((length <= tolerance).sum())
+        held_out = HeldOut(
+            name,
+            agreeing,
+            len(after),
+            log10_chance(agreeing, len(after), agreement_probability(tolerance, reach)),
+            LARGEST_LOG10_CHANCE,
+            mixture.sigma * math.sqrt(2),
+            max_error_px,
+            _spread_px(adjustment, control.size),
+            "the image",
+        )
+        used_px = control.found_px[adjustment.used]
+        return cls(
+            held_out,
+            before[mixture.inliers],
+            after[mixture.inliers],
+            float((np.ptp(used_px, axis=0) / np.array(control.size)).min()),
+            1 - hull_share(used_px, control.size),
+            len(control),
+            int(adjustment.used.sum()),
+            pixel_m,
+            folding_px,
+        )
+
+
+def _rms(residuals_px: FloatArray) -> float:
+    if len(residuals_px) == 0:
+        return math.inf
+    return float(np.sqrt((residuals_px**2).sum(axis=1).mean()))
+
+
+def _spread_px(adjustment: Adjustment, size: tuple[int, int]) -> float:
+    """Return how far the correction varies with its points over the image, root mean square."""
+    nodes: FloatArray = np.stack(
+        np.meshgrid(*(np.linspace(0, side - 1, _NODES) for side in size)), -1
+    )
+    px = nodes.reshape(-1, 2)
+    by_points = adjustment.spread_px(px)
+    by_noise = adjustment.bias.sigma_px(px)
+    return float(np.sqrt(np.mean(np.maximum(by_points, by_noise) ** 2)))

@@ -1,0 +1,371 @@
+"""The one list of rules by which registrations are refused.
+
+A rule looks at evidence and returns why it refuses, in a sentence, or None. Its `stage` states
+which kind of evidence it reads (see `evidence`); `verdict.judge` asks all rules of the evidence's
+stages in their order, and the first one that refuses decides.
+
+To add a rule, write a function and put a `Rule` in `RULES`. docs/method-verdict.md is made from
+this list, and a test asks for evidence that triggers it and evidence that does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import AmbiguousPlaceError, NothingFoundError, TooFewPointsError
+from ..geometry.judging import (
+    FEWEST_CHECK_POINTS,
+    LARGEST_LOG10_CHANCE,
+    LOG10_CHANCE_ON_GROUND,
+    SMALLEST_INLIER_SHARE,
+    TOLERANCE_PX,
+)
+from ..geometry.robust import distances, find_consensus
+from ..masks.choice import LAYER, REGIONS
+from .evidence import (
+    AGREEMENT,
+    ERROR,
+    REFINEMENT,
+    SCENE,
+    SEARCH,
+    RegistrationEvidence,
+    SearchEvidence,
+)
+from .layover import count_on_line, scatter_along_line_px
+from .refinement_evidence import RefinementEvidence
+
+# Check points that agree on another transform within this distance make it a rival, if they are
+# more by so many, as three always agree on an affine model and one or two more may by chance, and
+# by this factor. Measured by the suites real and crossings.
+_RIVAL_TOLERANCE_PX = 3.0
+_RIVAL_POINTS = 3
+_RIVAL_SHARE = 1.25
+
+# What the ground shows of a fit that was not made on it: it is itself good to a pixel or two.
+# Measured by the suite city.
+_LARGEST_GROUND_SHIFT_PX = 1.0
+
+# Check points along a line, over those that agree: from here on it is open which are the ground.
+# Measured on pairs that were registered right: up to 0.56; on others: from 0.78 (suite sar_sar).
+_LAYOVER_SHARE = 2 / 3
+
+# From this share of agreeing check points on, more agree than roofs alone do. Measured where a
+# dense town was matched whole and a wrong registration accepted: 28 to 56 %; on other scenes with
+# as many strong scatterers: from 72 % (suite city).
+_CLEAR_SHARE = 2 / 3
+
+# Control must spread over so much of each side of an image (suite rpc).
+_SMALLEST_EXTENT = 0.25
+
+# A bias that is folded into new RPCs may be missed by so much, in pixels.
+_LARGEST_FOLDING_PX = 0.01
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A reason to refuse.
+
+    Parameters
+    ----------
+    name
+        What it is called in verdicts and in the documentation.
+    stage
+        Which kind of evidence it reads.
+    refuses
+        What it refuses, with its limit, for the documentation.
+    source
+        Where the limit comes from.
+    advice
+        What a user can do that is safe.
+    reason
+        Returns why it refuses, in a sentence; None: it does not.
+    """
+
+    name: str
+    stage: str
+    refuses: str
+    source: str
+    advice: str
+    reason: Callable[[Any], str | None]
+
+
+def _ambiguous(evidence: SearchEvidence) -> str | None:
+    failure = evidence.failure
+    return str(failure) if isinstance(failure, AmbiguousPlaceError) else None
+
+
+def _nothing_found(evidence: SearchEvidence) -> str | None:
+    failure = evidence.failure
+    return str(failure) if isinstance(failure, NothingFoundError) else None
+
+
+def _too_few_points(evidence: SearchEvidence) -> str | None:
+    failure = evidence.failure
+    return str(failure) if isinstance(failure, TooFewPointsError) else None
+
+
+def _by_chance(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+    points = evidence.held_out
+    is_chance = points.log10_chance > points.largest_log10_chance
+    if not is_chance and points.agreeing >= FEWEST_CHECK_POINTS:
+        return None
+    return f"{points.agreeing} of {points.total} {points.name} agree, as they may by chance"
+
+
+def _few_agree(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+    points = evidence.held_out
+    if points.agreeing >= SMALLEST_INLIER_SHARE * points.total:
+        return None
+    return f"only {points.agreeing} of {points.total} {points.name} agree"
+
+
+def _another_transform(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+    if isinstance(evidence, RefinementEvidence):
+        return None
+    residuals = evidence.residuals_px
+    own = int((np.hypot(*residuals.T) <= _RIVAL_TOLERANCE_PX).sum())
+    px = evidence.grid.map_to_pixel(evidence.counted.reference_xy)
+    rival = find_consensus(px, px + residuals, _RIVAL_TOLERANCE_PX)
+    others = int((distances(rival, px, px + residuals) <= _RIVAL_TOLERANCE_PX).sum())
+    if others < max(own + _RIVAL_POINTS, _RIVAL_SHARE * own):
+        return None
+    return f"{others} of {evidence.held_out.total} check points agree on another transform"
+
+
+def _large_error(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+    points = evidence.held_out
+    if points.rmse_px <= points.max_error_px:
+        return None
+    return f"error at {points.name} is {points.rmse_px:.2f} px, above {points.max_error_px:g} px"
+
+
+def _loose_model(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+    points = evidence.held_out
+    if points.spread_px <= points.max_error_px:
+        return None
+    spread = f"{points.spread_px:.2f} px over {points.area}"
+    return f"the points do not hold the model: it varies by {spread}"
+
+
+def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
+    if evidence.ground_shift_px <= _LARGEST_GROUND_SHIFT_PX:
+        return None
+    return f"the ground alone matches {evidence.ground_shift_px:.1f} px elsewhere"
+
+
+def _layover_of_check_points(evidence: RegistrationEvidence) -> str | None:
+    if evidence.layover_factor is None:
+        return None
+    residuals = evidence.check.residual_on(evidence.grid, evidence.estimate.transform)
+    agreeing = int((np.hypot(*residuals.T) <= TOLERANCE_PX).sum())
+    on_line = count_on_line(residuals, evidence.radius_px)
+    if on_line < max(_LAYOVER_SHARE * agreeing, 1):
+        return None
+    return (
+        f"{on_line} of {len(residuals)} check points lie along a line beside the {agreeing} that "
+        "agree, as layover displaces elevated objects"
+    )
+
+
+def _layover_of_fit_points(evidence: RegistrationEvidence) -> str | None:
+    if evidence.layover_factor is None:
+        return None
+    used = evidence.estimate.points.take(evidence.estimate.points.used)
+    scatter = scatter_along_line_px(used.residual_on(evidence.grid, evidence.estimate.transform))
+    if evidence.layover_factor * scatter <= evidence.max_error_px:
+        return None
+    return (
+        f"matched points scatter by {scatter:.1f} px along a line more than across it, as layover "
+        "scatters heights"
+    )
+
+
+def _despeckled_town(evidence: RegistrationEvidence) -> str | None:
+    kind = evidence.mask.kind
+    if evidence.scene is None or kind == LAYER:
+        return None
+    if not evidence.scene.is_despeckled_town(masked_by_regions=kind == REGIONS):
+        return None
+    return "the radar image of a dense town has no speckle, by which its ground is found"
+
+
+def _town_matched_whole(evidence: RegistrationEvidence) -> str | None:
+    points = evidence.held_out
+    is_ground = evidence.mask.kind in (REGIONS, LAYER) or evidence.is_ground_checked
+    if evidence.scene is None or is_ground or points.agreeing >= _CLEAR_SHARE * points.total:
+        return None
+    if not evidence.scene.may_be_dense_town:
+        return None
+    return (
+        f"only {points.agreeing} of {points.total} check points agree, as roofs may, and an image "
+        "has as many strong scatterers as a radar's of a dense town"
+    )
+
+
+def _narrow_control(evidence: RefinementEvidence) -> str | None:
+    if evidence.extent >= _SMALLEST_EXTENT:
+        return None
+    share = f"{100 * evidence.extent:.0f} %"
+    return f"the control points spread over {share} of a side of the image only"
+
+
+def _not_nearer(evidence: RefinementEvidence) -> str | None:
+    before, after = evidence.rms_before_px, evidence.rms_after_px
+    if before > after:
+        return None
+    name = evidence.held_out.name
+    return f"{name} are not nearer than before: {after:.2f} px, {before:.2f} px as delivered"
+
+
+def _not_folded(evidence: RefinementEvidence) -> str | None:
+    if evidence.folding_px <= _LARGEST_FOLDING_PX:
+        return None
+    return f"RPCs cannot take up the bias: they miss it by {evidence.folding_px:.3f} px"
+
+
+_WIDER = "check the band and the overlap; give a larger search radius, or allow rotation"
+_GROUND = "give a mask of the ground, such as roads and waters"
+
+RULES: tuple[Rule, ...] = (
+    Rule(
+        "second place",
+        SEARCH,
+        "a second place matches about as well as the best: half of its evidence (log10), or "
+        "keypoints that agree on a second transform",
+        "suite crossings and repetitive scenes",
+        "give a larger part of the scene, or a matching pixel size that shows more than what "
+        "repeats",
+        _ambiguous,
+    ),
+    Rule(
+        "nothing in common",
+        SEARCH,
+        "no place matches better than random ones would",
+        "expected false alarms above 1; [Moisan2004]",
+        _WIDER,
+        _nothing_found,
+    ),
+    Rule(
+        "too few points",
+        SEARCH,
+        "fewer points match, or agree, than the model needs",
+        "number of parameters of the model",
+        "give a larger part of the scene, or a simpler model",
+        _too_few_points,
+    ),
+    Rule(
+        "chance agreement",
+        AGREEMENT,
+        f"fewer than {FEWEST_CHECK_POINTS} held-out points agree, or as many as agree would by "
+        f"chance with a probability above 10^{LARGEST_LOG10_CHANCE:.0f} "
+        f"(10^{LOG10_CHANCE_ON_GROUND:.0f} where the ground of a dense town was matched)",
+        "[Moisan2004]; suites crossings and city",
+        "give a larger part of the scene: more check points then confirm it",
+        _by_chance,
+    ),
+    Rule(
+        "small share of check points",
+        AGREEMENT,
+        f"less than {SMALLEST_INLIER_SHARE:.0%} of the held-out points agree",
+        "suites simulated and real",
+        "mask clouds and changes; give bands that show the same",
+        _few_agree,
+    ),
+    Rule(
+        "another transform",
+        AGREEMENT,
+        f"check points agree on another transform: {_RIVAL_POINTS} more than on this one, and "
+        f"{_RIVAL_SHARE:g} times as many",
+        "suites real and crossings",
+        "give parts of a mosaic one by one, or a more flexible model",
+        _another_transform,
+    ),
+    Rule(
+        "error at held-out points",
+        ERROR,
+        "the root mean square error of held-out inliers is above the largest error",
+        "the user's largest error",
+        "give a more flexible model, or ask for less",
+        _large_error,
+    ),
+    Rule(
+        "loose model",
+        ERROR,
+        "the model varies by more than the largest error if blocks of points are left out in turn",
+        "jackknife; [Efron1993]",
+        "give a simpler model, or a larger part of the scene",
+        _loose_model,
+    ),
+    Rule(
+        "ground elsewhere",
+        SCENE,
+        f"the ground of a dense town alone matches more than {_LARGEST_GROUND_SHIFT_PX:g} px from "
+        "the transform",
+        "suite city",
+        _GROUND,
+        _ground_elsewhere,
+    ),
+    Rule(
+        "layover of check points",
+        SCENE,
+        "between two radar images, check points that disagree lie along one line, "
+        f"{_LAYOVER_SHARE:.2f} times as many as agree",
+        "suite sar_sar",
+        _GROUND,
+        _layover_of_check_points,
+    ),
+    Rule(
+        "layover of fit points",
+        SCENE,
+        "between two radar images, points of the fit scatter so far along one line that heights "
+        "displace the model by more than the largest error",
+        "[Mauchly1940]; suite sar_sar",
+        _GROUND,
+        _layover_of_fit_points,
+    ),
+    Rule(
+        "despeckled town",
+        SCENE,
+        "a radar image of a dense town has no speckle, by which its ground is found",
+        "suite city",
+        f"give the radar image unfiltered; {_GROUND}",
+        _despeckled_town,
+    ),
+    Rule(
+        "town matched whole",
+        SCENE,
+        f"less than {_CLEAR_SHARE:.0%} of the check points agree, an image may be a radar's of a "
+        "dense town, and its ground did not confirm the transform",
+        "suite city",
+        f"if it is a town, give the radar image unfiltered; {_GROUND}",
+        _town_matched_whole,
+    ),
+    Rule(
+        "narrow control",
+        REFINEMENT,
+        f"control points spread over less than {_SMALLEST_EXTENT:.0%} of a side of the image",
+        "suite rpc",
+        "give control all over the image",
+        _narrow_control,
+    ),
+    Rule(
+        "not nearer than before",
+        REFINEMENT,
+        "held-out points are no nearer by the refined RPCs than by the delivered ones",
+        "definition of a refinement",
+        "keep the delivered RPCs",
+        _not_nearer,
+    ),
+    Rule(
+        "bias not folded",
+        REFINEMENT,
+        f"new RPCs miss the bias by more than {_LARGEST_FOLDING_PX:g} px",
+        "a hundredth of a pixel is below what control measures",
+        "give a simpler model of the bias",
+        _not_folded,
+    ),
+)

@@ -1,0 +1,217 @@
+"""What the images of a pair are: each fact is found once, when a step first needs it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from ..masks.choice import (
+    INPUT,
+    REFERENCE,
+    is_dense,
+    is_perhaps_dense,
+    share_of_strong_scatterers,
+)
+from ..masks.radar import LEAST_VARIATION2, LEAST_VARIATION2_RATIO, variation2_of
+from ..masks.scene import Scene
+from ..rasters.pair import Image, ImagePair
+from ..rasters.patch import Patch
+from ..rasters.radar_tags import is_known_radar
+from ..rasters.reading import Window
+from .specification import AUTO, NEITHER
+
+
+@dataclass(frozen=True)
+class ImageFacts:
+    """What one image of a pair is.
+
+    Parameters
+    ----------
+    image
+        The image.
+    scene
+        The image on the matching lattice, with the masks that the user gave.
+    """
+
+    image: Image
+    scene: Scene
+
+    @cached_property
+    def is_known_radar(self) -> bool:
+        """Whether its metadata name a radar."""
+        return is_known_radar(self.image.source)
+
+    @cached_property
+    def variation2(self) -> float:
+        """Squared coefficient of variation of the power in its most homogeneous windows."""
+        return variation2_of(self.image)
+
+    @cached_property
+    def strong_share(self) -> float:
+        """Share of strong scatterers, 0 to 1: brighter than usual by 6 dB or more."""
+        return share_of_strong_scatterers(self.scene)
+
+    @property
+    def has_speckle(self) -> bool:
+        """Whether it varies in its most homogeneous windows as a radar image does."""
+        return self.variation2 >= LEAST_VARIATION2
+
+    @property
+    def looks(self) -> float:
+        """Equivalent number of looks, if it is a radar image: that of fully developed speckle."""
+        return 1 / max(self.variation2, 1e-9)
+
+
+@dataclass(frozen=True)
+class SceneInfo:
+    """What a pair of images is: radar or camera, speckled, built-up.
+
+    Facts are found when they are first asked for, and never again.
+
+    Parameters
+    ----------
+    reference, input
+        What the two images are.
+    declared
+        Which image is declared to be a radar's: see `Specification.radar`.
+    has_user_mask
+        Whether the user gave a mask for one of the images.
+    """
+
+    reference: ImageFacts
+    input: ImageFacts
+    declared: str = AUTO
+    has_user_mask: bool = False
+
+    @classmethod
+    def of(cls, pair: ImagePair, declared: str = AUTO) -> SceneInfo:
+        """Return the facts of a pair, with the masks that the user gave."""
+        reference, input = (
+            ImageFacts(getattr(pair, name), scene_of(pair, name)) for name in (REFERENCE, INPUT)
+        )
+        return cls(reference, input, declared, pair.is_masked)
+
+    def of_name(self, name: str) -> ImageFacts:
+        """Return what the "reference" or the "input" is."""
+        return self.reference if name == REFERENCE else self.input
+
+    @cached_property
+    def radar_name(self) -> str:
+        """Which image is rather a radar's, "reference" or "input": by metadata, else by speckle."""
+        if self.declared in (REFERENCE, INPUT):
+            return self.declared
+        if self.reference.is_known_radar != self.input.is_known_radar:
+            return REFERENCE if self.reference.is_known_radar else INPUT
+        return REFERENCE if self.reference.variation2 >= self.input.variation2 else INPUT
+
+    @property
+    def radar(self) -> ImageFacts:
+        """The image that is rather a radar's."""
+        return self.of_name(self.radar_name)
+
+    @property
+    def other(self) -> ImageFacts:
+        """The other image."""
+        return self.of_name(INPUT if self.radar_name == REFERENCE else REFERENCE)
+
+    @cached_property
+    def is_radar_and_camera(self) -> bool:
+        """Whether one image is a radar's, and the other is a camera's.
+
+        It has the speckle of a radar's, and the other far less of it; or its metadata name one,
+        and the other has no speckle.
+        """
+        if self.declared in (REFERENCE, INPUT):
+            return True
+        radar, other = self.radar, self.other
+        if other.is_known_radar:
+            return False
+        if radar.is_known_radar:
+            return not other.has_speckle
+        return radar.has_speckle and radar.variation2 >= LEAST_VARIATION2_RATIO * other.variation2
+
+    @cached_property
+    def are_both_radar(self) -> bool:
+        """Whether both images have the speckle of a radar's, or metadata that name one."""
+        return all(one.is_known_radar or one.has_speckle for one in (self.reference, self.input))
+
+    @property
+    def is_dense_town(self) -> bool:
+        """Whether the radar image of a pair with a camera's shows a dense town."""
+        return self.is_radar_and_camera and is_dense(self.radar.strong_share)
+
+    @property
+    def may_be_dense_town(self) -> bool:
+        """Whether an image may be a radar's of a dense town.
+
+        Without its speckle a radar image cannot be told from a camera's, and has fewer strong
+        scatterers; both images are looked at then, unless they are declared to be a camera's.
+        """
+        if self.are_both_radar:
+            return False
+        if self.is_radar_and_camera:
+            return is_perhaps_dense(self.radar.strong_share)
+        suspects = () if self.declared == NEITHER else (self.reference, self.input)
+        return any(is_perhaps_dense(one.strong_share) for one in suspects)
+
+    def is_despeckled_town(self, masked_by_regions: bool) -> bool:
+        """Whether a radar image of a dense town lacks the speckle that its ground is found by.
+
+        Speckle filters leave no number of looks that homogeneous areas are found by, and smooth
+        roofs, too.
+
+        Parameters
+        ----------
+        masked_by_regions
+            Whether regions of the radar image were taken for its ground.
+        """
+        if self.has_user_mask:
+            return False
+        # Else a radar image is recognised by its very speckle.
+        is_named = self.declared in (REFERENCE, INPUT) or (
+            self.reference.is_known_radar or self.input.is_known_radar
+        )
+        if not masked_by_regions and not (is_named and self.is_radar_and_camera):
+            return False
+        return not self.radar.has_speckle and is_perhaps_dense(self.radar.strong_share)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the facts that were found, as values that JSON can carry; nothing is read."""
+        found: dict[str, Any] = {}
+        for name, facts in ((REFERENCE, self.reference), (INPUT, self.input)):
+            known = vars(facts)
+            values = {key: known[key] for key in _FACTS if key in known}
+            if values:
+                found[name] = values
+        known = vars(self)
+        return found | {key: known[key] for key in _PAIR_FACTS if key in known}
+
+    def lines(self) -> list[str]:
+        """Return the facts that were found as lines of text."""
+        known = vars(self)
+        if known.get("are_both_radar"):
+            return ["both images are a radar's"]
+        if not known.get("is_radar_and_camera"):
+            return []
+        kind = "a radar image beside a camera's"
+        share = vars(self.radar).get("strong_share")
+        town = "" if share is None else f"; strong scatterers on {share:.0%} of it"
+        return [f"the {self.radar_name} is {kind}{town}"]
+
+
+_FACTS = ("is_known_radar", "variation2", "strong_share")
+_PAIR_FACTS = ("radar_name", "is_radar_and_camera", "are_both_radar")
+
+
+def scene_of(pair: ImagePair, name: str) -> Scene:
+    """Return one image of a pair on the matching lattice, as far as searches may reach."""
+    grid = pair.surroundings
+
+    def read(window: Window) -> Patch:
+        piece = grid.window(*window)
+        if name == REFERENCE:
+            return pair.reference_patch(piece)
+        return pair.input_patch(piece, pair.nominal_px)
+
+    return Scene(grid, read, getattr(pair, name).source)

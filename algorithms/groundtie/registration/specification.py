@@ -1,0 +1,97 @@
+"""What a registration is asked for: one value that every stage of the pipeline reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..geometry.judging import USUAL_MAX_ERROR_PX
+from ..masks.choice import AUTO
+
+# What matches the tie points of the fit: chips alone; keypoints refined by chips around them; chips
+# all over around a model of keypoints.
+CHIPS, KEYPOINTS, GUIDED_CHIPS = "chips", "keypoints", "guided-chips"
+MATCHERS = (CHIPS, KEYPOINTS, GUIDED_CHIPS)
+
+# Which images are declared to be a radar's; by default that is inferred from them.
+BOTH, NEITHER = "both", "neither"
+
+
+@dataclass(frozen=True)
+class FreeSearch:
+    """How far images without any georeferencing are searched for.
+
+    Parameters
+    ----------
+    radius_share
+        Largest shift, as a share of the input's longer side; None: as georeferenced images.
+    rotation_deg
+        Largest rotation, either way.
+    scale
+        Largest scale, either way.
+    """
+
+    radius_share: float | None = None
+    rotation_deg: float = 0.0
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Specification:
+    """How a pair is registered; the registering tools are presets of it.
+
+    Parameters
+    ----------
+    matcher
+        One of `MATCHERS`.
+    similarity
+        One of `similarity.surface.SIMILARITIES`: what chips of the fit, the coarse shift and
+        check chips are compared by.
+    refinement
+        By what chips refine keypoints.
+    model
+        One of `models.KINDS`, or "auto" for the simplest polynomial that the points justify.
+    max_error_px
+        Largest root mean square error at check points, in matching pixels.
+    search_radius_m
+        How far the input may lie from its nominal place; None: 100 m or 20 pixels.
+    rotation_deg, scale
+        How far it may be rotated and scaled, either way; None: not at all, or as `free` has it.
+    free
+        What is searched where there is no georeferencing.
+    mask
+        One of `masks.choice.MASKS`.
+    radar
+        Which image is a radar's, "reference", "input", "both" or "neither", for tools that are
+        made for such pairs; "auto": inferred from metadata and speckle.
+    matching_pixel_size_m, chip_px, spacing_px
+        Pixel size of the matching grid, side of the chips and distance between them; None: by the
+        images.
+    tries
+        How many registrations of this pair were tried, this one included: the probability of
+        agreement by chance is counted for all of them.
+    """
+
+    matcher: str = CHIPS
+    similarity: str = "fused"
+    refinement: str = "fused"
+    model: str = AUTO
+    max_error_px: float = USUAL_MAX_ERROR_PX
+    search_radius_m: float | None = None
+    rotation_deg: float | None = None
+    scale: float | None = None
+    free: FreeSearch = FreeSearch()
+    mask: str = AUTO
+    radar: str = AUTO
+    matching_pixel_size_m: float | None = None
+    chip_px: int | None = None
+    spacing_px: float | None = None
+    tries: int = 1
+
+
+# What the three tools are made for (see `tools`). Without georeferencing, SAR images may have any
+# rotation, optical ones another scale besides, and lie a quarter of their side off.
+COREGISTER = Specification()
+SAR_SAR = Specification(
+    KEYPOINTS, refinement="nmi", radar=BOTH, free=FreeSearch(0.25, rotation_deg=180.0)
+)
+OPTICAL = Specification(GUIDED_CHIPS, radar=NEITHER, free=FreeSearch(0.25, 180.0, scale=2.0))

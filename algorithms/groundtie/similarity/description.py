@@ -1,0 +1,101 @@
+"""What measures of similarity compare: bins, orientation fields and edge strength of a window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rasters.patch import Patch
+from .binning import to_bins
+from .joint_histogram import reach
+from .orientation import edge_strength, orientation_fields
+
+# Pixels that windows have beyond the chip on each side: what the widest gradient filter and the
+# widest histogram kernel reach.
+BORDER_PX = 8
+
+_MARGIN_PX = reach()
+
+
+@dataclass(frozen=True)
+class _Window:
+    """An image window with `BORDER_PX` on each side; each description is made when first asked."""
+
+    patch: Patch
+    bin_count: int
+
+    @cached_property
+    def bins(self) -> NDArray[np.uint8]:
+        around = self.patch.inner(BORDER_PX - _MARGIN_PX)
+        return to_bins(around.values, around.valid, self.bin_count)
+
+    @cached_property
+    def fields(self) -> NDArray[np.complex64]:
+        return orientation_fields(self.patch)
+
+    @cached_property
+    def strength(self) -> Patch:
+        return edge_strength(self.fields[0], self.patch.valid)
+
+
+@dataclass(frozen=True)
+class Description:
+    """An image window and what measures compare of it, shared by all of its inner parts.
+
+    Parameters
+    ----------
+    window
+        The whole window.
+    border_px
+        Pixels of it that are left out on each side, at least `BORDER_PX`.
+    """
+
+    window: _Window
+    border_px: int = BORDER_PX
+
+    @classmethod
+    def of(cls, window: Patch, bin_count: int) -> Description:
+        """Return the description of a window with `BORDER_PX` on each side."""
+        return cls(_Window(window, bin_count))
+
+    def inner(self, border_px: int) -> Description:
+        """Return the description of the window without a further border on each side."""
+        return replace(self, border_px=self.border_px + border_px)
+
+    @property
+    def patch(self) -> Patch:
+        """Grey values."""
+        return self.window.patch.inner(self.border_px)
+
+    @property
+    def bin_count(self) -> int:
+        """Number of bins."""
+        return self.window.bin_count
+
+    @property
+    def bins(self) -> NDArray[np.uint8]:
+        """Bins of the patch."""
+        return self._bins(self.border_px - BORDER_PX + _MARGIN_PX)
+
+    @property
+    def bins_around(self) -> NDArray[np.uint8]:
+        """Bins of the patch, and of pixels around it as far as the histogram's kernel reaches."""
+        return self._bins(self.border_px - BORDER_PX)
+
+    def _bins(self, border_px: int) -> NDArray[np.uint8]:
+        inside = slice(border_px, -border_px or None)
+        return self.window.bins[inside, inside]
+
+    @property
+    def fields(self) -> NDArray[np.complex64]:
+        """Orientation fields at all scales, shape (scales, h, w)."""
+        inside = slice(self.border_px, -self.border_px)
+        return self.window.fields[:, inside, inside]
+
+    @property
+    def strength(self) -> Patch:
+        """How strong edges are, 0 to 1."""
+        return self.window.strength.inner(self.border_px)

@@ -1,0 +1,163 @@
+"""Estimators of the gradient of a SAR image ([Suri2010] 6.4).
+
+All return the derivatives along columns and rows. Differences are taken of grey values as they
+are; ratios, for which multiplicative noise is alike in bright and dark areas, of positive ones.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..features.gradients import FloatImage, Gradient, GradientOperator, differences
+from ..speckle.isef import isef_along
+
+# Decay of the exponential averages, per pixel.
+_DECAY = 0.5
+
+# Deriche's α: the reciprocal of the filter's width, per pixel.
+_ALPHA = 1.0
+
+_TINY = np.float32(1e-6)
+
+
+def recursive_differences(image: FloatImage) -> Gradient:
+    """Return Deriche's recursive differences (S eq 6.7–6.12; Deriche 1987, Paillou 1997).
+
+    The derivative filter x·exp(−α|x|) along one axis, its smoothing (α|x| + 1)·exp(−α|x|) along
+    the other, both of unit gain.
+    """
+    return (
+        _deriche_derivative(_deriche_smoothing(image, 0), 1),
+        _deriche_derivative(_deriche_smoothing(image, 1), 0),
+    )
+
+
+def log_ratios(image: FloatImage) -> Gradient:
+    """Return the logarithm of the ratio of exponentially weighted averages, with its sign.
+
+    ROEWA (Fjørtoft et al. 1995; S eq 6.13–6.22), but the average after the pixel over the one
+    before it, not the smaller of both ratios: its logarithm is positive where it gets brighter.
+
+    Parameters
+    ----------
+    image
+        Positive grey values.
+    """
+    return _log_ratio(image, 1), _log_ratio(image, 0)
+
+
+def unsigned_log_ratios(image: FloatImage) -> Gradient:
+    """Return ROEWA as [Suri2010] has it: strength without a sign, so directions in 0 … 90° only."""
+    along_cols, along_rows = log_ratios(image)
+    return np.abs(along_cols), np.abs(along_rows)
+
+
+def average_before(image: FloatImage, decay: float, axis: int) -> FloatImage:
+    """Return the exponentially weighted average of each pixel and all before it.
+
+    The causal filter h1 of [Suri2010] eq 6.14, 6.19 and 6.20, (1 − b) bˣ; the first pixel goes on
+    forever before the image.
+
+    Parameters
+    ----------
+    image
+        Shape (h, w), float32.
+    decay
+        b, from 0 to 1: the weight of a pixel against its neighbour's.
+    axis
+        0: along rows, 1: along columns.
+    """
+    # Late: few features need it, and this package takes long to import.
+    from scipy.signal import lfilter
+
+    first = np.take(image, [0], axis=axis)
+    numerator, denominator = (np.array(c, image.dtype) for c in ([1 - decay], [1, -decay]))
+    start = first * image.dtype.type(decay)
+    return np.asarray(lfilter(numerator, denominator, image, axis=axis, zi=start)[0])
+
+
+def average_after(image: FloatImage, decay: float, axis: int) -> FloatImage:
+    """Return the exponentially weighted average of each pixel and all after it (h2)."""
+    return np.flip(average_before(np.flip(image, axis), decay, axis), axis)
+
+
+def _log_ratio(image: FloatImage, axis: int) -> FloatImage:
+    across = isef_along(image, _DECAY, 1 - axis)
+    before = _shifted(average_before(across, _DECAY, axis), 1, axis)
+    after = _shifted(average_after(across, _DECAY, axis), -1, axis)
+    return np.asarray(np.log(np.maximum(after, _TINY) / np.maximum(before, _TINY)))
+
+
+def _shifted(image: FloatImage, by: int, axis: int) -> FloatImage:
+    """Return an image moved by a pixel, its border repeated: averages leave the pixel out."""
+    moved = np.roll(image, by, axis)
+    edge = [slice(None)] * 2
+    edge[axis] = slice(0, 1) if by > 0 else slice(-1, None)
+    moved[tuple(edge)] = image[tuple(edge)]
+    return moved
+
+
+def _deriche_smoothing(image: FloatImage, axis: int) -> FloatImage:
+    decay = np.exp(-_ALPHA)
+    gain = (1 - decay) ** 2 / (1 + 2 * _ALPHA * decay - decay**2)
+    before = gain * np.array([1, decay * (_ALPHA - 1), 0])
+    after = gain * np.array([0, decay * (_ALPHA + 1), -(decay**2)])
+    return _two_passes(image, before, after, 1.0, axis)
+
+
+def _deriche_derivative(image: FloatImage, axis: int) -> FloatImage:
+    decay = np.exp(-_ALPHA)
+    # A ramp of slope one gives one.
+    gain = (1 - decay) ** 3 / (2 * decay * (1 + decay))
+    weights = gain * np.array([0, decay, 0])
+    return _two_passes(image, weights, weights, -1.0, axis)
+
+
+def _two_passes(
+    image: FloatImage,
+    before: NDArray[np.float64],
+    after: NDArray[np.float64],
+    sign: float,
+    axis: int,
+) -> FloatImage:
+    """Return `sign`·(what the pixels before give) + (what the pixels after give), second order."""
+    # Late: few features need it, and this package takes long to import.
+    from scipy.signal import lfilter
+
+    decay = np.exp(-_ALPHA)
+    recursion = np.array([1, -2 * decay, decay**2], np.float32)
+
+    def one(source: FloatImage, weights: NDArray[np.float64]) -> FloatImage:
+        # The first pixel goes on forever before the image.
+        steady = weights.sum() / recursion.sum()
+        start = np.array([steady - weights[0], weights[2] - recursion[2] * steady], np.float32)
+        shape = (2, 1) if axis == 0 else (1, 2)
+        edge = np.take(source, [0], axis=axis) * start.reshape(shape)
+        return np.asarray(
+            lfilter(weights.astype(np.float32), recursion, source, axis=axis, zi=edge)[0]
+        )
+
+    causal = one(image, before)
+    anticausal = np.flip(one(np.flip(image, axis), after), axis)
+    return np.asarray(np.float32(sign) * causal + anticausal)
+
+
+# What each estimator is called, and whether it needs positive grey values.
+_ESTIMATORS: dict[str, tuple[GradientOperator, bool]] = {
+    "differences": (differences, False),
+    "recursive": (recursive_differences, False),
+    "roewa": (log_ratios, True),
+    "roewa-unsigned": (unsigned_log_ratios, True),
+}
+GRADIENTS = tuple(_ESTIMATORS)
+
+
+def gradient_operator(name: str) -> GradientOperator:
+    """Return the operator of a name of `GRADIENTS`."""
+    return _ESTIMATORS[name][0]
+
+
+def needs_positive(name: str) -> bool:
+    """Return whether an operator is one of ratios."""
+    return _ESTIMATORS[name][1]

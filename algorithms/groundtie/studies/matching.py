@@ -1,0 +1,84 @@
+"""Which keypoints belong together by their descriptors alone, wherever they lie."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ..features.matching import Descriptors, FloatArray, Indices, Matches, Nearest
+
+METHODS = ("exact", "kd-tree")
+
+# The forest of k-d trees, and how many leaves are looked at (best bin first; Beis & Lowe 1997).
+_TREES = 4
+_CHECKS = 64
+
+# So many distances are held in memory at a time.
+_BLOCK = 4_000_000
+
+
+def match(
+    first: Descriptors,
+    second: Descriptors,
+    ratio: float = 1.0,
+    mutual: bool = False,
+    method: str = "kd-tree",
+) -> Matches:
+    """Match keypoints by their descriptors alone.
+
+    Parameters
+    ----------
+    first, second
+        Descriptors, shapes (n, k) and (m, k).
+    ratio
+        Largest ratio of the distances to the nearest and to the next partner; at 1 each keypoint
+        keeps its nearest one.
+    mutual
+        Whether each must be the other's nearest.
+    method
+        "exact", or "kd-tree": approximately, by a forest of k-d trees.
+    """
+    forward = _nearest(first, second, method)
+    found = Matches.of(forward, ratio)
+    if not mutual:
+        return found
+    back = _nearest(second, first, method).index
+    return found.take(back[found.second] == found.first)
+
+
+def _nearest(first: Descriptors, second: Descriptors, method: str) -> Nearest:
+    if len(first) == 0 or len(second) == 0:
+        nothing = np.full(len(first), np.inf)
+        return Nearest(np.full(len(first), -1), nothing, nothing)
+    if len(second) == 1:
+        distance = np.linalg.norm(first - second, axis=1).astype(float)
+        return Nearest(np.zeros(len(first), np.intp), distance, np.full(len(first), np.inf))
+    if method == "exact":
+        index, distance = _two_nearest(first, second)
+    else:
+        index, distance = _two_nearest_by_trees(first, second)
+    return Nearest(index, distance[:, 0], distance[:, 1])
+
+
+def _two_nearest(first: Descriptors, second: Descriptors) -> tuple[Indices, FloatArray]:
+    own, other = (first**2).sum(axis=1), (second**2).sum(axis=1)
+    index = np.zeros((len(first), 2), np.intp)
+    squared = np.zeros((len(first), 2))
+    step = max(_BLOCK // len(second), 1)
+    for start in range(0, len(first), step):
+        block = slice(start, start + step)
+        distances = own[block, None] + other - 2 * (first[block] @ second.T)
+        two = np.argpartition(distances, 1, axis=1)[:, :2]
+        values = np.take_along_axis(distances, two, axis=1)
+        order = np.argsort(values, axis=1, kind="stable")
+        index[block] = np.take_along_axis(two, order, axis=1)
+        squared[block] = np.take_along_axis(values, order, axis=1)
+    return index[:, 0], np.sqrt(np.maximum(squared, 0))
+
+
+def _two_nearest_by_trees(first: Descriptors, second: Descriptors) -> tuple[Indices, FloatArray]:
+    # The trees are drawn at random: the same seed, the same result.
+    cv2.setRNGSeed(0)
+    index = cv2.flann.Index(second, {"algorithm": 1, "trees": _TREES})
+    found, squared = index.knnSearch(first, 2, params={"checks": _CHECKS})
+    return found[:, 0].astype(np.intp), np.sqrt(np.asarray(squared, float))

@@ -1,0 +1,132 @@
+"""Measures on joint histograms that studies compare with the product's ([Suri2010] 3.3, 2.3.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from ..similarity.measures import (
+    FloatArray,
+    HistogramMeasure,
+    Histograms,
+    entropy,
+    normalized_mutual_information,
+    tables,
+)
+
+# Shares and variances below this hold rounding only.
+_NOTHING = 1e-9
+
+
+def mutual_information(histograms: Histograms) -> FloatArray:
+    """Return Shannon's H(A) + H(B) - H(A, B) in nats ([Suri2010] eq 3.19)."""
+    a, b, ab = map(entropy, tables(histograms))
+    return np.asarray(a + b - ab)
+
+
+def renyi_mutual_information(alpha: float) -> HistogramMeasure:
+    """Return the measure R(A) + R(B) - R(A, B) with Rényi's entropy ([Suri2010] eq 3.15, 3.16).
+
+    Parameters
+    ----------
+    alpha
+        Order of the entropy, any real number; 1 is Shannon's, as the limit. Other than Shannon's,
+        the measure may be negative.
+    """
+    if alpha == 1:
+        return mutual_information
+
+    def measure(histograms: Histograms) -> FloatArray:
+        a, b, ab = (_log_power_sum(table, alpha) for table in tables(histograms))
+        return np.asarray((a + b - ab) / (1 - alpha))
+
+    return measure
+
+
+def tsallis_mutual_information(q: float) -> HistogramMeasure:
+    """Return the measure S(A) + S(B) + (1 - q) S(A) S(B) - S(A, B) ([Suri2010] eq 3.17, 3.18).
+
+    The cross term makes it 0 for independent images, as Tsallis' entropy is not additive. With
+    S = (Σ p^q - 1) / (1 - q) all of it is (Σ p_A^q Σ p_B^q - Σ p_AB^q) / (1 - q).
+
+    Parameters
+    ----------
+    q
+        Index of the entropy, any real number; 1 is Shannon's, as the limit.
+    """
+    if q == 1:
+        return mutual_information
+
+    def measure(histograms: Histograms) -> FloatArray:
+        a, b, ab = (np.exp(_log_power_sum(table, q)) for table in tables(histograms))
+        return np.asarray((a * b - ab) / (1 - q))
+
+    return measure
+
+
+def cluster_reward(histograms: Histograms) -> FloatArray:
+    """Return the index of the cluster reward algorithm, 0 (independent) to 1 (one to one).
+
+    (Φ / F - F / N²) / (1 - F / N²) with Φ the sum of the squared joint counts, F² the product of
+    the sums of the squared marginal counts and N the number of pixels: Inglada & Giros 2004,
+    doi:10.1109/TGRS.2004.835294.
+    """
+    a, b, ab = (np.square(_shares(table)).sum(axis=-1) for table in tables(histograms))
+    chance = np.sqrt(a * b)
+    informative = (chance > 0) & (chance < 1 - _NOTHING)
+    chance = np.where(informative, chance, 0.5)
+    return np.where(informative, (ab / chance - chance) / (1 - chance), 0.0)
+
+
+def correlation_ratio(histograms: Histograms) -> FloatArray:
+    """Return which share of A's variance a function of B explains, 0 to 1.
+
+    Roche et al. 1998, doi:10.1007/BFb0056301. The grey value of a bin is its number. A should be
+    the template: its variance is the same at all shifts. For the other way round transpose the
+    histogram.
+    """
+    a, b, _ = tables(histograms)
+    levels = np.arange(a.shape[-1], dtype=float)
+    sums = levels @ histograms
+    total = _at_least(a.sum(axis=-1))
+    mean = (sums.sum(axis=-1) / total)[..., None]
+    explained = ((sums - mean * b) ** 2 / _at_least(b)).sum(axis=-1) / total
+    variance = (a * (levels - mean) ** 2).sum(axis=-1) / total
+    informative = variance > _NOTHING
+    return np.where(informative, explained / np.where(informative, variance, 1.0), 0.0)
+
+
+def _at_least(counts: FloatArray) -> FloatArray:
+    """Return counts to divide by: a bin without pixels has a numerator of 0 as well."""
+    return np.where(counts > 0, counts, 1.0)
+
+
+def _shares(table: FloatArray) -> FloatArray:
+    return table / _at_least(table.sum(axis=-1))[..., None]
+
+
+def _log_power_sum(table: FloatArray, power: float) -> FloatArray:
+    """Return ln Σ p^power over the occupied cells; 0 for an empty table, as for a constant."""
+    shares = _shares(table.astype(float))
+    occupied = shares > 0
+    exponents = np.where(occupied, power * np.log(np.where(occupied, shares, 1.0)), -np.inf)
+    # Relative to the largest term, which a high power alone would round to 0.
+    largest = exponents.max(axis=-1, keepdims=True, initial=-np.inf)
+    largest = np.where(np.isfinite(largest), largest, 0.0)
+    total = np.exp(exponents - largest).sum(axis=-1)
+    return np.log(np.where(total > 0, total, 1.0)) + largest[..., 0]
+
+
+# With the usual orders of the parametrised ones.
+HISTOGRAM_MEASURES: Mapping[str, HistogramMeasure] = MappingProxyType(
+    {
+        "nmi": normalized_mutual_information,
+        "mi": mutual_information,
+        "renyi": renyi_mutual_information(2.0),
+        "tsallis": tsallis_mutual_information(2.0),
+        "cluster-reward": cluster_reward,
+        "correlation-ratio": correlation_ratio,
+    }
+)

@@ -1,0 +1,223 @@
+"""Phase correlation: the shift between two windows from the phases of their spectra.
+
+The cross-power spectrum is divided by its magnitude, which leaves a peak instead of the broad
+hill of a plain correlation. Source: Kuglin & Hines 1975; [Patel2011], section 3.3.1, steps 16–21.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from ..context import Context
+from ..geometry.limits import SearchLimits
+from ..pose.pose import Pose, PoseFound
+from ..rasters.patch import Patch
+from ..similarity.peaks import highest_peaks
+from ..similarity.surface import SimilaritySettings, Surface, normalise
+from .spectral_windows import (
+    SAME_PX,
+    Field,
+    Image,
+    Shared,
+    aligned,
+    covering_shape,
+    distinct,
+    resampled,
+    structure,
+)
+
+# How many shifts are returned at most.
+CANDIDATES = 4
+
+# Peaks of one surface that are nearer than this are the same.
+_SAME = np.ones((2 * int(SAME_PX) + 1,) * 2, bool)
+
+# Frequencies beyond this (standard deviation, in cycles per pixel) hold noise and what resampling
+# has left; without them the peak is a Gaussian of 0.8 px.
+_BAND = 0.2
+
+# Magnitudes below this share of their mean are rounding; their phases are, too.
+_ROUNDING = 0.05
+
+# How far a shift can be corrected once the windows have been cut to what they share.
+CORRECTION_PX = 8.0
+
+
+@dataclass(frozen=True)
+class PhaseSurface:
+    """Phase correlation over all shifts, in robust standard deviations of its background.
+
+    Parameters
+    ----------
+    values
+        Shape (h, w), float32.
+    right_px, down_px
+        By how much the input's centre lies right of and below the reference's, for columns
+        and rows.
+    """
+
+    values: Surface
+    right_px: NDArray[np.float64]
+    down_px: NDArray[np.float64]
+
+    def peaks(
+        self, linear: NDArray[np.float64], radius_px: float, count: int
+    ) -> list[tuple[tuple[float, float], float]]:
+        """Return shifts (right, down) in pixels and heights of the highest peaks, best first.
+
+        Parameters
+        ----------
+        linear
+            What rotates and scales shifts of the surface into those of the input, shape (2, 2).
+        radius_px
+            Largest shift along rows and columns, in input pixels.
+        count
+            How many are wanted.
+        """
+        searched = np.where(self.within(linear, radius_px), self.values, 0)
+        found = []
+        for row, col in highest_peaks(searched, count, _SAME):
+            if searched[row, col] > 0:
+                right = self.right_px[col] + gaussian_peak(self.values[row], col)
+                down = self.down_px[row] + gaussian_peak(self.values[:, col], row)
+                found.append(((float(right), float(down)), float(searched[row, col])))
+        return found
+
+    def within(self, linear: NDArray[np.float64], radius_px: float) -> NDArray[np.bool_]:
+        """Return at which shifts the input itself is shifted by no more than a radius.
+
+        Parameters
+        ----------
+        linear, radius_px
+            As of `peaks`.
+        """
+        right, down = self.right_px[None, :], self.down_px[:, None]
+        return np.logical_and.reduce(
+            [np.abs(a * right + b * down) <= radius_px + 0.5 for a, b in linear]
+        )
+
+
+def whitened(spectrum: Field, exponent: float = 1.0) -> Field:
+    """Return a cross-power spectrum divided by a power of its magnitude, where it is not 0."""
+    size = np.abs(spectrum)
+    divisor = (size + _ROUNDING * size.mean()) ** exponent
+    return np.divide(spectrum, divisor, out=np.zeros_like(spectrum), where=divisor > 0)
+
+
+def phase_surface(
+    reference: Image | Field, input: Image | Field, wrap: bool = False
+) -> PhaseSurface:
+    """Return the phase correlation of two apodised images.
+
+    Parameters
+    ----------
+    reference, input
+        Real or complex, shapes (h, w) and (m, n); their centres are compared.
+    wrap
+        Whether shifts are known to be small: images of one shape are then not padded.
+    """
+    pairs = list(zip(reference.shape, input.shape, strict=True))
+    sides = [max(pair) if wrap else sum(pair) for pair in pairs]
+    shape = [scipy.fft.next_fast_len(side) for side in sides]
+    cross = scipy.fft.fft2(reference, shape).conj() * scipy.fft.fft2(input, shape)
+    across, down = (np.exp(-(scipy.fft.fftfreq(n) ** 2) / (2 * _BAND**2)) for n in shape[::-1])
+    weights = (down[:, None] * across).astype(np.float32)
+    values = scipy.fft.fftshift(scipy.fft.ifft2(whitened(cross) * weights).real)
+    shifts = [np.arange(n) - n // 2 - (b - a) / 2 for n, (a, b) in zip(shape, pairs, strict=True)]
+    return PhaseSurface(normalise(values.astype(np.float32)), shifts[1], shifts[0])
+
+
+def gaussian_peak(values: NDArray[np.floating], index: int) -> float:
+    """Return how far the peak of a sampled Gaussian lies from its highest sample, -0.5 to 0.5.
+
+    The samples are periodic, as surfaces made by FFT are.
+    """
+    around = np.array([values[index - 1], values[index], values[(index + 1) % len(values)]])
+    top = float(around[1])
+    before, middle, after = np.log(np.maximum(around / top, 1e-3)) if top > 0 else (0.0, 0.0, 0.0)
+    bend = before - 2 * middle + after
+    if bend >= 0:
+        return 0.0
+    return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5))
+
+
+def shifts_at(
+    reference: Image | Field,
+    input: Patch,
+    pose: Pose,
+    radius_px: float,
+    settings: SimilaritySettings,
+    count: int,
+) -> list[PoseFound]:
+    """Return the best shifts for the rotation and scale of a pose, best first.
+
+    Parameters
+    ----------
+    reference
+        The reference's `structure`, shape (h, w).
+    input
+        The window.
+    pose
+        Rotation and scale; its shift must be 0.
+    radius_px
+        Largest shift along rows and columns, in input pixels.
+    settings
+        How similarity is measured.
+    count
+        How many shifts are wanted.
+    """
+    shape = covering_shape(input.values.shape, pose, reference.shape)
+    back = input if pose == Pose() else resampled(input, pose, shape, "bilinear")
+    if back.is_flat:
+        return []
+    surface = phase_surface(reference, structure(back, settings))
+    found = []
+    for shift, height in surface.peaks(pose.linear, radius_px, count):
+        right, down = pose.linear @ shift
+        moved = Pose(pose.rotation_deg, pose.scale, (float(right), float(down)))
+        found.append(PoseFound(moved, height))
+    return found
+
+
+def remaining_shift(both: Shared, settings: SimilaritySettings) -> PoseFound | None:
+    """Return the shift that is left between the parts that two windows share."""
+    first, second = (structure(window, settings) for window in (both.reference, both.input))
+    surface = phase_surface(first, second, wrap=True)
+    peaks = surface.peaks(np.eye(2), CORRECTION_PX, 1)
+    return PoseFound(Pose(shift_px=peaks[0][0]), peaks[0][1]) if peaks else None
+
+
+def phase_correlation(
+    reference: Patch,
+    input: Patch,
+    limits: SearchLimits,
+    settings: SimilaritySettings,
+    context: Context,
+) -> list[PoseFound]:
+    """Search for the shift of an input that is not rotated; a `PoseSearch`.
+
+    Parameters
+    ----------
+    reference, input
+        The windows.
+    limits
+        Only shifts are searched for; the scale is the one nearest to 1 within the limits.
+    settings
+        "ncc" compares grey values, all else orientation fields.
+    context
+        Threads to align the candidates in.
+    """
+    if reference.is_flat or input.is_flat:
+        return []
+    pose = Pose(scale=float(np.clip(1.0, *limits.scale)))
+    fixed = structure(reference, settings)
+    found = shifts_at(fixed, input, pose, limits.radius, settings, CANDIDATES)
+
+    def align(one: PoseFound) -> PoseFound:
+        return aligned(reference, input, one, limits, lambda both: remaining_shift(both, settings))
+
+    return distinct(context.quiet().map(align, found))

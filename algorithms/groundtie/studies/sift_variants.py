@@ -1,0 +1,82 @@
+"""SIFT with other octaves, smoothing, gradients and orientations ([Suri2010] 6.3, 6.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..features.descriptors import LENGTH, sift_rows
+from ..features.detectors import SiftDetector, SiftOctDetector
+from ..features.gradients import FloatImage
+from ..features.keypoints import Keypoints
+from ..features.scale_space import describe_at_scales
+from ..rasters.patch import Patch
+from ..similarity.orientation import compress, is_logarithmic
+from ..speckle.isef import isef
+from .gradients import GRADIENTS, gradient_operator, needs_positive
+from .orientation import oriented
+
+# Least contrast of the comparison of detectors. Without speckle's octave keypoints are weaker, and
+# inliers among them.
+_CONTRAST = {"sift": 0.04, "sift-oct": 0.075, "sift-isef-oct": 0.04}
+DETECTORS = tuple(_CONTRAST)
+
+# Decay of the ISEF per pixel, S eq 6.2.
+_ISEF_DECAY = 0.5
+
+# Amplitude in nepers, of which decibels are so many.
+_NEPER_PER_DB = np.log(10) / 20
+
+
+def sift_detector(name: str, contrast: float | None = None) -> SiftDetector:
+    """Return the detector of a name of `DETECTORS`; by default with the contrast that fits it.
+
+    "sift"; "sift-oct", without the first octave; "sift-isef-oct", the same on an image that was
+    smoothed by the infinite symmetric exponential filter.
+    """
+    least = _CONTRAST[name] if contrast is None else contrast
+    if name == "sift":
+        return SiftDetector(least)
+    return SiftOctDetector(least) if name == "sift-oct" else SiftIsefOctDetector(least)
+
+
+@dataclass(frozen=True)
+class SiftIsefOctDetector(SiftOctDetector):
+    """SIFT-OCT on an image that was smoothed first."""
+
+    def prepare(self, window: Patch) -> FloatImage:
+        """Return the compressed grey values of a window, smoothed."""
+        return isef(super().prepare(window), _ISEF_DECAY**2)
+
+
+@dataclass(frozen=True)
+class SiftVariantDescriptor:
+    """SIFT's descriptor by any gradient, upright or oriented.
+
+    Parameters
+    ----------
+    gradient
+        One of `gradients.GRADIENTS`.
+    upright
+        Whether keypoints keep the image's axes; else each is rotated by its own orientation, and
+        one with several is repeated.
+    """
+
+    gradient: str = GRADIENTS[0]
+    upright: bool = True
+
+    def describe(self, window: Patch, found: Keypoints) -> tuple[Keypoints, FloatImage]:
+        """Return m keypoints, m ≥ n unless upright, and their descriptors, shape (m, 128)."""
+        image = compress(window)
+        if needs_positive(self.gradient):
+            image = np.exp(image * np.float32(_NEPER_PER_DB) if is_logarithmic(window) else image)
+        return self.describe_image(image, window.valid, found)
+
+    def describe_image(
+        self, image: FloatImage, valid: NDArray[np.bool_], found: Keypoints
+    ) -> tuple[Keypoints, FloatImage]:
+        """Describe keypoints of an image whose grey values are taken as they are."""
+        operator, orient = gradient_operator(self.gradient), None if self.upright else oriented
+        return describe_at_scales(image, valid, found, sift_rows, LENGTH, operator, orient)

@@ -1,0 +1,234 @@
+"""Rasters that are no files: arrays and open datasets are read as files with the same pixels."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rasterio
+from affine import Affine
+from raster_files import UTM, utm_grid, write_raster
+from rasterio.io import MemoryFile
+from rasterio.vrt import WarpedVRT
+
+from groundtie.arrays import Raster
+from groundtie.errors import BandError, ParameterError, RasterOpenError, SameFileError
+from groundtie.rasters.grid import PIXEL_COORDINATES
+from groundtie.rasters.pair import Image, make_pair
+from groundtie.rasters.reading import Window, open_raster
+
+RNG = np.random.default_rng(0)
+GRID = utm_grid(60, 40)
+WINDOW = Window(-3, 5, 30, 50)
+
+
+def image(dtype: Any, bands: int = 2) -> Any:
+    values = RNG.integers(0, 200, (bands, 40, 60)).astype(dtype)
+    if values.dtype.kind in "fc":
+        values[0, 3:6, 4:9] = np.nan
+    return values
+
+
+def assert_read_alike(one: Any, other: Any) -> None:
+    with open_raster(one) as a, open_raster(other) as b:
+        assert a.grid == b.grid
+        assert (a.count, a.dtype, a.says_what_is_valid) == (b.count, b.dtype, b.says_what_is_valid)
+        for found, expected in (
+            (a.read(WINDOW), b.read(WINDOW)),
+            (a.read(a.window, 1, (10, 15)), b.read(b.window, 1, (10, 15))),
+            (a.read_bands(WINDOW), b.read_bands(WINDOW)),
+            (a.read_untouched(a.window), b.read_untouched(b.window)),
+        ):
+            np.testing.assert_array_equal(found[0], expected[0])
+            np.testing.assert_array_equal(found[1], expected[1])
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "int16", "uint16", "float32", "float64", "complex64"])
+@pytest.mark.parametrize("nodata", [None, 7])
+def test_an_array_is_read_as_a_file_of_it(tmp_path: Path, dtype: str, nodata: int | None) -> None:
+    values = image(dtype)
+    path = write_raster(tmp_path / "a.tif", values, GRID, nodata=nodata)
+    assert_read_alike(Raster(values, GRID.transform, UTM, nodata), path)
+
+
+def test_a_masked_array_is_read_as_a_file_with_a_mask(tmp_path: Path) -> None:
+    values = image("uint16", bands=1)
+    mask = np.zeros((40, 60), bool)
+    mask[10:20, 30:] = True
+    path = write_raster(tmp_path / "a.tif", values, GRID, mask=~mask)
+    assert_read_alike(Raster(np.ma.MaskedArray(values, mask[None]), GRID.transform, UTM), path)
+
+
+def test_a_bare_array_is_in_pixel_coordinates(tmp_path: Path) -> None:
+    values = image("uint8", bands=1)
+    assert_read_alike(values[0], write_raster(tmp_path / "a.tif", values))
+    with open_raster(values[0]) as source:
+        assert source.grid.transform == PIXEL_COORDINATES
+        assert not source.grid.is_georeferenced
+
+
+def test_reading_leaves_the_array_as_it_was() -> None:
+    values = image("float32")
+    before = values.copy()
+    with open_raster(values) as source:
+        source.read(source.window)
+    np.testing.assert_array_equal(values, before)
+
+
+def test_messages_name_the_size() -> None:
+    with (
+        open_raster(np.zeros((400, 500))) as source,
+        pytest.raises(BandError, match=r"^array of 500 × 400 has no band 2; it has 1$"),
+    ):
+        source.read(source.window, 2)
+
+
+class TestDatasets:
+    def test_an_open_dataset_is_read_as_its_file_and_stays_open(self, tmp_path: Path) -> None:
+        path = write_raster(tmp_path / "a.tif", image("uint16"), GRID, nodata=7)
+        with rasterio.open(path) as dataset:
+            assert_read_alike(dataset, path)
+            assert not dataset.closed
+
+    def test_datasets_without_a_file(self, tmp_path: Path) -> None:
+        values = image("uint16")
+        path = write_raster(tmp_path / "a.tif", values, GRID, nodata=7)
+        with (
+            MemoryFile(path.read_bytes()) as memory,
+            memory.open() as dataset,
+            WarpedVRT(dataset) as warped,
+        ):
+            assert_read_alike(dataset, path)
+            assert_read_alike(warped, path)
+
+    def test_threads_take_turns(self, tmp_path: Path) -> None:
+        values = RNG.integers(0, 60_000, (1, 700, 900)).astype(np.uint16)
+        path = write_raster(
+            tmp_path / "a.tif", values, utm_grid(900, 700), tiled=True, compress="deflate"
+        )
+        rows = [Window(0, row, 900, 20) for row in range(0, 700, 20)]
+        with rasterio.open(path) as dataset, ThreadPoolExecutor(8) as pool:
+            source = open_raster(dataset)
+            strips = list(pool.map(lambda window: source.read(window)[0], rows * 4))
+        np.testing.assert_array_equal(np.concatenate(strips[:35]), values[0])
+        np.testing.assert_array_equal(strips[:35] * 4, strips)
+
+    def test_a_closed_dataset_cannot_be_read(self, tmp_path: Path) -> None:
+        path = write_raster(tmp_path / "a.tif", image("uint8"), GRID)
+        with rasterio.open(path) as dataset:
+            pass
+        with pytest.raises(RasterOpenError, match="the dataset is closed: "):
+            open_raster(dataset)
+
+
+class TestIdentity:
+    """Whether two sources are one raster, for arrays of one size, too."""
+
+    def test_arrays_are_told_apart_by_their_pixels(self) -> None:
+        one, other = np.zeros((40, 60)), np.zeros((40, 60))
+        assert open_raster(one).is_same_as(open_raster(one))
+        assert not open_raster(one).is_same_as(open_raster(other))
+
+    def test_a_dataset_is_its_file(self, tmp_path: Path) -> None:
+        path = write_raster(tmp_path / "a.tif", image("uint8"), GRID)
+        with rasterio.open(path) as dataset:
+            assert open_raster(dataset).is_same_as(open_raster(path))
+
+    def test_a_pair_is_two_rasters(self) -> None:
+        values = image("float64", 1)
+        first, second = (open_raster(v) for v in (values, values.copy()))
+        make_pair(Image(first), Image(second))
+        with pytest.raises(SameFileError, match="same raster: array of 60 × 40"):
+            make_pair(Image(first), Image(open_raster(values)))
+
+
+class TestRaster:
+    def test_the_crs_may_be_anything_that_names_one(self) -> None:
+        for crs in (UTM, 32632, "EPSG:32632", UTM.to_wkt()):
+            assert Raster(np.zeros((2, 3)), GRID.transform, crs).crs == UTM
+
+    @pytest.mark.parametrize(
+        ("values", "place", "message"),
+        [
+            (np.zeros(4), {}, r"must have the shape \(h, w\) or \(bands, h, w\), not \(4,\)"),
+            (np.zeros((0, 4)), {}, "must have the shape"),
+            (np.array([["a"]]), {}, "must hold numbers, not <U1"),
+            (np.zeros((2, 3)), {"transform": (1, 0, 0)}, r"must be an affine\.Affine, not tuple"),
+            (
+                np.zeros((2, 3)),
+                {"transform": Affine.identity(), "crs": "EPSG:no"},
+                "no coordinate reference system: 'EPSG:no'",
+            ),
+            (np.zeros((2, 3)), {"crs": UTM}, "an array with a CRS needs its transform"),
+        ],
+    )
+    def test_what_is_no_raster(self, values: Any, place: dict[str, Any], message: str) -> None:
+        with pytest.raises(ValueError, match=message):
+            Raster(values, **place)
+
+    def test_types_that_files_cannot_hold(self) -> None:
+        assert Raster(np.zeros((2, 3), bool)).values.dtype == np.uint8
+        assert Raster(np.zeros((2, 3), np.float16)).values.dtype == np.float32
+        assert Raster(np.zeros((2, 3), ">u2")).values.dtype == np.uint16
+        assert Raster(np.zeros((2, 3), np.int64)).values.dtype == np.int64
+
+    def test_it_is_an_array_for_numpy(self) -> None:
+        raster = Raster(np.arange(6).reshape(2, 3), GRID.transform, UTM)
+        np.testing.assert_array_equal(raster, [[0, 1, 2], [3, 4, 5]])
+        assert (raster.width, raster.height, raster.bands.shape) == (3, 2, (1, 2, 3))
+        assert str(raster) == "array of 3 × 2"
+        assert repr(raster) == "<Raster (2, 3) int64, EPSG:32632>"
+
+
+class TestXarray:
+    """With rioxarray, where it is installed."""
+
+    @pytest.fixture
+    def opened(self, tmp_path: Path) -> Any:
+        rioxarray = pytest.importorskip("rioxarray")
+        values = image("uint16")
+        path = write_raster(tmp_path / "a.tif", values, GRID, nodata=7)
+        with rioxarray.open_rasterio(path) as array:
+            yield path, array
+
+    def test_it_is_read_as_its_file(self, opened: Any) -> None:
+        assert_read_alike(opened[1], opened[0])
+
+    def test_dimensions_in_any_order(self, opened: Any) -> None:
+        path, array = opened
+        assert_read_alike(array.transpose("x", "band", "y"), path)
+
+    def test_a_part_lies_where_it_was(self, opened: Any) -> None:
+        part = Raster.from_xarray(opened[1].isel(band=0, x=slice(10, 30), y=slice(4, 20)))
+        moved = GRID.window(10, 4, 20, 16).transform
+        np.testing.assert_allclose(part.transform[:6], moved[:6], atol=1e-6)
+        assert (part.values.shape, part.crs, part.nodata) == ((16, 20), UTM, 7)
+
+    def test_to_xarray_and_back(self, opened: Any) -> None:
+        raster = Raster.from_xarray(opened[1])
+        assert raster.transform == GRID.transform
+        assert_read_alike(Raster.from_xarray(raster.to_xarray()), opened[0])
+
+    def test_what_is_masked_becomes_nan(self, opened: Any) -> None:
+        values = np.ma.MaskedArray([[1, 2], [3, 4]], [[False, True], [False, False]])
+        array = Raster(values).to_xarray()
+        np.testing.assert_array_equal(array, [[1, np.nan], [3, 4]])
+
+    def test_dimensions_that_are_no_map(self, opened: Any) -> None:
+        import xarray
+
+        with pytest.raises(ParameterError, match="needs dimensions y and x"):
+            Raster.from_xarray(xarray.DataArray(np.zeros((2, 3)), dims=("a", "b")))
+        with pytest.raises(ParameterError, match="has bands, y and x, not time, band"):
+            Raster.from_xarray(opened[1].expand_dims("time"))
+
+
+def test_an_array_without_rioxarray_is_explained() -> None:
+    class Bare:
+        dims, coords = ("y", "x"), {}
+
+    with pytest.raises(ParameterError, match="needs rioxarray"):
+        open_raster(Bare())
