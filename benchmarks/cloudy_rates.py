@@ -1,4 +1,4 @@
-"""Correct-match rates under simulated clouds, by what keeps their features out (thesis P 5.5)."""
+"""Correct-match rates under simulated clouds, by what masks their features ([Patel2017] 5.5)."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Clouded:
 
     @property
     def px(self) -> NDArray[np.float64]:
-        return self.features.keypoints.position_px
+        return self.features.points.position_px
 
     def training(self, statistics: str) -> Training:
         bands = self.bands if statistics == BAND_RATIOS else NO_BANDS
@@ -157,7 +157,7 @@ def _clouded(clear: Sequence[Clear], case: RealCase, draw: int) -> list[Clouded]
         image = Patch(clouds.over(each.grey.values), each.grey.valid)
         features = described(image, REFINED)
         labels = np.where(clouds.hidden, LEFT_OUT, KEPT).astype(np.int8)
-        kept = patch_labels(labels, features.keypoints.position_px) == KEPT
+        kept = patch_labels(labels, features.points.position_px) == KEPT
         both.append(Clouded(image, clouds.over(each.bands), features, kept))
     return both
 

@@ -26,7 +26,7 @@ from groundtie.studies.sift_variants import DETECTORS, SiftVariantDescriptor, si
 from .cases import RealCase, write_case
 from .suites import Goal, Table
 
-# Matching by descriptors alone, and in the gate: thesis S table 6.11.
+# Matching by descriptors alone, and in the gate: [Suri2010] table 6.11.
 RATIO = 0.8
 _HYBRID_CONTRAST = 0.03
 
@@ -187,7 +187,7 @@ def count_turn(case: RealCase, gradient: str) -> TurnCount:
 
 
 def detector_table(counts: Sequence[DetectorCount]) -> Table:
-    """Return what the detectors find, as thesis S tables 6.5 to 6.8."""
+    """Return what the detectors find, as [Suri2010] tables 6.5 to 6.8."""
     head = ("pair", "detector", "features", *(f"repeat {c}" for c in CLASS_NAMES[:2]))
     rows = [
         [
@@ -205,7 +205,7 @@ def detector_table(counts: Sequence[DetectorCount]) -> Table:
 
 
 def chain_table(counts: Sequence[ChainCount]) -> Table:
-    """Return right matches of all ways, as thesis S table 6.11."""
+    """Return right matches of all ways, as [Suri2010] table 6.11."""
     rows = [
         [
             one.name,
@@ -220,7 +220,7 @@ def chain_table(counts: Sequence[ChainCount]) -> Table:
 
 
 def turn_table(counts: Sequence[TurnCount]) -> Table:
-    """Return right matches before and after a quarter turn, as thesis S table 6.2."""
+    """Return right matches before and after a quarter turn, as [Suri2010] table 6.2."""
     rows = [
         [one.name, one.gradient, str(one.without), str(one.turned), _share(one.turned, one.without)]
         for one in counts
@@ -236,7 +236,7 @@ def _share(part: int, whole: int) -> str:
 def goals(
     detectors: Sequence[DetectorCount], chains: Sequence[ChainCount], turns: Sequence[TurnCount]
 ) -> tuple[Goal, ...]:
-    """Return the goals of thesis S's claims and what was found."""
+    """Return the goals of the claims of [Suri2010] and what was found."""
     by = {name: [one for one in detectors if one.detector == name] for name in DETECTORS}
     features = {name: sum(map(sum, (o.detections for o in own))) for name, own in by.items()}
     seconds = {name: sum(one.seconds for one in own) for name, own in by.items()}

@@ -16,7 +16,7 @@ from groundtie.rasters.patch import Patch
 Image = NDArray[np.float32]
 
 # What becomes of the corners of the input that the reference's window does not fill: the input
-# shows more of the ground; they are black and masked; they are black and nobody knows (thesis P).
+# shows more of the ground; they are black and masked; they are black and unmasked ([Patel2017]).
 WHOLE = "whole"
 MASKED = "black corners, masked"
 BLACK = "black corners"

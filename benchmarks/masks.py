@@ -1,4 +1,4 @@
-"""One shift of a whole dense city, as thesis S measured it: what masks of the radar image change.
+"""One shift of a whole dense city, as in [Suri2010]: what masks of the radar image change.
 
 The input is resampled by the truth, so that every peak away from 0 is an error on the ground.
 """
@@ -26,7 +26,7 @@ from groundtie.similarity.surface import SimilaritySettings, describe, similarit
 from .city import city
 from .suites import Goal, Settings, SuiteResult, Table
 
-# Thesis S searched 20 m around where the images were expected to meet.
+# [Suri2010] searched 20 m around where the images were expected to meet.
 RADIUS_PX = 20
 SIMILARITIES = ("nmi", "orientation", "fused")
 PLAIN = "no mask"
@@ -127,7 +127,7 @@ def _masked(images: ImagePair, scene: Scene, select: Select, stack: ExitStack) -
 
 
 def stability(cells: Mapping[tuple[str, str], list[float]]) -> Goal:
-    """Return whether thresholds of 10 to 40 % agree with each other, as in thesis S, 5.3.1."""
+    """Return whether thresholds of 10 to 40 % agree with each other, as in [Suri2010] 5.3.1."""
     medians = [float(np.median(cells[f"brightest {p} %", "fused"])) for p in (10, 20, 30, 40)]
     text = ", ".join(f"{median:.1f}" for median in medians)
     return Goal("Median errors for thresholds of 10, 20, 30, 40 %, fused", "reported", text, None)

@@ -1,4 +1,4 @@
-"""Correct-match rates of features of optical images (thesis P 4.7, 5.5)."""
+"""Correct-match rates of features of optical images ([Patel2017] 4.7, 5.5)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .accuracy import FloatArray
 from .cases import RealCase
 from .offsets import OffsetPair, Scene, open_offset
 
-# Matches within these distances of the truth count as right (thesis P: 5 px).
+# Matches within these distances of the truth count as right ([Patel2017]: 5 px).
 LIMITS_PX = (5.0, 1.5)
 BEST = 20
 

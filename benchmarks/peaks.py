@@ -16,15 +16,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from groundtie.pose.pose import Pose, PoseLimits
+from groundtie.context import threads
+from groundtie.geometry.limits import SearchLimits
+from groundtie.pose.pose import Pose
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.binning import MASKED, to_bins
 from groundtie.similarity.joint_histogram import count_joint_histograms, reach
 from groundtie.similarity.measures import normalized_mutual_information
 from groundtie.similarity.surface import SimilaritySettings, detrend
-from groundtie.studies.objective import EFFORT, Effort
+from groundtie.studies.climbing import ClimbingSearch
 from groundtie.studies.simplex import nelder_mead, powell
-from groundtie.studies.spsa import DISCRETE_EFFORT, discrete_spsa, spsa, spsa_second_order
+from groundtie.studies.spsa import discrete_spsa, spsa, spsa_second_order
 
 from .accuracy import CORRECT_PX
 from .cases import SAR_OPTICAL, RealCase, read_cases, read_image
@@ -35,7 +37,7 @@ Peak = tuple[int, int]
 
 RADIUS_PX = 20
 
-# Thesis S table 3.2, without its 256th bin: bins are bytes, and one value stands for "masked".
+# [Suri2010] table 3.2, without its 256th bin: bins are bytes, and one value stands for "masked".
 BINS_RADIUS_PX = 10
 BIN_COUNTS = (8, 16, 32, 64, 128, 255)
 WANTED_BINS = 32
@@ -43,13 +45,13 @@ BINNINGS = ("linear", "equal-frequency")
 NEAREST = 1
 ORDERS = (NEAREST, 4, 7)
 
-# Thesis S table 4.2.
+# [Suri2010] table 4.2.
 SHARES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 WANTED_SHARE = 0.7
 _MASK_BINS = 32
 _BLOCK_PX = 4
 
-# Thesis S table 4.3, from many seeds instead of four.
+# [Suri2010] table 4.3, from many seeds instead of four.
 RUNS = 100
 CONTINUOUS_RUNS = 3
 WANTED_REACHED = 0.9
@@ -61,12 +63,12 @@ CLIMBED = SimilaritySettings("nmi")
 WINDOW_PX, WINDOW_RADIUS_PX, WINDOW_BINS = 1000, 100, 16
 _WANTED_RATIO = 3.0
 
-SEARCHES: dict[str, tuple[Any, Effort]] = {
-    "discrete SPSA": (discrete_spsa, DISCRETE_EFFORT),
-    "SPSA": (spsa, EFFORT),
-    "second-order SPSA": (spsa_second_order, EFFORT),
-    "Powell": (powell, EFFORT),
-    "Nelder–Mead": (nelder_mead, EFFORT),
+SEARCHES: dict[str, ClimbingSearch] = {
+    "discrete SPSA": discrete_spsa,
+    "SPSA": spsa,
+    "second-order SPSA": spsa_second_order,
+    "Powell": powell,
+    "Nelder–Mead": nelder_mead,
 }
 DISCRETE = next(iter(SEARCHES))
 
@@ -157,7 +159,7 @@ def run(settings: Settings) -> SuiteResult:
         [*bins, *masks, *climbs, counting],
         (
             f"Peaks are the highest of all whole shifts (right, down) of ± {BINS_RADIUS_PX} px for "
-            f"bins and ± {RADIUS_PX} px for masks, as in thesis S tables 3.2 and 4.2; "
+            f"bins and ± {RADIUS_PX} px for masks, as in [Suri2010] tables 3.2 and 4.2; "
             "(0, 0) is the truth, which is known to σ. Climbs: one window a pair, whose centre is "
             f"up to {_OFF_CENTRE_PX} px off the truth, seeds drawn evenly from ± {RADIUS_PX} px. "
             "They must reach the peak of the exhaustive search in that window, exactly if "
@@ -174,7 +176,7 @@ def _told(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return records
 
 
-# Bins: thesis S table 3.2.
+# Bins: [Suri2010] table 3.2.
 
 
 def measure_bins(pair: Aligned) -> list[dict[str, Any]]:
@@ -243,11 +245,11 @@ def bins_table(records: Sequence[dict[str, Any]]) -> Table:
     return Table("True peaks, and median distance to the truth, by bins", head, rows)
 
 
-# Masks: thesis S table 4.2.
+# Masks: [Suri2010] table 4.2.
 
 
 def block_mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the mean of every block at each of its pixels (thesis S 4.5)."""
+    """Return the mean of every block at each of its pixels ([Suri2010] 4.5)."""
     height, width = values.shape
     small = cv2.copyMakeBorder(
         values, 0, -height % _BLOCK_PX, 0, -width % _BLOCK_PX, cv2.BORDER_REPLICATE
@@ -339,7 +341,7 @@ def masks_table(records: Sequence[dict[str, Any]]) -> Table:
     return Table("Peaks with the brightest part of the SAR masked, cubic kernel", head, rows)
 
 
-# Climbs: thesis S table 4.3.
+# Climbs: [Suri2010] table 4.3.
 
 
 def measure_climbs(pair: Aligned, quick: bool) -> list[dict[str, Any]]:
@@ -350,15 +352,17 @@ def measure_climbs(pair: Aligned, quick: bool) -> list[dict[str, Any]]:
     peak = exhaustive_peak(*windows)
     seeds = rng.integers(-RADIUS_PX, RADIUS_PX + 1, (RUNS, 2)).astype(float)
     records = []
-    for name, (search, effort) in SEARCHES.items():
+    for name, search in SEARCHES.items():
         discrete = name == DISCRETE
         runs = RUNS if discrete and not quick else CONTINUOUS_RUNS
         reached, evaluations, seconds = [], [], []
         for number, (x, y) in enumerate(seeds[:runs].tolist()):
-            own = replace(effort, start=Pose(shift_px=(x, y)), seed=number)
-            started = time.perf_counter()
-            found = search(*windows, PoseLimits(RADIUS_PX), CLIMBED, effort=own)[0]
-            seconds.append(time.perf_counter() - started)
+            effort = replace(search.effort, start=Pose(shift_px=(x, y)))
+            with threads(1, seed=number) as context:
+                started = time.perf_counter()
+                climbing = replace(search, effort=effort)
+                found = climbing(*windows, SearchLimits(RADIUS_PX), CLIMBED, context)[0]
+                seconds.append(time.perf_counter() - started)
             distance_px = np.abs(np.subtract(found.pose.shift_px, peak)).max()
             reached.append(bool(distance_px <= (0 if discrete else _SAME_PX)))
             evaluations.append(found.evaluations)

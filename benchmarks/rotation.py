@@ -1,4 +1,4 @@
-"""Phase correlation, Fourier–Mellin and Radon: known poses of 20 images, and thesis P's tables."""
+"""Phase correlation, Fourier–Mellin, Radon: known poses of 20 images, tables of [Patel2017]."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from groundtie.pose.phase_correlation import phase_correlation
-from groundtie.pose.pose import Pose, PoseLimits, PoseSearch
+from groundtie.context import threads
+from groundtie.geometry.limits import SearchLimits
+from groundtie.pose.pose import Pose
 from groundtie.similarity.surface import SimilaritySettings
 from groundtie.studies.fourier_mellin import fourier_mellin
+from groundtie.studies.phase_correlation import phase_correlation
+from groundtie.studies.pose_searches import PoseSearch
 from groundtie.studies.radon import radon
 
 from .cases import read_image
@@ -79,9 +82,9 @@ class Range:
         return Pose(turned, scale, (float(right), float(down)))
 
     @property
-    def limits(self) -> PoseLimits:
+    def limits(self) -> SearchLimits:
         """Limits of the search."""
-        return PoseLimits(_RADIUS_PX * max(self.scale[1], 1), self.rotation_deg, self.scale)
+        return SearchLimits(_RADIUS_PX * max(self.scale[1], 1), self.rotation_deg, self.scale)
 
 
 SHIFTS = Range("shifts", 0.0, (1.0, 1.0), (PHASE,))
@@ -200,7 +203,7 @@ def variants(range_: Range) -> list[tuple[str, float]]:
 
 
 def search_as_thesis(settings: Settings) -> list[Found]:
-    """Search for the poses of thesis P in images of the same sizes, in `ESTIMATES`' order."""
+    """Search for the poses of [Patel2017] in images of the same sizes, in `ESTIMATES`' order."""
     found = []
     for estimates in ESTIMATES:
         name, (columns, rows) = STAND_INS[estimates.image]
@@ -209,11 +212,11 @@ def search_as_thesis(settings: Settings) -> list[Found]:
             injection = Injection(
                 Pose(degrees, 1.0, (x, y)), MASKED, estimates.noise_variance, seed
             )
-            limits = PoseLimits(_RADIUS_PX, 30.0)
+            limits = SearchLimits(_RADIUS_PX, 30.0)
             found.append(
                 search(
                     estimates.image,
-                    "thesis P",
+                    "[Patel2017]",
                     image,
                     (rows, columns),
                     injection,
@@ -233,13 +236,15 @@ def search(
     injection: Injection,
     method: str,
     similarity: str,
-    limits: PoseLimits,
+    limits: SearchLimits,
 ) -> Found:
     """Put a pose into an image and search for it."""
     reference, input = injection.windows(image, shape)
-    started = time.perf_counter()
-    candidates = METHODS[method](reference, input, limits, SimilaritySettings(similarity))
-    seconds = time.perf_counter() - started
+    with threads(1) as context:
+        started = time.perf_counter()
+        settings = SimilaritySettings(similarity)
+        candidates = METHODS[method](reference, input, limits, settings, context)
+        seconds = time.perf_counter() - started
     truth, best = injection.pose, candidates[0]
     turned, error = pose_errors(best.pose, truth, shape)
     right, down = (float(e) for e in np.abs(np.subtract(best.pose.shift_px, truth.shift_px)))
@@ -325,7 +330,7 @@ def _median_and_largest(errors: Sequence[float]) -> list[str]:
 
 
 def thesis_table(found: Sequence[Found]) -> Table:
-    """Return thesis P's tables 3.3 and 3.4 as errors, ours beside them; `found` as searched."""
+    """Return [Patel2017] tables 3.3 and 3.4 as errors, beside ours; `found` as searched."""
     rows = []
     for index, estimates in enumerate(ESTIMATES):
         own = found[index * len(ACTUAL) : (index + 1) * len(ACTUAL)]

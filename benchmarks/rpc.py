@@ -32,7 +32,7 @@ from .tables import accuracy_table
 
 HALF_REAL, ROUND_TRIP, BLUNDERS = "half real", "round trip", "blunders"
 RURAL, URBAN = "simulated, hills", "simulated, town"
-# With masks in the reference: thesis S' thresholds, and what it has for dense towns.
+# With masks in the reference: thresholds of [Suri2010], and what it has for dense towns.
 HALF_REAL_MASKED, URBAN_MASKED = "half real, thresholds", "simulated, town, regions"
 MASKS = {HALF_REAL_MASKED: "threshold", URBAN_MASKED: "regions"}
 DENSITY = {RURAL: "rural", URBAN: "urban", URBAN_MASKED: "urban"}
@@ -100,7 +100,7 @@ class HalfRealCase:
                 )
             seconds = time.perf_counter() - started
             error = scene.error_px(read_rpc(output))
-            kept = _misses(scene.truth, table, _crs_of(scene.reference))
+            kept = misses(scene.truth, table, crs_of(scene.reference))
         verdict = classify(True, error, scene.sigma_px)
         return Outcome(
             self.name,
@@ -158,11 +158,11 @@ class SimulatedCase:
                 seconds = time.perf_counter() - started
                 return unregistered(REFUSED, self.name, self.group, 0.0, seconds, str(refusal))
             seconds = time.perf_counter() - started
-            crs = _crs_of(scene / "reference.tif")
-            error = _rms(
-                _misses(read_rpc(scene / "refined_RPC.TXT"), scene / "check_points.csv", crs)
+            crs = crs_of(scene / "reference.tif")
+            error = rms(
+                misses(read_rpc(scene / "refined_RPC.TXT"), scene / "check_points.csv", crs)
             )
-            kept = _misses(read_rpc(scene / "exact_rpc.txt"), scene / "points.csv", crs)
+            kept = misses(read_rpc(scene / "exact_rpc.txt"), scene / "points.csv", crs)
         return Outcome(
             self.name,
             self.group,
@@ -184,16 +184,26 @@ def near_the_truth(misses_px: FloatArray) -> str:
     return f"{near:.0%} of the kept points within {_NEAR_PX:g} px of the truth"
 
 
-def _crs_of(path: Path) -> CRS:
+def crs_of(path: Path) -> CRS:
+    """Return the CRS of a raster."""
     with rasterio.open(path) as dataset:
         return dataset.crs
 
 
-def _misses(rpc: RPC, table: Path, crs: CRS) -> FloatArray:
-    """Return measured minus projected positions of the points of a table, (n, 2).
+def misses(rpc: RPC, table: Path, crs: CRS) -> FloatArray:
+    """Return measured minus projected positions of the points of a table, (n, 2)."""
+    x, y, height = _columns(table, "reference_x", "reference_y", "height_m").T
+    lon_lat = reproject(np.column_stack([x, y]), crs, LON_LAT)
+    return image_positions(table) - rpc.project(lon_lat, height)
 
-    Of tables that tell, those count that the fit kept.
-    """
+
+def image_positions(table: Path) -> FloatArray:
+    """Return the image positions (col, row) of the points of a table, (n, 2)."""
+    return _columns(table, "input_col", "input_row")
+
+
+def _columns(table: Path, *names: str) -> FloatArray:
+    """Return columns of a table of points; of those that a fit saw, what it kept counts."""
     with table.open(newline="") as file:
         kept = {"state": "used", "role": "fit"}
         rows = [
@@ -201,14 +211,12 @@ def _misses(rpc: RPC, table: Path, crs: CRS) -> FloatArray:
             for row in csv.DictReader(file)
             if all(row.get(name, value) == value for name, value in kept.items())
         ]
-    names = "reference_x", "reference_y", "height_m", "input_col", "input_row"
-    x, y, height, col, row = np.array([[float(r[n]) for n in names] for r in rows]).T
-    lon_lat = reproject(np.column_stack([x, y]), crs, LON_LAT)
-    return np.column_stack([col, row]) - rpc.project(lon_lat, height)
+    return np.array([[float(row[name]) for name in names] for row in rows])
 
 
-def _rms(misses: FloatArray) -> float:
-    return float(np.sqrt((misses**2).sum(axis=1).mean()))
+def rms(off_px: FloatArray) -> float:
+    """Return the root mean square length of differences, shape (n, 2)."""
+    return float(np.sqrt((off_px**2).sum(axis=1).mean()))
 
 
 @dataclass(frozen=True)

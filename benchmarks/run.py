@@ -25,6 +25,7 @@ SUITES = (
     "rotated_pairs",
     "rotation",
     "rpc",
+    "rpc_city",
     "sar_sar",
     "speed",
     "methods",
@@ -53,7 +54,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _suite_names(text: str) -> tuple[str, ...]:
-    names = tuple(text.split(","))
+    names = tuple(text.replace("-", "_").split(","))
     for name in names:
         if name not in SUITES:
             raise argparse.ArgumentTypeError(f"no suite {name!r}; there are {', '.join(SUITES)}")

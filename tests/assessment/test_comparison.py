@@ -17,15 +17,16 @@ from html_pages import Page, picture_of
 from raster_files import UTM, utm_grid, wave_image, write_raster
 from rasterio.crs import CRS
 
-from groundtie.assessment.accuracy import Assessment, PointErrors
+from groundtie.assessment.accuracy import Assessment
 from groundtie.assessment.comparison import Comparison, compare
+from groundtie.assessment.point_errors import PointErrors
 from groundtie.errors import GeoreferencingError, NoOverlapError, OutputError
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import RasterSource, open_raster
-from groundtie.report.report import AssessmentReport
+from groundtie.report.assessment_report import AssessmentReport
 
 GRID = utm_grid(160, 120)
 SHIFT_M = np.array([70.0, 40.0])
@@ -74,7 +75,7 @@ class TestComparison:
         reference = grey(found.reference)
         assert reference.shape == (found.height, found.width)
         assert likeness(grey(found.registered), reference) > 0.99
-        assert likeness(grey(found.claimed), reference) < 0.9
+        assert likeness(grey(found.nominal), reference) < 0.9
         assert (found.reference_name, found.input_name) == ("reference.tif", "input.tif")
 
     def test_it_shows_where_they_overlap_as_registered(self, opened: Opened) -> None:
@@ -83,7 +84,7 @@ class TestComparison:
         assert (found.width, found.height) == (160 - 7, 120 - 4)
         assert likeness(grey(found.reference), wave_image(GRID, LENGTH_M)[4:, : 160 - 7]) > 0.99
 
-    def test_what_does_not_overlap_as_claimed_may_do_so_as_registered(
+    def test_what_does_not_overlap_nominally_may_do_so_as_registered(
         self, tmp_path: Path, opened: Opened
     ) -> None:
         away = np.array([5_000.0, 9_000.0])
@@ -95,22 +96,22 @@ class TestComparison:
             found = compare(opened.reference, source, shifted(away, source.grid))
             assert likeness(grey(found.registered), grey(found.reference)) > 0.99
             # Where it claims to be there is nothing: light grey.
-            assert np.unique(np.rint(grey(found.claimed))).tolist() == [226]
+            assert np.unique(np.rint(grey(found.nominal))).tolist() == [226]
 
     def test_a_transform_on_another_map(self, opened: Opened) -> None:
         """The transform's map is in degrees, the reference in UTM; nothing is off."""
-        claimed = Transform.nominal(LONLAT, GRID)
-        moved = replace(claimed, input_grid=GRID.shifted(*-SHIFT_M))
+        nominal = Transform.nominal(LONLAT, GRID)
+        moved = replace(nominal, input_grid=GRID.shifted(*-SHIFT_M))
         found = compare(opened.reference, opened.input, moved)
         assert likeness(grey(found.registered), grey(found.reference)) > 0.99
         # The footprint in degrees is not aligned, which may take a pixel more.
         assert abs(found.width - (160 - 7)) <= 1
 
-    def test_without_a_transform_the_pair_is_shown_as_claimed(self, opened: Opened) -> None:
+    def test_without_a_transform_the_pair_is_shown_as_nominal(self, opened: Opened) -> None:
         pair = make_pair(Image(opened.reference), Image(opened.input))
         found = Comparison.of(pair, None)
         assert found.registered is None
-        assert likeness(grey(found.claimed), grey(found.reference)) < 0.9
+        assert likeness(grey(found.nominal), grey(found.reference)) < 0.9
         assert grey(found.backdrop).min() > 140
 
     def test_images_that_do_not_meet_as_registered(self, opened: Opened) -> None:
@@ -233,7 +234,7 @@ class TestPage:
         assert kinds == [
             ("range", "50"),
             *[("radio", mode) for mode in modes],
-            ("radio", "claimed"),
+            ("radio", "nominal"),
             ("radio", "registered"),
         ]
         style = page.all("style")[0].text
@@ -243,7 +244,7 @@ class TestPage:
         alts = [str(e.attributes["alt"]) for e in page.all("img")]
         assert alts[:3] == [
             "Overview of the reference image reference.tif",
-            "Overview of the input image input.tif where it claims to be",
+            "Overview of the input image input.tif at its nominal position",
             "Overview of the input image input.tif as registered",
         ]
         pictures = [grey(str(e.attributes["src"])) for e in page.all("img")[:3]]
@@ -270,12 +271,12 @@ class TestPage:
         assert headings == ["Measured", "Errors", "How it was made"]
         assert page.all("title")[0].text.startswith("Measured: ")
         assert "No largest error was asked for: there is no verdict." in page.text
-        assert "nothing on this page tells the accuracy" in page.text
+        assert "nothing on this page is a measure of accuracy" in page.text
         assert not page.all("img")
 
     def test_test_points_alone(self, tmp_path: Path) -> None:
         page = written(report_of(assessment=Assessment(test_points=errors([0, 0]))), tmp_path)
-        assert "Wrong matches among them do not count." in page.text
+        assert "Outliers among them do not count." in page.text
 
     def test_a_refusal(self, tmp_path: Path) -> None:
         assessment = Assessment(check_points=errors([4.0, 0]))
@@ -319,7 +320,7 @@ class TestPage:
         assert not any("onerror" in e.attributes for e in page.elements)
         assert page.all("h1")[0].text == HOSTILE
         assert page.all("img")[1].attributes["alt"] == (
-            f"Overview of the input image {HOSTILE} where it claims to be"
+            f"Overview of the input image {HOSTILE} at its nominal position"
         )
 
     def test_the_map_shows_errors_where_they_are(self, page: Page) -> None:

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from raster_files import UTM, utm_grid
 from rasterio.crs import CRS
 
-from groundtie.assessment.accuracy import PointErrors
 from groundtie.assessment.consistency import Leg, consistency, lattice
+from groundtie.assessment.point_errors import PointErrors
 from groundtie.errors import GeoreferencingError, NoOverlapError
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.models import Frame, PolynomialModel
@@ -88,7 +88,7 @@ class TestTwoWay:
         turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
         centre = B.pixel_to_map([B.centre_px])[0]
         found = two_way(shifted(0, 0, B), affine(turn, centre, np.zeros(2), A))
-        distance = np.hypot(*(found.input_px - B.centre_px).T)
+        distance = np.hypot(*(found.position_px - B.centre_px).T)
         chord = 2 * math.sin(angle / 2) * distance
         np.testing.assert_allclose(np.hypot(*found.error_px.T), chord, atol=1e-6)
         assert found.in_pixels.rmse == pytest.approx(np.sqrt((chord**2).mean()))
@@ -120,10 +120,10 @@ class TestTwoWay:
         xy = A.pixel_to_map(lattice(A, 9))
         centre = A.pixel_to_map([[60.0, 60.0]])[0]
         bulge = 15 * np.exp(-((xy - centre) ** 2).sum(axis=1) / 300**2)
-        claimed = xy + np.column_stack([bulge, 0 * bulge])
-        back = Transform(fit_model("tps", xy, claimed), UTM, A)
+        nominal = xy + np.column_stack([bulge, 0 * bulge])
+        back = Transform(fit_model("tps", xy, nominal), UTM, A)
         found = two_way(shifted(0, 0, A), back)
-        on_map = A.pixel_to_map(found.input_px)
+        on_map = A.pixel_to_map(found.position_px)
         distance = np.hypot(*(on_map - centre).T)
         expected = back.model(on_map)[:, 0] - on_map[:, 0]
         np.testing.assert_allclose(found.error_px[:, 0], -expected / 10, atol=1e-6)

@@ -1,4 +1,4 @@
-"""The suite of rotations: what is drawn, what is judged, and thesis P's figures beside ours."""
+"""The suite of rotations: what is drawn and judged, figures of [Patel2017] beside ours."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ from benchmarks.rotation import (
 )
 from benchmarks.tables import to_markdown
 from benchmarks.thesis_radon import ACTUAL, ESTIMATES, SIZES
-from groundtie.pose.pose import Pose, PoseLimits
+from groundtie.geometry.limits import SearchLimits
+from groundtie.pose.pose import Pose
 
 ONE = Found(
     "hills", SMALL.name, RADON, "fused", WHOLE, 0.0, 12.0, 1.0, 0.05, 0.2, (0.1, 0.3), 50.0, 0.4
@@ -84,7 +85,7 @@ def test_a_turned_window_stays_inside_the_image() -> None:
 def test_a_search_is_judged_by_what_was_put_in(method: str) -> None:
     image = window((220, 220)).values / 1000
     pose = Pose(0.0 if method == PHASE else 12.0, 1.0, (4.0, -6.0))
-    limits = PoseLimits(20.0, 30.0)
+    limits = SearchLimits(20.0, 30.0)
     found = search("hills", "any", image, (128, 128), Injection(pose), method, "ncc", limits)
     assert found.error_px < 0.5 and found.rotation_error_deg < 0.25
     assert max(found.shift_errors_px) < 0.5

@@ -66,6 +66,10 @@ def test_unknown_suites_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert "no suite 'unreal'" in capsys.readouterr().err
 
 
+def test_suites_may_be_named_with_hyphens() -> None:
+    assert run.parse(["--only", "rpc-city,real"]).only == ("rpc_city", "real")
+
+
 def test_a_quick_run_says_so() -> None:
     assert "not all" in run.about(run.parse(["--quick"]))["quick"]
     assert run.about(run.parse([]))["quick"] == "no"

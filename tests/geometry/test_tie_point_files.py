@@ -31,9 +31,9 @@ def made(crs: CRS | None, grid: Grid, count: int = 12) -> tuple[TiePoints, Trans
     """Points that lie SHIFT away from where the input claims them, but for 0.5 px along rows."""
     rng = np.random.default_rng(0)
     px = rng.uniform(10, 290, (count, 2))
-    claimed = Transform.nominal(crs, grid).nominal_xy(px)
+    nominal = Transform.nominal(crs, grid).nominal_xy(px)
     points = TiePoints(
-        reference_xy=claimed - SHIFT,
+        reference_xy=nominal - SHIFT,
         input_px=px + [0, 0.5],
         score=rng.uniform(5, 20, count),
         covariance_px2=np.tile(np.diag([0.04, 0.09]), (count, 1, 1)),
@@ -41,7 +41,7 @@ def made(crs: CRS | None, grid: Grid, count: int = 12) -> tuple[TiePoints, Trans
         is_check=np.arange(count) % 3 == 0,
         state=np.where(np.arange(count) == 1, "rejected: far, and “odd”", "used"),
     )
-    return points, Transform(fit_model("translation", claimed - SHIFT, claimed), crs, grid)
+    return points, Transform(fit_model("translation", nominal - SHIFT, nominal), crs, grid)
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -71,7 +71,7 @@ def test_a_table_without_points(tmp_path: Path, suffix: str) -> None:
     assert found.used.shape == (0,)
 
 
-def test_geopackage_lines_run_from_the_claimed_to_the_true_place(tmp_path: Path) -> None:
+def test_geopackage_lines_run_from_the_nominal_to_the_reference_position(tmp_path: Path) -> None:
     points, transform = made(UTM, GRID)
     write_tie_points(tmp_path / "a.gpkg", points, transform)
     with fiona.open(tmp_path / "a.gpkg") as layer:
@@ -183,7 +183,9 @@ def test_what_we_write_for_the_georeferencer(tmp_path: Path) -> None:
     assert set(enabled) == {"0", "1"}
 
 
-def test_another_raster_of_the_scene_finds_its_pixels_by_the_claimed_place(tmp_path: Path) -> None:
+def test_another_raster_of_the_scene_finds_its_pixels_by_nominal_positions(
+    tmp_path: Path,
+) -> None:
     points, transform = made(UTM, GRID)
     for suffix in FORMATS:
         path = tmp_path / f"a{suffix}"

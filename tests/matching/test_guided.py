@@ -5,6 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from groundtie.matching.guided import GuidedSearch
+from groundtie.matching.hybrid import FeatureSearch
+from groundtie.matching.local import LocalSearch
 from raster_files import write_raster
 from textured_pairs import TexturedPair, error_px, pixels, shift_on_map, write_textured_pair
 
@@ -14,10 +17,7 @@ from groundtie.features.hog import HogDescriptor
 from groundtie.geometry.estimation import Estimate
 from groundtie.matching.alignment import LINEAR_CANDIDATES
 from groundtie.matching.feature_tiles import FeatureMatcher
-from groundtie.matching.guided import GuidedSearch
-from groundtie.matching.hybrid import FeatureSearch
 from groundtie.matching.layout import lay_out_chips
-from groundtie.matching.local import LocalSearch
 from groundtie.similarity.surface import SimilaritySettings
 
 SIZE = (400, 380)

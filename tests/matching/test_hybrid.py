@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from affine import Affine
+from groundtie.matching.hybrid import FeatureSearch
+from groundtie.matching.local import LocalSearch
 from raster_files import write_raster
 from speckled_pairs import write_speckled_pair
 from textured_pairs import TexturedPair, error_px, pixels, shift_on_map
 
+from groundtie.context import threads
 from groundtie.errors import TooFewPointsError
 from groundtie.features import tiles
 from groundtie.features.descriptors import SiftDescriptor
@@ -21,9 +24,7 @@ from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.models import Model
 from groundtie.matching import feature_tiles
 from groundtie.matching.feature_tiles import FeatureMatcher, FeatureMatches
-from groundtie.matching.hybrid import FeatureSearch
 from groundtie.matching.layout import lay_out_chips
-from groundtie.matching.local import LocalSearch
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, ImagePair
 from groundtie.rasters.reading import Window, open_raster
@@ -32,6 +33,7 @@ from groundtie.studies.sift_variants import SiftVariantDescriptor, sift_detector
 
 SIZE = (300, 280)
 NMI = SimilaritySettings("nmi")
+KEYPOINTS = SiftOctDetector(0.075), SiftDescriptor()
 # The truth is 60 m east and 45 m south, pixels are 10 m: the rough model is off by 5 px.
 TRUTH, ROUGH = shift_on_map(60.0, -45.0), shift_on_map(30.0, -5.0)
 
@@ -46,12 +48,13 @@ def estimate_of(
     kind: str = "auto",
     refinement: SimilaritySettings | None = None,
     coarse: Model = ROUGH,
-    detector: Detecting = SiftOctDetector(0.075),  # noqa: B008
-    descriptor: Describing = SiftDescriptor(),  # noqa: B008
+    detector: Detecting = KEYPOINTS[0],
+    descriptor: Describing = KEYPOINTS[1],
+    ratio: float = 1.0,
 ) -> Estimate:
     local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("fused"))
     features = FeatureSearch(
-        FeatureMatcher(pair, detector, descriptor, held_out=local.held_out),
+        FeatureMatcher(pair, detector, descriptor, ratio, held_out=local.held_out),
         local,
         refinement,
     )
@@ -160,10 +163,10 @@ def test_the_rough_model_is_taken_where_features_agree_on_a_wrong_one(files: Tex
 
 
 def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.MonkeyPatch) -> None:
-    with files.opened() as pair, ThreadPoolExecutor(2) as executor:
-        whole = FeatureMatcher(pair).match(ROUGH, executor)
+    with files.opened() as pair, threads(2) as context:
+        whole = FeatureMatcher(pair, *KEYPOINTS).match(ROUGH, context)
         monkeypatch.setattr(tiles, "_TILE_PX", 128)
-        parts = FeatureMatcher(pair).match(ROUGH, executor)
+        parts = FeatureMatcher(pair, *KEYPOINTS).match(ROUGH, context)
 
     def places(matches: feature_tiles.FeatureMatches) -> set[tuple[float, ...]]:
         both = np.hstack([matches.reference.position_px, matches.input.position_px])
@@ -191,10 +194,10 @@ def test_only_features_on_the_ground_are_matched(files: TexturedPair, tmp_path: 
     shown = np.zeros((SIZE[1], SIZE[0]), np.uint8)
     shown[:, 100:] = 1
     mask = write_raster(tmp_path / "ground.tif", shown, files.grid)
-    with files.opened() as pair, open_raster(mask) as ground, ThreadPoolExecutor(2) as executor:
+    with files.opened() as pair, open_raster(mask) as ground, threads(2) as context:
         masked = replace(pair, reference=Image(pair.reference.source, None, ground))
-        found = FeatureMatcher(pair, shown=masked).match(ROUGH, executor)
-        everywhere = FeatureMatcher(pair).match(ROUGH, executor)
+        found = FeatureMatcher(pair, *KEYPOINTS, shown=masked).match(ROUGH, context)
+        everywhere = FeatureMatcher(pair, *KEYPOINTS).match(ROUGH, context)
     assert 50 < len(found.reference) < len(everywhere.reference)
     assert found.reference.position_px[:, 0].min() > 99
 

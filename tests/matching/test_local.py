@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundtie.matching.local import AUTO, LocalSearch
 from raster_files import write_raster
 from textured_pairs import TexturedPair, everywhere, rms, shift_on_map, write_textured_pair
 
 from groundtie.errors import TooFewPointsError
 from groundtie.geometry.models import KINDS, Model
 from groundtie.matching.layout import lay_out_chips
-from groundtie.matching.local import AUTO, LocalSearch
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.similarity.surface import SimilaritySettings

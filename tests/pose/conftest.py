@@ -1,5 +1,5 @@
-"""The pair that the tests of matching share."""
+"""The context that the tests share."""
 
-from matching.conftest import executor, other_place, pair, textured
+from contexts import context, one_thread
 
-__all__ = ["executor", "other_place", "pair", "textured"]
+__all__ = ["context", "one_thread"]

@@ -59,9 +59,9 @@ class TestField:
 
     def test_an_input_is_seen_where_its_pose_puts_it(self) -> None:
         reference = field_of(0)
-        seen = reference.seen_from(reference, Pose(shift_px=(3, -2)), 0)
+        seen = reference.resampled(reference, Pose(shift_px=(3, -2)), 0)
         np.testing.assert_allclose(seen[5:, :-5], reference.parts[3:-2, 3:-2], atol=1e-5)
-        bordered = reference.seen_from(reference, Pose(), 4)
+        bordered = reference.resampled(reference, Pose(), 4)
         np.testing.assert_allclose(bordered[4:-4, 4:-4], reference.parts, atol=1e-5)
         assert not bordered[:3].any()
 
@@ -69,7 +69,7 @@ class TestField:
         image = gaussian_filter(np.random.default_rng(0).normal(size=(81, 81)), 2)
         # `rot90` turns counter-clockwise, as a positive rotation does.
         upright, turned = (Field.of(patch(100 + i), 1.0) for i in (image, np.rot90(image)))
-        seen = turned.seen_from(upright, Pose(90.0), 0)
+        seen = turned.resampled(upright, Pose(90.0), 0)
         both = np.sum(np.conj(as_complex(upright)) * (seen[..., 0] + 1j * seen[..., 1]))
         assert np.angle(both) == pytest.approx(np.pi, abs=1e-3) or np.angle(both) == pytest.approx(
             -np.pi, abs=1e-3

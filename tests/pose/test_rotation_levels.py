@@ -1,15 +1,15 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import Executor
 
 import numpy as np
 import pytest
 from turned_pairs import turned_pair
 
+from groundtie.context import Context
 from groundtie.pose.pose import Pose
 from groundtie.pose.rotation_fields import Template
-from groundtie.pose.rotation_levels import Level, in_threads, parabola
+from groundtie.pose.rotation_levels import Level, parabola
 
 
 def surface_with(*peaks: tuple[int, int, float], radius: int = 20) -> np.ndarray:
@@ -22,8 +22,8 @@ def surface_with(*peaks: tuple[int, int, float], radius: int = 20) -> np.ndarray
 
 
 @pytest.fixture(scope="module")
-def level() -> Level:
-    return Level.of(*turned_pair(Pose(15.0, 1.2)), 2.0, [1.0, 1.2, 1.9])
+def level(context: Context) -> Level:
+    return Level.of(*turned_pair(Pose(15.0, 1.2)), 2.0, [1.0, 1.2, 1.9], context)
 
 
 class TestFields:
@@ -32,16 +32,16 @@ class TestFields:
         for scale in (1.0, 1.2, 1.9):
             assert level.input(scale).pixel_px == pytest.approx(2 * scale, rel=0.1)
 
-    def test_each_fineness_is_made_once(self) -> None:
-        level = Level.of(*turned_pair(Pose()), 2.0, np.linspace(0.97, 1.03, 9))
+    def test_each_fineness_is_made_once(self, context: Context) -> None:
+        level = Level.of(*turned_pair(Pose()), 2.0, np.linspace(0.97, 1.03, 9), context)
         assert len(level.inputs) == 1
 
     def test_the_nearest_one_is_taken(self, level: Level) -> None:
         assert level.input(5.0) is level.input(1.9)
         assert level.input(0.3) is level.input(1.0)
 
-    def test_in_threads(self, level: Level, executor: Executor) -> None:
-        other = Level.of(*turned_pair(Pose(15.0, 1.2)), 2.0, [1.0, 1.2, 1.9], executor)
+    def test_in_one_thread(self, level: Level, one_thread: Context) -> None:
+        other = Level.of(*turned_pair(Pose(15.0, 1.2)), 2.0, [1.0, 1.2, 1.9], one_thread)
         assert list(other.inputs) == list(level.inputs)
         for scale, field in level.inputs.items():
             np.testing.assert_array_equal(field.parts, other.inputs[scale].parts)
@@ -101,7 +101,3 @@ class TestParabola:
     @pytest.mark.parametrize("values", [[1, 1, 1], [2, 1, 2], [0, 1, 2]])
     def test_without_a_top_the_middle_stays(self, values: list[float]) -> None:
         assert parabola(values) == (0.0, 0.0)
-
-
-def test_in_threads_keeps_the_order(executor: Executor) -> None:
-    assert list(in_threads(executor, str, range(5))) == list(in_threads(None, str, range(5)))

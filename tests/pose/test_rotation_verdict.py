@@ -1,20 +1,21 @@
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from turned_pairs import patch, turned_pair
 
-from groundtie.pose.pose import Pose, PoseFound, PoseLimits
-from groundtie.pose.rotation_steps import rotation_steps
+from groundtie.context import Context
+from groundtie.geometry.limits import SearchLimits
+from groundtie.pose.pose import Pose, PoseFound
 from groundtie.pose.rotation_verdict import LEAST_HEIGHT, LEAST_RIVAL_RATIO, judge_pose
+from groundtie.pose.search import find_poses
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.surface import SimilaritySettings
 
 TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
-ANY = PoseLimits(30, 180, (0.8, 1.25))
+ANY = SearchLimits(30, 180, (0.8, 1.25))
 
 
 def candidates(*heights: float) -> list[PoseFound]:
@@ -27,8 +28,8 @@ def windows() -> tuple[Patch, Patch]:
 
 
 class TestWhatAnExhaustiveSearchFound:
-    def test_a_pose_that_stands_out(self, windows: tuple[Patch, Patch]) -> None:
-        verdict = judge_pose(*windows, ANY, candidates(12.0, 4.0), exhaustive=True)
+    def test_a_pose_that_stands_out(self, windows: tuple[Patch, Patch], context: Context) -> None:
+        verdict = judge_pose(*windows, ANY, candidates(12.0, 4.0), exhaustive=True, context=context)
         assert verdict.accepted
         assert verdict.summary() == {
             "accepted": True,
@@ -37,23 +38,23 @@ class TestWhatAnExhaustiveSearchFound:
             "rival_ratio": 3.0,
         }
 
-    def test_a_rival(self, windows: tuple[Patch, Patch]) -> None:
+    def test_a_rival(self, windows: tuple[Patch, Patch], context: Context) -> None:
         found = candidates(12.0, 12.0 / LEAST_RIVAL_RATIO + 0.1)
-        verdict = judge_pose(*windows, ANY, found, exhaustive=True)
+        verdict = judge_pose(*windows, ANY, found, exhaustive=True, context=context)
         assert not verdict.accepted
         assert "another pose" in verdict.reason
 
-    def test_no_higher_than_chance(self, windows: tuple[Patch, Patch]) -> None:
+    def test_no_higher_than_chance(self, windows: tuple[Patch, Patch], context: Context) -> None:
         found = candidates(LEAST_HEIGHT - 0.1, 1.0)
-        verdict = judge_pose(*windows, ANY, found, exhaustive=True)
+        verdict = judge_pose(*windows, ANY, found, exhaustive=True, context=context)
         assert not verdict.accepted
         assert "chance" in verdict.reason
 
     @pytest.mark.parametrize("heights", [(), (30.0,)])
     def test_nothing_to_compare_with(
-        self, windows: tuple[Patch, Patch], heights: tuple[float, ...]
+        self, windows: tuple[Patch, Patch], heights: tuple[float, ...], context: Context
     ) -> None:
-        verdict = judge_pose(*windows, ANY, candidates(*heights), exhaustive=True)
+        verdict = judge_pose(*windows, ANY, candidates(*heights), exhaustive=True, context=context)
         assert not verdict.accepted
         assert verdict.rival_ratio is None
 
@@ -71,32 +72,34 @@ class TestWhatAnotherSearchFound:
         ],
     )
     def test_only_the_right_pose_is_accepted(
-        self, windows: tuple[Patch, Patch], executor: Executor, pose: Pose, accepted: bool
+        self, windows: tuple[Patch, Patch], context: Context, pose: Pose, accepted: bool
     ) -> None:
         found = [PoseFound(pose, 99.0)]
-        verdict = judge_pose(*windows, ANY, found, exhaustive=False, executor=executor)
+        verdict = judge_pose(*windows, ANY, found, exhaustive=False, context=context)
         assert verdict.accepted == accepted
         assert accepted or "prefers" in verdict.reason
 
     def test_a_pose_that_the_limits_hid(
-        self, windows: tuple[Patch, Patch], executor: Executor
+        self, windows: tuple[Patch, Patch], context: Context
     ) -> None:
-        limits = PoseLimits(30, 10, (1.0, 1.0))
-        found = rotation_steps(*windows, limits, SimilaritySettings(), executor)
-        verdict = judge_pose(*windows, limits, found, exhaustive=True, executor=executor)
+        limits = SearchLimits(30, 10, (1.0, 1.0))
+        found = find_poses(*windows, limits, SimilaritySettings(), context)
+        verdict = judge_pose(*windows, limits, found, exhaustive=True, context=context)
         assert not verdict.accepted
         assert "prefers 50" in verdict.reason or "prefers 49" in verdict.reason
 
 
 @pytest.mark.parametrize("seed", [20, 21, 22])
-def test_two_places_are_refused(seed: int, executor: Executor) -> None:
+def test_two_places_are_refused(seed: int, context: Context) -> None:
     windows = turned_pair(TRUTH, seed=seed, input_seed=seed + 100)
-    found = rotation_steps(*windows, ANY, SimilaritySettings(), executor)
-    assert not judge_pose(*windows, ANY, found, exhaustive=True).accepted
+    found = find_poses(*windows, ANY, SimilaritySettings(), context)
+    assert not judge_pose(*windows, ANY, found, exhaustive=True, context=context).accepted
 
 
-def test_windows_without_content_are_refused() -> None:
+def test_windows_without_content_are_refused(context: Context) -> None:
     flat = patch(np.ones((50, 50)))
-    verdict = judge_pose(flat, flat, ANY, [PoseFound(Pose(), 9.0)], exhaustive=False)
+    verdict = judge_pose(
+        flat, flat, ANY, [PoseFound(Pose(), 9.0)], exhaustive=False, context=context
+    )
     assert not verdict.accepted
     assert "too little" in verdict.reason

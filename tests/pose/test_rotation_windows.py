@@ -44,9 +44,9 @@ def corners(width: int, height: int) -> np.ndarray:
 
 
 class TestWithGeoreferencing:
-    def test_windows_lie_as_claimed(self, tmp_path: Path) -> None:
+    def test_windows_lie_at_their_nominal_places(self, tmp_path: Path) -> None:
         grid = utm_grid(120, 100)
-        # Shown upside down, at another pixel size, the input still claims the same ground.
+        # Stored upside down, at another pixel size, the input has the same nominal ground.
         turned = Grid(Affine(-5, 0, 501_100, 0, 5, 4_999_100), UTM, 200, 180)
         windows = windows_of(waves(tmp_path / "a.tif", grid), waves(tmp_path / "b.tif", turned))
         assert windows.is_georeferenced
@@ -72,7 +72,7 @@ class TestWithGeoreferencing:
             ),
         )
         centre = windows.input_grid.pixel_to_map([windows.input_grid.centre_px])
-        px = windows.claim(centre)
+        px = windows.nominal(centre)
         assert degrees.contains(px).all()
         assert windows.input.valid.any()
 
@@ -99,7 +99,7 @@ class TestWithGeoreferencing:
         )
         reach = np.hypot(600, 500) / 2 + 200
         assert windows.reference_grid.width * 10 < 2 * reach + 20
-        assert windows.limits(10, (1.0, 1.0)).radius_px == pytest.approx(20)
+        assert windows.limits(10, (1.0, 1.0)).radius == pytest.approx(20)
 
     def test_the_default_radius_is_a_quarter_of_the_input(self, tmp_path: Path) -> None:
         grid = utm_grid(120, 100)
@@ -137,7 +137,7 @@ class TestWithoutGeoreferencing:
 
 
 class TestTransform:
-    def test_without_a_turn_it_is_the_claim(self, tmp_path: Path) -> None:
+    def test_without_a_pose_it_is_the_nominal_one(self, tmp_path: Path) -> None:
         grid, other = utm_grid(100, 90), utm_grid(60, 50, 20.0)
         windows = windows_of(waves(tmp_path / "a.tif", grid), waves(tmp_path / "b.tif", other))
         xy = grid.pixel_to_map(corners(100, 90))

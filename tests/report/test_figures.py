@@ -14,6 +14,7 @@ from matplotlib.patches import Circle
 from matplotlib.quiver import Quiver
 from rasterio.crs import CRS
 
+from groundtie.assessment.point_errors import PointErrors
 from groundtie.geometry.judging import TOLERANCE_PX
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
@@ -55,14 +56,14 @@ def tie_points(
     return points.reject(np.arange(count) == 2, "disagrees with the model")
 
 
-def measured() -> figures.Residuals:
-    return figures.Residuals.of(tie_points(), TRANSFORM, GRID)
+def measured() -> PointErrors:
+    return PointErrors.on_grid(tie_points(), TRANSFORM, GRID)
 
 
 def test_residuals_are_the_injected_errors_in_matching_pixels() -> None:
     residuals = measured()
     np.testing.assert_allclose(residuals.position_px, AT_PX, atol=1e-6)
-    np.testing.assert_allclose(residuals.residual_px, ERROR_PX, atol=1e-6)
+    np.testing.assert_allclose(residuals.error_px, ERROR_PX, atol=1e-6)
     np.testing.assert_allclose(residuals.length_px, np.hypot(*ERROR_PX.T), atol=1e-6)
 
 
@@ -78,7 +79,7 @@ def test_points_that_cannot_be_projected_are_no_residuals() -> None:
     points = tie_points()
     nowhere = points.input_px.copy()
     nowhere[3] = np.inf
-    residuals = figures.Residuals.of(replace(points, input_px=nowhere), TRANSFORM, GRID)
+    residuals = PointErrors.on_grid(replace(points, input_px=nowhere), TRANSFORM, GRID)
     assert not residuals.check[3]
     assert residuals.check[5]
 
@@ -96,26 +97,26 @@ def test_arrows_are_the_residuals_times_their_stated_factor() -> None:
 def test_arrows_of_check_points_set_the_factor_where_there_are_some() -> None:
     """A flexible model fits its own points better than it is."""
     error_px = np.array([[0.001, 0], [0, 0.001], [0, 0], [0.6, 0], [0, 0.7], [0.8, 0], [9, 9]])
-    residuals = figures.Residuals.of(tie_points(error_px=error_px), TRANSFORM, GRID)
+    residuals = PointErrors.on_grid(tie_points(error_px=error_px), TRANSFORM, GRID)
     # 4 % of 300 px over 0.7 px is 17.
     assert figures.residual_arrows(residuals, GRID).exaggeration == 10
 
 
 def test_arrows_are_never_shortened() -> None:
-    residuals = figures.Residuals.of(tie_points(error_px=ERROR_PX * 30), TRANSFORM, GRID)
+    residuals = PointErrors.on_grid(tie_points(error_px=ERROR_PX * 30), TRANSFORM, GRID)
     assert figures.residual_arrows(residuals, GRID).exaggeration == 1
 
 
 def test_arrows_of_points_without_error() -> None:
     """What rounding leaves is not blown up to arrows."""
-    residuals = figures.Residuals.of(tie_points(error_px=ERROR_PX * 1e-9), TRANSFORM, GRID)
+    residuals = PointErrors.on_grid(tie_points(error_px=ERROR_PX * 1e-9), TRANSFORM, GRID)
     assert np.abs(figures.residual_arrows(residuals, GRID).vector_px).max() < 1e-3
 
 
 @pytest.mark.parametrize("only_fit", [True, False])
 def test_arrows_without_check_points_or_any_point(only_fit: bool) -> None:
     points = tie_points().take(slice(0, 2 if only_fit else 0))
-    residuals = figures.Residuals.of(points, TRANSFORM, GRID)
+    residuals = PointErrors.on_grid(points, TRANSFORM, GRID)
     arrows = figures.residual_arrows(residuals, GRID)
     # 4 % of 300 px over the median of 1 and 1.5 px is 9.6.
     assert arrows.exaggeration == (5 if only_fit else 1)

@@ -24,7 +24,9 @@ from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.verdict import Verdict, refuse
-from groundtie.report.report import Report, versions
+from groundtie.report.correction import Correction
+from groundtie.report.page import versions
+from groundtie.report.report import Report
 from groundtie.version import __version__
 
 GRID = utm_grid(160, 120)
@@ -224,7 +226,7 @@ def test_the_verdict_comes_first(page: Page) -> None:
         "Extrapolated": "18 % of the overlap",
     }
     assert [e.text for e in page.all("sup")] == ["14"]
-    assert "90 % of right matches lie within 0.93 px (9.30 m) of where" in page.text
+    assert "90 % of inliers lie within 0.93 px (9.30 m) of where" in page.text
     assert "18 % of the overlap lies outside" in page.text
 
 
@@ -253,18 +255,73 @@ def test_the_correction_is_the_injected_shift(page: Page) -> None:
     assert f"by {length:.1f} to {length:.1f} px over the grid" in page.text
 
 
+def test_the_correction_is_the_first_line_with_its_direction(
+    page: Page, pair: ImagePair, tmp_path: Path
+) -> None:
+    (line,) = [e for e in page.all("p") if e.attributes.get("class") == "correction"]
+    # The input's georeferencing puts its ground 70 m too far east and 40 m too far north.
+    assert "at the centre: 70.0 m west, 40.0 m south;" in " ".join(line.text.split())
+    paragraphs = [e.attributes.get("class") for e in page.all("p")]
+    assert paragraphs.index("correction") == paragraphs.index("reason") - 1
+    changes = {"transform": transform_of(pair), "points": None}
+    refusal = written(refused(pair, **changes), tmp_path)
+    assert "The refused transform moves the input by" in refusal.text
+
+
+def test_the_direction_without_georeferencing(ungeoreferenced: ImagePair) -> None:
+    transform = transform_of(ungeoreferenced, np.array([7.0, -4.0]))
+    assert Correction.of(transform, ungeoreferenced.grid).direction == "7.0 px left, 4.0 px down"
+    nothing = Transform.nominal(None, ungeoreferenced.input.source.grid)
+    assert Correction.of(nothing, ungeoreferenced.grid).direction == ""
+
+
+def test_the_deciding_rule_and_its_advice_are_shown(pair: ImagePair, tmp_path: Path) -> None:
+    verdict = replace(
+        refuse("the overlap is small"), rule="overlap", advice="try a <larger> input."
+    )
+    page = written(refused(pair, verdict=verdict), tmp_path)
+    assert "The overlap is small. Try a <larger> input." in page.text
+    assert "Deciding rule: overlap" in page.text
+    numbers = numbers_in(tmp_path)["verdict"]
+    assert (numbers["rule"], numbers["advice"]) == ("overlap", "try a <larger> input.")
+
+
+def test_facts_about_the_images(pair: ImagePair, tmp_path: Path) -> None:
+    page = written(report_of(pair, scene={"reference": "radar, 1 look", "urban": None}), tmp_path)
+    assert "The images" in [e.text for e in page.all("h2")]
+    assert {"radar, 1 look", "–"} <= {e.text for e in page.all("td")}
+    assert numbers_in(tmp_path)["scene"] == {"reference": "radar, 1 look", "urban": None}
+
+
+def test_what_is_masked_is_shown_with_a_tint(pair: ImagePair, tmp_path: Path) -> None:
+    keep = np.ones((120, 160), np.uint8)
+    keep[:, :80] = 0
+    mask = write_raster(tmp_path / "mask.tif", keep, GRID)
+    with open_raster(mask) as source:
+        masked = replace(pair, reference=replace(pair.reference, mask=source))
+        page = written(report_of(masked), tmp_path)
+    plain = picture(written(report_of(pair), tmp_path), "Overview of the reference")
+    tinted = picture(page, "Overview of the reference").astype(float)
+    assert np.abs(tinted[:, 90:].mean(axis=2) - plain[:, 90:]).mean() < 5
+    # Magenta over grey: less green than red; the image is still seen.
+    assert (tinted[:, :70, 2] - tinted[:, :70, 1]).mean() > 10
+    likeness = np.corrcoef(tinted[:, :70].mean(axis=2).ravel(), plain[:, :70].ravel())[0, 1]
+    assert likeness > 0.95
+    assert "purple tint: masked" in page.text
+
+
 def test_pictures_before_and_after(page: Page) -> None:
     reference = picture(page, "Overview of the reference image reference.tif").astype(float)
-    claimed = picture(page, "Overview of the input image input.tif where it claims").astype(float)
+    nominal = picture(page, "Overview of the input image input.tif at its nominal").astype(float)
     registered = picture(page, "Overview of the input image input.tif as registered").astype(float)
     inside = np.s_[15:-15, 15:-15]
-    assert reference.shape == claimed.shape == registered.shape == (120, 160)
+    assert reference.shape == nominal.shape == registered.shape == (120, 160)
 
     def likeness(image: np.ndarray) -> float:
         return float(np.corrcoef(image[inside].ravel(), reference[inside].ravel())[0, 1])
 
     assert likeness(registered) > 0.99
-    assert likeness(claimed) < 0.9
+    assert likeness(nominal) < 0.9
 
 
 def test_the_viewer_can_be_used_by_keyboard(page: Page) -> None:
@@ -401,7 +458,7 @@ def test_refused_without_a_transform(pair: ImagePair, tmp_path: Path) -> None:
     assert "No registered image was written: there is no transform." in page.text
     assert set(page.numbers.values()) == {"–", "0 of 0"}
     headings = [e.text for e in page.all("h2")]
-    assert headings == ["Refused", "The images as claimed", "How it was made"]
+    assert headings == ["Refused", "The images at their nominal positions", "How it was made"]
     assert not [e for e in page.all("input") if e.attributes.get("name") == "state"]
     assert len(page.all("img")) == 2
     assert numbers_in(tmp_path)["transform"] is None

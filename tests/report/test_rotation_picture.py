@@ -5,11 +5,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from contexts import context
 from turned_pairs import patch, turned_pair
 
+from groundtie.context import Context
 from groundtie.errors import OutputError
-from groundtie.pose.pose import Pose, PoseLimits
-from groundtie.report.rotation_picture import checkerboard, draw_evidence
+from groundtie.geometry.limits import SearchLimits
+from groundtie.pose.pose import Pose
+from groundtie.report.rotation_picture import checkerboard, draw_rotation
+
+__all__ = ["context"]
 
 TRUTH = Pose(30.0, 1.2, (5.0, 5.0))
 
@@ -38,20 +43,24 @@ class TestCheckerboard:
 @pytest.mark.parametrize(
     ("limits", "pose"),
     [
-        (PoseLimits(20, 180, (0.8, 1.25)), TRUTH),
-        (PoseLimits(10), TRUTH),
-        (PoseLimits(10, 10), None),
+        (SearchLimits(20, 180, (0.8, 1.25)), TRUTH),
+        (SearchLimits(10), TRUTH),
+        (SearchLimits(10, 10), None),
     ],
 )
-def test_a_picture_is_drawn(tmp_path: Path, limits: PoseLimits, pose: Pose | None) -> None:
+def test_a_picture_is_drawn(
+    tmp_path: Path, limits: SearchLimits, pose: Pose | None, context: Context
+) -> None:
     path = tmp_path / "picture.png"
-    draw_evidence(path, *turned_pair(TRUTH), limits, pose, "a title")
+    draw_rotation(path, *turned_pair(TRUTH), limits, pose, "a title", context)
     image = cv2.imread(str(path))
     assert image.shape[0] > 500
     assert image.std() > 20
 
 
-def test_a_disk_that_cannot_be_written_to(tmp_path: Path) -> None:
+def test_a_disk_that_cannot_be_written_to(tmp_path: Path, context: Context) -> None:
     windows = turned_pair(TRUTH)
     with pytest.raises(OutputError):
-        draw_evidence(tmp_path / "no" / "p.png", *windows, PoseLimits(10), TRUTH, "a title")
+        draw_rotation(
+            tmp_path / "no" / "p.png", *windows, SearchLimits(10), TRUTH, "a title", context
+        )

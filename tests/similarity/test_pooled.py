@@ -40,7 +40,7 @@ def on_each_other(chips: list[tuple[Patch, Patch]]) -> list[tuple[Patch, Patch]]
 
 
 def levels_of(chips: list[tuple[Patch, Patch]]) -> tuple[PooledHistogram, list[np.ndarray]]:
-    """Return what chips on each other say, and their grey values."""
+    """Return the pooled histogram of aligned chips, and their grey values."""
     sides = [
         np.concatenate([smooth(template).values[template.valid] for template, _ in chips]),
         np.concatenate([search.values[template.valid] for template, search in chips]),
@@ -48,19 +48,19 @@ def levels_of(chips: list[tuple[Patch, Patch]]) -> tuple[PooledHistogram, list[n
     return PooledHistogram.of(*sides), sides
 
 
-def test_the_mean_evidence_is_mutual_information() -> None:
+def test_the_mean_is_mutual_information() -> None:
     """As scikit-learn has it, of the same grey levels."""
     levels, values = levels_of(on_each_other(ground_chips(40, 1.0)))
     edges = levels.template_edges, levels.search_edges
     sides = [np.searchsorted(e, v, side="right") for e, v in zip(edges, values, strict=True)]
-    mean = float(levels.evidence[sides[0], sides[1]].mean())
+    mean = float(levels.information[sides[0], sides[1]].mean())
     assert mean == pytest.approx(mutual_info_score(*sides), abs=1e-3)
     assert mean > 0.1
     for side in sides:
         assert np.bincount(side, minlength=BINS).min() > 0.9 * side.size / BINS
 
 
-def test_a_surface_adds_up_what_the_pixels_say() -> None:
+def test_a_surface_sums_the_information_of_pixels() -> None:
     [(template, search)] = ground_chips(1, 0.3)
     search.valid[10:20, 15:30] = False
     levels, _ = levels_of(on_each_other(ground_chips(5, 0.5)))
@@ -71,7 +71,7 @@ def test_a_surface_adds_up_what_the_pixels_say() -> None:
     for row, col in [(0, 0), (8, 8), (3, 16), (16, 1)]:
         window = np.s_[row : row + height, col : col + width]
         counted = template.valid & search.valid[window]
-        expected = levels.evidence[there, here[window]][counted].sum()
+        expected = levels.information[there, here[window]][counted].sum()
         assert surface[row, col] == pytest.approx(expected, rel=1e-4, abs=1e-2)
 
 

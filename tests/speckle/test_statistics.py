@@ -7,7 +7,6 @@ from scipy.ndimage import generic_filter
 from groundtie.speckle.statistics import (
     estimate_looks,
     local_statistics,
-    speckle_variation2,
     window_counts,
 )
 
@@ -79,13 +78,3 @@ def test_looks_are_estimated_from_valid_pixels_alone() -> None:
     assert estimate_looks(image, valid) == pytest.approx(4.0, rel=0.08)
     assert estimate_looks(image, np.zeros_like(valid)) == 1.0
     assert estimate_looks(np.ones_like(image), np.ones_like(valid)) == 1.0
-
-
-@pytest.mark.parametrize("looks", [1.0, 3.5, 20.0])
-def test_variation_of_speckle_is_that_of_drawn_speckle(looks: float) -> None:
-    intensity = np.random.default_rng(0).gamma(looks, 1 / looks, 400_000)
-    for amplitude, values in ((False, intensity), (True, np.sqrt(intensity))):
-        expected = values.var() / values.mean() ** 2
-        assert speckle_variation2(looks, amplitude=amplitude) == pytest.approx(expected, rel=0.02)
-    # Rayleigh: 4 / pi - 1.
-    assert speckle_variation2(1.0, amplitude=True) == pytest.approx(4 / np.pi - 1)

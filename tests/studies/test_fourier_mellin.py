@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
-
 import numpy as np
 import pytest
 from posed_windows import error_px, masked, shifted_by, turned_by, window
 
-from groundtie.pose.polar import ANGLE_STEP_DEG, ANGLES, half_turns
-from groundtie.pose.pose import Pose, PoseFound, PoseLimits
+from groundtie.context import Context
+from groundtie.geometry.limits import SearchLimits
+from groundtie.pose.pose import Pose, PoseFound
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.surface import SimilaritySettings
 from groundtie.studies.fourier_mellin import (
     RETURNED,
     correlate_spectra,
     fourier_mellin,
+    rotations,
     spectra,
     spectrum,
-    turns,
 )
+from groundtie.studies.polar import ANGLE_STEP_DEG, ANGLES, half_turns
 
 GREY, FIELD = SimilaritySettings("ncc"), SimilaritySettings("fused")
 REFERENCE = window((160, 160))
-ANY = PoseLimits(40.0, 180.0, (0.5, 2.0))
+ANY = SearchLimits(40.0, 180.0, (0.5, 2.0))
 
 
 def is_right(found: PoseFound, truth: Pose) -> bool:
@@ -45,120 +45,122 @@ def is_right(found: PoseFound, truth: Pose) -> bool:
     ],
     ids=str,
 )
-def test_poses_are_found(truth: Pose, side: int, settings: SimilaritySettings) -> None:
-    found = fourier_mellin(REFERENCE, window((side, side), truth), ANY, settings)
+def test_poses_are_found(
+    truth: Pose, side: int, settings: SimilaritySettings, context: Context
+) -> None:
+    found = fourier_mellin(REFERENCE, window((side, side), truth), ANY, settings, context)
     assert is_right(found[0], truth)
 
 
-def test_better_than_the_lattice_of_angles() -> None:
+def test_better_than_the_lattice_of_angles(context: Context) -> None:
     """Thesis P gets 2.8125° for 3°, the step of its lattice."""
     truth = Pose(3.1)
     assert truth.rotation_deg / ANGLE_STEP_DEG % 1 != 0
-    found = fourier_mellin(REFERENCE, window((160, 160), truth), PoseLimits(5, 30), GREY)
+    found = fourier_mellin(REFERENCE, window((160, 160), truth), SearchLimits(5, 30), GREY, context)
     assert turned_by(found[0], truth) < 0.03
 
 
-def test_windows_need_not_be_square() -> None:
+def test_windows_need_not_be_square(context: Context) -> None:
     truth = Pose(12.0, 1.1, (6.0, -9.0))
-    found = fourier_mellin(window((150, 200)), window((190, 170), truth), ANY, GREY)
+    found = fourier_mellin(window((150, 200)), window((190, 170), truth), ANY, GREY, context)
     assert is_right(found[0], truth)
 
 
-def test_large_windows_are_tried_small() -> None:
+def test_large_windows_are_tried_small(context: Context) -> None:
     truth = Pose(-41.0, 1.2, (-23.0, 31.0))
-    found = fourier_mellin(window((330, 330)), window((330, 330), truth), ANY, GREY)
+    found = fourier_mellin(window((330, 330)), window((330, 330), truth), ANY, GREY, context)
     assert is_right(found[0], truth)
 
 
-def test_inverted_contrast() -> None:
+def test_inverted_contrast(context: Context) -> None:
     truth = Pose(24.0, 1.2, (8.0, -5.0))
     input = window((200, 200), truth)
     inverted = Patch(1e4 / input.values, input.valid)
-    assert is_right(fourier_mellin(REFERENCE, inverted, ANY, FIELD)[0], truth)
+    assert is_right(fourier_mellin(REFERENCE, inverted, ANY, FIELD, context)[0], truth)
 
 
-def test_noise() -> None:
+def test_noise(context: Context) -> None:
     truth = Pose(17.0, 0.9, (-7.0, 4.0))
-    found = fourier_mellin(REFERENCE, window((160, 160), truth, noise=25.0), ANY, GREY)[0]
+    found = fourier_mellin(REFERENCE, window((160, 160), truth, noise=25.0), ANY, GREY, context)[0]
     assert turned_by(found, truth) < 0.3
     assert shifted_by(found, truth) < 0.5
 
 
 @pytest.mark.parametrize("settings", [GREY, FIELD], ids=lambda s: s.similarity)
-def test_masked_corners(settings: SimilaritySettings) -> None:
-    """The corners that a turned image does not fill, as thesis P has them."""
+def test_masked_corners(settings: SimilaritySettings, context: Context) -> None:
+    """The corners that a turned image does not fill, as [Patel2017] has them."""
     truth = Pose(25.0, 1.0, (6.0, -3.0))
     input = window((160, 160), truth)
     rows, cols = np.indices((160, 160)) - 79.5
     moved = np.stack([cols - 6.0, rows + 3.0])
     inside = np.abs(np.einsum("ij,jkl->ikl", np.linalg.inv(truth.linear), moved)).max(axis=0)
     corners = Patch(np.where(inside < 80, input.values, 0), inside < 80)
-    found = fourier_mellin(REFERENCE, corners, PoseLimits(20, 30, (0.9, 1.1)), settings)
+    found = fourier_mellin(REFERENCE, corners, SearchLimits(20, 30, (0.9, 1.1)), settings, context)
     assert is_right(found[0], truth)
 
 
-def test_masked_pixels_do_not_count() -> None:
+def test_masked_pixels_do_not_count(context: Context) -> None:
     truth = Pose(25.0, 1.0, (6.0, -3.0))
     input = masked(window((160, 160), truth), slice(100, 130), slice(20, 50))
-    found = fourier_mellin(REFERENCE, input, PoseLimits(20, 30, (0.9, 1.1)), GREY)
+    found = fourier_mellin(REFERENCE, input, SearchLimits(20, 30, (0.9, 1.1)), GREY, context)
     assert is_right(found[0], truth)
 
 
 @pytest.mark.parametrize(
     "limits",
     [
-        PoseLimits(20.0, 10.0, (0.9, 1.1)),
-        PoseLimits(20.0, 30.0),
-        PoseLimits(5.0, 120.0, (0.5, 2.0)),
-        PoseLimits(20.0, 0.0, (0.5, 2.0)),
-        PoseLimits(20.0, 180.0, (1.3, 1.6)),
+        SearchLimits(20.0, 10.0, (0.9, 1.1)),
+        SearchLimits(20.0, 30.0),
+        SearchLimits(5.0, 120.0, (0.5, 2.0)),
+        SearchLimits(20.0, 0.0, (0.5, 2.0)),
+        SearchLimits(20.0, 180.0, (1.3, 1.6)),
     ],
     ids=str,
 )
-def test_limits_are_kept(limits: PoseLimits) -> None:
+def test_limits_are_kept(limits: SearchLimits, context: Context) -> None:
     truth = Pose(24.0, 1.2, (8.0, -12.0))
-    for one in fourier_mellin(REFERENCE, window((200, 200), truth), limits, GREY):
+    for one in fourier_mellin(REFERENCE, window((200, 200), truth), limits, GREY, context):
         assert abs(one.pose.rotation_deg) <= limits.rotation_deg
         assert limits.scale[0] <= one.pose.scale <= limits.scale[1]
-        assert np.abs(one.pose.shift_px).max() <= limits.radius_px
+        assert np.abs(one.pose.shift_px).max() <= limits.radius
 
 
-def test_a_known_scale_is_exact() -> None:
+def test_a_known_scale_is_exact(context: Context) -> None:
     truth = Pose(24.0, 1.25, (8.0, -12.0))
-    limits = PoseLimits(20.0, 30.0, (1.25, 1.25))
-    (found, *_) = fourier_mellin(REFERENCE, window((200, 200), truth), limits, GREY)
+    limits = SearchLimits(20.0, 30.0, (1.25, 1.25))
+    (found, *_) = fourier_mellin(REFERENCE, window((200, 200), truth), limits, GREY, context)
     assert found.pose.scale == 1.25
     assert is_right(found, truth)
 
 
-def test_the_half_turn_is_told_by_the_shift() -> None:
+def test_the_half_turn_is_told_by_the_shift(context: Context) -> None:
     for degrees in (20.0, -160.0):
         truth = Pose(degrees)
-        found = fourier_mellin(REFERENCE, window((160, 160), truth), ANY, GREY)
+        found = fourier_mellin(REFERENCE, window((160, 160), truth), ANY, GREY, context)
         assert turned_by(found[0], truth) < 0.1
         assert all(turned_by(other, truth) > 1 for other in found[1:])
 
 
-def test_another_place_does_not_stand_out() -> None:
-    true = fourier_mellin(REFERENCE, window((160, 160)), ANY, GREY)[0].height
-    found = fourier_mellin(REFERENCE, window((160, 160), seed=5), ANY, GREY)
+def test_another_place_does_not_stand_out(context: Context) -> None:
+    true = fourier_mellin(REFERENCE, window((160, 160)), ANY, GREY, context)[0].height
+    found = fourier_mellin(REFERENCE, window((160, 160), seed=5), ANY, GREY, context)
     assert 0 < len(found) <= RETURNED
     assert all(one.height < true / 5 for one in found)
 
 
-def test_threads_change_nothing(executor: Executor) -> None:
+def test_threads_change_nothing(context: Context, one_thread: Context) -> None:
     input = window((160, 160), Pose(10.0))
-    alone = fourier_mellin(REFERENCE, input, ANY, GREY)
-    assert fourier_mellin(REFERENCE, input, ANY, GREY, executor) == alone
+    alone = fourier_mellin(REFERENCE, input, ANY, GREY, one_thread)
+    assert fourier_mellin(REFERENCE, input, ANY, GREY, context) == alone
 
 
 @pytest.mark.parametrize("settings", [GREY, FIELD], ids=lambda s: s.similarity)
-def test_what_has_no_content_has_no_pose(settings: SimilaritySettings) -> None:
+def test_what_has_no_content_has_no_pose(settings: SimilaritySettings, context: Context) -> None:
     flat = Patch(np.full((90, 80), 3, np.float32), np.ones((90, 80), bool))
     nothing = Patch(REFERENCE.values, np.zeros(REFERENCE.valid.shape, bool))
     for empty in (flat, nothing):
-        assert fourier_mellin(REFERENCE, empty, ANY, settings) == []
-        assert fourier_mellin(empty, REFERENCE, ANY, settings) == []
+        assert fourier_mellin(REFERENCE, empty, ANY, settings, context) == []
+        assert fourier_mellin(empty, REFERENCE, ANY, settings, context) == []
 
 
 def test_a_wave_is_a_point_of_the_spectrum() -> None:
@@ -189,19 +191,19 @@ def test_a_spectrum_does_not_change_with_the_shift() -> None:
 def test_the_correlation_peaks_at_rotation_and_scale() -> None:
     truth = Pose(-33.0, 1.4)
     surface = correlate_spectra(*spectra(REFERENCE, window((224, 224), truth), GREY, disc=True))
-    first, second, *_ = turns(surface, ANY, 2)
+    first, second, *_ = rotations(surface, ANY, 2)
     assert first.rotation_deg == pytest.approx(-33, abs=0.5)
     assert second.rotation_deg == pytest.approx(147, abs=0.5)
     assert first.scale == second.scale == pytest.approx(1.4, rel=0.02)
 
 
 def test_no_variation_gives_no_turns() -> None:
-    assert list(turns(np.zeros((ANGLES, 64), np.float32), ANY, 3)) == []
+    assert list(rotations(np.zeros((ANGLES, 64), np.float32), ANY, 3)) == []
 
 
 def test_half_turns_within_limits() -> None:
-    assert [p.rotation_deg for p in half_turns(20.0, 1.0, PoseLimits(1, 180))] == [20, -160]
-    assert [p.rotation_deg for p in half_turns(-20.0, 1.0, PoseLimits(1, 180))] == [-20, 160]
-    assert [p.rotation_deg for p in half_turns(20.0, 1.0, PoseLimits(1, 90))] == [20]
-    assert [p.rotation_deg for p in half_turns(80.0, 1.0, PoseLimits(1, 110))] == [80, -100]
-    assert list(half_turns(50.0, 1.0, PoseLimits(1, 30))) == []
+    assert [p.rotation_deg for p in half_turns(20.0, 1.0, SearchLimits(1, 180))] == [20, -160]
+    assert [p.rotation_deg for p in half_turns(-20.0, 1.0, SearchLimits(1, 180))] == [-20, 160]
+    assert [p.rotation_deg for p in half_turns(20.0, 1.0, SearchLimits(1, 90))] == [20]
+    assert [p.rotation_deg for p in half_turns(80.0, 1.0, SearchLimits(1, 110))] == [80, -100]
+    assert list(half_turns(50.0, 1.0, SearchLimits(1, 30))) == []

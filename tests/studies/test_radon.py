@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
-
 import numpy as np
 import pytest
 from posed_windows import masked, shifted_by, turned_by, window
 
-from groundtie.pose.polar import ANGLE_STEP_DEG, ANGLES, evened, log_power
-from groundtie.pose.pose import Pose, PoseFound, PoseLimits
+from groundtie.context import Context
+from groundtie.geometry.limits import SearchLimits
+from groundtie.pose.pose import Pose, PoseFound
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.surface import SimilaritySettings
+from groundtie.studies.polar import ANGLE_STEP_DEG, ANGLES, evened, log_power
 from groundtie.studies.radon import (
     RETURNED,
     projection_spectra,
@@ -24,7 +24,7 @@ from groundtie.studies.radon import (
 
 GREY, FIELD = SimilaritySettings("ncc"), SimilaritySettings("fused")
 REFERENCE = window((160, 160))
-LIMITS = PoseLimits(40.0, 30.0)
+LIMITS = SearchLimits(40.0, 30.0)
 
 
 def is_right(found: PoseFound, truth: Pose) -> bool:
@@ -43,96 +43,99 @@ def is_right(found: PoseFound, truth: Pose) -> bool:
     ],
     ids=str,
 )
-def test_poses_of_thesis_p(truth: Pose, settings: SimilaritySettings) -> None:
-    found = radon(REFERENCE, window((160, 160), truth), LIMITS, settings)
+def test_poses_of_thesis_p(truth: Pose, settings: SimilaritySettings, context: Context) -> None:
+    found = radon(REFERENCE, window((160, 160), truth), LIMITS, settings, context)
     assert is_right(found[0], truth)
     assert found[0].pose.scale == 1
 
 
 @pytest.mark.parametrize("degrees", [65.0, -118.0, 172.0])
-def test_any_rotation(degrees: float) -> None:
+def test_any_rotation(degrees: float, context: Context) -> None:
     truth = Pose(degrees, 1.0, (7.0, -4.0))
-    found = radon(REFERENCE, window((160, 160), truth), PoseLimits(20, 180), GREY)
+    found = radon(REFERENCE, window((160, 160), truth), SearchLimits(20, 180), GREY, context)
     assert is_right(found[0], truth)
 
 
-def test_windows_need_not_be_of_one_shape() -> None:
+def test_windows_need_not_be_of_one_shape(context: Context) -> None:
     truth = Pose(12.0, 1.0, (6.0, -9.0))
-    found = radon(window((150, 200)), window((190, 170), truth), LIMITS, GREY)
+    found = radon(window((150, 200)), window((190, 170), truth), LIMITS, GREY, context)
     assert is_right(found[0], truth)
 
 
-def test_large_windows_are_reduced_for_the_rotation() -> None:
+def test_large_windows_are_reduced_for_the_rotation(context: Context) -> None:
     truth = Pose(-21.0, 1.0, (-23.0, 31.0))
-    found = radon(window((420, 400)), window((420, 400), truth), LIMITS, GREY)
+    found = radon(window((420, 400)), window((420, 400), truth), LIMITS, GREY, context)
     assert is_right(found[0], truth)
 
 
-def test_inverted_contrast() -> None:
+def test_inverted_contrast(context: Context) -> None:
     truth = Pose(24.0, 1.0, (8.0, -5.0))
     input = window((160, 160), truth)
     inverted = Patch(1e4 / input.values, input.valid)
-    assert is_right(radon(REFERENCE, inverted, LIMITS, FIELD)[0], truth)
+    assert is_right(radon(REFERENCE, inverted, LIMITS, FIELD, context)[0], truth)
 
 
-def test_a_known_scale() -> None:
+def test_a_known_scale(context: Context) -> None:
     truth = Pose(24.0, 1.25, (8.0, -12.0))
-    limits = PoseLimits(20.0, 30.0, (1.25, 1.25))
-    (found, *_) = radon(REFERENCE, window((200, 200), truth), limits, GREY)
+    limits = SearchLimits(20.0, 30.0, (1.25, 1.25))
+    (found, *_) = radon(REFERENCE, window((200, 200), truth), limits, GREY, context)
     assert found.pose.scale == 1.25
     assert is_right(found, truth)
 
 
-def test_noise() -> None:
+def test_noise(context: Context) -> None:
     truth = Pose(17.0, 1.0, (-7.0, 4.0))
-    assert is_right(radon(REFERENCE, window((160, 160), truth, noise=25.0), LIMITS, GREY)[0], truth)
+    assert is_right(
+        radon(REFERENCE, window((160, 160), truth, noise=25.0), LIMITS, GREY, context)[0], truth
+    )
 
 
-def test_masked_pixels_do_not_count() -> None:
+def test_masked_pixels_do_not_count(context: Context) -> None:
     truth = Pose(15.0, 1.0, (6.0, -3.0))
     input = masked(window((160, 160), truth), slice(100, 130), slice(0, 30))
-    assert is_right(radon(REFERENCE, input, LIMITS, GREY)[0], truth)
+    assert is_right(radon(REFERENCE, input, LIMITS, GREY, context)[0], truth)
 
 
 @pytest.mark.parametrize(
     "limits",
-    [PoseLimits(20.0, 10.0), PoseLimits(5.0, 30.0), PoseLimits(20.0, 180.0, (1.3, 1.6))],
+    [SearchLimits(20.0, 10.0), SearchLimits(5.0, 30.0), SearchLimits(20.0, 180.0, (1.3, 1.6))],
     ids=str,
 )
-def test_limits_are_kept(limits: PoseLimits) -> None:
+def test_limits_are_kept(limits: SearchLimits, context: Context) -> None:
     truth = Pose(24.0, 1.0, (8.0, -12.0))
-    for one in radon(REFERENCE, window((200, 200), truth), limits, GREY):
+    for one in radon(REFERENCE, window((200, 200), truth), limits, GREY, context):
         assert abs(one.pose.rotation_deg) <= limits.rotation_deg
         assert limits.scale[0] <= one.pose.scale <= limits.scale[1]
-        assert np.abs(one.pose.shift_px).max() <= limits.radius_px + 1e-9
+        assert np.abs(one.pose.shift_px).max() <= limits.radius + 1e-9
 
 
-def test_without_rotation_only_the_shift_is_found() -> None:
+def test_without_rotation_only_the_shift_is_found(context: Context) -> None:
     truth = Pose(0.0, 1.0, (-13.4, 8.8))
-    (found, *_) = radon(REFERENCE, window((160, 160), truth), PoseLimits(20.0), GREY)
+    (found, *_) = radon(REFERENCE, window((160, 160), truth), SearchLimits(20.0), GREY, context)
     assert found.pose.rotation_deg == 0
     assert is_right(found, truth)
 
 
-def test_another_place_does_not_stand_out() -> None:
-    true = radon(REFERENCE, window((160, 160)), LIMITS, GREY)[0].height
-    found = radon(REFERENCE, window((160, 160), seed=5), LIMITS, GREY)
+def test_another_place_does_not_stand_out(context: Context) -> None:
+    true = radon(REFERENCE, window((160, 160)), LIMITS, GREY, context)[0].height
+    found = radon(REFERENCE, window((160, 160), seed=5), LIMITS, GREY, context)
     assert 0 < len(found) <= RETURNED
     assert found[0].height < true / 2
 
 
-def test_threads_change_nothing(executor: Executor) -> None:
+def test_threads_change_nothing(context: Context, one_thread: Context) -> None:
     input = window((160, 160), Pose(10.0))
-    assert radon(REFERENCE, input, LIMITS, GREY, executor) == radon(REFERENCE, input, LIMITS, GREY)
+    alone = radon(REFERENCE, input, LIMITS, GREY, one_thread)
+    assert radon(REFERENCE, input, LIMITS, GREY, context) == alone
 
 
 @pytest.mark.parametrize("settings", [GREY, FIELD], ids=lambda s: s.similarity)
-def test_what_has_no_content_has_no_pose(settings: SimilaritySettings) -> None:
+def test_what_has_no_content_has_no_pose(settings: SimilaritySettings, context: Context) -> None:
     flat = Patch(np.full((90, 80), 3, np.float32), np.ones((90, 80), bool))
     nothing = Patch(REFERENCE.values, np.zeros(REFERENCE.valid.shape, bool))
     for empty in (flat, nothing):
-        assert radon(REFERENCE, empty, LIMITS, settings) == []
-        assert radon(empty, REFERENCE, LIMITS, settings) == []
+        assert radon(REFERENCE, empty, LIMITS, settings, context) == []
+        assert radon(empty, REFERENCE, LIMITS, settings, context) == []
 
 
 def blob(right: float, down: float, side: int = 101, sigma: float = 3.0) -> np.ndarray:
@@ -171,9 +174,9 @@ def test_a_shift_moves_projections_along_a_sine() -> None:
 def test_the_spectra_of_projections_turn_with_the_image() -> None:
     truth = Pose(31.0, 1.0, (5.0, -8.0))
     found = projection_spectra(REFERENCE, window((160, 160), truth), GREY, disc=True)
-    (best,) = rotations(found, PoseLimits(0, 60), 1)
+    (best,) = rotations(found, SearchLimits(0, 60), 1)
     assert best.rotation_deg == pytest.approx(31, abs=0.3)
-    assert [p.rotation_deg for p in rotations(found, PoseLimits(0, 180), 1)] == pytest.approx(
+    assert [p.rotation_deg for p in rotations(found, SearchLimits(0, 180), 1)] == pytest.approx(
         [31, -149], abs=0.3
     )
 

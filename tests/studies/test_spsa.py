@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from scipy.ndimage import affine_transform, gaussian_filter
 
+from groundtie.context import Context
 from groundtie.errors import ParameterError
-from groundtie.pose.pose import Pose, PoseLimits
+from groundtie.geometry.limits import SearchLimits
+from groundtie.pose.pose import Pose
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.surface import SimilaritySettings
-from groundtie.studies.objective import Counted, Effort, PoseSpace
+from groundtie.studies.climbing import Counted, Effort, PoseSpace
 from groundtie.studies.spsa import (
     ALPHA,
     GAMMA,
@@ -44,7 +46,7 @@ def ascend(
     climb: Callable[..., Place], function: Callable[[Place], float], seed: int, **space: object
 ) -> tuple[Place, Counted]:
     similarity = Counted(function)
-    where = PoseSpace(PoseLimits(20), 30.0, **space)  # type: ignore[arg-type]
+    where = PoseSpace(SearchLimits(20), 30.0, **space)  # type: ignore[arg-type]
     rng = np.random.default_rng(seed)
     return climb(similarity, where, (-15.0, 12.0), rng, Gains(look_px=1.0)), similarity
 
@@ -97,7 +99,7 @@ def test_looks_stay_within_limits(climb: Callable[..., Place]) -> None:
 
 def test_a_climb_on_a_plain_gives_up() -> None:
     """Three looks a step, one of them where it stands, and 40 of them without a change."""
-    start, space = (3.0, 4.0), PoseSpace(PoseLimits(20), 30.0)
+    start, space = (3.0, 4.0), PoseSpace(SearchLimits(20), 30.0)
     plain = Counted(lambda _: 1.0)
     found = climb_first_order(plain, space, start, np.random.default_rng(0), Gains())
     assert found == start
@@ -107,7 +109,7 @@ def test_a_climb_on_a_plain_gives_up() -> None:
 
 def test_a_climb_of_second_order_on_a_plain_gives_up() -> None:
     """Five looks a step; some of them may meet."""
-    start, space = (3.0, 4.0), PoseSpace(PoseLimits(20), 30.0)
+    start, space = (3.0, 4.0), PoseSpace(SearchLimits(20), 30.0)
     plain = Counted(lambda _: 1.0)
     assert climb_second_order(plain, space, start, np.random.default_rng(0), Gains()) == start
     steps = -(-PATIENCE // 5)
@@ -123,7 +125,7 @@ def test_a_step_of_first_order_is_spalls() -> None:
         asked.append(place)
         return place[0]
 
-    space = PoseSpace(PoseLimits(1e6), 30.0)
+    space = PoseSpace(SearchLimits(1e6), 30.0)
     climb_first_order(
         Counted(lambda p: slope(p) if len(asked) < 60 else 0.0),
         space,
@@ -165,9 +167,11 @@ def posed(pose: Pose, side: int = 64, margin: int = 20) -> tuple[Patch, Patch]:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_discrete_search_finds_a_known_shift(seed: int) -> None:
+def test_the_discrete_search_finds_a_known_shift(seed: int, context: Context) -> None:
     windows = posed(Pose(shift_px=(11.0, -5.0)))
-    found = discrete_spsa(*windows, PoseLimits(20), NMI, effort=Effort(agreeing=3, seed=seed))
+    found = replace(discrete_spsa, effort=Effort(agreeing=3))(
+        *windows, SearchLimits(20), NMI, replace(context, seed=seed)
+    )
     assert found[0].pose == Pose(shift_px=(11.0, -5.0))
     assert found[0].height > 5
     assert found[0].evaluations < 41**2 / 3
@@ -175,58 +179,68 @@ def test_the_discrete_search_finds_a_known_shift(seed: int) -> None:
 
 
 @pytest.mark.parametrize("search", [spsa, spsa_second_order])
-def test_continuous_searches_find_a_known_shift(search: Callable[..., list]) -> None:
+def test_continuous_searches_find_a_known_shift(
+    search: Callable[..., list], context: Context
+) -> None:
     windows = posed(Pose(shift_px=(-6.4, 3.3)))
-    found = search(*windows, PoseLimits(12), NMI, effort=LITTLE)
+    found = replace(search, effort=LITTLE)(*windows, SearchLimits(12), NMI, context)
     np.testing.assert_allclose(found[0].pose.shift_px, (-6.4, 3.3), atol=0.7)
     assert (found[0].pose.rotation_deg, found[0].pose.scale) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("search", [spsa, spsa_second_order])
-def test_rotation_and_scale_are_found_with_the_shift(search: Callable[..., list]) -> None:
+def test_rotation_and_scale_are_found_with_the_shift(
+    search: Callable[..., list], context: Context
+) -> None:
     truth = Pose(4.0, 1.05, (3.0, -2.0))
-    found = search(*posed(truth), PoseLimits(6, 8, (0.9, 1.1)), NMI, effort=LITTLE)[0].pose
+    found = replace(search, effort=LITTLE)(
+        *posed(truth), SearchLimits(6, 8, (0.9, 1.1)), NMI, context
+    )[0].pose
     assert found.rotation_deg == pytest.approx(4.0, abs=1.0)
     assert found.scale == pytest.approx(1.05, abs=0.02)
     np.testing.assert_allclose(found.shift_px, truth.shift_px, atol=0.8)
 
 
-def test_windows_of_unlike_parity() -> None:
+def test_windows_of_unlike_parity(context: Context) -> None:
     """Their pixels meet where the centres are half a pixel apart."""
     ground = texture(100)
     reference, input = patch(ground[20:80, 20:80]), patch(-ground[9:92, 11:94])
-    found = discrete_spsa(reference, input, PoseLimits(8), NMI, effort=Effort(agreeing=4))
+    found = replace(discrete_spsa, effort=Effort(agreeing=4))(
+        reference, input, SearchLimits(8), NMI, context
+    )
     # Reference pixel (0, 0) is input pixel (9, 11); the centres are at 29.5 and 41.
     assert found[0].pose.shift_px == (9 + 29.5 - 41, 11 + 29.5 - 41)
 
 
-def test_the_seed_decides() -> None:
+def test_the_seed_decides(context: Context) -> None:
     windows = posed(Pose(shift_px=(4.0, 3.0)), side=40)
     effort = Effort(restarts=3, agreeing=2)
     for search in (spsa, spsa_second_order, discrete_spsa):
-        run = partial(search, *windows, PoseLimits(8), NMI)
-        one, same, other = (run(effort=replace(effort, seed=seed)) for seed in (3, 3, 4))
+        run = partial(replace(search, effort=effort), *windows, SearchLimits(8), NMI)
+        one, same, other = (run(replace(context, seed=seed)) for seed in (3, 3, 4))
         assert one == same
         assert one != other
 
 
 @pytest.mark.parametrize("search", [spsa, spsa_second_order, discrete_spsa])
-def test_flat_windows_have_no_pose(search: Callable[..., list]) -> None:
+def test_flat_windows_have_no_pose(search: Callable[..., list], context: Context) -> None:
     flat, textured = patch(np.ones((40, 40))), patch(texture(40))
     for one, other in ((flat, textured), (textured, flat)):
-        assert search(one, other, PoseLimits(5), NMI) == []
+        assert search(one, other, SearchLimits(5), NMI, context) == []
 
 
-@pytest.mark.parametrize("limits", [PoseLimits(5, 1.0), PoseLimits(5, scale=(0.9, 1.1))])
-def test_discrete_spsa_neither_turns_nor_scales(limits: PoseLimits) -> None:
+@pytest.mark.parametrize("limits", [SearchLimits(5, 1.0), SearchLimits(5, scale=(0.9, 1.1))])
+def test_discrete_spsa_neither_rotates_nor_scales(limits: SearchLimits, context: Context) -> None:
     window = patch(texture(40))
     with pytest.raises(ParameterError, match="shifts alone"):
-        discrete_spsa(window, window, limits, NMI)
+        discrete_spsa(window, window, limits, NMI, context)
 
 
 @pytest.mark.parametrize("search", [spsa, spsa_second_order, discrete_spsa])
-def test_without_room_the_claimed_pose_is_found(search: Callable[..., list]) -> None:
+def test_without_room_the_nominal_pose_is_found(
+    search: Callable[..., list], context: Context
+) -> None:
     window = patch(texture(40))
-    (found,) = search(window, window, PoseLimits(0), NMI)
+    (found,) = search(window, window, SearchLimits(0), NMI, context)
     assert found.pose == Pose()
     assert (found.height, found.evaluations) == (0.0, 1)

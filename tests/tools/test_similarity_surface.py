@@ -124,7 +124,7 @@ def test_deviations_are_those_of_matching(
     settings = SimilaritySettings(similarity)
     with textured.opened() as pair:
         side = 61 + 2 * (10 + BORDER_PX)
-        nominal = pair.claimed_px
+        nominal = pair.nominal_px
         corner = pair.grid.map_to_pixel(result.grid.pixel_to_map([[10, 10]]))[0] - side // 2
         piece = pair.grid.window(*np.rint(corner).astype(int), side, side)
         template, search = (

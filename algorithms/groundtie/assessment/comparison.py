@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..errors import GeoreferencingError, NoOverlapError
 from ..geometry.transform import Transform
-from ..rasters.grid import FloatArray, Grid, reproject
+from ..rasters.grid import FloatArray, reproject
 from ..rasters.pair import Image, ImagePair
 from ..rasters.reading import RasterSource
 from ..rasters.target_grids import covering_grid
@@ -20,44 +20,59 @@ class Comparison:
 
     Parameters
     ----------
-    reference, claimed, registered
-        The reference, the input where it claims to be, and the input where a transform puts it
-        (None: there is no transform).
+    reference, nominal, registered
+        The reference, the input where its georeferencing puts it, and the input where a transform
+        puts it (None: there is no transform). What is masked is tinted.
     backdrop
         The reference, small and faint.
     reference_name, input_name
         Names of the files.
     width, height
         Size in pixels.
+    is_masked
+        Whether a mask may tint the pictures.
     """
 
     reference: str
-    claimed: str
+    nominal: str
     registered: str | None
     backdrop: str
     reference_name: str
     input_name: str
     width: int
     height: int
+    is_masked: bool = False
 
     @classmethod
     def of(cls, pair: ImagePair, to_input_px: pictures.ToPixel | None) -> Comparison:
         """Draw the images of a pair; `to_input_px` takes map positions to the input's pixels."""
         grid = pictures.overview_grid(pair.grid)
-        reference = pictures.grey_picture(pair.reference_patch(grid))
+        bare = replace(
+            pair,
+            reference=replace(pair.reference, mask=None),
+            input=replace(pair.input, mask=None),
+        )
+        plain = bare.reference_patch(grid)
+        masked = pair.reference_patch(grid) if pair.reference.mask is not None else plain
+
+        def input_uri(to_px: pictures.ToPixel) -> str:
+            patch = bare.input_patch(grid, to_px)
+            shown = pair.input_patch(grid, to_px) if pair.input.mask is not None else patch
+            return pictures.jpeg_uri(pictures.tinted_picture(patch, shown.valid))
+
         registered = None
         if to_input_px is not None:
-            positions = pictures.overview_positions(to_input_px, grid)
-            registered = _uri(pair, grid, positions)
+            registered = input_uri(pictures.overview_positions(to_input_px, grid))
         return cls(
-            pictures.jpeg_uri(reference),
-            _uri(pair, grid, pair.nominal_px),
+            pictures.jpeg_uri(pictures.tinted_picture(plain, masked.valid)),
+            input_uri(pair.nominal_px),
             registered,
-            pictures.jpeg_uri(pictures.backdrop(reference)),
+            pictures.jpeg_uri(pictures.backdrop(pictures.grey_picture(plain))),
             Path(pair.reference.source.path).name,
             Path(pair.input.source.path).name,
             grid.width,
             grid.height,
+            pair.is_masked,
         )
 
 
@@ -86,7 +101,3 @@ def compare(reference: RasterSource, input: RasterSource, transform: Transform) 
     size = common.width, common.height
     pair = ImagePair(Image(reference), Image(input), common, size, common)
     return Comparison.of(pair, to_input_px)
-
-
-def _uri(pair: ImagePair, grid: Grid, to_input_px: pictures.ToPixel) -> str:
-    return pictures.jpeg_uri(pictures.grey_picture(pair.input_patch(grid, to_input_px)))

@@ -1,7 +1,8 @@
 """Registration consistency: how far several transforms that should cancel out do not.
 
-Consistency needs no points, but tells no accuracy: transforms that are wrong in the same way are
-consistent. Thesis S eq 2.4 (two-way; Holden et al. 2000) and eq 5.2 (three-way).
+Consistency needs no points, but is no measure of accuracy: transforms that are wrong in the same
+way are consistent. Source: [Suri2010] eq 2.4 (two-way, after Holden et al. 2000) and eq 5.2
+(three-way).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from rasterio.crs import CRS
 from ..errors import GeoreferencingError, NoOverlapError
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid, reproject
-from .accuracy import PointErrors
+from .point_errors import PointErrors
 
 FloatArray = NDArray[np.float64]
 
@@ -75,7 +76,7 @@ def consistency(transform: Leg, way: Sequence[Leg]) -> PointErrors:
     The way leads from the transform's input to its reference; the transform leads back. Two-way
     consistency has one leg: the registration of the reference to the input. Three-way consistency
     leads through a third image. The errors' mean length is the registration consistency of
-    thesis S eq 2.4.
+    [Suri2010] eq 2.4.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Errors of RPCs at independent check points, before and after a refinement (S table 5.7)."""
+"""Errors of RPCs at check points, before and after a refinement ([Suri2010], table 5.7)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..report.figures import CHECK_COLOUR, FIT_COLOUR, round_length
 from ..sensor.control_points import ControlPoints
 from ..sensor.rpc import RPC
 from ..sensor.surfaces import LON_LAT
-from .accuracy import Statistics
+from .statistics import Statistics
 
 FloatArray = NDArray[np.float64]
 
@@ -42,12 +42,12 @@ class SensorErrors:
     def of(cls, rpc: RPC, points: ControlPoints) -> SensorErrors:
         """Measure the errors of RPCs."""
         table = points.points
-        shown = rpc.localise(table.input_px, points.height_m)
-        moved = reproject(shown, LON_LAT, points.crs) - table.reference_xy
+        seen = rpc.localise(table.input_px, points.height_m)
+        moved = reproject(seen, LON_LAT, points.crs) - table.reference_xy
         middle = Affine.translation(*table.reference_xy.mean(axis=0).tolist())
-        here = Grid(middle, points.crs, 1, 1)
+        around = Grid(middle, points.crs, 1, 1)
         error_px = table.input_px - rpc.project(points.lon_lat, points.height_m)
-        return cls(error_px, moved * here.metres_per_unit)
+        return cls(error_px, moved * around.metres_per_unit)
 
     def summary(self) -> dict[str, Any]:
         """Return the statistics as values that JSON can carry."""
@@ -59,7 +59,7 @@ class SensorErrors:
 
 
 def table_lines(errors: dict[str, SensorErrors]) -> list[str]:
-    """Return the errors of each point, and what there is to say of all, as lines of text."""
+    """Return the errors of each point, and their statistics, as lines of text."""
     head = "point" + "".join(f"  {name + ' x':>10}{'y (m)':>9}" for name in errors)
     lines = [head]
     count = len(next(iter(errors.values())).error_m)

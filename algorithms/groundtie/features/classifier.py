@@ -1,4 +1,4 @@
-"""A support vector machine that tells which features may be matched (thesis P 5.2, 5.3).
+"""A support vector machine that tells which features may be matched ([Patel2017] 5.2, 5.3).
 
 It is kept as JSON that says all there is to it, and needs no scikit-learn to be used.
 """

@@ -16,7 +16,7 @@ GradientOperator = Callable[[FloatImage], Gradient]
 
 
 def differences(image: FloatImage) -> Gradient:
-    """Return differences between the next and the previous pixel (thesis S eq 6.5, 6.6)."""
+    """Return differences between the next and the previous pixel ([Suri2010] eq 6.5, 6.6)."""
     padded = cv2.copyMakeBorder(image, 1, 1, 1, 1, cv2.BORDER_REFLECT_101)
     along_cols = padded[1:-1, 2:] - padded[1:-1, :-2]
     along_rows = padded[2:, 1:-1] - padded[:-2, 1:-1]

@@ -1,4 +1,4 @@
-"""Histograms of oriented gradients as descriptors of keypoints (thesis P 4.3–4.5).
+"""Histograms of oriented gradients as descriptors of keypoints ([Patel2017] 4.3–4.5).
 
 The patch of 41 × 41 pixels around a keypoint is divided into 3 × 3 cells; each has a histogram of
 the directions of gradients, which neither contrast nor its sign changes: 81 values with nine

@@ -12,7 +12,7 @@ FloatArray = NDArray[np.float64]
 Descriptors = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
-# How far a partner may lie from its predicted place (thesis S 6.9.2).
+# How far a partner may lie from its predicted place ([Suri2010] 6.9.2).
 GATE_PX = 16.0
 
 # So many distances are held in memory at a time.
@@ -79,7 +79,7 @@ def match_near(
     """Match keypoints whose partner is known to lie near a predicted place.
 
     Only partners within the gate are compared, which leaves hundreds of times fewer wrong ones
-    than the whole image has; so the ratio need not separate inliers from outliers (thesis S 6.9).
+    than the whole image has; so the ratio need not separate inliers from outliers ([Suri2010] 6.9).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the patch around a feature is like, in a few numbers (thesis P 5.3)."""
+"""What the patch around a feature is like, in a few numbers ([Patel2017] 5.3)."""
 
 from __future__ import annotations
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,7 @@ from rasterio.crs import CRS
 def write_layer(
     path: Path,
     name: str,
-    records: Iterable[dict[str, Any]],
-    count: int,
+    records: list[dict[str, Any]],
     properties: dict[str, str],
     crs: CRS | None,
 ) -> None:
@@ -26,8 +24,8 @@ def write_layer(
     ----------
     path, name
         The file, and the layer's name.
-    records, count
-        The features as GeoJSON has them, and how many there are.
+    records
+        The features as GeoJSON has them.
     properties
         Types of the properties, by name.
     crs
@@ -50,7 +48,7 @@ def write_layer(
             layer.writerecords(records)
         # SQLite may meet a full disk in silence.
         with fiona.open(path, layer=name) as layer:
-            complete = len(layer) == count
+            complete = len(layer) == len(records)
     except (TransactionError, CPLE_BaseError, RuntimeError):
         complete = False
     except FionaError as error:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from affine import Affine
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 from rasterio.errors import CRSError
@@ -20,62 +18,40 @@ from rasterio.errors import CRSError
 from ..errors import OutputError, TransformFileError
 from ..rasters.atomic import writing
 from ..rasters.grid import Grid, reproject
+<<<<<<< HEAD
 from .tie_point_frames import NUMBERS, TEXTS, tie_point_columns
+=======
+from .georeferencer import Row, positions, read_georeferencer, unmeasured, write_georeferencer
+>>>>>>> core
 from .tie_points import USED, TiePoints
 from .transform import Transform
 
 FloatArray = NDArray[np.float64]
-Row = dict[str, Any]
 
+_SUFFIXES = (".gpkg", ".geojson", ".csv", ".points")
 _LAYER = "tie_points"
+<<<<<<< HEAD
 _TEXTS = (*TEXTS, "reference_crs")
+=======
+_NUMBERS = (
+    "reference_x", "reference_y", "nominal_x", "nominal_y", "input_col", "input_row",
+    "residual_px", "dx_px", "dy_px", "score", "forward_backward_error_px",
+    "sigma_x_px", "sigma_y_px",
+)  # fmt: skip
+_TEXTS = ("role", "state", "reference_crs")
+>>>>>>> core
 
 # Longitude and latitude, as GeoJSON demands (RFC 7946).
 _GEOJSON_CRS = CRS.from_epsg(4326)
 
-# The Georeferencer counts pixels from the image's corner, and rows downwards from 0.
-_GEOREFERENCER_PIXELS = Grid(Affine.scale(1, -1), None, 1, 1)
 
+def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform: Transform) -> None:
+    """Write tie points in the format of the suffix of `path`.
 
-@dataclass(frozen=True)
-class StoredTiePoints:
-    """What of tie points is needed to fit a transform to them.
-
-    Parameters
-    ----------
-    reference_xy
-        Positions on the reference map, shape (n, 2).
-    input_px
-        Positions in the input image (col, row), pixel centres at integers, shape (n, 2).
-    is_check
-        True for points that are held out of every fit, shape (n,).
-    used
-        False for rejected points, shape (n,).
-    crs
-        CRS of the reference map.
-    more
-        Further columns, shape (n,) each; NaN where a value is missing.
-    """
-
-    reference_xy: FloatArray
-    input_px: FloatArray
-    is_check: NDArray[np.bool_]
-    used: NDArray[np.bool_]
-    crs: CRS | None
-    more: dict[str, FloatArray] = field(default_factory=dict)
-
-
-def write_tie_points(
-    path: str | os.PathLike[str],
-    points: TiePoints,
-    transform: Transform,
-    more: Mapping[str, FloatArray] = MappingProxyType({}),
-) -> None:
-    """Write tie points in the format that the suffix of `path` tells.
-
-    `.gpkg` and `.geojson` hold lines from where the input claims a point to be to where the
-    reference has it, in the reference's CRS and in longitude and latitude; `.csv` holds the
-    attributes alone; `.points` is for the QGIS Georeferencer, with rejected points disabled.
+    `.gpkg` and `.geojson` hold lines from the nominal position of a point in the input to its
+    position on the reference, in the reference's CRS and in longitude and latitude; `.csv` holds
+    the attributes alone; `.points` is for the QGIS Georeferencer, with rejected points disabled
+    and without further columns.
 
     Parameters
     ----------
@@ -85,79 +61,134 @@ def write_tie_points(
         The points.
     transform
         What their residuals refer to, with the CRS of the map and the input's grid.
-    more
-        Further columns of numbers, shape (n,) each, by their names; `.points` has no room for them.
 
     Raises
     ------
     OutputError
         The file cannot be written, or its suffix is not known.
     """
-    write = _WRITERS.get(Path(path).suffix.lower())
-    if write is None:
-        raise OutputError(f"tie points are written as {', '.join(_WRITERS)}: {path}")
+    path = Path(path)
+    suffix = _suffix(path, "written as", OutputError)
     with writing(path):
-        write(Path(path), points, transform, more)
+        if suffix == ".points":
+            write_georeferencer(path, points, transform)
+            return
+        rows, numbers = _rows(points, transform), (*_NUMBERS, *points.more)
+        if suffix == ".gpkg":
+            _write_gpkg(path, rows, numbers, transform.crs)
+        elif suffix == ".geojson":
+            _write_geojson(path, rows, transform.crs)
+        else:
+            _write_csv(path, rows, numbers)
 
 
 def read_tie_points(
-    path: str | os.PathLike[str], input_grid: Grid, more: Sequence[str] = ()
-) -> StoredTiePoints:
+    path: str | os.PathLike[str],
+    input_grid: Grid,
+    more: Sequence[str] = (),
+    table_crs: CRS | None = None,
+) -> TiePoints:
     """Read tie points that `write_tie_points`, or a person with QGIS, wrote.
 
     Parameters
     ----------
     path
         A `.gpkg`, `.geojson`, `.csv` or `.points` file. Tables need the columns `reference_x`,
-        `reference_y`, and `claimed_x`, `claimed_y` or `input_col`, `input_row`.
+        `reference_y`, and one pair of `nominal_x`, `nominal_y` on the reference map, `input_x`,
+        `input_y` on the input's own map, or `input_col`, `input_row`.
     input_grid
-        Grid of the input. Georeferenced inputs find their pixels by the claimed positions, so
+        Grid of the input. Georeferenced inputs find their pixels by the nominal positions, so
         that any raster of the scene can be given; others find them by column and row.
     more
-        Further columns of numbers to read, where the file has them.
+        Further columns of numbers to read; NaN where the file has none.
+    table_crs
+        CRS of the reference map for a CSV table that names none; by default that of the input.
+
+    Returns
+    -------
+    TiePoints
+        With the CRS of their map; numbers that the file lacks are NaN.
 
     Raises
     ------
     TransformFileError
         The file cannot be read or understood.
     """
-    read = _READERS.get(Path(path).suffix.lower())
-    if read is None:
-        raise TransformFileError(f"tie points are read from {', '.join(_READERS)}: {path}")
+    path = Path(path)
+    suffix = _suffix(path, "read from", TransformFileError)
     try:
-        return read(Path(path), input_grid, more)
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        CRSError,
-    ) as error:
+        if suffix == ".points":
+            points = read_georeferencer(path, input_grid)
+            return replace(points, more={name: np.full(len(points), np.nan) for name in more})
+        rows, crs = _read_rows(path, suffix)
+        if crs is None and suffix != ".gpkg":
+            crs = (table_crs if suffix == ".csv" else None) or input_grid.crs
+        return _from_rows(rows, input_grid, crs, more)
+    except (OSError, ValueError, KeyError, TypeError, CRSError, csv.Error) as error:
         reason = f"column {error} is missing" if isinstance(error, KeyError) else error
         raise TransformFileError(f"cannot read the tie points {path}: {reason}") from error
 
 
+<<<<<<< HEAD
 def _rows(points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]) -> list[Row]:
     columns = {**tie_point_columns(points, transform), **more}
     texts = {"reference_crs": "" if transform.crs is None else transform.crs.to_string()}
     return [
         dict(zip(columns, values, strict=True)) | texts
         for values in zip(*(column.tolist() for column in columns.values()), strict=True)
+=======
+def _suffix(path: Path, verb: str, error: type[OutputError | TransformFileError]) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in _SUFFIXES:
+        raise error(f"tie points are {verb} {', '.join(_SUFFIXES)}: {path}")
+    return suffix
+
+
+def _rows(points: TiePoints, transform: Transform) -> list[Row]:
+    residual = points.residual_px(transform)
+    numbers = [
+        points.reference_xy,
+        transform.nominal_xy(points.input_px),
+        points.input_px,
+        np.hypot(*residual.T),
+        residual,
+        points.score,
+        points.forward_backward_error_px,
+        np.sqrt(points.covariance_px2[:, [0, 1], [0, 1]]),
+        *points.more.values(),
+    ]
+    names = (*_NUMBERS, *points.more, "role", "state")
+    crs = "" if transform.crs is None else transform.crs.to_string()
+    return [
+        dict(zip(names, (*values, role, state), strict=True)) | {"reference_crs": crs}
+        for values, role, state in zip(
+            np.column_stack(numbers).tolist(),
+            points.role.tolist(),
+            points.state.tolist(),
+            strict=True,
+        )
+>>>>>>> core
     ]
 
 
-def _line(row: Row, crs: CRS | None, target: CRS | None) -> dict[str, Any]:
-    ends = np.array(
-        [[row["claimed_x"], row["claimed_y"]], [row["reference_x"], row["reference_y"]]]
-    )
-    return {"type": "LineString", "coordinates": reproject(ends, crs, target).tolist()}
+def _features(rows: list[Row], crs: CRS | None, target: CRS | None) -> list[dict[str, Any]]:
+    """Return rows as GeoJSON's features: lines from nominal to reference positions in a CRS."""
+    ends = [positions(rows, f"{name}_x", f"{name}_y") for name in ("nominal", "reference")]
+    lines = np.stack([reproject(end, crs, target) for end in ends], axis=1)
+    return [
+        {
+            "type": "Feature",
+            "geometry": {"type": "LineString", "coordinates": line},
+            "properties": {name: _or_null(value) for name, value in row.items()},
+        }
+        for line, row in zip(lines.tolist(), rows, strict=True)
+    ]
 
 
-def _write_gpkg(
-    path: Path, points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]
-) -> None:
+def _write_gpkg(path: Path, rows: list[Row], numbers: Sequence[str], crs: CRS | None) -> None:
     from .geopackage import write_layer  # heavy
 
+<<<<<<< HEAD
     rows = _rows(points, transform, more)
     properties = dict.fromkeys((*NUMBERS, *more), "float") | dict.fromkeys(_TEXTS, "str")
     records = (
@@ -169,142 +200,82 @@ def _write_gpkg(
         for row in rows
     )
     write_layer(path, _LAYER, records, len(rows), properties, transform.crs)
+=======
+    properties = dict.fromkeys(numbers, "float") | dict.fromkeys(_TEXTS, "str")
+    write_layer(path, _LAYER, _features(rows, crs, crs), properties, crs)
+>>>>>>> core
 
 
-def _write_geojson(
-    path: Path, points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]
-) -> None:
-    features = [
-        {
-            "type": "Feature",
-            "geometry": _line(row, transform.crs, _GEOJSON_CRS),
-            "properties": {name: _or_null(value) for name, value in row.items()},
-        }
-        for row in _rows(points, transform, more)
-    ]
+def _write_geojson(path: Path, rows: list[Row], crs: CRS | None) -> None:
+    features = _features(rows, crs, _GEOJSON_CRS)
     collection = {"type": "FeatureCollection", "name": _LAYER, "features": features}
     path.write_text(json.dumps(collection, indent=1, allow_nan=False), encoding="utf-8")
 
 
-def _write_csv(
-    path: Path, points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]
-) -> None:
+def _write_csv(path: Path, rows: list[Row], numbers: Sequence[str]) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
+<<<<<<< HEAD
         table = csv.DictWriter(file, (*NUMBERS, *more, *_TEXTS), lineterminator="\n")
+=======
+        table = csv.DictWriter(file, (*numbers, *_TEXTS), lineterminator="\n")
+>>>>>>> core
         table.writeheader()
-        table.writerows(_rows(points, transform, more))
+        table.writerows(rows)
 
 
-def _write_points(
-    path: Path, points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]
-) -> None:
-    source_xy = _georeferencer_grid(transform.input_grid).pixel_to_map(points.input_px)
-    residual = points.residual_px(transform)
-    lines = [] if transform.crs is None else [f"#CRS: {transform.crs.to_wkt()}"]
-    lines.append("mapX,mapY,sourceX,sourceY,enable,dX,dY,residual")
-    # Its rows are negative: so are its residuals along them.
-    # The Georeferencer knows no check points: it would fit to every point that is enabled.
-    fitted = points.used & ~points.is_check
-    for xy, source, used, (dx, dy) in zip(
-        points.reference_xy, source_xy, fitted, residual, strict=True
-    ):
-        numbers = [*xy, *source, int(used), dx, -dy, np.hypot(dx, dy)]
-        lines.append(",".join(f"{number:.17g}" for number in numbers))
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+def _read_rows(path: Path, suffix: str) -> tuple[list[Row], CRS | None]:
+    """Return the rows of a file, and the CRS of its layer, if it has one on the map."""
+    if suffix == ".gpkg":
+        from .geopackage import read_layer  # heavy
 
-
-def _read_gpkg(path: Path, input_grid: Grid, more: Sequence[str]) -> StoredTiePoints:
-    from .geopackage import read_layer  # heavy
-
-    rows, crs = read_layer(path)
-    return _from_rows(rows, input_grid, crs, more)
-
-
-def _read_geojson(path: Path, input_grid: Grid, more: Sequence[str]) -> StoredTiePoints:
-    collection = json.loads(path.read_text(encoding="utf-8"))
-    rows = [feature["properties"] for feature in collection["features"]]
-    return _from_rows(rows, input_grid, input_grid.crs, more)
-
-
-def _read_csv(path: Path, input_grid: Grid, more: Sequence[str]) -> StoredTiePoints:
+        return read_layer(path)
+    if suffix == ".geojson":
+        features = json.loads(path.read_text(encoding="utf-8"))["features"]
+        return [feature["properties"] for feature in features], None
     with path.open(encoding="utf-8-sig", newline="") as file:
-        return _from_rows(list(csv.DictReader(file)), input_grid, input_grid.crs, more)
+        return list(csv.DictReader(file)), None
 
 
 def _from_rows(
     rows: list[Row], input_grid: Grid, usual_crs: CRS | None, more: Sequence[str]
-) -> StoredTiePoints:
+) -> TiePoints:
     """Return the points of a table; without a column `reference_crs` the map has the usual CRS."""
     named = {str(row["reference_crs"] or "") for row in rows if "reference_crs" in row}
     if len(named) > 1:
         raise ValueError("the points have several CRSs")
     text = named.pop() if named else None
     crs = usual_crs if text is None else CRS.from_user_input(text) if text else None
-    reference_xy = _columns(rows, "reference_x", "reference_y")
-    if input_grid.is_georeferenced and rows and "claimed_x" in rows[0]:
-        claimed = _columns(rows, "claimed_x", "claimed_y")
-        input_px = input_grid.map_to_pixel(reproject(claimed, crs, input_grid.crs))
-    else:
-        input_px = _columns(rows, "input_col", "input_row")
-    roles = [row.get("role", "fit") for row in rows]
-    states = [row.get("state", USED) for row in rows]
-    return StoredTiePoints(
-        reference_xy,
-        input_px,
-        np.array([role == "check" for role in roles], bool),
-        np.array([state == USED for state in states], bool),
-        crs,
-        {name: np.array([_number(row.get(name)) for row in rows]) for name in more},
+    states = [str(row.get("state", USED)) for row in rows]
+    sigma = np.column_stack([_numbers(rows, f"sigma_{axis}_px") for axis in "xy"])
+    points = unmeasured(
+        positions(rows, "reference_x", "reference_y"), _input_px(rows, input_grid, crs), states, crs
+    )
+    return replace(
+        points,
+        score=_numbers(rows, "score"),
+        covariance_px2=sigma[:, :, None] ** 2 * np.eye(2),
+        forward_backward_error_px=_numbers(rows, "forward_backward_error_px"),
+        is_check=np.array([row.get("role") == "check" for row in rows], bool),
+        more={name: _numbers(rows, name) for name in more},
     )
 
 
-def _read_points(path: Path, input_grid: Grid, more: Sequence[str]) -> StoredTiePoints:
-    """Read a Georeferencer file; without a CRS line its map is in the raster's CRS."""
-    crs = input_grid.crs
-    lines = path.read_text(encoding="utf-8-sig").splitlines()
-    while lines and lines[0].startswith("#"):
-        comment = lines.pop(0)
-        if comment.startswith("#CRS:"):
-            crs = CRS.from_user_input(comment.removeprefix("#CRS:").strip())
-    rows: list[Row] = list(csv.DictReader(lines))
-    # Older versions of QGIS called the columns so.
-    x, y = ("pixelX", "pixelY") if rows and "pixelX" in rows[0] else ("sourceX", "sourceY")
-    source_xy = _columns(rows, x, y)
-    return StoredTiePoints(
-        _columns(rows, "mapX", "mapY"),
-        _georeferencer_grid(input_grid).map_to_pixel(source_xy),
-        np.zeros(len(rows), bool),
-        np.array([row["enable"].strip() != "0" for row in rows], bool),
-        crs,
-        {name: np.full(len(rows), np.nan) for name in more},
-    )
+def _input_px(rows: list[Row], input_grid: Grid, crs: CRS | None) -> FloatArray:
+    """Return where the points of a table are in the input (col, row), shape (n, 2)."""
+    names = rows[0] if rows else {}
+    if input_grid.is_georeferenced and "nominal_x" in names:
+        nominal = positions(rows, "nominal_x", "nominal_y")
+        return input_grid.map_to_pixel(reproject(nominal, crs, input_grid.crs))
+    if "input_x" in names:
+        return input_grid.map_to_pixel(positions(rows, "input_x", "input_y"))
+    return positions(rows, "input_col", "input_row")
 
 
-def _georeferencer_grid(input_grid: Grid) -> Grid:
-    return input_grid if input_grid.is_georeferenced else _GEOREFERENCER_PIXELS
-
-
-def _columns(rows: Iterable[Row], x: str, y: str) -> FloatArray:
-    return np.array([[float(row[x]), float(row[y])] for row in rows], float).reshape(-1, 2)
-
-
-def _number(value: Any) -> float:
-    return float("nan") if value is None or value == "" else float(value)
+def _numbers(rows: list[Row], name: str) -> FloatArray:
+    """Return a column of numbers, shape (n,); NaN where there is none."""
+    values = [row.get(name) for row in rows]
+    return np.array([np.nan if value in (None, "") else float(value) for value in values], float)
 
 
 def _or_null(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-_WRITERS: dict[str, Callable[[Path, TiePoints, Transform, Mapping[str, FloatArray]], None]] = {
-    ".gpkg": _write_gpkg,
-    ".geojson": _write_geojson,
-    ".csv": _write_csv,
-    ".points": _write_points,
-}
-_READERS: dict[str, Callable[[Path, Grid, Sequence[str]], StoredTiePoints]] = {
-    ".gpkg": _read_gpkg,
-    ".geojson": _read_geojson,
-    ".csv": _read_csv,
-    ".points": _read_points,
-}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rasterio.crs import CRS
 
 from ..rasters.grid import Grid
 from .transform import Transform
@@ -35,6 +36,10 @@ class TiePoints:
         True for points that are held out of every fit, shape (n,).
     state
         "used" or "rejected: …" with the reason, shape (n,).
+    crs
+        CRS of the reference map; None: that of the transform at hand, or none at all.
+    more
+        Further columns of numbers, shape (n,) each, by their names.
     """
 
     reference_xy: FloatArray
@@ -44,6 +49,8 @@ class TiePoints:
     forward_backward_error_px: FloatArray
     is_check: NDArray[np.bool_]
     state: NDArray[np.str_]
+    crs: CRS | None = None
+    more: dict[str, FloatArray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.reference_xy)
@@ -63,24 +70,29 @@ class TiePoints:
         return np.asarray(self.input_px - transform(self.reference_xy))
 
     def residual_on(self, grid: Grid, transform: Transform) -> FloatArray:
-        """Return claimed minus predicted positions in pixels of a grid on the map, (n, 2)."""
-        claimed = grid.map_to_pixel(transform.nominal_xy(self.input_px))
-        return claimed - grid.map_to_pixel(transform.model(self.reference_xy))
+        """Return nominal minus predicted positions in pixels of a grid on the map, (n, 2)."""
+        nominal = grid.map_to_pixel(transform.nominal_xy(self.input_px))
+        return nominal - grid.map_to_pixel(transform.model(self.reference_xy))
 
     def reject(self, which: NDArray[np.bool_], reason: str) -> TiePoints:
-        """Return the table in which the points `which` that were used are so no longer."""
+        """Return the table with the points `which`, if they were used, rejected for a reason."""
         state = self.state.astype(object)
         state[which & self.used] = f"rejected: {reason}"
         return replace(self, state=state.astype(str))
 
     def take(self, which: Any) -> TiePoints:
         """Return the rows that the index or mask `which` selects."""
-        return TiePoints(**{name: getattr(self, name)[which] for name in _FIELDS})
+        columns = {name: getattr(self, name)[which] for name in _COLUMNS}
+        more = {name: values[which] for name, values in self.more.items()}
+        return replace(self, **columns, more=more)
 
     @classmethod
     def concatenate(cls, tables: list[TiePoints]) -> TiePoints:
-        """Return the rows of all tables, one after the other."""
-        return cls(**{name: np.concatenate([getattr(t, name) for t in tables]) for name in _FIELDS})
+        """Return the rows of all tables, which have one map and the same further columns."""
+        first = tables[0]
+        columns = {name: np.concatenate([getattr(t, name) for t in tables]) for name in _COLUMNS}
+        more = {name: np.concatenate([t.more[name] for t in tables]) for name in first.more}
+        return replace(first, **columns, more=more)
 
 
-_FIELDS = tuple(TiePoints.__dataclass_fields__)
+_COLUMNS = tuple(TiePoints.__dataclass_fields__)[:-2]

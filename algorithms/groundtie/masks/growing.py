@@ -40,7 +40,7 @@ def grow_regions(
 ) -> Iterator[Region]:
     """Yield the homogeneous regions of an image, from the most homogeneous seed on.
 
-    Castleman 1996, Digital Image Processing: a region takes in neighbours that differ from its
+    Region growing [Castleman1996]: a region takes in neighbours that differ from its
     seed by no more than a tolerance. No pixel belongs to two regions.
 
     Parameters

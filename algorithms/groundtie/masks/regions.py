@@ -1,4 +1,4 @@
-"""Masks by regions: what is flat and homogeneous, as roads, waters and fields are (S 5.3.2).
+"""Masks by regions: what is flat and homogeneous, as roads, waters and fields ([Suri2010] 5.3.2).
 
 Speckle is filtered, regions grow from homogeneous seeds, their shapes separate ground from roofs,
 and long ones are thinned to their skeleton and broadened by a window again.
@@ -26,7 +26,7 @@ from .shapes import Shape
 from .skeleton import pruned, skeleton
 from .threshold import disc
 
-# Window by which skeletons are broadened, 5–19 m in thesis S, and percentage of the brightest
+# Window by which skeletons are broadened, 5–19 m in [Suri2010], and percentage of the brightest
 # pixels inside that take no part after all.
 WIDTH_M = 11.0
 HIGH_PERCENT = 10.0
@@ -47,7 +47,7 @@ _SMALLEST_M2 = 200.0
 _LONG_M, _ELONGATION = 50.0, 3.0
 _LARGE_M2 = 1500.0
 
-# Ground lies in the lower part of the histogram (S 5.3.2); its upper part is roofs and walls.
+# Ground lies in the lower part of the histogram ([Suri2010] 5.3.2), roofs and walls in the upper.
 _BRIGHTEST_PERCENT = 60.0
 
 # Regions as dark as the darkest of the scene are radar shadow, unless as large as a lake.
@@ -130,7 +130,7 @@ def find_ground(
     scene
         Grey values are amplitudes.
     width_m
-        Window by which skeletons are broadened; 5–19 m in thesis S.
+        Window by which skeletons are broadened; 5–19 m in [Suri2010].
     high_percent
         Percentage of the brightest pixels inside that take no part after all.
     progress

@@ -31,7 +31,7 @@ _TABLES = (_removable(False), _removable(True))
 
 
 def skeleton(mask: Mask) -> Mask:
-    """Thin a mask to lines (Zhang and Suen 1984, doi:10.1145/357994.358023).
+    """Thin a mask to lines [Zhang1984].
 
     Only the remaining border is examined, so that each pixel is touched a few times.
 

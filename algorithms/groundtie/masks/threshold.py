@@ -1,7 +1,7 @@
-"""Masks by grey value: strong scatterers, as walls and double bounces, are masked (thesis S 4.5).
+"""Masks by grey value: strong scatterers, as walls and double bounces, are masked ([Suri2010] 4.5).
 
-The thresholds stand in the histogram of the block-averaged image, where speckle is less; they are
-applied to the blocks at full resolution.
+The thresholds are percentiles of the block-averaged image, where speckle is less; they are applied
+to the blocks at full resolution.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from ..progress import SILENT, Progress
 from ..rasters.reading import Mask, Window
 from .scene import Scene, Selection, block_means
 
-# Side of the blocks whose means are compared, in pixels (thesis S 4.5).
+# Side of the blocks whose means are compared, in pixels ([Suri2010] 4.5).
 BLOCK_PX = 4
 
-# Masked by default: 20–30 % served best in thesis S.
+# Masked by default: 20–30 % served best in [Suri2010].
 HIGH_PERCENT = 20.0
 
 # Blocks of a scene that its histogram is made from, at most.

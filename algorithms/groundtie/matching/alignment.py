@@ -26,7 +26,7 @@ from ..geometry.model_choice import (
     left_out_scores,
 )
 from ..geometry.models import DEGREE, PARAMETERS, Frame, Model, PolynomialModel, monomials
-from .chips import Surfaces
+from .belief_propagation import Surfaces
 
 FloatArray = NDArray[np.float64]
 Positions = Callable[[FloatArray], FloatArray]

@@ -13,14 +13,15 @@ from ..geometry.fitting import fit_model
 from ..geometry.limits import SearchLimits
 from ..geometry.models import Frame, Model, PolynomialModel
 from ..geometry.transform import Transform
-from ..pose.rotation_steps import rotation_steps
 from ..pose.rotation_windows import read_windows
+from ..pose.search import find_poses
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.correlation import MINIMUM_OVERLAP
 from ..similarity.description import BORDER_PX
 from ..similarity.peak import find_peak
+from ..similarity.peaks import suppress
 from ..similarity.surface import SimilaritySettings, describe, similarity_surface
 from .matcher import MaskOf
 
@@ -32,7 +33,7 @@ CANDIDATES = 4
 _LOW = 0.4
 
 # Candidates nearer than this are the same, in pixels of the level.
-_SAME_PX = 4
+_SAME_PLACE = np.ones((2 * 4 + 1,) * 2, bool)
 
 # Few bins keep the count over a large search window quick, and are enough for whole scenes.
 _BINS = 8
@@ -92,9 +93,9 @@ def coarse_candidates(
         return _shifts(pair, level, limits.radius, settings, held_out, context)
     windows = read_windows(pair.reference, pair.input, limits.scale, limits.radius, held_out)
     pose_limits = windows.limits(limits.rotation_deg, limits.scale)
-    found = rotation_steps(
-        windows.reference, windows.input, pose_limits, settings, context.executor
-    )[:CANDIDATES]
+    found = find_poses(windows.reference, windows.input, pose_limits, settings, context.quiet())[
+        :CANDIDATES
+    ]
     high = [one for one in found if one.height > found[0].height * _LOW]
     return [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in high]
 
@@ -133,9 +134,7 @@ def _shifts(
         dx, dy = level.pixel_to_map([[x, y]])[0] - level.pixel_to_map([[0, 0]])[0]
         found.append(Candidate(shift_model(float(dx), float(dy)), peak.height))
         row, col = round(y) + radius_px, round(x) + radius_px
-        surface[
-            max(row - _SAME_PX, 0) : row + _SAME_PX + 1, max(col - _SAME_PX, 0) : col + _SAME_PX + 1
-        ] = 0.0
+        suppress(surface, (row, col), _SAME_PLACE)
     return found
 
 

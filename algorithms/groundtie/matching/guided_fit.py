@@ -1,4 +1,4 @@
-"""Chips all over a pair, guided by its keypoints (thesis P, chapter 4, and the chips of S 6.9).
+"""Chips all over a pair, guided by its keypoints ([Patel2017] 4, [Suri2010] 6.9).
 
 Keypoints locate an image whose bands or light differ from a coarse model that is many pixels off.
 They lie where edges are strongest: on roofs, walls and crowns, which may be displaced against the

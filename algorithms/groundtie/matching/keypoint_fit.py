@@ -1,4 +1,4 @@
-"""The hybrid chain's tie points (thesis S 6.9): features near where a rough model puts them.
+"""The hybrid chain's tie points ([Suri2010] 6.9): features near where a rough model puts them.
 
 Mutual information on reduced images has found the rough model; features are matched without a
 limit on the ratio, but only near their prediction. Most of these matches are wrong, and fall
@@ -113,7 +113,7 @@ class KeypointFit:
 
     def _match(self, coarse: Model, kind: str, context: Context) -> tuple[Correspondences, Fit]:
         """Return matches of keypoints, few enough of each place, and the model of most of them."""
-        matches = self.matcher.match(coarse, context.executor, context.progress)
+        matches = self.matcher.match(coarse, context)
         score = 1 / np.maximum(matches.ratio, 1 / _LARGEST_SCORE)
         area = float(np.pi * self.matcher.gate_px**2)
         everywhere = Correspondences(

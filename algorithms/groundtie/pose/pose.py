@@ -1,17 +1,12 @@
-"""Rotation, scale and shift between two images: what is searched for, and what a search returns."""
+"""Rotation, scale and shift between two images, and what a search for them returns."""
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
-
-from ..rasters.patch import Patch
-from ..similarity.surface import SimilaritySettings
 
 
 @dataclass(frozen=True)
@@ -24,7 +19,7 @@ class Pose:
     Parameters
     ----------
     rotation_deg
-        By how much the input's content is turned against the reference's, counter-clockwise as
+        By how much the input's content is rotated against the reference's, counter-clockwise as
         seen on the screen.
     scale
         How many input pixels a reference pixel is long.
@@ -56,25 +51,6 @@ class Pose:
 
 
 @dataclass(frozen=True)
-class PoseLimits:
-    """Within which limits a pose is searched for.
-
-    Parameters
-    ----------
-    radius_px
-        Largest shift along rows and columns, in input pixels.
-    rotation_deg
-        Largest rotation either way; 0: none, 180: any.
-    scale
-        Smallest and largest scale.
-    """
-
-    radius_px: float
-    rotation_deg: float = 0.0
-    scale: tuple[float, float] = (1.0, 1.0)
-
-
-@dataclass(frozen=True)
 class PoseFound:
     """A candidate of a search.
 
@@ -83,7 +59,7 @@ class PoseFound:
     pose
         Where the input lies.
     height
-        How far the evidence stands out, in robust standard deviations of its background.
+        Height of the peak, in robust standard deviations of its background.
     evaluations
         How often similarity was evaluated until it was found; 0 if the search does not count.
     """
@@ -91,21 +67,3 @@ class PoseFound:
     pose: Pose
     height: float
     evaluations: int = 0
-
-
-class PoseSearch(Protocol):
-    """A way to find the pose of an input window in a reference window.
-
-    Windows may differ in size; their centres are compared. Returns candidates, best first; none
-    if the windows have nothing to compare.
-    """
-
-    def __call__(
-        self,
-        reference: Patch,
-        input: Patch,
-        limits: PoseLimits,
-        settings: SimilaritySettings,
-        executor: Executor | None = None,
-    ) -> list[PoseFound]:
-        """Search within limits."""

@@ -23,8 +23,7 @@ Spectrum = NDArray[np.complex64]
 # is taken off as the field's Gaussian mean of this width, in pixels of the level.
 _TREND_PX = 8.0
 
-# An overlap of less than this share of the largest possible one gets no more credit for being
-# small.
+# Below this share of the largest possible overlap, weights of smaller ones no longer grow.
 _SMALL_OVERLAP = 0.2
 
 # Energies vary slowly, and are summed up over squares of this side.
@@ -75,11 +74,11 @@ class Field:
         filled = self.energy[self.energy > 0]
         return float(filled.mean()) if filled.size else 0.0
 
-    def seen_from(self, reference: Field, pose: Pose, border: int) -> FloatImage:
+    def resampled(self, reference: Field, pose: Pose, border: int) -> FloatImage:
         """Return the field as it lies on a reference's pixels if the input has a pose.
 
-        Shape (h + 2 border, w + 2 border, 2). The gradient's directions turn with the image; as
-        the field is its square, they turn by twice the angle, which is left to the caller.
+        Shape (h + 2 border, w + 2 border, 2). The gradient's directions rotate with the image; as
+        the field is its square, they rotate by twice the angle, which is left to the caller.
         """
         linear = pose.linear * reference.pixel_px / self.pixel_px
         shape = [side + 2 * border for side in reference.shape]
@@ -123,28 +122,34 @@ class Template:
         as seen in the reference's pixels. Correlations are divided by what they would be on
         average if the fields' directions were random in every pixel.
         """
-        seen = input.seen_from(self.field, pose, self.radius)
-        spectra = scipy.fft.rfft2(seen, self._shape, axes=(0, 1))
+        spectra, energy = self._spectra_of(input, pose)
         correlation = self._correlation(spectra, pose.rotation_deg)[: self._span, : self._span]
-        return correlation * self._weights(_coarse(_energy(seen)), input.density)
+        return correlation * self._weights(energy, input.density)
 
     def surfaces_both_ways(self, input: Field, pose: Pose) -> tuple[Surface, Surface]:
-        """Return the surfaces around a pose without shift, and around it turned by 180° more.
+        """Return the surfaces around a pose without shift, and around it rotated by 180° more.
 
-        An image that stands on its head has the conjugate spectrum.
+        An image rotated by 180° has the conjugate spectrum.
         """
-        seen = input.seen_from(self.field, pose, self.radius)
-        spectra = scipy.fft.rfft2(seen, self._shape, axes=(0, 1))
+        spectra, energy = self._spectra_of(input, pose)
         upright = self._correlation(spectra, pose.rotation_deg)[: self._span, : self._span]
         # The last pixel has become the first.
-        top, left = (n - m + 1 for n, m in zip(self._shape, seen.shape, strict=False))
-        turned = self._correlation(spectra.conj(), pose.rotation_deg)
-        turned = turned[top : top + self._span, left : left + self._span]
-        coarse = _coarse(_energy(seen))
-        return (
-            upright * self._weights(coarse, input.density),
-            turned * self._weights(coarse[::-1, ::-1], input.density),
+        top, left = (
+            n - side - 2 * self.radius + 1
+            for n, side in zip(self._shape, self.field.shape, strict=True)
         )
+        rotated = self._correlation(spectra.conj(), pose.rotation_deg)
+        rotated = rotated[top : top + self._span, left : left + self._span]
+        return (
+            upright * self._weights(energy, input.density),
+            rotated * self._weights(energy[::-1, ::-1], input.density),
+        )
+
+    def _spectra_of(self, input: Field, pose: Pose) -> tuple[Spectrum, FloatImage]:
+        """Return the spectra of the input's parts as they lie at a pose, and its coarse energy."""
+        parts = input.resampled(self.field, pose, self.radius)
+        spectra = scipy.fft.rfft2(parts, self._shape, axes=(0, 1))
+        return np.asarray(spectra), _coarse(_energy(parts))
 
     @property
     def _span(self) -> int:
@@ -180,7 +185,7 @@ class Template:
         return np.maximum(1 - np.abs(at), 0).astype(np.float32)
 
     def _correlation(self, spectra: Spectrum, rotation_deg: float) -> FloatImage:
-        # Directions turn with the image; those of the square, by twice the angle.
+        # Directions rotate with the image; those of the square, by twice the angle.
         angle = 2 * np.radians(rotation_deg)
         cosine, sine = np.float32(np.cos(angle)), np.float32(np.sin(angle))
         real, imaginary = self._spectra

@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Executor
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from functools import cached_property
+from itertools import product
+from operator import attrgetter
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..context import Context
+from ..geometry.limits import SearchLimits
 from ..rasters.patch import Patch
+from ..similarity.peaks import highest_peaks
 from ..similarity.surface import Surface
 from .pose import Pose, PoseFound
 from .rotation_fields import Field, Template
 
-T = TypeVar("T")
-U = TypeVar("U")
+# Peaks of one surface that are nearer than 4 pixels of the level are the same.
+_SAME = cv2.circle(np.zeros((9, 9), np.uint8), (4, 4), 4, 1, -1) > 0
 
-# Peaks of one surface that are nearer than this are the same, in pixels of the level.
-_SAME_PX = 4
+# How far a candidate may be off on the next finer level, in its pixels; even.
+_NEAR_PX = 4
+
+# How often the steps are halved on the finest level, and how many of them are taken at most.
+_HALVINGS = 3
+_CLIMBS = 3
+
+HEIGHT = attrgetter("height")
 
 # Inputs are reduced to these steps of scale (log2); what is left of it is interpolated.
 _INPUT_STEP = 0.25
@@ -48,11 +58,11 @@ class Level:
         input: Patch,
         pixel_px: float,
         scales: Iterable[float],
-        executor: Executor | None = None,
+        context: Context,
     ) -> Level:
         """Return the level for a pixel size in reference pixels; `scales` will be asked for."""
         near = sorted({_near(scale) for scale in scales})
-        fields = in_threads(executor, lambda scale: Field.of(input, pixel_px * scale), near)
+        fields = context.map(lambda scale: Field.of(input, pixel_px * scale), near)
         return cls(Field.of(reference, pixel_px), dict(zip(near, fields, strict=True)))
 
     @property
@@ -91,21 +101,68 @@ class Level:
         if np.isfinite(radius_px):
             surface[~_within(linear, pose.shift_px, radius, radius_px)] = 0
         found = []
-        for _ in range(count):
-            (x, y), height = _peak(surface)
-            shift = linear @ [x, y] + pose.shift_px
+        for row, col in highest_peaks(surface, count, _SAME):
+            across, down, height = _between(surface, row, col)
+            shift = linear @ [col - radius + across, row - radius + down] + pose.shift_px
             moved = replace(pose, shift_px=(float(shift[0]), float(shift[1])))
             found.append(PoseFound(moved, height, 1))
-            if len(found) < count:
-                cv2.circle(surface, (round(x) + radius, round(y) + radius), _SAME_PX, 0.0, -1)
         return found
 
 
-def in_threads(
-    executor: Executor | None, call: Callable[[T], U], values: Iterable[T]
-) -> Iterable[U]:
-    """Return what `call` returns for each value, in order."""
-    return map(call, values) if executor is None else executor.map(call, values)
+@dataclass(frozen=True)
+class Climber:
+    """Looks for better poses nearby: steps of rotation (degrees) and of log2 of the scale."""
+
+    level: Level
+    rotation: float
+    scale: float
+    limits: SearchLimits
+
+    @cached_property
+    def template(self) -> Template:
+        return Template(self.level.reference, _NEAR_PX)
+
+    def climb(self, start: PoseFound) -> PoseFound:
+        """Return the best of a candidate and its neighbours, tried on this level."""
+        tried = self.around(start.pose)
+        return replace(max(tried.values(), key=HEIGHT), evaluations=len(tried))
+
+    def climb_finely(self, start: PoseFound) -> PoseFound:
+        """Return the best pose near a candidate of this level, between the steps."""
+        best, count, climber = start, 0, self
+        for _ in range(_HALVINGS):
+            climber = replace(climber, rotation=climber.rotation / 2, scale=climber.scale / 2)
+            for _ in range(_CLIMBS):
+                tried = climber.around(best.pose)
+                count += len(tried)
+                centre, best = tried[0, 0], max(tried.values(), key=HEIGHT)
+                if best is centre:
+                    break
+        rotation, scale = (
+            parabola([tried[-i, -j].height, best.height, tried[i, j].height])[0]
+            if best is centre and {(i, j), (-i, -j)} <= tried.keys()
+            else 0.0
+            for i, j in ((1, 0), (0, 1))
+        )
+        between = climber.level.best(climber.template, climber.step(best.pose, rotation, scale))
+        return replace(max(best, between, key=HEIGHT), evaluations=count + 1)
+
+    def around(self, pose: Pose) -> dict[tuple[int, int], PoseFound]:
+        """Return the matches at a pose and its neighbours within the limits, by steps."""
+        poses = {(i, j): self.step(pose, i, j) for i, j in product((0, -1, 1), repeat=2)}
+        return {
+            steps: self.level.best(self.template, near)
+            for steps, near in poses.items()
+            if steps == (0, 0) or self.is_allowed(near)
+        }
+
+    def step(self, pose: Pose, rotation: float, scale: float) -> Pose:
+        angle = (pose.rotation_deg + rotation * self.rotation + 180) % 360 - 180
+        return replace(pose, rotation_deg=angle, scale=pose.scale * 2 ** (scale * self.scale))
+
+    def is_allowed(self, pose: Pose) -> bool:
+        low, high = self.limits.scale
+        return abs(pose.rotation_deg) <= self.limits.rotation_deg and low <= pose.scale <= high
 
 
 def _near(scale: float) -> float:
@@ -115,7 +172,7 @@ def _near(scale: float) -> float:
 def _within(
     linear: NDArray[np.float64], shift_px: tuple[float, float], radius: int, radius_px: float
 ) -> NDArray[np.bool_]:
-    """Tell at which shifts of a surface the input's shift is within limits, to half a pixel."""
+    """Return at which shifts of a surface the input's shift is within limits, to half a pixel."""
     across = np.arange(-radius, radius + 1)
     largest = radius_px + np.sqrt(np.abs(np.linalg.det(linear))) / 2
     return np.logical_and.reduce(
@@ -126,16 +183,14 @@ def _within(
     )
 
 
-def _peak(surface: Surface) -> tuple[tuple[float, float], float]:
-    """Return shift (x, y) and height of the highest peak, both between the surface's values."""
-    radius = surface.shape[0] // 2
-    row, col = (int(i) for i in np.unravel_index(surface.argmax(), surface.shape))
-    top = float(surface[row, col])
-    if not (0 < row < 2 * radius and 0 < col < 2 * radius):
-        return (float(col - radius), float(row - radius)), top
+def _between(surface: Surface, row: int, col: int) -> tuple[float, float, float]:
+    """Return how far (x, y) a peak lies from the highest value, and its height there."""
+    top, last = float(surface[row, col]), surface.shape[0] - 1
+    if not (0 < row < last and 0 < col < last):
+        return 0.0, 0.0, top
     right, above_x = parabola(surface[row, col - 1 : col + 2])
     down, above_y = parabola(surface[row - 1 : row + 2, col])
-    return (col - radius + right, row - radius + down), top + above_x + above_y
+    return right, down, top + above_x + above_y
 
 
 def parabola(values: Iterable[float]) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Two rasters as windows whose pose is searched for, reduced and with a common claimed centre."""
+"""Two rasters as windows whose pose is searched for, reduced and with a common nominal centre."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
 from ..geometry.fitting import fit_model
+from ..geometry.limits import SearchLimits
 from ..geometry.models import Frame, PolynomialModel
 from ..geometry.transform import Transform
 from ..matching.chips import MaskOf
 from ..rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
 from ..rasters.pair import Image
 from ..rasters.patch import Patch
-from .pose import Pose, PoseLimits
+from .pose import Pose
 
 FloatArray = NDArray[np.float64]
 
@@ -29,7 +30,7 @@ _DEFAULT_RADIUS_SHARE = 0.25
 
 @dataclass(frozen=True)
 class PoseWindows:
-    """Reference and input as their georeferencing claims them to lie: of equal pixels, north up.
+    """Reference and input at their nominal places: of equal pixels, north up.
 
     Images without georeferencing are taken to have equal pixels and a common centre.
 
@@ -39,8 +40,8 @@ class PoseWindows:
         The windows; they have one centre.
     reference_grid, input_grid
         Where their pixels lie on the reference's map.
-    claim
-        Reference map position → input pixel position, as claimed.
+    nominal
+        Reference map position → input pixel position, by the georeferencing.
     radius_m
         How far the input may be off.
     """
@@ -49,7 +50,7 @@ class PoseWindows:
     input: Patch
     reference_grid: Grid
     input_grid: Grid
-    claim: Transform
+    nominal: Transform
     radius_m: float
 
     @property
@@ -60,20 +61,19 @@ class PoseWindows:
     @property
     def is_georeferenced(self) -> bool:
         """Whether the images are."""
-        return self.claim.input_grid.is_georeferenced
+        return self.nominal.input_grid.is_georeferenced
 
-    def limits(self, rotation_deg: float, scale: tuple[float, float]) -> PoseLimits:
-        """Return the limits of a search in these windows."""
-        return PoseLimits(self.radius_m / self.pixel_m, rotation_deg, scale)
+    def limits(self, rotation_deg: float, scale: tuple[float, float]) -> SearchLimits:
+        """Return the limits of a search in these windows, in their pixels."""
+        return SearchLimits(self.radius_m / self.pixel_m, rotation_deg, scale)
 
     def transform(self, pose: Pose) -> Transform:
         """Return the transform between the rasters if the windows have a pose to one another."""
         shapes = [(grid.height, grid.width) for grid in (self.reference_grid, self.input_grid)]
         moved = apply_affine(pose.between(shapes[0], shapes[1]), self.reference_grid.outline(4))
         xy = self.reference_grid.pixel_to_map(self.reference_grid.outline(4))
-        claimed = self.claim.model(self.input_grid.pixel_to_map(moved))
-        model = fit_model("affine", xy, claimed)
-        return Transform(model, self.claim.crs, self.claim.input_grid)
+        model = fit_model("affine", xy, self.nominal.model(self.input_grid.pixel_to_map(moved)))
+        return Transform(model, self.nominal.crs, self.nominal.input_grid)
 
 
 def read_windows(
@@ -92,10 +92,9 @@ def read_windows(
     scale
         Smallest and largest scale that will be searched for.
     radius_m
-        How far the input may lie from where it claims to be; None: a quarter of its longer side.
+        How far the input may lie from its nominal place; None: a quarter of its longer side.
     held_out
-        Returns for a piece of the grid which pixels of the reference must not be seen; None: all
-        may be.
+        Returns for a piece of the grid which pixels of the reference take no part; None: all do.
 
     Raises
     ------
@@ -106,37 +105,37 @@ def read_windows(
     RasterContentError
         One of them is constant or has no valid pixel.
     """
-    claim = _claim(reference, input)
+    nominal = _nominal(reference, input)
     own = reference.source.grid
     frame = _metric_frame(own)
     low, high = _box(frame, own.pixel_to_map(own.outline()))
-    claimed = claim.inverse(claim.input_grid.outline())
-    if not np.isfinite(claimed).all():
+    outline = nominal.inverse(nominal.input_grid.outline())
+    if not np.isfinite(outline).all():
         raise NoOverlapError(_apart(reference, input))
-    claimed_low, claimed_high = _box(frame, claimed)
-    side = float((claimed_high - claimed_low).max())
+    nominal_low, nominal_high = _box(frame, outline)
+    side = float((nominal_high - nominal_low).max())
     radius = _DEFAULT_RADIUS_SHARE * side if radius_m is None else radius_m
-    # Wherever it is turned to, the input shows no more of the reference than this.
-    reach = float(np.hypot(*(claimed_high - claimed_low))) / 2 / scale[0] + radius
-    middle = (claimed_low + claimed_high) / 2
+    # However it is rotated, the input shows no more of the reference than this.
+    reach = float(np.hypot(*(nominal_high - nominal_low))) / 2 / scale[0] + radius
+    middle = (nominal_low + nominal_high) / 2
     low, high = np.maximum(low, middle - reach), np.minimum(high, middle + reach)
-    if (high <= low).any() or ((claimed_low > high + radius) | (claimed_high < low - radius)).any():
+    if (high <= low).any() or ((nominal_low > high + radius) | (nominal_high < low - radius)).any():
         raise NoOverlapError(_apart(reference, input))
     centre, half = (low + high) / 2, (high - low) / 2
     needed = float(np.hypot(*half)) * scale[1] + radius
-    around = np.minimum(np.maximum(claimed_high - centre, centre - claimed_low), needed)
+    around = np.minimum(np.maximum(nominal_high - centre, centre - nominal_low), needed)
     longest = 2 * max(half.max(), around.max() / np.sqrt(scale[0] * scale[1]))
-    pixel = max(own.pixel_size_m, claim.input_grid.pixel_size_m, longest / LONGEST_PX)
+    pixel = max(own.pixel_size_m, nominal.input_grid.pixel_size_m, longest / LONGEST_PX)
     grids = [_grid(frame, own, centre, size, pixel) for size in (half, around)]
     # Larger by their last, incomplete pixels, windows still have one centre.
     windows = PoseWindows(
         reference.read_onto(
             grids[0], own.map_to_pixel, hidden=None if held_out is None else held_out(grids[0])
         ),
-        input.read_onto(grids[1], claim),
+        input.read_onto(grids[1], nominal),
         grids[0],
         grids[1],
-        claim,
+        nominal,
         radius,
     )
     for image, patch in ((reference, windows.reference), (input, windows.input)):
@@ -147,7 +146,7 @@ def read_windows(
     return windows
 
 
-def _claim(reference: Image, input: Image) -> Transform:
+def _nominal(reference: Image, input: Image) -> Transform:
     ref, inp = reference.source, input.source
     for one, other in ((ref, inp), (inp, ref)):
         if one.grid.is_georeferenced and not other.grid.is_georeferenced:

@@ -28,7 +28,7 @@ def _bilinear(s: NDArray[Any]) -> list[NDArray[Any]]:
 
 
 def _cubic(s: NDArray[Any]) -> list[NDArray[Any]]:
-    """Keys 1981, doi:10.1109/TASSP.1981.1163711, with a = -1/2: exact for parabolas."""
+    """Cubic convolution [Keys1981] with a = -1/2: exact for parabolas."""
     square = s * s
     cube = square * s
     return [

@@ -61,6 +61,15 @@ class Masked:
     used: MaskUsed
     ground: ImagePair | None = None
 
+    def on(self, pair: ImagePair) -> Masked:
+        """Return the masks of the reference on another pair with the same reference."""
+        ground = self.ground
+        return Masked(
+            replace(pair, reference=self.pair.reference),
+            self.used,
+            None if ground is None else replace(pair, reference=ground.reference),
+        )
+
 
 def is_raster_mask(mask: Path | str | None) -> bool:
     """Whether a mask that the user gave is a raster, by the ending of its name."""

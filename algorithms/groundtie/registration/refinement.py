@@ -6,40 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..assessment.point_errors import PointErrors
 from ..errors import NotRegisteredError, TooFewPointsError
 from ..rasters.grid import PIXEL_COORDINATES, Grid
-from ..report.figures import Residuals
 from ..sensor.adjustment import Adjustment, Control, adjust
 from ..sensor.bias import fold
 from ..sensor.control_points import ControlPoints
 from ..sensor.height_check import HeightCheck, check_heights
 from ..sensor.orientation import sensor_grid
 from ..sensor.rpc_fit import RPCFit
-from .refinement_verdict import RefinementVerdict, judge_refinement
+from .evidence import SearchEvidence
+from .refinement_evidence import RefinementEvidence
+from .refinement_verdict import RefinementVerdict
 from .sensor_input import OrientedImage
-from .verdict import refuse
-
-# A bias that is folded in by a new fit may be missed by so much, in pixels.
-_LARGEST_FOLDING_PX = 0.01
-
-
-@dataclass(frozen=True)
-class Fitting:
-    """How a bias is estimated and judged; parameters of `refine_rpc`.
-
-    Parameters
-    ----------
-    model, method, largest_residual_px, seed
-        As `adjust` takes them.
-    max_error_px
-        Largest error at held-out points.
-    """
-
-    model: str
-    method: str
-    largest_residual_px: float
-    max_error_px: float
-    seed: int
+from .verdict import Verdict, judge_search
 
 
 @dataclass(frozen=True)
@@ -57,6 +37,8 @@ class Refinement:
         there are none of the latter.
     adjustment
         The bias.
+    fit
+        RPCs with the bias folded in.
     judged
         The verdict, and the errors before and after.
     """
@@ -66,11 +48,25 @@ class Refinement:
     control: Control
     check: Control | None
     adjustment: Adjustment
+    fit: RPCFit
     judged: RefinementVerdict
 
     @classmethod
-    def of(cls, points: ControlPoints, image: OrientedImage, fitting: Fitting) -> Refinement:
-        """Estimate the bias by the points of the fit that are used.
+    def of(
+        cls, points: ControlPoints, image: OrientedImage, model: str, max_error_px: float
+    ) -> Refinement:
+        """Estimate the bias by the points of the fit that are used, and judge it.
+
+        Parameters
+        ----------
+        points
+            The ground control.
+        image
+            The image.
+        model
+            As `adjust` takes it.
+        max_error_px
+            Largest root mean square error at held-out points.
 
         Raises
         ------
@@ -83,26 +79,27 @@ class Refinement:
         control = seen.take(fitted)
         check = seen.take(checked) if checked.any() else None
         try:
-            adjustment = adjust(
-                control, fitting.model, fitting.method, fitting.largest_residual_px, fitting.seed
-            )
+            adjustment = adjust(control, model)
         except TooFewPointsError as error:
-            raise NotRegisteredError(
-                f"the RPCs of {image.source.path} were not refined: {error}", refuse(str(error))
-            ) from error
+            verdict = judge_search(SearchEvidence(error))
+            raise _refused(image, verdict) from error
         blunders = np.zeros(len(table), bool)
         blunders[np.flatnonzero(fitted)[~adjustment.used]] = True
         pixel_m = sensor_grid(image.source, image.orientation).pixel_size_m
-        judged = judge_refinement(control, adjustment, check, pixel_m, fitting.max_error_px)
+        fit = fold(image.rpc, adjustment.bias)
+        evidence = RefinementEvidence.of(
+            control, adjustment, check, pixel_m, max_error_px, fit.largest_residual_px
+        )
         kept = points.with_points(table.reject(blunders, "blunder"))
-        return cls(image, kept, control, check, adjustment, judged)
+        judged = RefinementVerdict.of(evidence)
+        return cls(image, kept, control, check, adjustment, fit, judged)
 
     @property
     def grid(self) -> Grid:
         """The image's pixels."""
         return Grid(PIXEL_COORDINATES, None, *self.image.size)
 
-    def residuals(self) -> Residuals:
+    def residuals(self) -> PointErrors:
         """Return by how much the refined RPCs miss the points, in the image.
 
         Without check points, those are shown for them that points have when they are left out.
@@ -113,7 +110,7 @@ class Refinement:
             held_out, missed = self.control, self.adjustment.left_out_px
         else:
             missed = held_out.residuals_px(bias)
-        return Residuals(
+        return PointErrors(
             np.concatenate([self.control.found_px, held_out.found_px]),
             np.concatenate([fitted, missed]),
             np.repeat([False, True], [len(fitted), len(missed)]),
@@ -126,26 +123,16 @@ class Refinement:
         Raises
         ------
         NotRegisteredError
-            The refinement is refused, or RPCs cannot take up the bias.
+            The refinement is refused.
         """
-        verdict, name = self.judged.verdict, self.image.source.path
-        if not verdict.accepted:
-            raise NotRegisteredError(
-                f"the RPCs of {name} were not refined: {verdict.reason}", verdict
-            )
-        fit = fold(self.image.rpc, self.adjustment.bias)
-        if fit.largest_residual_px > _LARGEST_FOLDING_PX:
-            raise NotRegisteredError(
-                f"the RPCs of {name} cannot take up the bias: they miss it by "
-                f"{fit.largest_residual_px:.3f} px",
-                verdict,
-            )
-        return fit
+        if not self.judged.verdict.accepted:
+            raise _refused(self.image, self.judged.verdict)
+        return self.fit
 
     def heights(self, own_heights: bool) -> HeightCheck:
-        """Return what speaks against the heights.
+        """Return what contradicts the heights.
 
-        `own_heights` tells that the points have heights of their own, which are compared.
+        With `own_heights` the points have heights of their own, which are compared.
         """
         above = self._median_above() if own_heights else None
         return check_heights(
@@ -158,3 +145,8 @@ class Refinement:
         above = points.height_m - self.image.orientation.heights.at(points.lon_lat)
         above = above[np.isfinite(above) & points.points.used]
         return float(np.median(above)) if len(above) else None
+
+
+def _refused(image: OrientedImage, verdict: Verdict) -> NotRegisteredError:
+    name = image.source.path
+    return NotRegisteredError(f"the RPCs of {name} were not refined: {verdict.sentence()}", verdict)

@@ -22,7 +22,6 @@ from ..sensor.rpc_fit import RPCFit
 from ..sensor.rpc_tags import rpc_to_tags
 from .ground_control import GroundControl
 from .refinement import Refinement
-from .registration import report_on
 from .sensor_input import OrientedImage
 
 # Outputs that are copies of the image.
@@ -31,7 +30,7 @@ IMAGES = (".tif", ".tiff")
 
 @dataclass(frozen=True)
 class Call:
-    """What a report says of how it was made.
+    """How a report was made.
 
     Parameters
     ----------
@@ -67,11 +66,7 @@ class RefinementFiles:
             They are refused.
         """
         if not found.registration.verdict.accepted and self.report is not None:
-            page = report_on(found.registration, call.parameters, call.started, found.mask)
-            with Outputs() as outputs:
-                page.write(
-                    outputs.stage(self.report), outputs.stage(self.report.with_suffix(".json"))
-                )
+            replace(found.registration, parameters=call.parameters).report(self.report)
         return found.accepted()
 
     def write(
@@ -89,13 +84,13 @@ class RefinementFiles:
         refinement
             What was estimated.
         heights
-            What speaks against the heights.
+            What contradicts the heights.
         found
             The matching that the points come from; None: they were given.
         call
             For the report.
         progress
-            Is told of every tile of a copied image.
+            Receives every tile of a copied image.
 
         Raises
         ------
@@ -141,7 +136,7 @@ def _report(
         heights=image.heights,
         warnings=tuple(heights.warnings()),
         comparison=None if found is None else _compared(refinement, found),
-        mask=None if found is None else found.mask,
+        mask=None if found is None else found.registration.mask,
         parameters={k: v for k, v in call.parameters.items() if v is not None},
         seconds=time.perf_counter() - call.started,
     )

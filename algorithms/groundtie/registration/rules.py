@@ -2,9 +2,10 @@
 
 A rule looks at evidence and returns why it refuses, in a sentence, or None. Its `stage` states
 which kind of evidence it reads (see `evidence`); `verdict.judge` asks all rules of the evidence's
-stages in their order, and the first one that refuses decides. To add a rule, write a function and put a
-`Rule` in `RULES`; docs/method-verdict.md is made from this list, and a test asks that one test
-triggers it and one does not.
+stages in their order, and the first one that refuses decides.
+
+To add a rule, write a function and put a `Rule` in `RULES`. docs/method-verdict.md is made from
+this list, and a test asks for evidence that triggers it and evidence that does not.
 """
 
 from __future__ import annotations

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ..errors import GeoreferencingError, NoOverlapError, TransformFileError
 from ..geometry.fitting import fit_model
 from ..geometry.models import Model
-from ..geometry.tie_point_files import StoredTiePoints, read_tie_points
+from ..geometry.tie_point_files import read_tie_points
+from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform, load_transform
 from ..rasters.grid import Grid, apply_affine, reproject
 from ..rasters.reading import RasterSource
@@ -41,6 +42,15 @@ class TiePointFit:
     check_points: int
     check_rmse_px: float | None
 
+    def lines(self) -> list[str]:
+        """Return the fit as lines of text."""
+        residuals = f"residuals of {self.rmse_px:.2f} px (RMSE)"
+        lines = [f"fitted to {self.points} tie points with {residuals}"]
+        if self.check_rmse_px is not None:
+            error = f"{self.check_rmse_px:.2f} px (RMSE)"
+            lines.append(f"error at {self.check_points} check points: {error}")
+        return lines
+
 
 def load_stored(
     path: Path, model: str, source: RasterSource
@@ -67,27 +77,27 @@ def load_stored(
         return load_transform(path), None
     points = read_tie_points(path, source.grid)
     if points.crs is None and source.grid.crs is not None:
-        raise TransformFileError(f"{path} does not tell the CRS of its map positions")
+        raise TransformFileError(f"{path} does not state the CRS of its map positions")
     found = Transform(_fit(points, model, source.grid), points.crs, source.grid)
     return found, _assess(found, points)
 
 
-def _fit(points: StoredTiePoints, kind: str, input_grid: Grid) -> Model:
+def _fit(points: TiePoints, kind: str, input_grid: Grid) -> Model:
     """Fit a model in metres, so that rigid ones preserve shapes also on maps in degrees."""
-    claimed = Transform.nominal(points.crs, input_grid).nominal_xy(points.input_px)
+    nominal = Transform.nominal(points.crs, input_grid).nominal_xy(points.input_px)
     taken = points.used & ~points.is_check
     centre = points.reference_xy[taken].mean(axis=0) if taken.any() else np.zeros(2)
     here = Grid(Affine.translation(*(centre - 0.5)), points.crs, 1, 1)
     width, height = here.metres_per_unit
     metres = Affine(1 / width, 0, centre[0], 0, 1 / height, centre[1])
-    xy, claimed_xy = (
-        apply_affine(~metres, positions[taken]) for positions in (points.reference_xy, claimed)
+    xy, nominal_xy = (
+        apply_affine(~metres, positions[taken]) for positions in (points.reference_xy, nominal)
     )
-    return fit_model(kind, xy, claimed_xy).on_map(metres)
+    return fit_model(kind, xy, nominal_xy).on_map(metres)
 
 
-def _assess(found: Transform, points: StoredTiePoints) -> TiePointFit:
-    squared = np.sum((points.input_px - found(points.reference_xy)) ** 2, axis=1)
+def _assess(found: Transform, points: TiePoints) -> TiePointFit:
+    squared = np.sum(points.residual_px(found) ** 2, axis=1)
     fitted, check = points.used & ~points.is_check, points.used & points.is_check
     return TiePointFit(
         points=int(fitted.sum()),

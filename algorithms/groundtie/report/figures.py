@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..assessment.point_errors import PointErrors
 from ..geometry.judging import FEWEST_CHECK_POINTS, TOLERANCE_PX
 from ..geometry.tie_points import TiePoints
-from ..geometry.transform import Transform
 from ..rasters.grid import Grid
 from ..registration.verdict import Verdict
 from .pictures import data_uri
@@ -25,9 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
-# Told apart by people with any colour vision (Okabe & Ito 2008).
+# People with any colour vision see them as different (Okabe & Ito 2008).
 FIT_COLOUR = "#0072b2"
 CHECK_COLOUR = "#d55e00"
 REJECTED_COLOUR = "#7a7a7a"
@@ -36,59 +35,6 @@ REJECTED_COLOUR = "#7a7a7a"
 _SMALLEST_PX = 0.01
 
 _ROUND_NUMBERS = (1.0, 2.0, 5.0)
-
-
-@dataclass(frozen=True)
-class Residuals:
-    """By how much tie points disagree with a transform, as the verdict counts it.
-
-    Parameters
-    ----------
-    position_px
-        The points in the matching grid (col, row), shape (n, 2).
-    residual_px
-        Found minus predicted position of the input's content, matching pixels, shape (n, 2).
-    is_check
-        Which points were held out of the fit, shape (n,).
-    used
-        Which points were not rejected and have a residual, shape (n,).
-    """
-
-    position_px: FloatArray
-    residual_px: FloatArray
-    is_check: Mask
-    used: Mask
-
-    @classmethod
-    def of(cls, points: TiePoints, transform: Transform, grid: Grid) -> Residuals:
-        """Measure the residuals of points in pixels of the matching grid."""
-        residual = points.residual_on(grid, transform)
-        return cls(
-            grid.map_to_pixel(points.reference_xy),
-            residual,
-            points.is_check,
-            points.used & np.isfinite(residual).all(axis=1),
-        )
-
-    @property
-    def length_px(self) -> FloatArray:
-        """Lengths of the residuals, shape (n,)."""
-        return np.asarray(np.hypot(*self.residual_px.T))
-
-    @property
-    def fit(self) -> Mask:
-        """Which points the fit used, shape (n,)."""
-        return self.used & ~self.is_check
-
-    @property
-    def check(self) -> Mask:
-        """Which points the verdict measured, shape (n,)."""
-        return self.used & self.is_check
-
-    @property
-    def agreeing(self) -> Mask:
-        """Which check points agree with the transform, shape (n,)."""
-        return self.check & (self.length_px <= TOLERANCE_PX)
 
 
 @dataclass(frozen=True)
@@ -111,32 +57,32 @@ class Arrows:
     scale_px: float
 
 
-def residual_arrows(residuals: Residuals, grid: Grid) -> Arrows:
+def residual_arrows(errors: PointErrors, grid: Grid) -> Arrows:
     """Exaggerate residuals by a round factor so that the typical one is well visible."""
     side = max(grid.width, grid.height)
     # A flexible model leaves next to nothing at the points of its own fit.
-    held_out = residuals.agreeing.sum() >= FEWEST_CHECK_POINTS
-    believed = residuals.agreeing if held_out else residuals.used
+    enough = errors.agreeing.sum() >= FEWEST_CHECK_POINTS
+    which = errors.agreeing if enough else errors.used
     factor = 1.0
-    if believed.any():
-        typical = max(float(np.median(residuals.length_px[believed])), _SMALLEST_PX)
+    if which.any():
+        typical = max(float(np.median(errors.length_px[which])), _SMALLEST_PX)
         factor = max(round_length(0.04 * side / typical), 1.0)
     return Arrows(
-        residuals.position_px,
-        residuals.residual_px * factor,
+        errors.position_px,
+        errors.error_px * factor,
         factor,
         round_length(0.12 * side / factor),
     )
 
 
-def error_reach_px(residuals: Residuals, verdict: Verdict) -> float:
+def error_reach_px(errors: PointErrors, verdict: Verdict) -> float:
     """Return up to which error the figures of errors reach, in matching pixels.
 
-    As far as needed to see the errors of right matches; without such, to the largest error.
+    As far as needed to see the errors of inliers; without such, to the largest error.
     """
     if math.isfinite(verdict.check_ce90_px):
         return max(1.6 * verdict.check_ce90_px, 1.5 * TOLERANCE_PX)
-    return float(max(residuals.length_px[residuals.check].max(initial=0.0), TOLERANCE_PX) * 1.05)
+    return float(max(errors.length_px[errors.check].max(initial=0.0), TOLERANCE_PX) * 1.05)
 
 
 def rayleigh_counts(at_px: FloatArray, width_px: float, verdict: Verdict) -> FloatArray:
@@ -158,21 +104,19 @@ def svg_uri(figure: Figure) -> str:
     return data_uri("image/svg+xml", buffer.getvalue())
 
 
-def residual_map(residuals: Residuals, grid: Grid) -> Figure:
+def residual_map(errors: PointErrors, grid: Grid) -> Figure:
     """Draw the points and their exaggerated residuals; the figure's edges are the grid's."""
-    arrows = residual_arrows(residuals, grid)
+    arrows = residual_arrows(errors, grid)
     axes = _map_axes(grid)
-    disagreeing = residuals.check & ~residuals.agreeing
-    axes.plot(*residuals.position_px[~residuals.used].T, ".", color=REJECTED_COLOUR, ms=3.5)
-    axes.plot(*residuals.position_px[residuals.fit].T, ".", color=FIT_COLOUR, ms=4)
-    axes.plot(
-        *residuals.position_px[residuals.agreeing].T, "o", color=CHECK_COLOUR, mfc="none", ms=7
-    )
-    axes.plot(*residuals.position_px[disagreeing].T, "x", color=CHECK_COLOUR, ms=6)
+    disagreeing = errors.check & ~errors.agreeing
+    axes.plot(*errors.position_px[~errors.used].T, ".", color=REJECTED_COLOUR, ms=3.5)
+    axes.plot(*errors.position_px[errors.fit].T, ".", color=FIT_COLOUR, ms=4)
+    axes.plot(*errors.position_px[errors.agreeing].T, "o", color=CHECK_COLOUR, mfc="none", ms=7)
+    axes.plot(*errors.position_px[disagreeing].T, "x", color=CHECK_COLOUR, ms=6)
     for which, colour, strength in (
-        (residuals.fit, FIT_COLOUR, 1.0),
+        (errors.fit, FIT_COLOUR, 1.0),
         (disagreeing, CHECK_COLOUR, 0.35),
-        (residuals.agreeing, CHECK_COLOUR, 1.0),
+        (errors.agreeing, CHECK_COLOUR, 1.0),
     ):
         _draw_arrows(axes, arrows.start_px[which], arrows.vector_px[which], colour, strength)
     _draw_scale(axes, arrows, grid)
@@ -189,15 +133,15 @@ def point_map(points: TiePoints, grid: Grid) -> Figure:
     return axes.figure
 
 
-def error_histogram(residuals: Residuals, verdict: Verdict, metres_per_px: float | None) -> Figure:
+def error_histogram(errors: PointErrors, verdict: Verdict, metres_per_px: float | None) -> Figure:
     """Draw how many check points have which error, and the curve that the verdict's error means.
 
     `metres_per_px` adds a scale in metres; None: there are no metres.
     """
     axes = _plot_axes(4.8)
-    reach = error_reach_px(residuals, verdict)
+    reach = error_reach_px(errors, verdict)
     edges = np.linspace(0, reach, 13)
-    lengths = residuals.length_px[residuals.check]
+    lengths = errors.length_px[errors.check]
     axes.hist(lengths, edges, color=CHECK_COLOUR, alpha=0.45, edgecolor="white")
     if math.isfinite(verdict.check_rmse_px):
         at = np.linspace(0, reach, 100)
@@ -216,16 +160,16 @@ def error_histogram(residuals: Residuals, verdict: Verdict, metres_per_px: float
     return axes.figure
 
 
-def error_scatter(residuals: Residuals, verdict: Verdict) -> Figure:
+def error_scatter(errors: PointErrors, verdict: Verdict) -> Figure:
     """Draw the check points' residuals around zero and the circle that holds 90 % of them."""
     from matplotlib.patches import Circle
 
     axes = _plot_axes(3.9)
-    reach = error_reach_px(residuals, verdict)
-    shown = residuals.check & (residuals.length_px <= reach)
+    reach = error_reach_px(errors, verdict)
+    shown = errors.check & (errors.length_px <= reach)
     axes.axhline(0, color="#bbbbbb", lw=0.8, zorder=0)
     axes.axvline(0, color="#bbbbbb", lw=0.8, zorder=0)
-    axes.plot(*residuals.residual_px[shown].T, "o", color=CHECK_COLOUR, alpha=0.75, ms=5, mew=0)
+    axes.plot(*errors.error_px[shown].T, "o", color=CHECK_COLOUR, alpha=0.75, ms=5, mew=0)
     if math.isfinite(verdict.check_ce90_px):
         circle = Circle((0, 0), verdict.check_ce90_px, fill=False, ec=FIT_COLOUR, ls="--", lw=1.5)
         axes.add_patch(circle)

@@ -28,6 +28,10 @@ _JPEG_QUALITIES = (85, 75, 60, 45, 30, 15)
 _NO_DATA_GREY = 226
 _BACKDROP_STRENGTH = 0.4
 
+# What is masked: reddish purple (Okabe & Ito 2008).
+_TINT_BGR = np.array([167.0, 121.0, 204.0])
+_TINT_STRENGTH = 0.3
+
 # A side of the lattice on which an overview follows a transform.
 _NODES = 33
 
@@ -71,6 +75,17 @@ def grey_picture(patch: Patch) -> Picture:
     return picture
 
 
+def tinted_picture(patch: Patch, taking_part: NDArray[np.bool_]) -> Picture:
+    """Return a grey picture, in which what is valid but takes no part is tinted (BGR then)."""
+    grey = grey_picture(patch)
+    masked = patch.valid & ~taking_part
+    if not masked.any():
+        return grey
+    picture = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
+    picture[masked] = (1 - _TINT_STRENGTH) * picture[masked] + _TINT_STRENGTH * _TINT_BGR
+    return np.asarray(picture)
+
+
 def backdrop(picture: Picture) -> Picture:
     """Return a picture small and faint enough to draw on."""
     factor = min(BACKDROP_PX / max(picture.shape), 1.0)
@@ -80,7 +95,7 @@ def backdrop(picture: Picture) -> Picture:
 
 
 def jpeg_uri(picture: Picture) -> str:
-    """Return a grey picture as a data URI, in the best quality that is not too large."""
+    """Return a picture as a data URI, in the best quality that is not too large."""
     for quality in _JPEG_QUALITIES:
         data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
         if len(data) <= LARGEST_JPEG_BYTES:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +10,10 @@ import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
 
-from ..pose.pose import Pose, PoseLimits
-from ..pose.rotation_steps import scan, shift_surface
+from ..context import Context
+from ..geometry.limits import SearchLimits
+from ..pose.pose import Pose
+from ..pose.search import scan, shift_surface
 from ..rasters.atomic import writing
 from ..rasters.patch import Patch
 from .pictures import grey_picture
@@ -21,14 +22,14 @@ from .pictures import grey_picture
 _SQUARES = 8
 
 
-def draw_evidence(
+def draw_rotation(
     path: Path,
     reference: Patch,
     input: Patch,
-    limits: PoseLimits,
+    limits: SearchLimits,
     pose: Pose | None,
     title: str,
-    executor: Executor | None = None,
+    context: Context,
 ) -> None:
     """Draw how well all rotations, scales and shifts match, and both images, as a PNG.
 
@@ -44,7 +45,7 @@ def draw_evidence(
         The pose that was found; None if none was.
     title
         Heading of the picture.
-    executor
+    context
         Threads to work in.
     """
     from matplotlib.figure import Figure
@@ -52,14 +53,16 @@ def draw_evidence(
     figure = Figure(figsize=(11, 9), layout="constrained")
     axes = figure.subplots(2, 2)
     figure.suptitle(title)
-    _draw_scan(figure, axes[0, 0], reference, input, limits, pose, executor)
+    _draw_scan(figure, axes[0, 0], reference, input, limits, pose, context)
     _draw_image(axes[1, 0], grey_picture(reference), "reference")
     if pose is None:
         axes[0, 1].set_axis_off()
         _draw_image(axes[1, 1], grey_picture(input), "input")
     else:
-        _draw_shifts(figure, axes[0, 1], reference, input, pose)
-        _draw_image(axes[1, 1], checkerboard(reference, input, pose), "both, in squares")
+        _draw_shifts(figure, axes[0, 1], reference, input, pose, context)
+        _draw_image(
+            axes[1, 1], checkerboard(reference, input, pose), "reference and input, in squares"
+        )
     with writing(path):
         figure.savefig(path, format="png", dpi=110, metadata={"Software": None})
 
@@ -85,11 +88,11 @@ def _draw_scan(
     axes: Any,
     reference: Patch,
     input: Patch,
-    limits: PoseLimits,
+    limits: SearchLimits,
     pose: Pose | None,
-    executor: Executor | None,
+    context: Context,
 ) -> None:
-    scanned = scan(reference, input, limits, executor)
+    scanned = scan(reference, input, limits, context)
     rotations, scales = scanned.rotations_deg, np.log2(scanned.scales)
     extent = (*_ends(rotations), *_ends(scales))
     shown = axes.imshow(
@@ -102,8 +105,10 @@ def _draw_scan(
     axes.set(xlabel="rotation (°)", ylabel="log₂ of the scale", title="on small images")
 
 
-def _draw_shifts(figure: Any, axes: Any, reference: Patch, input: Patch, pose: Pose) -> None:
-    surface, pixel = shift_surface(reference, input, pose)
+def _draw_shifts(
+    figure: Any, axes: Any, reference: Patch, input: Patch, pose: Pose, context: Context
+) -> None:
+    surface, pixel = shift_surface(reference, input, pose, context)
     edge = surface.shape[0] / 2 * pixel
     shown = axes.imshow(surface, extent=(-edge, edge, edge, -edge), interpolation="nearest")
     figure.colorbar(shown, ax=axes, label="robust standard deviations")

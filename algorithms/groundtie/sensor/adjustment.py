@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 AUTO = "auto"
 
 # How blunders are found: all at once, by what is probable, or one after the other, the worst
-# first, as thesis S does it (section 5.4.1).
+# first ([Suri2010] section 5.4.1).
 ROBUST, WORST_FIRST = "robust", "worst-first"
 METHODS = (ROBUST, WORST_FIRST)
 

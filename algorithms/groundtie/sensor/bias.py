@@ -1,8 +1,7 @@
 """Corrections of RPCs in image space, and folding them into the coefficients.
 
 What is wrong with RPCs are attitude and position of the satellite; over a scene that moves image
-positions by a shift, drifts along the lines, or an affine change (Fraser & Hanley 2003,
-doi:10.14358/PERS.69.1.53).
+positions by a shift, drifts along the lines, or an affine change [Fraser2003].
 """
 
 from __future__ import annotations

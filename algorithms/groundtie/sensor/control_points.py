@@ -101,7 +101,7 @@ class ControlPoints:
         sigma = np.sqrt(covariance[:, 0, 0] * covariance[:, 1, 1])
         more = {HEIGHT: self.height_m, CORRELATION: covariance[:, 0, 1] / sigma}
         transform = Transform.nominal(self.crs, own)
-        write_tie_points(path, self.points, transform, more)
+        write_tie_points(path, replace(self.points, more=more), transform)
 
     def _gdal_options(self) -> str:
         """Return the used points of the fit as options of gdal_translate."""

@@ -38,7 +38,7 @@ def fit_rpc(lon_lat: ArrayLike, height_m: ArrayLike, px: ArrayLike, **stated: An
     """Fit RPCs to pairs of ground and image positions by regularised least squares.
 
     The equations are linearised by multiplying with the denominator, and weighted by what the fit
-    before found it to be (Tao & Hu 2001, doi:10.1016/S0924-2716(01)00033-3).
+    before found it to be [Tao2001].
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Radiometric binning: grey values to the bins of a histogram (thesis S 3.4.3, eq 3.38)."""
+"""Radiometric binning: grey values to the bins of a histogram ([Suri2010] 3.4.3, eq 3.38)."""
 
 from __future__ import annotations
 

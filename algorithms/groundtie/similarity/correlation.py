@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
 
-# Below this share of the template's pixels an overlap says nothing.
+# Overlaps of a smaller share of the template's pixels are not compared.
 MINIMUM_OVERLAP = 0.3
 
 
@@ -48,8 +48,8 @@ def overlap_share(template: Patch, search: Patch) -> NDArray[np.float32]:
     count = np.float32(max(int(template.valid.sum()), 1))
     if template.all_valid:
         return box_sums(search.valid.astype(np.float32), *template.valid.shape) / count
-    both = correlate(template.valid.astype(np.float32), search.valid.astype(np.float32))
-    return both / count
+    overlap = correlate(template.valid.astype(np.float32), search.valid.astype(np.float32))
+    return overlap / count
 
 
 def correlate_fields(
@@ -89,9 +89,9 @@ def correlate_fields(
 
 
 def correlate_grey(template: Patch, search: Patch) -> NDArray[np.float32]:
-    """Return the normalised cross-correlation of grey values over shifts (thesis S eq 3.2).
+    """Return the normalised cross-correlation of grey values over shifts ([Suri2010] eq 3.2).
 
-    With masks, each shift is normalised by the pixels that are valid in both (Padfield 2012).
+    With masks, each shift is normalised by the pixels that are valid in both [Padfield2012].
     """
     mean = np.float32(search.values[search.valid].mean()) if search.valid.any() else np.float32(0)
     if template.all_valid and search.all_valid:
@@ -100,8 +100,8 @@ def correlate_grey(template: Patch, search: Patch) -> NDArray[np.float32]:
         found = cv2.matchTemplate(search.values - mean, t, cv2.TM_CCOEFF_NORMED)
         return np.asarray(found, np.float32)
     tm, sm = (window.valid.astype(np.float32) for window in (template, search))
-    own = np.float32(template.values[template.valid].mean()) if template.valid.any() else mean
-    t, s = (template.values - own) * tm, (search.values - mean) * sm
+    own_mean = np.float32(template.values[template.valid].mean()) if template.valid.any() else mean
+    t, s = (template.values - own_mean) * tm, (search.values - mean) * sm
     count = np.maximum(correlate(tm, sm), 1)
     sum_t, sum_s = correlate(t, sm), correlate(tm, s)
     covariance = correlate(t, s) - sum_t * sum_s / count

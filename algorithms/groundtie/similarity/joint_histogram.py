@@ -1,6 +1,6 @@
 """The joint-histogram volume: joint histograms of a template and a search window at all shifts.
 
-The joint histogram of generalised partial volume estimation (GPVE; Chen & Varshney 2003, thesis S
+The joint histogram of generalised partial volume estimation (GPVE; [Chen2003], [Suri2010]
 eq 3.34) at any continuous shift is a B-spline combination of the nearest-neighbour histograms at
 integer shifts, as long as every shift sees the same template pixels:
 
@@ -212,8 +212,8 @@ def _count_spectrally(
     planes = np.stack([search == k for k in range(bins[1])]).astype(np.float32)
     spectra = scipy.fft.rfft2(planes, shape, workers=_WORKERS)
     for k in range(bins[0]):
-        own = scipy.fft.rfft2((template == k).astype(np.float32), shape)
-        found = scipy.fft.irfft2(spectra * own.conj(), shape, workers=_WORKERS)
+        spectrum = scipy.fft.rfft2((template == k).astype(np.float32), shape)
+        found = scipy.fft.irfft2(spectra * spectrum.conj(), shape, workers=_WORKERS)
         counts[:, :, k] = found[:, :ny, :nx].transpose(1, 2, 0)
     # Counts are whole numbers; what is left over is rounding, and so is the sign of zero.
     np.rint(counts, out=counts)

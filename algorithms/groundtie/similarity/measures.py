@@ -63,7 +63,7 @@ def of_histograms(function: HistogramMeasure) -> Measure:
 
 
 def normalized_mutual_information(histograms: Histograms) -> FloatArray:
-    """Return Studholme's (H(A) + H(B)) / H(A, B), between 1 and 2 (thesis S eq 3.21)."""
+    """Return Studholme's (H(A) + H(B)) / H(A, B), between 1 and 2 ([Suri2010] eq 3.21)."""
     a, b, ab = map(entropy, tables(histograms))
     informative = ab > _NOTHING
     return np.where(informative, (a + b) / np.where(informative, ab, 1.0), 1.0)

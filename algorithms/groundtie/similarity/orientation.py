@@ -2,9 +2,9 @@
 
 Edges keep their place and direction between a SAR and an optical image when their contrast does
 not keep its sign. Squaring the complex gradient makes opposite directions the same; dividing by
-its magnitude makes weak and strong edges alike (orientation correlation: Fitch et al. 2002;
-normalised gradient fields: Haber & Modersitzki 2006). How strong edges are is evidence of its own:
-see `edge_strength`.
+its magnitude makes weak and strong edges alike (orientation correlation [Fitch2002];
+normalised gradient fields [Haber2006]). The strength of edges is a measure of its own: see
+`edge_strength`.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def compress(window: Patch) -> NDArray[np.float32]:
 
 
 def is_logarithmic(window: Patch) -> bool:
-    """Tell whether grey values are on a logarithmic scale already (decibels): many are negative."""
+    """Return whether grey values are in decibels already: many are negative."""
     values = window.values[window.valid]
     return values.size > 0 and bool(np.mean(values < 0) > _NEGATIVE_SHARE)
 

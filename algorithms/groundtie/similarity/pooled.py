@@ -1,12 +1,12 @@
-"""Mutual information of many chips together: one joint histogram says what goes with what.
+"""Mutual information of many chips by one pooled joint histogram.
 
-A mask of the ground leaves little of a chip, too little for a joint histogram of its own. All
-chips together have enough. From the histogram of all of them, where they lie, follows what a pair
-of grey levels says for or against belonging together, log p(a, b) / (p(a) p(b)); its mean is
-mutual information. A chip's similarity at a shift is the sum over its pixels, so that chips add
-up: many that say little each outweigh what draws a few.
+A mask of the ground leaves too few pixels of a chip for a joint histogram of its own; the pixels
+of all chips are enough. From their pooled histogram follows the pointwise mutual information of a
+pair of grey levels, log p(a, b) / (p(a) p(b)), whose mean is mutual information. A chip's
+similarity at a shift is the sum over its pixels, so that chips add up: weak evidence of many
+outweighs the bias of a few.
 
-Point similarity measures: Rogelj, Kovačič & Gee 2003, doi:10.1016/S1077-3142(03)00116-4.
+Source: point similarity measures [Rogelj2003], doi:10.1016/S1077-3142(03)00116-4.
 """
 
 from __future__ import annotations
@@ -34,29 +34,29 @@ _SMOOTH_PX = 3
 
 @dataclass(frozen=True)
 class PooledHistogram:
-    """What pairs of grey levels say.
+    """Pointwise mutual information of pairs of grey levels.
 
     Parameters
     ----------
     template_edges, search_edges
         Inner edges between grey levels, shape (bins - 1,).
-    evidence
+    information
         log p(a, b) / (p(a) p(b)) of the template's level a and the search window's b, in nats,
         shape (bins, bins).
     """
 
     template_edges: FloatArray
     search_edges: FloatArray
-    evidence: FloatArray
+    information: FloatArray
 
     @classmethod
     def of(cls, template: FloatArray, search: FloatArray, bins: int = BINS) -> PooledHistogram:
-        """Return what pairs say of which many are known.
+        """Return the pointwise mutual information by a sample of pairs.
 
         Parameters
         ----------
         template, search
-            Grey values of pixels that lie on each other, the template's `smooth`, shape (n,).
+            Grey values of corresponding pixels, the template's `smooth`, shape (n,).
         bins
             Number of grey levels, equally frequent each.
         """
@@ -65,27 +65,27 @@ class PooledHistogram:
         levels = [np.searchsorted(e, s, side="right") for e, s in zip(edges, sides, strict=True)]
         counts = np.bincount(levels[0] * bins + levels[1], minlength=bins * bins) + _UNSEEN
         joint = counts.reshape(bins, bins) / counts.sum()
-        apart = joint.sum(axis=1, keepdims=True) * joint.sum(axis=0, keepdims=True)
-        return cls(edges[0], edges[1], np.log(joint / apart).astype(np.float32))
+        independent = joint.sum(axis=1, keepdims=True) * joint.sum(axis=0, keepdims=True)
+        return cls(edges[0], edges[1], np.log(joint / independent).astype(np.float32))
 
     def surface(self, template: Patch, search: Patch) -> Surface:
-        """Return the evidence over shifts, in nats, shape (2 r + 1, 2 r + 1).
+        """Return the sums of information over shifts, in nats, shape (2 r + 1, 2 r + 1).
 
         Parameters
         ----------
         template
-            The chip; what is not valid takes no part.
+            The chip; invalid pixels take no part.
         search
-            A window with the same centre, larger by r on each side; what is not valid says nothing.
+            A window with the same centre, larger by r on each side; invalid pixels add 0.
         """
         template = smooth(template)
         levels = np.searchsorted(self.template_edges, template.values, side="right")
-        shown = np.searchsorted(self.search_edges, search.values, side="right")
+        others = np.searchsorted(self.search_edges, search.values, side="right")
         total = np.zeros((), np.float32)
         for level in np.unique(levels[template.valid]):
-            says = np.where(search.valid, self.evidence[level][shown], np.float32(0))
-            there = (template.valid & (levels == level)).astype(np.float32)
-            total = total + cv2.matchTemplate(says, there, cv2.TM_CCORR)
+            information = np.where(search.valid, self.information[level][others], np.float32(0))
+            pixels = (template.valid & (levels == level)).astype(np.float32)
+            total = total + cv2.matchTemplate(information, pixels, cv2.TM_CCORR)
         span = search.values.shape[0] - template.values.shape[0] + 1
         return np.broadcast_to(total, (span, span)).astype(np.float32)
 

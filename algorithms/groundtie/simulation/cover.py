@@ -1,9 +1,8 @@
 """Land cover classes and how bright each looks to a radar and to a camera.
 
-Backscatter follows X-band at medium incidence (order of magnitude of Ulaby & Dobson, Handbook of
-Radar Scattering Statistics for Terrain, 1989); reflectances are those of common spectral
-libraries, rounded. Both are drawn independently of one another, so that their relation holds by
-class and is not monotonic.
+Backscatter follows X-band at medium incidence (order of magnitude of [Ulaby1989]); reflectances are
+those of common spectral libraries, rounded. Both are drawn independently of one another, so that
+their relation holds by class and is not monotonic.
 """
 
 from __future__ import annotations

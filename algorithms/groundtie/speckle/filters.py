@@ -20,7 +20,7 @@ from .statistics import FloatImage, LocalStatistics, Mask, local_statistics
 # Side of tiles that stay, with all that filters need, in the processor's cache.
 _TILE_PX = 256
 
-# Beyond so many windows an exponential filter weighs less than a ten thousandth.
+# Beyond so many windows the weight of an exponential filter is less than a ten thousandth.
 _ISEF_REACH = 3
 
 
@@ -98,12 +98,12 @@ class _Tile:
 
 
 def _lee(by: SpeckleFilter, tile: _Tile) -> FloatImage:
-    """Lee 1980, doi:10.1109/TPAMI.1980.4766994, for multiplicative noise."""
+    """Return Lee's estimate for multiplicative noise [Lee1980]."""
     return _linear(tile, _signal_share(tile.local, by.looks))
 
 
 def _kuan(by: SpeckleFilter, tile: _Tile) -> FloatImage:
-    """Kuan et al. 1985, doi:10.1109/TPAMI.1985.4767641."""
+    """Return Kuan's estimate [Kuan1985]."""
     return _linear(tile, _signal_share(tile.local, by.looks) / np.float32(1 + 1 / by.looks))
 
 
@@ -112,7 +112,7 @@ def _frost(by: SpeckleFilter, tile: _Tile) -> FloatImage:
 
 
 def _gamma_map(by: SpeckleFilter, tile: _Tile) -> FloatImage:
-    """Lopes, Nezry, Touzi and Laur 1990, doi:10.1109/IGARSS.1990.689026."""
+    """Return the gamma MAP estimate [Lopes1990b]."""
     mean, variation2 = tile.local.mean, tile.local.variation2
     looks, speckle2 = np.float32(by.looks), np.float32(1 / by.looks)
     alpha = (1 + speckle2) / np.maximum(variation2 - speckle2, np.float32(1e-6))

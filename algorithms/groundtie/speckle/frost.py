@@ -21,7 +21,7 @@ def enhanced_frost(
     looks: float,
     damping: float = 1.0,
 ) -> FloatImage:
-    """Filter speckle as Lopes, Touzi and Nezry did (1990, doi:10.1109/36.62623).
+    """Filter speckle by the enhanced Frost filter [Lopes1990a].
 
     Where the image varies no more than speckle does, the result is the local mean; where it varies
     more than speckle on any texture, the pixel itself; between the two, the mean with weights

@@ -13,13 +13,13 @@ FloatImage = NDArray[np.float32]
 def isef(image: FloatImage, decay: float) -> FloatImage:
     """Smooth an image by a b^|x| along both axes, with a = (1 - b) / (1 + b).
 
-    Shen and Castan 1992, doi:10.1016/1049-9652(92)90060-B: the best linear filter for edges that
+    [Shen1992]: the best linear filter for edges that
     are many and near each other.
 
     Parameters
     ----------
     image
-        Float32, shape (h, w). Beyond its borders, the values there go on.
+        Float32, shape (h, w). Beyond its borders, the outermost values go on.
     decay
         The b of the formula, 0 to below 1: weight of a pixel over that of its nearer neighbour.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import cv2
@@ -103,7 +102,7 @@ def estimate_looks(intensity: FloatImage, valid: Mask) -> float:
 
     In a homogeneous area, intensity has the squared coefficient of variation 1 / looks. Windows
     that hold edges or texture vary more, each in its own way: the first of the frequent values is
-    that of the homogeneous ones (after Foucher et al. 2000, doi:10.1109/IGARSS.2000.861621).
+    that of the homogeneous ones (after [Foucher2000]).
 
     Parameters
     ----------
@@ -157,12 +156,3 @@ def homogeneous_variation2(intensity: FloatImage, valid: Mask) -> float:
     full = window_counts(valid, _HOMOGENEOUS_WINDOW_PX) == _HOMOGENEOUS_WINDOW_PX**2
     variation2 = local.variation2[full & (local.mean > 0)]
     return float(np.quantile(variation2, _HOMOGENEOUS_SHARE)) if variation2.size else 0.0
-
-
-def speckle_variation2(looks: float, *, amplitude: bool = False) -> float:
-    """Return the squared coefficient of variation of pure speckle, of intensity or amplitude."""
-    if not amplitude:
-        return 1 / looks
-    # Mean of the square root of a gamma variate of mean 1 and shape `looks`.
-    mean = math.exp(math.lgamma(looks + 0.5) - math.lgamma(looks)) / math.sqrt(looks)
-    return 1 / mean**2 - 1

@@ -1,10 +1,9 @@
-"""Mutual information by maximum likelihood of a density ratio (MLMI; thesis P 3.2.1).
+"""Mutual information by maximum likelihood of a density ratio (MLMI; [Patel2017] 3.2.1).
 
 The ratio w(x, y) = p(x, y) / (p(x) p(y)) is modelled as it is, without densities: as a sum of
 Gaussian kernels with weights that are not negative. They maximise the likelihood Σ log w(x, y) of
 the pairs seen, with the mean of w over all x and y combined freely held at 1. Mutual information
-is the mean of log w. Suzuki, Sugiyama, Sese & Kanamori 2008, "Approximating mutual information by
-maximum likelihood density ratio estimation", JMLR W&CP 4, 5–20.
+is the mean of log w [Suzuki2008].
 """
 
 from __future__ import annotations

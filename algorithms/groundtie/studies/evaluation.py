@@ -1,4 +1,4 @@
-"""How features of two registered images repeat and match (thesis S 6.6.2)."""
+"""How features of two registered images repeat and match ([Suri2010] 6.6.2)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Filtered matching: the worst match goes until the rest agree (thesis S 3.4.4, 6.7.1)."""
+"""Filtered matching: the worst match goes until the rest agree ([Suri2010] 3.4.4, 6.7.1)."""
 
 from __future__ import annotations
 

@@ -1,25 +1,32 @@
 """Fourier–Mellin: rotation and scale from magnitude spectra, then the shift.
 
-Thesis P section 3.3.1; Chen, Defrise & Deconinck 1994, doi:10.1109/34.387491; Reddy & Chatterji
-1996, doi:10.1109/83.506761. The magnitude of a spectrum does not change with a shift, turns with
-the image, and shrinks as the image grows; on axes of angle and log frequency, both are shifts.
-Unlike P's 22 steps: spectra are made alike at all frequencies, peaks are found between the bins,
-several are tried, and rotation, scale and shift are found again on what both windows show.
+The magnitude of a spectrum does not change with a shift, rotates with the image, and shrinks as
+the image grows; on axes of angle and log frequency, both are shifts. Unlike the source's 22
+steps: spectra are normalised at each frequency, peaks are found between the bins, several are
+tried, and rotation, scale and shift are found again on what both windows show. Source:
+[Patel2011], section 3.3.1; Chen, Defrise & Deconinck 1994, doi:10.1109/34.387491; Reddy &
+Chatterji 1996, doi:10.1109/83.506761.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import scipy.fft
 
-from ..pose.phase_correlation import gaussian_peak, shift_left, shifts_at, whitened
-from ..pose.polar import ANGLE_STEP_DEG, ANGLES, evened, half_turns, log_power
-from ..pose.pose import Pose, PoseFound, PoseLimits
-from ..pose.windows import (
+from ..context import Context
+from ..geometry.limits import SearchLimits
+from ..pose.pose import Pose, PoseFound
+from ..rasters.kernels import interpolate
+from ..rasters.patch import Patch, reduced_patch
+from ..similarity.peaks import highest_peaks
+from ..similarity.surface import SimilaritySettings, Surface, normalise
+from .phase_correlation import gaussian_peak, remaining_shift, shifts_at, whitened
+from .polar import ANGLE_STEP_DEG, ANGLES, evened, half_turns, log_power
+from .spectral_windows import (
     SAME_DEG,
     SAME_LOG_SCALE,
     Image,
@@ -30,9 +37,6 @@ from ..pose.windows import (
     structure,
     texture,
 )
-from ..rasters.kernels import interpolate
-from ..rasters.patch import Patch, reduced_patch
-from ..similarity.surface import SimilaritySettings, Surface, normalise
 
 # A spectrum is given at so many log frequencies between two frequencies in cycles per pixel.
 _FREQUENCIES = 256
@@ -43,7 +47,7 @@ _LOG_STEP = float(np.log(_RANGE[1] / _RANGE[0]) / (_FREQUENCIES - 1))
 _BAND = 0.1
 
 # Magnitudes of the cross-power spectrum are raised to 1 less this: 1 is phase correlation, which
-# is exact, 0 a plain correlation, which endures more difference between the images.
+# is exact, 0 a plain correlation, which tolerates more difference between the images.
 _WHITENING = 0.5
 
 # Candidates of rotation and scale: how many are tried.
@@ -52,7 +56,12 @@ CANDIDATES = 20
 # Candidates are tried on windows reduced to about this length, in pixels, …
 _TRIAL_SIDE_PX = 128
 # … until one is so high that the others need no trial. Wrong ones were below 33.
-_CLEAR_HEIGHT = 60.0
+_SURE_HEIGHT = 60.0
+
+# Peaks that are nearer than this, in bins of rotation and scale, are the same.
+_SAME = np.ones(
+    [2 * round(n) + 1 for n in (SAME_DEG / ANGLE_STEP_DEG, SAME_LOG_SCALE / _LOG_STEP)], bool
+)
 
 # How many candidates are aligned and returned at most, and which share of the best one's height
 # they have at least.
@@ -61,7 +70,7 @@ WORTH_ALIGNING = 0.5
 
 # How often, and how far, rotation and scale are corrected on what both windows show.
 _CORRECTIONS = 2
-_CORRECTION = PoseLimits(0.0, 2.0, (0.95, 1.05))
+_CORRECTION = SearchLimits(0.0, 2.0, (0.95, 1.05))
 
 
 def spectrum(image: Image, side: int) -> Image:
@@ -98,13 +107,13 @@ def spectra(
 
 
 def correlate_spectra(reference: Image, input: Image) -> Surface:
-    """Return the correlation of two spectra over all turns, normalised.
+    """Return the correlation of two spectra over all rotations and scales, normalised.
 
-    Rows are rotations (see `_rotations`), columns logarithms of the scale; the middle is none.
+    Rows are rotations, columns logarithms of the scale; the middle is none.
     """
     fading = np.sqrt(np.hanning(_FREQUENCIES + 2)[1:-1]).astype(np.float32)
     shape = (ANGLES, scipy.fft.next_fast_len(2 * _FREQUENCIES))
-    # The reference at a bin further on looks like the input: an input that is turned
+    # The reference at a bin further on looks like the input: an input that is rotated
     # counter-clockwise has its spectrum at smaller angles, a larger one at lower frequencies.
     first, second = (scipy.fft.fft2(s * fading, shape) for s in (reference, input))
     down, across = (np.exp(-(scipy.fft.fftfreq(n) ** 2) / (2 * _BAND**2)) for n in shape)
@@ -113,7 +122,7 @@ def correlate_spectra(reference: Image, input: Image) -> Surface:
     return normalise(scipy.fft.fftshift(scipy.fft.ifft2(cross).real).astype(np.float32))
 
 
-def turns(surface: Surface, limits: PoseLimits, count: int) -> Iterator[Pose]:
+def rotations(surface: Surface, limits: SearchLimits, count: int) -> Iterator[Pose]:
     """Yield the most likely rotations and scales within limits, best first.
 
     Rotations come in pairs that are half a turn apart, if both are within the limits.
@@ -125,39 +134,35 @@ def turns(surface: Surface, limits: PoseLimits, count: int) -> Iterator[Pose]:
     allowed = (np.abs(rotation) <= limits.rotation_deg + ANGLE_STEP_DEG / 2)[:, None] & (
         (log_scale >= low - _LOG_STEP / 2) & (log_scale <= high + _LOG_STEP / 2)
     )
-    searched = np.where(allowed, surface, -np.inf)
-    same = round(SAME_DEG / ANGLE_STEP_DEG)
-    near_rows, near_cols = np.arange(-same, same + 1), round(SAME_LOG_SCALE / _LOG_STEP)
-    for _ in range(count):
-        row, col = (int(i) for i in np.unravel_index(searched.argmax(), searched.shape))
+    searched = np.where(allowed, surface, 0)
+    for row, col in highest_peaks(searched, count, _SAME, circular=(0,)):
         if searched[row, col] <= 0:
             return
         degrees = rotation[row] + ANGLE_STEP_DEG * gaussian_peak(surface[:, col], row)
         scale = np.exp(log_scale[col] + _LOG_STEP * gaussian_peak(surface[row], col))
         yield from half_turns(float(degrees), float(scale), limits)
-        searched[(row + near_rows) % rows, max(col - near_cols, 0) : col + near_cols + 1] = -np.inf
 
 
-def left(both: Shared, settings: SimilaritySettings) -> PoseFound | None:
+def remaining_pose(both: Shared, settings: SimilaritySettings) -> PoseFound | None:
     """Return what rotation, scale and shift are left between the parts that two windows share."""
     surface = correlate_spectra(*spectra(both.reference, both.input, settings, disc=False))
-    shift = shift_left(both, settings)
+    shift = remaining_shift(both, settings)
     if shift is None:
         return None
-    turn = next(turns(surface, _CORRECTION, 1), Pose())
-    return replace(shift, pose=replace(turn, shift_px=shift.pose.shift_px))
+    rotation = next(rotations(surface, _CORRECTION, 1), Pose())
+    return replace(shift, pose=replace(rotation, shift_px=shift.pose.shift_px))
 
 
-def try_turns(
+def try_poses(
     reference: Patch,
     input: Patch,
     poses: Iterable[Pose],
-    limits: PoseLimits,
+    limits: SearchLimits,
     settings: SimilaritySettings,
 ) -> list[PoseFound]:
     """Return the best shift at each of some rotations and scales, best first.
 
-    Windows are reduced. No more poses are tried after one of `_CLEAR_HEIGHT`, but for its other
+    Windows are reduced. No more poses are tried after one of `_SURE_HEIGHT`, but for its other
     half turn.
     """
     factor = max(round(min(reference.values.shape) / _TRIAL_SIDE_PX), 1)
@@ -165,11 +170,11 @@ def try_turns(
     small = reduced_patch(input, factor)
     found: list[PoseFound] = []
     for pose in poses:
-        trials = shifts_at(fixed, small, pose, limits.radius_px / factor, settings, 1)
+        trials = shifts_at(fixed, small, pose, limits.radius / factor, settings, 1)
         for trial in trials:
             right, down = (factor * shift for shift in trial.pose.shift_px)
             found.append(replace(trial, pose=replace(pose, shift_px=(right, down))))
-        if found and found[-1].height >= _CLEAR_HEIGHT:
+        if found and found[-1].height >= _SURE_HEIGHT:
             break
     return distinct(found, WORTH_ALIGNING)
 
@@ -177,9 +182,9 @@ def try_turns(
 def fourier_mellin(
     reference: Patch,
     input: Patch,
-    limits: PoseLimits,
+    limits: SearchLimits,
     settings: SimilaritySettings,
-    executor: Executor | None = None,
+    context: Context,
 ) -> list[PoseFound]:
     """Search for rotation, scale and shift by Fourier–Mellin; a `PoseSearch`.
 
@@ -192,18 +197,18 @@ def fourier_mellin(
     settings
         "ncc" compares grey values; all else has its spectra made of their logarithms, and its
         shift found on orientation fields.
-    executor
+    context
         Threads to align the candidates in.
     """
     if reference.is_flat or input.is_flat:
         return []
     surface = correlate_spectra(*spectra(reference, input, settings, disc=True))
-    tried = turns(surface, limits, CANDIDATES)
-    found = try_turns(reference, input, tried, limits, settings)[:RETURNED]
+    tried = rotations(surface, limits, CANDIDATES)
+    found = try_poses(reference, input, tried, limits, settings)[:RETURNED]
 
     def align(one: PoseFound) -> PoseFound:
-        for _ in range(_CORRECTIONS):
-            one = aligned(reference, input, one, limits, lambda both: left(both, settings))
-        return aligned(reference, input, one, limits, lambda both: shift_left(both, settings))
+        steps = [partial(remaining_pose, settings=settings)] * _CORRECTIONS
+        shift = partial(remaining_shift, settings=settings)
+        return aligned(reference, input, one, limits, *steps, shift)
 
-    return distinct((executor.map if executor else map)(align, found))
+    return distinct(context.quiet().map(align, found))

@@ -1,4 +1,4 @@
-"""Estimators of the gradient of a SAR image (thesis S 6.4).
+"""Estimators of the gradient of a SAR image ([Suri2010] 6.4).
 
 All return the derivatives along columns and rows. Differences are taken of grey values as they
 are; ratios, for which multiplicative noise is alike in bright and dark areas, of positive ones.
@@ -48,7 +48,7 @@ def log_ratios(image: FloatImage) -> Gradient:
 
 
 def unsigned_log_ratios(image: FloatImage) -> Gradient:
-    """Return ROEWA as thesis S has it: strength without a sign, so directions in 0 … 90° only."""
+    """Return ROEWA as [Suri2010] has it: strength without a sign, so directions in 0 … 90° only."""
     along_cols, along_rows = log_ratios(image)
     return np.abs(along_cols), np.abs(along_rows)
 
@@ -56,7 +56,7 @@ def unsigned_log_ratios(image: FloatImage) -> Gradient:
 def average_before(image: FloatImage, decay: float, axis: int) -> FloatImage:
     """Return the exponentially weighted average of each pixel and all before it.
 
-    The causal filter h1 of thesis S eq 6.14, 6.19 and 6.20, (1 − b) bˣ; the first pixel goes on
+    The causal filter h1 of [Suri2010] eq 6.14, 6.19 and 6.20, (1 − b) bˣ; the first pixel goes on
     forever before the image.
 
     Parameters

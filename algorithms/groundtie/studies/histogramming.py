@@ -1,11 +1,11 @@
-"""The joint histogram of a template and an image under any affine transform (thesis S 3.4.2).
+"""The joint histogram of a template and an image under any affine transform ([Suri2010] 3.4.2).
 
 * Two-step estimators interpolate the image at each template pixel's place and count one entry; but
   for nearest neighbour, interpolation smooths the image between its pixels and not on them, which
   gives similarity false maxima.
 * One-step estimators spread each template pixel over the bins of the image pixels around its
-  place, with the weights of a B-spline: generalised partial volume estimation (GPVE; Chen &
-  Varshney 2003, S eq 3.34). Order 2 is partial volume interpolation (PVI; Maes et al. 1997), which
+  place, with the weights of a B-spline: generalised partial volume estimation (GPVE;
+  [Chen2003], [Suri2010] eq 3.34). Order 2 is partial volume interpolation (PVI [Maes1997]), which
   has false maxima of its own; from order 4 on there are none.
 
 For shifts alone `joint_histogram` counts many transforms at once.
@@ -34,13 +34,13 @@ from ..similarity.measures import HistogramMeasure
 FloatArray = NDArray[np.float64]
 Bins = NDArray[np.uint8] | NDArray[np.uint16]
 
-# Stands for masked pixels among grey levels of 16 bits, as `binning.MASKED` among those of 8.
+# Value of masked pixels among grey levels of 16 bits, as `binning.MASKED` among those of 8.
 MASKED_LEVEL = np.uint16(65_535)
 
 # Up to so many template pixels every weight is summed up; beyond, that takes too long for a search.
 _EXACT_PIXELS = 20_000
 
-# Histograms of all shifts take no more memory than this together, else each is counted by itself.
+# If histograms of all shifts need more memory than this, each is counted by itself.
 _MOST_VOLUME_BYTES = 150_000_000
 
 
@@ -55,7 +55,7 @@ def to_levels(
         Grey values.
     bins
         Number of levels, up to 65 535; None: every grey value that occurs is a level of its own,
-        as for S's images of 11 and 16 bits "without binning".
+        as [Suri2010] for images of 11 and 16 bits "without binning".
     binning
         One of `binning.BINNINGS`.
 
@@ -232,8 +232,8 @@ def measure_surface(
 
     volume_bytes = 4 * (span + 2 * margin) ** 2 * counts[0] * counts[1]
     if max(counts) <= MASKED and volume_bytes <= _MOST_VOLUME_BYTES:
-        own, other = (np.minimum(bins, MASKED).astype(np.uint8) for bins in (template, search))
-        volume = count_joint_histograms(own, other, counts, span // 2, context)
+        first, second = (np.minimum(bins, MASKED).astype(np.uint8) for bins in (template, search))
+        volume = count_joint_histograms(first, second, counts, span // 2, context)
         rows = context.map(measure, list(volume.histograms(order)))
     else:
         rows = context.map(one_by_one, range(span))
@@ -272,7 +272,7 @@ def _contributions(
         start = row * stride
         for col, weight_x in zip(cols, along_x, strict=True):
             weights = None if order == 1 else weight_y * weight_x
-            # Under whole shifts, pixels at the ends of even orders' kernels weigh nothing.
+            # Under whole shifts, pixels at the ends of even orders' kernels have no weight.
             if weights is None or weights.any():
                 yield codes + padded[start + col], weights
 

@@ -1,4 +1,4 @@
-"""Measures on joint histograms that studies compare with the product's (thesis S 3.3, 2.3.1)."""
+"""Measures on joint histograms that studies compare with the product's ([Suri2010] 3.3, 2.3.1)."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ _NOTHING = 1e-9
 
 
 def mutual_information(histograms: Histograms) -> FloatArray:
-    """Return Shannon's H(A) + H(B) - H(A, B) in nats (thesis S eq 3.19)."""
+    """Return Shannon's H(A) + H(B) - H(A, B) in nats ([Suri2010] eq 3.19)."""
     a, b, ab = map(entropy, tables(histograms))
     return np.asarray(a + b - ab)
 
 
 def renyi_mutual_information(alpha: float) -> HistogramMeasure:
-    """Return the measure R(A) + R(B) - R(A, B) with Rényi's entropy (thesis S eq 3.15, 3.16).
+    """Return the measure R(A) + R(B) - R(A, B) with Rényi's entropy ([Suri2010] eq 3.15, 3.16).
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def renyi_mutual_information(alpha: float) -> HistogramMeasure:
 
 
 def tsallis_mutual_information(q: float) -> HistogramMeasure:
-    """Return the measure S(A) + S(B) + (1 - q) S(A) S(B) - S(A, B) (thesis S eq 3.17, 3.18).
+    """Return the measure S(A) + S(B) + (1 - q) S(A) S(B) - S(A, B) ([Suri2010] eq 3.17, 3.18).
 
     The cross term makes it 0 for independent images, as Tsallis' entropy is not additive. With
     S = (Σ p^q - 1) / (1 - q) all of it is (Σ p_A^q Σ p_B^q - Σ p_AB^q) / (1 - q).

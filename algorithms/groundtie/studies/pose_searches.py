@@ -1,13 +1,18 @@
-"""All searches for a pose, by the names that users choose them by."""
+"""All searches for a pose, by the names that users choose them by to compare them."""
 
 from __future__ import annotations
 
 from types import MappingProxyType
+from typing import Protocol
 
-from ..pose.phase_correlation import phase_correlation
-from ..pose.pose import PoseSearch
-from ..pose.rotation_steps import rotation_steps
+from ..context import Context
+from ..geometry.limits import SearchLimits
+from ..pose.pose import PoseFound
+from ..pose.search import find_poses
+from ..rasters.patch import Patch
+from ..similarity.surface import SimilaritySettings
 from .fourier_mellin import fourier_mellin
+from .phase_correlation import phase_correlation
 from .radon import radon
 from .simplex import nelder_mead, powell
 from .spsa import discrete_spsa, spsa, spsa_second_order
@@ -17,9 +22,24 @@ DEFAULT_SEARCH = "rotation-steps"
 # Those that climb a joint histogram; all others correlate orientation fields or grey values.
 HISTOGRAM_SEARCHES = frozenset({"spsa", "spsa2", "discrete-spsa", "powell", "nelder-mead"})
 
+
+class PoseSearch(Protocol):
+    """A way to find the pose of an input window in a reference window; see `find_poses`."""
+
+    def __call__(
+        self,
+        reference: Patch,
+        input: Patch,
+        limits: SearchLimits,
+        settings: SimilaritySettings,
+        context: Context,
+    ) -> list[PoseFound]:
+        """Search within limits; return candidates, best first."""
+
+
 SEARCHES = MappingProxyType[str, PoseSearch](
     {
-        DEFAULT_SEARCH: rotation_steps,
+        DEFAULT_SEARCH: find_poses,
         "fourier-mellin": fourier_mellin,
         "radon": radon,
         "phase-correlation": phase_correlation,

@@ -1,27 +1,33 @@
 """Radon: rotation and shift from projections of the windows.
 
-Thesis P sections 3.3.2–3.3.4. A rotation is a shift of the Radon transform along its angle; the
-spectra of the projections do not change with the image's shift, so the rotation is found on
-them. The shift is then that of the projections onto the rows' and columns' directions (P eq
-3.10–3.12). P's own errors are up to 2° and a few pixels; here the spectra are made alike at all
-frequencies, peaks are found between the bins, and all is found again on what both windows show.
+A rotation is a shift of the Radon transform along its angle; the spectra of the projections do
+not change with the image's shift, so the rotation is found on them. The shift is then that of the
+projections onto the rows' and columns' directions (equations 3.10–3.12). The source's errors are
+up to 2° and a few pixels; here the spectra are normalised at each frequency, peaks are found
+between the bins, and all is found again on what both windows show. Source: [Patel2011], sections
+3.3.2–3.3.4.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from ..pose.phase_correlation import CORRECTION_PX, gaussian_peak, whitened
-from ..pose.polar import ANGLE_STEP_DEG, ANGLES, evened, half_turns, log_power
-from ..pose.pose import Pose, PoseFound, PoseLimits
-from ..pose.windows import (
+from ..context import Context
+from ..geometry.limits import SearchLimits
+from ..pose.pose import Pose, PoseFound
+from ..rasters.patch import Patch, reduced
+from ..similarity.peaks import highest_peaks
+from ..similarity.surface import SimilaritySettings, normalise
+from .phase_correlation import CORRECTION_PX, gaussian_peak, whitened
+from .polar import ANGLE_STEP_DEG, ANGLES, evened, half_turns, log_power
+from .spectral_windows import (
     SAME_DEG,
     Field,
     Image,
@@ -35,8 +41,6 @@ from ..pose.windows import (
     texture,
     within,
 )
-from ..rasters.patch import Patch, reduced
-from ..similarity.surface import SimilaritySettings, normalise
 
 # The rotation is found on images reduced to about this length, in pixels.
 _SIDE_PX = 192
@@ -49,8 +53,9 @@ _RANGE = (0.02, 0.4)
 _ANGLE_BAND = 0.15
 _SHIFT_BAND = 0.2
 
-# How many rotations are tried.
+# How many rotations are tried, and which bins of the angle are the same peak.
 CANDIDATES = 5
+_SAME = np.ones(2 * round(SAME_DEG / ANGLE_STEP_DEG) + 1, bool)
 
 # How many candidates are aligned and returned at most, and which share of the best one's height
 # they have at least.
@@ -59,7 +64,7 @@ WORTH_ALIGNING = 0.5
 
 # How often, and how far, the rotation is corrected on what both windows show.
 _CORRECTIONS = 2
-_CORRECTION = PoseLimits(0.0, 2.0)
+_CORRECTION = SearchLimits(0.0, 2.0)
 
 
 def radon_transform(image: Image) -> Image:
@@ -83,7 +88,7 @@ def radon_transform(image: Image) -> Image:
         angle = np.pi * step / ANGLES
         along = np.array([np.sin(angle), -np.cos(angle)])
         across = np.array([np.cos(angle), np.sin(angle)])
-        # Rows of the turned image are the lines: it runs along them by columns.
+        # Rows of the rotated image are the lines: it runs along them by columns.
         matrix = np.column_stack([across, along, np.zeros(2)])
         matrix[:, 2] = to_middle - matrix[:, :2] @ np.full(2, (side - 1) / 2)
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -109,7 +114,7 @@ def projection_spectra(
     return found
 
 
-def rotations(spectra: list[Image], limits: PoseLimits, count: int) -> Iterator[Pose]:
+def rotations(spectra: list[Image], limits: SearchLimits, count: int) -> Iterator[Pose]:
     """Yield the most likely rotations within limits, best first, with half turns.
 
     Parameters
@@ -128,16 +133,12 @@ def rotations(spectra: list[Image], limits: PoseLimits, count: int) -> Iterator[
     values = scipy.fft.fftshift(scipy.fft.ifft(whitened(cross, 0.5) * weights).real)
     rotation = (np.arange(ANGLES) - ANGLES // 2) * ANGLE_STEP_DEG
     allowed = np.abs(rotation) <= limits.rotation_deg + ANGLE_STEP_DEG / 2
-    searched = np.where(allowed, values, -np.inf)
-    same = round(SAME_DEG / ANGLE_STEP_DEG)
-    near = np.arange(-same, same + 1)
-    for _ in range(count):
-        best = int(searched.argmax())
+    searched = np.where(allowed, values, 0)
+    for (best,) in highest_peaks(searched, count, _SAME, circular=(0,)):
         if searched[best] <= 0:
             return
         degrees = rotation[best] + ANGLE_STEP_DEG * gaussian_peak(values, best)
         yield from half_turns(float(degrees), 1.0, limits)
-        searched[(best + near) % ANGLES] = -np.inf
 
 
 def shift_along(
@@ -167,7 +168,10 @@ def shift_along(
 def shift_by_projections(
     reference: Image | Field, input: Image | Field, reach_px: float, wrap: bool = False
 ) -> PoseFound:
-    """Return the shift of an image by its projections at 0° and 90° (P eq 3.11, 3.12)."""
+    """Return the shift of an image by its projections at 0° and 90°.
+
+    Source: [Patel2011], equations 3.11 and 3.12.
+    """
     right, height = shift_along(reference.sum(axis=0), input.sum(axis=0), reach_px, wrap)
     down, other = shift_along(reference.sum(axis=1), input.sum(axis=1), reach_px, wrap)
     return PoseFound(Pose(shift_px=(right, down)), min(height, other))
@@ -176,9 +180,9 @@ def shift_by_projections(
 def radon(
     reference: Patch,
     input: Patch,
-    limits: PoseLimits,
+    limits: SearchLimits,
     settings: SimilaritySettings,
-    executor: Executor | None = None,
+    context: Context,
 ) -> list[PoseFound]:
     """Search for rotation and shift by projections; a `PoseSearch`.
 
@@ -192,7 +196,7 @@ def radon(
     settings
         "ncc" compares grey values; all else finds the rotation on their logarithms, and the
         shift on orientation fields.
-    executor
+    context
         Threads to align the candidates in.
     """
     scale = float(np.clip(1.0, *limits.scale))
@@ -202,7 +206,7 @@ def radon(
         input = resampled(input, pose, shape, "cubic")
     if reference.is_flat or input.is_flat:
         return []
-    own = PoseLimits(limits.radius_px / scale, limits.rotation_deg)
+    own = SearchLimits(limits.radius / scale, limits.rotation_deg)
     spectra = projection_spectra(reference, input, settings, disc=True)
     tried = [
         _shifted(structure(reference, settings), input, pose, own, settings)
@@ -210,41 +214,40 @@ def radon(
     ]
 
     def align(one: PoseFound) -> PoseFound:
-        for _ in range(_CORRECTIONS):
-            one = aligned(reference, input, one, own, lambda both: left(both, settings))
-        one = aligned(reference, input, one, own, lambda both: shift_left(both, settings))
+        steps = [partial(remaining_pose, settings=settings)] * _CORRECTIONS
+        shift = partial(remaining_shift, settings=settings)
+        one = aligned(reference, input, one, own, *steps, shift)
         right, down = (scale * shift for shift in one.pose.shift_px)
         return replace(one, pose=Pose(one.pose.rotation_deg, scale, (right, down)))
 
-    work = executor.map if executor else map
-    return distinct(work(align, distinct(tried, WORTH_ALIGNING)[:RETURNED]))
+    return distinct(context.quiet().map(align, distinct(tried, WORTH_ALIGNING)[:RETURNED]))
 
 
 def _shifted(
     reference: Image | Field,
     input: Patch,
     pose: Pose,
-    limits: PoseLimits,
+    limits: SearchLimits,
     settings: SimilaritySettings,
 ) -> PoseFound:
     """Return the best shift of an input at a rotation; `reference` is a `structure`."""
     shape = covering_shape(input.values.shape, pose, reference.shape)
     back = structure(resampled(input, pose, shape, "bilinear"), settings)
-    found = shift_by_projections(reference, back, float(np.sqrt(2)) * limits.radius_px)
+    found = shift_by_projections(reference, back, float(np.sqrt(2)) * limits.radius)
     right, down = pose.linear @ found.pose.shift_px
     moved = replace(pose, shift_px=(float(right), float(down)))
     return replace(found, pose=within(moved, limits))
 
 
-def shift_left(both: Shared, settings: SimilaritySettings) -> PoseFound:
+def remaining_shift(both: Shared, settings: SimilaritySettings) -> PoseFound:
     """Return the shift that is left between the parts that two windows share."""
     first, second = (structure(window, settings) for window in (both.reference, both.input))
     return shift_by_projections(first, second, CORRECTION_PX, wrap=True)
 
 
-def left(both: Shared, settings: SimilaritySettings) -> PoseFound:
+def remaining_pose(both: Shared, settings: SimilaritySettings) -> PoseFound:
     """Return what rotation and shift are left between the parts that two windows share."""
     spectra = projection_spectra(both.reference, both.input, settings, disc=False)
-    turn = next(rotations(spectra, _CORRECTION, 1), Pose())
-    shift = shift_left(both, settings)
-    return replace(shift, pose=replace(turn, shift_px=shift.pose.shift_px))
+    rotation = next(rotations(spectra, _CORRECTION, 1), Pose())
+    shift = remaining_shift(both, settings)
+    return replace(shift, pose=replace(rotation, shift_px=shift.pose.shift_px))

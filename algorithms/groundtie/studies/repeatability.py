@@ -1,6 +1,6 @@
-"""How well a detector finds the same features in two registered images (thesis S 6.6.2).
+"""How well a detector finds the same features in two registered images ([Suri2010] 6.6.2).
 
-Mikolajczyk et al. 2005: features are circles as large as their scale; two correspond if their
+[Mikolajczyk2005]: features are circles as large as their scale; two correspond if their
 circles overlap enough, after both were scaled so that the first's radius is 30 pixels.
 """
 
@@ -39,7 +39,7 @@ def overlap_error(
         Radius to which the first circle is scaled, and the second with it.
     """
     grow = radius_px / first.scale_px
-    # Positions keep their distance: only the regions are normalised, as Mikolajczyk et al. do.
+    # Positions keep their distance: only the regions are normalised, as in [Mikolajczyk2005].
     apart = np.hypot(*(second.position_px - first.position_px).T)
     a, b = np.full(len(first), radius_px), second.scale_px * grow
     shared = _lens(a, b, apart)

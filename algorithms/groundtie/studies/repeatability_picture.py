@@ -1,4 +1,4 @@
-"""The picture of what `detector_repeatability` measured, as thesis S has it in figures 6.9–6.14."""
+"""The picture of what `detector_repeatability` measured, as [Suri2010] figures 6.9–6.14."""
 
 from __future__ import annotations
 

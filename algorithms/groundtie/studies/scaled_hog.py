@@ -1,4 +1,4 @@
-"""HOG on patches that grow with their keypoints, and may rotate with them (thesis P 4.3)."""
+"""HOG on patches that grow with their keypoints, and may rotate with them ([Patel2017] 4.3)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""SIFT with other octaves, smoothing, gradients and orientations (thesis S 6.3, 6.4)."""
+"""SIFT with other octaves, smoothing, gradients and orientations ([Suri2010] 6.3, 6.4)."""
 
 from __future__ import annotations
 

@@ -1,30 +1,17 @@
 """Powell's and Nelder and Mead's ways to climb, which need no gradient (scipy).
 
-Powell 1964 (doi:10.1093/comjnl/7.2.155); Nelder & Mead 1965 (doi:10.1093/comjnl/7.4.308).
+Source: Powell 1964, doi:10.1093/comjnl/7.2.155; Nelder & Mead 1965, doi:10.1093/comjnl/7.4.308.
 """
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from functools import partial
 from typing import Any
 
 import numpy as np
 import scipy.optimize
 
-from ..pose.pose import PoseFound, PoseLimits
-from ..rasters.patch import Patch
-from ..similarity.surface import SimilaritySettings
-from .objective import (
-    EFFORT,
-    Counted,
-    Effort,
-    Place,
-    PoseSpace,
-    bin_pair,
-    search_by_climbing,
-    spread_px,
-)
+from .climbing import ClimbingSearch, Counted, Place, PoseSpace
 
 POWELL, NELDER_MEAD = "Powell", "Nelder-Mead"
 
@@ -37,9 +24,6 @@ _SIMPLEX_PX = 4.0
 
 # A climb ends after so many evaluations.
 _LONGEST = 400
-
-# Ends of climbs that are the same place, in pixels.
-_SAME_PX = 1.0
 
 
 def climb(
@@ -67,52 +51,6 @@ def _simplex(space: PoseSpace, start: Place) -> list[Place]:
     return [start, *(space.settle(start + side) for side in np.diag(towards))]
 
 
-def _search(
-    method: str,
-    reference: Patch,
-    input: Patch,
-    limits: PoseLimits,
-    settings: SimilaritySettings,
-    effort: Effort,
-) -> list[PoseFound]:
-    pair = bin_pair(reference, input, settings)
-    if pair is None:
-        return []
-    space = PoseSpace(limits, spread_px(reference.values.shape))
-    return search_by_climbing(pair, space, partial(climb, method=method), effort, _SAME_PX)
-
-
-def powell(
-    reference: Patch,
-    input: Patch,
-    limits: PoseLimits,
-    settings: SimilaritySettings,
-    executor: Executor | None = None,
-    *,
-    effort: Effort = EFFORT,
-) -> list[PoseFound]:
-    """Search for a pose by Powell's method: along one direction after the other.
-
-    Parameters
-    ----------
-    reference, input, limits, settings
-        As in `pose.PoseSearch`; the similarity must be one of joint histograms.
-    executor
-        Not used: every evaluation depends on those before.
-    effort
-        Where and how often to start.
-    """
-    return _search(POWELL, reference, input, limits, settings, effort)
-
-
-def nelder_mead(
-    reference: Patch,
-    input: Patch,
-    limits: PoseLimits,
-    settings: SimilaritySettings,
-    executor: Executor | None = None,
-    *,
-    effort: Effort = EFFORT,
-) -> list[PoseFound]:
-    """Search for a pose with Nelder and Mead's simplex; parameters as of `powell`."""
-    return _search(NELDER_MEAD, reference, input, limits, settings, effort)
+# Along one direction after the other; and by a simplex that moves, grows and shrinks.
+powell = ClimbingSearch(partial(climb, method=POWELL))
+nelder_mead = ClimbingSearch(partial(climb, method=NELDER_MEAD))

@@ -1,37 +1,22 @@
 """Simultaneous perturbation stochastic approximation (SPSA): climbing with two looks a step.
 
-First order: Spall 1992, 1998 (doi:10.1109/7.705889), thesis S eq 4.1–4.4. Second order: Spall 2000
-(doi:10.1109/TAC.2000.880982), for registration Cole-Rhodes et al. 2003
-(doi:10.1109/TIP.2003.819237). Discrete: thesis S 4.4.2.
-
-One number must be known beforehand that nobody knows: how steep the similarity is. NMI changes by
-some thousandths. So slopes are divided by their own root mean square so far, and gains are pixels.
+How steep the similarity is is not known beforehand; NMI changes by some thousandths. So slopes are
+divided by their own root mean square so far, and gains are pixels. Source, first order: Spall 1992,
+1998, doi:10.1109/7.705889, [Suri2010], equations 4.1–4.4; second order: Spall 2000,
+doi:10.1109/TAC.2000.880982, for registration Cole-Rhodes et al. 2003, doi:10.1109/TIP.2003.819237;
+discrete: [Suri2010], section 4.4.2.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ParameterError
-from ..pose.pose import PoseFound, PoseLimits
-from ..rasters.patch import Patch
-from ..similarity.surface import SimilaritySettings
-from .objective import (
-    EFFORT,
-    Counted,
-    Effort,
-    Place,
-    PoseSpace,
-    bin_pair,
-    search_by_climbing,
-    spread_px,
-)
+from .climbing import ClimbingSearch, Counted, Effort, Place, PoseSpace
 
 FloatArray = NDArray[np.float64]
 Measure = Callable[[FloatArray], float]
@@ -39,14 +24,10 @@ Measure = Callable[[FloatArray], float]
 # Spall's exponents: the least that still converge.
 ALPHA, GAMMA = 0.602, 0.101
 
-# A climb ends after so many evaluations without a change (thesis S 4.4.1): without more than what
-# the usual slope rises in so many pixels.
+# A climb ends after so many evaluations without a change: without more than what the usual slope
+# rises in so many pixels ([Suri2010], section 4.4.1).
 PATIENCE = 40
 _CHANGE_PX = 0.05
-
-# Ends of climbs that are the same place, in pixels: at the latest perturbation they cannot be
-# told apart.
-_SAME_PX = 1.0
 
 
 @dataclass(frozen=True)
@@ -76,12 +57,11 @@ class Gains:
         return self.look_px / (k + 1) ** GAMMA
 
 
-DISCRETE, DISCRETE_EFFORT = Gains(), Effort(agreeing=4)
 CONTINUOUS = Gains(look_px=1.0)
 
 
 class _Slopes:
-    """What the looks so far say: the slopes' root mean square, and for second order the Hessian."""
+    """Estimates so far: the slopes' root mean square, and for second order the Hessian."""
 
     def __init__(self, dimensions: int) -> None:
         self.steps = 0
@@ -115,7 +95,7 @@ def climb_first_order(
     """Return the best place found from a start by SPSA of first order.
 
     In a space of aligned grids (`PoseSpace.origin`) this is discrete SPSA: looks and steps are
-    rounded to whole pixels (thesis S 4.4.2).
+    rounded to whole pixels ([Suri2010], section 4.4.2).
     """
 
     def uphill(look: Measure, at: FloatArray, slopes: _Slopes) -> FloatArray:
@@ -185,87 +165,8 @@ def _climb(
     return best
 
 
-def spsa(
-    reference: Patch,
-    input: Patch,
-    limits: PoseLimits,
-    settings: SimilaritySettings,
-    executor: Executor | None = None,
-    *,
-    effort: Effort = EFFORT,
-    gains: Gains = CONTINUOUS,
-) -> list[PoseFound]:
-    """Search for a pose by SPSA of first order (see `pose.PoseSearch`).
-
-    Parameters
-    ----------
-    reference, input, limits, settings
-        As in `pose.PoseSearch`; the similarity must be one of joint histograms.
-    executor
-        Not used: every evaluation depends on those before.
-    effort
-        Where and how often to start.
-    gains
-        How far to step and look.
-    """
-    return _search(climb_first_order, reference, input, limits, settings, effort, gains)
-
-
-def spsa_second_order(
-    reference: Patch,
-    input: Patch,
-    limits: PoseLimits,
-    settings: SimilaritySettings,
-    executor: Executor | None = None,
-    *,
-    effort: Effort = EFFORT,
-    gains: Gains = CONTINUOUS,
-) -> list[PoseFound]:
-    """Search for a pose by SPSA of second order; parameters as of `spsa`."""
-    return _search(climb_second_order, reference, input, limits, settings, effort, gains)
-
-
-def discrete_spsa(
-    reference: Patch,
-    input: Patch,
-    limits: PoseLimits,
-    settings: SimilaritySettings,
-    executor: Executor | None = None,
-    *,
-    effort: Effort = DISCRETE_EFFORT,
-    gains: Gains = DISCRETE,
-) -> list[PoseFound]:
-    """Search for a shift of whole pixels by discrete SPSA (thesis S 4.4.2).
-
-    Parameters as of `spsa`. Only histograms at aligned grids are counted: shifts are whole pixels
-    between the windows' pixels. Where their sizes are even in one and odd in the other, the shift
-    of their centres ends in a half.
-
-    Raises
-    ------
-    ParameterError
-        Rotation or scale are searched for as well, or pixels differ in size.
-    """
-    if limits.rotation_deg != 0 or limits.scale != (1.0, 1.0):
-        raise ParameterError("discrete SPSA searches for shifts alone")
-    pair = bin_pair(reference, input, settings)
-    if pair is None:
-        return []
-    space = PoseSpace(limits, spread_px(reference.values.shape), pair.origin)
-    return search_by_climbing(pair, space, partial(climb_first_order, gains=gains), effort, 0.0)
-
-
-def _search(
-    climb: Callable[..., Place],
-    reference: Patch,
-    input: Patch,
-    limits: PoseLimits,
-    settings: SimilaritySettings,
-    effort: Effort,
-    gains: Gains,
-) -> list[PoseFound]:
-    pair = bin_pair(reference, input, settings)
-    if pair is None:
-        return []
-    space = PoseSpace(limits, spread_px(reference.values.shape))
-    return search_by_climbing(pair, space, partial(climb, gains=gains), effort, _SAME_PX)
+spsa = ClimbingSearch(partial(climb_first_order, gains=CONTINUOUS))
+spsa_second_order = ClimbingSearch(partial(climb_second_order, gains=CONTINUOUS))
+discrete_spsa = ClimbingSearch(
+    partial(climb_first_order, gains=Gains()), Effort(agreeing=4), on_grid=True
+)

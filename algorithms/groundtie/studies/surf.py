@@ -1,4 +1,4 @@
-"""SURF's keypoints (Bay et al. 2008; thesis P 4.2): blobs, by the Hessian of box filters.
+"""SURF's keypoints (Bay et al. 2008; [Patel2017] 4.2): blobs, by the Hessian of box filters.
 
 SURF's authors held patents, which may still run in some countries.
 """
@@ -36,7 +36,7 @@ class SurfDetector:
     Parameters
     ----------
     threshold
-        Least determinant of the Hessian of a feature, on grey values from 0 to 1 (thesis P:
+        Least determinant of the Hessian of a feature, on grey values from 0 to 1 ([Patel2017]:
         0.0005 to 0.002).
     octaves
         How often the size of blobs is doubled: the largest is as large as 2 ^ octaves times the

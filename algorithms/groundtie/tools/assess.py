@@ -1,4 +1,4 @@
-"""Judge a registration that was made before, by points, by consistency and by eye."""
+"""Measure how good a registration is that was made before, by points, consistency and by eye."""
 
 from __future__ import annotations
 
@@ -10,26 +10,21 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
-from ..assessment.accuracy import (
-    Assessment,
-    PointErrors,
-    measure_check_points,
-    measure_tie_points,
-)
+from ..assessment.accuracy import Assessment
 from ..assessment.comparison import Comparison, compare
-from ..assessment.consistency import Leg, consistency
+from ..assessment.evidence import AssessmentFiles
+from ..assessment.point_errors import PointErrors
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
-from ..errors import GeoreferencingError, NotRegisteredError, ParameterError, SameFileError
+from ..errors import NotRegisteredError
 from ..geometry.models import KINDS
-from ..geometry.transform import Transform, load_transform
-from ..kinds import Choice, FileIn, FileOut, Number, RasterIn, check_different
+from ..geometry.transform import Transform
+from ..kinds import Choice, FileIn, FileOut, Number, RasterIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
-from ..rasters.reading import RasterSource, bounded_cache, open_raster
-from ..registration.stored_transform import load_stored, transform_of
+from ..rasters.reading import bounded_cache, open_raster
 from ..registration.verdict import Verdict
-from ..report.report import PART_LABELS, AssessmentReport
+from ..report.assessment_report import PART_LABELS, AssessmentReport
 
 _TABLES = (".gpkg", ".geojson", ".csv", ".points")
 
@@ -73,18 +68,22 @@ class AssessmentResult:
 
 def _lines(label: str, errors: PointErrors) -> list[str]:
     px, metres = errors.in_pixels, errors.in_metres
-
-    def both(name: str) -> str:
-        in_metres = f" ({getattr(metres, name):.2f} m)" if errors.error_m is not None else ""
-        return f"{getattr(px, name):.2f} px{in_metres}"
-
+    names = {"rmse": "RMSE", "mean": "mean", "median": "median", "ce90": "CE90",
+             "largest": "largest"}  # fmt: skip
+    lengths = [
+        f"{label_of} {getattr(px, name):.2f} px"
+        + (f" ({getattr(metres, name):.2f} m)" if errors.error_m is not None else "")
+        for name, label_of in names.items()
+    ]
     return [
-        f"{label}: {errors.used.sum()} of {len(errors)} points, RMSE {both('rmse')}, "
-        f"mean {both('mean')}, median {both('median')}, CE90 {both('ce90')}, "
-        f"largest {both('largest')}",
+        f"{label}: {errors.used.sum()} of {len(errors)} points, {', '.join(lengths)}",
         f"  bias {px.bias[0]:+.2f}, {px.bias[1]:+.2f} px, standard deviation {px.std[0]:.2f}, "
         f"{px.std[1]:.2f} px (columns, rows)",
     ]
+
+
+def _transform_in(label: str, help: str, advanced: bool = True) -> FileIn:
+    return FileIn(label=label, help=help, suffixes=(".json",), advanced=advanced)
 
 
 @tool(
@@ -102,11 +101,11 @@ def _lines(label: str, errors: PointErrors) -> list[str]:
 def assess(
     transform: Annotated[
         Path | None,
-        FileIn(
-            label="Transform",
-            help="The registration: a transform from reference to input. Without it, it is fitted "
-            "to the tie points; without these, the input's own georeferencing is judged.",
-            suffixes=(".json",),
+        _transform_in(
+            "Transform",
+            "The registration: a transform from reference to input. Without it, it is fitted "
+            "to the tie points; without these, the input's own georeferencing is measured.",
+            advanced=False,
         ),
     ] = None,
     tie_points: Annotated[
@@ -130,10 +129,10 @@ def assess(
     ] = None,
     back_transform: Annotated[
         Path | None,
-        FileIn(
-            label="Transform back",
-            help="The registration of the reference to the input, for two-way consistency.",
-            suffixes=(".json",),
+        _transform_in(
+            "Transform back",
+            "The registration of the reference to the input, for two-way consistency.",
+            advanced=False,
         ),
     ] = None,
     reference: Annotated[
@@ -148,7 +147,7 @@ def assess(
         RasterIn(
             label="Input image",
             help="The image that was registered, for the report's pictures. It is needed where "
-            "there is no transform, as it tells where its pixels claim to be.",
+            "there is no transform: its georeferencing gives the nominal positions.",
         ),
     ] = None,
     max_error: Annotated[
@@ -174,32 +173,26 @@ def assess(
     ] = None,
     onward_transform: Annotated[
         Path | None,
-        FileIn(
-            label="Transform onward",
-            help="For three-way consistency: the registration of a third image to the input "
+        _transform_in(
+            "Transform onward",
+            "For three-way consistency: the registration of a third image to the input "
             "(the input is its reference). It needs the transform closing or direct, too.",
-            suffixes=(".json",),
-            advanced=True,
         ),
     ] = None,
     closing_transform: Annotated[
         Path | None,
-        FileIn(
-            label="Transform closing",
-            help="For three-way consistency: the registration of the reference to the third image "
+        _transform_in(
+            "Transform closing",
+            "For three-way consistency: the registration of the reference to the third image "
             "(the third image is its reference).",
-            suffixes=(".json",),
-            advanced=True,
         ),
     ] = None,
     direct_transform: Annotated[
         Path | None,
-        FileIn(
-            label="Transform direct",
-            help="For three-way consistency, in place of the closing transform: the registration "
+        _transform_in(
+            "Transform direct",
+            "For three-way consistency, in place of the closing transform: the registration "
             "of the third image to the reference; its inverse is taken.",
-            suffixes=(".json",),
-            advanced=True,
         ),
     ] = None,
     model: Annotated[
@@ -214,7 +207,7 @@ def assess(
     progress: Progress = SILENT,
     parameters: Mapping[str, Any] = MappingProxyType({}),
 ) -> AssessmentResult:
-    """Judge a registration that was made before, by points, by consistency and by eye.
+    """Measure how good a registration is that was made before, by points, consistency and by eye.
 
     Errors are measured at control points (no measure of accuracy), at test points, at independent
     check points, and as the consistency of several transforms: RMSE, mean, median, CE90, largest,
@@ -222,152 +215,39 @@ def assess(
     fit can confirm a registration; inconsistency can refuse it, too.
     """
     started = time.perf_counter()
-    files = _Files(
+    files = AssessmentFiles(
         transform, tie_points, check_points, back_transform,
         onward_transform, closing_transform, direct_transform,
     )  # fmt: skip
-    _check_call(files, reference, input, max_error, report)
+    images = {"reference": reference, "input": input}
+    files.check(images, max_error, report)
+    comparison: Comparison | None = None
     with ExitStack() as stack:
         stack.enter_context(bounded_cache())
-        reference_source, input_source = (
+        right, moving = (
             None if path is None else stack.enter_context(open_raster(path))
-            for path in (reference, input)
+            for path in images.values()
         )
         progress.update(0.0, "measuring")
-        found = files.registration(model, reference_source, input_source)
+        found = files.registration(model, right, moving)
         assessment = files.measure(found, max_error)
         verdict = None if max_error is None else assessment.judge(max_error)
         progress.update(0.3, "drawing")
-        comparison = None
-        if report is not None and reference_source is not None and input_source is not None:
-            comparison = _pictures(files, reference_source, input_source, found)
+        if report is not None and right is not None and moving is not None:
+            comparison = compare(right, moving, found)
+            if files.is_nominal:  # nothing was registered: there is no before and after
+                comparison = replace(comparison, registered=None)
     subject = str(transform or tie_points or input)
+    given = {name: value for name, value in parameters.items() if value is not None}
     page = AssessmentReport(
-        title=f"Assessment of {Path(subject).name}",
-        assessment=assessment,
-        verdict=verdict,
-        transform=found,
-        comparison=comparison,
-        parameters={k: v for k, v in parameters.items() if v is not None},
-        seconds=time.perf_counter() - started,
-    )
+        f"Assessment of {Path(subject).name}",
+        assessment, verdict, found, comparison, given, time.perf_counter() - started,
+    )  # fmt: skip
     progress.update(0.8, "writing")
-    written = {}
     with Outputs() as outputs:
         if report is not None:
             page.write(outputs.stage(report), outputs.stage(report.with_suffix(".json")))
-            written["report"] = str(report)
     if verdict is not None and not verdict.accepted:
         raise NotRegisteredError(f"{subject} is refused: {verdict.reason}", verdict)
+    written = {} if report is None else {"report": str(report)}
     return AssessmentResult(assessment, verdict, found, page.summary(), written)
-
-
-@dataclass(frozen=True)
-class _Files:
-    """The files that a registration is given and measured by; None: not given."""
-
-    transform: Path | None
-    tie_points: Path | None
-    check_points: Path | None
-    back_transform: Path | None
-    onward_transform: Path | None
-    closing_transform: Path | None
-    direct_transform: Path | None
-
-    @property
-    def is_claimed(self) -> bool:
-        """Whether it is the input's own georeferencing that is judged."""
-        return self.transform is None and self.tie_points is None
-
-    def registration(
-        self, model: str, reference: RasterSource | None, input: RasterSource | None
-    ) -> Transform:
-        """Return the transform that is judged."""
-        if self.transform is not None:
-            found = load_transform(self.transform)
-            return found if input is None else transform_of(found, input, self.transform)
-        if input is None:
-            raise ParameterError(
-                "give a transform, or the input image, which tells where its pixels claim to be"
-            )
-        if self.tie_points is not None:
-            return load_stored(self.tie_points, model, input)[0]
-        crs = input.grid.crs if reference is None else reference.grid.crs
-        if (crs is None) != (input.grid.crs is None):
-            raise GeoreferencingError(f"only one of {input.path} and the reference has a CRS")
-        return Transform.nominal(crs, input.grid)
-
-    def measure(self, found: Transform, max_error_px: float | None) -> Assessment:
-        """Measure a transform by all evidence there is."""
-        measured = Assessment()
-        if self.tie_points is not None:
-            control, test = measure_tie_points(self.tie_points, found, max_error_px)
-            measured = replace(measured, control_points=control, test_points=test)
-        if self.check_points is not None:
-            check = measure_check_points(self.check_points, found)
-            measured = replace(measured, check_points=check)
-        subject = Leg(str(self.transform or self.tie_points), found)
-        if self.back_transform is not None:
-            measured = replace(measured, two_way=consistency(subject, [_leg(self.back_transform)]))
-        if self.onward_transform is not None:
-            last = _leg(
-                self.closing_transform or self.direct_transform,
-                reverse=self.closing_transform is None,
-            )
-            way = [_leg(self.onward_transform), last]
-            measured = replace(measured, three_way=consistency(subject, way))
-        return measured
-
-
-def _leg(path: Path | None, reverse: bool = False) -> Leg:
-    assert path is not None
-    return Leg(str(path), load_transform(path), reverse)
-
-
-def _pictures(
-    files: _Files, reference: RasterSource, input: RasterSource, found: Transform
-) -> Comparison:
-    drawn = compare(reference, input, found)
-    # There is no before and after where the input is believed.
-    return replace(drawn, registered=None) if files.is_claimed else drawn
-
-
-def _check_call(
-    files: _Files,
-    reference: Path | None,
-    input: Path | None,
-    max_error: float | None,
-    report: Path | None,
-) -> None:
-    """Raise if the parameters do not go together."""
-    ways = (files.closing_transform is not None) + (files.direct_transform is not None)
-    if ways > 1 or ways != (files.onward_transform is not None):
-        raise ParameterError(
-            "three-way consistency needs onward_transform and either closing_transform or "
-            "direct_transform"
-        )
-    if files.is_claimed and (
-        files.back_transform is not None or files.onward_transform is not None
-    ):
-        raise ParameterError("consistency needs a transform or tie points")
-    by_points = files.tie_points is not None or files.check_points is not None
-    by_eye = reference is not None and input is not None and report is not None
-    if not (
-        by_points
-        or by_eye
-        or files.back_transform is not None
-        or files.onward_transform is not None
-    ):
-        raise ParameterError(
-            "there is nothing to judge by: give check_points, tie_points, back_transform, or "
-            "reference, input and report"
-        )
-    if max_error is not None and not by_points:
-        raise ParameterError("max_error needs points: give check_points or tie_points")
-    given = {"reference": reference, "input": input}
-    check_different({name: path for name, path in given.items() if path is not None})
-    if report is not None:
-        numbers = report.with_suffix(".json")
-        for name, path in (vars(files) | given).items():
-            if isinstance(path, Path) and path.resolve() == numbers.resolve():
-                raise SameFileError(f"{name} would be overwritten by the report's JSON: {path}")

@@ -5,37 +5,34 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+from ..context import threads
 from ..declaration import tool
 from ..errors import ParameterError
 from ..geometry.transform import Transform, load_transform
 from ..kinds import Choice, FileIn, FileOut, Number, Text
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, writing
-from ..rasters.pair import ImagePair, make_pair
+from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
-from ..rasters.reading import bounded_cache
-from ..registration.classifying import Classifying
-from ..registration.registration import open_image
+from ..registration.pipeline import open_pair
+from ..registration.specification import Specification
 from ..registration.stored_transform import transform_of
 from ..studies.evaluation import Evaluation, Variant, evaluate
 from ..studies.matching import METHODS
 from ..studies.repeatability import CLASS_NAMES
 from ..studies.repeatability_picture import draw_evaluations
-from .classifier_parameters import InputClassifier, ReferenceClassifier
 from .common import (
     Input,
     InputBand,
-    InputMask,
     MatchingPixelSize,
     Reference,
     ReferenceBand,
-    ReferenceMask,
 )
+from .registration_parameters import InputMask, ReferenceMask
 
 
 @dataclass(frozen=True)
@@ -156,8 +153,6 @@ def detector_repeatability(
             advanced=True,
         ),
     ] = METHODS[-1],
-    reference_classifier: ReferenceClassifier = None,
-    input_classifier: InputClassifier = None,
     reference_band: ReferenceBand = None,
     input_band: InputBand = None,
     reference_mask: ReferenceMask = None,
@@ -175,24 +170,19 @@ def detector_repeatability(
     chosen = [Variant.parse(name.strip(), contrast) for name in variants.split(",")]
     if len({variant.name for variant in chosen}) < len(chosen):
         raise ParameterError(f"a variant is named twice: {variants}")
-    with ExitStack() as stack:
-        stack.enter_context(bounded_cache())
-        pair = make_pair(
-            open_image(stack, reference, reference_band, reference_mask),
-            open_image(stack, input, input_band, input_mask),
-            matching_pixel_size,
-            0.0,
-        )
-        for note in pair.notes():
-            progress.update(0.0, note)
+    spec = Specification(search_radius_m=0.0, matching_pixel_size_m=matching_pixel_size)
+    bands, masks = (reference_band, input_band), (reference_mask, input_mask)
+    with (
+        threads(progress=progress) as context,
+        open_pair(reference, input, spec, context.part(0.0, 0.1), bands, masks) as opened,
+    ):
+        pair = opened.images
         known = None
         if transform is not None:
             known = transform_of(load_transform(transform), pair.input.source, transform)
-        classifying = Classifying(reference_classifier, input_classifier)
-        shown = classifying.apply(pair, stack, progress.part(0.0, 0.1))
         parts = None
-        if shown is not pair:
-            reference_part, input_part = _read(shown, known, size)
+        if opened.pair.is_masked:
+            reference_part, input_part = _read(opened.pair, known, size)
             parts = reference_part.valid, input_part.valid
         patches = _both_valid(*_read(pair, known, size))
     evaluations = []

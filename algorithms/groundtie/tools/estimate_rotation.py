@@ -1,14 +1,15 @@
-"""Rotation, scale and shift between two rasters, from no more than rough limits."""
+"""Rotation, scale and shift between two rasters, from no more than coarse limits."""
 
 from __future__ import annotations
 
 import json
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+from ..context import threads
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import NotRegisteredError, ParameterError
@@ -22,10 +23,10 @@ from ..rasters.atomic import Outputs, writing
 from ..rasters.pair import Image
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.verdict import refuse
-from ..report.rotation_picture import draw_evidence
-from ..similarity.surface import SIMILARITIES, SimilaritySettings
+from ..report.rotation_picture import draw_rotation
+from ..similarity.surface import SimilaritySettings
 from ..studies.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
-from .common import Input, InputBand, Reference, ReferenceBand, TransformOut, Workers, worker_count
+from .common import Input, InputBand, Reference, ReferenceBand, TransformOut, Workers
 
 _AUTO = "auto"
 
@@ -107,10 +108,11 @@ def estimate_rotation(
         str,
         Choice(
             label="Search",
-            help="How the pose is searched for: rotation-steps tries everything and is the only "
-            "one that is meant for SAR with optical images; fourier-mellin finds any rotation "
-            "and scale, radon rotations, phase-correlation shifts alone; the others climb "
-            "mutual information from where the input claims to lie.",
+            help="How the pose is searched for: rotation-steps, which all registrations use, tries "
+            "everything and is the only one that is meant for SAR with optical images. The others "
+            "are there to compare: fourier-mellin finds any rotation and scale, radon rotations, "
+            "phase-correlation shifts alone; the rest climb mutual information from the nominal "
+            "position.",
             choices=tuple(SEARCHES),
         ),
     ] = DEFAULT_SEARCH,
@@ -129,7 +131,7 @@ def estimate_rotation(
         Number(
             label="Smallest scale",
             help="Least length of a reference's pixel in pixels of the input; of georeferenced "
-            "images, compared with what they claim.",
+            "images, against the nominal one.",
             minimum=0.25,
             maximum=4,
         ),
@@ -147,7 +149,7 @@ def estimate_rotation(
         float | None,
         Distance(
             label="Search radius",
-            help="How far the input may lie from where it claims to be, along rows and columns; "
+            help="How far the input may lie from its nominal position, along rows and columns; "
             "without georeferencing, how far the images' centres are apart, in input pixels. By "
             "default a quarter of the input's longer side.",
         ),
@@ -157,7 +159,8 @@ def estimate_rotation(
         Path | None,
         FileOut(
             label="Picture",
-            help="What speaks for the pose, to look at; it is drawn for a refused one, too.",
+            help="How well all poses match, and the images on one another; it is drawn for a "
+            "refused pose, too.",
             suffixes=(".png",),
         ),
     ] = None,
@@ -167,8 +170,8 @@ def estimate_rotation(
             label="Similarity",
             help="What is compared; auto takes what fits the search: mutual information where "
             "it climbs, else the orientation of edges. The search rotation-steps always takes "
-            "the latter.",
-            choices=(_AUTO, *SIMILARITIES),
+            "the latter; ncc compares grey values.",
+            choices=(_AUTO, "orientation", "ncc", "nmi"),
             advanced=True,
         ),
     ] = _AUTO,
@@ -179,10 +182,10 @@ def estimate_rotation(
 ) -> RotationResult:
     """Estimate rotation, scale and shift between two rasters of the same place.
 
-    Nothing needs to be known but limits. Images with georeferencing are compared as they claim to
-    lie: what is found is by how much the input is rotated, scaled and shifted against that.
-    Images without it are compared pixel by pixel, from centre to centre. Large images are reduced
-    to some 500 pixels, so that what is found is a start for a registration, not its end.
+    Images with georeferencing are compared at their nominal positions: what is found is by how
+    much the input is rotated, scaled and shifted against that. Images without it are compared
+    pixel by pixel, from centre to centre. Large images are reduced to some 500 pixels, so that
+    what is found is a start for a registration, not its end.
 
     Whatever the search, its pose is accepted only if an exhaustive search over all rotations
     finds it, too, and nothing nearly as good elsewhere.
@@ -191,37 +194,41 @@ def estimate_rotation(
         raise ParameterError("the smallest scale is larger than the largest")
     settings = SimilaritySettings(_similarity(search, similarity))
     scales = smallest_scale, largest_scale
-    with ExitStack() as stack:
-        stack.enter_context(bounded_cache())
-        images = [
-            Image(stack.enter_context(open_raster(path)), band)
-            for path, band in ((reference, reference_band), (input, input_band))
-        ]
-        progress.update(0.0, "reading")
-        windows = read_windows(images[0], images[1], scales, search_radius)
-    with ThreadPoolExecutor(worker_count(workers)) as executor:
-        progress.update(0.1, "searching")
-        pair = windows.reference, windows.input
-        limits = windows.limits(largest_rotation, scales)
-        found = SEARCHES[search](*pair, limits, settings, executor)
-        progress.update(0.5, "judging")
+    with threads(workers, progress) as context, Outputs() as outputs:
+        context.update(0.0, "reading")
+        rasters = (reference, reference_band), (input, input_band)
+        windows = _read(rasters, scales, search_radius)
+        pair, limits = (windows.reference, windows.input), windows.limits(largest_rotation, scales)
+        context.update(0.1, "searching")
+        found = SEARCHES[search](*pair, limits, settings, context.quiet())
+        context.update(0.5, "checking")
         exhaustive = search == DEFAULT_SEARCH
-        verdict = judge_pose(*pair, limits, found, exhaustive, executor)
+        verdict = judge_pose(*pair, limits, found, exhaustive, context.quiet())
+        context.update(0.8, "writing")
         pose = found[0].pose if found else None
-        progress.update(0.8, "writing")
-        with Outputs() as outputs:
-            if picture is not None:
-                word = "accepted" if verdict.accepted else "refused"
-                title = f"{word}: {verdict.reason}"
-                draw_evidence(outputs.stage(picture), *pair, limits, pose, title, executor)
-            if verdict.accepted and pose is not None:
-                result = _result(windows, pose, verdict, search, transform, picture)
-                _write_transform(outputs, transform, result.transform)
-                return result
+        if picture is not None:
+            title = f"{'accepted' if verdict.accepted else 'refused'}: {verdict.reason}"
+            draw_rotation(outputs.stage(picture), *pair, limits, pose, title, context.quiet())
+        if verdict.accepted and pose is not None:
+            files = {"transform": transform, "picture": picture}
+            result = _result(windows, pose, verdict, search, files)
+            _write_transform(outputs, transform, result.transform)
+            return result
     raise NotRegisteredError(
         f"no rotation of {input} against {reference} was found: {verdict.reason}",
         refuse(verdict.reason),
     )
+
+
+def _read(
+    rasters: Sequence[tuple[Path, int | None]],
+    scales: tuple[float, float],
+    radius: float | None,
+) -> PoseWindows:
+    with ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        images = [Image(stack.enter_context(open_raster(path)), band) for path, band in rasters]
+        return read_windows(images[0], images[1], scales, radius)
 
 
 def _similarity(search: str, wanted: str) -> str:
@@ -237,11 +244,9 @@ def _result(
     pose: Pose,
     verdict: PoseVerdict,
     search: str,
-    transform: Path | None,
-    picture: Path | None,
+    files: Mapping[str, Path | None],
 ) -> RotationResult:
     right, down = (float(shift) * windows.pixel_m for shift in pose.shift_px)
-    files = {"transform": transform, "picture": picture}
     return RotationResult(
         verdict,
         pose,

@@ -11,10 +11,9 @@ from typing import Annotated, Any
 from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
-from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import GeoreferencingError, ParameterError
-from ..kinds import Distance, Flag, RasterIn, RasterOut, Text
+from ..kinds import Flag, RasterOut, Text
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster
@@ -25,46 +24,30 @@ from ..rasters.writing import write_cog
 from ..registration.sensor_input import Ground, open_sensor_image, utm_of
 from ..sensor.dense import DenseOrientation
 from ..sensor.orientation import Orientation
-from .common import Resampling, Workers, crs_name, worker_count
+from .common import Resampling, Workers, worker_count
 from .sensor_parameters import Dem, DemDatum, Geoid, Height, RpcFile, SensorImage
+from .written_raster import SIZE_OUTPUTS, WrittenRaster, like_reference, pixel_size_of_result
 
 
 @dataclass(frozen=True)
-class OrthoResult:
-    """What `orthorectify` made: the file, its grid, and the heights that were used, in words."""
+class OrthoResult(WrittenRaster):
+    """What `orthorectify` made: the raster, and the heights that were used, in words."""
 
-    output: Path
-    grid: Grid
     heights: str
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
-        return {
-            "output": str(self.output),
-            "width": self.grid.width,
-            "height": self.grid.height,
-            "pixel_size": list(self.grid.pixel_size),
-            "crs": crs_name(self.grid),
-            "heights": self.heights,
-        }
+        return {**super().summary(), "heights": self.heights}
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
-        size = " × ".join(f"{side:g}" for side in self.grid.pixel_size)
-        return [
-            f"wrote {self.output}",
-            f"grid: {self.grid.width} × {self.grid.height} pixels of {size}, {crs_name(self.grid)}",
-            self.heights,
-        ]
+        return [*super().lines(), self.heights]
 
 
 @tool(
     title="Orthorectify",
     group="Sensor models",
-    outputs=(
-        ResultOutput("WIDTH", "Width of the result in pixels", "width"),
-        ResultOutput("HEIGHT", "Height of the result in pixels", "height"),
-    ),
+    outputs=SIZE_OUTPUTS,
 )
 def orthorectify(
     image: SensorImage,
@@ -77,21 +60,9 @@ def orthorectify(
     ],
     dem: Dem = None,
     dem_datum: DemDatum = None,
-    reference: Annotated[
-        Path | None,
-        RasterIn(
-            label="Reference image",
-            help="The result gets exactly the grid of this raster, so that the two stack. By "
-            "default the result covers all of the image.",
-        ),
-    ] = None,
+    reference: Annotated[Path | None, like_reference("image")] = None,
     pixel_size: Annotated[
-        float | None,
-        Distance(
-            label="Pixel size",
-            help="Pixel size of the result; by default that of the image on the ground.",
-            minimum=1e-6,
-        ),
+        float | None, pixel_size_of_result("; by default that of the image on the ground")
     ] = None,
     crs: Annotated[
         str | None,

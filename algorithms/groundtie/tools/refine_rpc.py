@@ -2,118 +2,34 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
-from ..errors import ParameterError
-from ..kinds import Choice, FileIn, FileOut, Number, RasterIn, VectorOut
-from ..masks.choice import NONE, REFERENCE, MaskUsed
+from ..kinds import Choice, FileIn, FileOut, RasterIn, VectorOut
+from ..masks.choice import AUTO as AUTO_MASK
 from ..progress import SILENT, Progress
-from ..rasters.reading import bounded_cache
-from ..registration.classifying import Classifying
-from ..registration.ground_control import Matching, match_ground_control, open_reference
-from ..registration.masking import MaskRequest
-from ..registration.refinement import Fitting, Refinement
-from ..registration.refinement_output import IMAGES, Call, RefinementFiles
-from ..registration.refinement_verdict import RefinementVerdict
-from ..registration.sensor_input import Ground, open_oriented_image
-from ..sensor.adjustment import AUTO, METHODS, ROBUST, Adjustment
+from ..registration.refinement_output import IMAGES
+from ..registration.sensor_jobs import RefinedRpc, refine
+from ..sensor.adjustment import AUTO
 from ..sensor.bias import KINDS
-from ..sensor.control_points import SUFFIXES, read_control_points
-from ..sensor.height_check import HeightCheck
-from ..sensor.rpc_fit import RPCFit
-from ..similarity.surface import SimilaritySettings
-from .classifier_parameters import InputClassifier
-from .common import (
-    ChipSize,
-    HighPercent,
-    LowPercent,
-    MatchingPixelSize,
-    ReferenceBand,
-    ReferenceMask,
-    Seed,
-    Workers,
-    worker_count,
-)
-from .registration_parameters import MaxError
-from .sensor_matching import (
-    ForwardBackwardError,
+from ..sensor.control_points import SUFFIXES
+from .common import MatchingPixelSize, ReferenceBand, Workers
+from .registration_parameters import Mask, MaxError, ReferenceMask
+from .sensor_parameters import (
+    Dem,
+    DemDatum,
+    Geoid,
+    Height,
     ImageBand,
-    MaskKind,
-    SearchRadius,
-    Similarity,
+    ImageMask,
+    RpcFile,
+    RpcSearchRadius,
+    SensorImage,
 )
-from .sensor_parameters import Dem, DemDatum, Geoid, Height, RpcFile, SensorImage
-
-
-@dataclass(frozen=True)
-class RefinedRpc:
-    """Refined RPCs, and how far to trust them.
-
-    Parameters
-    ----------
-    fit
-        The RPCs, with the bias folded in, and how far they miss it.
-    adjustment
-        The bias.
-    judged
-        The verdict, and the errors before and after.
-    heights
-        What speaks against the heights.
-    ground
-        Which heights were used, in words.
-    mask
-        Which mask points were matched with; None: they were given.
-    files
-        What was written, by name.
-    """
-
-    fit: RPCFit
-    adjustment: Adjustment
-    judged: RefinementVerdict
-    heights: HeightCheck
-    ground: str
-    mask: MaskUsed | None
-    files: dict[str, str]
-
-    def summary(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry."""
-        return {
-            "verdict": self.judged.summary(),
-            "bias": self.adjustment.bias.to_json(),
-            "left_out_rmse_px": self.adjustment.left_out_rmse_px,
-            "folding_residual_px": self.fit.largest_residual_px,
-            "heights": {"used": self.ground, **self.heights.summary()},
-            "mask": None if self.mask is None else self.mask.summary(),
-            "files": self.files,
-        }
-
-    def lines(self) -> list[str]:
-        """Return the result as lines of text."""
-        verdict, bias = self.judged.verdict, self.adjustment.bias
-        shift, sigma = bias.shift_px()
-        return [
-            f"accepted: {verdict.reason}",
-            f"model: {bias.kind}, {verdict.fit_points_used} of {verdict.fit_points} points",
-            f"shift in the middle of the image: {shift[0]:+.2f} ± {sigma[0]:.2f}, "
-            f"{shift[1]:+.2f} ± {sigma[1]:.2f} px (column, row)",
-            f"error at {self.judged.held_out}: {self.judged.before.rmse:.2f} px before, "
-            f"{self.judged.after.rmse:.2f} px after; CE90 {verdict.check_ce90_px:.2f} px "
-            f"({verdict.check_ce90_m:.2f} m)",
-            f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
-            self.ground,
-            *(() if self.mask is None else (self.mask.line(),)),
-            *(f"warning: {line}" for line in self.heights.warnings()),
-            *(f"{name}: {path}" for name, path in self.files.items()),
-        ]
 
 
 @tool(
@@ -163,7 +79,7 @@ def refine_rpc(
             choices=(AUTO, *KINDS),
         ),
     ] = AUTO,
-    search_radius: SearchRadius = None,
+    search_radius: RpcSearchRadius = None,
     max_error: MaxError = 3.0,
     residuals: Annotated[
         Path | None,
@@ -184,43 +100,16 @@ def refine_rpc(
             advanced=True,
         ),
     ] = None,
-    similarity: Similarity = "fused",
-    blunders: Annotated[
-        str,
-        Choice(
-            label="Blunders",
-            help="How wrong points are found: all at once by what is probable (robust), or one "
-            "after the other, the one with the largest residual first (worst-first; thesis S).",
-            choices=METHODS,
-            advanced=True,
-        ),
-    ] = ROBUST,
-    largest_residual: Annotated[
-        float,
-        Number(
-            label="Largest residual",
-            help="With worst-first: points with larger residuals are blunders.",
-            unit="px",
-            minimum=0.1,
-            maximum=100,
-            advanced=True,
-        ),
-    ] = 2.0,
     height: Height = None,
     geoid: Geoid = None,
     rpc: RpcFile = None,
     image_band: ImageBand = None,
-    image_classifier: InputClassifier = None,
+    image_mask: ImageMask = None,
     reference_band: ReferenceBand = None,
     reference_mask: ReferenceMask = None,
-    mask: MaskKind = NONE,
-    mask_high_percent: HighPercent = None,
-    mask_low_percent: LowPercent = 10.0,
+    mask: Mask = AUTO_MASK,
     matching_pixel_size: MatchingPixelSize = None,
-    chip_size: ChipSize = None,
-    forward_backward_error: ForwardBackwardError = 2.0,
     workers: Workers = None,
-    seed: Seed = 0,
     progress: Progress = SILENT,
     parameters: Mapping[str, Any] = MappingProxyType({}),
 ) -> RefinedRpc:
@@ -231,52 +120,4 @@ def refine_rpc(
     nothing is written, if points that took no part are not nearer than before, if these do not
     agree, or if the points do not hold the model all over the image.
     """
-    if (reference is None) == (gcps is None):
-        raise ParameterError("give either a reference or ground control points (gcps)")
-    started = time.perf_counter()
-    ground = Ground(dem, dem_datum, geoid, height)
-    matching = Matching(
-        search_radius,
-        SimilaritySettings(similarity),
-        MaskRequest(mask, REFERENCE, mask_high_percent, mask_low_percent, 0.0),
-        matching_pixel_size,
-        chip_size,
-        forward_backward_error,
-        max_error,
-        seed,
-        Classifying(None, image_classifier),
-        image_band,
-    )
-    fitting = Fitting(model, blunders, largest_residual, max_error, seed)
-    files = RefinementFiles(output, residuals, report)
-    with ExitStack() as stack:
-        stack.enter_context(bounded_cache())
-        located = None
-        if reference is not None:
-            located = open_reference(reference, reference_band, reference_mask, stack)
-        crs = None if located is None else located.source.grid.crs
-        sensor = open_oriented_image(image, rpc, ground, crs, stack, progress)
-        call, found = Call(parameters, started), None
-        if located is not None:
-            with ThreadPoolExecutor(worker_count(workers)) as executor:
-                part = progress.part(0.0, 0.9)
-                found = match_ground_control(sensor, located, matching, executor, stack, part)
-            points = files.points_or_report(found, call)
-        else:
-            assert gcps is not None
-            points = read_control_points(gcps, sensor.orientation, sensor.source.grid)
-        progress.update(0.9, "estimating the bias")
-        refinement = Refinement.of(points, sensor, fitting)
-        heights = refinement.heights(own_heights=gcps is not None and dem is not None)
-        for warning in heights.warnings():
-            progress.update(0.9, warning)
-        fit = files.write(refinement, heights, found, call, progress.part(0.9, 1.0))
-    return RefinedRpc(
-        fit,
-        refinement.adjustment,
-        refinement.judged,
-        heights,
-        sensor.heights,
-        None if found is None else found.mask,
-        files.written(),
-    )
+    return refine(parameters, progress)

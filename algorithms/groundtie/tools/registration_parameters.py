@@ -81,16 +81,14 @@ SearchScale = Annotated[
         advanced=True,
     ),
 ]
-_MASK_HELP = (
+MASK_HELP = (
     "A raster whose zeros take no part, a vector layer of what takes part (polygons, and "
     "lines as 11 m wide), or a classifier of train_feature_classifier (.json)."
 )
 ReferenceMask = Annotated[
-    Path | None, MaskIn(label="Mask of the reference", help=_MASK_HELP, advanced=True)
+    Path | None, MaskIn(label="Mask of the reference", help=MASK_HELP, advanced=True)
 ]
-InputMask = Annotated[
-    Path | None, MaskIn(label="Mask of the input", help=_MASK_HELP, advanced=True)
-]
+InputMask = Annotated[Path | None, MaskIn(label="Mask of the input", help=MASK_HELP, advanced=True)]
 Mask = Annotated[
     str,
     Choice(

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from ..kinds import Choice, FileIn, Number, RasterIn
+from ..kinds import Band, Choice, Distance, FileIn, MaskIn, Number, RasterIn
 from ..sensor.heights import DATUMS
+from .registration_parameters import MASK_HELP
 
 SensorImage = Annotated[
     Path,
@@ -63,3 +64,21 @@ RpcFile = Annotated[
         advanced=True,
     ),
 ]
+RpcSearchRadius = Annotated[
+    float | None,
+    Distance(
+        label="Search radius",
+        help="How far the RPCs may be wrong on the ground. By default 100 m or 20 pixels of the "
+        "coarser image, whichever is larger.",
+    ),
+]
+ImageBand = Annotated[
+    int | None,
+    Band(
+        label="Band of the image",
+        help="The band that is matched; by default the mean of all bands.",
+        of="image",
+        advanced=True,
+    ),
+]
+ImageMask = Annotated[Path | None, MaskIn(label="Mask of the image", help=MASK_HELP, advanced=True)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -11,8 +10,8 @@ from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..kinds import Choice, Distance, FileOut, Number, RasterOut
 from ..progress import SILENT, Progress
-from ..rasters.pair import Image, make_pair
-from ..rasters.reading import RasterSource, bounded_cache, open_raster
+from ..registration.pipeline import open_pair
+from ..registration.specification import Specification
 from ..similarity.binning import BINNINGS
 from ..studies.surface_result import SurfaceResult
 from ..studies.window_surface import (
@@ -27,14 +26,13 @@ from .common import (
     GpveOrder,
     Input,
     InputBand,
-    InputMask,
     MatchingPixelSize,
     Reference,
     ReferenceBand,
-    ReferenceMask,
     Seed,
     Workers,
 )
+from .registration_parameters import InputMask, ReferenceMask
 
 
 @tool(
@@ -187,24 +185,13 @@ def similarity_surface(
     """
     settings = SurfaceSettings(similarity, bins, binning, gpve_order, alpha, q, sample)
     files = {"output": output, "picture": picture, "numbers": numbers}
-    with ExitStack() as stack:
-        stack.enter_context(bounded_cache())
-
-        def opened(path: Path | None) -> RasterSource | None:
-            return None if path is None else stack.enter_context(open_raster(path))
-
-        first = stack.enter_context(open_raster(reference))
-        second = stack.enter_context(open_raster(input))
-        pair = make_pair(
-            Image(first, reference_band, opened(reference_mask)),
-            Image(second, input_band, opened(input_mask)),
-            matching_pixel_size,
-            search_radius_m=0.0,
-        )
-        for note in pair.notes():
-            progress.update(0.0, note)
-        window = Window.at(pair, (centre_x, centre_y), chip_size, search_radius)
-        context = stack.enter_context(threads(workers, progress.part(0.0, 0.9), seed))
+    spec = Specification(search_radius_m=0.0, matching_pixel_size_m=matching_pixel_size)
+    bands, masks = (reference_band, input_band), (reference_mask, input_mask)
+    with (
+        threads(workers, progress.part(0.0, 0.9), seed) as context,
+        open_pair(reference, input, spec, context, bands, masks) as opened,
+    ):
+        window = Window.at(opened.pair, (centre_x, centre_y), chip_size, search_radius)
         result = SurfaceResult.measured(window, settings, files, context)
     progress.update(0.9, "writing")
     result.write()

@@ -6,15 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import GeoreferencingError, ParameterError
 from ..geometry.models import KINDS
 from ..geometry.transform import Transform
-from ..kinds import Choice, Distance, FileIn, RasterIn
+from ..kinds import Choice, FileIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster
@@ -22,61 +18,32 @@ from ..rasters.grid import Grid, reproject
 from ..rasters.reading import open_raster
 from ..rasters.target_grids import covering_grid, registered_grid
 from ..registration.stored_transform import TiePointFit, load_stored, transform_of
-from .common import Input, Output, Resampling, Workers, crs_name, worker_count
-
-FloatArray = NDArray[np.float64]
+from .common import Input, Output, Resampling, Workers, worker_count
+from .written_raster import SIZE_OUTPUTS, WrittenRaster, like_reference, pixel_size_of_result
 
 
 @dataclass(frozen=True)
-class WarpResult:
-    """What `warp` made."""
+class WarpResult(WrittenRaster):
+    """What `warp` made: the raster, the transform, and how that fits tie points."""
 
-    output: Path
-    grid: Grid
     transform: Transform
     fit: TiePointFit | None
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
-        return {
-            "output": str(self.output),
-            "width": self.grid.width,
-            "height": self.grid.height,
-            "pixel_size": list(self.grid.pixel_size),
-            "crs": crs_name(self.grid),
-            "model": self.transform.model.kind,
-            "tie_points": None if self.fit is None else vars(self.fit),
-        }
+        fit = None if self.fit is None else vars(self.fit)
+        return {**super().summary(), "model": self.transform.model.kind, "tie_points": fit}
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
-        grid = self.grid
-        size = " × ".join(f"{side:g}" for side in grid.pixel_size)
-        lines = [
-            f"wrote {self.output}",
-            f"grid: {grid.width} × {grid.height} pixels of {size}, {crs_name(grid)}",
-            f"model: {self.transform.model.kind}",
-        ]
-        if self.fit is not None:
-            lines.append(
-                f"fitted to {self.fit.points} tie points with residuals of "
-                f"{self.fit.rmse_px:.2f} px (RMSE)"
-            )
-            if self.fit.check_rmse_px is not None:
-                lines.append(
-                    f"error at {self.fit.check_points} check points: "
-                    f"{self.fit.check_rmse_px:.2f} px (RMSE)"
-                )
-        return lines
+        lines = [*super().lines(), f"model: {self.transform.model.kind}"]
+        return lines if self.fit is None else [*lines, *self.fit.lines()]
 
 
 @tool(
     title="Warp a raster",
     group="Apply",
-    outputs=(
-        ResultOutput("WIDTH", "Width of the result in pixels", "width"),
-        ResultOutput("HEIGHT", "Height of the result in pixels", "height"),
-    ),
+    outputs=SIZE_OUTPUTS,
 )
 def warp(
     input: Input,
@@ -92,20 +59,11 @@ def warp(
         ),
     ],
     reference: Annotated[
-        Path | None,
-        RasterIn(
-            label="Reference image",
-            help="The result gets exactly the grid of this raster, so that the two stack. By "
-            "default the result covers all of the input with pixels of the input's size.",
-        ),
+        Path | None, like_reference("input with pixels of the input's size")
     ] = None,
     pixel_size: Annotated[
         float | None,
-        Distance(
-            label="Pixel size",
-            help="Pixel size of the result, where it does not get the reference's grid.",
-            minimum=1e-6,
-        ),
+        pixel_size_of_result(", where it does not get the reference's grid"),
     ] = None,
     model: Annotated[
         str,

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
-
 import numpy as np
 import pytest
 from posed_windows import masked, shifted_by, window
 
-from groundtie.pose.phase_correlation import (
+from groundtie.context import Context
+from groundtie.geometry.limits import SearchLimits
+from groundtie.pose.pose import Pose
+from groundtie.rasters.patch import Patch
+from groundtie.similarity.surface import SimilaritySettings
+from groundtie.studies.phase_correlation import (
     CANDIDATES,
     gaussian_peak,
     phase_correlation,
@@ -16,14 +19,11 @@ from groundtie.pose.phase_correlation import (
     shifts_at,
     whitened,
 )
-from groundtie.pose.pose import Pose, PoseLimits
-from groundtie.pose.windows import structure
-from groundtie.rasters.patch import Patch
-from groundtie.similarity.surface import SimilaritySettings
+from groundtie.studies.spectral_windows import structure
 
 GREY, FIELD = SimilaritySettings("ncc"), SimilaritySettings("orientation")
 REFERENCE = window((120, 140))
-LIMITS = PoseLimits(30.0)
+LIMITS = SearchLimits(30.0)
 
 
 def flat(shape: tuple[int, int] = (50, 60), value: float = 7.0) -> Patch:
@@ -33,33 +33,33 @@ def flat(shape: tuple[int, int] = (50, 60), value: float = 7.0) -> Patch:
 @pytest.mark.parametrize("settings", [GREY, FIELD], ids=lambda s: s.similarity)
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (3.4, -7.7), (-21.25, 12.5), (0.5, 27.9)])
 def test_shifts_are_found_to_a_fraction_of_a_pixel(
-    shift: tuple[float, float], settings: SimilaritySettings
+    shift: tuple[float, float], settings: SimilaritySettings, context: Context
 ) -> None:
     truth = Pose(shift_px=shift)
-    found = phase_correlation(REFERENCE, window((120, 140), truth), LIMITS, settings)
+    found = phase_correlation(REFERENCE, window((120, 140), truth), LIMITS, settings, context)
     assert shifted_by(found[0], truth) < 0.1
     assert (found[0].pose.rotation_deg, found[0].pose.scale) == (0, 1)
     assert found[0].height > 15
 
 
-def test_windows_may_differ_in_size() -> None:
+def test_windows_may_differ_in_size(context: Context) -> None:
     truth = Pose(shift_px=(10.3, -14.6))
-    found = phase_correlation(REFERENCE, window((175, 180), truth), LIMITS, GREY)
+    found = phase_correlation(REFERENCE, window((175, 180), truth), LIMITS, GREY, context)
     assert shifted_by(found[0], truth) < 0.1
 
 
-def test_fields_do_not_mind_inverted_contrast() -> None:
+def test_fields_do_not_mind_inverted_contrast(context: Context) -> None:
     truth = Pose(shift_px=(6.3, 9.6))
     input = window((120, 140), truth)
     inverted = Patch(1e4 / input.values, input.valid)
-    found = phase_correlation(REFERENCE, inverted, LIMITS, FIELD)
+    found = phase_correlation(REFERENCE, inverted, LIMITS, FIELD, context)
     assert shifted_by(found[0], truth) < 0.1
 
 
-def test_noise_costs_height_first() -> None:
+def test_noise_costs_height_first(context: Context) -> None:
     truth = Pose(shift_px=(-8.3, 11.6))
     clean, noisy = (
-        phase_correlation(REFERENCE, window((120, 140), truth, noise=n), LIMITS, GREY)[0]
+        phase_correlation(REFERENCE, window((120, 140), truth, noise=n), LIMITS, GREY, context)[0]
         for n in (0.0, 50.0)
     )
     assert shifted_by(noisy, truth) < 0.3
@@ -67,41 +67,44 @@ def test_noise_costs_height_first() -> None:
 
 
 @pytest.mark.parametrize("settings", [GREY, FIELD], ids=lambda s: s.similarity)
-def test_masked_pixels_do_not_count(settings: SimilaritySettings) -> None:
+def test_masked_pixels_do_not_count(settings: SimilaritySettings, context: Context) -> None:
     truth = Pose(shift_px=(5.3, -4.6))
     input = masked(window((120, 140), truth), slice(0, 50), slice(40, 75))
     reference = masked(REFERENCE, slice(80, 120), slice(90, 140))
-    found = phase_correlation(reference, input, LIMITS, settings)
+    found = phase_correlation(reference, input, LIMITS, settings, context)
     assert shifted_by(found[0], truth) < 0.1
 
 
-def test_a_masked_value_is_not_looked_at() -> None:
+def test_a_masked_value_is_not_looked_at(context: Context) -> None:
     input = window((120, 140), Pose(shift_px=(5.3, -4.6)))
     one = masked(input, slice(0, 50), slice(40, 75))
     other = Patch(np.where(one.valid, one.values, -3), one.valid)
-    assert phase_correlation(REFERENCE, one, LIMITS, GREY) == phase_correlation(
-        REFERENCE, other, LIMITS, GREY
+    assert phase_correlation(REFERENCE, one, LIMITS, GREY, context) == phase_correlation(
+        REFERENCE, other, LIMITS, GREY, context
     )
 
 
-def test_shifts_stay_within_the_radius() -> None:
+def test_shifts_stay_within_the_radius(context: Context) -> None:
     input = window((120, 140), Pose(shift_px=(14.0, 2.0)))
-    for one in phase_correlation(REFERENCE, input, PoseLimits(10.0), GREY):
+    for one in phase_correlation(REFERENCE, input, SearchLimits(10.0), GREY, context):
         assert np.abs(one.pose.shift_px).max() <= 10
-    assert phase_correlation(REFERENCE, input, PoseLimits(15.0), GREY)[0].pose.shift_px[0] > 13.5
+    assert (
+        phase_correlation(REFERENCE, input, SearchLimits(15.0), GREY, context)[0].pose.shift_px[0]
+        > 13.5
+    )
 
 
-def test_the_scale_is_the_one_that_is_allowed() -> None:
+def test_the_scale_is_the_one_that_is_allowed(context: Context) -> None:
     truth = Pose(scale=1.5, shift_px=(-9.0, 12.0))
-    limits = PoseLimits(30.0, scale=(1.5, 2.0))
-    found = phase_correlation(REFERENCE, window((180, 210), truth), limits, GREY)
+    limits = SearchLimits(30.0, scale=(1.5, 2.0))
+    found = phase_correlation(REFERENCE, window((180, 210), truth), limits, GREY, context)
     assert found[0].pose.scale == 1.5
     assert shifted_by(found[0], truth) < 0.2
 
 
-def test_candidates_are_apart_and_best_first() -> None:
+def test_candidates_are_apart_and_best_first(context: Context) -> None:
     input = window((120, 140), Pose(shift_px=(4.0, 2.0)))
-    found = phase_correlation(REFERENCE, input, LIMITS, GREY)
+    found = phase_correlation(REFERENCE, input, LIMITS, GREY, context)
     assert len(found) <= CANDIDATES
     heights = [one.height for one in found]
     assert heights == sorted(heights, reverse=True)
@@ -110,24 +113,24 @@ def test_candidates_are_apart_and_best_first() -> None:
     assert (gaps >= 6).all()
 
 
-def test_another_place_does_not_stand_out() -> None:
+def test_another_place_does_not_stand_out(context: Context) -> None:
     other = window((120, 140), seed=5)
-    true = phase_correlation(REFERENCE, window((120, 140)), LIMITS, GREY)[0].height
-    assert phase_correlation(REFERENCE, other, LIMITS, GREY)[0].height < true / 3
+    true = phase_correlation(REFERENCE, window((120, 140)), LIMITS, GREY, context)[0].height
+    assert phase_correlation(REFERENCE, other, LIMITS, GREY, context)[0].height < true / 3
 
 
-def test_threads_change_nothing(executor: Executor) -> None:
+def test_threads_change_nothing(context: Context, one_thread: Context) -> None:
     input = window((120, 140), Pose(shift_px=(4.3, 2.1)))
-    alone = phase_correlation(REFERENCE, input, LIMITS, GREY)
-    assert phase_correlation(REFERENCE, input, LIMITS, GREY, executor) == alone
+    alone = phase_correlation(REFERENCE, input, LIMITS, GREY, one_thread)
+    assert phase_correlation(REFERENCE, input, LIMITS, GREY, context) == alone
 
 
 @pytest.mark.parametrize("settings", [GREY, FIELD], ids=lambda s: s.similarity)
-def test_what_has_no_content_has_no_pose(settings: SimilaritySettings) -> None:
+def test_what_has_no_content_has_no_pose(settings: SimilaritySettings, context: Context) -> None:
     nothing = Patch(REFERENCE.values, np.zeros(REFERENCE.valid.shape, bool))
     for empty in (flat(), nothing):
-        assert phase_correlation(REFERENCE, empty, LIMITS, settings) == []
-        assert phase_correlation(empty, REFERENCE, LIMITS, settings) == []
+        assert phase_correlation(REFERENCE, empty, LIMITS, settings, context) == []
+        assert phase_correlation(empty, REFERENCE, LIMITS, settings, context) == []
 
 
 def test_shifts_at_a_pose_are_in_input_pixels() -> None:
@@ -144,8 +147,8 @@ def test_a_surface_knows_its_shifts() -> None:
     reference, input = np.zeros((9, 12), np.float32), np.zeros((14, 11), np.float32)
     reference[4, 3] = input[8, 7] = 1
     surface = phase_surface(reference, input)
-    (peak,) = surface.peaks(np.ones(surface.values.shape, bool), 1)
-    assert peak.shift_px == pytest.approx((7 - 5 - (3 - 5.5), 8 - 6.5 - (4 - 4)), abs=1e-3)
+    ((shift, _),) = surface.peaks(np.eye(2), 99.0, 1)
+    assert shift == pytest.approx((7 - 5 - (3 - 5.5), 8 - 6.5 - (4 - 4)), abs=1e-3)
 
 
 def test_which_shifts_are_within_a_radius_of_a_turned_input() -> None:

@@ -10,11 +10,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..geometry.limits import SearchLimits
+from ..pose.pose import Pose, PoseFound
 from ..rasters.kernels import interpolate
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress, squared_gradients
 from ..similarity.surface import SimilaritySettings
-from .pose import Pose, PoseFound, PoseLimits
 
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -35,7 +36,7 @@ SAME_PX = 6.0
 # A resampled pixel counts if the weights of all pixels it is made of sum up to this.
 _ALL_VALID = 0.999
 
-# Below this share of the reference's pixels, what two windows share says nothing.
+# Windows that share less than this of the reference's pixels are not compared.
 MINIMUM_SHARED = 0.05
 
 
@@ -52,9 +53,7 @@ def texture(window: Patch, settings: SimilaritySettings) -> Image:
 
 
 def structure(window: Patch, settings: SimilaritySettings) -> Image | Field:
-    """Return what is shifted over one another, apodised: grey values or orientation field.
-
-    "ncc" takes grey values, all else the field.
+    """Return what is correlated, apodised: grey values for "ncc", else the orientation field.
 
     The field (see `orientation`) is what a SAR and an optical image have in common.
     """
@@ -72,8 +71,7 @@ def apodise(image: AnyImage, valid: NDArray[np.bool_], disc: bool = False) -> An
     image, valid
         Grey values, or a complex field, and which of them count, shape (h, w).
     disc
-        Whether only the disc inside the borders is kept, which looks the same however it is
-        turned.
+        Whether only the disc inside the borders is kept, which a rotation does not change.
     """
     weights = _fading(valid)
     if disc:
@@ -100,7 +98,7 @@ def _raised_cosine(share: NDArray[np.floating]) -> Image:
 
 
 def resampled(input: Patch, pose: Pose, shape: tuple[int, int], kernel: str) -> Patch:
-    """Return the input as it would lie in the reference: turned back, scaled back, shifted back.
+    """Return the input as it would lie in the reference: rotated, scaled and shifted back.
 
     Parameters
     ----------
@@ -115,12 +113,7 @@ def resampled(input: Patch, pose: Pose, shape: tuple[int, int], kernel: str) -> 
     """
     to_input = pose.between(shape, input.values.shape)
     rows, cols = np.indices(shape, float)
-    px = np.stack(
-        [
-            to_input.a * cols + to_input.b * rows + to_input.c,
-            to_input.d * cols + to_input.e * rows + to_input.f,
-        ]
-    )
+    px = np.stack([x * cols + y * rows + start for x, y, start in (to_input[:3], to_input[3:6])])
     fill = np.float32(input.values[input.valid].mean()) if input.valid.any() else np.float32(0)
     values = np.where(input.valid, input.values - fill, np.float32(0))
     if pose.scale > 1:
@@ -180,8 +173,8 @@ def aligned(
     reference: Patch,
     input: Patch,
     found: PoseFound,
-    limits: PoseLimits,
-    left: Callable[[Shared], PoseFound | None],
+    limits: SearchLimits,
+    *remaining: Callable[[Shared], PoseFound | None],
 ) -> PoseFound:
     """Return a candidate corrected by what is left between the parts that both windows show.
 
@@ -196,15 +189,17 @@ def aligned(
         The candidate.
     limits
         Within which the result stays.
-    left
-        Returns the pose of one part against the other, None if it has none.
+    remaining
+        Each corrects what those before have left: returns the pose of one part against the
+        other, None if it has none.
     """
-    both = shared(reference, input, found.pose)
-    correction = None if both is None else left(both)
-    if both is None or correction is None:
-        return found
-    pose = corrected(found.pose, correction.pose, both.offset_px)
-    return PoseFound(within(pose, limits), correction.height)
+    for correct in remaining:
+        both = shared(reference, input, found.pose)
+        correction = None if both is None else correct(both)
+        if both is not None and correction is not None:
+            pose = corrected(found.pose, correction.pose, both.offset_px)
+            found = PoseFound(within(pose, limits), correction.height)
+    return found
 
 
 def corrected(pose: Pose, correction: Pose, offset_px: FloatArray) -> Pose:
@@ -221,15 +216,13 @@ def corrected(pose: Pose, correction: Pose, offset_px: FloatArray) -> Pose:
     """
     shift = offset_px + correction.shift_px - correction.linear @ offset_px
     right, down = pose.shift_px + pose.linear @ shift
-    turned = pose.rotation_deg + correction.rotation_deg
-    return Pose(
-        (turned + 180) % 360 - 180, pose.scale * correction.scale, (float(right), float(down))
-    )
+    rotation = (pose.rotation_deg + correction.rotation_deg + 180) % 360 - 180
+    return Pose(rotation, pose.scale * correction.scale, (float(right), float(down)))
 
 
-def within(pose: Pose, limits: PoseLimits) -> Pose:
+def within(pose: Pose, limits: SearchLimits) -> Pose:
     """Return the pose nearest to a pose within limits."""
-    right, down = np.clip(pose.shift_px, -limits.radius_px, limits.radius_px)
+    right, down = np.clip(pose.shift_px, -limits.radius, limits.radius)
     return Pose(
         float(np.clip(pose.rotation_deg, -limits.rotation_deg, limits.rotation_deg)),
         float(np.clip(pose.scale, *limits.scale)),
@@ -256,7 +249,7 @@ def distinct(found: Iterable[PoseFound], least_share: float = 0.0) -> list[PoseF
 
 
 def _same(one: Pose, other: Pose) -> bool:
-    turned = abs((one.rotation_deg - other.rotation_deg + 180) % 360 - 180)
+    rotated = abs((one.rotation_deg - other.rotation_deg + 180) % 360 - 180)
     scaled = abs(float(np.log(one.scale / other.scale)))
     apart = np.abs(np.subtract(one.shift_px, other.shift_px)).max()
-    return bool(turned < SAME_DEG and scaled < SAME_LOG_SCALE and apart < SAME_PX)
+    return bool(rotated < SAME_DEG and scaled < SAME_LOG_SCALE and apart < SAME_PX)

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from .pose import Pose, PoseLimits
-from .windows import Image, within
+from ..geometry.limits import SearchLimits
+from ..pose.pose import Pose
+from .spectral_windows import Image, within
 
 # A spectrum is given at these angles over half a turn, from straight up, clockwise; the other
 # half is the same.
@@ -40,7 +41,7 @@ def evened(spectrum: Image) -> Image:
     return np.divide(centred, spread, out=np.zeros_like(centred), where=spread > _FLAT)
 
 
-def half_turns(rotation_deg: float, scale: float, limits: PoseLimits) -> Iterator[Pose]:
+def half_turns(rotation_deg: float, scale: float, limits: SearchLimits) -> Iterator[Pose]:
     """Yield the poses within limits that a rotation, known up to half a turn, may stand for."""
     for other in (rotation_deg, rotation_deg - float(np.copysign(180, rotation_deg))):
         if abs(other) <= limits.rotation_deg + ANGLE_STEP_DEG:

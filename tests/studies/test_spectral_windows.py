@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from posed_windows import masked, shifted_by, turned_by, window
 
-from groundtie.pose.pose import Pose, PoseFound, PoseLimits
-from groundtie.pose.windows import (
+from groundtie.geometry.limits import SearchLimits
+from groundtie.pose.pose import Pose, PoseFound
+from groundtie.rasters.patch import Patch, reduced, reduced_patch
+from groundtie.similarity.surface import SimilaritySettings
+from groundtie.studies.spectral_windows import (
     aligned,
     apodise,
     corrected,
@@ -19,11 +22,9 @@ from groundtie.pose.windows import (
     texture,
     within,
 )
-from groundtie.rasters.patch import Patch, reduced, reduced_patch
-from groundtie.similarity.surface import SimilaritySettings
 
 GREY, FIELD = SimilaritySettings("ncc"), SimilaritySettings("fused")
-LIMITS = PoseLimits(50.0, 180.0, (0.5, 2.0))
+LIMITS = SearchLimits(50.0, 180.0, (0.5, 2.0))
 REFERENCE = window((90, 110))
 TURNED = Pose(33.0, 1.2, (9.0, -4.0))
 
@@ -153,7 +154,7 @@ def test_a_correction_comes_first_about_its_own_centre() -> None:
 
 
 def test_poses_are_kept_within_limits() -> None:
-    limits = PoseLimits(5.0, 10.0, (0.9, 1.1))
+    limits = SearchLimits(5.0, 10.0, (0.9, 1.1))
     assert within(Pose(-12.0, 1.3, (7.0, -6.0)), limits) == Pose(-10.0, 1.1, (5.0, -5.0))
     assert within(Pose(3.0, 1.0, (1.0, 2.0)), limits) == Pose(3.0, 1.0, (1.0, 2.0))
 

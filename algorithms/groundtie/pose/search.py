@@ -1,34 +1,35 @@
-"""The pose by stepping over rotation and scale, with all shifts at once (thesis P 3.2.2).
+"""The exhaustive search for a pose: all rotations and scales in steps, all shifts at once.
 
 Coarse to fine: every rotation and scale is tried on small images; the best candidates are tried
 again in finer steps on larger ones, and compared with one another on the way. Similarity is the
-correlation of squared orientation fields, which is quick over all shifts, and right between SAR
-and optical images.
+correlation of squared orientation fields, which is quick over all shifts, and does not depend on
+contrast, which differs between SAR and optical images. Source: [Patel2011], section 3.2.2.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 
+from ..context import Context
+from ..geometry.limits import SearchLimits
 from ..rasters.patch import Patch
 from ..similarity.surface import SimilaritySettings, Surface
-from .pose import Pose, PoseFound, PoseLimits
+from .pose import Pose, PoseFound
 from .rotation_fields import Template
-from .rotation_levels import Level, in_threads, parabola
+from .rotation_levels import HEIGHT, Climber, Level
 
 FloatArray = NDArray[np.float64]
 
 # Side of the small images on which all is tried, in pixels: the geometric mean of both images'.
 _COARSE_SIDE_PX = 96
 
-# Images larger than this tell nothing more.
+# Larger images do not change the result.
 _FINE_SIDE_PX = 384
 
 # A step of rotation moves what lies a quarter of the side off the centre by this, in pixels; with a
@@ -39,20 +40,13 @@ _SCALE_STEP = 1.25
 # How many candidates are tried again on each finer level.
 _KEPT = (32, 8, 4)
 
-# How far a candidate may be off on the next finer level, in its pixels; even.
-_NEAR_PX = 4
-
-# How often the steps are halved on the finest level, and how many of them are taken at most.
-_HALVINGS = 3
-_CLIMBS = 3
-
 # Poses are the same if they move the reference's corners by less than this share of its side.
 _SAME_SHARE = 0.06
 
 # Least share of the smaller image's side that overlaps.
 _LEAST_OVERLAP = 0.3
 
-# Radius of the surface that tells how high chance is, in pixels of the finest level; even.
+# Radius of the surface whose spread is the height of chance, in pixels of the finest level; even.
 _BACKGROUND_PX = 32
 
 
@@ -76,49 +70,51 @@ class Scan:
     found: tuple[PoseFound, ...]
 
 
-def rotation_steps(
+def find_poses(
     reference: Patch,
     input: Patch,
-    limits: PoseLimits,
+    limits: SearchLimits,
     settings: SimilaritySettings,
-    executor: Executor | None = None,
+    context: Context,
 ) -> list[PoseFound]:
-    """Search by stepping over rotation and scale; a `PoseSearch`.
+    """Return how an input window may lie against a reference window, best first.
 
     Parameters
     ----------
     reference, input
-        The windows.
+        The windows; their sizes may differ, their centres are compared.
     limits
-        What is searched.
+        Within which rotation, scale and shift (in input pixels) are searched for.
     settings
-        Not used: similarity is the correlation of squared orientation fields.
-    executor
+        Not used: similarity is the correlation of squared orientation fields. The searches that
+        are compared with this one have it.
+    context
         Threads to work in.
 
     Returns
     -------
-    Different candidates, best first. Their heights are compared at the same pixel size, so that
-    the ratio of the first two tells how unlikely a mistake is.
+    Different candidates; none if a window is flat. Their heights are compared at the same pixel
+    size, so that the ratio of the first two measures how unlikely a mistake is.
     """
     if reference.is_flat or input.is_flat:
         return []
-    return _Search(reference, input, limits, executor).run()
+    return _Search(reference, input, limits, context.quiet()).run()
 
 
-def scan(
-    reference: Patch, input: Patch, limits: PoseLimits, executor: Executor | None = None
-) -> Scan:
+def scan(reference: Patch, input: Patch, limits: SearchLimits, context: Context) -> Scan:
     """Try all rotations and scales within limits on small images."""
-    return _Search(reference, input, limits, executor).scan()
+    return _Search(reference, input, limits, context.quiet()).scan()
 
 
-def shift_surface(reference: Patch, input: Patch, pose: Pose) -> tuple[Surface, float]:
+def shift_surface(
+    reference: Patch, input: Patch, pose: Pose, context: Context
+) -> tuple[Surface, float]:
     """Return how well images match around a pose, and the surface's pixel in reference pixels.
 
     The surface has the shape (2 r + 1, 2 r + 1); its values are robust standard deviations.
     """
-    search = _Search(reference, input, PoseLimits(0.0, 0.0, (pose.scale, pose.scale)), None)
+    limits = SearchLimits(0.0, 0.0, (pose.scale, pose.scale))
+    search = _Search(reference, input, limits, context.quiet())
     level = search.level(search.fine_px, [pose.scale])
     surface = level.surface(Template(level.reference, _BACKGROUND_PX), pose)
     return surface / np.float32(_spread(surface)), level.pixel_px
@@ -136,8 +132,8 @@ def moved_px(one: Pose, other: Pose, shape: tuple[int, int]) -> float:
 class _Search:
     reference: Patch
     input: Patch
-    limits: PoseLimits
-    executor: Executor | None
+    limits: SearchLimits
+    context: Context
 
     @cached_property
     def side_px(self) -> float:
@@ -169,16 +165,15 @@ class _Search:
         scanned = self.scan()
         found: Sequence[PoseFound] = scanned.found
         count = scanned.heights.size
-        rotation, scale = self.steps
-        pixel_px = self.coarse_px
+        (rotation, scale), pixel_px = self.steps, self.coarse_px
         for kept in _KEPT:
             if not found:
                 return []
             pixel_px = max(pixel_px / 2, self.fine_px)
             rotation, scale = rotation / 2, scale / 2
             level = self.level(pixel_px, [candidate.pose.scale for candidate in found[:kept]])
-            climber = _Climber(level, rotation, scale, self.limits)
-            climbed = list(in_threads(self.executor, climber.climb, found[:kept]))
+            climber = Climber(level, rotation, scale, self.limits)
+            climbed = list(self.context.map(climber.climb, found[:kept]))
             count += sum(candidate.evaluations for candidate in climbed)
             found = self.distinct(climbed)
             if pixel_px == self.fine_px:
@@ -201,13 +196,15 @@ class _Search:
             template = Template(level.reference, self.radius(level, scale))
             poses = [Pose(float(rotation), scale) for rotation in rotations]
             surfaces = self.surfaces(level, template, poses)
-            allowed = self.limits.radius_px
             pairs = zip(surfaces, poses, strict=True)
-            return [level.peaks(surface, pose, allowed, peaks) for surface, pose in pairs]
+            return [
+                level.peaks(surface, pose, self.limits.radius, peaks) for surface, pose in pairs
+            ]
 
-        rows = list(in_threads(self.executor, at_scale, [float(scale) for scale in scales]))
+        rows = list(self.context.map(at_scale, scales.tolist()))
         heights = np.array([[found[0].height for found in row] for row in rows])
-        tops = np.argwhere(_is_local_maximum(heights, self.whole_circle))
+        modes = "constant", "wrap" if self.whole_circle else "constant"
+        tops = np.argwhere(heights >= maximum_filter(heights, 3, mode=modes, cval=-np.inf))
         found = [one for i, j in tops for one in rows[i][j] if one.height > 0]
         return Scan(rotations, scales, heights, tuple(_best_first(found)))
 
@@ -220,7 +217,7 @@ class _Search:
         return [one for one, _ in pairs] + [other for _, other in pairs]
 
     def level(self, pixel_px: float, scales: Iterable[float]) -> Level:
-        return Level.of(self.reference, self.input, pixel_px, scales, self.executor)
+        return Level.of(self.reference, self.input, pixel_px, scales, self.context)
 
     def rotations_deg(self) -> FloatArray:
         step = self.steps[0]
@@ -240,8 +237,8 @@ class _Search:
         own, other = max(self.reference.values.shape), max(self.input.values.shape) / scale
         useful = (own + other) / 2 - _LEAST_OVERLAP * min(own, other)
         # The limits are along the input's rows and columns, which may lie across.
-        turn = np.radians(min(self.limits.rotation_deg, 45.0))
-        wanted = self.limits.radius_px / scale * (np.cos(turn) + np.sin(turn))
+        across = np.radians(min(self.limits.rotation_deg, 45.0))
+        wanted = self.limits.radius / scale * (np.cos(across) + np.sin(across))
         return 2 * int(np.ceil(min(wanted, useful) / level.pixel_px / 2))
 
     def distinct(self, candidates: Iterable[PoseFound]) -> list[PoseFound]:
@@ -255,80 +252,10 @@ class _Search:
         return kept
 
 
-@dataclass(frozen=True)
-class _Climber:
-    """Looks for better poses nearby: steps of rotation (degrees) and of log2 of the scale."""
-
-    level: Level
-    rotation: float
-    scale: float
-    limits: PoseLimits
-
-    @cached_property
-    def template(self) -> Template:
-        return Template(self.level.reference, _NEAR_PX)
-
-    def climb(self, start: PoseFound) -> PoseFound:
-        """Return the best of a candidate and its neighbours, tried on this level."""
-        tried = self.around(start.pose)
-        return replace(max(tried.values(), key=_height), evaluations=len(tried))
-
-    def climb_finely(self, start: PoseFound) -> PoseFound:
-        """Return the best pose near a candidate of this level, between the steps."""
-        best, count, climber = start, 0, self
-        for _ in range(_HALVINGS):
-            climber = replace(climber, rotation=climber.rotation / 2, scale=climber.scale / 2)
-            for _ in range(_CLIMBS):
-                tried = climber.around(best.pose)
-                count += len(tried)
-                centre, best = tried[0, 0], max(tried.values(), key=_height)
-                if best is centre:
-                    break
-        turn, grow = (
-            parabola([tried[-i, -j].height, best.height, tried[i, j].height])[0]
-            if best is centre and {(i, j), (-i, -j)} <= tried.keys()
-            else 0.0
-            for i, j in ((1, 0), (0, 1))
-        )
-        between = climber.level.best(climber.template, climber.step(best.pose, turn, grow))
-        return replace(max(best, between, key=_height), evaluations=count + 1)
-
-    def around(self, pose: Pose) -> dict[tuple[int, int], PoseFound]:
-        """Return the matches at a pose and its neighbours within the limits, by steps."""
-        poses = {(i, j): self.step(pose, i, j) for i, j in product((0, -1, 1), repeat=2)}
-        return {
-            steps: self.level.best(self.template, near)
-            for steps, near in poses.items()
-            if steps == (0, 0) or self.is_allowed(near)
-        }
-
-    def step(self, pose: Pose, rotation: float, scale: float) -> Pose:
-        turned = (pose.rotation_deg + rotation * self.rotation + 180) % 360 - 180
-        return replace(pose, rotation_deg=turned, scale=pose.scale * 2 ** (scale * self.scale))
-
-    def is_allowed(self, pose: Pose) -> bool:
-        low, high = self.limits.scale
-        return abs(pose.rotation_deg) <= self.limits.rotation_deg and low <= pose.scale <= high
-
-
-def _is_local_maximum(heights: FloatArray, circular: bool) -> NDArray[np.bool_]:
-    """Tell which heights, shape (scales, rotations), no neighbour exceeds."""
-    sides = {"mode": "wrap"} if circular else {"constant_values": -np.inf}
-    around = np.pad(heights, ((1, 1), (0, 0)), constant_values=-np.inf)
-    around = np.pad(around, ((0, 0), (1, 1)), **sides)
-    rows, cols = heights.shape
-    shifted = [around[i : i + rows, j : j + cols] for i, j in product(range(3), repeat=2)]
-    return np.asarray(heights >= np.max(shifted, axis=0))
-
-
 def _spread(surface: Surface) -> float:
     """Return the robust standard deviation of a surface."""
     return max(1.4826 * float(np.median(np.abs(surface - np.median(surface)))), 1e-9)
 
 
-def _height(found: PoseFound) -> float:
-    return found.height
-
-
 def _best_first(found: Iterable[PoseFound]) -> list[PoseFound]:
-    return sorted(found, key=_height, reverse=True)
+    return sorted(found, key=HEIGHT, reverse=True)

@@ -1,22 +1,24 @@
 """Phase correlation: the shift between two windows from the phases of their spectra.
 
-Kuglin & Hines 1975; thesis P section 3.3.1, steps 16–21. The cross-power spectrum is divided by
-its magnitude, which leaves a peak instead of the broad hill of a plain correlation.
+The cross-power spectrum is divided by its magnitude, which leaves a peak instead of the broad
+hill of a plain correlation. Source: Kuglin & Hines 1975; [Patel2011], section 3.3.1, steps 16–21.
 """
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from ..context import Context
+from ..geometry.limits import SearchLimits
+from ..pose.pose import Pose, PoseFound
 from ..rasters.patch import Patch
+from ..similarity.peaks import highest_peaks
 from ..similarity.surface import SimilaritySettings, Surface, normalise
-from .pose import Pose, PoseFound, PoseLimits
-from .windows import (
+from .spectral_windows import (
     SAME_PX,
     Field,
     Image,
@@ -31,26 +33,18 @@ from .windows import (
 # How many shifts are returned at most.
 CANDIDATES = 4
 
-# Peaks of one surface are further apart than this, in pixels.
-_SAME_BINS = int(SAME_PX)
+# Peaks of one surface that are nearer than this are the same.
+_SAME = np.ones((2 * int(SAME_PX) + 1,) * 2, bool)
 
 # Frequencies beyond this (standard deviation, in cycles per pixel) hold noise and what resampling
 # has left; without them the peak is a Gaussian of 0.8 px.
 _BAND = 0.2
 
-# Magnitudes below this share of their mean are rounding; their phases say nothing.
+# Magnitudes below this share of their mean are rounding; their phases are, too.
 _ROUNDING = 0.05
 
 # How far a shift can be corrected once the windows have been cut to what they share.
 CORRECTION_PX = 8.0
-
-
-@dataclass(frozen=True)
-class Peak:
-    """A peak of a phase correlation: (right, down) in pixels, and its robust height."""
-
-    shift_px: tuple[float, float]
-    height: float
 
 
 @dataclass(frozen=True)
@@ -70,20 +64,27 @@ class PhaseSurface:
     right_px: NDArray[np.float64]
     down_px: NDArray[np.float64]
 
-    def peaks(self, allowed: NDArray[np.bool_], count: int) -> list[Peak]:
-        """Return the highest peaks at allowed shifts, shape (h, w), best first."""
-        searched = np.where(allowed, self.values, -np.inf)
-        found: list[Peak] = []
-        for _ in range(count):
-            row, col = (int(i) for i in np.unravel_index(searched.argmax(), searched.shape))
-            height = float(searched[row, col])
-            if height <= 0:
-                break
-            right = self.right_px[col] + gaussian_peak(self.values[row], col)
-            down = self.down_px[row] + gaussian_peak(self.values[:, col], row)
-            found.append(Peak((float(right), float(down)), height))
-            rows = slice(max(row - _SAME_BINS, 0), row + _SAME_BINS + 1)
-            searched[rows, max(col - _SAME_BINS, 0) : col + _SAME_BINS + 1] = -np.inf
+    def peaks(
+        self, linear: NDArray[np.float64], radius_px: float, count: int
+    ) -> list[tuple[tuple[float, float], float]]:
+        """Return shifts (right, down) in pixels and heights of the highest peaks, best first.
+
+        Parameters
+        ----------
+        linear
+            What rotates and scales shifts of the surface into those of the input, shape (2, 2).
+        radius_px
+            Largest shift along rows and columns, in input pixels.
+        count
+            How many are wanted.
+        """
+        searched = np.where(self.within(linear, radius_px), self.values, 0)
+        found = []
+        for row, col in highest_peaks(searched, count, _SAME):
+            if searched[row, col] > 0:
+                right = self.right_px[col] + gaussian_peak(self.values[row], col)
+                down = self.down_px[row] + gaussian_peak(self.values[:, col], row)
+                found.append(((float(right), float(down)), float(searched[row, col])))
         return found
 
     def within(self, linear: NDArray[np.float64], radius_px: float) -> NDArray[np.bool_]:
@@ -91,10 +92,8 @@ class PhaseSurface:
 
         Parameters
         ----------
-        linear
-            What turns and scales shifts of the surface into those of the input, shape (2, 2).
-        radius_px
-            Largest shift along rows and columns, in input pixels.
+        linear, radius_px
+            As of `peaks`.
         """
         right, down = self.right_px[None, :], self.down_px[:, None]
         return np.logical_and.reduce(
@@ -177,29 +176,29 @@ def shifts_at(
         return []
     surface = phase_surface(reference, structure(back, settings))
     found = []
-    for peak in surface.peaks(surface.within(pose.linear, radius_px), count):
-        right, down = pose.linear @ peak.shift_px
+    for shift, height in surface.peaks(pose.linear, radius_px, count):
+        right, down = pose.linear @ shift
         moved = Pose(pose.rotation_deg, pose.scale, (float(right), float(down)))
-        found.append(PoseFound(moved, peak.height))
+        found.append(PoseFound(moved, height))
     return found
 
 
-def shift_left(both: Shared, settings: SimilaritySettings) -> PoseFound | None:
+def remaining_shift(both: Shared, settings: SimilaritySettings) -> PoseFound | None:
     """Return the shift that is left between the parts that two windows share."""
     first, second = (structure(window, settings) for window in (both.reference, both.input))
     surface = phase_surface(first, second, wrap=True)
-    peaks = surface.peaks(surface.within(np.eye(2), CORRECTION_PX), 1)
-    return PoseFound(Pose(shift_px=peaks[0].shift_px), peaks[0].height) if peaks else None
+    peaks = surface.peaks(np.eye(2), CORRECTION_PX, 1)
+    return PoseFound(Pose(shift_px=peaks[0][0]), peaks[0][1]) if peaks else None
 
 
 def phase_correlation(
     reference: Patch,
     input: Patch,
-    limits: PoseLimits,
+    limits: SearchLimits,
     settings: SimilaritySettings,
-    executor: Executor | None = None,
+    context: Context,
 ) -> list[PoseFound]:
-    """Search for the shift of an input that is not turned; a `PoseSearch`.
+    """Search for the shift of an input that is not rotated; a `PoseSearch`.
 
     Parameters
     ----------
@@ -209,16 +208,16 @@ def phase_correlation(
         Only shifts are searched for; the scale is the one nearest to 1 within the limits.
     settings
         "ncc" compares grey values, all else orientation fields.
-    executor
+    context
         Threads to align the candidates in.
     """
     if reference.is_flat or input.is_flat:
         return []
     pose = Pose(scale=float(np.clip(1.0, *limits.scale)))
     fixed = structure(reference, settings)
-    found = shifts_at(fixed, input, pose, limits.radius_px, settings, CANDIDATES)
+    found = shifts_at(fixed, input, pose, limits.radius, settings, CANDIDATES)
 
     def align(one: PoseFound) -> PoseFound:
-        return aligned(reference, input, one, limits, lambda both: shift_left(both, settings))
+        return aligned(reference, input, one, limits, lambda both: remaining_shift(both, settings))
 
-    return distinct((executor.map if executor else map)(align, found))
+    return distinct(context.quiet().map(align, found))

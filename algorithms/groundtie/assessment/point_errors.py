@@ -1,0 +1,167 @@
+"""By how much a transform misses points: those of its fit, and those held out of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from affine import Affine
+from numpy.typing import ArrayLike, NDArray
+
+from ..geometry.judging import TOLERANCE_PX, USUAL_MAX_ERROR_PX, sigma_range_px
+from ..geometry.robust import fit_mixture
+from ..geometry.tie_points import TiePoints
+from ..geometry.transform import Transform
+from ..rasters.grid import Grid
+from .statistics import Statistics
+
+FloatArray = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# Search window of held-out points, in pixels², if residuals do not show a larger one.
+_WINDOW_AREA_PX2 = 25.0**2
+
+
+@dataclass(frozen=True)
+class PointErrors:
+    """By how much a transform misses points.
+
+    Parameters
+    ----------
+    position_px
+        The points (col, row) in the image or grid whose pixels the errors are in, shape (n, 2).
+    error_px
+        Where the input has the points minus where the transform puts them, shape (n, 2).
+    is_check
+        Which points were held out of the fit, shape (n,).
+    counted
+        False for rejected points and outliers, which the statistics leave out, shape (n,).
+    error_m
+        Where the registered input shows the points minus where they are, metres along the axes
+        of the reference map, shape (n, 2); None if there are no metres.
+    """
+
+    position_px: FloatArray
+    error_px: FloatArray
+    is_check: Mask
+    counted: Mask
+    error_m: FloatArray | None = None
+
+    @classmethod
+    def of(cls, transform: Transform, reference_xy: ArrayLike, input_px: ArrayLike) -> PointErrors:
+        """Measure a transform at points held out of its fit, in pixels of the input.
+
+        Parameters
+        ----------
+        transform
+            The transform.
+        reference_xy
+            The points on the reference map, in the transform's CRS, shape (n, 2).
+        input_px
+            The points in the input (col, row), shape (n, 2).
+        """
+        xy = np.asarray(reference_xy, float).reshape(-1, 2)
+        px = np.asarray(input_px, float).reshape(-1, 2)
+        error_m = None
+        if transform.crs is not None or transform.input_grid.is_georeferenced:
+            error_m = (transform.inverse(px) - xy) * _metres_per_unit(transform, xy)
+        every = np.ones(len(px), bool)
+        return cls(px, px - transform(xy), every, every, error_m)
+
+    @classmethod
+    def on_grid(cls, points: TiePoints, transform: Transform, grid: Grid) -> PointErrors:
+        """Measure a transform at tie points, in pixels of the matching grid."""
+        errors = points.residual_on(grid, transform)
+        return cls(grid.map_to_pixel(points.reference_xy), errors, points.is_check, points.used)
+
+    @classmethod
+    def none(cls) -> PointErrors:
+        """Return the errors at no points."""
+        return cls(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, bool), np.zeros(0, bool))
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[PointErrors]) -> PointErrors:
+        """Return the errors in pixels of all parts, one after the other."""
+        names = ("position_px", "error_px", "is_check", "counted")
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+    def __len__(self) -> int:
+        return len(self.position_px)
+
+    @property
+    def placed(self) -> Mask:
+        """Which points the transform can place at all, shape (n,)."""
+        finite = np.isfinite(self.error_px).all(axis=1)
+        if self.error_m is not None:
+            finite &= np.isfinite(self.error_m).all(axis=1)
+        return np.asarray(finite)
+
+    @property
+    def used(self) -> Mask:
+        """Which points the statistics are of, shape (n,)."""
+        return self.counted & self.placed
+
+    @property
+    def length_px(self) -> FloatArray:
+        """Lengths of the errors, shape (n,)."""
+        return np.asarray(np.hypot(*self.error_px.T))
+
+    @property
+    def fit(self) -> Mask:
+        """Which points the fit used, shape (n,)."""
+        return self.used & ~self.is_check
+
+    @property
+    def check(self) -> Mask:
+        """Which held-out points were measured, shape (n,)."""
+        return self.used & self.is_check
+
+    @property
+    def agreeing(self) -> Mask:
+        """Which held-out points agree with the transform, shape (n,)."""
+        return self.check & (self.length_px <= TOLERANCE_PX)
+
+    @property
+    def in_pixels(self) -> Statistics:
+        """Statistics in pixels, along columns and rows."""
+        return Statistics.of(self.error_px[self.used])
+
+    @property
+    def in_metres(self) -> Statistics:
+        """Statistics in metres, along x and y of the reference map."""
+        return Statistics.of(np.zeros((0, 2)) if self.error_m is None else self.error_m[self.used])
+
+    def of_inliers(self, max_error_px: float | None = None) -> PointErrors:
+        """Return the errors of which only those of inliers count.
+
+        Inliers scatter around their place, outliers fall anywhere in their search window; the
+        verdict on a registration separates them in the same way. `max_error_px` is the root mean
+        square error that inliers may well have (None: as `coregister` has it).
+        """
+        which = self.placed
+        errors = self.error_px[which]
+        if len(errors) == 0:
+            return self
+        area = max(_WINDOW_AREA_PX2, float(np.ptp(errors, axis=0).prod()))
+        sigmas = sigma_range_px(USUAL_MAX_ERROR_PX if max_error_px is None else max_error_px)
+        counted = np.zeros(len(self), bool)
+        counted[which] = fit_mixture(errors, area, sigmas).right
+        return replace(self, counted=counted)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the numbers of points and the statistics, by name."""
+        return {
+            "points": len(self),
+            "points_used": int(self.used.sum()),
+            **self.in_pixels.summary("px", ("col", "row")),
+            **self.in_metres.summary("m", ("x", "y")),
+        }
+
+
+def _metres_per_unit(transform: Transform, xy: FloatArray) -> FloatArray:
+    """Return how long the reference map's units are at the middle of some positions, (2,)."""
+    finite = xy[np.isfinite(xy).all(axis=1)]
+    centre = finite.mean(axis=0) if len(finite) else np.zeros(2)
+    return np.array(Grid(Affine.translation(*(centre - 0.5)), transform.crs, 1, 1).metres_per_unit)

@@ -1,0 +1,80 @@
+"""The QGIS Georeferencer's files of points."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+from rasterio.crs import CRS
+
+from ..rasters.grid import Grid
+from .tie_points import USED, TiePoints
+from .transform import Transform
+
+FloatArray = NDArray[np.float64]
+Row = dict[str, Any]
+
+# It counts pixels from the image's corner, and rows downwards from 0.
+_PIXELS = Grid(Affine.scale(1, -1), None, 1, 1)
+
+
+def write_georeferencer(path: Path, points: TiePoints, transform: Transform) -> None:
+    """Write points for the Georeferencer, in which only used points of the fit are enabled."""
+    source_xy = _source_grid(transform.input_grid).pixel_to_map(points.input_px)
+    residual = points.residual_px(transform)
+    lines = [] if transform.crs is None else [f"#CRS: {transform.crs.to_wkt()}"]
+    lines.append("mapX,mapY,sourceX,sourceY,enable,dX,dY,residual")
+    # It has no check points: it would fit to every point that is enabled.
+    fitted = points.used & ~points.is_check
+    # Its rows are negative: so are its residuals along them.
+    numbers = [points.reference_xy, source_xy, fitted, residual * [1, -1], np.hypot(*residual.T)]
+    for row in np.column_stack(numbers):
+        lines.append(",".join(f"{number:.17g}" for number in row))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def read_georeferencer(path: Path, input_grid: Grid) -> TiePoints:
+    """Read points of the Georeferencer; without a CRS line their map is in the raster's CRS."""
+    crs = input_grid.crs
+    lines = path.read_text(encoding="utf-8-sig").splitlines()
+    while lines and lines[0].startswith("#"):
+        comment = lines.pop(0)
+        if comment.startswith("#CRS:"):
+            crs = CRS.from_user_input(comment.removeprefix("#CRS:").strip())
+    rows: list[Row] = list(csv.DictReader(lines))
+    # Older versions of QGIS called the columns so.
+    x, y = ("pixelX", "pixelY") if rows and "pixelX" in rows[0] else ("sourceX", "sourceY")
+    input_px = _source_grid(input_grid).map_to_pixel(positions(rows, x, y))
+    states = [USED if row["enable"].strip() != "0" else "rejected: disabled" for row in rows]
+    return unmeasured(positions(rows, "mapX", "mapY"), input_px, states, crs)
+
+
+def unmeasured(
+    reference_xy: FloatArray, input_px: FloatArray, states: list[str], crs: CRS | None
+) -> TiePoints:
+    """Return points of a fit whose places and states are all that is known."""
+    count = len(states)
+    return TiePoints(
+        reference_xy,
+        input_px,
+        np.full(count, np.nan),
+        np.full((count, 2, 2), np.nan),
+        np.full(count, np.nan),
+        np.zeros(count, bool),
+        np.array(states, str),
+        crs,
+    )
+
+
+def positions(rows: Iterable[Row], x: str, y: str) -> FloatArray:
+    """Return the positions in two columns of a table, shape (n, 2)."""
+    return np.array([[float(row[x]), float(row[y])] for row in rows], float).reshape(-1, 2)
+
+
+def _source_grid(input_grid: Grid) -> Grid:
+    return input_grid if input_grid.is_georeferenced else _PIXELS

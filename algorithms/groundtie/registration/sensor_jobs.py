@@ -1,0 +1,223 @@
+"""The two jobs for images with RPCs: ground control from a reference, and refined RPCs by it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..context import Context, threads
+from ..errors import ParameterError
+from ..masks.choice import MaskUsed
+from ..progress import Progress
+from ..rasters.atomic import Outputs
+from ..rasters.reading import bounded_cache, open_raster
+from ..sensor.adjustment import Adjustment
+from ..sensor.control_points import ControlPoints, read_control_points
+from ..sensor.height_check import HeightCheck
+from ..sensor.rpc_fit import RPCFit
+from .ground_control import GroundControl, match_ground_control, require_crs
+from .refinement import Refinement
+from .refinement_output import Call, RefinementFiles
+from .refinement_verdict import RefinementVerdict
+from .sensor_input import Ground, OrientedImage, open_oriented_image
+from .specification import Specification
+from .verdict import Verdict
+
+
+@dataclass(frozen=True)
+class GcpResult:
+    """What `extract_gcps` found.
+
+    Parameters
+    ----------
+    points
+        The points, check points included.
+    verdict
+        Whether they can be trusted, by the check points.
+    mask
+        The mask that was used.
+    output
+        The file.
+    heights
+        Which heights were used, in words.
+    """
+
+    points: ControlPoints
+    verdict: Verdict
+    mask: MaskUsed
+    output: Path
+    heights: str
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {
+            "output": str(self.output),
+            "points": len(self.points),
+            "points_used": int(self.points.points.used.sum()),
+            "heights": self.heights,
+            "mask": self.mask.summary(),
+            "verdict": self.verdict.summary(),
+        }
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        table, verdict = self.points.points, self.verdict
+        return [
+            f"accepted: {verdict.reason}",
+            f"{int((table.used & ~table.is_check).sum())} of {int((~table.is_check).sum())} "
+            f"points, and {int((table.used & table.is_check).sum())} check points",
+            f"error at check points: RMSE {verdict.check_rmse_px:.2f} px "
+            f"({verdict.check_rmse_m:.2f} m)",
+            self.heights,
+            self.mask.line(),
+            f"wrote {self.output}",
+        ]
+
+
+@dataclass(frozen=True)
+class RefinedRpc:
+    """Refined RPCs, and how far to trust them.
+
+    Parameters
+    ----------
+    fit
+        The RPCs, with the bias folded in, and how far they miss it.
+    adjustment
+        The bias.
+    judged
+        The verdict, and the errors before and after.
+    heights
+        What contradicts the heights.
+    ground
+        Which heights were used, in words.
+    mask
+        Which mask points were matched with; None: they were given.
+    files
+        What was written, by name.
+    """
+
+    fit: RPCFit
+    adjustment: Adjustment
+    judged: RefinementVerdict
+    heights: HeightCheck
+    ground: str
+    mask: MaskUsed | None
+    files: dict[str, str]
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {
+            "verdict": self.judged.summary(),
+            "bias": self.adjustment.bias.to_json(),
+            "left_out_rmse_px": self.adjustment.left_out_rmse_px,
+            "folding_residual_px": self.fit.largest_residual_px,
+            "heights": {"used": self.ground, **self.heights.summary()},
+            "mask": None if self.mask is None else self.mask.summary(),
+            "files": self.files,
+        }
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        verdict, bias = self.judged.verdict, self.adjustment.bias
+        shift, sigma = bias.shift_px()
+        return [
+            f"accepted: {verdict.reason}",
+            f"model: {bias.kind}, {verdict.fit_points_used} of {verdict.fit_points} points",
+            f"shift in the middle of the image: {shift[0]:+.2f} ± {sigma[0]:.2f}, "
+            f"{shift[1]:+.2f} ± {sigma[1]:.2f} px (column, row)",
+            f"error at {self.judged.held_out}: {self.judged.before.rmse:.2f} px before, "
+            f"{self.judged.after.rmse:.2f} px after; CE90 {verdict.check_ce90_px:.2f} px "
+            f"({verdict.check_ce90_m:.2f} m)",
+            f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
+            self.ground,
+            *(() if self.mask is None else (self.mask.line(),)),
+            *(f"warning: {line}" for line in self.heights.warnings()),
+            *(f"{name}: {path}" for name, path in self.files.items()),
+        ]
+
+
+def extract_control(parameters: Mapping[str, Any], progress: Progress) -> GcpResult:
+    """Extract ground control as the tool `extract_gcps` does, from its parameters by name.
+
+    Raises
+    ------
+    NotRegisteredError
+        The points are refused; nothing is written.
+    """
+    output = parameters["output"]
+    with threads(parameters["workers"], progress) as context, ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        sensor, found = _matched(parameters, stack, context)
+        assert found is not None
+        points = found.accepted()
+        with Outputs() as outputs:
+            points.write(outputs.stage(output), sensor.orientation, sensor.source.grid)
+    registration = found.registration
+    return GcpResult(points, registration.verdict, registration.mask, output, sensor.heights)
+
+
+def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
+    """Refine RPCs as the tool `refine_rpc` does, from its parameters by name.
+
+    Raises
+    ------
+    ParameterError
+        There is neither a reference nor ground control, or both.
+    NotRegisteredError
+        The ground control or the refined RPCs are refused; the report is written.
+    """
+    gcps, dem = parameters["gcps"], parameters["dem"]
+    if (parameters["reference"] is None) == (gcps is None):
+        raise ParameterError("give either a reference or ground control points (gcps)")
+    call = Call(parameters, time.perf_counter())
+    files = RefinementFiles(parameters["output"], parameters["residuals"], parameters["report"])
+    with threads(parameters["workers"], progress) as context, ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        sensor, found = _matched(parameters, stack, context.part(0.0, 0.9))
+        if found is None:
+            points = read_control_points(gcps, sensor.orientation, sensor.source.grid)
+        else:
+            points = files.points_or_report(found, call)
+        context.update(0.9, "estimating the bias")
+        refinement = Refinement.of(points, sensor, parameters["model"], parameters["max_error"])
+        heights = refinement.heights(own_heights=gcps is not None and dem is not None)
+        for warning in heights.warnings():
+            context.update(0.9, warning)
+        fit = files.write(refinement, heights, found, call, context.part(0.9, 1.0).progress)
+    return RefinedRpc(
+        fit,
+        refinement.adjustment,
+        refinement.judged,
+        heights,
+        sensor.heights,
+        None if found is None else found.registration.mask,
+        files.written(),
+    )
+
+
+def _matched(
+    parameters: Mapping[str, Any], stack: ExitStack, context: Context
+) -> tuple[OrientedImage, GroundControl | None]:
+    """Return the oriented image, and ground control matched in the reference if there is one."""
+    given = parameters
+    ground = Ground(given["dem"], given["dem_datum"], given["geoid"], given["height"])
+    reference = None
+    if given["reference"] is not None:
+        reference = stack.enter_context(open_raster(given["reference"]))
+    crs = None if reference is None else require_crs(reference)
+    sensor = open_oriented_image(given["image"], given["rpc"], ground, crs, stack, context.progress)
+    if reference is None:
+        return sensor, None
+    spec = Specification(
+        max_error_px=given["max_error"],
+        search_radius_m=given["search_radius"],
+        mask=given["mask"],
+        matching_pixel_size_m=given["matching_pixel_size"],
+    )
+    bands = given["reference_band"], given["image_band"]
+    masks = given["reference_mask"], given["image_mask"]
+    return sensor, match_ground_control(sensor, reference, spec, bands, masks, stack, context)

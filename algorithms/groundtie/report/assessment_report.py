@@ -1,0 +1,97 @@
+"""The report on a registration that was made before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..assessment.accuracy import Assessment
+from ..assessment.comparison import Comparison
+from ..assessment.point_errors import PointErrors
+from ..geometry.transform import Transform
+from ..registration.verdict import Verdict
+from . import figures
+from .page import Page
+
+# What an assessment's parts are called.
+PART_LABELS = {
+    "control_points": "control points",
+    "test_points": "test points",
+    "check_points": "check points",
+    "two_way": "two-way consistency",
+    "three_way": "three-way consistency",
+}
+
+
+@dataclass(frozen=True)
+class AssessmentReport(Page):
+    """What is shown of how good a registration is that was made before.
+
+    Parameters
+    ----------
+    title
+        Heading of the page.
+    assessment
+        All that was measured.
+    verdict
+        Whether the registration can be trusted; None if no largest error was asked for.
+    transform
+        What was measured.
+    comparison
+        The images; None if they were not given.
+    parameters
+        What the tool was called with.
+    seconds
+        How long it took.
+    """
+
+    title: str
+    assessment: Assessment
+    verdict: Verdict | None
+    transform: Transform
+    comparison: Comparison | None
+    parameters: dict[str, Any]
+    seconds: float
+    template: ClassVar[str] = "assessment.html.j2"
+
+    def numbers(self) -> dict[str, Any]:
+        """Return what was measured, by name."""
+        verdict = None if self.verdict is None else self.verdict.summary()
+        parts = self.assessment.summary()
+        return {"verdict": verdict, **parts, "transform": self.transform.to_json()}
+
+    def values(self) -> dict[str, Any]:
+        """Return what the template shows."""
+        parts = {name: errors for name, errors in self.assessment.parts().items() if len(errors)}
+        return {
+            "verdict": self.verdict,
+            "parts": parts,
+            "labels": PART_LABELS,
+            "metres": any(errors.error_m is not None for errors in parts.values()),
+            "model": self.transform.model.kind,
+            "pictures": self.comparison,
+            "map": self._error_map(),
+        }
+
+    def _error_map(self) -> dict[str, Any] | None:
+        """Return the figure of the errors at all points, over the input."""
+        measured = self.assessment
+        fit = measured.control_points
+        parts = (
+            replace(fit, is_check=np.zeros(len(fit), bool)),
+            measured.test_points,
+            measured.check_points,
+        )
+        # An outlier is shown: as a check point that disagrees.
+        errors = PointErrors.concatenate([replace(part, counted=part.placed) for part in parts])
+        if not errors.used.any():
+            return None
+        grid = self.transform.input_grid
+        return {
+            "uri": figures.svg_uri(figures.residual_map(errors, grid)),
+            "exaggeration": figures.residual_arrows(errors, grid).exaggeration,
+            "width": grid.width,
+            "height": grid.height,
+        }

@@ -1,0 +1,119 @@
+"""What all reports share: one HTML page without network, and its numbers as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+from pathlib import Path
+from typing import Any, ClassVar
+
+import cv2
+import numpy as np
+import rasterio
+import scipy
+
+from ..geometry.judging import TOLERANCE_PX
+from ..rasters.atomic import writing
+from ..version import __version__
+from .figures import CHECK_COLOUR, FIT_COLOUR, REJECTED_COLOUR
+
+_TEMPLATES = Path(__file__).with_name("templates")
+_COLOURS = {"fit": FIT_COLOUR, "check": CHECK_COLOUR, "rejected": REJECTED_COLOUR}
+
+
+class Page:
+    """A page and its numbers: subclasses name the template and give its values."""
+
+    template: ClassVar[str]
+    title: str
+    parameters: dict[str, Any]
+    seconds: float
+
+    def numbers(self) -> dict[str, Any]:
+        """Return what was measured, by name."""
+        raise NotImplementedError
+
+    def values(self) -> dict[str, Any]:
+        """Return what the template shows besides what all pages show."""
+        raise NotImplementedError
+
+    def summary(self) -> dict[str, Any]:
+        """Return the numbers as values that strict JSON can carry."""
+        made = {"parameters": self.parameters, "versions": versions(), "seconds": self.seconds}
+        return {name: plain(value) for name, value in (self.numbers() | made).items()}
+
+    def write(self, html_path: str | os.PathLike[str], json_path: str | os.PathLike[str]) -> None:
+        """Write the page and its numbers.
+
+        Raises
+        ------
+        OutputError
+            A file cannot be written.
+        """
+        summary = self.summary()
+        shared = {name: summary[name] for name in ("parameters", "versions", "seconds")}
+        page = _rendered(self.template, title=self.title, **shared, **self.values())
+        with writing(html_path):
+            Path(html_path).write_text(page, encoding="utf-8")
+        with writing(json_path):
+            text = json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False)
+            Path(json_path).write_text(text, encoding="utf-8")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that a result depends on."""
+    return {
+        "groundtie": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "opencv": cv2.__version__,
+        "rasterio": rasterio.__version__,
+        "gdal": rasterio.__gdal_version__,
+    }
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON can carry it: what is not finite is None, what is no value text."""
+    if isinstance(value, dict):
+        return {str(name): plain(part) for name, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(part) for part in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, (bool, int, str)) else str(value)
+
+
+def _rendered(template: str, **values: Any) -> str:
+    import jinja2  # heavy
+
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.globals.update(colours=_COLOURS, tolerance_px=TOLERANCE_PX)
+    environment.filters.update(number=_number, percent=_percent, sentence=_sentence)
+    environment.tests["finite"] = math.isfinite
+    return environment.get_template(template).render(**values)
+
+
+def _number(value: float | None, digits: int = 2) -> str:
+    if value is None or not math.isfinite(value):
+        return "–"
+    # Adding 0 turns -0.0 into 0.0.
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _percent(value: float) -> str:
+    return f"{value:.0%}".replace("%", " %") if math.isfinite(value) else "–"
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,132 @@
+"""Speckle filters on rasters: tile by tile, band by band."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rasterio.windows
+from numpy.typing import NDArray
+
+from ..context import Context
+from ..errors import RasterContentError
+from ..rasters.radar_tags import with_speckle_filter
+from ..rasters.reading import Mask, RasterSource, Window
+from ..rasters.tiling import in_order, tiles
+from ..rasters.writing import create_like, fill_value
+from .filters import SpeckleFilter
+from .statistics import estimate_looks
+
+AMPLITUDE = "amplitude"
+VALUES = (AMPLITUDE, "intensity")
+
+# Looks are estimated in the middle of a large image.
+_SAMPLE_PX = 2048
+
+# Filters work in float32; its power must not overflow.
+_LARGEST_AMPLITUDE = 1e18
+
+
+@dataclass(frozen=True)
+class RasterFilter:
+    """A speckle filter on a raster, band by band.
+
+    Parameters
+    ----------
+    source
+        The raster; complex bands become amplitudes.
+    filter
+        The filter.
+    values
+        Unit of the pixels, one of `VALUES`.
+    """
+
+    source: RasterSource
+    filter: SpeckleFilter
+    values: str
+
+    def write(self, path: Path, context: Context) -> None:
+        """Write the filtered raster, tile by tile; see `atomic.Outputs.stage`."""
+        source, places = self.source, list(tiles(self.source.grid))
+        nodata = None if source.is_complex else source.bands[0].nodata
+        like = _as_amplitudes(source) if source.is_complex else source
+        # Without speckle, only the tag identifies it as a radar image.
+        like = with_speckle_filter(like, f"{self.filter.name}, {self.filter.window_px} px")
+        workers = context.workers
+        with create_like(like, source.grid, path, nodata=nodata, workers=workers) as dataset:
+            filtered = in_order(context.executor, self.tile, places, workers + 1)
+            for i, (bands, valid) in enumerate(filtered):
+                place = rasterio.windows.Window(*places[i])
+                dataset.write(bands, window=place)
+                if source.has_mask_band:
+                    dataset.write_mask(valid, window=place)
+                context.update((i + 1) / len(places))
+
+    def tile(self, tile: Window) -> tuple[NDArray[Any], Mask]:
+        """Return all bands of a tile, filtered, and which pixels of the first are valid."""
+        reach, source = self.filter.reach_px, self.source
+        around = Window(
+            tile.col - reach, tile.row - reach, tile.width + 2 * reach, tile.height + 2 * reach
+        )
+        inside = np.s_[:, reach : reach + tile.height, reach : reach + tile.width]
+        values, valid = source.read_bands(around)
+        out = np.empty_like(values[inside], dtype=np.float32 if source.is_complex else None)
+        for i in range(source.count):
+            out[i] = self._filtered(values[i], valid[i], i + 1, out.dtype)[inside[1:]]
+        return out, valid[inside][0]
+
+    def _filtered(
+        self, values: NDArray[Any], valid: Mask, band: int, dtype: np.dtype[Any]
+    ) -> NDArray[Any]:
+        source = self.source
+        if band == source.alpha_band:
+            return values
+        power = _power(values, self.values)
+        filtered = self.filter(power, valid)
+        if self.values == AMPLITUDE:
+            filtered = np.sqrt(filtered)
+        if dtype.kind in "iu":
+            limits = np.iinfo(dtype)
+            filtered = np.clip(np.rint(filtered), limits.min, limits.max)
+        if source.is_complex:
+            return filtered
+        # Without a nodata value, an invalid pixel keeps its value.
+        fill = values if source.bands[band - 1].nodata is None else _fill(source, band)
+        return np.where(valid, filtered.astype(dtype), fill)
+
+
+def _fill(source: RasterSource, band: int) -> Any:
+    return fill_value(source, source.bands[band - 1].nodata, band)
+
+
+def _as_amplitudes(source: RasterSource) -> RasterSource:
+    bands = tuple(replace(band, dtype="float32", nodata=None) for band in source.bands)
+    return replace(source, bands=bands)
+
+
+def _power(pixels: NDArray[Any], values: str) -> NDArray[np.float32]:
+    """Return the power of pixels, float32."""
+    if pixels.dtype.kind == "c":
+        return np.asarray(pixels.real**2 + pixels.imag**2, np.float32)
+    linear = np.clip(pixels.astype(np.float32), 0, _LARGEST_AMPLITUDE)
+    return linear * linear if values == AMPLITUDE else linear
+
+
+def looks_of(source: RasterSource, values: str) -> float:
+    """Return the equivalent number of looks in the middle of a raster.
+
+    Raises
+    ------
+    RasterContentError
+        No pixel there is valid.
+    """
+    width, height = (min(size, _SAMPLE_PX) for size in (source.grid.width, source.grid.height))
+    middle = Window((source.grid.width - width) // 2, (source.grid.height - height) // 2, 0, 0)
+    bands, valid = source.read_bands(
+        middle._replace(width=width, height=height), source.image_bands[:1]
+    )
+    if not valid.any():
+        raise RasterContentError(f"{source.path} has no valid pixels in its middle")
+    return estimate_looks(np.where(valid[0], _power(bands[0], values), np.float32(0)), valid[0])
