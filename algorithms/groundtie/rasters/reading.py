@@ -16,6 +16,7 @@ import rasterio
 import rasterio.windows
 from numpy.typing import NDArray
 from rasterio.enums import ColorInterp, MaskFlags
+from rasterio.env import env_ctx_if_needed
 from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
 
 from ..errors import BandError, GeoreferencingError, RasterOpenError
@@ -356,7 +357,8 @@ class _Handles:
             with self._lock:
                 dataset = self._free.pop() if self._free else None
             dataset = dataset or rasterio.open(self._path, sharing=False)
-            yield dataset
+            with env_ctx_if_needed():  # GDAL's messages in this thread go to rasterio's logger
+                yield dataset
         # RasterioIOError is no RasterioError before rasterio 1.4.
         except (RasterioError, RasterioIOError) as error:
             reason = error.__cause__ or error

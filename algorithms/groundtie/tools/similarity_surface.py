@@ -12,8 +12,6 @@ from typing import Annotated, Any
 import numpy as np
 import rasterio
 from numpy.typing import NDArray
-from rasterio._err import CPLE_BaseError
-from rasterio.errors import RasterioError
 
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
@@ -364,7 +362,7 @@ def _radius(pair: ImagePair, radius_m: float | None) -> int:
 def write_surface(path: Path, result: SurfaceResult) -> None:
     """Write a surface as a GeoTIFF: the values of the measure, and the evidence."""
     bands: NDArray[np.float32] = np.stack([result.values, result.evidence])
-    with writing(path, RasterioError, CPLE_BaseError):
+    with writing(path):
         with rasterio.open(
             path,
             "w",
