@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import groundtie
-from groundtie.features.detectors import SiftDetector, SiftOctDetector
 from groundtie.geometry.chance import agreement_probability, log10_chance
 from groundtie.matching import belief_propagation
 from groundtie.rasters.patch import Patch
+from groundtie.studies.sift_variants import sift_detector
 
 FIGURES = Path(__file__).resolve().parents[1] / "docs" / "figures"
 
@@ -176,9 +176,8 @@ def features(scenes: Scenes) -> Figure:
     values = _band(scenes.speckled() / "reference.tif")[20:110, 60:180]
     window = Patch(values.astype(np.float32), np.ones(values.shape, bool))
     figure, axes = _canvas(5.8, 2.5, 2)
-    detectors = (("SIFT", SiftDetector()), ("SIFT-OCT", SiftOctDetector()))
-    for each, (name, detector) in zip(axes, detectors, strict=True):
-        found = detector.detect(window)
+    for each, name in zip(axes, ("sift", "sift-oct"), strict=True):
+        found = sift_detector(name).detect(window)
         first = found.octave < 0
         each.imshow(_stretched(np.log(values + 1.0)), cmap="gray")
         for chosen, colour in ((first, ORANGE), (~first, BLUE)):
@@ -326,7 +325,7 @@ DRAWN: Mapping[str, Callable[[Scenes], Figure]] = {
     "method-search": search,
     "method-belief-propagation": propagation,
     "method-features": features,
-    "method-hog": hog,
+    "method-surf-hog": hog,
     "method-masks": masks,
     "method-rotation": rotation,
     "method-rpc": rpc,

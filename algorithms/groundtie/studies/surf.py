@@ -108,7 +108,7 @@ def _vertices(
 ) -> tuple[FloatArray, FloatArray]:
     """Return where parabolas through peaks and their neighbours are highest, and how high.
 
-    The offsets are along columns, rows and layers, shape (n, 3) [Brown2002].
+    The offsets are along columns, rows and layers, shape (n, 3) ([Brown2002]).
     """
 
     def value(x: int, y: int, z: int) -> FloatArray:
