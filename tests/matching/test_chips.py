@@ -8,10 +8,10 @@ from textured_pairs import TexturedPair, shift_on_map
 
 from groundtie.context import Context
 from groundtie.errors import CancelledError
+from groundtie.geometry.models import Model
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.matcher import ChipSurfaces, Places
 from groundtie.progress import Progress
-from groundtie.geometry.models import Model
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import ImagePair
 from groundtie.similarity.surface import SimilaritySettings
@@ -69,9 +69,7 @@ def test_what_is_known_already_is_taken_out(
     assert np.abs(peaks(found.combined)).max() == 0
 
 
-def test_chips_without_enough_valid_pixels_are_left_out(
-    pair: ImagePair, context: Context
-) -> None:
+def test_chips_without_enough_valid_pixels_are_left_out(pair: ImagePair, context: Context) -> None:
     beyond = np.array([[-60, 60], [130, 120], [259, 239], [1000, 1000]])
     found = matched(matcher(pair), context, beyond)
     assert found.centres.tolist() == [[130, 120]]

@@ -159,7 +159,9 @@ def test_chips_are_matched_again_where_the_first_model_went_astray(files: Textur
     assert right.max() > 0.8 * SIZE[0]
 
 
-def test_the_coarse_model_is_taken_where_keypoints_agree_on_a_wrong_one(files: TexturedPair) -> None:
+def test_the_coarse_model_is_taken_where_keypoints_agree_on_a_wrong_one(
+    files: TexturedPair,
+) -> None:
     """Nothing is alike 14 px beside the truth."""
     with files.opened() as pair, threads(2) as context:
         held_out = HeldOut.of(pair)

@@ -59,9 +59,7 @@ def test_tie_points_are_places_in_both_images(
     right = points.take(points.used)
     assert len(right) > 0.8 * len(fit.layout.fit_centres)
     px = textured.grid.map_to_pixel(right.reference_xy)
-    assert {tuple(p) for p in np.rint(px).astype(int)} <= {
-        tuple(c) for c in fit.layout.fit_centres
-    }
+    assert {tuple(p) for p in np.rint(px).astype(int)} <= {tuple(c) for c in fit.layout.fit_centres}
     errors = right.input_px - textured.truth(right.reference_xy)
     assert rms(errors) < 0.5
     # What the surfaces indicate of their peaks' scatter is neither far too bold nor far too modest.
@@ -71,9 +69,7 @@ def test_tie_points_are_places_in_both_images(
     assert (right.score > 3).all()
 
 
-def test_a_strict_forward_backward_limit_rejects_points(
-    pair: ImagePair, context: Context
-) -> None:
+def test_a_strict_forward_backward_limit_rejects_points(pair: ImagePair, context: Context) -> None:
     strict = fit_of(pair, forward_backward_px=0.05).estimate(COARSE, "translation", context)
     rejected = strict.points.take(~strict.points.used)
     assert 0 < strict.points.used.sum() < len(strict.points)
