@@ -11,7 +11,7 @@ from groundtie.geometry.limits import SearchLimits
 from groundtie.pose.pose import Pose
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.binning import MASKED
-from groundtie.similarity.measures import mutual_information, normalized_mutual_information
+from groundtie.similarity.measures import normalized_mutual_information
 from groundtie.similarity.surface import SimilaritySettings
 from groundtie.studies.climbing import (
     Counted,

@@ -1,0 +1,131 @@
+"""A registration: what it shows to people and programs, and that it closes what it opened."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from textured_pairs import TexturedPair, listing
+
+from groundtie.errors import NothingFoundError
+from groundtie.matching.check import CHECK_RADIUS_PX, Check
+from groundtie.registration.delivery import Call, RegistrationFiles
+from groundtie.registration.evidence import SearchEvidence
+from groundtie.registration.registration import Registration
+from groundtie.registration.specification import Specification
+from groundtie.registration.verdict import judge_search
+
+LOST = judge_search(SearchEvidence(NothingFoundError("nothing in common was found")))
+
+
+def refused(registration: Registration) -> Registration:
+    return replace(registration, estimate=None, check=None, verdict=LOST)
+
+
+def first_checks(registration: Registration, count: int) -> Registration:
+    """Return a registration with the first of its check points alone."""
+    check = registration.check
+    assert check is not None
+    few = Check(
+        check.points.take(slice(0, count)),  # type: ignore[arg-type]
+        check.surfaces[:count],
+        check.common_shift_px,
+    )
+    return replace(registration, check=few)
+
+
+def test_surfaces_of_the_best_and_worst_check_points(registration: Registration) -> None:
+    surfaces = registration.extreme_surfaces()
+    labels = [label for label, _ in surfaces]
+    best, worst = labels.count("best check point"), labels.count("worst check point")
+    assert best + worst == len(labels)
+    assert best == 3
+    assert 0 < worst <= 3
+    side = 2 * CHECK_RADIUS_PX + 1
+    for _, surface in surfaces:
+        assert surface.shape == (side, side)
+        assert np.isfinite(surface).all()
+    assert refused(registration).extreme_surfaces() == ()
+
+
+def test_few_check_points_are_shown_once(registration: Registration) -> None:
+    labels = [label for label, _ in first_checks(registration, 4).extreme_surfaces()]
+    assert labels == ["best check point"] * 3 + ["worst check point"]
+    assert first_checks(registration, 0).extreme_surfaces() == ()
+
+
+def test_a_registration_is_lines_for_people_and_json_for_programs(
+    registration: Registration,
+) -> None:
+    found = replace(registration, files={"output": Path("out.tif")}, parameters={"a": 1, "b": None})
+    summary = json.loads(json.dumps(found.summary(), allow_nan=False))
+    assert summary["files"] == {"output": "out.tif"}
+    assert summary["verdict"] == registration.verdict.summary()
+    assert summary["parameters"] == {"a": 1}
+    assert summary["scene"] == registration.scene.summary()
+    assert "tried" not in summary
+    lines = found.lines()
+    verdict = registration.verdict
+    assert lines[0] == "accepted: check points confirm the registration"
+    assert f"{verdict.fit_points_used} of {verdict.fit_points} points" in lines[1]
+    assert f"{verdict.check_points_agreeing} of {verdict.check_points}" in lines[3]
+    assert lines[-1] == "output: out.tif"
+    # 10 m pixels, in both units.
+    assert f"RMSE {verdict.check_rmse_px:.2f} px ({10 * verdict.check_rmse_px:.2f} m)" in lines[2]
+
+
+def test_what_was_tried_before_stands_first(registration: Registration) -> None:
+    found = replace(registration, tried=("tried chips: refused",))
+    assert found.lines()[0] == "tried chips: refused"
+    assert found.lines()[1].startswith("accepted: ")
+    assert found.summary()["tried"] == ["tried chips: refused"]
+
+
+def test_a_refusal_is_one_line_with_what_to_try(registration: Registration) -> None:
+    lost = refused(registration)
+    assert lost.lines() == [f"refused: {LOST.reason}; {LOST.advice}"]
+    summary = json.loads(json.dumps(lost.summary(), allow_nan=False))
+    assert summary["verdict"]["rule"] == "nothing in common"
+    assert lost.transform is None and lost.tie_points is None
+    with pytest.raises(AssertionError):
+        lost.accepted()
+
+
+def test_the_report_is_a_page_and_its_numbers(registration: Registration, tmp_path: Path) -> None:
+    registration.report(tmp_path / "r.html")
+    assert set(listing(tmp_path)) == {"r.html", "r.json"}
+    assert "input.tif registered to reference.tif" in (tmp_path / "r.html").read_text()
+    numbers = json.loads((tmp_path / "r.json").read_text())
+    assert numbers["verdict"] == registration.verdict.summary()
+    refused(registration).report(tmp_path / "lost.html")
+    assert "nothing in common" in (tmp_path / "lost.html").read_text()
+
+
+def test_a_page_without_surfaces_has_the_same_numbers(registration: Registration) -> None:
+    whole, bare = registration.page(), registration.page(with_surfaces=False)
+    assert len(whole.surfaces) > 0 and bare.surfaces == ()
+    one, other = whole.summary(), bare.summary()
+    assert one.pop("seconds") <= other.pop("seconds")
+    assert one == other
+
+
+def test_left_as_a_context_manager_it_closes_its_rasters(textured: TexturedPair) -> None:
+    spec = Specification(similarity="orientation", search_radius_m=200.0)
+    call = Call(textured.reference, textured.input, RegistrationFiles())
+    closed: list[bool] = []
+    with call.register(spec) as found:
+        found.rasters.callback(closed.append, True)
+        grid = found.pair.grid
+        assert found.pair.reference_patch(grid).valid.any()
+        assert closed == []
+    assert closed == [True]
+    with pytest.raises(Exception, match=r"closed|Dataset"):
+        found.pair.reference_patch(grid)
+    # What was computed stays.
+    points, transform = found.accepted()
+    assert np.isfinite(transform(points.reference_xy)).all()
+    assert found.lines() and found.verdict.accepted
+    found.close()
