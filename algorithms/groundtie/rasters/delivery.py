@@ -3,14 +3,8 @@
 from __future__ import annotations
 
 import os
-<<<<<<< HEAD
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-=======
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
->>>>>>> core
 from dataclasses import dataclass
 from typing import Any
 
@@ -272,5 +266,3 @@ def _is_covered(warp: _Warp) -> bool:
         lies_within(lattice(warp.target.window(*tile), warp.to_input_px), grid.width, grid.height)
         for tile in tiles(warp.target)
     )
-<<<<<<< HEAD
-=======
