@@ -124,7 +124,7 @@ def test_the_grid_is_cut_to_what_may_overlap_and_keeps_the_references_lattice(
     assert make_pair(files.image(), files.image(part)).grid == GRID.window(10, 0, 100, 90)
 
 
-@pytest.mark.parametrize(("largest_deg", "scale"), [(0.0, 1.0), (90.0, 1.0), (180.0, 1.4)])
+@pytest.mark.parametrize(("largest_deg", "scale"), [(0.0, 1.2), (90.0, 1.0), (180.0, 1.4)])
 def test_the_grid_holds_all_that_a_rotated_image_may_show(
     files: Files, largest_deg: float, scale: float
 ) -> None:

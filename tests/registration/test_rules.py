@@ -31,17 +31,26 @@ from groundtie.errors import (
 )
 from groundtie.geometry.estimation import Estimate
 from groundtie.masks.choice import LAYER, REGIONS, THRESHOLD, MaskUsed
+from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
 from groundtie.registration.evidence import (
     RegistrationEvidence,
     SearchEvidence,
 )
+from groundtie.registration.pose_verdict import PoseEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
-from groundtie.registration.verdict import first_refusal
+from groundtie.registration.verdict import Evidence, first_refusal
 
 GOOD = scatter(36, 0.4)
-RANK = (stages.SEARCH, stages.AGREEMENT, stages.ERROR, stages.SCENE, stages.REFINEMENT)
+RANK = (
+    stages.SEARCH,
+    stages.AGREEMENT,
+    stages.ERROR,
+    stages.SCENE,
+    stages.REFINEMENT,
+    stages.POSE,
+)
 
 # Dense towns: of a radar with speckle, of a radar whose speckle a filter took, of who knows what.
 TOWN = {"strong_share": 0.25}
@@ -72,6 +81,16 @@ def loose(by_px: float) -> Estimate:
 
 
 CONTROL = control((20, -9))
+
+
+BEST = Pose(40.0)
+
+
+def pose(height: float = 9.0, rival: float = 3.0, found: Pose = BEST) -> PoseEvidence:
+    """Return the evidence of a pose beside the two best ones of an exhaustive search."""
+    best = PoseFound(BEST, height), PoseFound(Pose(-70.0), rival)
+    return PoseEvidence([PoseFound(found, height)], best, (200, 100))
+
 
 # Of each rule: evidence that it refuses, and evidence that it does not.
 EVIDENCE: dict[str, tuple[Any, Any]] = {
@@ -127,10 +146,14 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         refinement(CONTROL, folding_px=0.02),
         refinement(CONTROL, folding_px=0.005),
     ),
+    "pose by chance": (pose(height=4.9, rival=3.0), pose(height=5.1, rival=3.0)),
+    "second pose": (pose(height=9.0, rival=5.7), pose(height=9.0, rival=5.5)),
+    # Three degrees move corners by 6 px, a degree by 2 px.
+    "other pose": (pose(found=Pose(43.0)), pose(found=Pose(41.0))),
 }
 
 
-def refusing(found: SearchEvidence | RegistrationEvidence | RefinementEvidence) -> list[str]:
+def refusing(found: Evidence) -> list[str]:
     """Return the names of all rules that refuse, whichever decides."""
     asked = [rule for rule in RULES if rule.stage in found.stages]
     return [rule.name for rule in asked if rule.reason(found) is not None]
@@ -199,6 +222,7 @@ def test_only_rules_of_the_evidence_are_asked() -> None:
     assert SearchEvidence.stages == (stages.SEARCH,)
     assert RegistrationEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.SCENE)
     assert RefinementEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.REFINEMENT)
+    assert PoseEvidence.stages == (stages.POSE,)
 
 
 def test_a_failure_that_is_no_refusal_decides_nothing() -> None:

@@ -21,6 +21,7 @@ from groundtie.studies.climbing import (
     search_by_climbing,
     spread_px,
 )
+from groundtie.studies.measures import mutual_information
 from groundtie.studies.objective import BinnedPair, bin_pair
 
 COUNTS = (4, 5)
