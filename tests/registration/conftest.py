@@ -5,21 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from textured_pairs import TexturedPair, shift_on_map, write_textured_pair
+from textured_pairs import TexturedPair
 from tools.conftest import simulated, textured
 
 from groundtie.registration.delivery import Call, RegistrationFiles
 from groundtie.registration.registration import Registration
 from groundtie.registration.specification import Specification
 
-__all__ = ["other_place", "registration", "simulated", "textured"]
-
-
-@pytest.fixture(scope="session")
-def other_place(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
-    """Return a pair of two places."""
-    folder = tmp_path_factory.mktemp("other_place")
-    return write_textured_pair(folder, (240, 220), shift_on_map(0, 0), input_seed=99)
+__all__ = ["registration", "simulated", "textured"]
 
 
 @pytest.fixture(scope="session")

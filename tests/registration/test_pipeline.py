@@ -12,20 +12,19 @@ import numpy as np
 import pytest
 from contexts import context
 from facts_of_pairs import TOWN, opened, speckled
-from raster_files import write_raster
-from rpc_scenes import Scene, ground_texture, make_scene
+from rpc_scenes import Scene, make_scene
 from textured_pairs import TexturedPair, error_px
 
 import groundtie
 from groundtie.context import Context
-from groundtie.errors import NotRegisteredError
+from groundtie.errors import NothingFoundError, NotRegisteredError
+from groundtie.geometry.models import Model
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.guided_fit import GuidedFit
 from groundtie.matching.keypoint_fit import KeypointFit
 from groundtie.matching.pooled import PooledHistogramMatcher
 from groundtie.matching.surface_fit import SurfaceFit
-from groundtie.rasters.reading import open_raster
-from groundtie.registration import masks, verdict
+from groundtie.registration import masks, pipeline, verdict
 from groundtie.registration import scene as scene_module
 from groundtie.registration.evidence import AGREEMENT, ERROR, REFINEMENT, SCENE, SEARCH
 from groundtie.registration.masks import Masked
@@ -64,10 +63,15 @@ def test_a_registration_has_a_transform_points_and_a_verdict(
     np.testing.assert_array_equal(held_out, points.is_check)
 
 
+def nothing_found(*_: object) -> Model:
+    raise NothingFoundError("nothing in common was found")
+
+
 def test_where_nothing_is_found_the_registration_has_a_verdict_alone(
-    other_place: TexturedPair, context: Context
+    textured: TexturedPair, context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with open_pair(other_place.reference, other_place.input, COREGISTER, context) as pair:
+    monkeypatch.setattr(pipeline, "find_coarse_model", nothing_found)
+    with open_pair(textured.reference, textured.input, COREGISTER, context) as pair:
         found = run(pair, COREGISTER, context)
     assert not found.verdict.accepted and found.verdict.rule == "nothing in common"
     assert found.transform is None and found.tie_points is None
@@ -189,17 +193,17 @@ def house_rule(stage: str) -> Rule:
 @pytest.mark.parametrize("stage", [SEARCH, AGREEMENT, ERROR, SCENE])
 def test_every_tool_is_judged_by_the_rules_of_every_stage(
     textured: TexturedPair,
-    other_place: TexturedPair,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     tool: str,
     stage: str,
 ) -> None:
     monkeypatch.setattr(verdict, "RULES", (house_rule(stage),))
-    files = other_place if stage == SEARCH else textured
+    if stage == SEARCH:
+        monkeypatch.setattr(pipeline, "find_coarse_model", nothing_found)
     output = tmp_path / "out.tif"
     with pytest.raises(NotRegisteredError, match="forbidden; go") as error:
-        getattr(groundtie, tool)(files.reference, files.input, output)
+        getattr(groundtie, tool)(textured.reference, textured.input, output)
     assert error.value.verdict is not None
     assert error.value.verdict.rule == f"house rule at {stage}"
     assert not output.exists()
@@ -208,13 +212,6 @@ def test_every_tool_is_judged_by_the_rules_of_every_stage(
 @pytest.fixture(scope="module")
 def sensor(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return make_scene(tmp_path_factory.mktemp("sensor"), None)
-
-
-def elsewhere(sensor: Scene, folder: Path) -> Path:
-    with open_raster(sensor.reference) as source:
-        grid = source.grid
-    other = ground_texture(grid.width, seed=77).astype(np.uint8)
-    return write_raster(folder / "other.tif", other, grid)
 
 
 @pytest.mark.parametrize(
@@ -228,12 +225,13 @@ def test_ground_control_is_judged_by_the_rules_of_every_stage(
     sensor: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tool: str, stage: str
 ) -> None:
     monkeypatch.setattr(verdict, "RULES", (house_rule(stage),))
-    reference = elsewhere(sensor, tmp_path) if stage == SEARCH else sensor.reference
+    if stage == SEARCH:
+        monkeypatch.setattr(pipeline, "find_coarse_model", nothing_found)
     output = tmp_path / ("gcps.csv" if tool == "extract_gcps" else "refined.txt")
     with pytest.raises(NotRegisteredError, match="forbidden; go") as error:
         getattr(groundtie, tool)(
             image=sensor.image,
-            reference=reference,
+            reference=sensor.reference,
             dem=sensor.dem,
             dem_datum="ellipsoidal",
             output=output,
