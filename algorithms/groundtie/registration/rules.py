@@ -112,7 +112,10 @@ def _ambiguous(evidence: SearchEvidence) -> str | None:
 
 def _nothing_found(evidence: SearchEvidence) -> str | None:
     failure = evidence.failure
-    return str(failure) if isinstance(failure, NothingFoundError) else None
+    is_none = isinstance(failure, NothingFoundError) and not isinstance(
+        failure, AmbiguousPlaceError
+    )
+    return str(failure) if is_none else None
 
 
 def _too_few_points(evidence: SearchEvidence) -> str | None:
@@ -139,6 +142,8 @@ def _another_transform(evidence: RegistrationEvidence | RefinementEvidence) -> s
     if isinstance(evidence, RefinementEvidence):
         return None
     residuals = evidence.residuals_px
+    if len(residuals) < _RIVAL_POINTS:
+        return None
     own = int((np.hypot(*residuals.T) <= _RIVAL_TOLERANCE_PX).sum())
     px = evidence.grid.map_to_pixel(evidence.counted.reference_xy)
     rival = find_consensus(px, px + residuals, _RIVAL_TOLERANCE_PX)
