@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundtie.matching.local import LocalSearch
+from groundtie.matching.rough import RoughSearch
 from raster_files import write_raster
 from textured_pairs import TexturedPair, shift_on_map, write_textured_pair
 
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.matching.layout import lay_out_chips
-from groundtie.matching.local import LocalSearch
 from groundtie.matching.pyramid import find_coarse_model
-from groundtie.matching.rough import RoughSearch
 from groundtie.progress import SILENT
 from groundtie.rasters.pair import ImagePair
 from groundtie.similarity.surface import SimilaritySettings

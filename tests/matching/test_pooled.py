@@ -8,16 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundtie.matching.local import LocalSearch
+from groundtie.matching.rough import RoughSearch
 from raster_files import utm_grid, write_raster
 from textured_pairs import everywhere, rms, shift_on_map, write_textured_pair
 
 from groundtie.errors import NothingFoundError, TooFewPointsError
 from groundtie.geometry.models import Frame, Model, PolynomialModel
 from groundtie.matching.layout import lay_out_chips
-from groundtie.matching.local import LocalSearch
 from groundtie.matching.pooled import tile_centres
 from groundtie.matching.pyramid import find_coarse_model
-from groundtie.matching.rough import RoughSearch
 from groundtie.progress import SILENT
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import ImagePair

@@ -7,6 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundtie.matching.coarse import refine_on_level
+from groundtie.matching.local import LocalSearch
+from groundtie.matching.rough import (
+    Candidate,
+    RoughSearch,
+    level_factor,
+    rough_candidates,
+    shift_model,
+)
 from raster_files import utm_grid, write_raster
 from textured_pairs import (
     TexturedPair,
@@ -18,17 +27,8 @@ from textured_pairs import (
 
 from groundtie.errors import CancelledError, RasterContentError
 from groundtie.geometry.models import Frame, Model, PolynomialModel
-from groundtie.matching.coarse import refine_on_level
 from groundtie.matching.layout import lay_out_chips
-from groundtie.matching.local import LocalSearch
 from groundtie.matching.pyramid import find_coarse_model
-from groundtie.matching.rough import (
-    Candidate,
-    RoughSearch,
-    level_factor,
-    rough_candidates,
-    shift_model,
-)
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.progress import SILENT, Progress
 from groundtie.rasters.grid import Grid

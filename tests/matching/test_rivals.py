@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundtie.matching.local import LocalSearch
+from groundtie.matching.rough import RoughSearch
 from raster_files import utm_grid, write_raster
 from textured_pairs import texture
 
 from groundtie.errors import NothingFoundError
 from groundtie.matching.layout import lay_out_chips
-from groundtie.matching.local import LocalSearch
 from groundtie.matching.pyramid import find_coarse_model
-from groundtie.matching.rough import RoughSearch
 from groundtie.progress import SILENT
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster

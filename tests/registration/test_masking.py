@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundtie.registration.masking import MaskRequest
 from raster_files import utm_grid, write_raster
 
 from groundtie.progress import SILENT
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.masking import MaskRequest
 
 SIZE = 400
 NO_RADAR = "there is no radar image beside a camera's"

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundtie.matching.local import LocalSearch
+from groundtie.matching.rough import RoughSearch
 from textured_pairs import TexturedPair, error_px, listing
 
 from groundtie.errors import NotRegisteredError, OutputError, SameFileError
 from groundtie.geometry.transform import load_transform
 from groundtie.matching.layout import lay_out_chips
-from groundtie.matching.local import LocalSearch
-from groundtie.matching.rough import RoughSearch
 from groundtie.progress import SILENT
 from groundtie.rasters.pair import ImagePair
 from groundtie.registration.registration import (

@@ -15,6 +15,7 @@ from ..errors import NotRegisteredError, SameFileError
 from ..geometry.tie_point_files import write_tie_points
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, writing
+from ..rasters.reading import bounded_cache
 from .pipeline import OpenPair, open_pair, run
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import Registration
@@ -131,6 +132,7 @@ class Call:
             The registration was refused.
         """
         with threads(self.workers, self.progress) as context, ExitStack() as stack:
+            context.update(0.0, "opening the images")
             pair = open_pair(
                 self.reference, self.input, spec, context.part(0.0, 0.02), self.bands, self.masks
             )
@@ -153,7 +155,9 @@ class Call:
             It was refused; its report is written.
         """
         with stack:
-            self.files.write(registration, context)
+            # Not for as long as the rasters: environments must be left in the order of entering.
+            with bounded_cache():
+                self.files.write(registration, context)
             require_accepted(registration)
             rasters = stack.pop_all()
         kept = replace(registration, files=self.files.named(), rasters=rasters)
