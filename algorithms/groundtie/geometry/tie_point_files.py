@@ -18,11 +18,8 @@ from rasterio.errors import CRSError
 from ..errors import OutputError, TransformFileError
 from ..rasters.atomic import writing
 from ..rasters.grid import Grid, reproject
-<<<<<<< HEAD
-from .tie_point_frames import NUMBERS, TEXTS, tie_point_columns
-=======
 from .georeferencer import Row, positions, read_georeferencer, unmeasured, write_georeferencer
->>>>>>> core
+from .tie_point_frames import NUMBERS, TEXTS, tie_point_columns
 from .tie_points import USED, TiePoints
 from .transform import Transform
 
@@ -30,16 +27,7 @@ FloatArray = NDArray[np.float64]
 
 _SUFFIXES = (".gpkg", ".geojson", ".csv", ".points")
 _LAYER = "tie_points"
-<<<<<<< HEAD
 _TEXTS = (*TEXTS, "reference_crs")
-=======
-_NUMBERS = (
-    "reference_x", "reference_y", "nominal_x", "nominal_y", "input_col", "input_row",
-    "residual_px", "dx_px", "dy_px", "score", "forward_backward_error_px",
-    "sigma_x_px", "sigma_y_px",
-)  # fmt: skip
-_TEXTS = ("role", "state", "reference_crs")
->>>>>>> core
 
 # Longitude and latitude, as GeoJSON demands (RFC 7946).
 _GEOJSON_CRS = CRS.from_epsg(4326)
@@ -73,7 +61,7 @@ def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform:
         if suffix == ".points":
             write_georeferencer(path, points, transform)
             return
-        rows, numbers = _rows(points, transform), (*_NUMBERS, *points.more)
+        rows, numbers = _rows(points, transform), (*NUMBERS, *points.more)
         if suffix == ".gpkg":
             _write_gpkg(path, rows, numbers, transform.crs)
         elif suffix == ".geojson":
@@ -129,14 +117,6 @@ def read_tie_points(
         raise TransformFileError(f"cannot read the tie points {path}: {reason}") from error
 
 
-<<<<<<< HEAD
-def _rows(points: TiePoints, transform: Transform, more: Mapping[str, FloatArray]) -> list[Row]:
-    columns = {**tie_point_columns(points, transform), **more}
-    texts = {"reference_crs": "" if transform.crs is None else transform.crs.to_string()}
-    return [
-        dict(zip(columns, values, strict=True)) | texts
-        for values in zip(*(column.tolist() for column in columns.values()), strict=True)
-=======
 def _suffix(path: Path, verb: str, error: type[OutputError | TransformFileError]) -> str:
     suffix = path.suffix.lower()
     if suffix not in _SUFFIXES:
@@ -145,29 +125,11 @@ def _suffix(path: Path, verb: str, error: type[OutputError | TransformFileError]
 
 
 def _rows(points: TiePoints, transform: Transform) -> list[Row]:
-    residual = points.residual_px(transform)
-    numbers = [
-        points.reference_xy,
-        transform.nominal_xy(points.input_px),
-        points.input_px,
-        np.hypot(*residual.T),
-        residual,
-        points.score,
-        points.forward_backward_error_px,
-        np.sqrt(points.covariance_px2[:, [0, 1], [0, 1]]),
-        *points.more.values(),
-    ]
-    names = (*_NUMBERS, *points.more, "role", "state")
-    crs = "" if transform.crs is None else transform.crs.to_string()
+    columns = {**tie_point_columns(points, transform), **points.more}
+    texts = {"reference_crs": "" if transform.crs is None else transform.crs.to_string()}
     return [
-        dict(zip(names, (*values, role, state), strict=True)) | {"reference_crs": crs}
-        for values, role, state in zip(
-            np.column_stack(numbers).tolist(),
-            points.role.tolist(),
-            points.state.tolist(),
-            strict=True,
-        )
->>>>>>> core
+        dict(zip(columns, values, strict=True)) | texts
+        for values in zip(*(column.tolist() for column in columns.values()), strict=True)
     ]
 
 
@@ -188,22 +150,8 @@ def _features(rows: list[Row], crs: CRS | None, target: CRS | None) -> list[dict
 def _write_gpkg(path: Path, rows: list[Row], numbers: Sequence[str], crs: CRS | None) -> None:
     from .geopackage import write_layer  # heavy
 
-<<<<<<< HEAD
-    rows = _rows(points, transform, more)
-    properties = dict.fromkeys((*NUMBERS, *more), "float") | dict.fromkeys(_TEXTS, "str")
-    records = (
-        {
-            "type": "Feature",
-            "geometry": _line(row, transform.crs, transform.crs),
-            "properties": {name: _or_null(value) for name, value in row.items()},
-        }
-        for row in rows
-    )
-    write_layer(path, _LAYER, records, len(rows), properties, transform.crs)
-=======
     properties = dict.fromkeys(numbers, "float") | dict.fromkeys(_TEXTS, "str")
     write_layer(path, _LAYER, _features(rows, crs, crs), properties, crs)
->>>>>>> core
 
 
 def _write_geojson(path: Path, rows: list[Row], crs: CRS | None) -> None:
@@ -214,11 +162,7 @@ def _write_geojson(path: Path, rows: list[Row], crs: CRS | None) -> None:
 
 def _write_csv(path: Path, rows: list[Row], numbers: Sequence[str]) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
-<<<<<<< HEAD
-        table = csv.DictWriter(file, (*NUMBERS, *more, *_TEXTS), lineterminator="\n")
-=======
         table = csv.DictWriter(file, (*numbers, *_TEXTS), lineterminator="\n")
->>>>>>> core
         table.writeheader()
         table.writerows(rows)
 
