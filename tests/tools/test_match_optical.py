@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from brightness_classifiers import bright_is_left_out
+from groundtie.registration.masking import MaskRequest
 from raster_files import write_raster
 from textured_pairs import (
     TexturedPair,
@@ -20,12 +21,11 @@ from textured_pairs import (
 from groundtie import match_optical
 from groundtie.errors import NotRegisteredError, ParameterError
 from groundtie.features.classifier_training import Training, train_classifier
-from groundtie.features.optical import DESCRIPTORS, DETECTORS
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
-from groundtie.registration.masking import MaskRequest
 from groundtie.registration.verdict import Verdict
+from groundtie.studies.optical_variants import DESCRIPTORS, DETECTORS
 
 SIZE = (300, 280)
 

@@ -147,7 +147,7 @@ class PointErrors:
         area = max(_WINDOW_AREA_PX2, float(np.ptp(errors, axis=0).prod()))
         sigmas = sigma_range_px(USUAL_MAX_ERROR_PX if max_error_px is None else max_error_px)
         counted = np.zeros(len(self), bool)
-        counted[which] = fit_mixture(errors, area, sigmas).right
+        counted[which] = fit_mixture(errors, area, sigmas).inliers
         return replace(self, counted=counted)
 
     def summary(self) -> dict[str, Any]:

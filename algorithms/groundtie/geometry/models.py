@@ -177,7 +177,7 @@ class PolynomialModel(Model):
 
 @dataclass(frozen=True)
 class ThinPlateSpline(Model):
-    """Thin-plate spline: an affine part and bending weights at control points (Bookstein 1989).
+    """Thin-plate spline: an affine part and bending weights at control points ([Bookstein1989]).
 
     Parameters
     ----------

@@ -14,8 +14,8 @@ from .transform import Transform
 NUMBERS = (
     "reference_x",
     "reference_y",
-    "claimed_x",
-    "claimed_y",
+    "nominal_x",
+    "nominal_y",
     "input_col",
     "input_row",
     "residual_px",

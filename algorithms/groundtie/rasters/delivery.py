@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 import os
-<<<<<<< HEAD
-from collections.abc import Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
-=======
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
->>>>>>> core
 from dataclasses import dataclass
 from typing import Any
 
@@ -272,32 +267,3 @@ def _is_covered(warp: _Warp) -> bool:
         lies_within(lattice(warp.target.window(*tile), warp.to_input_px), grid.width, grid.height)
         for tile in tiles(warp.target)
     )
-<<<<<<< HEAD
-=======
-
-
-def _band_groups(source: RasterSource) -> list[tuple[int, ...]]:
-    most = max(_TILE_BYTES // (_TILE * _TILE * source.dtype.itemsize), 1)
-    numbers = range(1, source.count + 1)
-    return [tuple(numbers[i : i + most]) for i in range(0, source.count, most)]
-
-
-def in_order(
-    pool: Executor,
-    work: Callable[[Item], Result],
-    items: Iterable[Item],
-    ahead: int,
-) -> Iterator[Result]:
-    """Work on some items at a time, `ahead` at most, and yield the results in their order."""
-    waiting: deque[Future[Result]] = deque()
-    try:
-        for item in items:
-            waiting.append(pool.submit(work, item))
-            if len(waiting) >= ahead:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
-    finally:
-        for future in waiting:
-            future.cancel()
->>>>>>> core

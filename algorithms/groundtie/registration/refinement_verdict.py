@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..assessment.accuracy import Statistics
+from ..assessment.statistics import Statistics
 from .refinement_evidence import RefinementEvidence
 from .verdict import Verdict, judge_refinement
 

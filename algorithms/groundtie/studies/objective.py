@@ -19,9 +19,11 @@ from ..pose.pose import Pose
 from ..rasters.patch import Patch
 from ..similarity.binning import MASKED, to_bins
 from ..similarity.correlation import MINIMUM_OVERLAP
-from ..similarity.histogramming import joint_histogram_under
-from ..similarity.measures import MEASURES, Measure
+from ..similarity.joint_histogram import ORDER
+from ..similarity.measures import HistogramMeasure
 from ..similarity.surface import SimilaritySettings
+from .histogramming import joint_histogram_under
+from .measures import HISTOGRAM_MEASURES
 
 Bins = NDArray[np.uint8]
 
@@ -45,7 +47,7 @@ class BinnedPair:
     template: Bins
     image: Bins
     counts: tuple[int, int]
-    measure: Measure
+    measure: HistogramMeasure
     order: int
 
     @cached_property
@@ -116,12 +118,10 @@ def bin_pair(reference: Patch, input: Patch, settings: SimilaritySettings) -> Bi
         The similarity is not measured on joint histograms.
     """
     name = "nmi" if settings.similarity == "fused" else settings.similarity
-    if name not in MEASURES:
+    if name not in HISTOGRAM_MEASURES:
         raise ParameterError(f"{name} is not measured on joint histograms, as this search needs")
     if reference.is_flat or input.is_flat:
         return None
     bins = settings.bins_for(reference.values.size)
-    template, image = (
-        to_bins(patch.values, patch.valid, bins, settings.binning) for patch in (reference, input)
-    )
-    return BinnedPair(template, image, (bins, bins), MEASURES[name], settings.gpve_order)
+    template, image = (to_bins(patch.values, patch.valid, bins) for patch in (reference, input))
+    return BinnedPair(template, image, (bins, bins), HISTOGRAM_MEASURES[name], ORDER)

@@ -22,7 +22,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, writing
 from ..rasters.pair import Image
 from ..rasters.reading import bounded_cache, open_raster
-from ..registration.verdict import refuse
+from ..registration.verdict import Verdict
 from ..report.rotation_picture import draw_rotation
 from ..similarity.surface import SimilaritySettings
 from ..studies.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
@@ -216,7 +216,7 @@ def estimate_rotation(
             return result
     raise NotRegisteredError(
         f"no rotation of {input} against {reference} was found: {verdict.reason}",
-        refuse(verdict.reason),
+        Verdict(False, verdict.reason),
     )
 
 
