@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import groundtie
-from groundtie.features.detectors import Detector
+from groundtie.studies.sift_variants import sift_detector
 from groundtie.geometry.chance import agreement_probability, log10_chance
 from groundtie.matching import belief_propagation
 from groundtie.rasters.patch import Patch
@@ -159,7 +159,7 @@ def propagation(_: Scenes) -> Figure:
     bump = np.exp(-((cols - true[0]) ** 2 + (rows - true[1]) ** 2) / 3)
     surfaces = smooth / smooth.std() + rng.uniform(1.4, 3.2, (side * side, 1, 1)) * bump
     centres = np.array([(50 * c, 50 * r) for r in range(side) for c in range(side)])
-    after = belief_propagation.support(surfaces.astype(np.float32), centres, 75.0)
+    after = belief_propagation.propagate(surfaces.astype(np.float32), centres, 75.0)
     figure, axes = _canvas(8, 4.3, 8, rows=2)
     for column, chip in enumerate((8, 16, 24, 31)):
         for line, stack in enumerate((surfaces, after)):
@@ -177,7 +177,7 @@ def features(scenes: Scenes) -> Figure:
     window = Patch(values.astype(np.float32), np.ones(values.shape, bool))
     figure, axes = _canvas(5.8, 2.5, 2)
     for each, name in zip(axes, ("sift", "sift-oct"), strict=True):
-        found = Detector(name).detect(window)
+        found = sift_detector(name).detect(window)
         first = found.octave < 0
         each.imshow(_stretched(np.log(values + 1.0)), cmap="gray")
         for chosen, colour in ((first, ORANGE), (~first, BLUE)):
