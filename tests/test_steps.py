@@ -123,10 +123,10 @@ class TestFromImagesToVerdict:
     def test_different_places_are_refused(self) -> None:
         reference, input = pair()[0], pair(seed=5)[1]
         points = steps.match_chips(reference, input)
-        with pytest.raises(TooFewPointsError):
-            steps.fit_model("affine", points.reference_xy, points.input_px)
-        nothing = fit_model("translation", points.reference_xy, points.reference_xy)
-        assert not steps.judge(reference, input, nothing, points).accepted
+        fit = steps.fit_model("affine", points.reference_xy, points.input_px)
+        verdict = steps.judge(reference, input, fit.model, points.reject(~fit.inliers, "far"))
+        assert not verdict.accepted
+        assert verdict.rule == "too few points"
 
     def test_rasters_on_the_map(self) -> None:
         grid = utm_grid(SIZE, SIZE)
