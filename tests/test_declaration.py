@@ -16,7 +16,7 @@ from toys import RETURNING_TOY, TOY, returning_toy, toy
 
 from groundtie.declaration import Output, Parameter, tool, tool_of
 from groundtie.errors import OutputError, ParameterError, SameFileError
-from groundtie.kinds import Flag, Number, RasterIn, RasterOut
+from groundtie.kinds import Flag, MaskIn, Number, RasterIn, RasterOut
 from groundtie.progress import SILENT, Progress
 from groundtie.report.page import plain
 
@@ -190,6 +190,10 @@ class TestResultsInMemory:
                 returning_toy(dataset, path)
             with pytest.raises(SameFileError, match="input is the same raster as reference"):
                 toy(path, dataset, tmp_path / "c.tif", 3)
+
+    def test_a_mask_may_be_an_array(self) -> None:
+        held = MaskIn(label="Mask", help="It.").check("mask", np.zeros((4, 6), bool))
+        assert str(held) == "array of 6 × 4"
 
     def test_arrays_of_one_size_are_two_rasters(self, tmp_path: Path) -> None:
         one, other = np.zeros((40, 60)), np.zeros((40, 60))
