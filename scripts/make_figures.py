@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import groundtie
-from groundtie.studies.sift_variants import sift_detector
 from groundtie.geometry.chance import agreement_probability, log10_chance
 from groundtie.matching import belief_propagation
 from groundtie.rasters.patch import Patch
+from groundtie.studies.sift_variants import sift_detector
 
 FIGURES = Path(__file__).resolve().parents[1] / "docs" / "figures"
 

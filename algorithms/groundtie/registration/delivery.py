@@ -71,8 +71,9 @@ class RegistrationFiles:
                     staged.write_text(text, encoding="utf-8")
             if self.output is not None:
                 context.update(0.0, "writing the registered image")
-                pair = registration.pair
-                self.output.write(pair, transform, outputs, context.workers, context.progress)
+                source = registration.pair.input.source
+                reference = registration.pair.reference.source.grid
+                self.output.write(source, reference, transform, outputs, context)
 
 
 @dataclass(frozen=True)

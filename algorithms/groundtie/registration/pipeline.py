@@ -12,8 +12,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-import numpy as np
-
 from ..context import Context
 from ..errors import NothingFoundError, TooFewPointsError
 from ..features.presets import optical_keypoints, sar_keypoints
@@ -271,7 +269,8 @@ class Stages:
             self.masked.pair.grid,
             self.spec.max_error_px,
             CHECK_RADIUS_PX,
-            chance - float(np.log10(self.spec.tries)),
+            chance,
+            self.spec.tries,
             check.common_shift_px if is_apart else 0.0,
             is_apart,
             factor if is_radar else None,

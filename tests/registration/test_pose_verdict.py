@@ -9,9 +9,9 @@ from turned_pairs import patch, turned_pair
 from groundtie.context import Context
 from groundtie.geometry.limits import SearchLimits
 from groundtie.pose.pose import Pose, PoseFound
-from groundtie.pose.rotation_verdict import LEAST_HEIGHT, LEAST_RIVAL_RATIO, judge_pose
 from groundtie.pose.search import find_poses
 from groundtie.rasters.patch import Patch
+from groundtie.registration.pose_verdict import LEAST_HEIGHT, LEAST_RIVAL_RATIO, judge_pose
 from groundtie.similarity.surface import SimilaritySettings
 
 TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
