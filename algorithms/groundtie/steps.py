@@ -26,7 +26,7 @@ from .geometry.tie_points import TiePoints
 from .geometry.transform import Transform
 from .matching.surface_fit import FIT_RADIUS_PX, check_points
 from .rasters.patch import Patch
-from .rasters.reading import open_raster
+from .rasters.reading import bounded_cache, open_raster
 from .registration.evidence import SearchEvidence
 from .registration.pipeline import Stages, mask_pair, open_pair
 from .registration.scene import SceneInfo
@@ -249,7 +249,7 @@ def _stages(
         with threads() as own, _stages(reference, input, spec, own) as found:
             yield found
         return
-    with open_pair(reference, input, spec, context.quiet()) as opened:
+    with bounded_cache(), open_pair(reference, input, spec, context.quiet()) as opened:
         scene = SceneInfo.of(opened.pair, spec.radar)
         masked = mask_pair(opened, spec, scene, context.quiet())
         yield Stages.of(opened.images, masked, spec), scene, context

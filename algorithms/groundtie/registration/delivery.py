@@ -15,6 +15,7 @@ from ..errors import NotRegisteredError, SameFileError
 from ..geometry.tie_point_files import write_tie_points
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, writing
+from ..rasters.reading import bounded_cache
 from .pipeline import OpenPair, open_pair, run
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import Registration
@@ -131,7 +132,9 @@ class Call:
         NotRegisteredError
             The registration was refused.
         """
-        with threads(self.workers, self.progress) as context, ExitStack() as stack:
+        # GDAL's cache is bounded for the call, while the rasters may stay open after it.
+        bounds = bounded_cache()
+        with bounds, threads(self.workers, self.progress) as context, ExitStack() as stack:
             pair = open_pair(
                 self.reference, self.input, spec, context.part(0.0, 0.02), self.bands, self.masks
             )

@@ -30,7 +30,7 @@ from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
 from ..matching.surface_fit import SurfaceFit
 from ..rasters.pair import Image, ImagePair, make_pair
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from ..similarity.surface import SimilaritySettings
 from .evidence import RegistrationEvidence, SearchEvidence
 from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
@@ -100,7 +100,6 @@ def open_pair(
     """
     started = time.perf_counter()
     with ExitStack() as stack:
-        stack.enter_context(bounded_cache())
         opened = [
             Image(stack.enter_context(open_raster(raster)), band)
             for raster, band in zip((reference, input), bands, strict=True)
