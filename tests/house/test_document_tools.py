@@ -22,6 +22,7 @@ from groundtie.kinds import (
     Flag,
     FolderOut,
     Kind,
+    MaskIn,
     Number,
     RasterIn,
     RasterOut,
@@ -29,7 +30,7 @@ from groundtie.kinds import (
     VectorIn,
     VectorOut,
 )
-from groundtie.registration.verdict import refuse
+from groundtie.registration.verdict import Verdict
 from groundtie.tools import load_tools
 from scripts import document_tools
 
@@ -102,6 +103,7 @@ def test_advanced_parameters_stand_in_a_table_of_their_own() -> None:
         (FolderOut(**WORDS), "folder"),
         (RasterIn(**WORDS), "raster"),
         (VectorIn(**WORDS), "vector layer"),
+        (MaskIn(**WORDS), "raster, vector layer or classifier"),
         (Band(**WORDS, of="input"), "band number, from 1"),
         (Flag(**WORDS), "yes or no"),
         (Text(**WORDS), "text"),
@@ -218,4 +220,4 @@ def test_the_page_on_python_names_every_error_and_its_builtin() -> None:
 def test_the_page_on_reports_names_every_number_of_the_verdict() -> None:
     page = (DOCS / "report.md").read_text(encoding="utf-8")
     _, _, keys = page.partition("## The JSON")
-    assert {key for key in refuse("no reason").summary() if f"`{key}`" not in keys} == set()
+    assert {key for key in Verdict(False, "no reason").summary() if f"`{key}`" not in keys} == set()

@@ -149,7 +149,9 @@ def pair_images(
     return OpenPair(images, pair, used, stack, started)
 
 
-def run(opened: OpenPair, spec: Specification, context: Context) -> Registration:
+def run(
+    opened: OpenPair, spec: Specification, context: Context, scene: SceneInfo | None = None
+) -> Registration:
     """Register the input of an open pair to its reference, and judge the result.
 
     Parameters
@@ -160,8 +162,10 @@ def run(opened: OpenPair, spec: Specification, context: Context) -> Registration
         How.
     context
         Threads, progress and seed.
+    scene
+        What the images are, if that was found before.
     """
-    scene = SceneInfo.of(opened.pair, spec.radar)
+    scene = scene or SceneInfo.of(opened.pair, spec.radar)
     context.update(0.02, "inspecting the images")
     masked = mask_pair(opened, spec, scene, context.part(0.02, 0.12))
     return register(opened, masked, scene, spec, context.part(0.12, 1.0))

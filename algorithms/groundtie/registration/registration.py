@@ -93,11 +93,10 @@ class Registration:
             return None
         return TiePoints.concatenate([self.estimate.points, self.check.points])
 
-    def accepted(self) -> tuple[TiePoints, Transform]:
-        """Return points and transform of a registration that was accepted, so that has both."""
-        points, transform = self.tie_points, self.transform
-        assert self.verdict.accepted and points is not None and transform is not None
-        return points, transform
+    def accepted(self) -> Transform:
+        """Return the transform of a registration that was accepted, so that has one."""
+        assert self.verdict.accepted and self.transform is not None
+        return self.transform
 
     def warp(
         self,
@@ -128,7 +127,7 @@ class Registration:
         GeoreferencingError, NoOverlapError
             The raster lies elsewhere than the input.
         """
-        _, transform = self.accepted()
+        transform = self.accepted()
         reference = self.pair.reference.source.grid
         with threads(workers) as context, ExitStack() as stack:
             source = self.pair.input.source

@@ -7,19 +7,11 @@ from typing import Annotated
 
 from ..declaration import Output
 from ..geometry.models import KINDS
-from ..kinds import Choice, Distance, FileOut, MaskIn, Number, RasterOut, VectorOut
+from ..kinds import Choice, Distance, FileOut, MaskIn, Number, VectorOut
 from ..masks.choice import MASKS
 from ..matching.surface_fit import AUTO
 from ..registration.registered_output import OUTPUT_GRIDS
 
-RegisteredOut = Annotated[
-    Path | None,
-    RasterOut(
-        label="Registered image",
-        help="GeoTIFF with the input's bands, data type, nodata value, colours and metadata.",
-        optional_in_python=True,
-    ),
-]
 Model = Annotated[
     str,
     Choice(
