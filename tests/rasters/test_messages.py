@@ -61,12 +61,15 @@ def test_nothing_is_shown_of_a_file_that_is_damaged(
     content[len(content) // 2 : len(content) // 2 + 2000] = bytes(2000)
     template.write_bytes(content)
     window = Window(0, 0, SIDE, SIDE)
-    with open_raster(template) as source, caplog.at_level(logging.DEBUG, "rasterio"):
-        with pytest.raises(RasterOpenError):
-            if workers is None:
-                source.read(window)
-            else:
-                with threads(workers) as context:
-                    list(context.map(source.read, [window] * 2))
+    with (
+        open_raster(template) as source,
+        caplog.at_level(logging.DEBUG, "rasterio"),
+        pytest.raises(RasterOpenError),
+    ):
+        if workers is None:
+            source.read(window)
+        else:
+            with threads(workers) as context:
+                list(context.map(source.read, [window] * 2))
     assert capfd.readouterr() == ("", "")
     assert any("ZIPDecode" in record.getMessage() for record in caplog.records)
