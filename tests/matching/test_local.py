@@ -31,6 +31,7 @@ def error_px(model: Model, files: TexturedPair) -> float:
     return rms(model(xy) - files.truth.model(xy)) / 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [AUTO, *KINDS])
 def test_every_model_is_fitted_from_a_coarse_one(
     textured: TexturedPair, pair: ImagePair, executor: Executor, kind: str
@@ -48,6 +49,7 @@ def test_every_model_is_fitted_from_a_coarse_one(
     assert estimate.spread_px(at)[0] < 1
 
 
+@pytest.mark.slow
 def test_tie_points_are_places_in_both_images(
     textured: TexturedPair, pair: ImagePair, executor: Executor
 ) -> None:
@@ -94,6 +96,7 @@ def test_check_surfaces_are_those_of_the_check_points(pair: ImagePair, executor:
     np.testing.assert_allclose(surfaces.max(axis=(1, 2)), check.score[:2], rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_strict_two_way_limit_rejects_points(pair: ImagePair, executor: Executor) -> None:
     strict = search_of(pair, two_way_px=0.05).estimate(COARSE, "translation", 0, executor)
     rejected = strict.points.take(~strict.points.used)
@@ -102,6 +105,7 @@ def test_a_strict_two_way_limit_rejects_points(pair: ImagePair, executor: Execut
     assert (strict.points.take(strict.points.used).two_way_error_px <= 0.05).all()
 
 
+@pytest.mark.slow
 def test_a_model_that_no_point_agrees_with_is_none(pair: ImagePair, executor: Executor) -> None:
     """No match back meets its start to the last digit."""
     with pytest.raises(TooFewPointsError, match="points agree"):
@@ -121,6 +125,7 @@ def test_too_few_chips_with_content(
         assert len(search_of(pair).check_points(COARSE, executor)) <= 4
 
 
+@pytest.mark.slow
 def test_the_model_reaches_the_input_through_its_own_georeferencing(
     tmp_path: Path, executor: Executor
 ) -> None:
@@ -134,6 +139,7 @@ def test_the_model_reaches_the_input_through_its_own_georeferencing(
     assert rms(right.residual_px(estimate.transform)) < 0.5
 
 
+@pytest.mark.slow
 def test_the_seed_decides(pair: ImagePair, executor: Executor) -> None:
     found = [search_of(pair).estimate(COARSE, "affine", 5, executor) for _ in range(2)]
     assert found[0].transform.to_json() == found[1].transform.to_json()

@@ -59,6 +59,7 @@ def search_of(pair: ImagePair) -> LocalSearch:
     return LocalSearch(pair, lay_out_chips(pair), SimilaritySettings()).of_ground(pair)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("input", [False, True], ids=["reference", "input"])
 def test_lines_alone_are_registered(tmp_path: Path, executor: Executor, input: bool) -> None:
     with masked(tmp_path, stretched(), lines(SIZE), input) as (pair, truth):
@@ -78,6 +79,7 @@ def test_lines_alone_are_registered(tmp_path: Path, executor: Executor, input: b
         np.testing.assert_allclose(heights, check.score, rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_check_points_that_lie_elsewhere_say_so(tmp_path: Path, executor: Executor) -> None:
     with masked(tmp_path, shift_on_map(60.0, -40.0), lines(SIZE)) as (pair, truth):
         search = search_of(pair)
@@ -86,6 +88,7 @@ def test_check_points_that_lie_elsewhere_say_so(tmp_path: Path, executor: Execut
         assert search.common_shift_px(off, executor) == pytest.approx(5.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_pyramid_leads_down_to_the_ground(tmp_path: Path, executor: Executor) -> None:
     """The rough search is at pixels three times as large, of roads three times as wide."""
     size = (1600, 500)
@@ -100,6 +103,7 @@ def test_a_pyramid_leads_down_to_the_ground(tmp_path: Path, executor: Executor) 
         assert rms(found(xy) - model(xy)) / 10 < 4
 
 
+@pytest.mark.slow
 def test_another_place_is_refused_or_judged_badly(tmp_path: Path, executor: Executor) -> None:
     with masked(tmp_path, shift_on_map(0, 0), lines(SIZE), input_seed=5) as (pair, _):
         search = search_of(pair)

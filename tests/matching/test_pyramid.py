@@ -121,6 +121,7 @@ def test_the_model_of_a_candidate_is_its_shift() -> None:
     np.testing.assert_allclose(model([[500_000.0, 4e6]]), [[500_030, 4e6 - 20]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("degrees", "growth"), [(0.0, 1.0), (2.0, 1.0), (-1.5, 1.02)])
 def test_a_level_corrects_a_model_that_is_off(
     tmp_path: Path, executor: Executor, degrees: float, growth: float
@@ -158,6 +159,7 @@ def test_too_few_chips_tell_nothing(pair: ImagePair, executor: Executor) -> None
     assert found.model is start
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(260, 240), (700, 200)])
 def test_from_the_rough_shift_to_a_model(
     tmp_path: Path, executor: Executor, size: tuple[int, int]
@@ -169,6 +171,7 @@ def test_from_the_rough_shift_to_a_model(
     assert error_m(model, files) < 10
 
 
+@pytest.mark.slow
 def test_a_radius_larger_than_the_scene_is_no_more_work_than_the_scene(
     textured: TexturedPair, pair: ImagePair, executor: Executor
 ) -> None:

@@ -59,6 +59,7 @@ class TestWhatAnExhaustiveSearchFound:
 
 
 class TestWhatAnotherSearchFound:
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("pose", "accepted"),
         [
@@ -78,6 +79,7 @@ class TestWhatAnotherSearchFound:
         assert verdict.accepted == accepted
         assert accepted or "prefers" in verdict.reason
 
+    @pytest.mark.slow
     def test_a_pose_that_the_limits_hid(
         self, windows: tuple[Patch, Patch], executor: Executor
     ) -> None:
@@ -88,6 +90,7 @@ class TestWhatAnotherSearchFound:
         assert "prefers 50" in verdict.reason or "prefers 49" in verdict.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [20, 21, 22])
 def test_two_places_are_refused(seed: int, executor: Executor) -> None:
     windows = turned_pair(TRUTH, seed=seed, input_seed=seed + 100)

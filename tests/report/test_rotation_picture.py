@@ -35,6 +35,7 @@ class TestCheckerboard:
         assert np.abs(board - plain).max() <= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("limits", "pose"),
     [
@@ -51,6 +52,7 @@ def test_a_picture_is_drawn(tmp_path: Path, limits: PoseLimits, pose: Pose | Non
     assert image.std() > 20
 
 
+@pytest.mark.slow
 def test_a_disk_that_cannot_be_written_to(tmp_path: Path) -> None:
     windows = turned_pair(TRUTH)
     with pytest.raises(OutputError):
