@@ -11,9 +11,9 @@ from groundtie.rasters.atomic import Outputs, writing
 
 
 class FakeLibraryError(Exception):
-    """An error of GDAL's, as rasterio raises it."""
+    """One of the classes that rasterio keeps to itself."""
 
-    __module__ = "rasterio._err"
+    __module__ = "rasterio._private"
 
 
 def test_outputs_appear_together_under_their_names(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
 from ..matching.surface_fit import SurfaceFit
 from ..rasters.pair import Image, ImagePair, make_pair
-from ..rasters.reading import open_raster
+from ..rasters.reading import bounded_cache, open_raster
 from ..similarity.surface import SimilaritySettings
 from .evidence import RegistrationEvidence, SearchEvidence
 from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
