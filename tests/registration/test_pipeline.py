@@ -13,7 +13,8 @@ import pytest
 from contexts import context
 from facts_of_pairs import TOWN, opened, speckled
 from rpc_scenes import Scene, make_scene
-from textured_pairs import TexturedPair, error_px
+from speckled_pairs import write_speckled_pair
+from textured_pairs import TexturedPair, error_px, shift_on_map
 
 import groundtie
 from groundtie.context import Context
@@ -150,7 +151,8 @@ def test_ground_is_found_once_whatever_takes_part_in_the_fit(
         stages = Stages.of(pair.images, masked, spec)
         is_apart = stages.checker is not stages.matcher
         assert is_apart == (mask != "regions")
-        assert isinstance(stages.checker, PooledHistogramMatcher)
+        is_pooled = is_apart or masked.used.leaves_little
+        assert isinstance(stages.checker, PooledHistogramMatcher) == is_pooled
 
 
 def test_matchers_are_put_together_by_name(textured: TexturedPair, context: Context) -> None:
@@ -185,6 +187,13 @@ def test_tries_count_against_agreement_by_chance(
         assert evidence.scene is scene
 
 
+@pytest.fixture(scope="module")
+def radars(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
+    """Return two radar images of one place."""
+    folder = tmp_path_factory.mktemp("radars")
+    return write_speckled_pair(folder, (300, 280), shift_on_map(60.0, -45.0))
+
+
 def house_rule(stage: str) -> Rule:
     return Rule(f"house rule at {stage}", stage, "all", "this test", "go", lambda _: "forbidden")
 
@@ -193,6 +202,7 @@ def house_rule(stage: str) -> Rule:
 @pytest.mark.parametrize("stage", [SEARCH, AGREEMENT, ERROR, SCENE])
 def test_every_tool_is_judged_by_the_rules_of_every_stage(
     textured: TexturedPair,
+    radars: TexturedPair,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     tool: str,
@@ -201,9 +211,10 @@ def test_every_tool_is_judged_by_the_rules_of_every_stage(
     monkeypatch.setattr(verdict, "RULES", (house_rule(stage),))
     if stage == SEARCH:
         monkeypatch.setattr(pipeline, "find_coarse_model", nothing_found)
+    files = radars if tool == "match_sar_sar" else textured
     output = tmp_path / "out.tif"
     with pytest.raises(NotRegisteredError, match="forbidden; go") as error:
-        getattr(groundtie, tool)(textured.reference, textured.input, output)
+        getattr(groundtie, tool)(files.reference, files.input, output)
     assert error.value.verdict is not None
     assert error.value.verdict.rule == f"house rule at {stage}"
     assert not output.exists()
