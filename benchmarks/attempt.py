@@ -15,8 +15,10 @@ import groundtie
 from groundtie.errors import NotRegisteredError
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.reading import open_raster
+from groundtie.registration.specification import Specification
 
 from .accuracy import CRASHED, REFUSED, FloatArray, Mapping, Truth, classify
+from .pipeline_runs import register_specified
 
 
 @dataclass(frozen=True)
@@ -97,19 +99,21 @@ def attempt(
     workers: int | None = None,
     *,
     tool: str = "coregister",
+    spec: Specification | None = None,
     **parameters: Any,
 ) -> Outcome:
-    """Register a pair by a tool of that name, with its `parameters`; compare with the truth."""
+    """Register a pair by a tool, with its `parameters`, and compare with the truth.
+
+    With a specification, the pair is registered as it asks, whatever the tool.
+    """
     with tempfile.TemporaryDirectory() as folder:
         started = time.perf_counter()
         try:
-            result = getattr(groundtie, tool)(
-                pair.reference,
-                pair.input,
-                Path(folder) / "registered.tif",
-                workers=workers,
-                **parameters,
-            )
+            files = pair.reference, pair.input, Path(folder) / "registered.tif"
+            if spec is not None:
+                result = register_specified(spec, *files, workers=workers)
+            else:
+                result = getattr(groundtie, tool)(*files, workers=workers, **parameters)
         except NotRegisteredError as refusal:
             seconds = time.perf_counter() - started
             reason = str(refusal) if refusal.verdict is None else refusal.verdict.reason

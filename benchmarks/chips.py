@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-import os
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundtie.context import Context, threads
 from groundtie.matching.chips import ChipMatcher
+from groundtie.matching.matcher import Places
 from groundtie.rasters.grid import Grid
 from groundtie.similarity.description import BORDER_PX
 from groundtie.similarity.peak import find_peak
@@ -80,29 +80,25 @@ class ChipCase:
         """Match the chips and compare with the truth."""
         with (
             tempfile.TemporaryDirectory() as folder,
-            ThreadPoolExecutor(workers or os.cpu_count()) as executor,
+            threads(workers) as context,
             open_offset(self.scene.pair(Path(folder)), self.scene.offset_px(OFFSETS_PX)) as pair,
         ):
             records = [
-                self.share(pair, similarity, chip_px, executor)
+                self.share(pair, similarity, chip_px, context)
                 for chip_px in CHIPS_PX
                 for similarity in SIMILARITIES
             ]
         return ChipShares(tuple(records))
 
-    def share(
-        self, pair: OffsetPair, similarity: str, chip_px: int, executor: ThreadPoolExecutor
-    ) -> ChipShare:
+    def share(self, pair: OffsetPair, similarity: str, chip_px: int, context: Context) -> ChipShare:
         """Return how many chips of a size one similarity matched."""
         grid = pair.images.grid
-        matcher = ChipMatcher(
-            pair.images, grid, pair.to_input_px, SimilaritySettings(similarity=similarity)
-        )
+        matcher = ChipMatcher(pair.images, SimilaritySettings(similarity))
         # Larger chips take longer, and overlap more.
         most = self.most_chips * CHIPS_PX[0] // chip_px
-        centres = chip_centres(grid, chip_px, most)
+        places = Places(grid, chip_centres(grid, chip_px, most), chip_px)
         started = time.perf_counter()
-        _, surfaces = matcher.match_forward(centres, chip_px, RADIUS_PX, executor)
+        _, surfaces = matcher.match_forward(pair.nominal(), places, RADIUS_PX, context)
         seconds = time.perf_counter() - started
         count = len(surfaces)
         errors = np.array([math.dist(find_peak(s).shift_px, pair.offset_px) for s in surfaces])

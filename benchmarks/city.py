@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+
+from groundtie.registration.specification import COREGISTER, Specification
 
 from .accuracy import REFUSED, SILENTLY_WRONG
 from .attempt import Outcome, accepted, attempt, count
@@ -23,30 +24,30 @@ _QUICK_SEEDS = 1
 
 @dataclass(frozen=True)
 class Setting:
-    """Parameters of `coregister` and what is wanted of them.
+    """How cities are registered, and what is wanted of it.
 
     Parameters
     ----------
-    parameters
-        Parameters that differ from their defaults.
+    spec
+        How: as `coregister` does but for what is compared.
     median_px
         Largest median error on the ground that is wanted; None: reported only.
     share_within
         Smallest share of the seeds within `WITHIN_PX` that is wanted; None: reported only.
     """
 
-    parameters: Mapping[str, Any] = field(default_factory=dict)
+    spec: Specification = COREGISTER
     median_px: float | None = None
     share_within: float | None = None
 
 
 SETTINGS: dict[str, Setting] = {
-    "NMI, no mask": Setting({"similarity": "nmi", "mask": "none"}),
-    "orientation, no mask": Setting({"similarity": "orientation", "mask": "none"}),
-    "fused, no mask": Setting({"mask": "none"}),
-    "fused, threshold": Setting({"mask": "threshold"}, median_px=1.5),
-    "fused, regions": Setting({"mask": "regions"}, median_px=1.0, share_within=0.8),
-    "fused, auto": Setting({"mask": "auto"}, median_px=1.0, share_within=0.8),
+    "NMI, no mask": Setting(replace(COREGISTER, similarity="nmi", mask="none")),
+    "orientation, no mask": Setting(replace(COREGISTER, similarity="orientation", mask="none")),
+    "fused, no mask": Setting(replace(COREGISTER, mask="none")),
+    "fused, threshold": Setting(replace(COREGISTER, mask="threshold"), median_px=1.5),
+    "fused, regions": Setting(replace(COREGISTER, mask="regions"), median_px=1.0, share_within=0.8),
+    "fused, auto": Setting(median_px=1.0, share_within=0.8),
 }
 
 
@@ -61,8 +62,8 @@ class CityCase:
     def run(self, workers: int | None) -> Outcome:
         """Make the pair if need be, register it and judge the result."""
         pair = city(self.seed).pair(self.cache)
-        parameters = SETTINGS[self.setting].parameters
-        return attempt(f"city, seed {self.seed}", self.setting, pair, workers, **parameters)
+        spec = SETTINGS[self.setting].spec
+        return attempt(f"city, seed {self.seed}", self.setting, pair, workers, spec=spec)
 
 
 def city(seed: int) -> Simulation:

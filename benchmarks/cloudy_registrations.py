@@ -51,7 +51,7 @@ class CloudyRegistration:
             pair = write_case(case, shift, Path(folder))
             parameters: dict[str, Any] = {}
             if self.classified:
-                parameters["input_classifier"] = _classifier(pair, case, Path(folder))
+                parameters["input_mask"] = _classifier(pair, case, Path(folder))
             clear = read_image(pair.input)
             _overwrite(pair.input, _clouds(clear, case, 0).over(clear.astype(np.float32)))
             return attempt(

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from groundtie.context import Context, threads
 from groundtie.matching.belief_propagation import Surfaces, propagate
-from groundtie.matching.chips import ChipMatcher, ToPixel
+from groundtie.matching.chips import ChipMatcher
+from groundtie.matching.matcher import Places, ToPixel
 from groundtie.similarity.peak import find_peak
 from groundtie.similarity.surface import SimilaritySettings
 
@@ -96,25 +96,24 @@ class FusionCase:
         """Match the chips and compare with the truth."""
         with (
             tempfile.TemporaryDirectory() as folder,
-            ThreadPoolExecutor(workers or os.cpu_count()) as executor,
+            threads(workers) as context,
             open_offset(self.scene.pair(Path(folder)), self.scene.offset_px(OFFSETS_PX)) as pair,
         ):
-            records = [self.share(pair, s, False, executor) for s in (FUSED, *SINGLE)]
-            records.append(self.share(pair, FUSED, True, executor))
+            records = [self.share(pair, s, False, context) for s in (FUSED, *SINGLE)]
+            records.append(self.share(pair, FUSED, True, context))
         return FusionShares(tuple(records))
 
     def share(
-        self, pair: OffsetPair, similarity: str, distorted: bool, executor: ThreadPoolExecutor
+        self, pair: OffsetPair, similarity: str, distorted: bool, context: Context
     ) -> FusionShare:
         """Return how many chips one similarity matched."""
         grid = pair.images.grid
-        to_px = _distorting(pair) if distorted else pair.to_input_px
-        matcher = ChipMatcher(pair.images, grid, to_px, SimilaritySettings(similarity))
-        found = matcher.match(
-            chip_centres(grid, CHIP_PX, grid.width * grid.height), CHIP_PX, RADIUS_PX, executor
-        )
+        model = pair.nominal(_distorting(pair) if distorted else None)
+        centres = chip_centres(grid, CHIP_PX, grid.width * grid.height)
+        matcher = ChipMatcher(pair.images, SimilaritySettings(similarity))
+        found = matcher.match(model, Places(grid, centres, CHIP_PX), RADIUS_PX, context)
         shifts = true_shifts(pair, found.centres, distorted)
-        both = found.both
+        both = found.combined
         return FusionShare(
             self.scene.name,
             _SIMULATED if isinstance(self.scene.source, Simulation) else _REAL,

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from groundtie.rasters.grid import reproject
 from groundtie.rasters.pair import Image, ImagePair, ToPixel
 from groundtie.rasters.reading import open_raster
 
@@ -74,6 +75,19 @@ class OffsetPair:
         """From map positions to input pixels."""
         grid = self.images.grid
         return lambda xy: apply_matrix(self.matrix, grid.map_to_pixel(xy) - self.offset_px)
+
+    def nominal(self, to_px: ToPixel | None = None) -> ToPixel:
+        """Return what matchers take for a model: the nominal places of what lies at `to_px`.
+
+        By default, as `to_input_px` has it.
+        """
+        to_input_px = self.to_input_px if to_px is None else to_px
+        reference, input = self.images.grid, self.images.input.source.grid
+
+        def nominal_xy(xy: FloatArray) -> FloatArray:
+            return reproject(input.pixel_to_map(to_input_px(xy)), input.crs, reference.crs)
+
+        return nominal_xy
 
     def offset_of(self, input_px: FloatArray) -> FloatArray:
         """Return where input pixels lie in the resampled input."""

@@ -85,7 +85,7 @@ class SimulatedAttempt:
         pair = self.simulation.pair(self.cache)
         given: dict[str, Any] = {}
         if self.mask == _GROUND:
-            given["ground_mask"] = self.simulation.ground(self.cache)
+            given["reference_mask"] = self.simulation.ground(self.cache)
         elif self.mask == _REGIONS:
             given["mask"] = "regions"
         return attempt(self.simulation.name, self.group, pair, workers, tool=TOOL, **given)

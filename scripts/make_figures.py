@@ -325,7 +325,7 @@ DRAWN: Mapping[str, Callable[[Scenes], Figure]] = {
     "method-search": search,
     "method-belief-propagation": propagation,
     "method-features": features,
-    "method-surf-hog": hog,
+    "method-hog": hog,
     "method-masks": masks,
     "method-rotation": rotation,
     "method-rpc": rpc,

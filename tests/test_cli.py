@@ -77,6 +77,7 @@ def test_json_is_the_summary(capsys: pytest.CaptureFixture[str]) -> None:
         "folder": "out",
         "regions": "r.gpkg",
         "transform": None,
+        "mask": None,
         "seed": 9,
     }
 

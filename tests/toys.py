@@ -21,6 +21,7 @@ from groundtie.kinds import (
     FileOut,
     Flag,
     FolderOut,
+    MaskIn,
     Number,
     RasterIn,
     RasterOut,
@@ -97,6 +98,9 @@ def toy(
     transform: Annotated[
         Path | None,
         FileIn(label="Transform", help="Where to begin.", suffixes=(".json",), advanced=True),
+    ] = None,
+    mask: Annotated[
+        Path | None, MaskIn(label="Mask", help="What takes part.", advanced=True)
     ] = None,
     seed: Annotated[
         int, Number(label="Seed", help="For chance.", integer=True, minimum=0, advanced=True)

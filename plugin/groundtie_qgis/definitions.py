@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from functools import singledispatch
+from pathlib import Path
 from typing import Any
 
 from qgis.core import (
+    QgsProcessingContext,
     QgsProcessingParameterBand,
     QgsProcessingParameterBoolean,
     QgsProcessingParameterDefinition,
@@ -14,6 +16,7 @@ from qgis.core import (
     QgsProcessingParameterFile,
     QgsProcessingParameterFileDestination,
     QgsProcessingParameterFolderDestination,
+    QgsProcessingParameterMapLayer,
     QgsProcessingParameterNumber,
     QgsProcessingParameterRasterDestination,
     QgsProcessingParameterRasterLayer,
@@ -64,6 +67,31 @@ def _raster_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDe
 def _vector_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     return QgsProcessingParameterVectorLayer(
         name, kind.label, types=[compat.ANY_VECTOR], optional=not parameter.required
+    )
+
+
+class LayerOrFile(QgsProcessingParameterMapLayer):
+    """A raster or vector layer, or any file, also one that is no layer."""
+
+    def checkValueIsAcceptable(
+        self, value: Any, context: QgsProcessingContext | None = None
+    ) -> bool:
+        is_file = isinstance(value, str) and Path(value).is_file()
+        return is_file or super().checkValueIsAcceptable(value, context)
+
+    def clone(self) -> LayerOrFile:
+        copy = LayerOrFile(self.name(), self.description(), types=self.dataTypes())
+        copy.fromVariantMap(self.toVariantMap())
+        return copy
+
+
+@_make.register(kinds.MaskIn)
+def _mask_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return LayerOrFile(
+        name,
+        kind.label,
+        optional=not parameter.required,
+        types=[compat.RASTER, compat.ANY_VECTOR],
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from qgis.core import (
@@ -10,6 +11,7 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProviderRegistry,
+    QgsVectorLayer,
 )
 
 from .definitions import qgis_name
@@ -59,6 +61,8 @@ class Reader:
             return self._raster(kind, name, given)
         if isinstance(kind, kinds.VectorIn):
             return self._vector(name, given)
+        if isinstance(kind, kinds.MaskIn):
+            return self._mask(kind, name, given)
         read, context = self._method(kind)
         return read(self._parameters, name, context)
 
@@ -90,6 +94,14 @@ class Reader:
                 f"provider {provider}; export it to a file first"
             )
         return _without_options(layer.source())
+
+    def _mask(self, kind: Any, name: str, given: Any) -> Any:
+        if isinstance(given, str) and Path(given).is_file():
+            return given  # a classifier is no layer, and GDAL may take it for one
+        layer = self._algorithm.parameterAsLayer(self._parameters, name, self._context)
+        if isinstance(layer, QgsVectorLayer):
+            return self._vector(name, given)
+        return self._raster(kind, name, given)
 
     def _vector(self, name: str, given: Any) -> Any:
         path = self._algorithm.parameterAsCompatibleSourceLayerPath(

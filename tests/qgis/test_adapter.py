@@ -114,6 +114,7 @@ class TestRun:
             "FOLDER": str(tmp_path / "more"),
             "REGIONS": str(tmp_path / "r.geojson"),
             "TRANSFORM": str(tmp_path / "t.json"),
+            "MASK": str(tmp_path / "t.json"),
             "SEED": 11,
         }
         seen = called_with(algorithm, {**values, **given}, monkeypatch)
@@ -139,6 +140,33 @@ class TestRun:
         layer = QgsRasterLayer(values["INPUT"], "layer")
         seen = called_with(algorithm, {**values, "INPUT": layer}, monkeypatch)
         assert seen["input"] == Path(values["INPUT"])
+
+    @pytest.mark.parametrize("kind", ["raster", "vector", "memory"])
+    def test_a_mask_may_be_any_layer(
+        self,
+        algorithm: Any,
+        values: dict[str, Any],
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+        kind: str,
+    ) -> None:
+        from qgis.core import QgsProject, QgsRasterLayer, QgsVectorLayer
+
+        files = {"raster": write_raster(tmp_path / "m.tif"), "vector": tmp_path / "m.geojson"}
+        files["vector"].write_text('{"type": "FeatureCollection", "features": []}')
+        layer = {
+            "raster": lambda: QgsRasterLayer(str(files["raster"]), "mask"),
+            "vector": lambda: QgsVectorLayer(str(files["vector"]), "mask"),
+            "memory": lambda: QgsVectorLayer("Polygon?crs=EPSG:32633", "mask", "memory"),
+        }[kind]()
+        QgsProject.instance().addMapLayer(layer)
+        assert check(algorithm, {**values, "MASK": layer.id()}) == (True, "")
+        seen = called_with(algorithm, {**values, "MASK": layer}, monkeypatch)
+        QgsProject.instance().clear()
+        if kind == "memory":
+            assert seen["mask"].suffix == ".gpkg"
+        else:
+            assert seen["mask"] == files[kind]
 
     def test_names_of_gdal_stay_as_they_are(
         self, algorithm: Any, values: dict[str, Any], monkeypatch: pytest.MonkeyPatch

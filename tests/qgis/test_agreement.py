@@ -16,6 +16,7 @@ INTEGER = 0  # of QgsProcessingParameterNumber.Type
 TYPES = {
     "RasterIn": "raster",
     "VectorIn": "vector",
+    "MaskIn": "layer",
     "FileIn": "file",
     "RasterOut": "rasterDestination",
     "VectorOut": "vectorDestination",

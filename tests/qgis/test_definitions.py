@@ -22,6 +22,7 @@ TYPES = {
     "FOLDER": "folderDestination",
     "REGIONS": "vector",
     "TRANSFORM": "file",
+    "MASK": "layer",
     "SEED": "number",
 }
 
@@ -46,12 +47,13 @@ def test_optional_is_what_may_be_absent(definitions: dict[str, Any]) -> None:
         "FOLDER",
         "REGIONS",
         "TRANSFORM",
+        "MASK",
     }
 
 
 def test_advanced_parameters_are_folded_away(definitions: dict[str, Any]) -> None:
     advanced = {n for n, d in definitions.items() if d.flags() & d.FlagAdvanced}
-    assert advanced == {"REGIONS", "TRANSFORM", "SEED"}
+    assert advanced == {"REGIONS", "TRANSFORM", "MASK", "SEED"}
 
 
 def test_defaults(definitions: dict[str, Any]) -> None:
@@ -84,6 +86,26 @@ def test_choices_are_words_not_numbers(definitions: dict[str, Any]) -> None:
 
 def test_a_band_follows_its_raster(definitions: dict[str, Any]) -> None:
     assert definitions["BAND"].parentLayerParameterName() == "INPUT"
+
+
+def test_a_mask_is_a_raster_or_a_vector_layer_or_a_file(
+    definitions: dict[str, Any], tmp_path: Path
+) -> None:
+    from groundtie_qgis import compat
+    from qgis.core import QgsProcessingContext
+
+    mask = definitions["MASK"]
+    assert set(mask.dataTypes()) == {compat.RASTER, compat.ANY_VECTOR}
+    classifier = tmp_path / "classifier.json"
+    context = QgsProcessingContext()
+    for one in (mask, mask.clone()):
+        assert not one.checkValueIsAcceptable(str(classifier), context)
+    classifier.write_text("{}")
+    for one in (mask, mask.clone()):
+        assert (one.name(), one.description()) == ("MASK", "Mask")
+        assert one.checkValueIsAcceptable(str(classifier), context)
+        assert one.flags() == mask.flags()
+    classifier.unlink()
 
 
 def test_files_have_filters(definitions: dict[str, Any]) -> None:

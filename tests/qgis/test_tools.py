@@ -20,7 +20,7 @@ from groundtie.rasters.grid import compose
 
 ROOT = Path(__file__).resolve().parents[2]
 # settings that make little work of a small pair
-QUICK = ["MODEL=translation", "SIMILARITY=orientation", "SEARCH_RADIUS=12"]
+QUICK = ["MODEL=translation", "SEARCH_RADIUS=12"]
 
 
 @pytest.fixture(scope="session")

@@ -272,7 +272,7 @@ class TestWithOtherTools:
         made = {"tie_points": tmp_path / "p.gpkg", "transform": tmp_path / "t.json"}
         registered = coregister(
             pair.reference, pair.input, tmp_path / "out.tif",
-            similarity="orientation", workers=2, **made,
+            workers=2, **made,
         )  # fmt: skip
         result = assess(**made, max_error=3.0)
         assert result.verdict is not None
@@ -287,7 +287,7 @@ class TestWithOtherTools:
         made = tmp_path / "t.json"
         registered = coregister(
             textured.reference, textured.input, tmp_path / "out.tif",
-            similarity="orientation", workers=2, transform=made,
+            workers=2, transform=made,
         )  # fmt: skip
         xy = textured.grid.pixel_to_map(
             np.random.default_rng(0).uniform([30, 30], [200, 190], (50, 2))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import fiona
@@ -11,9 +12,11 @@ import numpy as np
 import pytest
 import rasterio
 from raster_files import write_raster
+from specified_runs import register_specified
 from tools.conftest import SimulatedFiles
 
 from groundtie.errors import NotRegisteredError, ParameterError
+from groundtie.registration.specification import COREGISTER
 from groundtie.tools.coregister import coregister
 from groundtie.tools.filter_speckle import filter_speckle
 from groundtie.tools.simulate import simulate
@@ -24,29 +27,20 @@ def test_a_threshold_mask_is_used_and_reported(
 ) -> None:
     pair = simulated("shift")
     result = coregister(pair.reference, pair.input, tmp_path / "out.tif", mask="threshold")
-    mask = result.numbers["mask"]
-    assert (mask["kind"], mask["image"]) == ("threshold", "reference")
-    assert mask["share"] == pytest.approx(0.8, abs=0.02)
+    mask = result.mask
+    assert (mask.kind, mask.image) == ("threshold", "reference")
+    assert mask.share == pytest.approx(0.8, abs=0.02)
     assert pair.error_px(result.transform) < 0.5
 
 
-def test_either_image_can_be_masked(
-    simulated: Callable[[str], SimulatedFiles], tmp_path: Path
-) -> None:
+def test_either_image_can_be_masked(simulated: Callable[[str], SimulatedFiles]) -> None:
     """The optical image is the reference here: the radar's is found all the same."""
     pair = simulated("shift")
     for image, expected in (("auto", "input"), ("reference", "reference")):
-        result = coregister(
-            pair.input,
-            pair.reference,
-            tmp_path / "out.tif",
-            mask="threshold",
-            mask_image=image,
-            mask_high_percent=10.0,
-        )
-        mask = result.numbers["mask"]
-        assert mask["image"] == expected
-        assert mask["share"] == pytest.approx(0.9, abs=0.06)
+        spec = replace(COREGISTER, mask="threshold", radar=image)
+        mask = register_specified(spec, pair.input, pair.reference).mask
+        assert mask.image == expected
+        assert mask.share == pytest.approx(0.8, abs=0.06)
 
 
 def test_fields_are_left_without_a_mask_by_auto(
@@ -54,8 +48,8 @@ def test_fields_are_left_without_a_mask_by_auto(
 ) -> None:
     pair = simulated("shift")
     result = coregister(pair.reference, pair.input, tmp_path / "out.tif", mask="auto")
-    mask = result.numbers["mask"]
-    assert mask["kind"] == "none" and "too few buildings" in mask["reason"]
+    mask = result.mask
+    assert mask.kind == "none" and "too few buildings" in mask.reason
 
 
 def test_a_layer_does_the_same_job(
@@ -73,20 +67,20 @@ def test_a_layer_does_the_same_job(
     with fiona.open(layer, "w", driver="GPKG", crs_wkt=crs, schema=schema) as file:
         geometry = {"type": "Polygon", "coordinates": [ring]}
         file.write({"type": "Feature", "geometry": geometry, "properties": {}})
-    result = coregister(pair.reference, pair.input, tmp_path / "out.tif", mask_layer=layer)
-    mask = result.numbers["mask"]
-    assert (mask["kind"], mask["image"]) == ("layer", "reference")
-    assert mask["share"] == pytest.approx(2 / 3, abs=0.01)
-    xy = result.points.take(result.points.used).reference_xy
+    result = coregister(pair.reference, pair.input, tmp_path / "out.tif", reference_mask=layer)
+    mask = result.mask
+    assert (mask.kind, mask.image) == ("layer", "reference")
+    assert mask.share == pytest.approx(2 / 3, abs=0.01)
+    xy = result.tie_points.take(result.tie_points.used).reference_xy
     # Chips may lie across the border, but none beyond it.
     assert np.all(xy[:, 0] < right + 60)
-    with pytest.raises(ParameterError, match="either mask=threshold or a mask layer"):
+    with pytest.raises(ParameterError, match="either mask=threshold or a vector layer"):
         coregister(
             pair.reference,
             pair.input,
             tmp_path / "other.tif",
             mask="threshold",
-            mask_layer=layer,
+            reference_mask=layer,
         )
 
 
@@ -110,9 +104,9 @@ def test_a_dense_city_is_registered_by_its_ground(
     open_city: SimulatedFiles, tmp_path: Path
 ) -> None:
     result = coregister(open_city.reference, open_city.input, tmp_path / "out.tif")
-    mask = result.numbers["mask"]
-    assert (mask["kind"], mask["image"]) == ("regions", "reference")
-    assert mask["share"] < 0.3
+    mask = result.mask
+    assert (mask.kind, mask.image) == ("regions", "reference")
+    assert mask.share < 0.3
     assert open_city.error_px(result.transform) < 2
 
 

@@ -26,7 +26,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 def call(scene: Scene, output: Path, **changes: object) -> groundtie.tools.extract_gcps.GcpResult:
     files = {"image": scene.image, "reference": scene.reference, "dem": scene.dem}
-    more = {"dem_datum": "ellipsoidal", "similarity": "orientation", "output": output}
+    more = {"dem_datum": "ellipsoidal", "output": output}
     return groundtie.extract_gcps(**(files | more | changes))  # type: ignore[arg-type]
 
 
@@ -61,7 +61,7 @@ def test_what_a_classifier_leaves_out_of_the_image_takes_no_part(
         tmp_path / "bright.tif", values, nodata=0, rpcs=to_rasterio(scene.delivered)
     )
     classifier = bright_is_left_out(tmp_path / "c.json", 128)
-    found = call(scene, tmp_path / "g.csv", image=image, image_classifier=classifier).points
+    found = call(scene, tmp_path / "g.csv", image=image, image_mask=classifier).points
     # Chips whose middles lie just in the bright half still see some of the other one.
     used = found.points.input_px[found.points.used]
     assert len(used) > 10

@@ -2,13 +2,14 @@ from __future__ import annotations
 
 import json
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from brightness_classifiers import bright_is_left_out
-from groundtie.registration.masking import MaskRequest
 from raster_files import write_raster
+from specified_runs import register_specified
 from textured_pairs import (
     TexturedPair,
     error_px,
@@ -24,8 +25,9 @@ from groundtie.features.classifier_training import Training, train_classifier
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
-from groundtie.registration.verdict import Verdict
-from groundtie.studies.optical_variants import DESCRIPTORS, DETECTORS
+from groundtie.registration import rules
+from groundtie.registration.scene import ImageFacts, SceneInfo
+from groundtie.registration.specification import MATCHERS, OPTICAL
 
 SIZE = (300, 280)
 
@@ -51,7 +53,7 @@ def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: 
     report = json.loads((tmp_path / "report.json").read_text())
     assert report["verdict"]["accepted"] is True
     table = read_tie_points(tmp_path / "points.gpkg", found.transform.input_grid)
-    assert len(table.reference_xy) == len(found.points)
+    assert len(table.reference_xy) == len(found.tie_points)
     reference, registered = (
         pixels(path)[0][40:-40, 40:-40].astype(float)
         for path in (files.reference, tmp_path / "out.tif")
@@ -59,29 +61,21 @@ def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: 
     assert np.corrcoef(reference.ravel(), registered.ravel())[0, 1] < -0.9
 
 
-@pytest.mark.parametrize("detector", DETECTORS)
-@pytest.mark.parametrize("descriptor", DESCRIPTORS)
-def test_every_feature_finds_it_where_contrast_is_alike(
-    files: TexturedPair, tmp_path: Path, detector: str, descriptor: str
+@pytest.mark.parametrize("matcher", MATCHERS)
+def test_every_matcher_finds_it_where_contrast_is_alike(
+    files: TexturedPair, tmp_path: Path, matcher: str
 ) -> None:
     upright = write_raster(
         tmp_path / "in.tif", 4000 - pixels(files.input)[0], files.truth.input_grid
     )
-    found = match_optical(
-        files.reference,
-        upright,
-        tmp_path / "out.tif",
-        detector=detector,
-        descriptor=descriptor,
-        refinement="none",
-    )
+    found = register_specified(replace(OPTICAL, matcher=matcher), files.reference, upright)
     assert error_px(found.transform, files) < 0.5
 
 
-def test_check_points_lie_where_no_feature_was_seen(files: TexturedPair, tmp_path: Path) -> None:
-    found = match_optical(files.reference, files.input, tmp_path / "out.tif", refinement="none")
+def test_check_points_lie_where_no_keypoint_was_seen(files: TexturedPair, tmp_path: Path) -> None:
+    found = match_optical(files.reference, files.input, tmp_path / "out.tif")
     fit, check = (
-        files.grid.map_to_pixel(found.points.reference_xy[found.points.is_check == c])
+        files.grid.map_to_pixel(found.tie_points.reference_xy[found.tie_points.is_check == c])
         for c in (0, 1)
     )
     apart = np.linalg.norm(fit[:, None] - check[None], axis=2)
@@ -108,9 +102,10 @@ def test_a_radar_image_that_may_show_a_dense_town_is_in_doubt(
     radar: bool,
     refused: bool,
 ) -> None:
-    monkeypatch.setattr(MaskRequest, "sees_radar", lambda *_: radar)
-    monkeypatch.setattr(MaskRequest, "may_hide_a_town", lambda *_: True)
-    monkeypatch.setattr(Verdict, "is_clear", False)
+    monkeypatch.setattr(SceneInfo, "is_radar_and_camera", radar)
+    # Too few strong scatterers for a mask of the ground, too many for a town to be ruled out.
+    monkeypatch.setattr(ImageFacts, "strong_share", 0.1)
+    monkeypatch.setattr(rules, "_CLEAR_SHARE", 1.1)
     expected = pytest.raises(NotRegisteredError, match="as roofs may") if refused else nullcontext()
     with expected:
         match_optical(files.reference, files.input, tmp_path / "out.tif")
@@ -143,7 +138,7 @@ def test_what_a_coarser_image_shows_is_matched_all_over(tmp_path: Path) -> None:
     ]
     found = match_optical(*plain, tmp_path / "out.tif", search_scale=2.2)
     size = np.array(SIZE) * 2
-    assert (np.ptp(found.points.reference_xy, axis=0) > 0.75 * size).all()
+    assert (np.ptp(found.tie_points.reference_xy, axis=0) > 0.75 * size).all()
     corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (size - 1.0)
     off = found.transform(corners) - (corners - 0.5) / 2
     assert np.hypot(*off.T).max() < 1.0
@@ -158,8 +153,8 @@ def test_an_image_that_is_turned_is_classified_all_over(tmp_path: Path) -> None:
         for name, image in (("plain", pixels(pair.reference)[0]), ("turned", values))
     ]
     nothing = bright_is_left_out(tmp_path / "c.json", 60_000)
-    found = match_optical(*plain, tmp_path / "out.tif", input_classifier=nothing)
-    used = found.points.input_px[found.points.used]
+    found = match_optical(*plain, tmp_path / "out.tif", input_mask=nothing)
+    used = found.tie_points.input_px[found.tie_points.used]
     assert (np.ptp(used, axis=0) > 0.7 * np.array(values.shape[::-1])).all()
 
 
@@ -171,7 +166,7 @@ def test_a_classifier_of_other_bands_is_refused(files: TexturedPair, tmp_path: P
     )
     train_classifier(labelled, "band-ratios", "linear", 10.0, 0).write(path)
     with pytest.raises(ParameterError, match=r"of 4 bands; .*input.tif has 1"):
-        match_optical(files.reference, files.input, tmp_path / "out.tif", input_classifier=path)
+        match_optical(files.reference, files.input, tmp_path / "out.tif", input_mask=path)
     assert list(listing(tmp_path)) == ["c.json"]
 
 
@@ -187,10 +182,9 @@ def test_features_that_a_classifier_leaves_out_take_no_part(
             files.reference,
             bright,
             tmp_path / "out.tif",
-            input_classifier=chosen,
-            refinement="none",
+            input_mask=chosen,
         )
-        nearest = found.points.input_px[~found.points.is_check, 0].min()
+        nearest = found.tie_points.input_px[~found.tie_points.is_check, 0].min()
         assert (nearest > 110) == (chosen is not None)
         assert error_px(found.transform, files) < 0.6
 
@@ -199,6 +193,6 @@ def test_a_file_that_is_no_classifier_is_refused(files: TexturedPair, tmp_path: 
     (tmp_path / "c.json").write_text("{}")
     with pytest.raises(ParameterError, match="no feature classifier"):
         match_optical(
-            files.reference, files.input, tmp_path / "o.tif", input_classifier=tmp_path / "c.json"
+            files.reference, files.input, tmp_path / "o.tif", input_mask=tmp_path / "c.json"
         )
     assert list(listing(tmp_path)) == ["c.json"]

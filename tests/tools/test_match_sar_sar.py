@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,15 +10,17 @@ import numpy as np
 import pytest
 from brightness_classifiers import bright_is_left_out
 from raster_files import write_raster
+from specified_runs import register_specified
 from speckled_pairs import write_speckled_pair
 from textured_pairs import TexturedPair, error_px, listing, pixels, shift_on_map
 
 from groundtie import coregister, match_sar_sar
-from groundtie.errors import NotRegisteredError, ParameterError
+from groundtie.errors import NotRegisteredError
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
-from groundtie.registration.verdict import Verdict
+from groundtie.registration import rules
+from groundtie.registration.specification import SAR_SAR
 
 SIZE = (300, 280)
 
@@ -46,7 +47,7 @@ def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: 
     assert report["verdict"]["accepted"] is True
     assert "<html" in (tmp_path / "report.html").read_text().lower()
     table = read_tie_points(tmp_path / "points.gpkg", found.transform.input_grid)
-    assert len(table.reference_xy) == len(found.points)
+    assert len(table.reference_xy) == len(found.tie_points)
     reference, registered = (
         np.log(pixels(path)[0][40:-40, 40:-40] + 1.0)
         for path in (files.reference, tmp_path / "out.tif")
@@ -55,7 +56,7 @@ def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: 
 
 
 @pytest.mark.parametrize("image", ["reference", "input"])
-def test_features_that_a_classifier_leaves_out_take_no_part(
+def test_keypoints_that_a_classifier_leaves_out_take_no_part(
     files: TexturedPair, tmp_path: Path, image: str
 ) -> None:
     """The right half of an image is made brighter than the left one anywhere is."""
@@ -69,22 +70,22 @@ def test_features_that_a_classifier_leaves_out_take_no_part(
     found = match_sar_sar(
         *paths.values(),
         tmp_path / "out.tif",
-        refinement="none",
-        **{f"{image}_classifier": classifier},
+        **{f"{image}_mask": classifier},
     )
-    fit = found.points.take(~found.points.is_check)
+    fit = found.tie_points.take(~found.tie_points.is_check)
     columns = {
         "reference": files.grid.map_to_pixel(fit.reference_xy)[:, 0],
         "input": fit.input_px[:, 0],
     }[image]
     assert len(columns) > 10
-    assert columns.max() < 160
+    # Chips may lie across the border, of which half their side of 81 px is beyond it at most.
+    assert columns.max() < 150 + 41
     assert error_px(found.transform, files) < 1.0
 
 
-def test_check_points_lie_where_no_feature_was_seen(files: TexturedPair, tmp_path: Path) -> None:
-    found = match_sar_sar(files.reference, files.input, tmp_path / "out.tif", refinement="none")
-    points = found.points
+def test_check_points_lie_where_no_keypoint_was_seen(files: TexturedPair, tmp_path: Path) -> None:
+    found = match_sar_sar(files.reference, files.input, tmp_path / "out.tif")
+    points = found.tie_points
     fit, check = (
         files.grid.map_to_pixel(points.reference_xy[points.is_check == c]) for c in (0, 1)
     )
@@ -113,10 +114,10 @@ def test_an_image_that_may_show_a_dense_town_to_a_camera_is_in_doubt(
     calm = write_raster(tmp_path / "in.tif", bright, files.truth.input_grid)
     found = match_sar_sar(files.reference, calm, tmp_path / "out.tif")
     assert error_px(found.transform, files) < 1.0
-    monkeypatch.setattr(Verdict, "is_clear", False)
+    monkeypatch.setattr(rules, "_CLEAR_SHARE", 1.1)
     with pytest.raises(NotRegisteredError, match="as roofs may"):
         match_sar_sar(files.reference, calm, tmp_path / "other.tif")
-    # Two radar images are judged by what leans alone.
+    # Two radar images are judged by layover alone.
     match_sar_sar(files.reference, files.input, tmp_path / "other.tif")
 
 
@@ -136,37 +137,18 @@ def test_images_without_georeferencing_may_be_turned(tmp_path: Path) -> None:
     assert np.hypot(*off.T).max() < 1.0
 
 
-def test_matches_off_the_ground_take_no_part(files: TexturedPair, tmp_path: Path) -> None:
-    ground = np.ones((SIZE[1], SIZE[0]), np.uint8)
-    ground[:, :90] = 0
-    mask = write_raster(tmp_path / "ground.tif", ground, files.grid)
-    found = match_sar_sar(files.reference, files.input, tmp_path / "out.tif", ground_mask=mask)
-    px = files.grid.map_to_pixel(found.points.reference_xy)
-    # Chips may lie across the border, of which half their side of 81 px is beyond it at most.
-    assert px[~found.points.is_check, 0].min() > 89 - 41
-    assert error_px(found.transform, files) < 0.6
-
-
 @pytest.mark.parametrize("image", ["reference", "input"])
-def test_what_shines_in_either_image_may_be_left_out(
-    files: TexturedPair, tmp_path: Path, image: str
-) -> None:
-    found = match_sar_sar(
-        files.reference,
-        files.input,
-        tmp_path / "out.tif",
-        mask="threshold",
-        mask_image=image,
-        mask_high_percent=10.0,
-    )
-    mask = found.numbers["mask"]
-    assert (mask["kind"], mask["image"]) == ("threshold", image)
-    assert mask["share"] == pytest.approx(0.9, abs=0.03)
+def test_strong_scatterers_of_either_image_may_be_left_out(files: TexturedPair, image: str) -> None:
+    spec = replace(SAR_SAR, mask="threshold", radar=image)
+    found = register_specified(spec, files.reference, files.input)
+    mask = found.mask
+    assert (mask.kind, mask.image) == ("threshold", image)
+    assert mask.share == pytest.approx(0.8, abs=0.03)
     assert error_px(found.transform, files) < 0.5
 
 
 @pytest.mark.parametrize("image", ["reference", "input"])
-def test_features_on_a_mask_of_either_image_take_no_part(
+def test_keypoints_on_a_mask_of_either_image_take_no_part(
     files: TexturedPair, tmp_path: Path, image: str
 ) -> None:
     """Bright bars on the left of one image: what is found there is not matched."""
@@ -174,45 +156,19 @@ def test_features_on_a_mask_of_either_image_take_no_part(
     values[:, :90] = np.clip(values[:, :90].astype(float) * 30, 1, 65_535).astype(values.dtype)
     bright = write_raster(tmp_path / "bright.tif", values, files.grid)
     pair = replace(files, **{image: bright})
+    shown = np.ones(SIZE[::-1], np.uint8)
+    shown[:, :90] = 0
+    mask = write_raster(tmp_path / "mask.tif", shown, files.grid)
     found = match_sar_sar(
-        pair.reference,
-        pair.input,
-        tmp_path / "out.tif",
-        mask="threshold",
-        mask_image=image,
-        mask_high_percent=30.0,
-        refinement="none",
+        pair.reference, pair.input, tmp_path / "out.tif", **{f"{image}_mask": mask}
     )
-    points = found.points.take(~found.points.is_check)
+    points = found.tie_points.take(~found.tie_points.is_check)
     on_reference = files.grid.map_to_pixel(points.reference_xy)
     px = on_reference if image == "reference" else points.input_px
     assert len(px) > 10
-    assert px[:, 0].min() > 89
+    # Chips may lie across the border, of which half their side of 81 px is beyond it at most.
+    assert px[:, 0].min() > 89 - 41
     assert error_px(found.transform, files) < 0.8
-
-
-def test_two_masks_of_the_reference_are_refused(files: TexturedPair, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="not both"):
-        match_sar_sar(
-            files.reference,
-            files.input,
-            tmp_path / "out.tif",
-            ground_mask=files.reference,
-            reference_mask=files.reference,
-        )
-
-
-def test_a_mask_of_the_ground_leaves_no_room_for_another(
-    files: TexturedPair, tmp_path: Path
-) -> None:
-    with pytest.raises(ParameterError, match="ground_mask or another mask"):
-        match_sar_sar(
-            files.reference,
-            files.input,
-            tmp_path / "out.tif",
-            ground_mask=files.reference,
-            mask="threshold",
-        )
 
 
 def lifted(files: TexturedPair, folder: Path, share: float, by_px: int) -> TexturedPair:
@@ -224,26 +180,25 @@ def lifted(files: TexturedPair, folder: Path, share: float, by_px: int) -> Textu
     return replace(files, input=write_raster(folder / "lifted.tif", moved, files.grid))
 
 
-def test_what_stands_is_not_taken_for_the_ground(files: TexturedPair, tmp_path: Path) -> None:
+def test_elevated_objects_are_not_taken_for_the_ground(files: TexturedPair, tmp_path: Path) -> None:
     pair = lifted(files, tmp_path, 0.5, 9)
     with pytest.raises(NotRegisteredError) as refused:
         match_sar_sar(pair.reference, pair.input, tmp_path / "out.tif")
     assert not (tmp_path / "out.tif").exists()
-    assert "ground and what stands on it" in str(refused.value)
+    assert "ground and elevated objects" in str(refused.value)
 
 
 @pytest.mark.parametrize("tool", [match_sar_sar, coregister])
-def test_what_leans_is_refused(
+def test_layover_is_refused(
     files: TexturedPair,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     tool: Callable[..., object],
 ) -> None:
-    shared = sys.modules["groundtie.registration.registration"]
-    monkeypatch.setattr(shared, "leaning", lambda *_: "roofs")
+    monkeypatch.setattr(rules, "scatter_along_line_px", lambda _: 99.0)
     report = tmp_path / "report.html"
-    with pytest.raises(NotRegisteredError, match="roofs"):
+    with pytest.raises(NotRegisteredError, match="as layover scatters heights"):
         tool(files.reference, files.input, tmp_path / "out.tif", report=report)
     verdict = json.loads(report.with_suffix(".json").read_text())["verdict"]
-    assert (verdict["accepted"], verdict["reason"]) == (False, "roofs")
+    assert (verdict["accepted"], verdict["rule"]) == (False, "layover of fit points")
     assert not (tmp_path / "out.tif").exists()

@@ -16,6 +16,7 @@ from ..errors import NotRegisteredError, SameFileError
 from ..geometry.tie_point_files import write_tie_points
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, writing
+from ..rasters.reading import bounded_cache
 from .pipeline import OpenPair, open_pair, pair_images, run
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import Registration
@@ -133,6 +134,7 @@ class Call:
             The registration was refused.
         """
         with threads(self.workers, self.progress) as context, ExitStack() as stack:
+            context.update(0.0, "opening the images")
             opened = stack.enter_context(self.open(spec, context.part(0.0, 0.02)))
             found = run(opened, spec, context.part(0.02, 0.7))
             found = replace(found, parameters=self.parameters or {})
@@ -168,7 +170,9 @@ class Call:
             It was refused; its report is written.
         """
         with stack:
-            self.files.write(registration, context)
+            # Not for as long as the rasters: environments must be left in the order of entering.
+            with bounded_cache():
+                self.files.write(registration, context)
             require_accepted(registration)
             rasters = stack.pop_all()
         kept = replace(registration, files=self.files.named(), rasters=rasters)

@@ -100,7 +100,6 @@ def open_pair(
     """
     started = time.perf_counter()
     with ExitStack() as stack:
-        stack.enter_context(bounded_cache())
         opened = [
             Image(stack.enter_context(open_raster(raster)), band)
             for raster, band in zip((reference, input), bands, strict=True)
@@ -166,10 +165,11 @@ def run(
     scene
         What the images are, if that was found before.
     """
-    scene = scene or SceneInfo.of(opened.pair, spec.radar)
-    context.update(0.02, "inspecting the images")
-    masked = mask_pair(opened, spec, scene, context.part(0.02, 0.12))
-    return register(opened, masked, scene, spec, context.part(0.12, 1.0))
+    with bounded_cache():
+        scene = scene or SceneInfo.of(opened.pair, spec.radar)
+        context.update(0.02, "inspecting the images")
+        masked = mask_pair(opened, spec, scene, context.part(0.02, 0.12))
+        return register(opened, masked, scene, spec, context.part(0.12, 1.0))
 
 
 def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: Context) -> Masked:
