@@ -20,7 +20,7 @@ from groundtie.geometry.transform import Transform
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.verdict import Verdict, refuse
+from groundtie.registration.verdict import Verdict
 from groundtie.report.report import Report
 
 GRID = utm_grid(160, 120)
@@ -153,7 +153,7 @@ def report_of(pair: ImagePair, **changes: Any) -> Report:
 
 def refused(pair: ImagePair, **changes: Any) -> Report:
     nothing = {"points": None, "transform": None, "surfaces": ()}
-    verdict = refuse("nothing in common was found")
+    verdict = Verdict(False, "nothing in common was found")
     return report_of(pair, **{"verdict": verdict, **nothing, **changes})
 
 

@@ -295,6 +295,7 @@ def test_ground_control_is_judged_by_the_rules_of_every_stage(
             reference=sensor.reference,
             dem=sensor.dem,
             dem_datum="ellipsoidal",
+            matching_pixel_size=2.0,
             output=output,
         )
 

@@ -20,7 +20,7 @@ from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.grid import Grid
-from groundtie.registration.verdict import Verdict, refuse
+from groundtie.registration.verdict import Verdict
 from groundtie.report import figures
 
 UTM = CRS.from_epsg(32633)
@@ -191,7 +191,7 @@ def test_the_scatter_shows_check_points_only() -> None:
 
 
 def test_without_a_measured_error_there_is_no_circle_and_no_curve() -> None:
-    verdict = refuse("too few points")
+    verdict = Verdict(False, "too few points")
     axes = figures.error_scatter(measured(), verdict).axes[0]
     assert len(axes.patches) == 0
     assert np.hypot(9, -3) < axes.get_xlim()[1]

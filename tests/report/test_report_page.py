@@ -24,7 +24,7 @@ from raster_files import write_raster
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.pair import ImagePair
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.verdict import refuse
+from groundtie.registration.verdict import Verdict
 from groundtie.report.correction import Correction
 
 
@@ -94,7 +94,7 @@ def test_the_direction_without_georeferencing(ungeoreferenced: ImagePair) -> Non
 
 def test_the_deciding_rule_and_its_advice_are_shown(pair: ImagePair, tmp_path: Path) -> None:
     verdict = replace(
-        refuse("the overlap is small"), rule="overlap", advice="try a <larger> input."
+        Verdict(False, "the overlap is small"), rule="overlap", advice="try a <larger> input."
     )
     page = written(refused(pair, verdict=verdict), tmp_path)
     assert "The overlap is small. Try a <larger> input." in page.text
