@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from contexts import context, one_thread
 from textured_pairs import TexturedPair
 from tools.conftest import simulated, textured
 
@@ -12,7 +13,7 @@ from groundtie.registration.delivery import Call, RegistrationFiles
 from groundtie.registration.registration import Registration
 from groundtie.registration.specification import Specification
 
-__all__ = ["registration", "simulated", "textured"]
+__all__ = ["context", "one_thread", "registration", "simulated", "textured"]
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,8 @@ import pytest
 from contexts import context
 from facts_of_pairs import TOWN, opened, speckled
 from rpc_scenes import Scene, make_scene
-from textured_pairs import TexturedPair, error_px
+from speckled_pairs import write_speckled_pair
+from textured_pairs import TexturedPair, error_px, shift_on_map
 
 import groundtie
 from groundtie.context import Context
@@ -150,7 +152,8 @@ def test_ground_is_found_once_whatever_takes_part_in_the_fit(
         stages = Stages.of(pair.images, masked, spec)
         is_apart = stages.checker is not stages.matcher
         assert is_apart == (mask != "regions")
-        assert isinstance(stages.checker, PooledHistogramMatcher)
+        is_pooled = is_apart or masked.used.leaves_little
+        assert isinstance(stages.checker, PooledHistogramMatcher) == is_pooled
 
 
 def test_matchers_are_put_together_by_name(textured: TexturedPair, context: Context) -> None:
@@ -185,27 +188,75 @@ def test_tries_count_against_agreement_by_chance(
         assert evidence.scene is scene
 
 
-def house_rule(stage: str) -> Rule:
-    return Rule(f"house rule at {stage}", stage, "all", "this test", "go", lambda _: "forbidden")
+@pytest.fixture(scope="module")
+def radars(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
+    """Return two radar images of one place."""
+    folder = tmp_path_factory.mktemp("radars")
+    return write_speckled_pair(folder, (300, 280), shift_on_map(60.0, -45.0))
+
+
+def name_of(stage: str) -> str:
+    return f"house rule at {stage}"
+
+
+@dataclass
+class HouseRules:
+    """Rules of all stages, each of which notes that it is asked, and the last of which refuses."""
+
+    stages: tuple[str, ...]
+    asked: list[str] = field(default_factory=list)
+
+    def rules(self) -> tuple[Rule, ...]:
+        return tuple(
+            Rule(
+                f"house rule at {stage}", stage, "all", "this test", "go", partial(self.ask, stage)
+            )
+            for stage in self.stages
+        )
+
+    def ask(self, stage: str, _: object) -> str | None:
+        self.asked.append(stage)
+        return "forbidden" if stage == self.stages[-1] else None
+
+
+def refused_by_house_rules(
+    monkeypatch: pytest.MonkeyPatch, stages: tuple[str, ...], call: Callable[[], object]
+) -> list[str]:
+    """Return the stages whose rules are asked until a call is refused by the last one's."""
+    house = HouseRules(stages)
+    monkeypatch.setattr(verdict, "RULES", house.rules())
+    if stages == (SEARCH,):
+        monkeypatch.setattr(pipeline, "find_coarse_model", nothing_found)
+    with pytest.raises(NotRegisteredError, match="forbidden; go") as error:
+        call()
+    assert error.value.verdict is not None
+    assert error.value.verdict.rule == name_of(stages[-1])
+    return house.asked
+
+
+SEARCHED, CHECKED = (SEARCH,), (AGREEMENT, ERROR, SCENE)
 
 
 @pytest.mark.parametrize("tool", [*PRESETS, "register"])
-@pytest.mark.parametrize("stage", [SEARCH, AGREEMENT, ERROR, SCENE])
+@pytest.mark.parametrize("stages", [SEARCHED, CHECKED], ids=["search", "check"])
 def test_every_tool_is_judged_by_the_rules_of_every_stage(
     textured: TexturedPair,
+    radars: TexturedPair,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     tool: str,
-    stage: str,
+    stages: tuple[str, ...],
 ) -> None:
-    monkeypatch.setattr(verdict, "RULES", (house_rule(stage),))
-    if stage == SEARCH:
-        monkeypatch.setattr(pipeline, "find_coarse_model", nothing_found)
+    files = radars if tool == "match_sar_sar" else textured
     output = tmp_path / "out.tif"
-    with pytest.raises(NotRegisteredError, match="forbidden; go") as error:
-        getattr(groundtie, tool)(textured.reference, textured.input, output)
-    assert error.value.verdict is not None
-    assert error.value.verdict.rule == f"house rule at {stage}"
+
+    def call() -> object:
+        return getattr(groundtie, tool)(files.reference, files.input, output)
+
+    asked = refused_by_house_rules(monkeypatch, stages, call)
+    # One tool tries more than once.
+    assert asked == list(stages) * (len(asked) // len(stages))
+    assert (len(asked) > len(stages)) == (tool == "register")
     assert not output.exists()
 
 
@@ -215,27 +266,38 @@ def sensor(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 @pytest.mark.parametrize(
-    ("tool", "stage"),
+    ("tool", "stages", "expected"),
     [
-        *(("extract_gcps", stage) for stage in (SEARCH, AGREEMENT, ERROR, SCENE)),
-        *(("refine_rpc", stage) for stage in (SEARCH, SCENE, REFINEMENT)),
+        ("extract_gcps", SEARCHED, SEARCHED),
+        ("refine_rpc", SEARCHED, SEARCHED),
+        ("extract_gcps", CHECKED, CHECKED),
+        # First of the ground control, then of what comes of it.
+        (
+            "refine_rpc",
+            (*CHECKED[:2], REFINEMENT),
+            (*CHECKED[:2], *CHECKED[:2], REFINEMENT),
+        ),
     ],
 )
 def test_ground_control_is_judged_by_the_rules_of_every_stage(
-    sensor: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tool: str, stage: str
+    sensor: Scene,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    tool: str,
+    stages: tuple[str, ...],
+    expected: tuple[str, ...],
 ) -> None:
-    monkeypatch.setattr(verdict, "RULES", (house_rule(stage),))
-    if stage == SEARCH:
-        monkeypatch.setattr(pipeline, "find_coarse_model", nothing_found)
-    output = tmp_path / ("gcps.csv" if tool == "extract_gcps" else "refined.txt")
-    with pytest.raises(NotRegisteredError, match="forbidden; go") as error:
-        getattr(groundtie, tool)(
+    output = tmp_path / ("gcps.csv" if tool == "extract_gcps" else "refined_RPC.TXT")
+
+    def call() -> object:
+        return getattr(groundtie, tool)(
             image=sensor.image,
             reference=sensor.reference,
             dem=sensor.dem,
             dem_datum="ellipsoidal",
+            matching_pixel_size=2.0,
             output=output,
         )
-    assert error.value.verdict is not None
-    assert error.value.verdict.rule == f"house rule at {stage}"
+
+    assert refused_by_house_rules(monkeypatch, stages, call) == list(expected)
     assert not output.exists()

@@ -10,10 +10,10 @@ from raster_files import UTM, utm_grid
 from rasterio.crs import CRS
 from textured_pairs import TexturedPair, pixels, shift_on_map
 
+from groundtie.context import Context
 from groundtie.errors import ParameterError
 from groundtie.geometry.models import KINDS, Frame, PolynomialModel
 from groundtie.geometry.transform import Transform
-from groundtie.progress import SILENT
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
 from groundtie.registration.registered_output import (
@@ -62,7 +62,7 @@ def test_a_shift_that_is_none_in_the_inputs_crs_is_an_error() -> None:
         moved_grid(Transform(shift_on_map(1e5, 0.0), UTM, wide))
 
 
-def test_a_turn_is_no_shift() -> None:
+def test_a_rotation_is_no_shift() -> None:
     frame = Frame.around(GRID.pixel_to_map(GRID.outline()))
     turn = PolynomialModel("rigid", frame, np.array([[0, 0], [0, 0.02], [-0.02, 0]]))
     with pytest.raises(ParameterError):
@@ -76,12 +76,13 @@ def test_images_without_georeferencing_move_in_pixels() -> None:
 
 
 @pytest.mark.parametrize("grid", OUTPUT_GRIDS)
-def test_ground_lies_where_the_truth_says_on_every_grid(
-    textured: TexturedPair, tmp_path: Path, grid: str
+def test_ground_lies_where_the_truth_has_it_on_every_grid(
+    textured: TexturedPair, tmp_path: Path, context: Context, grid: str
 ) -> None:
     output = RegisteredOutput(tmp_path / "out.tif", grid, "cubic")
     with textured.opened() as pair, Outputs() as outputs:
-        output.write(pair, textured.truth, outputs, 2, SILENT)
+        source, reference = pair.input.source, pair.reference.source.grid
+        output.write(source, reference, textured.truth, outputs, context)
     with rasterio.open(output.path) as out, rasterio.open(textured.reference) as reference:
         assert out.crs == reference.crs
         # The same ground in both: the textures are opposite, up to their noise.
@@ -95,11 +96,12 @@ def test_ground_lies_where_the_truth_says_on_every_grid(
 
 
 def test_the_rows_of_a_grid_are_moved_and_no_pixel_changed(
-    textured: TexturedPair, tmp_path: Path
+    textured: TexturedPair, tmp_path: Path, one_thread: Context
 ) -> None:
     output = RegisteredOutput(tmp_path / "out.tif", "untouched", "cubic")
     with textured.opened() as pair, Outputs() as outputs:
-        output.write(pair, textured.truth, outputs, 1, SILENT)
+        source, reference = pair.input.source, pair.reference.source.grid
+        output.write(source, reference, textured.truth, outputs, one_thread)
     np.testing.assert_array_equal(pixels(output.path), pixels(textured.input))
     with rasterio.open(output.path) as out:
         expected = textured.truth.input_grid.shifted(-70.0, 45.0).transform

@@ -25,8 +25,14 @@ from groundtie.geometry.judging import LOG10_CHANCE_ON_GROUND
 from groundtie.geometry.models import PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
-from groundtie.registration.evidence import RegistrationEvidence, SearchEvidence
-from groundtie.registration.rules import RULES
+from groundtie.registration.evidence import (
+    AGREEMENT,
+    ERROR,
+    SCENE,
+    RegistrationEvidence,
+    SearchEvidence,
+)
+from groundtie.registration.rules import RULES, Rule
 from groundtie.registration.verdict import NOT_JUDGED, Verdict, judge, judge_search
 
 TRUTH = Transform.nominal(UTM, GRID)
@@ -213,3 +219,15 @@ def test_what_the_model_predicts_is_judged_not_the_nominal_place() -> None:
     off = check_points(scatter(40, 0.3) + [8.0, 5.0])
     assert judged(off, moved).accepted
     assert not judged(check_points(scatter(40, 0.3)), moved).accepted
+
+
+@pytest.mark.parametrize("stage", [AGREEMENT, ERROR, SCENE])
+def test_a_rule_at_any_stage_refuses(stage: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    rule = Rule("house rule", stage, "all", "this test", "go", lambda _: "forbidden")
+    good = evidence(scatter(72, 0.3))
+    assert judge(good).accepted
+    monkeypatch.setattr("groundtie.registration.verdict.RULES", (*RULES, rule))
+    found = judge(good)
+    assert (found.accepted, found.rule, found.reason) == (False, "house rule", "forbidden")
+    # Errors of matches that may be random measure nothing.
+    assert math.isnan(found.check_rmse_px) == (stage == AGREEMENT)
