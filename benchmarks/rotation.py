@@ -143,7 +143,7 @@ def run(settings: Settings) -> SuiteResult:
             f"± {LARGEST_SHIFT_PX:g} px; the input shows the same extent of ground. Goals are "
             "judged by default similarity, without noise. Errors in pixels are root mean squares "
             "over the reference.",
-            "Thesis P: its images are not to be had; ours are cut to their size, image-3 to "
+            "[Patel2017]: its images are not to be had; ours are cut to their size, image-3 to "
             f"{STAND_INS['image-3'][1][0]}×{STAND_INS['image-3'][1][1]} px. P's times are those of "
             "MATLAB on a 2 GHz Pentium. Corners are black as P has them; here they are masked.",
         ),
@@ -352,7 +352,7 @@ def thesis_table(found: Sequence[Found]) -> Table:
         *(f"P: error of {what}" for what in ("θ", "tx", "ty")),
         *(f"here: error of {what}" for what in ("θ", "tx", "ty")),
     )
-    return Table("Thesis P, tables 3.3 and 3.4", head, rows)
+    return Table("[Patel2017], tables 3.3 and 3.4", head, rows)
 
 
 def _thesis_image(estimates: Estimates) -> str:

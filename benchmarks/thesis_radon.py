@@ -1,4 +1,4 @@
-"""Thesis P, tables 3.3 and 3.4: what its Radon method found, without and with noise."""
+"""[Patel2017], tables 3.3 and 3.4: what its Radon method found, without and with noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Write the tables of parameters into the tools' pages in docs/, from the tools' declarations."""
+"""Write the tables of tools' parameters and of the verdict's rules into docs/, from the code."""
 
 from __future__ import annotations
 
@@ -15,17 +15,22 @@ from groundtie.kinds import (
     Flag,
     FolderOut,
     Kind,
+    MaskIn,
     Number,
     OutputKind,
     RasterIn,
     Text,
     VectorIn,
 )
+from groundtie.registration.rules import RULES, Rule
 from groundtie.tools import load_tools
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 BEGIN = "<!-- parameters: begin, made by scripts/document_tools.py -->"
 END = "<!-- parameters: end -->"
+
+RULES_PAGE = "method-verdict.md"
+RULES_BEGIN, RULES_END = "<!-- rules -->", "<!-- /rules -->"
 
 
 def page_of(tool: Tool, folder: Path) -> Path:
@@ -55,24 +60,38 @@ def document(tools: Sequence[Tool], folder: Path) -> list[Path]:
     ValueError
         A page does not have the place of the tables marked once.
     """
-    changed = []
-    for tool in tools:
-        path = page_of(tool, folder)
-        page = path.read_text(encoding="utf-8")
-        updated = with_tables(page, tables(tool), path.name)
-        if updated != page:
-            path.write_text(updated, encoding="utf-8")
-            changed.append(path)
-    return changed
+    paths = {page_of(tool, folder): tables(tool) for tool in tools}
+    return [path for path, text in paths.items() if _update(path, text)]
 
 
-def with_tables(page: str, text: str, name: str) -> str:
+def document_rules(rules: Sequence[Rule], folder: Path) -> list[Path]:
+    """Bring the table of rules on the verdict's page up to date; as `document`."""
+    path = folder / RULES_PAGE
+    return [path] if _update(path, rule_table(rules), RULES_BEGIN, RULES_END) else []
+
+
+def _update(path: Path, text: str, begin: str = BEGIN, end: str = END) -> bool:
+    """Put a text between the marks of a page, and return whether it is another one."""
+    page = path.read_text(encoding="utf-8")
+    updated = with_tables(page, text, path.name, begin, end)
+    if updated != page:
+        path.write_text(updated, encoding="utf-8")
+    return updated != page
+
+
+def with_tables(page: str, text: str, name: str, begin: str = BEGIN, end: str = END) -> str:
     """Return a page with `text` between the marks; `name` is the page's in the error message."""
-    before, begin, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end or BEGIN in after or END in before + after:
-        raise ValueError(f"{name} must hold once, and in this order: {BEGIN} {END}")
-    return f"{before}{BEGIN}\n\n{text}\n\n{END}{after}"
+    before, found_begin, rest = page.partition(begin)
+    _, found_end, after = rest.partition(end)
+    if not found_begin or not found_end or begin in after or end in before + after:
+        raise ValueError(f"{name} must hold once, and in this order: {begin} {end}")
+    return f"{before}{begin}\n\n{text}\n\n{end}{after}"
+
+
+def rule_table(rules: Sequence[Rule]) -> str:
+    """Return the table of rules, in the order in which they are asked."""
+    rows = [(rule.name, rule.stage, rule.refuses, rule.source, rule.advice) for rule in rules]
+    return _rows(("rule", "stage", "refuses", "source of the limit", "what to try"), rows)
 
 
 def tables(tool: Tool) -> str:
@@ -105,15 +124,17 @@ def _parameter_table(title: str, parameters: Iterable[Parameter]) -> str:
 
 
 def _table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    if not rows:
-        return ""
+    return f"### {title}\n\n{_rows(header, rows)}" if rows else ""
+
+
+def _rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [header, ["---"] * len(header), *rows]
     cells = [" | ".join(cell.replace("|", "\\|") for cell in line) for line in lines]
-    return "\n".join([f"### {title}", "", *(f"| {line} |" for line in cells)])
+    return "\n".join(f"| {line} |" for line in cells)
 
 
 def values(kind: Kind) -> str:
-    """Say which values a parameter of this kind takes."""
+    """Return which values a parameter of this kind takes."""
     if isinstance(kind, Number):
         what = "whole number" if kind.integer else "number"
         bounds = f"{kind.range_text} {kind.unit}".strip()
@@ -126,6 +147,7 @@ def values(kind: Kind) -> str:
         Band: "band number, from 1",
         Flag: "yes or no",
         FolderOut: "folder",
+        MaskIn: "raster, vector layer or classifier",
         RasterIn: "raster",
         Text: "text",
         VectorIn: "vector layer",
@@ -134,7 +156,7 @@ def values(kind: Kind) -> str:
 
 
 def default(parameter: Parameter) -> str:
-    """Say which value a parameter has if none is given."""
+    """Return which value a parameter has if none is given."""
     if parameter.required:
         return "required"
     if isinstance(parameter.kind, Flag):
@@ -148,7 +170,8 @@ def default(parameter: Parameter) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--docs", type=Path, default=DOCS, help="folder of the pages")
-    for path in document(load_tools(), parser.parse_args().docs):
+    folder = parser.parse_args().docs
+    for path in [*document(load_tools(), folder), *document_rules(RULES, folder)]:
         print(path)
     return 0
 

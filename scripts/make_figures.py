@@ -7,7 +7,7 @@ import csv
 import io
 import tempfile
 from collections.abc import Callable, Mapping
-from functools import cache
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import groundtie
-from groundtie.features.detectors import Detector
 from groundtie.geometry.chance import agreement_probability, log10_chance
 from groundtie.matching import belief_propagation
 from groundtie.rasters.patch import Patch
+from groundtie.studies.sift_variants import sift_detector
 
 FIGURES = Path(__file__).resolve().parents[1] / "docs" / "figures"
 
@@ -36,40 +36,36 @@ _GREYS, _BLENDS = 22, 6
 FloatArray = NDArray[np.floating[Any]]
 
 
+@dataclass(frozen=True)
 class Scenes:
-    """Simulated scenes, made when they are asked for first."""
+    """Simulated scenes in a folder, made when they are asked for first."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    folder: Path
 
-    @cache  # noqa: B019: there is one object for each run
     def rural(self) -> Path:
         """Return the folder of a rural pair of 500 px."""
-        folder = self.folder / "rural"
-        groundtie.simulate(folder, size=500, density="rural", looks=4, seed=1)
-        return folder
+        return self._pair("rural", size=500, density="rural", looks=4, seed=1)
 
-    @cache  # noqa: B019
     def city(self) -> Path:
         """Return the folder of a dense city of 400 px."""
-        folder = self.folder / "city"
-        groundtie.simulate(folder, size=400, density="city", looks=4, seed=3)
-        return folder
+        return self._pair("city", size=400, density="city", looks=4, seed=3)
 
-    @cache  # noqa: B019
     def speckled(self) -> Path:
         """Return the folder of a rural pair with one look."""
-        folder = self.folder / "speckled"
-        groundtie.simulate(folder, size=300, density="rural", looks=1, seed=4)
-        return folder
+        return self._pair("speckled", size=300, density="rural", looks=1, seed=4)
 
-    @cache  # noqa: B019
     def sensor(self) -> Path:
         """Return the folder of an image in sensor geometry with wrong RPCs."""
         folder = self.folder / "sensor"
         groundtie.simulate_sensor(
             folder, size=600, density="rural", relief=60, shift=40, drift=8, seed=2
         )
+        return folder
+
+    def _pair(self, name: str, **options: Any) -> Path:
+        folder = self.folder / name
+        if not folder.exists():
+            groundtie.simulate(folder, **options)
         return folder
 
 
@@ -84,8 +80,7 @@ def pipeline(_: Scenes) -> Figure:
         ("check", "held-out points", "check points"),
         ("rules", "one list,\neach names itself", "verdict"),
     )
-    figure, axes = _canvas(9.6, 2.7, 1)
-    axes = axes[0]
+    figure, (axes,) = _canvas(9.6, 2.7, 1)
     for number, (name, what, gives) in enumerate(stages):
         colour = ORANGE if name in ("check", "rules") else BLUE
         left = number * 1.4
@@ -164,7 +159,7 @@ def propagation(_: Scenes) -> Figure:
     bump = np.exp(-((cols - true[0]) ** 2 + (rows - true[1]) ** 2) / 3)
     surfaces = smooth / smooth.std() + rng.uniform(1.4, 3.2, (side * side, 1, 1)) * bump
     centres = np.array([(50 * c, 50 * r) for r in range(side) for c in range(side)])
-    after = belief_propagation.support(surfaces.astype(np.float32), centres, 75.0)
+    after = belief_propagation.propagate(surfaces.astype(np.float32), centres, 75.0)
     figure, axes = _canvas(8, 4.3, 8, rows=2)
     for column, chip in enumerate((8, 16, 24, 31)):
         for line, stack in enumerate((surfaces, after)):
@@ -182,7 +177,7 @@ def features(scenes: Scenes) -> Figure:
     window = Patch(values.astype(np.float32), np.ones(values.shape, bool))
     figure, axes = _canvas(5.8, 2.5, 2)
     for each, name in zip(axes, ("sift", "sift-oct"), strict=True):
-        found = Detector(name).detect(window)
+        found = sift_detector(name).detect(window)
         first = found.octave < 0
         each.imshow(_stretched(np.log(values + 1.0)), cmap="gray")
         for chosen, colour in ((first, ORANGE), (~first, BLUE)):
@@ -330,7 +325,7 @@ DRAWN: Mapping[str, Callable[[Scenes], Figure]] = {
     "method-search": search,
     "method-belief-propagation": propagation,
     "method-features": features,
-    "method-surf-hog": hog,
+    "method-hog": hog,
     "method-masks": masks,
     "method-rotation": rotation,
     "method-rpc": rpc,
@@ -448,11 +443,12 @@ def _rotated(image: FloatArray, angle_deg: float) -> FloatArray:
     middle = (image.shape[1] / 2 - 0.5, image.shape[0] / 2 - 0.5)
     matrix = cv2.getRotationMatrix2D(middle, angle_deg, 1.0)
     border = float(np.median(image))
-    return cv2.warpAffine(image, matrix, image.shape[::-1], borderValue=border)
+    return np.asarray(cv2.warpAffine(image, matrix, image.shape[::-1], borderValue=border), float)
 
 
 def _reduced(image: FloatArray) -> FloatArray:
-    return cv2.resize(image.astype(np.float64), (240, 240), interpolation=cv2.INTER_AREA)
+    small = cv2.resize(image.astype(np.float64), (240, 240), interpolation=cv2.INTER_AREA)
+    return np.asarray(small, float)
 
 
 def _true_shift_px(pair: Path, x: float | None, y: float | None) -> tuple[float, float]:

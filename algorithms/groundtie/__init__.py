@@ -4,7 +4,7 @@ Tools are functions (`coregister`, `warp`, `simulate`, …) of files, arrays (`R
 datasets; see `groundtie.tools`. `load_transform` reads the transform that a registration wrote.
 
 What is decided on the way, and why, goes to `logging` under this package's name: steps at level
-INFO, rejected tie points at DEBUG. Nobody hears it who does not ask.
+INFO, rejected tie points at DEBUG. Without a handler of the caller's it goes nowhere.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .tools.match_sar_sar import match_sar_sar
     from .tools.orthorectify import orthorectify
     from .tools.refine_rpc import refine_rpc
+    from .tools.register import register
     from .tools.similarity_surface import similarity_surface
     from .tools.simulate import simulate
     from .tools.simulate_sensor import simulate_sensor
@@ -54,6 +55,7 @@ __all__ = [
     "match_sar_sar",
     "orthorectify",
     "refine_rpc",
+    "register",
     "similarity_surface",
     "simulate",
     "simulate_sensor",

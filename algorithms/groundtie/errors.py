@@ -88,3 +88,11 @@ class NotRegisteredError(GroundTieError, RuntimeError):
     def __init__(self, message: str, verdict: Verdict | None = None) -> None:
         super().__init__(message)
         self.verdict = verdict
+
+
+def raised_by(error: Exception, package: str) -> bool:
+    """Return whether an exception's class is one of a package's own.
+
+    GDAL's errors pass through rasterio and fiona as classes that these keep to themselves.
+    """
+    return type(error).__module__.partition(".")[0] == package

@@ -1,4 +1,4 @@
-"""The pages of the tools say what the declarations say, and their links lead somewhere."""
+"""The pages agree with the declarations and the rules, and their links lead somewhere."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,7 @@ from groundtie.kinds import (
     Flag,
     FolderOut,
     Kind,
+    MaskIn,
     Number,
     RasterIn,
     RasterOut,
@@ -29,7 +31,8 @@ from groundtie.kinds import (
     VectorIn,
     VectorOut,
 )
-from groundtie.registration.verdict import refuse
+from groundtie.registration.rules import RULES
+from groundtie.registration.verdict import NOT_JUDGED
 from groundtie.tools import load_tools
 from scripts import document_tools
 
@@ -100,6 +103,7 @@ def test_advanced_parameters_stand_in_a_table_of_their_own() -> None:
         (RasterOut(**WORDS), "file: `.tif`, `.tiff`"),
         (VectorOut(**WORDS), "file: `.gpkg`, `.geojson`"),
         (FolderOut(**WORDS), "folder"),
+        (MaskIn(**WORDS), "raster, vector layer or classifier"),
         (RasterIn(**WORDS), "raster"),
         (VectorIn(**WORDS), "vector layer"),
         (Band(**WORDS, of="input"), "band number, from 1"),
@@ -175,6 +179,7 @@ def test_a_tool_without_a_page_is_an_error(tmp_path: Path) -> None:
 def test_the_script_repairs_a_page(tmp_path: Path) -> None:
     for tool in TOOLS:
         shutil.copy(document_tools.page_of(tool, DOCS), tmp_path)
+    shutil.copy(DOCS / document_tools.RULES_PAGE, tmp_path)
     spoilt = document_tools.page_of(TOOLS[0], tmp_path)
     original = spoilt.read_text(encoding="utf-8")
     spoilt.write_text(original.replace("| required |", "| – |"), encoding="utf-8")
@@ -188,6 +193,39 @@ def test_the_script_repairs_a_page(tmp_path: Path) -> None:
     )
     assert done.stdout.split() == [str(spoilt)]
     assert spoilt.read_text(encoding="utf-8") == original
+
+
+def rules_section() -> str:
+    page = (DOCS / document_tools.RULES_PAGE).read_text(encoding="utf-8")
+    _, _, rest = page.partition(document_tools.RULES_BEGIN)
+    return rest.partition(document_tools.RULES_END)[0]
+
+
+def test_the_page_on_the_verdict_agrees_with_the_list_of_rules() -> None:
+    assert rules_section().strip() == document_tools.rule_table(RULES), "run document_tools.py"
+
+
+def test_every_rule_stands_in_one_row_in_its_order() -> None:
+    header, *rows = table_rows(rules_section())
+    assert header == ["rule", "stage", "refuses", "source of the limit", "what to try"]
+    assert rows == [
+        [rule.name, rule.stage, rule.refuses, rule.source, rule.advice] for rule in RULES
+    ]
+
+
+def test_a_rule_that_changes_changes_the_page(tmp_path: Path) -> None:
+    path = tmp_path / document_tools.RULES_PAGE
+    shutil.copy(DOCS / document_tools.RULES_PAGE, path)
+    assert document_tools.document_rules(RULES, tmp_path) == []
+    changed = (replace(RULES[0], name="a house rule"), *RULES[1:])
+    assert document_tools.document_rules(changed, tmp_path) == [path]
+    assert "| a house rule |" in path.read_text(encoding="utf-8")
+
+
+def test_a_page_without_the_marks_of_its_rules_is_refused(tmp_path: Path) -> None:
+    (tmp_path / document_tools.RULES_PAGE).write_text(empty_page(), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"method-verdict\.md must hold once"):
+        document_tools.document_rules(RULES, tmp_path)
 
 
 @pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
@@ -218,4 +256,4 @@ def test_the_page_on_python_names_every_error_and_its_builtin() -> None:
 def test_the_page_on_reports_names_every_number_of_the_verdict() -> None:
     page = (DOCS / "report.md").read_text(encoding="utf-8")
     _, _, keys = page.partition("## The JSON")
-    assert {key for key in refuse("no reason").summary() if f"`{key}`" not in keys} == set()
+    assert {key for key in NOT_JUDGED.summary() if f"`{key}`" not in keys} == set()

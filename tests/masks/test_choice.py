@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from raster_files import utm_grid, write_raster
 
-from groundtie.masks.choice import MaskUsed, bright_share, choose
+from groundtie.masks.choice import MaskUsed, choose, share_of_strong_scatterers
 from groundtie.masks.regions import GroundRegions
 from groundtie.masks.scene import Scene
-from groundtie.progress import Progress
 from groundtie.rasters.reading import open_raster
 
 
@@ -18,15 +17,19 @@ def scene_of(path: Path, image: np.ndarray) -> Scene:
 
 
 @pytest.mark.parametrize("share", [0.05, 0.3])
-def test_the_bright_share_is_that_of_what_was_drawn(tmp_path: Path, share: float) -> None:
+def test_the_share_of_strong_scatterers_is_that_of_what_was_drawn(
+    tmp_path: Path, share: float
+) -> None:
     random = np.random.default_rng(0)
     power = np.ones((400, 400))
     power[: int(400 * share)] = 20.0
     image = np.sqrt(power * random.gamma(4, 1 / 4, power.shape)).astype(np.float32)
-    assert bright_share(scene_of(tmp_path / "a.tif", image)) == pytest.approx(share, abs=0.005)
+    assert share_of_strong_scatterers(scene_of(tmp_path / "a.tif", image)) == pytest.approx(
+        share, abs=0.005
+    )
 
 
-def never(progress: Progress) -> GroundRegions:
+def never() -> GroundRegions:
     raise AssertionError("there is no need to look for the ground")
 
 
@@ -34,7 +37,9 @@ def test_fields_need_no_mask(tmp_path: Path) -> None:
     random = np.random.default_rng(0)
     fields = np.kron(random.uniform(200, 500, (20, 20)), np.ones((20, 20)))
     fields *= np.sqrt(random.gamma(1, 1, fields.shape))
-    kind, reason = choose(scene_of(tmp_path / "a.tif", fields.astype(np.float32)), never)
+    kind, reason = choose(
+        share_of_strong_scatterers(scene_of(tmp_path / "a.tif", fields.astype(np.float32))), never
+    )
     assert kind == "none" and "too few" in reason
 
 
@@ -46,18 +51,18 @@ def test_dense_towns_get_regions_where_there_are_enough(
     tmp_path: Path, share: float, skeleton_m: float, expected: str
 ) -> None:
     random = np.random.default_rng(0)
-    shining = np.kron(random.random((20, 20)) < 0.25, np.ones((20, 20)))
-    town = np.where(shining, 600, 100) * np.sqrt(random.gamma(1, 1, shining.shape))
+    bright = np.kron(random.random((20, 20)) < 0.25, np.ones((20, 20)))
+    town = np.where(bright, 600, 100) * np.sqrt(random.gamma(1, 1, bright.shape))
     scene = scene_of(tmp_path / "a.tif", town.astype(np.float32))
-    part = np.zeros(shining.shape, bool)
+    part = np.zeros(bright.shape, bool)
     part[: round(share * 400)] = True
     ground = GroundRegions(scene, 1, part, part, part, skeleton_m, np.inf, part.size)
-    kind, reason = choose(scene, lambda _: ground)
+    kind, reason = choose(share_of_strong_scatterers(scene), lambda: ground)
     assert kind == expected
     assert f"{skeleton_m:.0f} m of roads" in reason
 
 
-def test_it_is_said_in_a_line() -> None:
+def test_it_fits_in_a_line() -> None:
     used = MaskUsed("threshold", "reference", 0.8, "it has the more speckle")
     assert used.line() == "mask: threshold, 80% of the reference take part; it has the more speckle"
     assert MaskUsed("none", None, 1.0, "as asked for").line() == "mask: none, as asked for"

@@ -1,14 +1,16 @@
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from textured_pairs import TexturedPair
+from textured_pairs import TexturedPair, shift_on_map
 
+from groundtie.context import Context
 from groundtie.errors import CancelledError
+from groundtie.geometry.models import Model
 from groundtie.matching.chips import ChipMatcher
+from groundtie.matching.matcher import ChipSurfaces, Places
 from groundtie.progress import Progress
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import ImagePair
@@ -18,12 +20,19 @@ CHIP, RADIUS = 40, 10
 CENTRES = np.array([[60, 60], [130, 120], [200, 170]])
 SETTINGS = SimilaritySettings("orientation")
 
-# The input claims the ground 70 m east and 45 m south: 7 columns right and 4.5 rows down.
+# Nominally the input shows the ground 70 m east and 45 m south: 7 columns right and 4.5 rows down.
 SHIFT_PX = (7.0, 4.5)
+NOMINAL = shift_on_map(0.0, 0.0)
 
 
 def matcher(pair: ImagePair, **more: object) -> ChipMatcher:
-    return ChipMatcher(pair, pair.grid, pair.nominal_px, SETTINGS, **more)
+    return ChipMatcher(pair, SETTINGS, **more)  # type: ignore[arg-type]
+
+
+def matched(
+    by: ChipMatcher, context: Context, centres: np.ndarray = CENTRES, model: Model = NOMINAL
+) -> ChipSurfaces:
+    return by.match(model, Places(by.pair.grid, centres, CHIP), RADIUS, context)
 
 
 def peaks(surfaces: np.ndarray) -> np.ndarray:
@@ -34,58 +43,57 @@ def peaks(surfaces: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("similarity", ["orientation", "nmi", "fused"])
 def test_surfaces_of_both_ways_peak_at_the_shift(
-    pair: ImagePair, executor: Executor, similarity: str
+    pair: ImagePair, context: Context, similarity: str
 ) -> None:
     settings = SimilaritySettings(similarity)
-    found = replace(matcher(pair), settings=settings).match(CENTRES, CHIP, RADIUS, executor)
-    assert found.radius == RADIUS
+    found = matched(replace(matcher(pair), settings=settings), context)
+    assert found.radius_px == RADIUS
     np.testing.assert_array_equal(found.centres, CENTRES)
-    for surfaces in (found.forward, found.backward, found.both):
+    for surfaces in (found.forward, found.backward, found.combined):
         assert surfaces.shape == (3, 2 * RADIUS + 1, 2 * RADIUS + 1)
         assert np.abs(peaks(surfaces) - SHIFT_PX).max() <= 1
 
 
-def test_one_way_is_the_same_as_the_first_of_both(pair: ImagePair, executor: Executor) -> None:
-    both = matcher(pair).match(CENTRES, CHIP, RADIUS, executor)
-    centres, forward = matcher(pair).match_forward(CENTRES, CHIP, RADIUS, executor)
+def test_one_way_is_the_same_as_the_first_of_both(pair: ImagePair, context: Context) -> None:
+    both = matched(matcher(pair), context)
+    places = Places(pair.grid, CENTRES, CHIP)
+    centres, forward = matcher(pair).match_forward(NOMINAL, places, RADIUS, context)
     np.testing.assert_array_equal(centres, both.centres)
     np.testing.assert_array_equal(forward, both.forward)
 
 
 def test_what_is_known_already_is_taken_out(
-    textured: TexturedPair, pair: ImagePair, executor: Executor
+    textured: TexturedPair, pair: ImagePair, context: Context
 ) -> None:
-    known = replace(matcher(pair), to_input_px=textured.truth.__call__)
-    found = known.match(CENTRES, CHIP, RADIUS, executor)
-    assert np.abs(peaks(found.both)).max() == 0
+    found = matched(matcher(pair), context, model=textured.truth.model)
+    assert np.abs(peaks(found.combined)).max() == 0
 
 
-def test_chips_without_enough_valid_pixels_are_left_out(
-    pair: ImagePair, executor: Executor
-) -> None:
+def test_chips_without_enough_valid_pixels_are_left_out(pair: ImagePair, context: Context) -> None:
     beyond = np.array([[-60, 60], [130, 120], [259, 239], [1000, 1000]])
-    found = matcher(pair).match(beyond, CHIP, RADIUS, executor)
+    found = matched(matcher(pair), context, beyond)
     assert found.centres.tolist() == [[130, 120]]
-    none = matcher(pair).match(beyond[-1:], CHIP, RADIUS, executor)
+    none = matched(matcher(pair), context, beyond[-1:])
     assert none.centres.shape == (0, 2)
-    assert none.both.shape == (0, 21, 21)
-    assert none.radius == RADIUS
+    assert none.combined.shape == (0, 21, 21)
+    assert none.radius_px == RADIUS
 
 
-def test_chips_that_are_held_out_are_left_out(pair: ImagePair, executor: Executor) -> None:
+def test_chips_that_are_held_out_are_left_out(pair: ImagePair, context: Context) -> None:
     def left_half(piece: Grid) -> np.ndarray:
         cols, rows = np.meshgrid(np.arange(piece.width), np.arange(piece.height))
         xy = piece.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
         return (pair.grid.map_to_pixel(xy)[:, 0] < 100).reshape(piece.height, piece.width)
 
-    found = matcher(pair, held_out=left_half).match(CENTRES, CHIP, RADIUS, executor)
+    found = matched(matcher(pair, held_out=left_half), context)
     assert found.centres.tolist() == CENTRES[1:].tolist()
 
 
-def test_progress_counts_chips_and_may_cancel(pair: ImagePair, executor: Executor) -> None:
+def test_progress_counts_chips_and_may_cancel(pair: ImagePair, context: Context) -> None:
     told: list[float] = []
     progress = Progress(lambda fraction, _: told.append(fraction))
-    matcher(pair).match(CENTRES, CHIP, RADIUS, executor, progress)
+    matched(matcher(pair), replace(context, progress=progress))
     np.testing.assert_allclose(told, [1 / 3, 2 / 3, 1])
     with pytest.raises(CancelledError):
-        matcher(pair).match(CENTRES, CHIP, RADIUS, executor, Progress(is_cancelled=lambda: True))
+        cancelled = Progress(is_cancelled=lambda: True)
+        matched(matcher(pair), replace(context, progress=cancelled))

@@ -2,49 +2,47 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from groundtie.matching.local import LocalSearch
-from groundtie.matching.rough import RoughSearch
 from raster_files import write_raster
 from textured_pairs import TexturedPair, shift_on_map, write_textured_pair
 
+from groundtie.context import threads
 from groundtie.geometry.estimation import Estimate
+from groundtie.geometry.limits import SearchLimits
 from groundtie.geometry.tie_points import TiePoints
-from groundtie.matching.layout import lay_out_chips
+from groundtie.matching.check import check_model
+from groundtie.matching.chips import ChipMatcher
+from groundtie.matching.held_out import HeldOut
 from groundtie.matching.pyramid import find_coarse_model
-from groundtie.progress import SILENT
+from groundtie.matching.surface_fit import SurfaceFit
 from groundtie.rasters.pair import ImagePair
 from groundtie.similarity.surface import SimilaritySettings
 
 
-def search_of(pair: ImagePair, similarity: str) -> LocalSearch:
-    return LocalSearch(pair, lay_out_chips(pair), SimilaritySettings(similarity))
-
-
 def registered(files: TexturedPair, kind: str, similarity: str) -> tuple[Estimate, TiePoints]:
-    with files.opened() as pair, ThreadPoolExecutor(2) as executor:
-        search = search_of(pair, similarity)
-        coarse = find_coarse_model(pair, search, RoughSearch(200.0), executor, SILENT)
-        assert coarse is not None
-        estimate = search.estimate(coarse, kind, 0, executor)
-        return estimate, search.check_points(estimate.transform.model, executor)
+    with files.opened() as pair, threads(2) as context:
+        held_out = HeldOut.of(pair)
+        matcher = ChipMatcher(pair, SimilaritySettings(similarity), held_out)
+        coarse = find_coarse_model(matcher, held_out, SearchLimits(200.0), context)
+        estimate = SurfaceFit(matcher, held_out.layout).estimate(coarse, kind, context)
+        model = estimate.transform.model
+        return estimate, check_model(matcher, held_out.layout, model, context).points
 
 
 def spoiled(files: TexturedPair, folder: Path, emptied: bool) -> TexturedPair:
     """Return the pair with a reference that shows noise or zeros wherever it is held out."""
     with files.opened() as pair:
-        search = search_of(pair, "fused")
+        layout = HeldOut.of(pair).layout
         grid = pair.reference.source.grid
         cols, rows = np.meshgrid(np.arange(float(grid.width)), np.arange(float(grid.height)))
         px = pair.grid.map_to_pixel(
             grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
         )
-        held_out = search.layout.held_out(px).reshape(cols.shape)
+        held_out = layout.held_out(px).reshape(cols.shape)
     values = files.reference_values
     noise = np.random.default_rng(9).integers(1, 60_000, values.shape, dtype=np.uint16)
     values = np.where(held_out, 0 if emptied else noise, values).astype(np.uint16)
@@ -58,7 +56,7 @@ def spoiled(files: TexturedPair, folder: Path, emptied: bool) -> TexturedPair:
     [
         ((300, 280), 1.0, "auto", "fused", False),
         ((300, 280), 1.0, "affine", "fused", True),
-        ((640, 240), 1.0, "affine", "fused", False),  # the rough search is at a coarser level
+        ((640, 240), 1.0, "affine", "fused", False),  # the coarse search is at a coarser level
         # the matching grid is coarser than the reference
         ((400, 390), 1.6, "affine", "fused", False),
         ((503, 501), 2.0, "affine", "nmi", False),
@@ -86,3 +84,27 @@ def test_pixels_held_out_of_the_fit_change_nothing_of_it(
     theirs = check.residual_px(estimate.transform)
     assert not np.array_equal(misled.residual_px(blind.transform), theirs)
     assert len(misled) == 0 or misled.score.mean() < 0.6 * check.score.mean()
+
+
+def test_held_out_pixels_are_the_same_at_any_level(pair: ImagePair) -> None:
+    """On its own pixels as the layout says; on larger ones also what they see of a block."""
+    held_out = HeldOut.of(pair)
+    layout, grid = held_out.layout, pair.grid
+    cols, rows = np.meshgrid(np.arange(float(grid.width)), np.arange(float(grid.height)))
+    px = np.column_stack([cols.ravel(), rows.ravel()])
+    exact = layout.held_out(px).reshape(cols.shape)
+    np.testing.assert_array_equal(held_out(grid), exact)
+    window = grid.window(37, 51, 90, 70)
+    np.testing.assert_array_equal(held_out(window), exact[51:121, 37:127])
+    for factor in (2.0, 3.7):
+        level = grid.scaled(factor)
+        mask = held_out(level)
+        centres = np.rint(np.array([(np.arange(n) + 0.5) * factor - 0.5 for n in (40, 40)])).astype(
+            int
+        )
+        seen = exact[np.ix_(centres[1], centres[0])]
+        assert mask[:40, :40][seen].all()
+        # By the reach of the kernel and no more: five pixels of the level a side of a block.
+        blocks = layout.columns.cells * layout.rows.cells
+        side = layout.columns.block / factor + 7
+        assert mask.sum() <= blocks * side**2

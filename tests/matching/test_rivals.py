@@ -1,21 +1,20 @@
-"""Repetitive places match more than once; the search says so instead of guessing."""
+"""Repetitive places match more than once; the search refuses instead of guessing."""
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
-from groundtie.matching.local import LocalSearch
-from groundtie.matching.rough import RoughSearch
 from raster_files import utm_grid, write_raster
 from textured_pairs import texture
 
-from groundtie.errors import NothingFoundError
-from groundtie.matching.layout import lay_out_chips
+from groundtie.context import threads
+from groundtie.errors import AmbiguousPlaceError
+from groundtie.geometry.limits import SearchLimits
+from groundtie.matching.chips import ChipMatcher
+from groundtie.matching.held_out import HeldOut
 from groundtie.matching.pyramid import find_coarse_model
-from groundtie.progress import SILENT
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.similarity.surface import SimilaritySettings
@@ -35,11 +34,12 @@ def coarse_shift_px(folder: Path, values: np.ndarray, radius_m: float) -> np.nda
     with (
         open_raster(first) as one,
         open_raster(second) as other,
-        ThreadPoolExecutor(2) as executor,
+        threads(2) as context,
     ):
         pair = make_pair(Image(one), Image(other))
-        search = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("orientation"))
-        model = find_coarse_model(pair, search, RoughSearch(radius_m), executor, SILENT)
+        held_out = HeldOut.of(pair)
+        matcher = ChipMatcher(pair, SimilaritySettings("orientation"), held_out)
+        model = find_coarse_model(matcher, held_out, SearchLimits(radius_m), context)
         centre = grid.pixel_to_map([grid.centre_px])
         return (grid.map_to_pixel(model(centre)) - [grid.centre_px])[0]
 
@@ -53,7 +53,7 @@ def tiled() -> np.ndarray:
 
 
 def test_a_place_that_repeats_itself_within_the_radius_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(NothingFoundError, match="two places match about as well"):
+    with pytest.raises(AmbiguousPlaceError, match="two places match about as well"):
         coarse_shift_px(tmp_path, tiled(), radius_m=500.0)
 
 

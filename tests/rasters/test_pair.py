@@ -14,7 +14,7 @@ from scipy.ndimage import binary_erosion
 
 from groundtie.errors import BandError, GeoreferencingError, NoOverlapError, SameFileError
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, compose, reproject
-from groundtie.rasters.pair import Image, ImagePair, Turn, default_radius_m, make_pair
+from groundtie.rasters.pair import Image, ImagePair, default_radius_m, make_pair
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import RasterSource, open_raster
 
@@ -124,16 +124,16 @@ def test_the_grid_is_cut_to_what_may_overlap_and_keeps_the_references_lattice(
     assert make_pair(files.image(), files.image(part)).grid == GRID.window(10, 0, 100, 90)
 
 
-@pytest.mark.parametrize(("largest_deg", "scale"), [(0.0, 1.0), (90.0, 1.0), (180.0, 1.4)])
-def test_the_grid_holds_all_that_a_turned_image_may_show(
+@pytest.mark.parametrize(("largest_deg", "scale"), [(0.0, 1.2), (90.0, 1.0), (180.0, 1.4)])
+def test_the_grid_holds_all_that_a_rotated_image_may_show(
     files: Files, largest_deg: float, scale: float
 ) -> None:
     """Without georeferencing images have one centre."""
     values = [np.arange(w * h, dtype=np.float32).reshape(h, w) for w, h in ((200, 160), (60, 40))]
     images = [Image(files.open(image, None)) for image in values]
-    pair = make_pair(*images, search_radius_m=5.0, turn=Turn(largest_deg, scale))
+    pair = make_pair(*images, search_radius_m=5.0, rotation_deg=largest_deg, scale=scale)
     assert pair.overlap_px == (60, 40)
-    # Turned by all angles up to the largest, the corners reach so far.
+    # Rotated by all angles up to the largest, the corners reach so far.
     angle = np.radians(np.arange(0, largest_deg + 1e-9))
     half = [30 * np.cos(angle) + 20 * np.sin(angle), 30 * np.sin(angle) + 20 * np.cos(angle)]
     right, down = (scale * np.abs(reach).max() + 5 for reach in half)
@@ -143,12 +143,12 @@ def test_the_grid_holds_all_that_a_turned_image_may_show(
     np.testing.assert_allclose(last, [99.5 + right, 79.5 + down], atol=1.1)
 
 
-@pytest.mark.parametrize("turn", [None, Turn(180.0, 1.0)])
-def test_the_surroundings_hold_where_what_is_matched_may_claim_to_lie(
-    files: Files, turn: Turn | None
+@pytest.mark.parametrize("rotation_deg", [0.0, 180.0])
+def test_the_surroundings_hold_where_what_is_matched_may_nominally_lie(
+    files: Files, rotation_deg: float
 ) -> None:
     larger = GRID.window(-300, -200, 700, 600)
-    pair = make_pair(files.image(GRID), files.image(larger), None, 250.0, turn)
+    pair = make_pair(files.image(GRID), files.image(larger), None, 250.0, rotation_deg)
     low, high = pair.grid.map_to_pixel(
         pair.surroundings.pixel_to_map(
             [[0, 0], [pair.surroundings.width - 1, pair.surroundings.height - 1]]
@@ -157,9 +157,9 @@ def test_the_surroundings_hold_where_what_is_matched_may_claim_to_lie(
     reach = 250.0 / GRID.pixel_size_m
     assert (low <= -reach).all()
     assert (high >= [119 + reach, 99 + reach]).all()
-    # What is turned may show the reference with any of its pixels.
+    # What is rotated may show the reference with any of its pixels.
     own = pair.grid.map_to_pixel(larger.pixel_to_map([[0, 0], [699, 599]]))
-    assert ((low <= own[0]) & (high >= own[1])).all() == (turn is not None)
+    assert ((low <= own[0]) & (high >= own[1])).all() == (rotation_deg > 0)
 
 
 def test_a_pixel_size_that_is_asked_for(files: Files) -> None:

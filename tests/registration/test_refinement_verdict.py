@@ -2,29 +2,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from evidences import IMAGE_SIZE, control, refinement
 
-from groundtie.registration.refinement_verdict import judge_refinement
-from groundtie.sensor.adjustment import Control, adjust
-
-SIZE = (1000, 800)
-
-
-def points(
-    shift: tuple[float, float],
-    count: int = 40,
-    noise_px: float = 0.3,
-    corner: float = 1.0,
-    seed: int = 0,
-) -> Control:
-    random = np.random.default_rng(seed)
-    px = random.uniform(0, 1, (count, 2)) * SIZE * corner
-    found = px + shift + random.normal(0, noise_px, px.shape)
-    return Control(px, found, np.tile(0.01 * np.eye(2), (count, 1, 1)), SIZE)
+from groundtie.registration.refinement_verdict import RefinementVerdict
+from groundtie.sensor.adjustment import Control
 
 
 def test_points_that_agree_confirm() -> None:
-    fit, check = points((20, -9)), points((20, -9), 15, seed=1)
-    found = judge_refinement(fit, adjust(fit), check, 0.5, 3.0)
+    fit, check = control((20, -9)), control((20, -9), 15, seed=1)
+    found = RefinementVerdict.of(refinement(fit, check, 0.5))
     assert found.verdict.accepted
     assert found.held_out == "check points"
     assert found.before.rmse == pytest.approx(np.hypot(20, 9), abs=0.2)
@@ -34,17 +20,17 @@ def test_points_that_agree_confirm() -> None:
 
 
 def test_without_check_points_each_is_judged_by_a_fit_without_it() -> None:
-    fit = points((20, -9))
-    found = judge_refinement(fit, adjust(fit), None, 1.0, 3.0)
+    fit = control((20, -9))
+    found = RefinementVerdict.of(refinement(fit))
     assert found.verdict.accepted
     assert found.held_out == "points left out in turn"
     assert found.verdict.check_points == 40
 
 
 def test_what_is_not_better_than_before_is_refused() -> None:
-    fit = points((0, 0))
-    check = points((0, 0), 15, noise_px=0.01, seed=1)
-    found = judge_refinement(fit, adjust(fit), check, 1.0, 3.0)
+    fit = control((0, 0))
+    check = control((0, 0), 15, noise_px=0.01, seed=1)
+    found = RefinementVerdict.of(refinement(fit, check))
     assert not found.verdict.accepted
     assert "not nearer than before" in found.verdict.reason
 
@@ -52,22 +38,22 @@ def test_what_is_not_better_than_before_is_refused() -> None:
 @pytest.mark.parametrize(
     ("fit", "check", "max_error_px", "reason"),
     [
-        (points((20, -9)), points((0, 0), 15, 40.0, seed=1), 3.0, "agree"),
-        (points((20, -9), corner=0.2), None, 3.0, "spread over"),
-        (points((20, -9), noise_px=1.5), None, 0.5, "above 0.5 px"),
-        (points((20, -9)), points((26, -9), 15, seed=1), 3.0, "agree"),
+        (control((20, -9)), control((0, 0), 15, 40.0, seed=1), 3.0, "agree"),
+        (control((20, -9), corner=0.2), None, 3.0, "spread over"),
+        (control((20, -9), noise_px=1.5), None, 0.5, "above 0.5 px"),
+        (control((20, -9)), control((26, -9), 15, seed=1), 3.0, "agree"),
     ],
 )
 def test_refusals(fit: Control, check: Control | None, max_error_px: float, reason: str) -> None:
-    found = judge_refinement(fit, adjust(fit, "shift"), check, 1.0, max_error_px)
+    found = RefinementVerdict.of(refinement(fit, check, 1.0, max_error_px, "shift"))
     assert not found.verdict.accepted
     assert reason in found.verdict.reason
 
 
 def test_a_model_that_points_do_not_hold_is_refused() -> None:
-    """Points on a strip across the image say nothing of its rows."""
-    fit = points((20, -9), 20, 1.2)
+    """Points on a strip across the image show nothing of its rows."""
+    fit = control((20, -9), 20, 1.2)
     strip = fit.expected_px * [1.0, 0.26]
-    narrow = Control(strip, strip + fit.found_px - fit.expected_px, fit.covariance_px2, SIZE)
-    found = judge_refinement(narrow, adjust(narrow, "affine"), None, 1.0, 2.2)
+    narrow = Control(strip, strip + fit.found_px - fit.expected_px, fit.covariance_px2, IMAGE_SIZE)
+    found = RefinementVerdict.of(refinement(narrow, None, 1.0, 2.2, "affine"))
     assert not found.verdict.accepted

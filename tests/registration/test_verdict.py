@@ -2,72 +2,40 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from raster_files import UTM, utm_grid
+from evidences import (
+    GRID,
+    RADIUS,
+    check_points,
+    estimated,
+    evidence,
+    fallen,
+    fit_points,
+    scatter,
+)
+from raster_files import UTM
 
+from groundtie.errors import BandError, NothingFoundError
 from groundtie.geometry.chance import agreement_probability, log10_chance
 from groundtie.geometry.estimation import Estimate
-from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.judging import LOG10_CHANCE_ON_GROUND
-from groundtie.geometry.model_choice import block_folds
 from groundtie.geometry.models import PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
-from groundtie.registration.verdict import Verdict, judge, refuse
+from groundtie.registration.evidence import RegistrationEvidence, SearchEvidence
+from groundtie.registration.rules import RULES
+from groundtie.registration.verdict import NOT_JUDGED, Verdict, judge, judge_search
 
-GRID = utm_grid(600, 500)
-RADIUS = 16
 TRUTH = Transform.nominal(UTM, GRID)
-
-
-def points(px: np.ndarray, error_px: np.ndarray, *, check: bool) -> TiePoints:
-    """Return points of an image that is registered already, with errors of their matches."""
-    count = len(px)
-    return TiePoints(
-        reference_xy=GRID.pixel_to_map(px),
-        input_px=px + error_px,
-        score=np.full(count, 8.0),
-        covariance_px2=np.tile(0.04 * np.eye(2), (count, 1, 1)),
-        forward_backward_error_px=np.zeros(count),
-        is_check=np.full(count, check),
-        state=np.full(count, "used"),
-    )
-
-
-def fit_points(within: tuple[float, float] = (1.0, 1.0), sigma: float = 0.3) -> TiePoints:
-    rng = np.random.default_rng(1)
-    cols, rows = np.meshgrid(np.linspace(20, 579, 9), np.linspace(20, 479, 8))
-    px = np.column_stack([cols.ravel(), rows.ravel()]) * within
-    return points(px, sigma * rng.normal(size=px.shape), check=False)
-
-
-def estimated(fit: TiePoints, kind: str = "affine") -> Estimate:
-    """Fit a model to points as the search does: on the map, and in pixels without each block."""
-    px, nominal_px = GRID.map_to_pixel(fit.reference_xy), fit.input_px
-    on_map = fit_model(kind, fit.reference_xy, GRID.pixel_to_map(nominal_px))
-    folds = block_folds(px)
-    left_out = [fit_model(kind, px[folds != f], nominal_px[folds != f]) for f in np.unique(folds)]
-    return Estimate(Transform(on_map, UTM, GRID), fit, tuple(left_out))
-
-
-def check_points(error_px: np.ndarray) -> TiePoints:
-    rng = np.random.default_rng(2)
-    px = rng.uniform([30, 30], [570, 470], (len(error_px), 2))
-    return points(px, error_px, check=True)
-
-
-def scatter(count: int, sigma: float, seed: int = 3) -> np.ndarray:
-    return sigma * np.random.default_rng(seed).normal(size=(count, 2))
-
-
-def fallen(count: int, seed: int = 4) -> np.ndarray:
-    return np.random.default_rng(seed).uniform(-RADIUS, RADIUS, (count, 2))
+LOST = judge_search(SearchEvidence(NothingFoundError("nothing in common was found")))
 
 
 def judged(check: TiePoints, estimate: Estimate | None = None, max_error: float = 3.0) -> Verdict:
-    return judge(estimate or estimated(fit_points()), check, GRID, max_error, RADIUS)
+    estimate = estimate or estimated(fit_points())
+    return judge(RegistrationEvidence(estimate, check, GRID, max_error, RADIUS))
 
 
 @pytest.mark.parametrize("sigma", [0.2, 0.7, 1.2])
@@ -88,15 +56,6 @@ def test_right_points_are_accepted_and_their_error_measured(sigma: float, wrong:
     assert (verdict.fit_points, verdict.check_points) == (72, count)
     assert verdict.points == verdict.fit_points_used + verdict.check_points_agreeing
     assert verdict.extrapolated_share < 0.2
-
-
-@pytest.mark.parametrize(("right", "clear"), [(26, True), (22, False)])
-def test_of_a_clear_verdict_two_check_points_of_three_agree(right: int, clear: bool) -> None:
-    """Of 36."""
-    verdict = judged(check_points(np.concatenate([scatter(right, 0.4), fallen(36 - right)])))
-    assert verdict.accepted
-    assert verdict.check_points_agreeing == pytest.approx(right, abs=1)
-    assert verdict.is_clear == clear
 
 
 def test_ce90_holds_ninety_percent_of_the_errors() -> None:
@@ -138,7 +97,7 @@ def test_points_in_one_corner_do_not_hold_the_rest() -> None:
     assert "do not hold the model" in verdict.reason or "check points agree" in verdict.reason
 
 
-def test_a_shift_of_points_in_one_corner_is_accepted_and_the_rest_said_to_be_extrapolated() -> None:
+def test_a_shift_of_points_in_one_corner_is_accepted_and_the_rest_is_extrapolated() -> None:
     estimate = estimated(fit_points(within=(0.3, 0.3)), "translation")
     verdict = judged(check_points(scatter(72, 0.3)), estimate)
     assert verdict.accepted
@@ -182,8 +141,8 @@ def test_where_the_ground_of_a_town_was_matched_three_of_nine_are_not_enough(
 ) -> None:
     away = 9.0 * np.array([[1, 0], [0, -1], [-1, 1], [1, 1], [-1, 0], [0, 1]])
     check = check_points(np.concatenate([np.zeros((right, 2)), away[:wrong]]))
-    estimate = estimated(fit_points())
-    found = judge(estimate, check, GRID, 3.0, RADIUS, LOG10_CHANCE_ON_GROUND)
+    whole = evidence(np.zeros((3, 2)))
+    found = judge(replace(whole, check=check, largest_log10_chance=LOG10_CHANCE_ON_GROUND))
     assert found.accepted == accepted
     assert judged(check).accepted
 
@@ -208,18 +167,46 @@ def test_summaries_are_json_whatever_happened() -> None:
     one_fold = Estimate(one_fold.transform, one_fold.points, one_fold.fold_models[:1])
     unheld = judged(check_points(np.zeros((30, 2))), one_fold)
     assert not unheld.accepted
-    for verdict in (exact, judged(check_points(fallen(72))), refuse("nothing", 7), unheld):
+    for verdict in (exact, judged(check_points(fallen(72))), LOST, NOT_JUDGED, unheld):
         summary = json.loads(json.dumps(verdict.summary(), allow_nan=False))
         assert summary["accepted"] is verdict.accepted
         assert summary["reason"] == verdict.reason
         assert summary["points"] == verdict.points
         assert set(summary) == set(vars(verdict)) | {"points", "chance"}
-    assert refuse("nothing", 7).summary()["check_rmse_px"] is None
-    assert refuse("nothing", 7).fit_points == 7
+    assert LOST.summary()["check_rmse_px"] is None
+    assert NOT_JUDGED.summary()["check_rmse_px"] is None
 
 
-def test_what_the_model_predicts_is_judged_not_what_the_input_claims() -> None:
-    """The input claims to lie 80 m off; the model knows it, so that its points agree."""
+def test_a_refusal_names_its_rule_and_what_to_try() -> None:
+    accepted = judged(check_points(scatter(72, 0.3)))
+    assert (accepted.rule, accepted.advice) == ("", "")
+    assert accepted.sentence() == accepted.reason
+    refused = judged(check_points(fallen(72)))
+    rule = next(rule for rule in RULES if rule.name == refused.rule)
+    assert refused.advice == rule.advice
+    assert refused.sentence() == f"{refused.reason}; {rule.advice}"
+
+
+def test_the_first_rule_that_refuses_decides() -> None:
+    """Neither do these points agree, nor does the ground match; agreement is asked first."""
+    assert judge(evidence(fallen(72), ground_shift_px=9.0)).rule == "chance agreement"
+    errors = scatter(72, 0.3) + [1.2, 0.0]
+    found = judge(evidence(errors, max_error_px=1.0, ground_shift_px=9.0))
+    assert found.rule == "error at held-out points"
+    # What is refused for its error or its scene has figures all the same.
+    assert found.check_rmse_px > 1
+    assert judge(evidence(errors, ground_shift_px=9.0)).check_rmse_px > 1
+
+
+def test_a_search_that_failed_is_a_refusal_and_bad_input_is_not() -> None:
+    assert (LOST.accepted, LOST.rule) == (False, "nothing in common")
+    assert LOST.reason == "nothing in common was found"
+    with pytest.raises(BandError, match="no band 7"):
+        judge_search(SearchEvidence(BandError("there is no band 7")))
+
+
+def test_what_the_model_predicts_is_judged_not_the_nominal_place() -> None:
+    """Nominally the input lies 80 m off; the model knows it, so that its points agree."""
     shift = PolynomialModel("translation", TRUTH.model.frame, np.array([[80.0, -50.0]]))
     fit = fit_points()
     moved = Estimate(Transform(shift, UTM, GRID), fit, estimated(fit).fold_models)

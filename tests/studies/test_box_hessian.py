@@ -69,7 +69,7 @@ def test_threads_change_nothing() -> None:
 
 
 def test_filters_are_those_of_the_paper() -> None:
-    # Bay et al. 2008, figure 7.
+    # [Bay2008] figure 7.
     assert [octave_sides(octave) for octave in range(4)] == [
         (9, 15, 21, 27),
         (15, 27, 39, 51),

@@ -53,7 +53,7 @@ def test_poses_are_found(
 
 
 def test_better_than_the_lattice_of_angles(context: Context) -> None:
-    """Thesis P gets 2.8125° for 3°, the step of its lattice."""
+    """[Patel2017] gets 2.8125° for 3°, the step of its lattice."""
     truth = Pose(3.1)
     assert truth.rotation_deg / ANGLE_STEP_DEG % 1 != 0
     found = fourier_mellin(REFERENCE, window((160, 160), truth), SearchLimits(5, 30), GREY, context)

@@ -11,7 +11,8 @@ from groundtie.geometry.limits import SearchLimits
 from groundtie.pose.pose import Pose
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.binning import MASKED
-from groundtie.similarity.measures import mutual_information, normalized_mutual_information
+from groundtie.similarity.joint_histogram import ORDER
+from groundtie.similarity.measures import normalized_mutual_information
 from groundtie.similarity.surface import SimilaritySettings
 from groundtie.studies.climbing import (
     Counted,
@@ -21,6 +22,7 @@ from groundtie.studies.climbing import (
     search_by_climbing,
     spread_px,
 )
+from groundtie.studies.measures import mutual_information
 from groundtie.studies.objective import BinnedPair, bin_pair
 
 COUNTS = (4, 5)
@@ -101,10 +103,10 @@ def patch(values: np.ndarray) -> Patch:
 
 def test_windows_are_binned_by_the_settings() -> None:
     ramp = patch(np.arange(400.0).reshape(20, 20))
-    pair = bin_pair(ramp, ramp, SimilaritySettings("mi", bins=16, gpve_order=3))
+    pair = bin_pair(ramp, ramp, SimilaritySettings("mi", bins=16))
     assert pair is not None
     assert pair.measure is mutual_information
-    assert (pair.counts, pair.order) == ((16, 16), 3)
+    assert (pair.counts, pair.order) == ((16, 16), ORDER)
     np.testing.assert_array_equal(np.bincount(pair.template.ravel()), np.full(16, 25))
     # Identical images: MI is the entropy, of 16 equally frequent bins.
     assert pair.aligned((0.0, 0.0)) == pytest.approx(np.log(16))

@@ -28,7 +28,7 @@ def test_overlap_errors_are_shapely_s(apart: float, scales: tuple[float, float])
 
 
 def test_three_pixels_apart_is_an_error_of_about_a_tenth() -> None:
-    # Thesis S 6.6.2: 0–10 % are usually 0–3 pixels.
+    # [Suri2010] 6.6.2: 0–10 % are usually 0–3 pixels.
     assert overlap_error(circles([[0, 0]]), circles([[2.3, 0]]))[0] < 0.1
     assert overlap_error(circles([[0, 0]]), circles([[3.5, 0]]))[0] > 0.1
 

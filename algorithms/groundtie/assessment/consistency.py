@@ -1,7 +1,7 @@
 """Registration consistency: how far several transforms that should cancel out do not.
 
 Consistency needs no points, but is no measure of accuracy: transforms that are wrong in the same
-way are consistent. Source: [Suri2010] eq 2.4 (two-way, after Holden et al. 2000) and eq 5.2
+way are consistent. Source: [Suri2010] eq 2.4 (two-way, after [Holden2000]) and eq 5.2
 (three-way).
 """
 

@@ -1,4 +1,4 @@
-"""What of an image a classifier lets take part, told on a lattice of its pixels."""
+"""What of an image a classifier lets take part, decided on a lattice of its pixels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..rasters.reading import Mask, Window
 from .classifier import FeatureClassifier
 from .patch_statistics import NO_BANDS, PATCH_PX, FloatImage
 
-# So many pixels a side are told together: few of those that their patches see.
+# So many pixels a side are decided together: few of those that their patches see.
 _CELL_PX = 8
 
 _MARGIN_PX = PATCH_PX // 2
@@ -25,7 +25,7 @@ _BACK_PX = PATCH_PX // 4
 
 @dataclass(frozen=True)
 class ClassifiedScene:
-    """A scene, and the classifier that tells of each cell of its grid whether it takes part.
+    """A scene, and the classifier that decides of each cell of its grid whether it takes part.
 
     Parameters
     ----------
@@ -46,12 +46,12 @@ class ClassifiedScene:
         back = _BACK_PX
         col, row, width, height = window
         around = Window(col - back, row - back, width + 2 * back, height + 2 * back)
-        kept, shown = self._kept(around)
+        kept, valid = self._kept(around)
         # Nothing is drawn back from where the image ends.
-        masked = (~(kept & shown)).astype(np.uint8)
+        masked = (~(kept & valid)).astype(np.uint8)
         core = cv2.erode(masked, np.ones((2 * back + 1,) * 2, np.uint8))
         inside = slice(back, back + height), slice(back, back + width)
-        return Selection((core == 0)[inside] & shown[inside], shown[inside])
+        return Selection((core == 0)[inside] & valid[inside], valid[inside])
 
     def _kept(self, window: Window) -> tuple[Mask, Mask]:
         """Return which pixels' surroundings the classifier keeps, and which are valid."""
@@ -73,6 +73,6 @@ class ClassifiedScene:
         kept = self.classifier.keep(patch, middles, bands).reshape(down, across)
         pixels = kept.repeat(_CELL_PX, axis=0).repeat(_CELL_PX, axis=1)
         inside = slice(window.row - row, None), slice(window.col - col, None)
-        shown = patch.valid[_MARGIN_PX:, _MARGIN_PX:]
+        valid = patch.valid[_MARGIN_PX:, _MARGIN_PX:]
         size = slice(window.height), slice(window.width)
-        return pixels[inside][size], shown[inside][size]
+        return pixels[inside][size], valid[inside][size]

@@ -1,6 +1,6 @@
-"""A support vector machine that tells which features may be matched ([Patel2017] 5.2, 5.3).
+"""A support vector machine that decides which keypoints may be matched ([Patel2017] 5.2, 5.3).
 
-It is kept as JSON that says all there is to it, and needs no scikit-learn to be used.
+It is kept as complete JSON, and needs no scikit-learn to be used.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class FeatureClassifier:
     def keep(
         self, window: Patch, px: FloatArray, bands: FloatImage = NO_BANDS
     ) -> NDArray[np.bool_]:
-        """Tell which positions of a window may be matched, shape (n,).
+        """Return which positions of a window may be matched, shape (n,).
 
         Parameters
         ----------

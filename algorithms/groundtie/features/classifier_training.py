@@ -12,7 +12,7 @@ from .classifier import DEGREE, OFFSET, FeatureClassifier
 
 FloatArray = NDArray[np.float64]
 
-# Fewer labelled points of a class than this tell nothing.
+# Fewer labelled points of a class than this carry no information.
 FEWEST_POINTS = 10
 
 # More of a class make training longer, not better.
@@ -127,7 +127,7 @@ def train_classifier(
 def left_out_accuracy(
     labelled: Training, statistics: str, kernel: str, seed: int, balanced: bool = False
 ) -> float:
-    """Return the mean share of both classes that classifiers tell which have not seen them.
+    """Return the mean share of both classes that classifiers decide right which have not seen them.
 
     Blocks of neighbouring points are left out of the training together; NaN if the points of a
     class lie too near each other for that.
@@ -136,7 +136,7 @@ def left_out_accuracy(
     unit = (labelled.px - low) / np.maximum(high - low, 1e-9)
     block = np.minimum((unit * _BLOCKS).astype(int), _BLOCKS - 1)
     folds = block.sum(axis=1) % _FOLDS
-    told: list[NDArray[np.bool_]] = []
+    decided: list[NDArray[np.bool_]] = []
     truth: list[NDArray[np.bool_]] = []
     for fold in range(_FOLDS):
         rest, out = labelled.take(folds != fold), labelled.take(folds == fold)
@@ -144,11 +144,11 @@ def left_out_accuracy(
             found = train_classifier(rest, statistics, kernel, 1.0, seed, balanced)
         except TooFewPointsError:
             continue
-        told.append(found.decide(out.statistics) > 0)
+        decided.append(found.decide(out.statistics) > 0)
         truth.append(out.kept)
-    if not told:
+    if not decided:
         return float("nan")
-    right, kept = np.concatenate(told) == np.concatenate(truth), np.concatenate(truth)
+    right, kept = np.concatenate(decided) == np.concatenate(truth), np.concatenate(truth)
     if kept.all() or not kept.any():
         return float("nan")
     return float((right[kept].mean() + right[~kept].mean()) / 2)

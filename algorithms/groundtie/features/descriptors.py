@@ -2,7 +2,7 @@
 
 Gradients around a keypoint are sampled on a lattice that rotates and grows with it, so where a
 sample lies in the descriptor is the same for all keypoints: its share in the 4 × 4 cells is one
-constant matrix, and all keypoints are described by one product. Lowe 2004; [Suri2010] appendix.
+constant matrix, and all keypoints are described by one product. [Lowe2004]; [Suri2010] appendix.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""SIFT's keypoints (Lowe 2004; [Suri2010] 6.3): with all octaves, or without the first.
+"""SIFT's keypoints ([Lowe2004]; [Suri2010] 6.3): with all octaves, or without the first.
 
 The first octave of SIFT's scale space, on the image at twice its size, holds most keypoints of a
 SAR image, and most of them are speckle. SIFT-OCT leaves this octave out. OpenCV's SIFT always

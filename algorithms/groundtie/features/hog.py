@@ -2,7 +2,7 @@
 
 The patch of 41 × 41 pixels around a keypoint is divided into 3 × 3 cells; each has a histogram of
 the directions of gradients, which neither contrast nor its sign changes: 81 values with nine
-directions, 63 with seven. Dalal & Triggs 2005.
+directions, 63 with seven. [Dalal2005].
 """
 
 from __future__ import annotations

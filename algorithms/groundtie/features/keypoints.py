@@ -1,4 +1,4 @@
-"""Features: where they are, how large, which way they point and how strong they are."""
+"""Keypoints: where they are, how large, which way they point and how strong they are."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Keypoints:
-    """A table of features, one row a feature.
+    """A table of keypoints, one row a keypoint.
 
     Parameters
     ----------
     position_px
         Position (col, row), pixel centres at integers, shape (n, 2).
     scale_px
-        Characteristic scale: standard deviation of the Gaussian at which the feature stands out
+        Characteristic scale: standard deviation of the Gaussian at which the keypoint stands out
         most, in pixels, shape (n,).
     orientation_rad
         Direction of the gradients around it, from columns towards rows, shape (n,); 0 for upright
-        features.
+        ones.
     response
         How far it stands out; larger is stronger, shape (n,).
     octave
@@ -52,15 +52,15 @@ class Keypoints:
         return Keypoints(**{name: getattr(self, name)[which] for name in _FIELDS})
 
     def moved(self, by_px: ArrayLike) -> Keypoints:
-        """Return the features with positions (col, row) moved by `by_px`."""
+        """Return the keypoints with positions (col, row) moved by `by_px`."""
         return replace(self, position_px=self.position_px + np.asarray(by_px, float))
 
     def with_orientation(self, orientation_rad: FloatArray) -> Keypoints:
-        """Return the features with other orientations, shape (n,)."""
+        """Return the keypoints with other orientations, shape (n,)."""
         return replace(self, orientation_rad=orientation_rad)
 
     def strongest(self, count: int) -> Keypoints:
-        """Return at most so many features: those with the largest response, in their order."""
+        """Return at most so many keypoints: those with the largest response, in their order."""
         if len(self) <= count:
             return self
         # Among equals the first are kept.

@@ -1,4 +1,4 @@
-"""What the patch around a feature is like, in a few numbers ([Patel2017] 5.3)."""
+"""What the patch around a keypoint is like, in a few numbers ([Patel2017] 5.3)."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ def _mean_and_variance(values: FloatArray, bands: FloatImage, means: Means) -> l
 
 def _band_ratios(values: FloatArray, bands: FloatImage, means: Means) -> list[FloatArray]:
     of_bands = [means(band.astype(np.float64)) for band in bands]
-    together = np.sum(of_bands, axis=0)
+    total = np.sum(of_bands, axis=0)
     # Where all is black, all bands are alike.
-    black = np.abs(together) < 1e-9
-    together[black] = 1.0
-    shares = [np.where(black, 1 / len(bands), mean / together) for mean in of_bands]
+    black = np.abs(total) < 1e-9
+    total[black] = 1.0
+    shares = [np.where(black, 1 / len(bands), mean / total) for mean in of_bands]
     return [*_mean_and_variance(values, bands, means), *shares]
 
 

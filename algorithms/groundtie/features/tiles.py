@@ -1,4 +1,4 @@
-"""Tiles in which features are found, and what finds and describes them there."""
+"""Tiles in which keypoints are found, and what finds and describes them there."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from .keypoints import Keypoints
 
 FloatArray = NDArray[np.float64]
 
-# Tiles of a grid, and what features near their border see beyond it.
+# Tiles of a grid, and what keypoints near their border see beyond it.
 _TILE_PX = 1024
 MARGIN_PX = 64
 
 
 class Detecting(Protocol):
-    """What finds features."""
+    """What finds keypoints."""
 
     def detect(self, window: Patch) -> Keypoints:
-        """Return the features of an image window, upright."""
+        """Return the keypoints of an image window, upright."""
 
 
 class Describing(Protocol):
-    """What describes features."""
+    """What describes keypoints."""
 
     def describe(self, window: Patch, found: Keypoints) -> tuple[Keypoints, FloatImage]:
-        """Return m features, which may be repeated, and their descriptors, shape (m, k)."""
+        """Return m keypoints, which may be repeated, and their descriptors, shape (m, k)."""
 
 
 def widened(window: Window, margin: int) -> Window:
@@ -42,7 +42,7 @@ def widened(window: Window, margin: int) -> Window:
 
 
 def inside(px: FloatArray, window: Window) -> Mask:
-    """Tell which positions (col, row), shape (n, 2), lie on the pixels of a window."""
+    """Return which positions (col, row), shape (n, 2), lie on the pixels of a window."""
     at = np.rint(px)
     low = np.array([window.col, window.row])
     return np.asarray(np.all((at >= low) & (at < low + [window.width, window.height]), axis=1))

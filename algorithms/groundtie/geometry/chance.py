@@ -2,7 +2,7 @@
 
 A match that says nothing falls anywhere in its search window, and within the tolerance of a model
 with probability p = tolerance area / window area. That at least k of n such matches agree is a
-binomial tail [Moisan2004].
+binomial tail ([Moisan2004]).
 """
 
 from __future__ import annotations

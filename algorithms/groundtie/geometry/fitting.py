@@ -75,7 +75,7 @@ def _solve(design: FloatArray, target: FloatArray, weights: FloatArray) -> Float
 def _fit_similarity(
     uv: FloatArray, nominal_uv: FloatArray, weights: FloatArray, *, scaled: bool
 ) -> FloatArray:
-    """Rotation, shift and, if `scaled`, scale, in closed form [Umeyama1991], as coefficients."""
+    """Rotation, shift and, if `scaled`, scale, in closed form ([Umeyama1991]), as coefficients."""
     share = (weights / weights.sum())[:, None]
     centre, nominal_centre = (share * uv).sum(axis=0), (share * nominal_uv).sum(axis=0)
     z = (uv - centre) @ [1, 1j]
@@ -89,7 +89,7 @@ def _fit_similarity(
 def _fit_thin_plate(
     frame: Frame, uv: FloatArray, displacement: FloatArray, weights: FloatArray
 ) -> ThinPlateSpline:
-    """Smoothing thin-plate spline [Wahba1990]: residuals weigh against bending."""
+    """Smoothing thin-plate spline ([Wahba1990]): residuals weigh against bending."""
     count = len(uv)
     affine_part = monomials(uv, 1)
     stiffness = TPS_STIFFNESS * weights.mean() / weights

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import fiona
-from fiona._err import CPLE_BaseError
 from fiona.errors import FionaError, TransactionError
 from rasterio.crs import CRS
+
+from ..errors import raised_by
 
 
 def write_layer(
@@ -49,10 +50,14 @@ def write_layer(
         # SQLite may meet a full disk in silence.
         with fiona.open(path, layer=name) as layer:
             complete = len(layer) == len(records)
-    except (TransactionError, CPLE_BaseError, RuntimeError):
+    except (TransactionError, RuntimeError):
         complete = False
     except FionaError as error:
         raise OSError(str(error)) from error
+    except Exception as error:
+        if not raised_by(error, "fiona"):
+            raise
+        complete = False
     if not complete:
         raise OSError("the file is not complete; is the disk full?")
 
@@ -69,5 +74,7 @@ def read_layer(path: Path) -> tuple[list[dict[str, Any]], CRS | None]:
         with fiona.open(path) as layer:
             crs = CRS.from_wkt(layer.crs_wkt) if layer.crs_wkt else None
             return [dict(feature["properties"]) for feature in layer], crs
-    except (FionaError, CPLE_BaseError) as error:
+    except Exception as error:
+        if not raised_by(error, "fiona"):
+            raise
         raise OSError(str(error)) from error

@@ -20,7 +20,7 @@ Mask = NDArray[np.bool_]
 T = TypeVar("T")
 
 # A more flexible model must raise the left-out scores by so many of their standard errors: by one,
-# as is usual (Hastie et al. 2009, 7.10), but bending, which extrapolates badly, by two. Any shift
+# as is usual ([Hastie2009] 7.10), but bending, which extrapolates badly, by two. Any shift
 # is better than none. Measured with `make bench`.
 STANDARD_ERRORS = {
     "translation": 0.0,

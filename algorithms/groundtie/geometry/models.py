@@ -1,7 +1,7 @@
 """Models of the misregistration: maps of the plane onto itself.
 
 A model takes a position on the reference map to the place where the input's own georeferencing
-has this ground. Both are in reference map units. Thesis S eq 3.27–3.32, P eq 2.2–2.7.
+has this ground. Both are in reference map units. [Suri2010] eq 3.27–3.32, [Patel2017] eq 2.2–2.7.
 """
 
 from __future__ import annotations
@@ -177,7 +177,7 @@ class PolynomialModel(Model):
 
 @dataclass(frozen=True)
 class ThinPlateSpline(Model):
-    """Thin-plate spline: an affine part and bending weights at control points (Bookstein 1989).
+    """Thin-plate spline: an affine part and bending weights at control points ([Bookstein1989]).
 
     Parameters
     ----------

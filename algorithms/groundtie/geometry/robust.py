@@ -88,7 +88,7 @@ def find_consensus(
     kind: str = "affine",
     seed: int = 0,
 ) -> Model:
-    """Return the model of degree ≤ 1 that most pairs agree with (MSAC [Torr2000]).
+    """Return the model of degree ≤ 1 that most pairs agree with (MSAC; [Torr2000]).
 
     Parameters
     ----------

@@ -87,6 +87,14 @@ class TiePoints:
         return replace(self, **columns, more=more)
 
     @classmethod
+    def none(cls) -> TiePoints:
+        """Return a table without rows."""
+        zero = np.zeros(0)
+        place = np.zeros((0, 2))
+        nothing = np.zeros(0, bool)
+        return cls(place, place, zero, np.zeros((0, 2, 2)), zero, nothing, nothing.astype(str))
+
+    @classmethod
     def concatenate(cls, tables: list[TiePoints]) -> TiePoints:
         """Return the rows of all tables, which have one map and the same further columns."""
         first = tables[0]

@@ -3,7 +3,7 @@
 Coarse to fine: every rotation and scale is tried on small images; the best candidates are tried
 again in finer steps on larger ones, and compared with one another on the way. Similarity is the
 correlation of squared orientation fields, which is quick over all shifts, and does not depend on
-contrast, which differs between SAR and optical images. Source: [Patel2011], section 3.2.2.
+contrast, which differs between SAR and optical images. Source: [Patel2017], section 3.2.2.
 """
 
 from __future__ import annotations

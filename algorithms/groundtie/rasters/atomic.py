@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import TracebackType
 
-from ..errors import GroundTieError, OutputError
+from ..errors import GroundTieError, OutputError, raised_by
 
 # What GDAL and SQLite put beside a file, appended to its whole name.
 SIDECARS = (".aux.xml", ".ovr", ".msk", "-wal", "-shm", "-journal")
@@ -94,22 +94,20 @@ class Outputs:
 
 
 @contextlib.contextmanager
-def writing(path: str | os.PathLike[str], *others: type[Exception]) -> Iterator[None]:
+def writing(path: str | os.PathLike[str]) -> Iterator[None]:
     """Turn what goes wrong while `path` is written into `OutputError`, with the name and reason.
 
     Parameters
     ----------
     path
         The output; for one that is staged the message gives its final name.
-    others
-        Exceptions of the library in use that mean the same as an OSError.
     """
     try:
         yield
     except GroundTieError:
         raise
     except Exception as error:
-        if not isinstance(error, (OSError, *others)):
+        if not (isinstance(error, OSError) or raised_by(error, "rasterio")):
             raise
         raise OutputError(f"cannot write {_final_name(path)}: {_reason(error)}") from error
 

@@ -15,8 +15,9 @@ import numpy as np
 import rasterio.warp
 from affine import Affine
 from numpy.typing import ArrayLike, NDArray
-from rasterio._err import CPLE_BaseError
 from rasterio.crs import CRS
+
+from ..errors import raised_by
 
 FloatArray = NDArray[np.float64]
 
@@ -153,7 +154,9 @@ def apply_affine(transform: Affine, points: ArrayLike) -> FloatArray:
     """Return `points`, shape (n, 2), moved by an affine transform."""
     x, y = np.asarray(points, float).reshape(-1, 2).T
     t = transform
-    return np.column_stack([t.a * x + t.b * y + t.c, t.d * x + t.e * y + t.f])
+    # Positions outside of a projection's domain are infinite.
+    with np.errstate(invalid="ignore"):
+        return np.column_stack([t.a * x + t.b * y + t.c, t.d * x + t.e * y + t.f])
 
 
 def reproject(xy: FloatArray, source: CRS | None, target: CRS | None) -> FloatArray:
@@ -165,7 +168,9 @@ def reproject(xy: FloatArray, source: CRS | None, target: CRS | None) -> FloatAr
         return xy
     try:
         moved = rasterio.warp.transform(source, target, xy[:, 0], xy[:, 1])
-    except CPLE_BaseError:
+    except Exception as error:
+        if not raised_by(error, "rasterio"):
+            raise
         # One position outside fails them all: halves tell which.
         if len(xy) == 1:
             return np.full((1, 2), np.inf)

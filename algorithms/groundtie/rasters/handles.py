@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 import rasterio
 from numpy.typing import NDArray
+from rasterio.env import env_ctx_if_needed
 from rasterio.errors import RasterioError, RasterioIOError
 
 from ..arrays import Raster
@@ -51,7 +52,8 @@ class FileHandles:
             with self._lock:
                 dataset = self._free.pop() if self._free else None
             dataset = dataset or rasterio.open(self._path, sharing=False)
-            yield dataset
+            with env_ctx_if_needed():  # GDAL's messages in this thread go to rasterio's logger
+                yield dataset
         with self._lock:
             self._free.append(dataset)
 

@@ -14,8 +14,9 @@ import numpy as np
 import rasterio
 import rasterio.shutil
 from rasterio.enums import ColorInterp, Resampling
+from rasterio.env import GDALVersion
 
-from ..errors import ParameterError
+from ..errors import ParameterError, raised_by
 from .atomic import writing
 from .bands import BandInfo, fits
 from .grid import PIXEL_COORDINATES, Grid
@@ -72,14 +73,19 @@ def create_like(
     """
     if nodata is not None:
         require_fit(nodata, source.dtype)
-    profile = _profile(source, grid, nodata, interleave or source.interleave or "pixel", workers)
+    interleave = interleave or source.interleave or "pixel"
+    if interleave.lower() == "band" and not GDALVersion.runtime().at_least("3.8"):
+        # Threads of older GDAL that read such a file report by an ERROR each that they do not know
+        # its bands (OSGeo/gdal issue 7921), past every handler, and are right nonetheless.
+        workers = 1
+    profile = _profile(source, grid, nodata, interleave, workers)
     # A mask inside the file, not beside it.
     options = {
         "GDAL_TIFF_INTERNAL_MASK": True,
         "GDAL_CACHEMAX": CACHE_BYTES,
         "GDAL_NUM_THREADS": workers,
     }
-    with writing(path, *_gdal_errors()), rasterio.Env(**options):
+    with writing(path), rasterio.Env(**options):
         with rasterio.open(path, "w", **profile) as dataset:
             _describe(dataset, source)
             yield dataset
@@ -110,7 +116,7 @@ def write_cog(source: str | os.PathLike[str], path: str | os.PathLike[str], work
         The file cannot be written completely.
     """
     options = {"blocksize": BLOCK, "compress": "deflate", "level": 1, "bigtiff": "if_safer"}
-    with writing(path, *_gdal_errors()), rasterio.Env(GDAL_CACHEMAX=CACHE_BYTES):
+    with writing(path), rasterio.Env(GDAL_CACHEMAX=CACHE_BYTES):
         rasterio.shutil.copy(
             source, path, driver="COG", predictor="yes", num_threads=workers, **options
         )
@@ -122,7 +128,9 @@ def check_complete(path: str | os.PathLike[str]) -> None:
     with writing(path):
         try:
             complete = all(_block_ends(path, Path(path).stat().st_size))
-        except _gdal_errors():
+        except Exception as error:
+            if not raised_by(error, "rasterio"):
+                raise
             complete = False
         if not complete:
             raise OSError("the file is not complete; is the disk full?")
@@ -217,13 +225,6 @@ def _add_overviews(dataset: Any, *, nearest: bool) -> None:
         size = -(-size // 2)
     if factors:
         dataset.build_overviews(factors, Resampling.nearest if nearest else Resampling.average)
-
-
-def _gdal_errors() -> tuple[type[Exception], ...]:
-    from rasterio._err import CPLE_BaseError
-    from rasterio.errors import RasterioError, RasterioIOError
-
-    return RasterioError, RasterioIOError, CPLE_BaseError
 
 
 def require_fit(nodata: float, dtype: np.dtype[Any]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import weakref
 from collections.abc import Mapping
@@ -16,7 +17,7 @@ from ..geometry.tie_point_files import write_tie_points
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, writing
 from ..rasters.reading import bounded_cache
-from .pipeline import OpenPair, open_pair, run
+from .pipeline import OpenPair, open_pair, pair_images, run
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import Registration
 from .specification import Specification
@@ -62,8 +63,8 @@ class RegistrationFiles:
                 registration.page().write(outputs.stage(self.report), outputs.stage(numbers))
             if not registration.verdict.accepted:
                 return
-            points, transform = registration.accepted()
-            if self.tie_points is not None:
+            transform, points = registration.accepted(), registration.tie_points
+            if self.tie_points is not None and points is not None:
                 write_tie_points(outputs.stage(self.tie_points), points, transform)
             if self.transform is not None:
                 staged = outputs.stage(self.transform)
@@ -72,8 +73,9 @@ class RegistrationFiles:
                     staged.write_text(text, encoding="utf-8")
             if self.output is not None:
                 context.update(0.0, "writing the registered image")
-                pair = registration.pair
-                self.output.write(pair, transform, outputs, context.workers, context.progress)
+                source = registration.pair.input.source
+                reference = registration.pair.reference.source.grid
+                self.output.write(source, reference, transform, outputs, context)
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,7 @@ class Call:
     @classmethod
     def of(cls, parameters: Mapping[str, Any], progress: Progress) -> Call:
         """Return the call of a registering tool; see `register_as`."""
-        given = parameters
+        given = {**_USUAL, **parameters}
         output = None
         if given["output"] is not None:
             output = RegisteredOutput(given["output"], given["output_grid"], given["resampling"])
@@ -118,7 +120,7 @@ class Call:
             RegistrationFiles(output, given["tie_points"], given["transform"], given["report"]),
             (given["reference_band"], given["input_band"]),
             (given["reference_mask"], given["input_mask"]),
-            given,
+            parameters,
             given["workers"],
             progress,
         )
@@ -133,16 +135,29 @@ class Call:
         """
         with threads(self.workers, self.progress) as context, ExitStack() as stack:
             context.update(0.0, "opening the images")
-            pair = open_pair(
-                self.reference, self.input, spec, context.part(0.0, 0.02), self.bands, self.masks
-            )
-            opened = stack.enter_context(pair)
-            found = self.run(opened, spec, context.part(0.02, 0.7))
+            opened = stack.enter_context(self.open(spec, context.part(0.0, 0.02)))
+            found = run(opened, spec, context.part(0.02, 0.7))
+            found = replace(found, parameters=self.parameters or {})
             return self.deliver(found, context.part(0.7, 1.0), stack.pop_all())
 
-    def run(self, opened: OpenPair, spec: Specification, context: Context) -> Registration:
-        """Register an open pair as specified, whatever the verdict."""
-        return replace(run(opened, spec, context), parameters=self.parameters or {})
+    def open(
+        self, spec: Specification, context: Context
+    ) -> contextlib.AbstractContextManager[OpenPair]:
+        """Open the images and masks."""
+        return open_pair(self.reference, self.input, spec, context, self.bands, self.masks)
+
+    def with_limits(self, opened: OpenPair, spec: Specification, context: Context) -> OpenPair:
+        """Return an open pair as far as another specification searches."""
+        images = opened.images
+        return pair_images(
+            images.reference,
+            images.input,
+            spec,
+            context.quiet(),
+            self.masks,
+            opened.stack,
+            opened.started,
+        )
 
     def deliver(
         self, registration: Registration, context: Context, stack: ExitStack
@@ -163,6 +178,10 @@ class Call:
         kept = replace(registration, files=self.files.named(), rasters=rasters)
         weakref.finalize(kept, rasters.close)
         return kept
+
+
+# What tools may leave out that do not ask for it.
+_USUAL: Mapping[str, Any] = {"output_grid": "reference", "resampling": "cubic"}
 
 
 def register_as(

@@ -26,12 +26,13 @@ from ..rasters.grid import FloatArray, Grid
 from .scene import SceneInfo
 
 # Stages of a registration, in the order in which their rules are asked.
-SEARCH, AGREEMENT, ERROR, SCENE, REFINEMENT = (
+SEARCH, AGREEMENT, ERROR, SCENE, REFINEMENT, POSE = (
     "search",
     "agreement",
     "error",
     "scene",
     "refinement",
+    "pose",
 )
 
 _LATTICE = 9
@@ -129,6 +130,7 @@ class RegistrationEvidence:
     max_error_px: float
     radius_px: int
     largest_log10_chance: float = LARGEST_LOG10_CHANCE
+    tries: int = 1
     ground_shift_px: float = 0.0
     is_ground_checked: bool = False
     layover_factor: float | None = None
@@ -158,7 +160,7 @@ class RegistrationEvidence:
             "check points",
             agreeing,
             len(self.check),
-            log10_chance(agreeing, len(self.check), probability),
+            min(log10_chance(agreeing, len(self.check), probability) + math.log10(self.tries), 0.0),
             self.largest_log10_chance,
             mixture.sigma * math.sqrt(2),
             self.max_error_px,

@@ -12,8 +12,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-import numpy as np
-
 from ..context import Context
 from ..errors import NothingFoundError, TooFewPointsError
 from ..features.presets import optical_keypoints, sar_keypoints
@@ -151,7 +149,9 @@ def pair_images(
     return OpenPair(images, pair, used, stack, started)
 
 
-def run(opened: OpenPair, spec: Specification, context: Context) -> Registration:
+def run(
+    opened: OpenPair, spec: Specification, context: Context, scene: SceneInfo | None = None
+) -> Registration:
     """Register the input of an open pair to its reference, and judge the result.
 
     Parameters
@@ -162,9 +162,11 @@ def run(opened: OpenPair, spec: Specification, context: Context) -> Registration
         How.
     context
         Threads, progress and seed.
+    scene
+        What the images are, if that was found before.
     """
     with bounded_cache():
-        scene = SceneInfo.of(opened.pair, spec.radar)
+        scene = scene or SceneInfo.of(opened.pair, spec.radar)
         context.update(0.02, "inspecting the images")
         masked = mask_pair(opened, spec, scene, context.part(0.02, 0.12))
         return register(opened, masked, scene, spec, context.part(0.12, 1.0))
@@ -271,7 +273,8 @@ class Stages:
             self.masked.pair.grid,
             self.spec.max_error_px,
             CHECK_RADIUS_PX,
-            chance - float(np.log10(self.spec.tries)),
+            chance,
+            self.spec.tries,
             check.common_shift_px if is_apart else 0.0,
             is_apart,
             factor if is_radar else None,

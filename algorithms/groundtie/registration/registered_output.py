@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from ..context import Context
 from ..errors import ParameterError
 from ..geometry.transform import FloatArray, Transform
 from ..matching.surface_fit import AUTO
-from ..progress import Progress
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster, write_with_geotransform
 from ..rasters.grid import Grid, reproject
-from ..rasters.pair import ImagePair
+from ..rasters.reading import RasterSource
 from ..rasters.target_grids import registered_grid
 
-OUTPUT_GRIDS = ("reference", "input", "untouched")
+UNTOUCHED = "untouched"
+OUTPUT_GRIDS = ("reference", "input", UNTOUCHED)
 
 # Pixels keep their places when only the geotransform changes, but for this error, in pixels.
 _UNTOUCHED_TOLERANCE_PX = 0.05
@@ -43,48 +45,62 @@ class RegisteredOutput:
 
     def write(
         self,
-        pair: ImagePair,
+        source: RasterSource,
+        reference: Grid,
         transform: Transform,
         outputs: Outputs,
-        workers: int,
-        progress: Progress,
+        context: Context,
     ) -> None:
-        """Write the input of a pair as registered; it is resampled once, or not at all."""
-        source, reference = pair.input.source, pair.reference.source.grid
-        staged = outputs.stage(self.path)
-        if self.grid == "untouched":
+        """Write a raster as registered; it is resampled once, or not at all.
+
+        Parameters
+        ----------
+        source
+            The raster that the transform is for.
+        reference
+            The reference's own grid.
+        transform
+            From reference map positions to the raster's pixels.
+        outputs
+            Where the file is staged.
+        context
+            Threads and progress.
+        """
+        staged, progress = outputs.stage(self.path), context.progress
+        if self.grid == UNTOUCHED:
             moved = moved_grid(transform)
             write_with_geotransform(source, moved, staged, progress=progress)
             return
-        if self.grid == "reference":
-            warp_raster(
-                source,
-                transform,
-                reference,
-                staged,
-                self.resampling,
-                workers=workers,
-                progress=progress,
-            )
-            return
-        crs = source.grid.crs
-
-        def px_to_own_map(px: FloatArray) -> FloatArray:
-            return reproject(transform.inverse(px), transform.crs, crs)
-
-        def own_map_to_px(xy: FloatArray) -> FloatArray:
-            return transform(reproject(xy, crs, transform.crs))
-
-        target = registered_grid(source.grid, px_to_own_map, crs)
+        to_px, target = resampled_onto(self.grid, source, reference, transform)
+        workers = context.workers
         warp_raster(
-            source,
-            own_map_to_px,
-            target,
-            staged,
-            self.resampling,
-            workers=workers,
-            progress=progress,
+            source, to_px, target, staged, self.resampling, workers=workers, progress=progress
         )
+
+
+def resampled_onto(
+    grid: str, source: RasterSource, reference: Grid, transform: Transform
+) -> tuple[Callable[[FloatArray], FloatArray], Grid]:
+    """Return the grid of a registered raster, and what takes its map positions to pixels.
+
+    Parameters
+    ----------
+    grid
+        "reference" or "input".
+    source, reference, transform
+        As `RegisteredOutput.write` takes them.
+    """
+    if grid == "reference":
+        return transform, reference
+    crs = source.grid.crs
+
+    def px_to_own_map(px: FloatArray) -> FloatArray:
+        return reproject(transform.inverse(px), transform.crs, crs)
+
+    def own_map_to_px(xy: FloatArray) -> FloatArray:
+        return transform(reproject(xy, crs, transform.crs))
+
+    return own_map_to_px, registered_grid(source.grid, px_to_own_map, crs)
 
 
 def model_for_grid(model: str, output_grid: str) -> str:
@@ -95,7 +111,7 @@ def model_for_grid(model: str, output_grid: str) -> str:
     ParameterError
         They do not go together.
     """
-    if output_grid != "untouched":
+    if output_grid != UNTOUCHED:
         return model
     if model not in (AUTO, "translation"):
         raise ParameterError(f"output_grid untouched goes with model translation, not {model}")

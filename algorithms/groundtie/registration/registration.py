@@ -11,17 +11,23 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Raster
+from ..context import threads
 from ..geometry.estimation import Estimate
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..masks.choice import MaskUsed
 from ..matching.check import Check
 from ..rasters.atomic import Outputs
+from ..rasters.delivery import warp_to_array
 from ..rasters.pair import ImagePair
+from ..rasters.reading import open_raster
 from ..report.report import Report
 from ..similarity.surface import Surface
+from .registered_output import RegisteredOutput, resampled_onto
 from .scene import SceneInfo
 from .specification import Specification
+from .stored_transform import transform_of
 from .verdict import NOT_JUDGED, Verdict
 
 # How many surfaces of the best and of the worst check points a report shows.
@@ -87,11 +93,54 @@ class Registration:
             return None
         return TiePoints.concatenate([self.estimate.points, self.check.points])
 
-    def accepted(self) -> tuple[TiePoints, Transform]:
-        """Return points and transform of a registration that was accepted, so that has both."""
-        points, transform = self.tie_points, self.transform
-        assert self.verdict.accepted and points is not None and transform is not None
-        return points, transform
+    def accepted(self) -> Transform:
+        """Return the transform of a registration that was accepted, so that has one."""
+        assert self.verdict.accepted and self.transform is not None
+        return self.transform
+
+    def warp(
+        self,
+        raster: Any = None,
+        output: Path | str | None = None,
+        grid: str = "reference",
+        resampling: str = "cubic",
+        workers: int | None = None,
+    ) -> Raster | None:
+        """Resample a raster by the transform, once.
+
+        Parameters
+        ----------
+        raster
+            What `open_raster` takes: another band, date or resolution of the input, with its
+            nominal geotransform; None: the input.
+        output
+            The GeoTIFF to write; None: the registered raster is returned.
+        grid
+            One of `registered_output.OUTPUT_GRIDS`; "untouched" needs an output.
+        resampling
+            One of `warping.METHODS`.
+        workers
+            Number of threads; None: one per processor.
+
+        Raises
+        ------
+        GeoreferencingError, NoOverlapError
+            The raster lies elsewhere than the input.
+        """
+        transform = self.accepted()
+        reference = self.pair.reference.source.grid
+        with threads(workers) as context, ExitStack() as stack:
+            source = self.pair.input.source
+            if raster is not None:
+                source = stack.enter_context(open_raster(raster))
+                transform = transform_of(transform, source, "the registration")
+            if output is not None:
+                with Outputs() as outputs:
+                    made = RegisteredOutput(Path(output), grid, resampling)
+                    made.write(source, reference, transform, outputs, context)
+                return None
+            to_px, target = resampled_onto(grid, source, reference, transform)
+            return warp_to_array(source, to_px, target, resampling, workers=context.workers)
 
     def report(self, path: Path | str) -> None:
         """Write the report, an HTML page, and its numbers beside it as JSON.

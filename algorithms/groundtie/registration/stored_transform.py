@@ -107,15 +107,17 @@ def _assess(found: Transform, points: TiePoints) -> TiePointFit:
     )
 
 
-def transform_of(found: Transform, source: RasterSource, path: Path) -> Transform:
+def transform_of(found: Transform, source: RasterSource, name: object) -> Transform:
     """Return a transform for a raster, which need not be the one that was registered.
 
     Parameters
     ----------
-    found, path
-        The transform and the file that it comes from.
+    found
+        The transform.
     source
         The raster.
+    name
+        What the transform is called in messages: the file that it comes from.
 
     Raises
     ------
@@ -128,16 +130,16 @@ def transform_of(found: Transform, source: RasterSource, path: Path) -> Transfor
     own, registered = source.grid, found.input_grid
     if own.is_georeferenced and registered.is_georeferenced:
         if (own.crs is None) != (registered.crs is None):
-            raise GeoreferencingError(f"only one of {source.path} and {path} has a CRS")
+            raise GeoreferencingError(f"only one of {source.path} and {name} has a CRS")
         seen = registered.map_to_pixel(
             reproject(own.pixel_to_map(own.outline()), own.crs, registered.crs)
         )
         if not _boxes_meet(seen, registered):
-            raise NoOverlapError(f"{source.path} does not lie where {path} was made for")
+            raise NoOverlapError(f"{source.path} does not lie where {name} was made for")
         return Transform(found.model, found.crs, own)
     if (own.width, own.height) != (registered.width, registered.height):
         raise GeoreferencingError(
-            f"{source.path} has {own.width} × {own.height} pixels, but {path} was made for "
+            f"{source.path} has {own.width} × {own.height} pixels, but {name} was made for "
             f"{registered.width} × {registered.height}, and not both are georeferenced"
         )
     return found

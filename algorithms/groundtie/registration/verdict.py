@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from .evidence import AGREEMENT, RegistrationEvidence, SearchEvidence
 from .refinement_evidence import RefinementEvidence
@@ -81,9 +82,14 @@ class Verdict:
 NOT_JUDGED = Verdict(False, "not judged")
 
 
-def first_refusal(
-    evidence: SearchEvidence | RegistrationEvidence | RefinementEvidence,
-) -> tuple[Rule, str] | None:
+class Evidence(Protocol):
+    """What a verdict rests on; its stages name the rules that read it."""
+
+    @property
+    def stages(self) -> Collection[str]: ...
+
+
+def first_refusal(evidence: Evidence) -> tuple[Rule, str] | None:
     """Return the first rule of the evidence's stages that refuses, and why; None: none does."""
     for rule in RULES:
         reason = rule.reason(evidence) if rule.stage in evidence.stages else None

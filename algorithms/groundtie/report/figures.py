@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-# People with any colour vision see them as different (Okabe & Ito 2008).
+# People with any colour vision see them as different [Okabe2008].
 FIT_COLOUR = "#0072b2"
 CHECK_COLOUR = "#d55e00"
 REJECTED_COLOUR = "#7a7a7a"

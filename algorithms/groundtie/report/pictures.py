@@ -28,7 +28,7 @@ _JPEG_QUALITIES = (85, 75, 60, 45, 30, 15)
 _NO_DATA_GREY = 226
 _BACKDROP_STRENGTH = 0.4
 
-# What is masked: reddish purple (Okabe & Ito 2008).
+# What is masked: reddish purple [Okabe2008].
 _TINT_BGR = np.array([167.0, 121.0, 204.0])
 _TINT_STRENGTH = 0.3
 

@@ -17,7 +17,7 @@ from ..geometry.tie_point_files import read_tie_points, write_tie_points
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..rasters.atomic import writing
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import PIXEL_COORDINATES, Grid, reproject
 from .adjustment import Control
 from .orientation import Orientation, SensorGrid
 from .rpc import RPC
@@ -80,7 +80,7 @@ class ControlPoints:
         )
 
     def write(self, path: str | os.PathLike[str], orientation: Orientation, grid: Grid) -> None:
-        """Write the points in the format that the suffix of `path` tells (see `SUFFIXES`).
+        """Write the points in the format that the suffix of `path` names (see `SUFFIXES`).
 
         Residuals and lines refer to `orientation`: lines lead from where it sees a point on the
         map to where the point is. `grid` is the image's own.
@@ -124,7 +124,7 @@ def read_control_points(path: Path, orientation: Orientation, grid: Grid) -> Con
         A `.gpkg`, `.geojson`, `.csv` or `.points` file (see `geometry.tie_point_files`). Points
         without a height get that of the ground, those without a sigma one of 1 px.
     orientation
-        Gives heights, and the CRS of the map if the file does not tell it.
+        Gives heights, and the CRS of the map if the file does not state it.
     grid
         The image's own grid.
 
@@ -158,16 +158,14 @@ def read_control_points(path: Path, orientation: Orientation, grid: Grid) -> Con
 
 
 def _own_pixels(grid: Grid) -> Grid:
-    """Return a grid whose map positions are an image's pixels, wherever the image claims to be."""
-    from ..rasters.grid import PIXEL_COORDINATES
-
+    """Return a grid whose map positions are an image's pixels, wherever the image nominally is."""
     return replace(grid, transform=PIXEL_COORDINATES)
 
 
 def _covariances(x: FloatArray, y: FloatArray, correlation: FloatArray) -> FloatArray:
     x, y = (np.where(np.isfinite(sigma), sigma, _USUAL_SIGMA_PX) for sigma in (x, y))
-    both = np.where(np.isfinite(correlation), correlation, 0.0) * x * y
-    return np.stack([np.stack([x**2, both], -1), np.stack([both, y**2], -1)], -2)
+    covariance = np.where(np.isfinite(correlation), correlation, 0.0) * x * y
+    return np.stack([np.stack([x**2, covariance], -1), np.stack([covariance, y**2], -1)], -2)
 
 
 def joined(parts: Sequence[ControlPoints]) -> ControlPoints:

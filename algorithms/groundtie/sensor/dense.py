@@ -86,12 +86,12 @@ class DenseOrientation:
         return px
 
     def _holds_everywhere(self, grid: Grid, bounds_m: tuple[float, float]) -> bool:
-        """Tell whether the RPCs hold at all pixels of a grid and heights within bounds."""
+        """Return whether the RPCs hold at all pixels of a grid and heights within bounds."""
         outline = self.orientation.to_lon_lat(grid.pixel_to_map(grid.outline(3)))
         return all(self.orientation.rpc.is_valid(outline, bound).all() for bound in bounds_m)
 
     def _lost(self, grid: Grid, height: FloatImage, rows: slice) -> NDArray[np.bool_]:
-        """Tell at which pixels of some rows the RPCs do not hold."""
+        """Return at which pixels of some rows the RPCs do not hold."""
         px = np.meshgrid(np.arange(grid.width), np.arange(grid.height)[rows])
         xy = grid.pixel_to_map(np.stack(px, axis=-1).reshape(-1, 2))
         lon_lat = self.orientation.to_lon_lat(xy)

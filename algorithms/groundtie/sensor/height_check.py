@@ -1,4 +1,4 @@
-"""Whether heights fit the RPCs: what can be told of a wrong vertical datum, and what cannot.
+"""Whether heights fit the RPCs: what they indicate of a wrong vertical datum, and what not.
 
 All heights being wrong by the same moves the image positions by nearly the same everywhere, as a
 shift of the RPCs does, whatever the relief: a refinement takes it up, and residuals do not show
@@ -21,11 +21,11 @@ from .heights import ConstantHeight, find_geoid
 from .orientation import FloatArray, Orientation, seen_at
 from .surfaces import surface_over
 
-# Ground beyond the RPCs' range of heights by more is worth telling: metres, and share of the scale.
+# Ground beyond the RPCs' range of heights by more gets a warning: metres, and share of the scale.
 _BEYOND_M, _BEYOND_SHARE = 10.0, 0.05
 
-# A height offset is told if it is larger than so many standard deviations, and than this. What
-# cannot tell the largest offset of a vertical datum from none tells nothing.
+# A height offset is reported if it is larger than so many standard deviations, and than this, and
+# if the largest offset of a vertical datum would be larger than so many, too.
 _SIGMAS = 4.0
 _OFFSET_M = 10.0
 _LARGEST_DATUM_M = 110.0
@@ -36,7 +36,7 @@ _TAIL = 0.01
 
 @dataclass(frozen=True)
 class HeightCheck:
-    """What is known of the heights' zero.
+    """What indicates the heights' zero.
 
     Parameters
     ----------
@@ -72,20 +72,20 @@ class HeightCheck:
         return asdict(self) | {"warnings": self.warnings()}
 
     def warnings(self) -> list[str]:
-        """Return in words what speaks against the heights."""
-        told = []
+        """Return in words what indicates wrong heights."""
+        found = []
         scale = (self.range_m[1] - self.range_m[0]) / 2
         if abs(self.beyond_m) > max(_BEYOND_M, _BEYOND_SHARE * scale):
             geoid = (
                 "" if self.geoid_m is None else f" (EGM96 is {self.geoid_m:.0f} m above it here)"
             )
-            told.append(
+            found.append(
                 f"the ground lies at {self.ground_m[0]:.0f} to {self.ground_m[1]:.0f} m above the "
                 f"ellipsoid{geoid}, but the RPCs were made for {self.range_m[0]:.0f} to "
                 f"{self.range_m[1]:.0f} m: is the vertical datum right?"
             )
         if self.control_offset_m is not None and abs(self.control_offset_m) > _OFFSET_M:
-            told.append(
+            found.append(
                 f"the control points lie {self.control_offset_m:+.0f} m from the ground of the "
                 "terrain model: is the vertical datum right?"
             )
@@ -95,11 +95,11 @@ class HeightCheck:
             and _SIGMAS * self.offset_sigma_m < _LARGEST_DATUM_M
             and abs(self.offset_m) > max(_SIGMAS * self.offset_sigma_m, _OFFSET_M)
         ):
-            told.append(
+            found.append(
                 f"by the residuals all heights are wrong by {self.offset_m:+.0f} ± "
                 f"{self.offset_sigma_m:.0f} m: is the vertical datum right?"
             )
-        return told
+        return found
 
 
 def check_heights(
@@ -155,7 +155,7 @@ def _geoid(lon_lat: FloatArray) -> float | None:
 def _offset(
     orientation: Orientation, control: Control, adjustment: Adjustment
 ) -> tuple[float, float] | tuple[None, None]:
-    """Return what residuals say of a common error of all heights, and its standard deviation.
+    """Return what residuals indicate of a common error of all heights, and its standard deviation.
 
     None: nothing. Beside an affine bias, whatever was fitted: what a bias leaves must not look like
     heights.

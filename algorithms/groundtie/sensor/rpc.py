@@ -81,11 +81,8 @@ class RPC:
     @cached_property
     def _derivatives(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Coefficients, (4, 10) each, of the derivatives by longitude, latitude and height."""
-        return (
-            derivative(self._coefficients, 0),
-            derivative(self._coefficients, 1),
-            derivative(self._coefficients, 2),
-        )
+        by_lon, by_lat, by_height = (derivative(self._coefficients, axis) for axis in range(3))
+        return by_lon, by_lat, by_height
 
     def project(self, lon_lat: ArrayLike, height_m: ArrayLike, workers: int = 1) -> FloatArray:
         """Return the image positions (col, row), shape (n, 2), of ground positions.
@@ -162,7 +159,7 @@ class RPC:
         return found
 
     def is_valid(self, lon_lat: ArrayLike, height_m: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which ground positions lie where the coefficients may be used, shape (n,).
+        """Return which ground positions lie where the coefficients may be used, shape (n,).
 
         That is within 1.5 times the scales around the offsets: farther off, the polynomials may
         lead positions of other places back into the image. Parameters as `project`.

@@ -96,7 +96,7 @@ def read_rpc(path: str | os.PathLike[str]) -> RPC:
 
 
 def write_rpc(path: str | os.PathLike[str], rpc: RPC) -> None:
-    """Write RPCs as text in the format that the suffix of `path` tells, `.txt` or `.rpb`.
+    """Write RPCs as text in the format that the suffix of `path` names, `.txt` or `.rpb`.
 
     GDAL finds them as `IMAGE_RPC.TXT` or `IMAGE.RPB` beside `IMAGE.TIF`.
 

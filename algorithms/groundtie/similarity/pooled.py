@@ -6,7 +6,7 @@ pair of grey levels, log p(a, b) / (p(a) p(b)), whose mean is mutual information
 similarity at a shift is the sum over its pixels, so that chips add up: weak evidence of many
 outweighs the bias of a few.
 
-Source: point similarity measures [Rogelj2003], doi:10.1016/S1077-3142(03)00116-4.
+Source: point similarity measures [Rogelj2003].
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ from .measures import MEASURES
 
 Surface = NDArray[np.float32]
 
-# The measures that are summed up under this name, and their weights. docs/method-support.md has
-# the figures for other weights.
+# The measures that are summed up under this name, and their weights, chosen on 14 real SAR pairs;
+# docs/measurements.md has the figures of these and of others.
 _FUSED = "fused"
 _WEIGHTS = {"nmi": 0.75, "orientation": 1.0, "edge-strength": 0.75}
 

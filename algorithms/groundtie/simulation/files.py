@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import rasterio
-from rasterio.errors import RasterioError
 
 from ..geometry.models import DEGREE
 from ..rasters.atomic import Outputs, writing
@@ -60,7 +59,7 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
     with writing(folder):
         Path(folder).mkdir(parents=True, exist_ok=True)
     bands = [band.capitalize() for band in pair.options.optical.bands]
-    with Outputs() as outputs, writing(folder, RasterioError):
+    with Outputs() as outputs, writing(folder):
         staged = {key: outputs.stage(path) for key, path in paths.items()}
         write_raster(staged["reference"], pair.reference[None], pair.reference_grid, ["Amplitude"])
         write_raster(staged["input"], pair.input, pair.truth.input_grid, bands)

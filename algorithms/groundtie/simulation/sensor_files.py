@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rasterio.errors import RasterioError
 
 from ..rasters.atomic import Outputs, writing
 from ..rasters.grid import PIXEL_COORDINATES, Grid
@@ -52,7 +51,7 @@ def write_sensor_image(made: SensorImage, folder: str | Path) -> dict[str, Path]
         Path(folder).mkdir(parents=True, exist_ok=True)
     bands = [band.capitalize() for band in made.options.optical.bands]
     own = Grid(PIXEL_COORDINATES, None, made.image.shape[2], made.image.shape[1])
-    with Outputs() as outputs, writing(folder, RasterioError):
+    with Outputs() as outputs, writing(folder):
         staged = {key: outputs.stage(path) for key, path in paths.items()}
         write_raster(staged["reference"], made.reference[None], made.reference_grid, ["Amplitude"])
         write_raster(staged["image"], made.image, own, bands, made.delivered.rpc)

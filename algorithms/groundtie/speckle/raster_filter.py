@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..errors import RasterContentError
-from ..rasters.delivery import in_order, tiles
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
+from ..rasters.tiling import in_order, tiles
 from ..rasters.writing import create_like, fill_value
 from .filters import SpeckleFilter
 from .statistics import estimate_looks

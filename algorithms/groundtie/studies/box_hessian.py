@@ -1,4 +1,4 @@
-"""The determinant of the Hessian by box filters, from the integral image [Bay2008].
+"""The determinant of the Hessian by box filters, from the integral image ([Bay2008]).
 
 Second derivatives of a Gaussian are taken for a few boxes; a box of any size costs four values of
 the integral image. Differences along columns are shared by all boxes of a filter, and everything is
@@ -22,7 +22,7 @@ IntegralImage = NDArray[np.float64]
 # Standard deviation of the Gaussian that a filter of so many pixels a side stands for.
 FIRST_SIDE_PX, FIRST_SIGMA_PX = 9, 1.2
 
-# The mixed derivative is larger than that of the Gaussian by this ([Bay2008] eq 3).
+# The mixed derivative is larger than that of the Gaussian by this ([Bay2008], eq 3).
 _MIXED_WEIGHT = np.float32(0.9)
 
 # Pixels of a strip: a few arrays of them fit into the second cache.

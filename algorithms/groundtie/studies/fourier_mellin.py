@@ -4,8 +4,7 @@ The magnitude of a spectrum does not change with a shift, rotates with the image
 the image grows; on axes of angle and log frequency, both are shifts. Unlike the source's 22
 steps: spectra are normalised at each frequency, peaks are found between the bins, several are
 tried, and rotation, scale and shift are found again on what both windows show. Source:
-[Patel2011], section 3.3.1; Chen, Defrise & Deconinck 1994, doi:10.1109/34.387491; Reddy &
-Chatterji 1996, doi:10.1109/83.506761.
+[Patel2017] 3.3.1, [Chen1994], [Reddy1996].
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ def recursive_differences(image: FloatImage) -> Gradient:
 def log_ratios(image: FloatImage) -> Gradient:
     """Return the logarithm of the ratio of exponentially weighted averages, with its sign.
 
-    ROEWA (Fjørtoft et al. 1995; S eq 6.13–6.22), but the average after the pixel over the one
+    ROEWA ([Fjortoft1995]; S eq 6.13–6.22), but the average after the pixel over the one
     before it, not the smaller of both ratios: its logarithm is positive where it gets brighter.
 
     Parameters

@@ -1,4 +1,4 @@
-"""SURF's descriptor: sums of Haar wavelets around a keypoint, as 64 numbers (Bay et al. 2008).
+"""SURF's descriptor: sums of Haar wavelets around a keypoint, as 64 numbers ([Bay2008]).
 
 Wavelets are looked up in the integral image on a lattice that rotates and grows with the keypoint,
 for all keypoints at once.

@@ -9,7 +9,7 @@ from ..features.matching import Descriptors, FloatArray, Indices, Matches, Neare
 
 METHODS = ("exact", "kd-tree")
 
-# The forest of k-d trees, and how many leaves are looked at (best bin first; Beis & Lowe 1997).
+# The forest of k-d trees, and how many leaves are looked at (best bin first; [Beis1997]).
 _TREES = 4
 _CHECKS = 64
 

@@ -70,8 +70,7 @@ def cluster_reward(histograms: Histograms) -> FloatArray:
     """Return the index of the cluster reward algorithm, 0 (independent) to 1 (one to one).
 
     (Φ / F - F / N²) / (1 - F / N²) with Φ the sum of the squared joint counts, F² the product of
-    the sums of the squared marginal counts and N the number of pixels: Inglada & Giros 2004,
-    doi:10.1109/TGRS.2004.835294.
+    the sums of the squared marginal counts and N the number of pixels [Inglada2004].
     """
     a, b, ab = (np.square(_shares(table)).sum(axis=-1) for table in tables(histograms))
     chance = np.sqrt(a * b)
@@ -83,7 +82,7 @@ def cluster_reward(histograms: Histograms) -> FloatArray:
 def correlation_ratio(histograms: Histograms) -> FloatArray:
     """Return which share of A's variance a function of B explains, 0 to 1.
 
-    Roche et al. 1998, doi:10.1007/BFb0056301. The grey value of a bin is its number. A should be
+    Source: [Roche1998]. The grey value of a bin is its number. A should be
     the template: its variance is the same at all shifts. For the other way round transpose the
     histogram.
     """

@@ -1,4 +1,4 @@
-"""Orientations of keypoints by their gradients, for images that may be rotated (Lowe 2004)."""
+"""Orientations of keypoints by their gradients, for images that may be rotated ([Lowe2004])."""
 
 from __future__ import annotations
 

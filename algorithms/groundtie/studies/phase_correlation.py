@@ -1,7 +1,7 @@
 """Phase correlation: the shift between two windows from the phases of their spectra.
 
 The cross-power spectrum is divided by its magnitude, which leaves a peak instead of the broad
-hill of a plain correlation. Source: Kuglin & Hines 1975; [Patel2011], section 3.3.1, steps 16–21.
+hill of a plain correlation. Source: [Kuglin1975]; [Patel2017], section 3.3.1, steps 16–21.
 """
 
 from __future__ import annotations

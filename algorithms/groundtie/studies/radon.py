@@ -4,7 +4,7 @@ A rotation is a shift of the Radon transform along its angle; the spectra of the
 not change with the image's shift, so the rotation is found on them. The shift is then that of the
 projections onto the rows' and columns' directions (equations 3.10–3.12). The source's errors are
 up to 2° and a few pixels; here the spectra are normalised at each frequency, peaks are found
-between the bins, and all is found again on what both windows show. Source: [Patel2011], sections
+between the bins, and all is found again on what both windows show. Source: [Patel2017], sections
 3.3.2–3.3.4.
 """
 
@@ -170,7 +170,7 @@ def shift_by_projections(
 ) -> PoseFound:
     """Return the shift of an image by its projections at 0° and 90°.
 
-    Source: [Patel2011], equations 3.11 and 3.12.
+    Source: [Patel2017], equations 3.11 and 3.12.
     """
     right, height = shift_along(reference.sum(axis=0), input.sum(axis=0), reach_px, wrap)
     down, other = shift_along(reference.sum(axis=1), input.sum(axis=1), reach_px, wrap)

@@ -1,6 +1,6 @@
 """Powell's and Nelder and Mead's ways to climb, which need no gradient (scipy).
 
-Source: Powell 1964, doi:10.1093/comjnl/7.2.155; Nelder & Mead 1965, doi:10.1093/comjnl/7.4.308.
+Sources: [Powell1964], [Nelder1965].
 """
 
 from __future__ import annotations

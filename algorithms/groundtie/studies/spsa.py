@@ -1,10 +1,9 @@
 """Simultaneous perturbation stochastic approximation (SPSA): climbing with two looks a step.
 
 How steep the similarity is is not known beforehand; NMI changes by some thousandths. So slopes are
-divided by their own root mean square so far, and gains are pixels. Source, first order: Spall 1992,
-1998, doi:10.1109/7.705889, [Suri2010], equations 4.1–4.4; second order: Spall 2000,
-doi:10.1109/TAC.2000.880982, for registration Cole-Rhodes et al. 2003, doi:10.1109/TIP.2003.819237;
-discrete: [Suri2010], section 4.4.2.
+divided by their own root mean square so far, and gains are pixels. Source: [Spall1992],
+[Spall1998], [Suri2010] eq 4.1–4.4; second order: [Spall2000], for registration [ColeRhodes2003];
+discrete: [Suri2010] 4.4.2.
 """
 
 from __future__ import annotations

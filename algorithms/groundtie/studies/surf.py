@@ -1,4 +1,4 @@
-"""SURF's keypoints (Bay et al. 2008; [Patel2017] 4.2): blobs, by the Hessian of box filters.
+"""SURF's keypoints ([Bay2008]; [Patel2017] 4.2): blobs, by the Hessian of box filters.
 
 SURF's authors held patents, which may still run in some countries.
 """
@@ -108,7 +108,7 @@ def _vertices(
 ) -> tuple[FloatArray, FloatArray]:
     """Return where parabolas through peaks and their neighbours are highest, and how high.
 
-    The offsets are along columns, rows and layers, shape (n, 3) (Brown & Lowe 2002).
+    The offsets are along columns, rows and layers, shape (n, 3) ([Brown2002]).
     """
 
     def value(x: int, y: int, z: int) -> FloatArray:

@@ -8,6 +8,7 @@ from ..declaration import Tool, tool_of
 
 # In the order in which they are offered; a tool's function has the name of its module.
 NAMES = (
+    "register",
     "coregister",
     "match_sar_sar",
     "match_optical",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -14,13 +15,12 @@ Reference = Annotated[
     Path, RasterIn(label="Reference image", help="The image whose georeferencing is right.")
 ]
 Input = Annotated[Path, RasterIn(label="Input image", help="The image to be registered.")]
-Output = Annotated[
-    Path,
-    RasterOut(
-        label="Registered image",
-        help="GeoTIFF with the input's bands, data type, nodata value, colours and metadata.",
-    ),
-]
+_OUTPUT = RasterOut(
+    label="Registered image",
+    help="GeoTIFF with the input's bands, data type, nodata value, colours and metadata.",
+)
+Output = Annotated[Path, _OUTPUT]
+OptionalOutput = Annotated[Path | None, replace(_OUTPUT, optional_in_python=True)]
 Resampling = Annotated[
     str,
     Choice(

@@ -16,12 +16,12 @@ from ..errors import NotRegisteredError, ParameterError
 from ..geometry.transform import Transform
 from ..kinds import Choice, Distance, FileOut, Number
 from ..pose.pose import Pose
-from ..pose.rotation_verdict import PoseVerdict, judge_pose
 from ..pose.rotation_windows import PoseWindows, read_windows
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, writing
 from ..rasters.pair import Image
 from ..rasters.reading import bounded_cache, open_raster
+from ..registration.pose_verdict import PoseVerdict, judge_pose
 from ..registration.verdict import Verdict
 from ..report.rotation_picture import draw_rotation
 from ..similarity.surface import SimilaritySettings

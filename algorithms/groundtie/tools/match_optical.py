@@ -16,7 +16,7 @@ from .common import (
     Input,
     InputBand,
     MatchingPixelSize,
-    Output,
+    OptionalOutput,
     Reference,
     ReferenceBand,
     Resampling,
@@ -43,7 +43,7 @@ from .registration_parameters import (
 def match_optical(
     reference: Reference,
     input: Input,
-    output: Output,
+    output: OptionalOutput = None,
     search_radius: SearchRadius = None,
     search_rotation: SearchRotation = None,
     model: Model = AUTO,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,20 +10,16 @@ from typing import Annotated, Any
 from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
+from ..context import threads
 from ..declaration import tool
 from ..errors import GeoreferencingError, ParameterError
 from ..kinds import Flag, RasterOut, Text
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
-from ..rasters.delivery import warp_raster
-from ..rasters.grid import Grid
 from ..rasters.reading import bounded_cache, open_raster
-from ..rasters.target_grids import covering_grid, registered_grid
-from ..rasters.writing import write_cog
+from ..registration.orthorectification import Orthorectification
 from ..registration.sensor_input import Ground, open_sensor_image, utm_of
-from ..sensor.dense import DenseOrientation
-from ..sensor.orientation import Orientation
-from .common import Resampling, Workers, worker_count
+from .common import Resampling, Workers
 from .sensor_parameters import Dem, DemDatum, Geoid, Height, RpcFile, SensorImage
 from .written_raster import SIZE_OUTPUTS, WrittenRaster, like_reference, pixel_size_of_result
 
@@ -96,10 +91,10 @@ def orthorectify(
     if reference is not None and (pixel_size is not None or crs is not None):
         raise ParameterError("give either a reference, which has CRS and pixel size, or these")
     ground = Ground(dem, dem_datum, geoid, height)
-    with ExitStack() as stack:
+    with threads(workers, progress) as context, ExitStack() as stack:
         stack.enter_context(bounded_cache())
         source, model = open_sensor_image(image, rpc, stack)
-        progress.update(0.0, ground.note(model))
+        context.update(0.0, ground.note(model))
         grid = None
         if reference is not None:
             grid = stack.enter_context(open_raster(reference)).grid
@@ -107,32 +102,10 @@ def orthorectify(
                 raise GeoreferencingError(f"{reference} has no CRS")
         map_crs = grid.crs if grid is not None else _crs(crs) or utm_of(source, model)
         orientation = ground.orientation(source, model, map_crs, stack)
-        target = _target_grid(orientation, source.grid, grid, pixel_size)
+        ortho = Orthorectification(source, orientation, grid, pixel_size)
         outputs = stack.enter_context(Outputs())
-        staged, threads = outputs.stage(output), worker_count(workers)
-        with tempfile.TemporaryDirectory(dir=output.resolve().parent) as folder:
-            written = Path(folder) / "ortho.tif" if cog else staged
-            warp_raster(
-                source,
-                DenseOrientation(orientation),
-                target,
-                written,
-                resampling,
-                workers=threads,
-                progress=progress.part(0.0, 0.8 if cog else 1.0),
-            )
-            if cog:
-                write_cog(written, staged, threads)
+        target = ortho.write(output, outputs, context, resampling, cog)
     return OrthoResult(output, target, ground.note(model))
-
-
-def _target_grid(
-    orientation: Orientation, image: Grid, grid: Grid | None, pixel_size: float | None
-) -> Grid:
-    if grid is None:
-        return registered_grid(image, orientation.to_map, orientation.crs, pixel_size)
-    covering_grid(grid, orientation.to_map(image.outline()), within=True)
-    return grid
 
 
 def _crs(text: str | None) -> CRS | None:

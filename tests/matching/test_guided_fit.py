@@ -1,32 +1,33 @@
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from groundtie.matching.guided import GuidedSearch
-from groundtie.matching.hybrid import FeatureSearch
-from groundtie.matching.local import LocalSearch
 from raster_files import write_raster
 from textured_pairs import TexturedPair, error_px, pixels, shift_on_map, write_textured_pair
 
+from groundtie.context import threads
 from groundtie.errors import TooFewPointsError
 from groundtie.features.detectors import SiftDetector
 from groundtie.features.hog import HogDescriptor
 from groundtie.geometry.estimation import Estimate
 from groundtie.matching.alignment import LINEAR_CANDIDATES
+from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.feature_tiles import FeatureMatcher
-from groundtie.matching.layout import lay_out_chips
+from groundtie.matching.guided_fit import GuidedFit
+from groundtie.matching.held_out import HeldOut
+from groundtie.matching.keypoint_fit import KeypointFit
+from groundtie.matching.surface_fit import SurfaceFit
 from groundtie.similarity.surface import SimilaritySettings
 
 SIZE = (400, 380)
 FUSED = SimilaritySettings("fused")
-# The truth is 6 px east and 4 px south; the rough model is off by 5 px.
-TRUTH, ROUGH = shift_on_map(60.0, -40.0), shift_on_map(30.0, 0.0)
+# The truth is 6 px east and 4 px south; the coarse model is off by 5 px.
+TRUTH, COARSE = shift_on_map(60.0, -40.0), shift_on_map(30.0, 0.0)
 
 # Roofs: their side, the distance between them, and how far they lie beside the ground.
-ROOF_PX, APART_PX, LEANING_PX = 20, 48, 4
+ROOF_PX, APART_PX, PARALLAX_PX = 20, 48, 4
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +46,7 @@ def town(files: TexturedPair, tmp_path_factory: pytest.TempPathFactory) -> Textu
             roof = np.kron(tiles, np.ones((ROOF_PX // 5,) * 2, np.uint16))
             there = np.rint(files.truth(files.grid.pixel_to_map([[col, row]]))).astype(int)[0]
             reference[row : row + ROOF_PX, col : col + ROOF_PX] = roof
-            left = there[0] + LEANING_PX
+            left = there[0] + PARALLAX_PX
             input[there[1] : there[1] + ROOF_PX, left : left + ROOF_PX] = roof
     folder = tmp_path_factory.mktemp("town")
     return replace(
@@ -58,16 +59,15 @@ def town(files: TexturedPair, tmp_path_factory: pytest.TempPathFactory) -> Textu
 def estimates(
     files: TexturedPair, kind: str = "auto", threshold: float = 0.03
 ) -> tuple[Estimate, Estimate]:
-    """Return what features tell alone, and with chips all over the images."""
-    with files.opened() as pair, ThreadPoolExecutor(2) as executor:
-        local = LocalSearch(pair, lay_out_chips(pair), FUSED, candidates=LINEAR_CANDIDATES)
-        matcher = FeatureMatcher(
-            pair, SiftDetector(threshold), HogDescriptor(), held_out=local.held_out
-        )
-        features = FeatureSearch(matcher, local)
-        guided = GuidedSearch(features, local)
-        alone = features.estimate(ROUGH, kind, 0, executor)
-        return alone, guided.estimate(ROUGH, kind, 0, executor)
+    """Return what keypoints show alone, and with chips all over the images."""
+    with files.opened() as pair, threads(2) as context:
+        held_out = HeldOut.of(pair)
+        chips = SurfaceFit(ChipMatcher(pair, FUSED, held_out), held_out.layout, LINEAR_CANDIDATES)
+        matcher = FeatureMatcher(pair, SiftDetector(threshold), HogDescriptor(), held_out=held_out)
+        keypoints = KeypointFit(matcher, chips)
+        guided = GuidedFit(keypoints, chips)
+        alone = keypoints.estimate(COARSE, kind, context)
+        return alone, guided.estimate(COARSE, kind, context)
 
 
 @pytest.mark.parametrize("kind", ["auto", "polynomial2", "tps"])
@@ -84,6 +84,6 @@ def test_ground_counts_by_its_area_and_roofs_do_not_outvote_it(town: TexturedPai
     assert error_px(found.transform, town) < 1.0
 
 
-def test_without_features_nobody_tells_where_to_look(files: TexturedPair) -> None:
+def test_without_keypoints_nothing_shows_where_to_look(files: TexturedPair) -> None:
     with pytest.raises(TooFewPointsError):
         estimates(files, threshold=0.9)

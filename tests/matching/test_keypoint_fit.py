@@ -1,14 +1,11 @@
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from affine import Affine
-from groundtie.matching.hybrid import FeatureSearch
-from groundtie.matching.local import LocalSearch
 from raster_files import write_raster
 from speckled_pairs import write_speckled_pair
 from textured_pairs import TexturedPair, error_px, pixels, shift_on_map
@@ -23,8 +20,11 @@ from groundtie.features.tiles import Describing, Detecting
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.models import Model
 from groundtie.matching import feature_tiles
+from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.feature_tiles import FeatureMatcher, FeatureMatches
-from groundtie.matching.layout import lay_out_chips
+from groundtie.matching.held_out import HeldOut
+from groundtie.matching.keypoint_fit import KeypointFit
+from groundtie.matching.surface_fit import SurfaceFit
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, ImagePair
 from groundtie.rasters.reading import Window, open_raster
@@ -34,8 +34,8 @@ from groundtie.studies.sift_variants import SiftVariantDescriptor, sift_detector
 SIZE = (300, 280)
 NMI = SimilaritySettings("nmi")
 KEYPOINTS = SiftOctDetector(0.075), SiftDescriptor()
-# The truth is 60 m east and 45 m south, pixels are 10 m: the rough model is off by 5 px.
-TRUTH, ROUGH = shift_on_map(60.0, -45.0), shift_on_map(30.0, -5.0)
+# The truth is 60 m east and 45 m south, pixels are 10 m: the coarse model is off by 5 px.
+TRUTH, COARSE = shift_on_map(60.0, -45.0), shift_on_map(30.0, -5.0)
 
 
 @pytest.fixture(scope="module")
@@ -47,19 +47,26 @@ def estimate_of(
     pair: ImagePair,
     kind: str = "auto",
     refinement: SimilaritySettings | None = None,
-    coarse: Model = ROUGH,
+    coarse: Model = COARSE,
     detector: Detecting = KEYPOINTS[0],
     descriptor: Describing = KEYPOINTS[1],
     ratio: float = 1.0,
 ) -> Estimate:
-    local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("fused"))
-    features = FeatureSearch(
-        FeatureMatcher(pair, detector, descriptor, ratio, held_out=local.held_out),
-        local,
-        refinement,
-    )
-    with ThreadPoolExecutor(2) as executor:
-        return features.estimate(coarse, kind, 0, executor)
+    held_out = HeldOut.of(pair)
+    matcher = FeatureMatcher(pair, detector, descriptor, ratio, held_out=held_out)
+    with threads(2) as context:
+        return fit_of(pair, held_out, matcher, refinement).estimate(coarse, kind, context)
+
+
+def fit_of(
+    pair: ImagePair,
+    held_out: HeldOut,
+    matcher: FeatureMatcher,
+    refinement: SimilaritySettings | None,
+) -> KeypointFit:
+    chips = SurfaceFit(ChipMatcher(pair, SimilaritySettings("fused"), held_out), held_out.layout)
+    refining = None if refinement is None else ChipMatcher(pair, refinement, held_out)
+    return KeypointFit(matcher, chips, refining)
 
 
 @pytest.mark.parametrize("kind", ["auto", "affine", "polynomial2", "tps"])
@@ -97,7 +104,7 @@ def test_pixels_held_out_of_the_fit_change_nothing_of_it(
     files: TexturedPair, tmp_path: Path, emptied: bool, refinement: SimilaritySettings | None
 ) -> None:
     with files.opened() as pair:
-        layout = lay_out_chips(pair)
+        layout = HeldOut.of(pair).layout
         size = pair.grid.width, pair.grid.height
         px = np.stack(np.meshgrid(*(np.arange(float(n)) for n in size)), -1).reshape(-1, 2)
         held_out = layout.held_out(px).reshape(size[::-1])
@@ -119,7 +126,7 @@ class Astray:
     """Matches that are off by more the farther right they lie."""
 
     pair: ImagePair
-    local: LocalSearch
+    held_out: HeldOut
     most_px: float = 7.0
     gate_px: float = 16.0
     wrong_px: float = 0.0
@@ -128,7 +135,7 @@ class Astray:
         grid = self.pair.grid
         sides = [np.arange(30.0, size - 30, 12) for size in (grid.width, grid.height)]
         px = np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)
-        px = px[~self.local.layout.held_out(px)]
+        px = px[~self.held_out.layout.held_out(px)]
         partner = grid.map_to_pixel(TRUTH(grid.pixel_to_map(px)))
         partner = partner - (grid.map_to_pixel(coarse(grid.pixel_to_map(px))) - px)
         partner[:, 0] += self.most_px * px[:, 0] / grid.width
@@ -143,30 +150,32 @@ class Astray:
 
 def test_chips_are_matched_again_where_the_first_model_went_astray(files: TexturedPair) -> None:
     """Right chips lie up to 7 px off the first model, and are looked for within 4 px of it."""
-    with files.opened() as pair, ThreadPoolExecutor(2) as executor:
-        local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("fused"))
-        search = FeatureSearch(Astray(pair, local), local, NMI)  # type: ignore[arg-type]
-        found = search.estimate(ROUGH, "affine", 0, executor)
+    with files.opened() as pair, threads(2) as context:
+        held_out = HeldOut.of(pair)
+        fit = fit_of(pair, held_out, Astray(pair, held_out), NMI)  # type: ignore[arg-type]
+        found = fit.estimate(COARSE, "affine", context)
         right = files.grid.map_to_pixel(found.points.reference_xy[found.points.used])[:, 0]
     assert error_px(found.transform, files) < 0.4
     assert right.max() > 0.8 * SIZE[0]
 
 
-def test_the_rough_model_is_taken_where_features_agree_on_a_wrong_one(files: TexturedPair) -> None:
+def test_the_coarse_model_is_taken_where_keypoints_agree_on_a_wrong_one(
+    files: TexturedPair,
+) -> None:
     """Nothing is alike 14 px beside the truth."""
-    with files.opened() as pair, ThreadPoolExecutor(2) as executor:
-        local = LocalSearch(pair, lay_out_chips(pair), SimilaritySettings("fused"))
-        astray = Astray(pair, local, most_px=0.0, wrong_px=14.0)
-        search = FeatureSearch(astray, local, NMI)  # type: ignore[arg-type]
-        found = search.estimate(TRUTH, "affine", 0, executor)
+    with files.opened() as pair, threads(2) as context:
+        held_out = HeldOut.of(pair)
+        astray = Astray(pair, held_out, most_px=0.0, wrong_px=14.0)
+        fit = fit_of(pair, held_out, astray, NMI)  # type: ignore[arg-type]
+        found = fit.estimate(TRUTH, "affine", context)
     assert error_px(found.transform, files) < 0.4
 
 
 def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.MonkeyPatch) -> None:
     with files.opened() as pair, threads(2) as context:
-        whole = FeatureMatcher(pair, *KEYPOINTS).match(ROUGH, context)
+        whole = FeatureMatcher(pair, *KEYPOINTS).match(COARSE, context)
         monkeypatch.setattr(tiles, "_TILE_PX", 128)
-        parts = FeatureMatcher(pair, *KEYPOINTS).match(ROUGH, context)
+        parts = FeatureMatcher(pair, *KEYPOINTS).match(COARSE, context)
 
     def places(matches: feature_tiles.FeatureMatches) -> set[tuple[float, ...]]:
         both = np.hstack([matches.reference.position_px, matches.input.position_px])
@@ -178,7 +187,7 @@ def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.M
     assert len(shared) > 0.6 * len(places(whole))
 
 
-def test_a_tile_sees_all_that_its_features_see_but_not_far_beyond_the_grid() -> None:
+def test_a_tile_sees_all_that_its_keypoints_see_but_not_far_beyond_the_grid() -> None:
     grid = Grid(Affine.identity(), None, 3000, 1200)
     middle, last = Window(1024, 0, 1024, 1024), Window(2048, 1024, 952, 176)
     far = 16 + tiles.MARGIN_PX
@@ -190,19 +199,19 @@ def test_a_tile_sees_all_that_its_features_see_but_not_far_beyond_the_grid() -> 
     )
 
 
-def test_only_features_on_the_ground_are_matched(files: TexturedPair, tmp_path: Path) -> None:
+def test_only_keypoints_on_the_ground_are_matched(files: TexturedPair, tmp_path: Path) -> None:
     shown = np.zeros((SIZE[1], SIZE[0]), np.uint8)
     shown[:, 100:] = 1
     mask = write_raster(tmp_path / "ground.tif", shown, files.grid)
     with files.opened() as pair, open_raster(mask) as ground, threads(2) as context:
         masked = replace(pair, reference=Image(pair.reference.source, None, ground))
-        found = FeatureMatcher(pair, *KEYPOINTS, shown=masked).match(ROUGH, context)
-        everywhere = FeatureMatcher(pair, *KEYPOINTS).match(ROUGH, context)
+        found = FeatureMatcher(pair, *KEYPOINTS, shown=masked).match(COARSE, context)
+        everywhere = FeatureMatcher(pair, *KEYPOINTS).match(COARSE, context)
     assert 50 < len(found.reference) < len(everywhere.reference)
     assert found.reference.position_px[:, 0].min() > 99
 
 
-def test_a_rough_model_that_is_off_by_more_than_the_gate_finds_nothing_right(
+def test_a_coarse_model_that_is_off_by_more_than_the_gate_finds_nothing_right(
     files: TexturedPair,
 ) -> None:
     far = shift_on_map(60.0 + 400.0, -45.0)
@@ -225,7 +234,7 @@ def test_another_place_has_too_few_matches_that_agree(tmp_path: Path) -> None:
     assert found.points.used.sum() < 12
 
 
-def test_chips_between_the_features_take_part(files: TexturedPair) -> None:
+def test_chips_between_the_keypoints_take_part(files: TexturedPair) -> None:
     with files.opened() as pair:
         few = SiftOctDetector(contrast=0.12)
         alone, refined = (
@@ -235,7 +244,7 @@ def test_chips_between_the_features_take_part(files: TexturedPair) -> None:
     assert error_px(refined.transform, files) < 0.4
 
 
-def test_chips_alone_do_where_there_are_no_features(files: TexturedPair) -> None:
+def test_chips_alone_do_where_there_are_no_keypoints(files: TexturedPair) -> None:
     none = SiftOctDetector(contrast=0.9)
     with files.opened() as pair:
         with pytest.raises(TooFewPointsError):

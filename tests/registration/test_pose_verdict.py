@@ -9,9 +9,9 @@ from turned_pairs import patch, turned_pair
 from groundtie.context import Context
 from groundtie.geometry.limits import SearchLimits
 from groundtie.pose.pose import Pose, PoseFound
-from groundtie.pose.rotation_verdict import LEAST_HEIGHT, LEAST_RIVAL_RATIO, judge_pose
 from groundtie.pose.search import find_poses
 from groundtie.rasters.patch import Patch
+from groundtie.registration.pose_verdict import judge_pose
 from groundtie.similarity.surface import SimilaritySettings
 
 TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
@@ -36,16 +36,18 @@ class TestWhatAnExhaustiveSearchFound:
             "reason": "no other pose matches nearly as well",
             "height": 12.0,
             "rival_ratio": 3.0,
+            "rule": "",
+            "advice": "",
         }
 
     def test_a_rival(self, windows: tuple[Patch, Patch], context: Context) -> None:
-        found = candidates(12.0, 12.0 / LEAST_RIVAL_RATIO + 0.1)
+        found = candidates(12.0, 12.0 / 1.6 + 0.1)
         verdict = judge_pose(*windows, ANY, found, exhaustive=True, context=context)
         assert not verdict.accepted
         assert "another pose" in verdict.reason
 
     def test_no_higher_than_chance(self, windows: tuple[Patch, Patch], context: Context) -> None:
-        found = candidates(LEAST_HEIGHT - 0.1, 1.0)
+        found = candidates(4.9, 1.0)
         verdict = judge_pose(*windows, ANY, found, exhaustive=True, context=context)
         assert not verdict.accepted
         assert "chance" in verdict.reason

@@ -1,0 +1,245 @@
+"""Registration for people who do not want to choose: the images decide what is tried.
+
+Source: [Patel2017] section 6.2 leaves a "library of algorithms chosen by the image's
+characteristics" as future work.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from ..context import Context, threads
+from ..errors import GeoreferencingError, ParameterError
+from ..geometry.estimation import Estimate
+from ..geometry.tie_points import TiePoints
+from ..masks.choice import AUTO, NONE, MaskUsed
+from ..pose.rotation_windows import read_windows
+from ..pose.search import find_poses
+from ..progress import Progress
+from ..rasters.atomic import Outputs
+from ..rasters.reading import bounded_cache, open_raster
+from ..sensor.rpc_files import rpc_of
+from ..similarity.surface import SimilaritySettings
+from .delivery import Call
+from .evidence import SCENE
+from .orthorectification import Orthorectification
+from .pipeline import OpenPair, run
+from .pose_verdict import judge_pose
+from .registration import Registration
+from .rules import RULES
+from .scene import SceneInfo
+from .sensor_input import Ground, open_sensor_image
+from .sensor_jobs import RefinedRpc, refine
+from .specification import COREGISTER, OPTICAL, SAR_SAR, FreeSearch, Specification
+from .verdict import Verdict
+
+# Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
+_DOUBTED_DEG, _DOUBTED_SCALE = 10.0, 1.1
+
+# Without georeferencing: a quarter of the side, any rotation, half to twice the size.
+_ANYWHERE = FreeSearch(0.25, 180.0, 2.0)
+
+# Rules of the scene refuse what matches well, but not the ground: no other matcher may try again.
+_FINAL = {rule.name for rule in RULES if rule.stage == SCENE}
+
+
+@dataclass(frozen=True)
+class Try:
+    """One way to register a pair.
+
+    Parameters
+    ----------
+    name
+        The tool that does the same.
+    spec
+        What it is asked for.
+    because
+        Why it was chosen.
+    """
+
+    name: str
+    spec: Specification
+    because: str
+
+
+def plan(scene: SceneInfo, is_georeferenced: bool) -> tuple[Try, ...]:
+    """Return what is tried on a pair, in this order.
+
+    Parameters
+    ----------
+    scene
+        What the images are.
+    is_georeferenced
+        Whether they have georeferencing.
+    """
+    chips = Try("coregister", COREGISTER, "other images match by chips")
+    if scene.is_radar_and_camera:
+        tries = [replace(chips, because="a radar image and a camera's match by chips")]
+    elif scene.are_both_radar:
+        because = "both images are a radar's, which share keypoints"
+        tries = [Try("match_sar_sar", SAR_SAR, because), chips]
+    else:
+        # Not declared: an image that lost its speckle may be a radar's all the same.
+        spec = replace(OPTICAL, radar=COREGISTER.radar)
+        because = "both images are a camera's, which share keypoints"
+        tries = [Try("match_optical", spec, because), chips]
+    first = tries[0]
+    if is_georeferenced:
+        wider = replace(first.spec, rotation_deg=_DOUBTED_DEG, scale=_DOUBTED_SCALE)
+        because = f"rotated by up to {_DOUBTED_DEG:g}°, scaled by up to {_DOUBTED_SCALE:g}"
+    else:
+        wider = replace(first.spec, free=_ANYWHERE)
+        because = "with any rotation and scale"
+    return (*tries, Try(first.name, wider, because))
+
+
+@dataclass(frozen=True)
+class OrthorectifiedRpc(RefinedRpc):
+    """An image with RPCs, orthorectified by RPCs that were refined on the reference."""
+
+    chosen: str = field(default="refine_rpc: the input has RPCs", kw_only=True)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {**super().summary(), "tried": [self.chosen]}
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        return [self.chosen, *super().lines()]
+
+
+def register_anything(
+    parameters: Mapping[str, Any], progress: Progress
+) -> Registration | OrthorectifiedRpc:
+    """Register as the tool `register` does, from its parameters by name.
+
+    Raises
+    ------
+    NotRegisteredError
+        Everything that makes sense was refused.
+    """
+    if _needs_rpcs(parameters["input"]):
+        return _by_rpcs(parameters, progress)
+    call = Call.of(parameters, progress)
+    with threads(parameters["workers"], progress) as context:
+        found, stack = _first_accepted(call, parameters["max_error"], context.part(0.0, 0.7))
+        return call.deliver(found, context.part(0.7, 1.0), stack)
+
+
+def _first_accepted(
+    call: Call, max_error_px: float, context: Context
+) -> tuple[Registration, ExitStack]:
+    """Return the first registration that is accepted, or the first refusal if none is."""
+    tried: list[str] = []
+    refused: Registration | None = None
+    with ExitStack() as kept:
+        opened = kept.enter_context(call.open(COREGISTER, context.part(0.0, 0.02)))
+        scene = SceneInfo.of(opened.pair)
+        is_georeferenced = opened.pair.input.source.grid.is_georeferenced
+        ways = plan(scene, is_georeferenced)
+        for number, way in enumerate(ways, start=1):
+            part = context.part((number - 1) / len(ways), number / len(ways))
+            spec = replace(way.spec, max_error_px=max_error_px, tries=number)
+            found = run(call.with_limits(opened, spec, part), spec, part, scene)
+            verdict = found.verdict
+            word = "accepted" if verdict.accepted else f"refused ({verdict.reason})"
+            tried.append(f"{way.name}, as {way.because}: {word}")
+            if verdict.accepted or verdict.rule in _FINAL:
+                refused = found
+                break
+            refused = refused or found
+        assert refused is not None
+        if not refused.verdict.accepted and refused.verdict.rule not in _FINAL:
+            pose = None if is_georeferenced else _by_pose(opened, scene, len(ways) + 1, context)
+            if pose is not None:
+                word = "accepted" if pose.verdict.accepted else f"refused ({pose.verdict.reason})"
+                tried.append(f"estimate_rotation, as the images have no georeferencing: {word}")
+                refused = pose if pose.verdict.accepted else refused
+        parameters = call.parameters or {}
+        return replace(refused, tried=tuple(tried), parameters=parameters), kept.pop_all()
+
+
+def _by_pose(
+    opened: OpenPair, scene: SceneInfo, tries: int, context: Context
+) -> Registration | None:
+    """Return what an exhaustive search over rotation, scale and shift finds; None: nothing."""
+    pair = opened.pair
+    quiet = context.quiet()
+    windows = read_windows(pair.reference, pair.input, (1 / _ANYWHERE.scale, _ANYWHERE.scale))
+    limits = windows.limits(180.0, (1 / _ANYWHERE.scale, _ANYWHERE.scale))
+    images = windows.reference, windows.input
+    found = find_poses(*images, limits, SimilaritySettings(), quiet)
+    if not found:
+        return None
+    judged = judge_pose(*images, limits, found, True, quiet)
+    verdict = Verdict(judged.accepted, judged.reason, rule=judged.rule, advice=judged.advice)
+    estimate = Estimate(windows.transform(found[0].pose), TiePoints.none(), ())
+    spec = replace(COREGISTER, tries=tries)
+    used = MaskUsed(NONE, None, 1.0, "as rotation is searched for")
+    return Registration(pair, spec, scene, used, verdict, estimate, started=opened.started)
+
+
+def _needs_rpcs(raster: Any) -> bool:
+    """Whether a raster is in the geometry of its sensor, and has RPCs."""
+    with open_raster(raster, allow_sensor_geometry=True) as source:
+        if source.grid.is_georeferenced:
+            return False
+        try:
+            rpc_of(source)
+        except GeoreferencingError:
+            return False
+        return True
+
+
+def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> OrthorectifiedRpc:
+    """Refine the RPCs of the input on the reference, and orthorectify it."""
+    given = {**_RPC_DEFAULTS, **parameters}
+    if given["transform"] is not None:
+        raise ParameterError("an image with RPCs is orthorectified: there is no transform to write")
+    if given["output"] is None:
+        raise ParameterError("an image with RPCs is orthorectified: give an output")
+    given |= {
+        "image": given["input"],
+        "image_band": given["input_band"],
+        "image_mask": given["input_mask"],
+        "residuals": given["tie_points"],
+    }
+    output = Path(given["output"])
+    with tempfile.TemporaryDirectory(prefix="groundtie-") as folder:
+        refined = Path(folder) / "refined_RPC.TXT"
+        result = refine({**given, "output": refined}, progress.part(0.0, 0.7))
+        _orthorectify(given, refined, output, progress.part(0.7, 1.0))
+    files = {**result.files, "output": str(output)}
+    values = {f.name: getattr(result, f.name) for f in fields(result)}
+    return OrthorectifiedRpc(**{**values, "files": files})
+
+
+def _orthorectify(
+    given: Mapping[str, Any], rpc_file: Path, output: Path, progress: Progress
+) -> None:
+    ground = Ground(given["dem"], given["dem_datum"], None, None)
+    with threads(given["workers"], progress) as context, ExitStack() as stack:
+        stack.enter_context(bounded_cache())
+        source, rpc = open_sensor_image(given["input"], rpc_file, stack)
+        crs = stack.enter_context(open_raster(given["reference"])).grid.crs
+        orientation = ground.orientation(source, rpc, crs, stack)
+        outputs = stack.enter_context(Outputs())
+        Orthorectification(source, orientation).write(output, outputs, context)
+
+
+# What `refine` takes and the tool `register` does not ask for.
+_RPC_DEFAULTS: Mapping[str, Any] = {
+    "gcps": None,
+    "geoid": None,
+    "height": None,
+    "rpc": None,
+    "model": AUTO,
+    "search_radius": None,
+    "mask": AUTO,
+    "matching_pixel_size": None,
+}

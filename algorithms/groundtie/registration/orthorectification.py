@@ -1,0 +1,93 @@
+"""An image with RPCs, projected onto a map by them and a terrain model."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..context import Context
+from ..rasters.atomic import Outputs
+from ..rasters.delivery import warp_raster
+from ..rasters.grid import Grid
+from ..rasters.reading import RasterSource
+from ..rasters.target_grids import covering_grid, registered_grid
+from ..rasters.writing import write_cog
+from ..sensor.dense import DenseOrientation
+from ..sensor.orientation import Orientation
+
+
+@dataclass(frozen=True)
+class Orthorectification:
+    """How an image is orthorectified.
+
+    Parameters
+    ----------
+    source
+        The image, open.
+    orientation
+        How it sees the ground.
+    grid
+        The grid of the result; None: one that covers the image, in the orientation's CRS.
+    pixel_size
+        Of that grid, in its unit; None: that of the image on the ground.
+    """
+
+    source: RasterSource
+    orientation: Orientation
+    grid: Grid | None = None
+    pixel_size: float | None = None
+
+    @property
+    def target(self) -> Grid:
+        """The grid of the result.
+
+        Raises
+        ------
+        NoOverlapError
+            The image shows nothing of the grid that was given.
+        """
+        image, by = self.source.grid, self.orientation
+        if self.grid is None:
+            return registered_grid(image, by.to_map, by.crs, self.pixel_size)
+        covering_grid(self.grid, by.to_map(image.outline()), within=True)
+        return self.grid
+
+    def write(
+        self,
+        output: Path,
+        outputs: Outputs,
+        context: Context,
+        resampling: str = "cubic",
+        cog: bool = False,
+    ) -> Grid:
+        """Write the orthoimage, and return its grid.
+
+        Parameters
+        ----------
+        output
+            The GeoTIFF.
+        outputs
+            Where it is staged.
+        context
+            Threads and progress.
+        resampling
+            One of `warping.METHODS`.
+        cog
+            Whether it is copied into a Cloud Optimized GeoTIFF.
+        """
+        target, staged = self.target, outputs.stage(output)
+        with tempfile.TemporaryDirectory(dir=output.resolve().parent) as folder:
+            written = Path(folder) / "ortho.tif" if cog else staged
+            warp_raster(
+                self.source,
+                DenseOrientation(self.orientation),
+                target,
+                written,
+                resampling,
+                workers=context.workers,
+                progress=context.part(0.0, 0.8 if cog else 1.0).progress,
+            )
+            if cog:
+                write_cog(written, staged, context.workers)
+        return target

@@ -1,0 +1,259 @@
+"""The steps of a registration, one by one, on arrays.
+
+What `coregister` does in one call can be done step by step, or in part: the similarity surface of
+two windows, the peak of a surface, tie points of two images near a model, a robust fit to points,
+the verdict on a model. Images are whatever the tools take: arrays, files, open datasets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from affine import Affine
+from numpy.typing import ArrayLike, NDArray
+
+from .arrays import Raster
+from .context import Context, threads
+from .errors import ParameterError, TooFewPointsError
+from .geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_without_blocks
+from .geometry.models import DEGREE, KINDS, Model, PolynomialModel
+from .geometry.robust import find_consensus, fit_robustly
+from .geometry.tie_points import TiePoints
+from .geometry.transform import Transform
+from .matching.surface_fit import FIT_RADIUS_PX, check_points
+from .rasters.patch import Patch
+from .rasters.reading import open_raster
+from .registration.pipeline import Stages, mask_pair, open_pair
+from .registration.scene import SceneInfo
+from .registration.specification import COREGISTER, Specification
+from .registration.verdict import Verdict
+from .registration.verdict import judge as judge_evidence
+from .similarity.description import BORDER_PX
+from .similarity.peak import Peak, find_peak
+from .similarity.surface import SimilaritySettings, Surface, describe
+from .similarity.surface import similarity_surface as surface_of
+
+__all__ = [
+    "Fit",
+    "Peak",
+    "find_peak",
+    "fit_model",
+    "judge",
+    "match_chips",
+    "similarity_surface",
+]
+
+FloatArray = NDArray[np.float64]
+
+# Matches are taken to be as exact as this, in pixels, where nobody knows better.
+_USUAL_SIGMA_PX = 0.25
+
+
+def similarity_surface(
+    reference: ArrayLike, input: ArrayLike, radius_px: int, similarity: str = "fused"
+) -> Surface:
+    """Return how similar two windows are, over shifts of one against the other.
+
+    Parameters
+    ----------
+    reference, input
+        Grey values of the same size, (h, w), of nominally the same ground. What is masked or not
+        finite does not count. A border of `radius_px` + 8 pixels is not part of the chip that is
+        compared.
+    radius_px
+        Largest shift.
+    similarity
+        One of `similarity.surface.SIMILARITIES`.
+
+    Returns
+    -------
+    Shape (2 `radius_px` + 1, 2 `radius_px` + 1), in robust standard deviations: rows and columns
+    by which the input's content lies further down and right than the reference's.
+
+    Raises
+    ------
+    ParameterError
+        The windows are too small, or differ in size.
+    """
+    windows = [_patch(image) for image in (reference, input)]
+    height, width = windows[0].values.shape
+    if windows[1].values.shape != (height, width):
+        raise ParameterError("reference and input must be windows of the same size")
+    chip_pixels = (height - 2 * (radius_px + BORDER_PX), width - 2 * (radius_px + BORDER_PX))
+    if min(chip_pixels) < 1:
+        least = 2 * (radius_px + BORDER_PX) + 1
+        raise ParameterError(f"windows must have {least} pixels a side for a radius of {radius_px}")
+    settings = SimilaritySettings(similarity)
+    template, search = (describe(w, chip_pixels[0] * chip_pixels[1], settings) for w in windows)
+    return surface_of(template.inner(radius_px), search, radius_px, settings)
+
+
+def match_chips(
+    reference: Any,
+    input: Any,
+    model: Model | None = None,
+    radius_px: int = FIT_RADIUS_PX,
+    spec: Specification = COREGISTER,
+    context: Context | None = None,
+) -> TiePoints:
+    """Return tie points of two images near a model.
+
+    Chips lie between the blocks that are held out for `judge`, and see nothing of them.
+
+    Parameters
+    ----------
+    reference, input
+        The images, as `rasters.reading.open_raster` takes them.
+    model
+        The misregistration on the map as known so far; None: none.
+    radius_px
+        How far it may be wrong, in matching pixels.
+    spec
+        How chips are laid out, masked and compared.
+    context
+        Threads and progress; None: a thread for each processor.
+    """
+    model = PolynomialModel.identity() if model is None else model
+    with _stages(reference, input, spec, context) as (stages, _, running):
+        places = stages.matcher.fit_places(stages.held_out.layout)
+        surfaces = stages.matcher.match(model, places, radius_px, running)
+        points = check_points(stages.masked.pair, surfaces, model)
+        return replace(points, is_check=np.zeros(len(points), bool))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A robust fit.
+
+    Parameters
+    ----------
+    model
+        Takes positions of the reference to nominal ones of the input; `model.inverse` back.
+    inliers
+        Which pairs it was fitted to, shape (n,).
+    sigma
+        Standard deviation of the inliers' residuals along an axis, in the positions' unit.
+    """
+
+    model: Model
+    inliers: NDArray[np.bool_]
+    sigma: float
+
+
+def fit_model(
+    kind: str,
+    xy: ArrayLike,
+    nominal_xy: ArrayLike,
+    *,
+    pixel_size: float = 1.0,
+    tolerance_px: float = 3.0,
+    radius_px: float = FIT_RADIUS_PX,
+    seed: int = 0,
+) -> Fit:
+    """Fit a model to pairs of positions of which many may be outliers.
+
+    Parameters
+    ----------
+    kind
+        One of `geometry.models.KINDS`.
+    xy, nominal_xy
+        Positions in the reference and in the input, shape (n, 2), in one coordinate system: pixels
+        of two arrays, or map positions (see `Transform.nominal_xy`).
+    pixel_size
+        Size of a pixel in units of the positions.
+    tolerance_px
+        Within which pairs agree with a first model of degree 1, their consensus.
+    radius_px
+        How far outliers may have fallen from the truth.
+    seed
+        Of the consensus' random samples.
+
+    Raises
+    ------
+    ParameterError
+        There is no such kind of model.
+    TooFewPointsError
+        Too few pairs agree with a model of this kind.
+    """
+    if kind not in KINDS:
+        raise ParameterError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
+    px, nominal_px = (np.asarray(p, float).reshape(-1, 2) / pixel_size for p in (xy, nominal_xy))
+    if len(px) < 3:
+        raise TooFewPointsError(f"a robust fit needs at least 3 points; there are {len(px)}")
+    first = kind if DEGREE.get(kind, 2) <= 1 else "affine"
+    start = find_consensus(px, nominal_px, tolerance_px, first, seed)
+    model, mixture = fit_robustly(
+        kind,
+        px,
+        nominal_px,
+        np.full(len(px), _USUAL_SIGMA_PX**2),
+        start,
+        (2 * radius_px + 1) ** 2,
+        SIGMA_RANGE_PX,
+    )
+    return Fit(model.on_map(Affine.scale(pixel_size)), mixture.inliers, mixture.sigma * pixel_size)
+
+
+def judge(
+    reference: Any,
+    input: Any,
+    model: Model,
+    points: TiePoints,
+    spec: Specification = COREGISTER,
+    context: Context | None = None,
+) -> Verdict:
+    """Return the verdict on a model, wherever it comes from, by chips in held-out blocks.
+
+    All rules of a registration apply. They rest on the model having seen nothing of those blocks,
+    as the points of `match_chips` have not.
+
+    Parameters
+    ----------
+    reference, input
+        The images, as `rasters.reading.open_raster` takes them.
+    model
+        The misregistration on the map.
+    points
+        The points that it was fitted to, outliers rejected (see `TiePoints.reject`).
+    spec
+        How the images are inspected, masked and compared, and the largest error that is accepted.
+    context
+        Threads and progress; None: a thread for each processor.
+    """
+    with _stages(reference, input, spec, context) as (stages, scene, running):
+        pair = stages.masked.pair
+        transform = Transform(model, pair.grid.crs, pair.input.source.grid)
+        used = points.take(points.used)
+        px = pair.grid.map_to_pixel(used.reference_xy)
+        nominal_px = pair.grid.map_to_pixel(transform.nominal_xy(used.input_px))
+        without_blocks = fit_without_blocks(model.kind, px, nominal_px, np.ones(len(px)))
+        estimate = Estimate(transform, points, without_blocks)
+        check = stages.check(estimate, running)
+        return judge_evidence(stages.evidence(estimate, check, scene))
+
+
+@contextmanager
+def _stages(
+    reference: Any, input: Any, spec: Specification, context: Context | None
+) -> Iterator[tuple[Stages, SceneInfo, Context]]:
+    """Open a pair and put the stages of its registration together."""
+    if context is None:
+        with threads() as own, _stages(reference, input, spec, own) as found:
+            yield found
+        return
+    with open_pair(reference, input, spec, context.quiet()) as opened:
+        scene = SceneInfo.of(opened.pair, spec.radar)
+        masked = mask_pair(opened, spec, scene, context.quiet())
+        yield Stages.of(opened.images, masked, spec), scene, context
+
+
+def _patch(image: ArrayLike) -> Patch:
+    values = np.asanyarray(image)
+    if values.ndim != 2:
+        raise ParameterError(f"a window must have the shape (h, w), not {values.shape}")
+    with open_raster(Raster(values)) as source:
+        return Patch(*source.read(source.window))

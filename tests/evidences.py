@@ -1,0 +1,145 @@
+"""Evidence for verdicts, made without any image: what the rules of a registration read."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from raster_files import UTM, utm_grid
+
+from groundtie.geometry.estimation import Estimate
+from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.model_choice import block_folds
+from groundtie.geometry.tie_points import TiePoints
+from groundtie.geometry.transform import Transform
+from groundtie.registration.evidence import RegistrationEvidence
+from groundtie.registration.refinement_evidence import RefinementEvidence
+from groundtie.registration.scene import ImageFacts, SceneInfo
+from groundtie.sensor.adjustment import Control, adjust
+
+GRID = utm_grid(600, 500)
+RADIUS = 16
+
+# Pixels of the image whose RPCs are refined.
+IMAGE_SIZE = (1000, 800)
+
+# Where heights displace things: along range, here off the axes of the map.
+RANGE = np.array([np.cos(0.3), np.sin(0.3)])
+
+
+def points(px: np.ndarray, error_px: np.ndarray, *, check: bool) -> TiePoints:
+    """Return points of an image that is registered already, with errors of their matches."""
+    count = len(px)
+    return TiePoints(
+        reference_xy=GRID.pixel_to_map(px),
+        input_px=px + error_px,
+        score=np.full(count, 8.0),
+        covariance_px2=np.tile(0.04 * np.eye(2), (count, 1, 1)),
+        forward_backward_error_px=np.zeros(count),
+        is_check=np.full(count, check),
+        state=np.full(count, "used"),
+    )
+
+
+def fit_points(within: tuple[float, float] = (1.0, 1.0), sigma: float = 0.3) -> TiePoints:
+    """Return points on a lattice over a part of the overlap."""
+    rng = np.random.default_rng(1)
+    cols, rows = np.meshgrid(np.linspace(20, 579, 9), np.linspace(20, 479, 8))
+    px = np.column_stack([cols.ravel(), rows.ravel()]) * within
+    return points(px, sigma * rng.normal(size=px.shape), check=False)
+
+
+def fit_with(errors: np.ndarray) -> TiePoints:
+    """Return points of a fit whose matches have errors."""
+    px = np.random.default_rng(6).uniform([20, 20], [579, 479], (len(errors), 2))
+    return points(px, errors, check=False)
+
+
+def estimated(fit: TiePoints, kind: str = "affine") -> Estimate:
+    """Fit a model to points as the search does: on the map, and in pixels without each block."""
+    px, nominal_px = GRID.map_to_pixel(fit.reference_xy), fit.input_px
+    on_map = fit_model(kind, fit.reference_xy, GRID.pixel_to_map(nominal_px))
+    folds = block_folds(px)
+    left_out = [fit_model(kind, px[folds != f], nominal_px[folds != f]) for f in np.unique(folds)]
+    return Estimate(Transform(on_map, UTM, GRID), fit, tuple(left_out))
+
+
+def check_points(error_px: np.ndarray) -> TiePoints:
+    """Return check points anywhere in the overlap."""
+    rng = np.random.default_rng(2)
+    px = rng.uniform([30, 30], [570, 470], (len(error_px), 2))
+    return points(px, error_px, check=True)
+
+
+def scatter(count: int, sigma: float, seed: int = 3) -> np.ndarray:
+    """Return errors of inliers, shape (n, 2)."""
+    return sigma * np.random.default_rng(seed).normal(size=(count, 2))
+
+
+def fallen(count: int, seed: int = 4) -> np.ndarray:
+    """Return errors of matches that fell anywhere, shape (n, 2)."""
+    return np.random.default_rng(seed).uniform(-RADIUS, RADIUS, (count, 2))
+
+
+def displaced(count: int, low: float, high: float, seed: int = 5) -> np.ndarray:
+    """Return errors of matches on things of various heights, exact across the range."""
+    lengths = np.random.default_rng(seed).uniform(low, high, count)
+    return lengths[:, None] * RANGE + scatter(count, 0.2, seed)
+
+
+def evidence(
+    check_errors: np.ndarray,
+    estimate: Estimate | None = None,
+    max_error_px: float = 3.0,
+    **more: Any,
+) -> RegistrationEvidence:
+    """Return the evidence of a registration whose check points have errors, shape (n, 2)."""
+    estimate = estimate or estimated(fit_points())
+    return RegistrationEvidence(
+        estimate, check_points(check_errors), GRID, max_error_px, RADIUS, **more
+    )
+
+
+def facts(
+    variation2: float = 0.001, strong_share: float = 0.02, is_known_radar: bool = False
+) -> ImageFacts:
+    """Return facts about an image that need no image: by default a camera's, of fields."""
+    found = ImageFacts(None, None)  # type: ignore[arg-type]
+    vars(found).update(
+        variation2=variation2, strong_share=strong_share, is_known_radar=is_known_radar
+    )
+    return found
+
+
+def scene(
+    reference: ImageFacts | None = None, input: ImageFacts | None = None, declared: str = "auto"
+) -> SceneInfo:
+    """Return what two images are, by given facts."""
+    return SceneInfo(reference or facts(), input or facts(), declared)
+
+
+def control(
+    shift: tuple[float, float],
+    count: int = 40,
+    noise_px: float = 0.3,
+    corner: float = 1.0,
+    seed: int = 0,
+) -> Control:
+    """Return ground control on a part of an image, shifted against its RPCs."""
+    random = np.random.default_rng(seed)
+    px = random.uniform(0, 1, (count, 2)) * IMAGE_SIZE * corner
+    found = px + shift + random.normal(0, noise_px, px.shape)
+    return Control(px, found, np.tile(0.01 * np.eye(2), (count, 1, 1)), IMAGE_SIZE)
+
+
+def refinement(
+    fit: Control,
+    check: Control | None = None,
+    pixel_m: float = 1.0,
+    max_error_px: float = 3.0,
+    kind: str = "auto",
+    folding_px: float = 0.0,
+) -> RefinementEvidence:
+    """Return the evidence of RPCs that are refined by ground control."""
+    adjusted = adjust(fit, kind)
+    return RefinementEvidence.of(fit, adjusted, check, pixel_m, max_error_px, folding_px)

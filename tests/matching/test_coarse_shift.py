@@ -1,0 +1,94 @@
+"""The coarse shift: candidates from one search over a reduced image."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from raster_files import utm_grid, write_raster
+from textured_pairs import TexturedPair
+
+from groundtie.context import Context
+from groundtie.errors import RasterContentError
+from groundtie.geometry.limits import SearchLimits
+from groundtie.matching import coarse_shift
+from groundtie.matching.coarse_shift import (
+    Candidate,
+    coarse_candidates,
+    level_factor,
+    shift_model,
+)
+from groundtie.pose.pose import Pose, PoseFound
+from groundtie.rasters.grid import Grid
+from groundtie.rasters.pair import Image, ImagePair, make_pair
+from groundtie.rasters.reading import open_raster
+from groundtie.similarity.surface import SimilaritySettings
+
+SETTINGS = SimilaritySettings("orientation")
+
+
+def nothing_held_out(piece: Grid) -> np.ndarray:
+    return np.zeros((piece.height, piece.width), bool)
+
+
+def shift_m(candidate: Candidate) -> tuple[float, ...]:
+    return tuple(candidate.model([[0.0, 0.0]])[0])
+
+
+def test_levels_are_no_larger_than_512_pixels() -> None:
+    assert level_factor(utm_grid(300, 500)) == 1
+    assert level_factor(utm_grid(1024, 100)) == 2
+    assert level_factor(utm_grid(100, 5120)) == 10
+
+
+def test_the_best_candidate_is_the_shift(pair: ImagePair, context: Context) -> None:
+    found = coarse_candidates(
+        pair, pair.grid, SearchLimits(140.0), SETTINGS, nothing_held_out, context
+    )
+    assert shift_m(found[0]) == pytest.approx((70, -45), abs=2)
+    assert [c.height for c in found] == sorted((c.height for c in found), reverse=True)
+    places = np.array([shift_m(c) for c in found])
+    gaps = np.abs(places[:, None] - places[None]).max(axis=2)[np.triu_indices(len(found), 1)]
+    # Candidates are at least four pixels apart, but for their sub-pixel parts.
+    assert (gaps > 30).all()
+
+
+def test_candidates_on_a_coarser_level_are_in_map_units(pair: ImagePair, context: Context) -> None:
+    level = pair.grid.scaled(2)
+    found = coarse_candidates(pair, level, SearchLimits(140.0), SETTINGS, nothing_held_out, context)
+    assert shift_m(found[0]) == pytest.approx((70, -45), abs=6)
+
+
+def test_low_candidates_of_any_search_are_left_out(
+    pair: ImagePair, context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def poses(*given: object) -> list[PoseFound]:
+        places = ((0.0, 10.0), (20.0, 4.1), (-20.0, 3.9))
+        return [PoseFound(Pose(shift_px=(right, 0.0)), height) for right, height in places]
+
+    monkeypatch.setattr(coarse_shift, "find_poses", poses)
+    limits = SearchLimits(140.0, 10.0)
+    found = coarse_candidates(pair, pair.grid, limits, SETTINGS, nothing_held_out, context)
+    assert [candidate.height for candidate in found] == [10.0, 4.1]
+
+
+@pytest.mark.parametrize("which", ["reference", "input"])
+@pytest.mark.parametrize(("value", "text"), [(5, "constant"), (0, "no valid pixel")])
+def test_images_without_content_are_named(
+    textured: TexturedPair, tmp_path: Path, context: Context, which: str, value: int, text: str
+) -> None:
+    empty = np.full((240, 260), value, np.uint16)
+    path = write_raster(tmp_path / "empty.tif", empty, textured.grid, nodata=0)
+    paths = {"reference": textured.reference, "input": textured.input} | {which: path}
+    with open_raster(paths["reference"]) as reference, open_raster(paths["input"]) as input:
+        pair = make_pair(Image(reference), Image(input))
+        with pytest.raises(RasterContentError, match=rf"empty\.tif.*{text}"):
+            coarse_candidates(
+                pair, pair.grid, SearchLimits(40.0), SETTINGS, nothing_held_out, context
+            )
+
+
+def test_the_model_of_a_candidate_is_its_shift() -> None:
+    model = shift_model(30.0, -20.0)
+    np.testing.assert_allclose(model([[500_000.0, 4e6]]), [[500_030, 4e6 - 20]])

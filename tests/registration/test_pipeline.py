@@ -1,0 +1,241 @@
+"""One pipeline: its stages, what it finds out once, and that every tool is judged by all rules."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from contexts import context
+from facts_of_pairs import TOWN, opened, speckled
+from rpc_scenes import Scene, make_scene
+from textured_pairs import TexturedPair, error_px
+
+import groundtie
+from groundtie.context import Context
+from groundtie.errors import NothingFoundError, NotRegisteredError
+from groundtie.geometry.models import Model
+from groundtie.matching.chips import ChipMatcher
+from groundtie.matching.guided_fit import GuidedFit
+from groundtie.matching.keypoint_fit import KeypointFit
+from groundtie.matching.pooled import PooledHistogramMatcher
+from groundtie.matching.surface_fit import SurfaceFit
+from groundtie.registration import masks, pipeline, verdict
+from groundtie.registration import scene as scene_module
+from groundtie.registration.evidence import AGREEMENT, ERROR, REFINEMENT, SCENE, SEARCH
+from groundtie.registration.masks import Masked
+from groundtie.registration.pipeline import Stages, mask_pair, open_pair, run
+from groundtie.registration.registration import Registration
+from groundtie.registration.rules import Rule
+from groundtie.registration.scene import SceneInfo
+from groundtie.registration.specification import (
+    COREGISTER,
+    MATCHERS,
+    OPTICAL,
+    SAR_SAR,
+    Specification,
+)
+
+__all__ = ["context"]
+PRESETS = {"coregister": COREGISTER, "match_sar_sar": SAR_SAR, "match_optical": OPTICAL}
+
+
+def test_a_registration_has_a_transform_points_and_a_verdict(
+    registration: Registration, textured: TexturedPair
+) -> None:
+    assert registration.verdict.accepted
+    points, transform = registration.tie_points, registration.accepted()
+    assert points is not None
+    assert error_px(transform, textured) < 0.3
+    # Points of the fit first, then check points.
+    assert (np.diff(points.is_check.astype(int)) >= 0).all()
+    assert points.is_check.sum() == registration.verdict.check_points
+    # No check point lies among the pixels that the fit saw.
+    px = textured.grid.map_to_pixel(points.reference_xy)
+    stages = Stages.of(
+        registration.pair, Masked(registration.pair, registration.mask), registration.spec
+    )
+    held_out = stages.held_out.layout.held_out(px)
+    np.testing.assert_array_equal(held_out, points.is_check)
+
+
+def nothing_found(*_: object) -> Model:
+    raise NothingFoundError("nothing in common was found")
+
+
+def test_where_nothing_is_found_the_registration_has_a_verdict_alone(
+    textured: TexturedPair, context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pipeline, "find_coarse_model", nothing_found)
+    with open_pair(textured.reference, textured.input, COREGISTER, context) as pair:
+        found = run(pair, COREGISTER, context)
+    assert not found.verdict.accepted and found.verdict.rule == "nothing in common"
+    assert found.transform is None and found.tie_points is None
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Return a radar's and a camera's image of a dense town."""
+    folder = tmp_path_factory.mktemp("town")
+    with opened(folder, speckled(0.25), TOWN):
+        return folder / "reference.tif", folder / "input.tif"
+
+
+def counting(monkeypatch: pytest.MonkeyPatch) -> Counter[tuple[str, object]]:
+    """Count from now on how often each fact is found, of each image."""
+    found: Counter[tuple[str, object]] = Counter()
+    keys: dict[str, tuple[Any, Callable[[Any], object]]] = {
+        "variation2_of": (scene_module, lambda image: image.source.path),
+        "share_of_strong_scatterers": (scene_module, lambda scene: scene.like.path),
+        "is_known_radar": (scene_module, lambda source: source.path),
+        "find_ground": (masks, lambda scene: scene.like.path),
+        "shadow_azimuth_deg": (masks, lambda _: "shadow"),
+    }
+    for name, (module, key) in keys.items():
+        function = getattr(module, name)
+
+        def counted(
+            of: Any,
+            *more: Any,
+            name: str = name,
+            key: Callable[[Any], object] = key,
+            function: Callable[..., Any] = function,
+        ) -> Any:
+            found[name, key(of)] += 1
+            return function(of, *more)
+
+        monkeypatch.setattr(module, name, counted)
+    return found
+
+
+@pytest.mark.parametrize("tool", PRESETS)
+def test_each_fact_about_an_image_is_found_once(
+    town: tuple[Path, Path], context: Context, monkeypatch: pytest.MonkeyPatch, tool: str
+) -> None:
+    spec = PRESETS[tool]
+    found = counting(monkeypatch)
+    with open_pair(*town, spec, context) as pair:
+        result = run(pair, spec, context)
+        assert max(found.values()) == 1
+        if tool == "coregister":
+            # The radar's share and ground; nobody asks what is bright in the camera's.
+            counts = Counter(name for name, _ in found)
+            assert counts["variation2_of"] == 2
+            assert counts["share_of_strong_scatterers"] == 1
+            assert counts["find_ground"] == 1
+        before = found.copy()
+        # Reports and summaries read nothing again.
+        result.summary()
+        result.scene.lines()
+        assert found == before
+
+
+@pytest.mark.parametrize("mask", ["none", "threshold", "regions"])
+def test_ground_is_found_once_whatever_takes_part_in_the_fit(
+    town: tuple[Path, Path], context: Context, monkeypatch: pytest.MonkeyPatch, mask: str
+) -> None:
+    spec = replace(COREGISTER, mask=mask)
+    found = counting(monkeypatch)
+    with open_pair(*town, spec, context) as pair:
+        scene = SceneInfo.of(pair.pair, spec.radar)
+        masked = mask_pair(pair, spec, scene, context)
+        assert masked.used.kind == mask
+        # What shows more than the ground is checked on the ground.
+        assert (masked.ground is None) == (mask == "regions")
+        assert Counter(name for name, _ in found)["find_ground"] == 1
+        stages = Stages.of(pair.images, masked, spec)
+        is_apart = stages.checker is not stages.matcher
+        assert is_apart == (mask != "regions")
+        assert isinstance(stages.checker, PooledHistogramMatcher)
+
+
+def test_matchers_are_put_together_by_name(textured: TexturedPair, context: Context) -> None:
+    fits = dict(zip(MATCHERS, (SurfaceFit, KeypointFit, GuidedFit), strict=True))
+    for name, kind in fits.items():
+        spec = Specification(name)
+        with open_pair(textured.reference, textured.input, spec, context) as pair:
+            masked = mask_pair(pair, spec, SceneInfo.of(pair.pair), context)
+            stages = Stages.of(pair.images, masked, spec)
+            assert isinstance(stages.fit, kind)
+            assert isinstance(stages.matcher, ChipMatcher)
+            assert stages.checker is stages.matcher
+            # All of them are blind to what is held out.
+            assert stages.matcher.held_out is stages.held_out
+
+
+@pytest.mark.parametrize(("tries", "more"), [(1, 0.0), (100, 2.0)])
+def test_tries_count_against_agreement_by_chance(
+    textured: TexturedPair, context: Context, tries: int, more: float
+) -> None:
+    spec = replace(COREGISTER, tries=tries)
+    with open_pair(textured.reference, textured.input, spec, context) as pair:
+        scene = SceneInfo.of(pair.pair)
+        masked = mask_pair(pair, spec, scene, context)
+        stages = Stages.of(pair.images, masked, spec)
+        found = run(pair, spec, context)
+        assert found.estimate is not None and found.check is not None
+        evidence = stages.evidence(found.estimate, found.check, scene)
+        once = replace(evidence, tries=1).held_out.log10_chance
+        assert evidence.held_out.log10_chance == pytest.approx(once + more)
+        assert found.verdict.log10_chance == pytest.approx(once + more)
+        assert evidence.scene is scene
+
+
+def house_rule(stage: str) -> Rule:
+    return Rule(f"house rule at {stage}", stage, "all", "this test", "go", lambda _: "forbidden")
+
+
+@pytest.mark.parametrize("tool", [*PRESETS, "register"])
+@pytest.mark.parametrize("stage", [SEARCH, AGREEMENT, ERROR, SCENE])
+def test_every_tool_is_judged_by_the_rules_of_every_stage(
+    textured: TexturedPair,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    tool: str,
+    stage: str,
+) -> None:
+    monkeypatch.setattr(verdict, "RULES", (house_rule(stage),))
+    if stage == SEARCH:
+        monkeypatch.setattr(pipeline, "find_coarse_model", nothing_found)
+    output = tmp_path / "out.tif"
+    with pytest.raises(NotRegisteredError, match="forbidden; go") as error:
+        getattr(groundtie, tool)(textured.reference, textured.input, output)
+    assert error.value.verdict is not None
+    assert error.value.verdict.rule == f"house rule at {stage}"
+    assert not output.exists()
+
+
+@pytest.fixture(scope="module")
+def sensor(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return make_scene(tmp_path_factory.mktemp("sensor"), None)
+
+
+@pytest.mark.parametrize(
+    ("tool", "stage"),
+    [
+        *(("extract_gcps", stage) for stage in (SEARCH, AGREEMENT, ERROR, SCENE)),
+        *(("refine_rpc", stage) for stage in (SEARCH, SCENE, REFINEMENT)),
+    ],
+)
+def test_ground_control_is_judged_by_the_rules_of_every_stage(
+    sensor: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tool: str, stage: str
+) -> None:
+    monkeypatch.setattr(verdict, "RULES", (house_rule(stage),))
+    if stage == SEARCH:
+        monkeypatch.setattr(pipeline, "find_coarse_model", nothing_found)
+    output = tmp_path / ("gcps.csv" if tool == "extract_gcps" else "refined.txt")
+    with pytest.raises(NotRegisteredError, match="forbidden; go") as error:
+        getattr(groundtie, tool)(
+            image=sensor.image,
+            reference=sensor.reference,
+            dem=sensor.dem,
+            dem_datum="ellipsoidal",
+            output=output,
+        )
+    assert error.value.verdict is not None
+    assert error.value.verdict.rule == f"house rule at {stage}"
+    assert not output.exists()

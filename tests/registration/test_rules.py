@@ -1,0 +1,229 @@
+"""Every rule has evidence that it refuses, alone, and evidence that it lets pass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from evidences import (
+    control,
+    displaced,
+    estimated,
+    evidence,
+    facts,
+    fallen,
+    fit_points,
+    fit_with,
+    refinement,
+    scatter,
+    scene,
+)
+
+from groundtie.errors import (
+    AmbiguousPlaceError,
+    BandError,
+    NothingFoundError,
+    NotRegisteredError,
+    TooFewPointsError,
+)
+from groundtie.geometry.estimation import Estimate
+from groundtie.masks.choice import LAYER, REGIONS, THRESHOLD, MaskUsed
+from groundtie.pose.pose import Pose, PoseFound
+from groundtie.registration import evidence as stages
+from groundtie.registration.evidence import (
+    RegistrationEvidence,
+    SearchEvidence,
+)
+from groundtie.registration.pose_verdict import PoseEvidence
+from groundtie.registration.refinement_evidence import RefinementEvidence
+from groundtie.registration.rules import RULES, Rule
+from groundtie.registration.verdict import Evidence, first_refusal
+
+GOOD = scatter(36, 0.4)
+RANK = (
+    stages.SEARCH,
+    stages.AGREEMENT,
+    stages.ERROR,
+    stages.SCENE,
+    stages.REFINEMENT,
+    stages.POSE,
+)
+
+# Dense towns: of a radar with speckle, of a radar whose speckle a filter took, of who knows what.
+TOWN = {"strong_share": 0.25}
+SPECKLED = scene(facts(variation2=0.2, **TOWN))
+DESPECKLED = scene(facts(is_known_radar=True, **TOWN))
+PERHAPS = scene(facts(**TOWN))
+
+
+def masked(kind: str) -> MaskUsed:
+    return MaskUsed(kind, "reference", 0.3, "as asked for")
+
+
+def two_thirds(right: int) -> np.ndarray:
+    """Return errors of 36 check points of which so many agree."""
+    return np.concatenate([scatter(right, 0.4), fallen(36 - right)])
+
+
+def beside(right: int, others: int) -> np.ndarray:
+    """Return errors of check points of which some agree on a place 7 px off."""
+    return np.concatenate([scatter(right, 0.3), scatter(others, 0.3) + [5.0, 5.0]])
+
+
+def loose(by_px: float) -> Estimate:
+    """Return an estimate that varies by so much, and a little more, with each block of points."""
+    shifts = [(side * by_px, 0.0) for side in (-1, 1)] * 3
+    folds = tuple(partial(np.add, shift) for shift in shifts)
+    return replace(estimated(fit_points()), fold_models=folds)
+
+
+CONTROL = control((20, -9))
+
+
+BEST = Pose(40.0)
+
+
+def pose(height: float = 9.0, rival: float = 3.0, found: Pose = BEST) -> PoseEvidence:
+    """Return the evidence of a pose beside the two best ones of an exhaustive search."""
+    best = PoseFound(BEST, height), PoseFound(Pose(-70.0), rival)
+    return PoseEvidence([PoseFound(found, height)], best, (200, 100))
+
+
+# Of each rule: evidence that it refuses, and evidence that it does not.
+EVIDENCE: dict[str, tuple[Any, Any]] = {
+    "second place": (
+        SearchEvidence(AmbiguousPlaceError("two places match about as well")),
+        SearchEvidence(NothingFoundError("nothing in common was found")),
+    ),
+    "nothing in common": (
+        SearchEvidence(NothingFoundError("nothing in common was found")),
+        SearchEvidence(AmbiguousPlaceError("two places match about as well")),
+    ),
+    "too few points": (
+        SearchEvidence(TooFewPointsError("only 3 chips could be matched")),
+        SearchEvidence(BandError("there is no band 7")),
+    ),
+    "chance agreement": (evidence(np.zeros((2, 2))), evidence(np.zeros((3, 2)))),
+    "small share of check points": (
+        evidence(np.concatenate([scatter(14, 0.3), fallen(58)])),
+        evidence(np.concatenate([scatter(20, 0.3), fallen(52)])),
+    ),
+    "another transform": (evidence(beside(15, 20)), evidence(beside(20, 16))),
+    "error at held-out points": (
+        evidence(scatter(72, 0.3) + [1.2, 0.0], max_error_px=1.0),
+        evidence(scatter(72, 0.3) + [1.2, 0.0], max_error_px=1.5),
+    ),
+    "loose model": (evidence(GOOD, loose(2.0)), evidence(GOOD, loose(1.0))),
+    "ground elsewhere": (
+        evidence(GOOD, ground_shift_px=1.1),
+        evidence(GOOD, ground_shift_px=0.9),
+    ),
+    "layover of check points": (
+        evidence(np.concatenate([scatter(24, 0.3), displaced(20, 4, 10)]), layover_factor=3.0),
+        evidence(np.concatenate([scatter(24, 0.3), displaced(10, 4, 10)]), layover_factor=3.0),
+    ),
+    "layover of fit points": (
+        evidence(GOOD, estimated(fit_with(displaced(100, -2.5, 2.5))), layover_factor=3.0),
+        evidence(GOOD, estimated(fit_with(displaced(100, -0.8, 0.8))), layover_factor=3.0),
+    ),
+    "despeckled town": (evidence(GOOD, scene=DESPECKLED), evidence(GOOD, scene=SPECKLED)),
+    "town matched whole": (
+        evidence(two_thirds(20), scene=PERHAPS),
+        evidence(two_thirds(26), scene=PERHAPS),
+    ),
+    "narrow control": (
+        refinement(control((20, -9), corner=0.2), kind="shift"),
+        refinement(control((20, -9), corner=0.4), kind="shift"),
+    ),
+    "not nearer than before": (
+        refinement(control((0, 0)), control((0, 0), 15, noise_px=0.01, seed=1)),
+        refinement(CONTROL, control((20, -9), 15, noise_px=0.01, seed=1)),
+    ),
+    "bias not folded": (
+        refinement(CONTROL, folding_px=0.02),
+        refinement(CONTROL, folding_px=0.005),
+    ),
+    "pose by chance": (pose(height=4.9, rival=3.0), pose(height=5.1, rival=3.0)),
+    "second pose": (pose(height=9.0, rival=5.7), pose(height=9.0, rival=5.5)),
+    # Three degrees move corners by 6 px, a degree by 2 px.
+    "other pose": (pose(found=Pose(43.0)), pose(found=Pose(41.0))),
+}
+
+
+def refusing(found: Evidence) -> list[str]:
+    """Return the names of all rules that refuse, whichever decides."""
+    asked = [rule for rule in RULES if rule.stage in found.stages]
+    return [rule.name for rule in asked if rule.reason(found) is not None]
+
+
+def test_evidence_stands_here_for_every_rule_and_for_no_other() -> None:
+    assert list(EVIDENCE) == [rule.name for rule in RULES]
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
+def test_a_rule_refuses_what_it_is_for_and_no_other_does(rule: Rule) -> None:
+    refused, _ = EVIDENCE[rule.name]
+    assert refusing(refused) == [rule.name]
+    decided = first_refusal(refused)
+    assert decided is not None and decided[0] is rule
+    assert decided[1] == rule.reason(refused) and len(decided[1]) > 10
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
+def test_a_rule_lets_pass_what_is_just_within_its_limit(rule: Rule) -> None:
+    refused, passed = EVIDENCE[rule.name]
+    assert type(refused) is type(passed)
+    assert rule.name not in refusing(passed)
+    # Of a search, any failure is refused or no refusal.
+    assert rule.stage == stages.SEARCH or refusing(passed) == []
+
+
+def test_names_are_unique_and_stages_follow_one_another() -> None:
+    names = [rule.name for rule in RULES]
+    assert len(set(names)) == len(names)
+    ranks = [RANK.index(rule.stage) for rule in RULES]
+    assert ranks == sorted(ranks)
+    assert set(ranks) == set(range(len(RANK)))
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
+def test_a_rule_states_its_limit_its_source_and_what_to_try(rule: Rule) -> None:
+    for text in (rule.name, rule.refuses, rule.source, rule.advice):
+        assert text and text == text.strip() and not text.endswith(".")
+
+
+@pytest.mark.parametrize("kind", [REGIONS, LAYER])
+def test_a_town_whose_ground_was_matched_is_not_suspected(kind: str) -> None:
+    found = evidence(two_thirds(20), scene=PERHAPS, mask=masked(kind))
+    assert "town matched whole" not in refusing(found)
+
+
+def test_a_town_whose_ground_confirms_is_not_suspected() -> None:
+    assert refusing(evidence(two_thirds(20), scene=PERHAPS, is_ground_checked=True)) == []
+
+
+def test_an_image_of_fields_is_not_suspected() -> None:
+    assert refusing(evidence(two_thirds(20), scene=scene())) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"), [(LAYER, []), (REGIONS, ["despeckled town"]), (THRESHOLD, [])]
+)
+def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list[str]) -> None:
+    """Regions of a camera's image that pass for a radar's are no ground."""
+    assert refusing(evidence(GOOD, scene=PERHAPS, mask=masked(kind))) == expected
+
+
+def test_only_rules_of_the_evidence_are_asked() -> None:
+    """Rules of agreement and error judge refinements, too; those of scenes do not."""
+    assert SearchEvidence.stages == (stages.SEARCH,)
+    assert RegistrationEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.SCENE)
+    assert RefinementEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.REFINEMENT)
+    assert PoseEvidence.stages == (stages.POSE,)
+
+
+def test_a_failure_that_is_no_refusal_decides_nothing() -> None:
+    assert first_refusal(SearchEvidence(NotRegisteredError("refused elsewhere"))) is None

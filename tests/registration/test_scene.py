@@ -1,0 +1,181 @@
+"""What the images of a pair are: found when it is first needed, and once."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+from evidences import facts, scene
+from facts_of_pairs import FIELDS, TOWN, grey_values, opened, speckled
+
+from groundtie.masks.choice import INPUT, REFERENCE
+from groundtie.rasters.pair import Image, make_pair
+from groundtie.rasters.reading import open_raster
+from groundtie.registration import scene as scene_module
+from groundtie.registration.scene import SceneInfo
+
+
+@pytest.mark.parametrize(
+    ("reference", "input", "expected"),
+    [
+        (TOWN, FIELDS, True),
+        (FIELDS, TOWN, True),
+        (FIELDS, FIELDS, False),
+        # Filters dim a town; so less is enough for doubt than for a mask.
+        (grey_values(0.1, 0.01), FIELDS, True),
+        (grey_values(0.08, 0.01), FIELDS, False),
+        # Speckle shows which is the radar's: what the camera shows does not matter.
+        (speckled(0.02), TOWN, False),
+        (speckled(0.1), FIELDS, True),
+        (speckled(0.25), speckled(0.25), False),
+    ],
+)
+def test_what_is_bright_may_be_a_town(
+    tmp_path: Path, reference: np.ndarray, input: np.ndarray, expected: bool
+) -> None:
+    with opened(tmp_path, reference, input) as pair:
+        assert SceneInfo.of(pair).may_be_dense_town == expected
+
+
+def test_whoever_names_the_radar_image_is_believed(tmp_path: Path) -> None:
+    with opened(tmp_path, TOWN, FIELDS) as pair:
+        for declared, is_town in ((REFERENCE, True), (INPUT, False)):
+            info = SceneInfo.of(pair, declared)
+            assert info.is_radar_and_camera and info.radar_name == declared
+            assert info.may_be_dense_town == is_town
+            assert info.radar is info.of_name(declared) and info.other is not info.radar
+        assert not SceneInfo.of(pair).is_radar_and_camera
+        # Two images of a camera's hide no radar's.
+        assert not SceneInfo.of(pair, "neither").may_be_dense_town
+
+
+@pytest.mark.parametrize(
+    ("reference", "declared", "by_regions", "expected"),
+    [
+        # Named, or the ground of it matched: it is a radar's, and has no speckle.
+        (TOWN, REFERENCE, False, True),
+        (TOWN, REFERENCE, True, True),
+        (TOWN, "auto", False, False),
+        (FIELDS, REFERENCE, False, False),
+        (speckled(0.25), "auto", True, False),
+    ],
+)
+def test_the_ground_of_a_town_is_found_by_its_speckle(
+    tmp_path: Path, reference: np.ndarray, declared: str, by_regions: bool, expected: bool
+) -> None:
+    with opened(tmp_path, reference, FIELDS) as pair:
+        assert SceneInfo.of(pair, declared).is_despeckled_town(by_regions) == expected
+
+
+def test_a_users_mask_needs_no_speckle() -> None:
+    town = facts(is_known_radar=True, strong_share=0.25)
+    for has_mask in (False, True):
+        info = SceneInfo(town, facts(), has_user_mask=has_mask)
+        assert info.is_despeckled_town(False) != has_mask
+
+
+@pytest.mark.parametrize("looks", [1, 4, 20])
+def test_speckle_shows_which_is_the_radars(tmp_path: Path, looks: int) -> None:
+    random = np.random.default_rng(0)
+    ground = np.kron(random.uniform(20, 200, (25, 25)), np.ones((8, 8)))
+    radar = ground * np.sqrt(random.gamma(looks, 1 / looks, ground.shape))
+    camera = ground + random.normal(0, 3, ground.shape)
+    with opened(tmp_path, radar, camera) as pair:
+        one_way = SceneInfo.of(pair)
+        # Of both orders.
+        other_way = SceneInfo(one_way.input, one_way.reference)
+        twice = SceneInfo(one_way.reference, one_way.reference)
+        assert (one_way.radar_name, other_way.radar_name) == (REFERENCE, INPUT)
+        for info in (one_way, other_way):
+            # Twenty looks are as homogeneous as a camera's grain.
+            assert info.is_radar_and_camera == (looks < 20)
+            assert not info.are_both_radar
+        assert twice.are_both_radar == (looks < 20)
+
+
+def test_metadata_count_before_speckle(tmp_path: Path) -> None:
+    """The filtered image is the more homogeneous one."""
+    random = np.random.default_rng(0)
+    filtered = np.full((100, 100), 50) + random.normal(0, 0.1, (100, 100))
+    camera = np.full((100, 100), 50) + random.normal(0, 2, (100, 100))
+    radar = 50 * np.sqrt(random.gamma(2, 1 / 2, (100, 100)))
+    with opened(tmp_path, filtered, camera, filtered=(REFERENCE,)) as pair:
+        info = SceneInfo.of(pair)
+        assert info.reference.variation2 < info.input.variation2
+        assert info.radar_name == REFERENCE
+        assert info.is_radar_and_camera and not info.are_both_radar
+        swapped = SceneInfo(info.input, info.reference)
+        assert swapped.radar_name == INPUT and swapped.is_radar_and_camera
+    # Two radar images, of which one is filtered: neither is a camera's.
+    with opened(tmp_path, filtered, radar, filtered=(REFERENCE,)) as pair:
+        info = SceneInfo.of(pair)
+        pairs = [(info.reference, info.input), (info.input, info.reference)]
+        for one, other in [*pairs, (info.reference, info.reference)]:
+            both = SceneInfo(one, other)
+            assert not both.is_radar_and_camera and both.are_both_radar
+
+
+def test_facts_are_found_when_asked_for_and_never_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+    for name in ("variation2_of", "share_of_strong_scatterers", "is_known_radar"):
+        found = getattr(scene_module, name)
+
+        def counted(of: object, name: str = name, found: object = found) -> object:
+            asked.append(name)
+            return found(of)  # type: ignore[operator]
+
+        monkeypatch.setattr(scene_module, name, counted)
+    with opened(tmp_path, speckled(0.25), FIELDS) as pair:
+        info = SceneInfo.of(pair)
+        assert asked == [] and info.summary() == {} and info.lines() == []
+        for _ in range(2):
+            assert info.is_radar_and_camera and info.is_dense_town and info.may_be_dense_town
+            assert not info.is_despeckled_town(True) and not info.are_both_radar
+    # Of both images; what is bright in the camera's does not matter.
+    assert sorted(asked) == sorted(
+        ["variation2_of"] * 2 + ["is_known_radar"] * 2 + ["share_of_strong_scatterers"]
+    )
+    assert asked.count("share_of_strong_scatterers") == 1
+
+
+def test_a_summary_is_json_and_lines_are_for_people() -> None:
+    info = scene(facts(variation2=0.25, strong_share=0.25))
+    assert info.is_radar_and_camera
+    summary = json.loads(json.dumps(info.summary()))
+    assert summary["reference"] == {
+        "is_known_radar": False,
+        "variation2": 0.25,
+        "strong_share": 0.25,
+    }
+    assert summary["is_radar_and_camera"] is True
+    (line,) = info.lines()
+    assert line == (
+        "the reference is a radar image beside a camera's; strong scatterers on 25% of it"
+    )
+    assert info.radar.looks == pytest.approx(4)
+    both = scene(facts(variation2=0.25), facts(variation2=0.2))
+    assert both.are_both_radar
+    assert both.lines() == ["both images are a radar's"]
+
+
+def test_the_radar_image_of_every_real_pair_is_found(real_data: Path) -> None:
+    cases = json.loads((real_data / "cases.json").read_text())
+    pairs = [case for case in cases if case["kind"].startswith("sar-optical")]
+    assert len(pairs) >= 10
+    for case in pairs:
+        with ExitStack() as stack:
+            radar, camera = (
+                Image(
+                    stack.enter_context(
+                        open_raster(real_data / case[which], allow_sensor_geometry=True)
+                    )
+                )
+                for which in ("reference", "input")
+            )
+            info = SceneInfo.of(make_pair(radar, camera))
+            assert info.radar_name == REFERENCE, case["id"]

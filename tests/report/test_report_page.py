@@ -1,0 +1,178 @@
+"""What the page on a registration shows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from html_pages import Page
+from known_reports import (
+    ACCEPTED,
+    GRID,
+    numbers_in,
+    picture,
+    refused,
+    report_of,
+    transform_of,
+    written,
+)
+from raster_files import write_raster
+
+from groundtie.geometry.transform import Transform
+from groundtie.rasters.pair import ImagePair
+from groundtie.rasters.reading import open_raster
+from groundtie.registration.verdict import refuse
+from groundtie.report.correction import Correction
+
+
+def test_the_verdict_comes_first(page: Page) -> None:
+    assert page.all("h2")[0].text == "Accepted"
+    assert page.all("title")[0].text == "Accepted: input.tif registered to reference.tif"
+    assert "Check points confirm the registration." in page.text
+    assert page.numbers == {
+        "Error at check points (RMSE)": "0.61 px 6.10 m",
+        "90 % of errors within (CE90)": "0.93 px 9.30 m",
+        "Check points that agree": "8 of 9",
+        "Agreement by chance": "1 in 1014",  # 10 to the 14th: the exponent is raised
+        "Points used in the fit": "11 of 12",
+        "Model": "translation",
+        "Uncertainty of the model": "0.21 px 2.10 m",
+        "Extrapolated": "18 % of the overlap",
+    }
+    assert [e.text for e in page.all("sup")] == ["14"]
+    assert "90 % of inliers lie within 0.93 px (9.30 m) of where" in page.text
+    assert "18 % of the overlap lies outside" in page.text
+
+
+def test_a_covered_overlap_is_not_said_to_be_extrapolated(pair: ImagePair, tmp_path: Path) -> None:
+    verdict = replace(ACCEPTED, extrapolated_share=0.0)
+    page = written(report_of(pair, verdict=verdict), tmp_path)
+    assert "surround the whole overlap" in page.text
+    assert "lies outside" not in page.text
+
+
+@pytest.mark.parametrize(
+    ("log10_chance", "shown"),
+    [(-math.inf, "< 1 in 10300"), (-3.4, "1 in 103"), (-0.5, "32 %"), (0.0, "100 %")],
+)
+def test_how_chance_is_said(
+    pair: ImagePair, tmp_path: Path, log10_chance: float, shown: str
+) -> None:
+    verdict = replace(ACCEPTED, log10_chance=log10_chance)
+    page = written(report_of(pair, verdict=verdict), tmp_path)
+    assert page.numbers["Agreement by chance"] == shown
+
+
+def test_the_correction_is_the_injected_shift(page: Page) -> None:
+    length = np.hypot(7, 4)
+    assert f"moves the input by {length:.1f} px ({10 * length:.1f} m) at the centre" in page.text
+    assert f"by {length:.1f} to {length:.1f} px over the grid" in page.text
+
+
+def test_the_correction_is_the_first_line_with_its_direction(
+    page: Page, pair: ImagePair, tmp_path: Path
+) -> None:
+    (line,) = [e for e in page.all("p") if e.attributes.get("class") == "correction"]
+    # The input's georeferencing puts its ground 70 m too far east and 40 m too far north.
+    assert "at the centre: 70.0 m west, 40.0 m south;" in " ".join(line.text.split())
+    paragraphs = [e.attributes.get("class") for e in page.all("p")]
+    assert paragraphs.index("correction") == paragraphs.index("reason") - 1
+    changes = {"transform": transform_of(pair), "points": None}
+    refusal = written(refused(pair, **changes), tmp_path)
+    assert "The refused transform moves the input by" in refusal.text
+
+
+def test_the_direction_without_georeferencing(ungeoreferenced: ImagePair) -> None:
+    transform = transform_of(ungeoreferenced, np.array([7.0, -4.0]))
+    assert Correction.of(transform, ungeoreferenced.grid).direction == "7.0 px left, 4.0 px down"
+    nothing = Transform.nominal(None, ungeoreferenced.input.source.grid)
+    assert Correction.of(nothing, ungeoreferenced.grid).direction == ""
+
+
+def test_the_deciding_rule_and_its_advice_are_shown(pair: ImagePair, tmp_path: Path) -> None:
+    verdict = replace(
+        refuse("the overlap is small"), rule="overlap", advice="try a <larger> input."
+    )
+    page = written(refused(pair, verdict=verdict), tmp_path)
+    assert "The overlap is small. Try a <larger> input." in page.text
+    assert "Deciding rule: overlap" in page.text
+    numbers = numbers_in(tmp_path)["verdict"]
+    assert (numbers["rule"], numbers["advice"]) == ("overlap", "try a <larger> input.")
+
+
+def test_facts_about_the_images(pair: ImagePair, tmp_path: Path) -> None:
+    page = written(report_of(pair, scene={"reference": "radar, 1 look", "urban": None}), tmp_path)
+    assert "The images" in [e.text for e in page.all("h2")]
+    assert {"radar, 1 look", "–"} <= {e.text for e in page.all("td")}
+    assert numbers_in(tmp_path)["scene"] == {"reference": "radar, 1 look", "urban": None}
+
+
+def test_what_is_masked_is_shown_with_a_tint(pair: ImagePair, tmp_path: Path) -> None:
+    keep = np.ones((120, 160), np.uint8)
+    keep[:, :80] = 0
+    mask = write_raster(tmp_path / "mask.tif", keep, GRID)
+    with open_raster(mask) as source:
+        masked = replace(pair, reference=replace(pair.reference, mask=source))
+        page = written(report_of(masked), tmp_path)
+    plain = picture(written(report_of(pair), tmp_path), "Overview of the reference")
+    tinted = picture(page, "Overview of the reference").astype(float)
+    assert np.abs(tinted[:, 90:].mean(axis=2) - plain[:, 90:]).mean() < 5
+    # Magenta over grey: less green than red; the image is still seen.
+    assert (tinted[:, :70, 2] - tinted[:, :70, 1]).mean() > 10
+    likeness = np.corrcoef(tinted[:, :70].mean(axis=2).ravel(), plain[:, :70].ravel())[0, 1]
+    assert likeness > 0.95
+    assert "purple tint: masked" in page.text
+
+
+def test_pictures_before_and_after(page: Page) -> None:
+    reference = picture(page, "Overview of the reference image reference.tif").astype(float)
+    nominal = picture(page, "Overview of the input image input.tif at its nominal").astype(float)
+    registered = picture(page, "Overview of the input image input.tif as registered").astype(float)
+    inside = np.s_[15:-15, 15:-15]
+    assert reference.shape == nominal.shape == registered.shape == (120, 160)
+
+    def likeness(image: np.ndarray) -> float:
+        return float(np.corrcoef(image[inside].ravel(), reference[inside].ravel())[0, 1])
+
+    assert likeness(registered) > 0.99
+    assert likeness(nominal) < 0.9
+
+
+def test_the_viewer_can_be_used_by_keyboard(page: Page) -> None:
+    inputs = page.all("input")
+    kinds = [(e.attributes["type"], e.attributes.get("name")) for e in inputs]
+    assert kinds == [("range", None), *[("radio", "mode")] * 3, *[("radio", "state")] * 2]
+    (viewer,) = [e for e in page.all("figure") if e.attributes.get("class") == "viewer"]
+    checked = {
+        e.attributes["name"]: e.attributes["value"] for e in inputs if "checked" in e.attributes
+    }
+    # Every state that can be chosen has its style.
+    assert checked == {
+        "mode": viewer.attributes["data-mode"],
+        "state": viewer.attributes["data-state"],
+    }
+    style = page.all("style")[0].text
+    for name in ("mode", "state"):
+        values = [e.attributes["value"] for e in inputs if e.attributes.get("name") == name]
+        assert all(f'[data-{name}="{value}"]' in style for value in values)
+
+
+def test_figures_of_errors(page: Page) -> None:
+    alts = [str(e.attributes["alt"]) for e in page.all("img")]
+    assert any("11 of 12 points used in the fit, 8 of 9 check points agree" in a for a in alts)
+    assert any(a.startswith("Histogram") and "RMSE 0.61 px, CE90 0.93 px" in a for a in alts)
+    assert any("a circle of radius 0.93 px, the CE90" in a for a in alts)
+    # The figures reach to 3 px; one check point is 12.5 px off.
+    assert "the 9 check points that were matched" in page.text
+    assert "1 more than 3.0 px are not shown" in page.text
+
+
+def test_surfaces_show_their_peaks(page: Page) -> None:
+    assert picture(page, "Similarity surface: best check point").shape == (17, 17, 3)
+    peaks = [e.attributes for e in page.all("circle") if e.attributes.get("class") == "peak"]
+    # Pixel (col, row) = (8 + 1, 8 - 2) has its centre half a pixel further.
+    assert [(p["cx"], p["cy"]) for p in peaks] == [("9.50", "6.50"), ("14.50", "11.50")]
+    assert "± 8 px; peak 9.0 σ at (1.0, -2.0) px" in page.text
