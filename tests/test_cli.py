@@ -279,7 +279,7 @@ def test_who_asks_for_warnings_gets_them() -> None:
 class TestRealTools:
     """The tools themselves, in processes of their own."""
 
-    QUICK = "--model translation --similarity orientation --search-radius 12"
+    QUICK = "--model translation --search-radius 12"
 
     @pytest.fixture(autouse=True)
     def _pairs(self, tmp_path: Path) -> None:
