@@ -7,7 +7,7 @@ VENV := .venv
 PY := $(VENV)/bin/python
 PLUGIN := dist/groundtie_qgis.zip
 
-.PHONY: help install demo test test-newest test-debian lint bench plugin clean
+.PHONY: help install demo check test test-newest test-debian lint bench plugin clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -26,6 +26,10 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 
 demo: install ## simulate a SAR-optical pair, register it, compare with the truth; results in demo/
 	$(PY) scripts/demo.py demo
+
+check: lint ## lint and the quick tests of every module, in a minute or so
+	env -u GROUNDTIE_REQUIRE_QGIS $(PY) -m pytest -n 2 --dist=loadfile -m "not slow" \
+		--ignore=tests/qgis --durations=0 --durations-min=2
 
 test: test-newest test-debian ## everything, with the newest packages and with Debian's (incl. QGIS)
 

@@ -294,6 +294,7 @@ class TestRealTools:
             command, env=ENVIRONMENT, text=True, capture_output=True, timeout=300, check=False
         )
 
+    @pytest.mark.slow
     def test_an_accepted_registration(self) -> None:
         files = "--transform out/t.json --tie-points out/p.gpkg --report out/r.html"
         done = self.run(
@@ -307,6 +308,7 @@ class TestRealTools:
         found = load_transform(Path("out/t.json"))(reference_xy)
         np.testing.assert_allclose(found, true_input_px(reference_xy), atol=0.3)
 
+    @pytest.mark.slow
     def test_a_refused_registration(self) -> None:
         done = self.run(
             f"coregister here/reference.tif there/input.tif out/o.tif {self.QUICK} --json"
@@ -317,6 +319,7 @@ class TestRealTools:
         assert json.loads(done.stdout)["verdict"]["accepted"] is False
         assert list(Path("out").iterdir()) == []
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("images", "named"),
         [
@@ -336,6 +339,7 @@ class TestRealTools:
         assert done.stderr.count("\n") == 1
         assert list(Path("out").iterdir()) == []
 
+    @pytest.mark.slow
     def test_images_without_georeferencing_raise_no_other_voices(self) -> None:
         for name in ("reference", "input"):
             with rasterio.open(f"here/{name}.tif") as raster:
@@ -344,6 +348,7 @@ class TestRealTools:
         done = self.run(f"coregister reference.tif input.tif out/o.tif {self.QUICK}")
         assert (done.returncode, done.stderr) == (0, "")
 
+    @pytest.mark.slow
     def test_warp_and_simulate(self) -> None:
         Path("truth.points").write_text(POINTS)
         done = self.run("warp here/input.tif out/w.tif --transform truth.points")
@@ -352,6 +357,7 @@ class TestRealTools:
         assert (done.returncode, done.stderr) == (0, "")
         assert Path(json.loads(done.stdout)["files"]["reference"]).exists()
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
     def test_a_signal_in_the_middle_leaves_nothing(self, number: signal.Signals) -> None:
         primary, secondary = pty.openpty()

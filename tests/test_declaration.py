@@ -16,8 +16,9 @@ from toys import RETURNING_TOY, TOY, returning_toy, toy
 
 from groundtie.declaration import Output, Parameter, tool, tool_of
 from groundtie.errors import OutputError, ParameterError, SameFileError
-from groundtie.kinds import Flag, Number, RasterIn, RasterOut
+from groundtie.kinds import Flag, MaskIn, Number, RasterIn, RasterOut
 from groundtie.progress import SILENT, Progress
+from groundtie.report.page import plain
 
 
 @pytest.fixture
@@ -171,23 +172,28 @@ class TestResultsInMemory:
         with pytest.raises(ParameterError, match=r"^output is missing$"):
             RETURNING_TOY.check({"input": "a.tif"})
 
-    def test_an_array_is_handed_on_and_shown_by_its_size(self) -> None:
+    def test_an_array_is_handed_on_and_reported_by_its_size(self) -> None:
         values = np.zeros((40, 60))
         found = returning_toy(values).values
         assert found["input"].values is values
         assert found["output"] is None
-        assert found["shown"] == {"input": "array of 60 × 40", "output": None, "factor": 2.0}
+        assert found["shown"] == {"input": found["input"], "output": None, "factor": 2.0}
+        assert plain(found["shown"])["input"] == "array of 60 × 40"
 
-    def test_an_open_dataset_is_handed_on_and_shown_by_its_name(self, tmp_path: Path) -> None:
+    def test_an_open_dataset_is_handed_on_and_reported_by_its_name(self, tmp_path: Path) -> None:
         path = write_raster(tmp_path / "a.tif", np.zeros((4, 6)), utm_grid(6, 4))
         with rasterio.open(path) as dataset:
             found = returning_toy(dataset).values
             assert found["input"] is dataset
-            assert found["shown"]["input"] == str(path)
+            assert plain(found["shown"])["input"] == str(path)
             with pytest.raises(SameFileError, match="output is the same file as input"):
                 returning_toy(dataset, path)
             with pytest.raises(SameFileError, match="input is the same raster as reference"):
                 toy(path, dataset, tmp_path / "c.tif", 3)
+
+    def test_a_mask_may_be_an_array(self) -> None:
+        held = MaskIn(label="Mask", help="It.").check("mask", np.zeros((4, 6), bool))
+        assert str(held) == "array of 6 × 4"
 
     def test_arrays_of_one_size_are_two_rasters(self, tmp_path: Path) -> None:
         one, other = np.zeros((40, 60)), np.zeros((40, 60))

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 from .errors import ParameterError
-from .kinds import Kind, RasterIn, check_different, check_paths, plainly
+from .kinds import Kind, RasterIn, check_different, check_paths
 
 
 class ToolResult(Protocol):
@@ -155,7 +155,7 @@ def tool(
 
     Its keyword `progress` is handed through unchecked; every other parameter must be annotated
     with a `Kind`. If the function has a keyword `parameters`, it is given the checked values of
-    all parameters by name, as reports show them; callers do not see this keyword.
+    all parameters by name, for its report; callers do not see this keyword.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -166,8 +166,7 @@ def tool(
             bound = signature.bind(*args, **kwargs).arguments
             progress = {key: bound.pop(key) for key in ("progress",) if key in bound}
             values = declared.check(bound, in_python=True)
-            shown = {name: plainly(value) for name, value in values.items()}
-            given = {"parameters": shown} if "parameters" in signature.parameters else {}
+            given = {"parameters": values} if "parameters" in signature.parameters else {}
             return cast(Callable[..., R], function)(**values, **given, **progress)
 
         declared = _declare(function, signature, checked, title, group, outputs)

@@ -50,6 +50,14 @@ class PathKind(Kind):
 class InputKind(PathKind):
     """A file that is read."""
 
+    def check_raster(self, name: str, value: Any) -> Any:
+        """Check what may be a raster: a path, one of GDAL's names, or a raster in memory."""
+        if _is_gdal_name(value):
+            return value
+        if isinstance(value, (str, os.PathLike)):
+            return PathKind.check(self, name, value)
+        return _in_memory(name, value)
+
 
 @dataclass(frozen=True, kw_only=True)
 class OutputKind(PathKind):
@@ -71,11 +79,7 @@ class RasterIn(InputKind):
     """
 
     def check(self, name: str, value: Any) -> Any:
-        if _is_gdal_name(value):
-            return value
-        if isinstance(value, (str, os.PathLike)):
-            return super().check(name, value)
-        return _in_memory(name, value)
+        return self.check_raster(name, value)
 
 
 class VectorIn(InputKind):
@@ -86,10 +90,13 @@ class VectorIn(InputKind):
 
 
 class MaskIn(InputKind):
-    """A raster, a vector layer or a file that states what of an image takes part."""
+    """A raster, a vector layer or a file that states what of an image takes part.
+
+    In Python a raster may be in memory, as for `RasterIn`.
+    """
 
     def check(self, name: str, value: Any) -> Any:
-        return value if _is_gdal_name(value) else super().check(name, value)
+        return self.check_raster(name, value)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -26,11 +26,12 @@ from .geometry.tie_points import TiePoints
 from .geometry.transform import Transform
 from .matching.surface_fit import FIT_RADIUS_PX, check_points
 from .rasters.patch import Patch
-from .rasters.reading import open_raster
+from .rasters.reading import bounded_cache, open_raster
+from .registration.evidence import SearchEvidence
 from .registration.pipeline import Stages, mask_pair, open_pair
 from .registration.scene import SceneInfo
 from .registration.specification import COREGISTER, Specification
-from .registration.verdict import Verdict
+from .registration.verdict import Verdict, judge_search
 from .registration.verdict import judge as judge_evidence
 from .similarity.description import BORDER_PX
 from .similarity.peak import Peak, find_peak
@@ -230,9 +231,12 @@ def judge(
         used = points.take(points.used)
         px = pair.grid.map_to_pixel(used.reference_xy)
         nominal_px = pair.grid.map_to_pixel(transform.nominal_xy(used.input_px))
-        without_blocks = fit_without_blocks(model.kind, px, nominal_px, np.ones(len(px)))
-        estimate = Estimate(transform, points, without_blocks)
-        check = stages.check(estimate, running)
+        try:
+            without_blocks = fit_without_blocks(model.kind, px, nominal_px, np.ones(len(px)))
+            estimate = Estimate(transform, points, without_blocks)
+            check = stages.check(estimate, running)
+        except TooFewPointsError as error:
+            return judge_search(SearchEvidence(error))
         return judge_evidence(stages.evidence(estimate, check, scene))
 
 
@@ -245,7 +249,7 @@ def _stages(
         with threads() as own, _stages(reference, input, spec, own) as found:
             yield found
         return
-    with open_pair(reference, input, spec, context.quiet()) as opened:
+    with bounded_cache(), open_pair(reference, input, spec, context.quiet()) as opened:
         scene = SceneInfo.of(opened.pair, spec.radar)
         masked = mask_pair(opened, spec, scene, context.quiet())
         yield Stages.of(opened.images, masked, spec), scene, context

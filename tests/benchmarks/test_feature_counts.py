@@ -41,6 +41,7 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> RealCase:
     return RealCase("scene", "sar-sar", Path(paths[0]), Path(paths[1]), 1.0, matrix)
 
 
+@pytest.mark.slow
 def test_detectors_find_and_match_on_a_registered_pair(case: RealCase) -> None:
     sift, oct = (count_detector(case, name) for name in ("sift", "sift-oct"))
     assert min(sift.detections) > 2 * max(oct.detections) > 100
@@ -58,6 +59,7 @@ def test_right_matches_of_all_ways(case: RealCase) -> None:
     assert found.by_chance < 0.2 * found.hybrid[0]
 
 
+@pytest.mark.slow
 def test_a_quarter_turn_costs_unsigned_ratios_their_matches(case: RealCase) -> None:
     signed, unsigned = (count_turn(case, name) for name in ("roewa", "roewa-unsigned"))
     assert signed.turned > 0.8 * signed.without > 10

@@ -38,6 +38,7 @@ def shares(name: str, group: str, fused: float, singles: tuple[float, ...]) -> l
     return [*made, FusionShare(name, group, FUSED, 10, True, fused, fused - 0.05, fused + 0.05)]
 
 
+@pytest.mark.slow
 def test_all_chips_of_the_same_ground_are_matched(tmp_path: Path) -> None:
     found = FusionCase(textured_scene(tmp_path)).run(1)
     assert [(r.similarity, r.distorted) for r in found.records] == [
@@ -52,6 +53,7 @@ def test_all_chips_of_the_same_ground_are_matched(tmp_path: Path) -> None:
     assert "fused (distorted) 100%, 100%" in found.line()
 
 
+@pytest.mark.slow
 def test_peaks_beside_the_truth_do_not_count(tmp_path: Path) -> None:
     off = MATRIX.copy()
     off[:, 2] += off[:, :2] @ [4.0, 0.0]

@@ -46,6 +46,7 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> RealCase:
     return RealCase("hills", "optical-optical", folder / "a.tif", folder / "b.tif", 0.5, matrix)
 
 
+@pytest.mark.slow
 def test_equal_images_match_nearly_everywhere(case: RealCase) -> None:
     found = ClearCase(case).run(1).found
     assert [rate.method for rate in found] == list(METHODS)
@@ -54,12 +55,14 @@ def test_equal_images_match_nearly_everywhere(case: RealCase) -> None:
         assert rate.correct_at_20 == 20
 
 
+@pytest.mark.slow
 def test_a_wrong_truth_leaves_no_match_right(case: RealCase) -> None:
     wrong = case.matrix + [[0, 0, 40], [0, 0, 0]]
     off = RealCase("off", case.kind, case.reference, case.input, 0.5, wrong)
     assert max(rate.rates[0] for rate in ClearCase(off).run(1).found) < 0.1
 
 
+@pytest.mark.slow
 def test_refinement_leaves_out_matches_on_clouds(case: RealCase) -> None:
     labels = LabelCase(case).run(1)
     others = for_others([labels, CloudLabels("other", labels.labelled)], case.name)
@@ -82,6 +85,7 @@ def test_points_for_a_pair_are_those_of_all_others(case: RealCase) -> None:
     assert one.kept.any() and not one.kept.all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("classified", [False, True])
 def test_an_image_under_clouds_is_registered_or_refused(case: RealCase, classified: bool) -> None:
     found = CloudyRegistration(case, "match_optical", classified).run(1)
@@ -91,6 +95,7 @@ def test_an_image_under_clouds_is_registered_or_refused(case: RealCase, classifi
     assert not clouded_goal(outcomes({CORRECT: 3, SILENTLY_WRONG: 1})).reached
 
 
+@pytest.mark.slow
 def test_images_of_different_places_are_refused(case: RealCase, tmp_path: Path) -> None:
     other = np.clip(120 + 30 * texture(250, 250, 5), 0, 255).astype(np.uint8)[None]
     path = write_image(other, Affine.scale(1, -1), tmp_path / "other.tif")

@@ -28,6 +28,7 @@ def test_peak_memory_is_that_of_the_command() -> None:
     assert large.peak_bytes - small.peak_bytes == pytest.approx(megabytes << 20, rel=0.1)
 
 
+@pytest.mark.slow
 def test_the_memory_of_this_process_does_not_count() -> None:
     ballast = np.ones(40_000_000)  # 320 MB
     assert measure(python("pass")).peak_bytes < ballast.nbytes / 4

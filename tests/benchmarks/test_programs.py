@@ -117,6 +117,7 @@ def test_the_own_refusal_is_one(
     assert found is not None and (found.verdict, found.error_px) == (REFUSED, None)
 
 
+@pytest.mark.slow
 def test_a_pair_is_registered_by_the_command_line_and_by_no_peer_that_is_not_there(
     case: WholeCase, monkeypatch: pytest.MonkeyPatch
 ) -> None:

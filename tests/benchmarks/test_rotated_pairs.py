@@ -48,6 +48,7 @@ def test_only_cases_of_unknown_rotation_are_read(data: Path) -> None:
     assert cases[0].reference == data / "reference0.tif"
 
 
+@pytest.mark.slow
 def test_what_is_right_is_correct(data: Path) -> None:
     found = RotatedCase(rotated_cases(data)[0]).run(2)
     assert found.verdict == CORRECT
@@ -55,6 +56,7 @@ def test_what_is_right_is_correct(data: Path) -> None:
     assert found.group == KIND
 
 
+@pytest.mark.slow
 def test_what_is_accepted_but_wrong_is_silently_wrong(data: Path) -> None:
     case = rotated_cases(data)[0]
     matrix = case.matrix + [[0, 0, 5], [0, 0, 0]]
@@ -65,6 +67,7 @@ def test_what_is_accepted_but_wrong_is_silently_wrong(data: Path) -> None:
     assert found.error_px == pytest.approx(5 / 1.1 * 256 / 160, abs=1)
 
 
+@pytest.mark.slow
 def test_another_place_is_refused(data: Path) -> None:
     cases = rotated_cases(data)
     found = RotatedCase(cases[0], cases[1].input).run(2)
@@ -118,6 +121,7 @@ class TestGoals:
         assert goals("crossed", [outcome(REFUSED)])[0].reached is True
 
 
+@pytest.mark.slow
 def test_a_quick_run(data: Path, tmp_path: Path) -> None:
     result = run(Settings(True, 1, 1, data, tmp_path))
     assert [record["verdict"] for record in result.records][:2] == [CORRECT, CORRECT]

@@ -75,6 +75,7 @@ def test_a_quick_run_says_so() -> None:
     assert run.about(run.parse([]))["quick"] == "no"
 
 
+@pytest.mark.slow
 def test_every_suite_can_be_loaded_when_the_file_is_run() -> None:
     code = (
         f"import importlib, sys; sys.path.insert(0, {str(SCRIPT.parents[1])!r})\n"

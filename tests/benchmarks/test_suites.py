@@ -45,6 +45,7 @@ def test_one_job_runs_here_with_all_threads() -> None:
     assert [line.split("]")[0] for line in lines] == [f"[{n}/5" for n in range(1, 6)]
 
 
+@pytest.mark.slow
 def test_several_jobs_run_elsewhere_with_one_thread_each() -> None:
     lines: list[str] = []
     found = run_cases(CASES, 2, lines.append)
@@ -55,6 +56,7 @@ def test_several_jobs_run_elsewhere_with_one_thread_each() -> None:
     assert len(lines) == 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_case_that_is_itself_wrong_stops_the_suite(jobs: int) -> None:
     with pytest.raises(LookupError, match="no such file"):

@@ -74,6 +74,7 @@ def test_sift_is_opencv_s_without_its_repetitions_and_offset() -> None:
     np.testing.assert_array_equal(np.unique(found.octave)[:3], [-1, 0, 1])
 
 
+@pytest.mark.slow
 def test_without_the_first_octave_the_features_of_larger_ones_are_found() -> None:
     shares = []
     for seed in range(3):

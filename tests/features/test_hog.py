@@ -67,6 +67,7 @@ def test_patches_of_one_size_lie_on_whole_pixels() -> None:
     np.testing.assert_allclose(found[0], directly(values, 101, 87, 9), atol=1e-4)
 
 
+@pytest.mark.slow
 def test_it_does_not_matter_in_which_band_of_rows_a_feature_lies() -> None:
     values = image()
     border = hog._BAND_ROWS

@@ -84,6 +84,7 @@ def test_a_single_model_tells_nothing_of_its_spread() -> None:
     assert np.isinf(spread_of([IDENTITY], np.zeros((2, 2)))).all()
 
 
+@pytest.mark.slow
 def test_the_spline_follows_local_distortion_past_wrong_matches() -> None:
     rng = np.random.default_rng(0)
     px = lattice(17, 13)
@@ -102,6 +103,7 @@ def test_the_spline_follows_local_distortion_past_wrong_matches() -> None:
         assert 0 < np.abs(other(at) - model(at)).max() < 3
 
 
+@pytest.mark.slow
 def test_rejected_points_take_no_part_in_the_spline() -> None:
     px = lattice()
     claimed = bent(px)

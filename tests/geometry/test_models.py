@@ -46,6 +46,7 @@ def test_there_and_back(kind: str, seed: int) -> None:
     np.testing.assert_allclose(model(model.inverse(xy)), xy, atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @given(seed=st.integers(0, 10_000))
 def test_to_json_and_back(kind: str, seed: int) -> None:

@@ -144,6 +144,7 @@ def test_implausible_distortions_are_no_consensus() -> None:
     assert agree.mean() < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(2))
 def test_a_robust_fit_among_forty_percent_wrong_matches(kind: str, seed: int) -> None:

@@ -66,6 +66,7 @@ def fake_qgis(folder: Path) -> str:
     return str(folder / "fake")
 
 
+@pytest.mark.slow
 def test_missing_data_skips_and_says_so(project: Path) -> None:
     done = run(project, "tests/test_some.py")
     assert done.returncode == 0, done.stdout
@@ -74,6 +75,7 @@ def test_missing_data_skips_and_says_so(project: Path) -> None:
     assert "2 tests skipped: no folder" in done.stdout
 
 
+@pytest.mark.slow
 def test_module_skipped_as_a_whole_is_another_matter(project: Path) -> None:
     module = 'import pytest\npytest.skip("no such package", allow_module_level=True)\n'
     (project / "tests/test_other.py").write_text(module, encoding="utf-8")
@@ -82,6 +84,7 @@ def test_module_skipped_as_a_whole_is_another_matter(project: Path) -> None:
     assert "2 tests skipped: no folder" in done.stdout
 
 
+@pytest.mark.slow
 def test_missing_data_fails_in_ci(project: Path) -> None:
     done = run(project, "tests/test_some.py", CI="true")
     assert done.returncode == 1
@@ -89,6 +92,7 @@ def test_missing_data_fails_in_ci(project: Path) -> None:
     assert "CI=true needs the real image pairs" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("named", [True, False])
 def test_data_are_found(project: Path, named: bool) -> None:
     data = project / "data" if named else project.parent / "shared/data"
@@ -100,6 +104,7 @@ def test_data_are_found(project: Path, named: bool) -> None:
     assert "real image pairs" not in done.stdout
 
 
+@pytest.mark.slow
 def test_tests_with_real_data_can_be_left_out(project: Path) -> None:
     done = run(project, "-m", "not real_data", "tests/test_some.py", CI="true")
     assert "1 passed, 2 deselected" in done.stdout
@@ -111,6 +116,7 @@ def test_missing_qgis_is_said(project: Path, tmp_path: Path) -> None:
     assert "NOT TESTED: QGIS" in done.stdout
 
 
+@pytest.mark.slow
 def test_the_folder_of_qgis_tests_does_not_pass_for_qgis(project: Path) -> None:
     """Here `qgis` is found only as tests/qgis, where this Python has no QGIS of its own."""
     code = "import importlib.util as u, sys; sys.exit(u.find_spec('qgis') is not None)"

@@ -176,6 +176,7 @@ def test_a_tool_without_a_page_is_an_error(tmp_path: Path) -> None:
         document_tools.document([TOY], tmp_path)
 
 
+@pytest.mark.slow
 def test_the_script_repairs_a_page(tmp_path: Path) -> None:
     for tool in TOOLS:
         shutil.copy(document_tools.page_of(tool, DOCS), tmp_path)

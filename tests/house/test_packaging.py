@@ -72,10 +72,12 @@ def test_every_import_is_declared() -> None:
     assert not undeclared, "pyproject.toml lacks a dependency with Debian 12's version as bound"
 
 
+@pytest.mark.slow
 def test_every_dependency_is_imported() -> None:
     assert not modules() - imported(), "pyproject.toml lists what nothing imports"
 
 
+@pytest.mark.slow
 def test_the_package_calls_itself_by_relative_imports() -> None:
     """Inside the plugin it has another name."""
     assert "groundtie" not in imported()

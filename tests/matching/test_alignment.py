@@ -94,6 +94,7 @@ def test_the_model_behind_the_surfaces_is_found(kind: str, prior: Affine) -> Non
         assert 0 < error_px(model, kind) < 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", CANDIDATES)
 @pytest.mark.parametrize("seed", range(2))
 def test_the_simplest_model_that_fits_is_chosen(kind: str, seed: int) -> None:

@@ -167,6 +167,7 @@ def test_beliefs_do_not_depend_on_the_order_of_the_chips() -> None:
     )
 
 
+@pytest.mark.slow
 def test_many_neighbours_do_not_overflow() -> None:
     centres = np.random.default_rng(3).integers(0, 40, (60, 2))
     shifts = np.tile([[-3.0, 6.0]], (60, 1))

@@ -70,6 +70,7 @@ def estimates(
         return alone, guided.estimate(COARSE, kind, context)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["auto", "polynomial2", "tps"])
 def test_a_misregistration_is_recovered(files: TexturedPair, kind: str) -> None:
     _, found = estimates(files, kind)
@@ -78,6 +79,7 @@ def test_a_misregistration_is_recovered(files: TexturedPair, kind: str) -> None:
     assert not found.points.is_check.any()
 
 
+@pytest.mark.slow
 def test_ground_counts_by_its_area_and_roofs_do_not_outvote_it(town: TexturedPair) -> None:
     alone, found = estimates(town)
     assert error_px(alone.transform, town) > 2.0

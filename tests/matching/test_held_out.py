@@ -51,6 +51,7 @@ def spoiled(files: TexturedPair, folder: Path, emptied: bool) -> TexturedPair:
     return replace(files, reference=path, reference_values=values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "ratio", "kind", "similarity", "emptied"),
     [

@@ -69,6 +69,7 @@ def fit_of(
     return KeypointFit(matcher, chips, refining)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["auto", "affine", "polynomial2", "tps"])
 @pytest.mark.parametrize("refinement", [None, NMI])
 def test_a_misregistration_is_recovered(
@@ -98,6 +99,7 @@ def test_other_detectors_and_gradients_find_it_too(
     assert error_px(found.transform, files) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("emptied", [False, True])
 @pytest.mark.parametrize("refinement", [None, NMI])
 def test_pixels_held_out_of_the_fit_change_nothing_of_it(
@@ -148,6 +150,7 @@ class Astray:
         return FeatureMatches(*both, np.full(len(px), 0.5), (len(px), len(px)))
 
 
+@pytest.mark.slow
 def test_chips_are_matched_again_where_the_first_model_went_astray(files: TexturedPair) -> None:
     """Right chips lie up to 7 px off the first model, and are looked for within 4 px of it."""
     with files.opened() as pair, threads(2) as context:
@@ -159,6 +162,7 @@ def test_chips_are_matched_again_where_the_first_model_went_astray(files: Textur
     assert right.max() > 0.8 * SIZE[0]
 
 
+@pytest.mark.slow
 def test_the_coarse_model_is_taken_where_keypoints_agree_on_a_wrong_one(
     files: TexturedPair,
 ) -> None:
@@ -234,6 +238,7 @@ def test_another_place_has_too_few_matches_that_agree(tmp_path: Path) -> None:
     assert found.points.used.sum() < 12
 
 
+@pytest.mark.slow
 def test_chips_between_the_keypoints_take_part(files: TexturedPair) -> None:
     with files.opened() as pair:
         few = SiftOctDetector(contrast=0.12)
@@ -244,6 +249,7 @@ def test_chips_between_the_keypoints_take_part(files: TexturedPair) -> None:
     assert error_px(refined.transform, files) < 0.4
 
 
+@pytest.mark.slow
 def test_chips_alone_do_where_there_are_no_keypoints(files: TexturedPair) -> None:
     none = SiftOctDetector(contrast=0.9)
     with files.opened() as pair:

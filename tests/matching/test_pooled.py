@@ -74,6 +74,7 @@ def checked(pair: ImagePair, model: Model, context: Context) -> Check:
     return check_model(matcher_of(pair), HeldOut.of(pair).layout, model, context)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("input", [False, True], ids=["reference", "input"])
 def test_lines_alone_are_registered(tmp_path: Path, context: Context, input: bool) -> None:
     with masked(tmp_path, stretched(), lines(SIZE), input) as (pair, truth):
@@ -90,6 +91,7 @@ def test_lines_alone_are_registered(tmp_path: Path, context: Context, input: boo
         np.testing.assert_allclose(heights, check.score, rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_check_points_that_lie_elsewhere_show_it(tmp_path: Path, context: Context) -> None:
     with masked(tmp_path, shift_on_map(60.0, -40.0), lines(SIZE)) as (pair, truth):
         assert checked(pair, truth, context).common_shift_px < 0.3
@@ -97,6 +99,7 @@ def test_check_points_that_lie_elsewhere_show_it(tmp_path: Path, context: Contex
         assert checked(pair, off, context).common_shift_px == pytest.approx(5.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_pyramid_leads_down_to_the_ground(tmp_path: Path, context: Context) -> None:
     """The coarse search is at pixels three times as large, of roads three times as wide."""
     size = (1600, 500)
@@ -110,6 +113,7 @@ def test_a_pyramid_leads_down_to_the_ground(tmp_path: Path, context: Context) ->
         assert rms(found(xy) - model(xy)) / 10 < 4
 
 
+@pytest.mark.slow
 def test_another_place_is_refused_or_judged_badly(tmp_path: Path, context: Context) -> None:
     with masked(tmp_path, shift_on_map(0, 0), lines(SIZE), input_seed=5) as (pair, _):
         try:

@@ -47,6 +47,7 @@ def test_from_the_coarse_shift_to_a_model(
     assert error_m(model, files) < 10
 
 
+@pytest.mark.slow
 def test_a_radius_larger_than_the_scene_is_no_more_work_than_the_scene(
     textured: TexturedPair, pair: ImagePair, context: Context
 ) -> None:

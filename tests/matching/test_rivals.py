@@ -52,16 +52,19 @@ def tiled() -> np.ndarray:
     return np.tile(tile / tile.std(), (11, 11))
 
 
+@pytest.mark.slow
 def test_a_place_that_repeats_itself_within_the_radius_is_refused(tmp_path: Path) -> None:
     with pytest.raises(AmbiguousPlaceError, match="two places match about as well"):
         coarse_shift_px(tmp_path, tiled(), radius_m=500.0)
 
 
+@pytest.mark.slow
 def test_it_is_found_if_it_does_not_within_the_radius(tmp_path: Path) -> None:
     shift = coarse_shift_px(tmp_path, tiled(), radius_m=200.0)
     np.testing.assert_allclose(shift, [-9, -9], atol=1)
 
 
+@pytest.mark.slow
 def test_a_place_that_does_not_repeat_itself_is_found(tmp_path: Path) -> None:
     shift = coarse_shift_px(tmp_path, texture(400, 400, 5), radius_m=500.0)
     np.testing.assert_allclose(shift, [-9, -9], atol=1)

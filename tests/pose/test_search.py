@@ -23,6 +23,7 @@ def rotated(found: Pose, truth: Pose) -> float:
 
 
 class TestKnownPoses:
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         "truth",
         [
@@ -41,18 +42,21 @@ class TestKnownPoses:
         assert rotated(found[0].pose, truth) < 0.3
         assert found[0].height > RIVAL_RATIO * found[1].height
 
+    @pytest.mark.slow
     def test_images_larger_than_the_finest_level(self, context: Context) -> None:
         truth = Pose(-58.0, 1.1, (40.0, -22.0))
         reference, input = turned_pair(truth, (460, 440), (450, 470))
         found = find_poses(reference, input, SearchLimits(80, 180, (0.8, 1.3)), SETTINGS, context)
         assert error_px(found[0].pose, truth, reference, input) < 0.7
 
+    @pytest.mark.slow
     def test_images_smaller_than_the_coarsest_level(self, context: Context) -> None:
         truth = Pose(20.0, 1.0, (3.0, -5.0))
         reference, input = turned_pair(truth, (70, 60), (80, 80), noise=0.1)
         found = find_poses(reference, input, SearchLimits(10, 180, (0.8, 1.25)), SETTINGS, context)
         assert error_px(found[0].pose, truth, reference, input) < 0.7
 
+    @pytest.mark.slow
     def test_a_small_input_in_a_large_reference(self, context: Context) -> None:
         truth = Pose(-75.0, 1.0, (60.0, -45.0))
         reference, input = turned_pair(truth, (280, 300), (130, 140), noise=0.1)
@@ -60,6 +64,7 @@ class TestKnownPoses:
         found = find_poses(reference, input, limits, SETTINGS, context)
         assert error_px(found[0].pose, truth, reference, input) < 0.7
 
+    @pytest.mark.slow
     def test_masked_corners_do_not_matter(self, context: Context) -> None:
         truth = Pose(123.0, 1.15, (4.0, 9.0))
         reference, input = turned_pair(truth)
@@ -79,6 +84,7 @@ class TestLimits:
         assert {(one.pose.rotation_deg, one.pose.scale) for one in found} == {(0.0, 1.0)}
         np.testing.assert_allclose(found[0].pose.shift_px, truth.shift_px, atol=0.3)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("largest", [5.0, 60.0])
     def test_poses_stay_within_limits(self, largest: float, context: Context) -> None:
         truth = Pose(80.0, 1.5)
@@ -88,6 +94,7 @@ class TestLimits:
             assert abs(found.pose.rotation_deg) <= largest
             assert 0.9 <= found.pose.scale <= 1.1
 
+    @pytest.mark.slow
     def test_shifts_beyond_the_radius_are_not_found(self, context: Context) -> None:
         truth = Pose(45.0, 1.0, (30.0, 0.0))
         reference, input = turned_pair(truth)
@@ -97,6 +104,7 @@ class TestLimits:
         far = find_poses(reference, input, SearchLimits(32, 180, (0.9, 1.1)), SETTINGS, context)
         assert error_px(far[0].pose, truth, reference, input) < 0.5
 
+    @pytest.mark.slow
     def test_corners_of_the_square_of_shifts_are_reached(self, context: Context) -> None:
         truth = Pose(45.0, 1.0, (24.0, 24.0))
         reference, input = turned_pair(truth)
@@ -105,6 +113,7 @@ class TestLimits:
 
 
 class TestScan:
+    @pytest.mark.slow
     def test_all_is_tried_once(self, context: Context) -> None:
         reference, input = turned_pair(Pose(30.0, 1.2))
         scanned = scan(reference, input, ANY, context)
@@ -118,6 +127,7 @@ class TestScan:
         assert abs(scanned.rotations_deg[col] - 30) <= steps[0]
         assert scanned.scales[row] == pytest.approx(1.2, rel=0.12)
 
+    @pytest.mark.slow
     def test_candidates_are_the_local_maxima_best_first(self, context: Context) -> None:
         reference, input = turned_pair(Pose(30.0, 1.2))
         scanned = scan(reference, input, ANY, context)
@@ -140,12 +150,14 @@ class TestScan:
 
 
 class TestNothingInCommon:
+    @pytest.mark.slow
     @pytest.mark.parametrize("seed", [5, 6])
     def test_no_pose_stands_out(self, seed: int, context: Context) -> None:
         reference, input = turned_pair(Pose(40.0, 1.2), seed=seed, input_seed=seed + 50)
         found = find_poses(reference, input, ANY, SETTINGS, context)
         assert found[0].height < RIVAL_RATIO * found[1].height
 
+    @pytest.mark.slow
     def test_noise(self, context: Context) -> None:
         rng = np.random.default_rng(0)
         windows = [patch(rng.gamma(1.0, 100.0, (120, 120))) for _ in range(2)]
@@ -161,6 +173,7 @@ class TestNothingInCommon:
             assert find_poses(other, reference, ANY, SETTINGS, context) == []
 
 
+@pytest.mark.slow
 def test_threads_change_nothing(context: Context, one_thread: Context) -> None:
     reference, input = turned_pair(Pose(-20.0, 0.9, (5.0, 5.0)))
     limits = SearchLimits(20, 60, (0.8, 1.25))
@@ -169,6 +182,7 @@ def test_threads_change_nothing(context: Context, one_thread: Context) -> None:
     assert [one.pose for one in alone] == [one.pose for one in together]
 
 
+@pytest.mark.slow
 def test_evaluations_are_counted(context: Context) -> None:
     reference, input = turned_pair(Pose())
     limits = SearchLimits(20, 60, (0.8, 1.25))
@@ -176,6 +190,7 @@ def test_evaluations_are_counted(context: Context) -> None:
     assert found[0].evaluations > scan(reference, input, limits, context).heights.size
 
 
+@pytest.mark.slow
 def test_candidates_differ(context: Context) -> None:
     reference, input = turned_pair(Pose(10.0))
     found = find_poses(reference, input, ANY, SETTINGS, context)

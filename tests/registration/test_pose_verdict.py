@@ -62,6 +62,7 @@ class TestWhatAnExhaustiveSearchFound:
 
 
 class TestWhatAnotherSearchFound:
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("pose", "accepted"),
         [
@@ -81,6 +82,7 @@ class TestWhatAnotherSearchFound:
         assert verdict.accepted == accepted
         assert accepted or "prefers" in verdict.reason
 
+    @pytest.mark.slow
     def test_a_pose_that_the_limits_hid(
         self, windows: tuple[Patch, Patch], context: Context
     ) -> None:
@@ -91,6 +93,7 @@ class TestWhatAnotherSearchFound:
         assert "prefers 50" in verdict.reason or "prefers 49" in verdict.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [20, 21, 22])
 def test_two_places_are_refused(seed: int, context: Context) -> None:
     windows = turned_pair(TRUTH, seed=seed, input_seed=seed + 100)

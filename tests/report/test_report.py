@@ -181,6 +181,7 @@ def test_refused_with_a_transform(pair: ImagePair, tmp_path: Path) -> None:
     assert "not shown in either" not in page.text
 
 
+@pytest.mark.slow
 def test_without_georeferencing_there_are_no_metres(
     ungeoreferenced: ImagePair, tmp_path: Path
 ) -> None:
@@ -212,6 +213,7 @@ def test_notes_on_the_images_are_shown(tmp_path: Path) -> None:
     assert "slc.tif is complex-valued: its amplitude is matched." in page.text
 
 
+@pytest.mark.slow
 def test_the_page_is_small_even_for_large_noisy_images(tmp_path: Path) -> None:
     grid = utm_grid(1200, 1200)
     noise = np.random.default_rng(0).integers(0, 255, (1200, 1200)).astype(np.uint8)

@@ -40,6 +40,7 @@ class TestCheckerboard:
         assert np.abs(board - plain).max() <= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("limits", "pose"),
     [
@@ -58,6 +59,7 @@ def test_a_picture_is_drawn(
     assert image.std() > 20
 
 
+@pytest.mark.slow
 def test_a_disk_that_cannot_be_written_to(tmp_path: Path, context: Context) -> None:
     windows = turned_pair(TRUTH)
     with pytest.raises(OutputError):

@@ -39,12 +39,14 @@ def test_sigmas_are_those_of_the_parameters_covariance() -> None:
     np.testing.assert_allclose(bias.sigma_px(px), expected, rtol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_refined_rpcs_hold_the_bias_at_all_heights(kind: str) -> None:
     rpc, bias = camera_rpc(SIZE), bias_of(kind)
     assert_folded(rpc, bias, np.array([0.0, 300.0, 800.0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*REAL, DIMAP])
 def test_real_rpcs_take_up_a_bias(real_data: Path, name: str) -> None:
     path = real_data / name

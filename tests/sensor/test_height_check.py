@@ -34,6 +34,7 @@ def check(folder: Path, rpc: RPC, offset_m: float) -> HeightCheck:
         return check_heights(orient(source, rpc, UTM, terrain), SIZE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset_m", [-45.0, 45.0])
 def test_ground_beyond_the_rpcs_range_is_told(tmp_path: Path, offset_m: float) -> None:
     found = check(tmp_path, narrow(), offset_m)
@@ -41,6 +42,7 @@ def test_ground_beyond_the_rpcs_range_is_told(tmp_path: Path, offset_m: float) -
     assert "vertical datum" in found.warnings()[0]
 
 
+@pytest.mark.slow
 def test_ground_within_the_range_is_not(tmp_path: Path) -> None:
     assert check(tmp_path, narrow(), 0.0).warnings() == []
     # Wide ranges hide a wrong datum: it cannot be told.
@@ -71,6 +73,7 @@ def told_by_residuals(tmp_path: Path, noise_px: float) -> tuple[float, float]:
     return result.offset_m, result.offset_sigma_m
 
 
+@pytest.mark.slow
 def test_residuals_hardly_tell_a_height_error(tmp_path: Path) -> None:
     """It is a shift, but for how the view turns over the image: 1/1700 of a metre a pixel."""
     offset, sigma = told_by_residuals(tmp_path, 0.002)

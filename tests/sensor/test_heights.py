@@ -56,6 +56,7 @@ def test_heights_above_a_geoid_are_raised_by_it(tmp_path: Path) -> None:
         assert abs(raised.typical_m - plain.typical_m - 48) < 5
 
 
+@pytest.mark.slow
 def test_large_regions_are_read_in_blocks(tmp_path: Path) -> None:
     size = 2600
     grid = Grid(Affine(1e-4, 0, 8.9, 0, -1e-4, 45.3), LON_LAT, size, size)

@@ -88,6 +88,7 @@ def test_the_dense_positions_are_the_single_ones(tmp_path: Path, crs: str, pixel
     assert np.abs(dense - single).max() < 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("largest_px", [4096, 50])
 def test_houses_in_a_surface_model_are_seen_by_the_dense_positions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, largest_px: int

@@ -75,6 +75,7 @@ def test_derivatives_are_the_slopes_of_positions() -> None:
         np.testing.assert_allclose(slopes[:, :, axis], numeric, rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_the_inverse_holds_for_any_view(seed: int) -> None:
     low, high = [-60, 0.3, -0.6, -180], [60, 5.0, 0.6, 180]

@@ -96,6 +96,7 @@ def with_numpy(template: np.ndarray, search: np.ndarray, bins: tuple[int, int]) 
     return counts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("masked", [False, True])
 @pytest.mark.parametrize("bins", [(5, 6), (2, 2), (16, 16), (15, 17), (40, 30), (255, 255)])
 def test_counts_are_those_of_numpy(bins: tuple[int, int], masked: bool) -> None:

@@ -34,6 +34,7 @@ def shares(labels: np.ndarray, table: ParcelTable) -> dict[Cover, float]:
 
 
 class TestParts:
+    @pytest.mark.slow
     def test_covers_of_a_city(self) -> None:
         made = [laid_out(seed) for seed in range(5)]
         found = [shares(radar, table) for radar, _, table in made]
@@ -46,6 +47,7 @@ class TestParts:
         assert mean[Cover.RAIL] > 0.01
         assert mean[Cover.FIELD] == 0
 
+    @pytest.mark.slow
     def test_heights_reach_up_to_60_m(self) -> None:
         heights = np.concatenate(
             [t.height_m[t.cover == Cover.BUILDING] for *_, t in map(laid_out, range(3))]
@@ -74,6 +76,7 @@ class TestParts:
         assert not table.window_m[~built].any()
         assert np.ptp(table.wall_reflectance[built]) > 0.15
 
+    @pytest.mark.slow
     def test_no_cars_where_they_are_smaller_than_a_pixel(self) -> None:
         radar, _, table = laid_out(px_per_m=0.4)
         assert shares(radar, table)[Cover.CAR] < 0.01
@@ -91,6 +94,7 @@ class TestAcquisitions:
             (covers[1] == Cover.CAR).mean(), rel=0.15
         )
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("changed", [0.1, 0.4])
     def test_share_of_changed_buildings(self, changed: float) -> None:
         only_radar = only_camera = number = 0
@@ -107,6 +111,7 @@ class TestAcquisitions:
         for gone in (only_radar, only_camera):
             assert gone / number == pytest.approx(changed / 2, rel=0.35)
 
+    @pytest.mark.slow
     def test_changes_leave_the_rest_as_it_is(self) -> None:
         unchanged, _, table = laid_out(3)
         radar, _, _ = laid_out(3, 0.2)
@@ -118,5 +123,6 @@ class TestReproducible:
     def test_same_seed(self) -> None:
         assert np.array_equal(laid_out(9)[0], laid_out(9)[0])
 
+    @pytest.mark.slow
     def test_other_seed(self) -> None:
         assert not np.array_equal(laid_out(9)[0], laid_out(10)[0])

@@ -21,6 +21,7 @@ def share(labels: np.ndarray, table: ParcelTable, cover: Cover) -> float:
 
 
 class TestDensities:
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("density", "low", "high"),
         [("rural", 0.0, 0.03), ("suburban", 0.08, 0.25), ("urban", 0.4, 0.55)],
@@ -79,6 +80,7 @@ class TestParts:
         assert len(woods) > 0
         assert np.all(table.height_m[woods] > 3)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("density", ["suburban", "urban"])
     def test_no_building_stands_across_water(self, density: str) -> None:
         labels, table = laid_out(density, 5)
@@ -107,6 +109,7 @@ class TestReproducible:
     def test_other_seed(self) -> None:
         assert not np.array_equal(laid_out("urban", 9)[0], laid_out("urban", 10)[0])
 
+    @pytest.mark.slow
     def test_scale_changes_sizes_in_pixels(self) -> None:
         fine, fine_table = laid_out("suburban", 6, px_per_m=1.0)
         coarse, coarse_table = laid_out("suburban", 6, px_per_m=0.4)

@@ -137,6 +137,7 @@ class TestNeededMargin:
 
 
 class TestSourcePositions:
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", KINDS)
     @pytest.mark.parametrize("ratio", [0.5, 1.0, 2.5])
     def test_truth_takes_them_back_to_the_pixels(self, kind: str, ratio: float) -> None:

@@ -79,6 +79,7 @@ class TestContent:
         assert small.reference.min() >= 1
         assert small.input.min() >= 1
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         "distortion",
         [DistortionOptions("shift", 500.0), DistortionOptions("similarity", 10, 40, 0.7)],
@@ -158,6 +159,7 @@ class TestCheckPoints:
         assert small.truth.input_grid.contains(shown).all()
         assert (np.ptp(px, axis=0) > [200, 160]).all()
 
+    @pytest.mark.slow
     def test_none_where_the_input_shows_another_place(self) -> None:
         far = replace(SMALL, distortion=DistortionOptions("shift", 500.0))
         assert len(simulate_pair(far).check_points_px) == 0

@@ -57,6 +57,7 @@ class TestHeights:
     def test_flat_when_no_relief_is_wanted(self) -> None:
         assert not generate_scene(replace(SMALL, relief_m=0)).terrain_m.any()
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("relief_m", [20.0, 80.0])
     def test_terrain_range_and_slope(self, relief_m: float) -> None:
         options = SceneOptions((750, 750), pixel_size_m=8.0, relief_m=relief_m, seed=1)

@@ -115,6 +115,7 @@ class TestRpcs:
 
 
 class TestPicture:
+    @pytest.mark.slow
     def test_gdal_brings_it_onto_the_map(self, made: SensorImage, paths: dict[str, Path]) -> None:
         """GDAL's orthorectification by exact RPCs and DEM is the simulator's own orthoimage."""
         ortho = gdal_ortho(paths)
@@ -141,6 +142,7 @@ class TestPicture:
             assert np.array_equal(image.read(), made.image)
             assert image.descriptions == ("Red",)
 
+    @pytest.mark.slow
     def test_roofs_lean_on_a_plain(self) -> None:
         """Where the picture shows roofs is where collinearity has them."""
         scene = SceneOptions((300, 300), density="city", relief_m=0.0, seed=2)
@@ -150,6 +152,7 @@ class TestPicture:
         top = made.ground_m(roofs.px) + roofs.height_m[:, None] * [0, 0, 1]
         np.testing.assert_allclose(made.camera.project(top), roofs.input_px, atol=0.05)
 
+    @pytest.mark.slow
     def test_same_options_same_image(self, made: SensorImage) -> None:
         assert np.array_equal(simulate_sensor_image(OPTIONS).image, made.image)
 

@@ -30,6 +30,7 @@ def information_density(x: np.ndarray, y: np.ndarray, rho: float) -> np.ndarray:
     return -np.log(1 - rho**2) / 2 - form / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rho", [0.4, -0.8, 0.9])
 def test_gaussian_pairs(rho: float) -> None:
     """Also under monotone functions of each; the estimate is for the sample, not for all pairs.
@@ -45,6 +46,7 @@ def test_gaussian_pairs(rho: float) -> None:
     assert found == maximum_likelihood_mutual_information(x, y)
 
 
+@pytest.mark.slow
 def test_independent_images_share_nothing() -> None:
     """Twice the information is at most χ² with as many degrees as kernels matter, over n."""
     for seed in range(2):
@@ -52,6 +54,7 @@ def test_independent_images_share_nothing() -> None:
         assert maximum_likelihood_mutual_information(a, b) == pytest.approx(0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_dependence_without_correlation() -> None:
     rng = np.random.default_rng(4)
     x = rng.normal(size=1000)
@@ -59,6 +62,7 @@ def test_a_dependence_without_correlation() -> None:
     assert maximum_likelihood_mutual_information(x, y) > 0.8
 
 
+@pytest.mark.slow
 def test_few_grey_values() -> None:
     """Kernels are all on four places: the estimate is that of the table of counts."""
     rng = np.random.default_rng(5)
@@ -78,6 +82,7 @@ def test_images_without_content_share_nothing(a: np.ndarray, b: np.ndarray) -> N
     assert maximum_likelihood_mutual_information(a, b) == pytest.approx(0, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_only_a_sample_counts() -> None:
     x, y = gaussian_pair(0.8, 20_000)
     found = [
@@ -94,6 +99,7 @@ def problem(seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return x, y, np.column_stack([x, y])[:40]
 
 
+@pytest.mark.slow
 def test_the_constraints_hold() -> None:
     x, y, centres = problem()
     for width in WIDTHS:
@@ -141,6 +147,7 @@ def test_against_a_general_optimiser() -> None:
     assert ours == pytest.approx(-found.fun, abs=2e-5)
 
 
+@pytest.mark.slow
 def test_cross_validation_prefers_what_generalises() -> None:
     """Independent pairs take wide kernels, closely related ones narrow kernels."""
     chosen = []
@@ -167,6 +174,7 @@ def shifted_pair(radius: int = 4) -> tuple[Patch, Patch]:
     )
 
 
+@pytest.mark.slow
 def test_a_surface() -> None:
     template, search = shifted_pair()
     told: list[float] = []

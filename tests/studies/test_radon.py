@@ -31,6 +31,7 @@ def is_right(found: PoseFound, truth: Pose) -> bool:
     return turned_by(found, truth) < 0.25 and shifted_by(found, truth) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [GREY, FIELD], ids=lambda s: s.similarity)
 @pytest.mark.parametrize(
     "truth",
@@ -56,12 +57,14 @@ def test_any_rotation(degrees: float, context: Context) -> None:
     assert is_right(found[0], truth)
 
 
+@pytest.mark.slow
 def test_windows_need_not_be_of_one_shape(context: Context) -> None:
     truth = Pose(12.0, 1.0, (6.0, -9.0))
     found = radon(window((150, 200)), window((190, 170), truth), LIMITS, GREY, context)
     assert is_right(found[0], truth)
 
 
+@pytest.mark.slow
 def test_large_windows_are_reduced_for_the_rotation(context: Context) -> None:
     truth = Pose(-21.0, 1.0, (-23.0, 31.0))
     found = radon(window((420, 400)), window((420, 400), truth), LIMITS, GREY, context)
@@ -116,6 +119,7 @@ def test_without_rotation_only_the_shift_is_found(context: Context) -> None:
     assert is_right(found, truth)
 
 
+@pytest.mark.slow
 def test_another_place_does_not_stand_out(context: Context) -> None:
     true = radon(REFERENCE, window((160, 160)), LIMITS, GREY, context)[0].height
     found = radon(REFERENCE, window((160, 160), seed=5), LIMITS, GREY, context)

@@ -99,6 +99,7 @@ def posed(pose: Pose, side: int = 64, margin: int = 20) -> tuple[Patch, Patch]:
     return patch(ground[inner, inner]), patch(noise - moved)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", SEARCHES)
 @pytest.mark.parametrize("shift", [(-6.4, 3.3), (5.0, 10.0)])
 def test_a_known_shift_is_found(
@@ -111,6 +112,7 @@ def test_a_known_shift_is_found(
     assert found[0].height > 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", SEARCHES)
 @pytest.mark.parametrize(
     ("truth", "limits"),

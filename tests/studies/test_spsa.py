@@ -178,6 +178,7 @@ def test_the_discrete_search_finds_a_known_shift(seed: int, context: Context) ->
     assert len({candidate.evaluations for candidate in found}) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", [spsa, spsa_second_order])
 def test_continuous_searches_find_a_known_shift(
     search: Callable[..., list], context: Context
@@ -188,6 +189,7 @@ def test_continuous_searches_find_a_known_shift(
     assert (found[0].pose.rotation_deg, found[0].pose.scale) == (0.0, 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", [spsa, spsa_second_order])
 def test_rotation_and_scale_are_found_with_the_shift(
     search: Callable[..., list], context: Context
@@ -212,6 +214,7 @@ def test_windows_of_unlike_parity(context: Context) -> None:
     assert found[0].pose.shift_px == (9 + 29.5 - 41, 11 + 29.5 - 41)
 
 
+@pytest.mark.slow
 def test_the_seed_decides(context: Context) -> None:
     windows = posed(Pose(shift_px=(4.0, 3.0)), side=40)
     effort = Effort(restarts=3, agreeing=2)

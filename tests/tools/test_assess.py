@@ -264,6 +264,7 @@ class TestReport:
 
 
 class TestWithOtherTools:
+    @pytest.mark.slow
     def test_what_coregister_wrote_is_judged_as_coregister_did(
         self, simulated: Callable[[str], Any], tmp_path: Path
     ) -> None:
@@ -281,6 +282,7 @@ class TestWithOtherTools:
         assert 0 < ours.check_points_agreeing < ours.check_points
         assert ours.check_rmse_px == pytest.approx(theirs.check_rmse_px, rel=0.1)
 
+    @pytest.mark.slow
     def test_the_error_at_true_points_is_that_of_the_transform(
         self, textured: TexturedPair, tmp_path: Path
     ) -> None:

@@ -56,6 +56,7 @@ def test_errors_are_measured_in_pixels_and_metres(files: dict[str, Path], tmp_pa
     assert len(result.lines()) == 1 + 6 + 2 + 2
 
 
+@pytest.mark.slow
 def test_table_and_picture_are_written(files: dict[str, Path], tmp_path: Path) -> None:
     groundtie.assess_sensor(
         **files, refined=tmp_path / "refined_RPC.TXT", height=300.0,

@@ -99,6 +99,7 @@ def run(simulated: Callable[[str], Any], tmp_path_factory: Any) -> Callable[[str
 KINDS = tuple(OUTPUT_GRIDS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_distortion_is_recovered(kind: str, run: Callable[[str], Run]) -> None:
     assert run(kind).result.verdict.accepted
@@ -107,6 +108,7 @@ def test_every_distortion_is_recovered(kind: str, run: Callable[[str], Run]) -> 
     assert run(kind).result.verdict.check_rmse_px > 0.5 * run(kind).error_px
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_all_files_appear_and_no_other(kind: str, run: Callable[[str], Run]) -> None:
     names = {"out.tif", TIE_POINTS[kind], "transform.json", "report.html", "report.json"}
@@ -116,6 +118,7 @@ def test_all_files_appear_and_no_other(kind: str, run: Callable[[str], Run]) -> 
     assert {path.name for path in files.values()} == names - {"report.json"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_stored_transform_is_that_of_the_result(kind: str, run: Callable[[str], Run]) -> None:
     stored = load_transform(run(kind).folder / "transform.json")
@@ -123,6 +126,7 @@ def test_the_stored_transform_is_that_of_the_result(kind: str, run: Callable[[st
     np.testing.assert_array_equal(stored(xy), run(kind).result.transform(xy))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_numbers_beside_the_report_are_those_of_the_result(
     kind: str, run: Callable[[str], Run]
@@ -137,6 +141,7 @@ def test_numbers_beside_the_report_are_those_of_the_result(
     assert str(run(kind).output) in lines
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["shift", "rotation", "polynomial"])
 def test_tie_points_lie_where_the_transform_says(kind: str, run: Callable[[str], Run]) -> None:
     points, verdict = run(kind).result.tie_points, run(kind).result.verdict
@@ -149,6 +154,7 @@ def test_tie_points_lie_where_the_transform_says(kind: str, run: Callable[[str],
         assert len(layer) == len(points)
 
 
+@pytest.mark.slow
 def test_untouched_pixels_get_a_shifted_geotransform(
     run: Callable[[str], Run], simulated: Callable[[str], Any]
 ) -> None:
@@ -163,6 +169,7 @@ def test_untouched_pixels_get_a_shifted_geotransform(
         assert np.hypot(*(np.array(out.xy(0, 0)) - corner)) < 0.7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["rotation", "affine"])
 def test_the_reference_grid_is_the_references(
     kind: str, run: Callable[[str], Run], simulated: Callable[[str], Any]
@@ -174,6 +181,7 @@ def test_the_reference_grid_is_the_references(
             assert out.descriptions == before.descriptions
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["scale", "polynomial"])
 def test_the_input_grid_has_the_inputs_pixels(
     kind: str, run: Callable[[str], Run], simulated: Callable[[str], Any]
@@ -197,6 +205,7 @@ def registered(pair: TexturedPair, folder: Path, **more: Any) -> Registration:
     return coregister(pair.reference, pair.input, folder / "out.tif", **{"workers": 2} | more)
 
 
+@pytest.mark.slow
 def test_the_registered_image_stacks_on_the_reference(
     textured: TexturedPair, tmp_path: Path
 ) -> None:
@@ -212,6 +221,7 @@ def test_the_registered_image_stacks_on_the_reference(
     assert np.hypot(dx, dy) < 0.1
 
 
+@pytest.mark.slow
 def test_any_number_of_threads_gives_the_same_result(
     textured: TexturedPair, tmp_path: Path
 ) -> None:
@@ -230,6 +240,7 @@ def grid_elsewhere(crs: CRS) -> Grid:
     return Grid(rasterio.Affine(size, 0, low[0], 0, -size, high[1]), crs, int(width), int(height))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("epsg", "output_grid"), [(4326, "input"), (32633, "reference")])
 def test_an_input_in_another_crs(tmp_path: Path, epsg: int, output_grid: str) -> None:
     grid = grid_elsewhere(CRS.from_epsg(epsg))
@@ -240,6 +251,7 @@ def test_an_input_in_another_crs(tmp_path: Path, epsg: int, output_grid: str) ->
         assert out.crs == (grid.crs if output_grid == "input" else UTM)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [2.0, 0.5])
 def test_an_input_of_another_pixel_size(tmp_path: Path, ratio: float) -> None:
     size = (380, 360) if ratio > 1 else SIZE
@@ -248,6 +260,7 @@ def test_an_input_of_another_pixel_size(tmp_path: Path, ratio: float) -> None:
     assert error_px(result.transform, pair) * ratio < 0.5  # in reference pixels
 
 
+@pytest.mark.slow
 def test_images_without_georeferencing(textured: TexturedPair, tmp_path: Path) -> None:
     def bare(values: np.ndarray) -> tuple[np.ndarray, dict[str, Any]]:
         return values, {"grid": None}
@@ -298,6 +311,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", VARIANTS)
 def test_kinds_of_pixels(textured: TexturedPair, tmp_path: Path, name: str) -> None:
     pair = rewritten(textured, tmp_path, **VARIANTS[name])
@@ -312,6 +326,7 @@ def test_kinds_of_pixels(textured: TexturedPair, tmp_path: Path, name: str) -> N
         assert out.colorinterp == before.colorinterp
 
 
+@pytest.mark.slow
 def test_bands_and_masks_say_what_takes_part(textured: TexturedPair, tmp_path: Path) -> None:
     """The second band is right; a part of it shows something else and is masked out."""
     rng = np.random.default_rng(0)
@@ -331,6 +346,7 @@ def test_bands_and_masks_say_what_takes_part(textured: TexturedPair, tmp_path: P
     assert pixels(tmp_path / "out.tif").shape == (2, *SIZE[::-1])
 
 
+@pytest.mark.slow
 def test_what_a_classifier_leaves_out_takes_no_part(textured: TexturedPair, tmp_path: Path) -> None:
     """A part of the input shows something else, and is brighter."""
 
@@ -347,6 +363,7 @@ def test_what_a_classifier_leaves_out_takes_no_part(textured: TexturedPair, tmp_
     assert result.tie_points.input_px[result.tie_points.used][:, 0].min() > 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["rigid", "tps"])
 def test_a_model_that_is_asked_for_is_taken(
     textured: TexturedPair, tmp_path: Path, model: str
@@ -356,6 +373,7 @@ def test_a_model_that_is_asked_for_is_taken(
     assert error_px(result.transform, textured) < 0.5
 
 
+@pytest.mark.slow
 def test_a_copy_is_registered_to_itself_by_nothing(textured: TexturedPair, tmp_path: Path) -> None:
     copy = write_raster(tmp_path / "copy.tif", pixels(textured.reference), textured.grid)
     result = registered(replace(textured, input=copy), tmp_path)
@@ -363,6 +381,7 @@ def test_a_copy_is_registered_to_itself_by_nothing(textured: TexturedPair, tmp_p
     assert rms(result.transform(xy) - textured.grid.map_to_pixel(xy)) < 0.05
 
 
+@pytest.mark.slow
 def test_an_accepted_registration_on_the_command_line(
     textured: TexturedPair, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

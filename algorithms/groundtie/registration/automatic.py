@@ -126,7 +126,7 @@ def register_anything(
     if _needs_rpcs(parameters["input"]):
         return _by_rpcs(parameters, progress)
     call = Call.of(parameters, progress)
-    with threads(parameters["workers"], progress) as context:
+    with bounded_cache(), threads(parameters["workers"], progress) as context:
         found, stack = _first_accepted(call, parameters["max_error"], context.part(0.0, 0.7))
         return call.deliver(found, context.part(0.7, 1.0), stack)
 

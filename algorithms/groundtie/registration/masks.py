@@ -12,6 +12,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from ..context import Context
 from ..errors import ParameterError
@@ -71,12 +72,11 @@ class Masked:
         )
 
 
-def is_raster_mask(mask: Path | str | None) -> bool:
-    """Whether a mask that the user gave is a raster, by the ending of its name."""
-    return mask is not None and Path(mask).suffix.lower() not in (
-        _CLASSIFIER_SUFFIX,
-        *_VECTOR_SUFFIXES,
-    )
+def is_raster_mask(mask: Any) -> bool:
+    """Whether a mask that the user gave is a raster: in memory, or by the ending of its name."""
+    if not isinstance(mask, (str, Path)):
+        return mask is not None
+    return Path(mask).suffix.lower() not in (_CLASSIFIER_SUFFIX, *_VECTOR_SUFFIXES)
 
 
 def with_user_masks(

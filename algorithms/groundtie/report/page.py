@@ -15,6 +15,7 @@ import rasterio
 import scipy
 
 from ..geometry.judging import TOLERANCE_PX
+from ..kinds import plainly
 from ..rasters.atomic import writing
 from ..version import __version__
 from .figures import CHECK_COLOUR, FIT_COLOUR, REJECTED_COLOUR
@@ -85,7 +86,7 @@ def plain(value: Any) -> Any:
         return plain(value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, (bool, int, str)) else str(value)
+    return value if value is None or isinstance(value, (bool, int, str)) else str(plainly(value))
 
 
 def _rendered(template: str, **values: Any) -> str:

@@ -18,6 +18,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, writing
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
+from ..rasters.reading import bounded_cache
 from ..registration.pipeline import open_pair
 from ..registration.specification import Specification
 from ..registration.stored_transform import transform_of
@@ -174,6 +175,7 @@ def detector_repeatability(
     bands, masks = (reference_band, input_band), (reference_mask, input_mask)
     with (
         threads(progress=progress) as context,
+        bounded_cache(),
         open_pair(reference, input, spec, context.part(0.0, 0.1), bands, masks) as opened,
     ):
         pair = opened.images

@@ -1,0 +1,143 @@
+"""The steps of a registration on arrays, one by one and one after the other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from raster_files import UTM, utm_grid
+from textured_pairs import texture
+
+from groundtie import Raster, steps
+from groundtie.errors import ParameterError, TooFewPointsError
+from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.transform import Transform
+
+SIZE = 384
+MARGIN = 20
+# What lies at a pixel of the reference lies so many columns and rows further on in the input.
+SHIFT = np.array([4, -3])
+
+
+def pair(seed: int = 0) -> tuple[Any, Any]:
+    """Return a texture and its noisy negative, which lies SHIFT further on, as arrays."""
+    scene = texture(SIZE + 2 * MARGIN, SIZE + 2 * MARGIN, seed)
+    left, top = MARGIN - SHIFT
+    noise = np.random.default_rng(seed + 9).normal(0, 0.2, (SIZE, SIZE))
+    reference = scene[MARGIN : MARGIN + SIZE, MARGIN : MARGIN + SIZE]
+    return reference, -scene[top : top + SIZE, left : left + SIZE] + noise
+
+
+class TestSurface:
+    @pytest.mark.parametrize("similarity", ["fused", "nmi", "orientation"])
+    def test_it_peaks_at_the_shift(self, similarity: str) -> None:
+        reference, input = (image[:120, :140] for image in pair())
+        surface = steps.similarity_surface(reference, input, 10, similarity)
+        assert surface.shape == (21, 21)
+        peak = steps.find_peak(surface)
+        np.testing.assert_allclose(peak.shift_px, SHIFT, atol=0.3)
+        assert peak.height > 6 and not peak.at_border
+
+    def test_what_is_masked_or_not_finite_does_not_count(self) -> None:
+        reference, input = (image[:120, :140].copy() for image in pair())
+        expected = steps.similarity_surface(reference, input, 10)
+        masked = np.ma.MaskedArray(reference, np.zeros(reference.shape, bool))
+        np.testing.assert_array_equal(steps.similarity_surface(masked, input, 10), expected)
+        hidden = (slice(40, 60), slice(50, 90))
+        masked[hidden] = np.ma.masked
+        reference[hidden] = np.nan
+        found = [steps.similarity_surface(image, input, 10) for image in (masked, reference)]
+        np.testing.assert_array_equal(*found)
+        assert np.abs(found[0] - expected).max() > 0.1
+        np.testing.assert_allclose(steps.find_peak(found[0]).shift_px, SHIFT, atol=0.3)
+
+    @pytest.mark.parametrize(
+        ("shapes", "message"),
+        [
+            (((120, 140), (120, 139)), "windows of the same size"),
+            (((36, 140), (36, 140)), "must have 37 pixels a side for a radius of 10"),
+            (((2, 120, 140), (2, 120, 140)), r"must have the shape \(h, w\), not \(2, 120, 140\)"),
+        ],
+    )
+    def test_what_are_no_windows(self, shapes: Any, message: str) -> None:
+        with pytest.raises(ParameterError, match=message):
+            steps.similarity_surface(*(np.ones(shape) for shape in shapes), 10)
+
+
+class TestFit:
+    def made(self, kind: str, outliers: int, unit: float = 1.0) -> tuple[Any, Any, Any]:
+        rng = np.random.default_rng(1)
+        xy = rng.uniform(0, 300, (60, 2))
+        moved = xy + SHIFT + (0.002 * xy[:, ::-1] if kind != "translation" else 0)
+        found = moved + rng.normal(0, 0.1, (60, 2))
+        found[:outliers] += rng.uniform(-8, 8, (outliers, 2))
+        return unit * xy, unit * moved, unit * found
+
+    @pytest.mark.parametrize("kind", ["translation", "affine", "polynomial2", "tps"])
+    @pytest.mark.parametrize("unit", [1.0, 10.0])
+    def test_outliers_are_left_out(self, kind: str, unit: float) -> None:
+        xy, truth, found = self.made(kind, 20, unit)
+        fit = steps.fit_model(kind, xy, found, pixel_size=unit)
+        far = np.hypot(*(found - truth).T) > 2.0 * unit
+        assert not fit.inliers[far].any()
+        assert fit.inliers[20:].mean() > 0.9
+        assert fit.sigma < 0.5 * unit
+        errors = np.hypot(*(fit.model(xy[20:]) - truth[20:]).T)
+        assert np.median(errors) < 0.15 * unit
+        np.testing.assert_allclose(fit.model.inverse(fit.model(xy)), xy, atol=1e-4 * unit)
+
+    def test_too_few_points(self) -> None:
+        with pytest.raises(TooFewPointsError, match="at least 3 points; there are 2"):
+            steps.fit_model("translation", np.zeros((2, 2)), np.zeros((2, 2)))
+
+    def test_a_kind_that_is_none(self) -> None:
+        with pytest.raises(ParameterError, match=r"one of translation, .*, not 'rubb'"):
+            steps.fit_model("rubb", np.zeros((9, 2)), np.zeros((9, 2)))
+
+
+class TestFromImagesToVerdict:
+    """Match, fit and judge, without files."""
+
+    def test_arrays_in_pixel_coordinates(self) -> None:
+        reference, input = pair()
+        points = steps.match_chips(reference, input)
+        assert not points.is_check.any()
+        fit = steps.fit_model("affine", points.reference_xy, points.input_px)
+        corners = np.array([[0, 0], [SIZE - 1, 0], [0, SIZE - 1], [SIZE - 1, SIZE - 1]])
+        np.testing.assert_allclose(fit.model(corners), corners + SHIFT, atol=0.5)
+        inliers = points.reject(~fit.inliers, "disagrees with the model")
+        verdict = steps.judge(reference, input, fit.model, inliers)
+        assert verdict.accepted
+        assert verdict.fit_points_used == fit.inliers.sum()
+        assert verdict.check_rmse_px < 0.5
+
+    def test_a_wrong_model_is_refused(self) -> None:
+        reference, input = pair()
+        points = steps.match_chips(reference, input)
+        wrong = fit_model("translation", points.reference_xy, points.reference_xy + [30, 25])
+        verdict = steps.judge(reference, input, wrong, points)
+        assert not verdict.accepted
+        assert verdict.rule == "chance agreement"
+
+    def test_different_places_are_refused(self) -> None:
+        reference, input = pair()[0], pair(seed=5)[1]
+        points = steps.match_chips(reference, input)
+        fit = steps.fit_model("affine", points.reference_xy, points.input_px)
+        verdict = steps.judge(reference, input, fit.model, points.reject(~fit.inliers, "far"))
+        assert not verdict.accepted
+        assert verdict.rule == "too few points"
+
+    def test_rasters_on_the_map(self) -> None:
+        grid = utm_grid(SIZE, SIZE)
+        reference, input = (Raster(image, grid.transform, UTM) for image in pair())
+        points = steps.match_chips(reference, input)
+        nominal = Transform.nominal(UTM, grid)
+        nominal_xy = nominal.nominal_xy(points.input_px)
+        fit = steps.fit_model("affine", points.reference_xy, nominal_xy, pixel_size=10.0)
+        centre = grid.pixel_to_map([[SIZE / 2, SIZE / 2]])
+        np.testing.assert_allclose(fit.model(centre) - centre, [[40, 30]], atol=2)
+        again = steps.match_chips(reference, input, fit.model, radius_px=4)
+        assert again.used.sum() >= points.used.sum() * 0.9
+        inliers = points.reject(~fit.inliers, "disagrees with the model")
+        assert steps.judge(reference, input, fit.model, inliers).accepted
