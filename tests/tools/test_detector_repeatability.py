@@ -93,7 +93,7 @@ def test_features_that_a_classifier_leaves_out_are_not_counted(
                 registered.input,
                 tmp_path / "t.csv",
                 variants="sift-oct",
-                input_classifier=chosen,
+                input_mask=chosen,
             ).evaluations[0]
             for chosen in (None, classifier)
         )
