@@ -93,6 +93,7 @@ class TestStatistics:
         assert lengths == pytest.approx((5,) * 5)
         assert (found.bias, found.std) == ((3, -4), (0, 0))
 
+    @pytest.mark.slow
     @given(
         hnp.arrays(float, st.tuples(st.integers(1, 30), st.just(2)), elements=st.floats(-1e3, 1e3))
     )

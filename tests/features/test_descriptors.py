@@ -47,6 +47,7 @@ def cosines(image: NDArray[np.uint8]) -> NDArray[np.float64]:
     return (ours * theirs).sum(axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", _REAL)
 def test_differences_give_opencv_s_descriptor_on_real_images(name: str, real_data: Path) -> None:
     path = next(

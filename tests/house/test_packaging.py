@@ -61,6 +61,7 @@ def modules() -> set[str]:
     return {MODULES.get(name, name) for name in declared()}
 
 
+@pytest.mark.slow
 def test_every_import_is_declared() -> None:
     undeclared = {COMES_WITH.get(name, name) for name in imported()} - modules()
     assert not undeclared, "pyproject.toml lacks a dependency with Debian 12's version as bound"

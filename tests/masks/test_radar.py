@@ -64,6 +64,7 @@ def test_metadata_tell_before_speckle(tmp_path: Path) -> None:
         assert not are_both_radar(one, other)
 
 
+@pytest.mark.slow
 def test_the_radar_image_of_every_real_pair_is_found(real_data: Path) -> None:
     cases = json.loads((real_data / "cases.json").read_text())
     pairs = [case for case in cases if case["kind"].startswith("sar-optical")]

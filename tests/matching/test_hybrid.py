@@ -74,6 +74,7 @@ def test_a_misregistration_is_recovered(
         assert found.transform.model.kind == kind
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("detector", ["sift", "sift-isef-oct"])
 @pytest.mark.parametrize("gradient", ["recursive", "roewa"])
 def test_other_detectors_and_gradients_find_it_too(
@@ -158,6 +159,7 @@ def test_the_rough_model_is_taken_where_features_agree_on_a_wrong_one(files: Tex
     assert error_px(found.transform, files) < 0.4
 
 
+@pytest.mark.slow
 def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.MonkeyPatch) -> None:
     with files.opened() as pair, ThreadPoolExecutor(2) as executor:
         whole = FeatureMatcher(pair).match(ROUGH, executor)

@@ -134,6 +134,7 @@ def test_a_level_corrects_a_model_that_is_off(
     assert error_m(found.model, files) < 10  # a pixel
 
 
+@pytest.mark.slow
 def test_a_correction_comes_before_the_model_that_is_known(
     tmp_path: Path, executor: Executor
 ) -> None:
@@ -145,6 +146,7 @@ def test_a_correction_comes_before_the_model_that_is_known(
     assert error_m(found.model, files) < 10
 
 
+@pytest.mark.slow
 def test_two_places_have_nothing_in_common(other_place: TexturedPair, executor: Executor) -> None:
     with other_place.opened() as pair:
         start = shift_on_map(0, 0)

@@ -78,6 +78,7 @@ class TestKnownPoses:
 
 
 class TestLimits:
+    @pytest.mark.slow
     def test_without_rotation_and_scale_only_shifts_are_tried(self) -> None:
         truth = Pose(shift_px=(14.0, -9.0))
         reference, input = turned_pair(truth)

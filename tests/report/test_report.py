@@ -228,6 +228,7 @@ def test_the_verdict_comes_first(page: Page) -> None:
     assert "18 % of the overlap lies outside" in page.text
 
 
+@pytest.mark.slow
 def test_a_covered_overlap_is_not_said_to_be_extrapolated(pair: ImagePair, tmp_path: Path) -> None:
     verdict = replace(ACCEPTED, extrapolated_share=0.0)
     page = written(report_of(pair, verdict=verdict), tmp_path)
@@ -235,6 +236,7 @@ def test_a_covered_overlap_is_not_said_to_be_extrapolated(pair: ImagePair, tmp_p
     assert "lies outside" not in page.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("log10_chance", "shown"),
     [(-math.inf, "< 1 in 10300"), (-3.4, "1 in 103"), (-0.5, "32 %"), (0.0, "100 %")],
@@ -447,6 +449,7 @@ def test_map_units_without_a_crs_are_said_to_be_taken_for_metres(tmp_path: Path)
     assert page.numbers["Error at check points (RMSE)"] == "0.61 px 6.10 m"
 
 
+@pytest.mark.slow
 def test_notes_on_the_images_are_shown(tmp_path: Path) -> None:
     values = wave_image(GRID, 400).astype(np.complex64)
     reference = write_raster(tmp_path / "slc.tif", values, GRID)
@@ -467,6 +470,7 @@ def test_the_page_is_small_even_for_large_noisy_images(tmp_path: Path) -> None:
     assert (tmp_path / "report.html").stat().st_size < 2_000_000
 
 
+@pytest.mark.slow
 def test_a_report_that_cannot_be_written(pair: ImagePair, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"cannot write .*nowhere/report\.html"):
         report_of(pair).write(tmp_path / "nowhere" / "report.html", tmp_path / "report.json")

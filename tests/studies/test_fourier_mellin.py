@@ -30,6 +30,7 @@ def is_right(found: PoseFound, truth: Pose) -> bool:
     return turned_by(found, truth) < 0.1 and error_px(found, truth, (160, 160)) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [GREY, FIELD], ids=lambda s: s.similarity)
 @pytest.mark.parametrize(
     ("truth", "side"),
@@ -104,6 +105,7 @@ def test_masked_pixels_do_not_count() -> None:
     assert is_right(found[0], truth)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "limits",
     [
@@ -139,6 +141,7 @@ def test_the_half_turn_is_told_by_the_shift() -> None:
         assert all(turned_by(other, truth) > 1 for other in found[1:])
 
 
+@pytest.mark.slow
 def test_another_place_does_not_stand_out() -> None:
     true = fourier_mellin(REFERENCE, window((160, 160)), ANY, GREY)[0].height
     found = fourier_mellin(REFERENCE, window((160, 160), seed=5), ANY, GREY)

@@ -50,6 +50,7 @@ def test_poses_of_thesis_p(truth: Pose, settings: SimilaritySettings) -> None:
     assert found[0].pose.scale == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [65.0, -118.0, 172.0])
 def test_any_rotation(degrees: float) -> None:
     truth = Pose(degrees, 1.0, (7.0, -4.0))
@@ -78,6 +79,7 @@ def test_inverted_contrast() -> None:
     assert is_right(radon(REFERENCE, inverted, LIMITS, FIELD)[0], truth)
 
 
+@pytest.mark.slow
 def test_a_known_scale() -> None:
     truth = Pose(24.0, 1.25, (8.0, -12.0))
     limits = PoseLimits(20.0, 30.0, (1.25, 1.25))
@@ -97,6 +99,7 @@ def test_masked_pixels_do_not_count() -> None:
     assert is_right(radon(REFERENCE, input, LIMITS, GREY)[0], truth)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "limits",
     [PoseLimits(20.0, 10.0), PoseLimits(5.0, 30.0), PoseLimits(20.0, 180.0, (1.3, 1.6))],
@@ -125,6 +128,7 @@ def test_another_place_does_not_stand_out() -> None:
     assert found[0].height < true / 2
 
 
+@pytest.mark.slow
 def test_threads_change_nothing(executor: Executor) -> None:
     input = window((160, 160), Pose(10.0))
     assert radon(REFERENCE, input, LIMITS, GREY, executor) == radon(REFERENCE, input, LIMITS, GREY)

@@ -19,6 +19,7 @@ from groundtie.tools.filter_speckle import filter_speckle
 from groundtie.tools.simulate import simulate
 
 
+@pytest.mark.slow
 def test_a_threshold_mask_is_used_and_reported(
     simulated: Callable[[str], SimulatedFiles], tmp_path: Path
 ) -> None:
@@ -30,6 +31,7 @@ def test_a_threshold_mask_is_used_and_reported(
     assert pair.error_px(result.transform) < 0.5
 
 
+@pytest.mark.slow
 def test_either_image_can_be_masked(
     simulated: Callable[[str], SimulatedFiles], tmp_path: Path
 ) -> None:
@@ -49,6 +51,7 @@ def test_either_image_can_be_masked(
         assert mask["share"] == pytest.approx(0.9, abs=0.06)
 
 
+@pytest.mark.slow
 def test_fields_are_left_without_a_mask_by_auto(
     simulated: Callable[[str], SimulatedFiles], tmp_path: Path
 ) -> None:
@@ -58,6 +61,7 @@ def test_fields_are_left_without_a_mask_by_auto(
     assert mask["kind"] == "none" and "too few buildings" in mask["reason"]
 
 
+@pytest.mark.slow
 def test_a_layer_does_the_same_job(
     simulated: Callable[[str], SimulatedFiles], tmp_path: Path
 ) -> None:
@@ -106,6 +110,7 @@ def open_city(tmp_path_factory: pytest.TempPathFactory) -> SimulatedFiles:
     return SimulatedFiles(folder)
 
 
+@pytest.mark.slow
 def test_a_dense_city_is_registered_by_its_ground(
     open_city: SimulatedFiles, tmp_path: Path
 ) -> None:
@@ -127,6 +132,7 @@ def filtered(city: SimulatedFiles) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_city_without_speckle_is_refused(open_city: SimulatedFiles, tmp_path: Path) -> None:
     """Nothing but the filter's tag tells that it is a radar's."""
     filtered, report = tmp_path / "filtered.tif", tmp_path / "report.html"
@@ -137,6 +143,7 @@ def test_a_city_without_speckle_is_refused(open_city: SimulatedFiles, tmp_path: 
     assert (told["mask"]["kind"], told["mask"]["image"]) == ("regions", "reference")
 
 
+@pytest.mark.slow
 def test_where_nothing_tells_the_radar_few_who_agree_are_not_enough(
     city: SimulatedFiles, filtered: Path, tmp_path: Path
 ) -> None:
@@ -152,6 +159,7 @@ def test_where_nothing_tells_the_radar_few_who_agree_are_not_enough(
     assert told["mask"]["kind"] == "none"
 
 
+@pytest.mark.slow
 def test_its_buildings_alone_are_refused(city: SimulatedFiles, tmp_path: Path) -> None:
     """They agree with each other at check points, too: only the ground contradicts."""
     with pytest.raises(NotRegisteredError):

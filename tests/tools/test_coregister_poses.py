@@ -35,6 +35,7 @@ def registered(folder: Path, model: Model, **options: object) -> tuple[float, Re
     return error_px(found.transform, pair), found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("degrees", "growth"), [(25.0, 1.0), (-40.0, 1.1), (150.0, 0.8)])
 def test_a_rotation_and_a_scale_are_searched_for(
     tmp_path: Path, degrees: float, growth: float
@@ -46,17 +47,20 @@ def test_a_rotation_and_a_scale_are_searched_for(
     assert found.transform.model.kind == "similarity"
 
 
+@pytest.mark.slow
 def test_a_rotation_that_is_not_searched_for_is_refused(tmp_path: Path) -> None:
     with pytest.raises(NotRegisteredError):
         registered(tmp_path, turned(25.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", SEARCHES)
 def test_every_search_finds_a_shift(tmp_path: Path, search: str) -> None:
     error, _ = registered(tmp_path, turned(0.0), search=search)
     assert error < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", ["rotation-steps", "fourier-mellin", "radon", "powell"])
 def test_searches_that_know_rotations_find_one(tmp_path: Path, search: str) -> None:
     error, _ = registered(tmp_path, turned(4.0), search=search, search_rotation=10.0)

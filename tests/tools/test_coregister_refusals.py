@@ -53,6 +53,7 @@ def other_place(values: np.ndarray) -> np.ndarray:
     return (2000 - 300 * texture(*values.shape, seed=77)).astype(np.uint16)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shown", "similarity"), [(noise_image, "fused"), (other_place, "nmi")])
 def test_what_is_not_the_same_place_is_refused(
     textured: TexturedPair, tmp_path: Path, shown: Any, similarity: str
@@ -73,6 +74,7 @@ def test_what_is_not_the_same_place_is_refused(
     assert listing(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_a_refusal_on_the_command_line(
     textured: TexturedPair, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -101,6 +103,7 @@ def test_a_refusal_on_the_command_line(
     assert numbers["verdict"]["reason"] in printed.err
 
 
+@pytest.mark.slow
 def test_an_error_limit_below_what_is_possible_is_refused(
     textured: TexturedPair, tmp_path: Path
 ) -> None:
@@ -115,6 +118,7 @@ def test_an_error_limit_below_what_is_possible_is_refused(
     assert not (tmp_path / "out.tif").exists()
 
 
+@pytest.mark.slow
 def test_impossible_demands_on_tie_points_are_refused(
     textured: TexturedPair, tmp_path: Path
 ) -> None:
@@ -280,6 +284,7 @@ def test_a_link_to_the_reference_is_the_reference(textured: TexturedPair, tmp_pa
         coregister(textured.reference, link, tmp_path / "out.tif", **QUICK)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("free_bytes", [0, 40_000])
 def test_a_full_disk_leaves_nothing(
     textured: TexturedPair, tmp_path: Path, free_bytes: int
@@ -292,6 +297,7 @@ def test_a_full_disk_leaves_nothing(
     assert listing(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_to(
     textured: TexturedPair, tmp_path: Path, capsys: Any
 ) -> None:
@@ -302,6 +308,7 @@ def test_a_folder_that_cannot_be_written_to(
         coregister(textured.reference, textured.input, "/proc/out.tif", **QUICK)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("message", ["rough", "tie points", "took no part", "writing"])
 def test_cancelling_leaves_nothing(textured: TexturedPair, tmp_path: Path, message: str) -> None:
     said = ""
@@ -324,6 +331,7 @@ def test_cancelling_leaves_nothing(textured: TexturedPair, tmp_path: Path, messa
     assert listing(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_progress_rises_to_the_end(textured: TexturedPair, tmp_path: Path) -> None:
     fractions: list[float] = []
     registered(textured, tmp_path, progress=Progress(lambda f, _: fractions.append(f)))
