@@ -145,6 +145,7 @@ def test_a_default_is_a_value_that_the_kind_takes(tool: Tool, parameter: Paramet
         assert tool.parameter(parameter.kind.of)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tool", "parameter"), EVERY)
 def test_the_help_of_the_command_line_tells_all(
     tool: Tool, parameter: Parameter, capsys: pytest.CaptureFixture[str]

@@ -210,6 +210,7 @@ def assert_near_shift(found: PointErrors, expected_px: tuple[float, float]) -> N
 
 
 class TestLattice:
+    @pytest.mark.slow
     @given(st.integers(1, 4000), st.integers(1, 4000))
     def test_it_covers_the_grid_evenly(self, width: int, height: int) -> None:
         px = lattice(Grid(PIXEL_COORDINATES, None, width, height))

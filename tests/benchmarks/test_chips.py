@@ -24,6 +24,7 @@ def of_size(records: tuple[ChipShare, ...], chip_px: int) -> dict[str, ChipShare
     return {record.similarity: record for record in records if record.chip_px == chip_px}
 
 
+@pytest.mark.slow
 def test_every_similarity_matches_images_of_the_same_ground(tmp_path: Path) -> None:
     found = ChipCase(textured_scene(tmp_path), 4).run(1)
     small = of_size(found.records, 41)
@@ -46,6 +47,7 @@ def test_peaks_beside_the_truth_do_not_count(
     assert of_size(found.records, 41)["ncc"].shares == shares
 
 
+@pytest.mark.slow
 def test_chips_that_are_larger_than_the_image_have_no_share(tmp_path: Path) -> None:
     found = ChipCase(textured_scene(tmp_path), 2).run(1)
     large = of_size(found.records, 401)

@@ -50,6 +50,7 @@ def test_detectors_find_and_match_on_a_registered_pair(case: RealCase) -> None:
     assert oct.seconds > 0
 
 
+@pytest.mark.slow
 def test_right_matches_of_all_ways(case: RealCase) -> None:
     found = count_chain(case)
     # Of an easy pair hardly any match is lost without the gate.

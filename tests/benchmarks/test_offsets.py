@@ -31,6 +31,7 @@ def test_both_images_are_written_on_one_grid(tmp_path: Path) -> None:
         assert reference.count == image.count == 1
 
 
+@pytest.mark.slow
 def test_the_input_shows_everything_so_far_off(tmp_path: Path) -> None:
     pair = write_offset(textured_scene(tmp_path).pair(tmp_path), OFFSET, tmp_path)
     reference, image = read(pair.reference), read(pair.input)

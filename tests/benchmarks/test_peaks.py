@@ -81,6 +81,7 @@ def test_blocks_hold_their_mean() -> None:
     np.testing.assert_allclose(found[:4, 4:], values[:4, 4:].mean())
 
 
+@pytest.mark.slow
 def test_masks_that_say_nothing_false_leave_the_peak(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(peaks, "SHARES", (0.3,))
     records = measure_masks(aligned((3, 1)))

@@ -24,6 +24,7 @@ def test_biases_turn_and_grow() -> None:
     assert {bias.kind for bias in biases} == {"shift", "shift_drift"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", list(SENSORS))
 def test_a_scene_shows_the_ground_where_its_true_rpcs_see_it(
     real_data: Path, tmp_path: Path, sensor: str

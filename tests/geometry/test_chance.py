@@ -19,6 +19,7 @@ def test_the_tolerance_circle_over_the_search_square() -> None:
     assert agreement_probability(100.0, 400) == pytest.approx(inside.mean(), rel=1e-3)
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(total=st.integers(1, 300), share=st.floats(0, 1), probability=st.floats(1e-3, 0.999))
 def test_chance_is_the_binomial_tail(total: int, share: float, probability: float) -> None:
@@ -49,6 +50,7 @@ def test_chance_far_below_the_smallest_number() -> None:
     assert log10_chance(500, 600, 1 / 90) == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=100)
 @given(
     total=st.integers(5, 200),

@@ -110,6 +110,7 @@ def test_tests_with_real_data_can_be_left_out(project: Path) -> None:
     assert "1 passed, 2 deselected" in done.stdout
 
 
+@pytest.mark.slow
 def test_missing_qgis_is_said(project: Path, tmp_path: Path) -> None:
     done = run(project, PYTHONPATH=hide_qgis(tmp_path))
     assert done.returncode == 0, done.stdout
@@ -127,12 +128,14 @@ def test_the_folder_of_qgis_tests_does_not_pass_for_qgis(project: Path) -> None:
     assert "NOT TESTED: QGIS" in done.stdout
 
 
+@pytest.mark.slow
 def test_required_qgis_is_an_error(project: Path, tmp_path: Path) -> None:
     done = run(project, PYTHONPATH=hide_qgis(tmp_path), GROUNDTIE_REQUIRE_QGIS="1")
     assert done.returncode == pytest.ExitCode.USAGE_ERROR
     assert "GROUNDTIE_REQUIRE_QGIS=1" in done.stderr
 
 
+@pytest.mark.slow
 def test_qgis_tests_run_where_there_is_qgis(project: Path, tmp_path: Path) -> None:
     done = run(project, PYTHONPATH=fake_qgis(tmp_path), GROUNDTIE_REQUIRE_QGIS="1")
     assert done.returncode == 0, done.stdout

@@ -72,6 +72,7 @@ def test_what_the_design_allows_passes(package: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lower", "higher"),
     [

@@ -67,6 +67,7 @@ def extras() -> set[str]:
     return {name.split(">=")[0] for group in groups if group != "dev" for name in groups[group]}
 
 
+@pytest.mark.slow
 def test_every_import_is_declared() -> None:
     undeclared = {COMES_WITH.get(name, name) for name in imported()} - modules() - extras()
     assert not undeclared, "pyproject.toml lacks a dependency with Debian 12's version as bound"

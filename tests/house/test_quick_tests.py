@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-import re
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -21,30 +21,33 @@ MODULES = {dotted(path): path for path in sorted(PACKAGE.rglob("*.py"))}
 TOOLS = {name.rpartition(".")[2]: name for name in MODULES if name.startswith("groundtie.tools.")}
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def imported(path: Path) -> set[str]:
     """Return the package's modules that a file imports, tools as `groundtie.TOOL` among them."""
     package = dotted(path).split(".") if path.is_relative_to(PACKAGE) else []
     if path.name != "__init__.py":
         package = package[:-1]
     names: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.ImportFrom):
             above = package[: len(package) + 1 - node.level] if node.level else []
             module = ".".join([*above, *([node.module] if node.module else [])])
             names |= {module, *(f"{module}.{alias.name}" for alias in node.names)}
         elif isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) == "groundtie":
-            names.add(TOOLS.get(node.attr, ""))
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            names.add(TOOLS.get(node.attr, "") if node.value.id == "groundtie" else "")
     names |= {TOOLS.get(name.removeprefix("groundtie."), "") for name in names}
     return names & MODULES.keys()
 
 
 def is_quick(path: Path) -> bool:
     """Return whether a file has a test that is not marked slow."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    if re.search(r"^pytestmark = .*\bslow\b", path.read_text(encoding="utf-8"), re.MULTILINE):
-        return False
 
     def tests(body: list[ast.stmt]) -> bool:
         for node in body:
@@ -56,7 +59,7 @@ def is_quick(path: Path) -> bool:
                 return True
         return False
 
-    return tests(tree.body)
+    return tests(parsed(path).body)
 
 
 def test_every_module_is_met_by_a_quick_test() -> None:

@@ -81,6 +81,7 @@ def error_px(model: Model, kind: str) -> float:
 PRIORS = [Affine.identity(), Affine(1.003, 0.002, 1.0, -0.001, 0.998, -0.5)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", DEGREE)
 @pytest.mark.parametrize("prior", PRIORS, ids=["plain", "resampled"])
 def test_the_model_behind_the_surfaces_is_found(kind: str, prior: Affine) -> None:

@@ -46,6 +46,7 @@ def test_a_shift_is_found_among_three_times_as_many_wrong_matches(kind: str) -> 
     assert len(fit.fold_models) == 5
 
 
+@pytest.mark.slow
 def test_auto_takes_the_simplest_model_that_predicts_best() -> None:
     for truth, bend, kinds in (
         (SHIFT, 0.0, {"translation"}),
@@ -63,6 +64,7 @@ def test_the_model_tells_claimed_positions_whatever_the_input_was_resampled_by()
     assert error_px(fit, prior, LINEAR) < 0.4
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_model() -> None:
     px, partner = matches(LINEAR)
     one, other = (fit_matches("auto", px, partner, Affine.identity(), AREA, 3) for _ in range(2))

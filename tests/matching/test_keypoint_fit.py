@@ -87,6 +87,7 @@ def test_a_misregistration_is_recovered(
         assert found.transform.model.kind == kind
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("detector", ["sift", "sift-isef-oct"])
 @pytest.mark.parametrize("gradient", ["recursive", "roewa"])
 def test_other_detectors_and_gradients_find_it_too(
@@ -175,6 +176,7 @@ def test_the_coarse_model_is_taken_where_keypoints_agree_on_a_wrong_one(
     assert error_px(found.transform, files) < 0.4
 
 
+@pytest.mark.slow
 def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.MonkeyPatch) -> None:
     with files.opened() as pair, threads(2) as context:
         whole = FeatureMatcher(pair, *KEYPOINTS).match(COARSE, context)

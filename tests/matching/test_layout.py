@@ -48,6 +48,7 @@ CHIPS = st.one_of(st.none(), st.integers(16, 33))
 SPACINGS = st.one_of(st.none(), st.floats(5, 200))
 
 
+@pytest.mark.slow
 @settings(max_examples=100)
 @given(size=SIZES, chip=CHIPS, spacing=SPACINGS)
 def test_check_chips_share_no_pixel_with_the_fit_nor_leave_the_grid(

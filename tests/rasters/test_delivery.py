@@ -304,6 +304,7 @@ def test_progress_runs_to_the_end(small_tiles: None, tmp_path: Path) -> None:
     assert seen[-1] == 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
 def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path: Path, share: float) -> None:
     grid = utm_grid(1100, 1100)

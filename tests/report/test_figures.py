@@ -113,6 +113,7 @@ def test_arrows_of_points_without_error() -> None:
     assert np.abs(figures.residual_arrows(residuals, GRID).vector_px).max() < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("only_fit", [True, False])
 def test_arrows_without_check_points_or_any_point(only_fit: bool) -> None:
     points = tie_points().take(slice(0, 2 if only_fit else 0))

@@ -77,6 +77,7 @@ def test_the_covariance_is_that_of_weighted_least_squares() -> None:
     np.testing.assert_allclose(found.bias.covariance, np.linalg.inv(normal), rtol=1e-6, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_estimates_scatter_as_their_covariance_says() -> None:
     drawn = [adjust(control("shift_drift", 50, seed=s), "shift_drift").bias for s in range(60)]
     scatter = np.std([b.coefficients for b in drawn], axis=0)

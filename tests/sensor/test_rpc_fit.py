@@ -31,6 +31,7 @@ def test_a_camera_is_fitted_to_a_thousandth_of_a_pixel() -> None:
     assert fit.rmse_px <= fit.largest_residual_px
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*REAL, DIMAP])
 def test_an_affine_change_of_real_rpcs_is_taken_up(real_data: Path, name: str) -> None:
     path, size = real_data / name, (1024, 1024)

@@ -56,6 +56,7 @@ class TestParts:
         assert heights.max() > 50
         assert 10 < np.median(heights) < 25
 
+    @pytest.mark.slow
     def test_nothing_stands_across_water_or_rails(self) -> None:
         """Their outlines do not touch them: the ground on both sides of a wall is dry."""
         book = ParcelBook(np.random.default_rng(7))
@@ -120,6 +121,7 @@ class TestAcquisitions:
 
 
 class TestReproducible:
+    @pytest.mark.slow
     def test_same_seed(self) -> None:
         assert np.array_equal(laid_out(9)[0], laid_out(9)[0])
 

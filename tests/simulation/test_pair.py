@@ -58,6 +58,7 @@ class TestShapes:
         assert pair.truth.input_grid.pixel_size == (size_m, size_m)
         assert pair.reference.shape == (200, 240)
 
+    @pytest.mark.slow
     def test_pixel_size_of_the_scene(self) -> None:
         pair = simulate_pair(replace(SMALL, scene=replace(SMALL.scene, pixel_size_m=3.0)))
         assert pair.reference_grid.pixel_size == (3.0, 3.0)
@@ -166,6 +167,7 @@ class TestCheckPoints:
 
 
 class TestTruth:
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", list(DISTORTIONS))
     def test_round_trip(self, kind: str) -> None:
         options = replace(SMALL, distortion=DistortionOptions(kind, 5.0), input_pixel_size_m=1.5)
@@ -173,6 +175,7 @@ class TestTruth:
         xy = pair.reference_grid.pixel_to_map(pair.check_points_px)
         np.testing.assert_allclose(pair.truth.inverse(pair.truth(xy)), xy, atol=1e-6)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", ["shift", "polynomial"])
     def test_takes_the_distorted_image_to_the_undistorted_one(self, kind: str) -> None:
         quiet = replace(SMALL, optical=OpticalOptions(bands=("green",), noise_dn=0))

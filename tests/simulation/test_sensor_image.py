@@ -108,6 +108,7 @@ class TestRpcs:
         centre = np.array([199.5, 179.5])
         assert math.dist(matrix @ [*centre, 1], centre) == pytest.approx(80)
 
+    @pytest.mark.slow
     def test_no_error_no_bias(self) -> None:
         none = replace(OPTIONS, attitude=AttitudeOptions(0.0, 0.0, 0.0))
         made = simulate_sensor_image(replace(none, scene=SceneOptions((64, 64), relief_m=0.0)))

@@ -425,6 +425,7 @@ def truth_of(data: Path, case: str) -> tuple[np.ndarray, float]:
     return np.array(truth["reference_to_input"]), truth["sigma_px"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["so-fields", "so-sentinel", "so-rosenheim"])
 def test_real_images(real_data: Path, tmp_path: Path, case: str) -> None:
     reference, input = real_pair(real_data, case, tmp_path, (120.0, -80.0))
@@ -437,6 +438,7 @@ def test_real_images(real_data: Path, tmp_path: Path, case: str) -> None:
     assert rms(result.transform(xy) - truth) <= sigma_px + 1
 
 
+@pytest.mark.slow
 def test_real_images_of_two_places_are_refused(real_data: Path, tmp_path: Path) -> None:
     reference, _ = real_pair(real_data, "so-fields", tmp_path, (0.0, 0.0))
     _, input = real_pair(real_data, "so-rosenheim", tmp_path, (0.0, 0.0))

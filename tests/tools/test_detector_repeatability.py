@@ -23,6 +23,7 @@ def registered(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
     return write_speckled_pair(folder, SIZE, shift_on_map(0.0, 0.0))
 
 
+@pytest.mark.slow
 def test_all_variants_are_compared(registered: TexturedPair, tmp_path: Path) -> None:
     names = ["sift", "sift-oct", "sift-oct+roewa+oriented"]
     found = detector_repeatability(
@@ -81,6 +82,7 @@ def test_the_middle_of_a_large_overlap_is_looked_at(
     assert part.detections[0] == pytest.approx(share * whole.detections[0], rel=0.3)
 
 
+@pytest.mark.slow
 def test_features_that_a_classifier_leaves_out_are_not_counted(
     registered: TexturedPair, tmp_path: Path
 ) -> None:
@@ -100,6 +102,7 @@ def test_features_that_a_classifier_leaves_out_are_not_counted(
         assert left.detections == (whole.detections[0], share * whole.detections[1])
 
 
+@pytest.mark.slow
 def test_images_without_features_have_a_table_of_zeros(
     registered: TexturedPair, tmp_path: Path
 ) -> None:

@@ -60,6 +60,7 @@ def turned_on_map(
 
 
 class TestWithoutGeoreferencing:
+    @pytest.mark.slow
     def test_the_pose_is_found(self, plain: tuple[Path, Path], tmp_path: Path) -> None:
         result = estimate_rotation(*plain, transform=tmp_path / "t.json")
         assert result.pose.rotation_deg == pytest.approx(TRUTH.rotation_deg, abs=0.3)
@@ -75,6 +76,7 @@ class TestWithoutGeoreferencing:
         stored = load_transform(tmp_path / "t.json")
         np.testing.assert_allclose(stored(px), expected, atol=1.5)
 
+    @pytest.mark.slow
     def test_warp_takes_the_transform(self, plain: tuple[Path, Path], tmp_path: Path) -> None:
         estimate_rotation(*plain, transform=tmp_path / "t.json")
         warp(plain[1], tmp_path / "out.tif", tmp_path / "t.json", reference=plain[0])
