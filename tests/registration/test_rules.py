@@ -117,6 +117,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(scatter(72, 0.3) + [1.2, 0.0], max_error_px=1.5),
     ),
     "loose model": (evidence(GOOD, loose(2.0)), evidence(GOOD, loose(1.0))),
+    "too little ground": (
+        evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.08, "as in a dense town")),
+        evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.12, "as in a dense town")),
+    ),
     "ground elsewhere": (
         evidence(GOOD, ground_shift_px=1.1),
         evidence(GOOD, ground_shift_px=0.9),
@@ -207,6 +211,16 @@ def test_a_town_whose_ground_confirms_is_not_suspected() -> None:
 
 def test_an_image_of_fields_is_not_suspected() -> None:
     assert refusing(evidence(two_thirds(20), scene=scene())) == []
+
+
+def test_ground_must_be_reliable_and_span_the_overlap() -> None:
+    regions = MaskUsed(REGIONS, "reference", 0.3, "as in a dense town")
+    assert refusing(evidence(GOOD, mask=regions)) == []
+    doubted = replace(regions, is_reliable=False)
+    assert refusing(evidence(GOOD, mask=doubted)) == ["too little ground"]
+    narrow = estimated(fit_points(within=(0.6, 0.6)))
+    assert refusing(evidence(GOOD, narrow, mask=regions)) == ["too little ground"]
+    assert refusing(evidence(GOOD, narrow)) == []
 
 
 @pytest.mark.parametrize(

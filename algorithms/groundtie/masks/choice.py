@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -51,12 +50,15 @@ class MaskUsed:
         Share of the pixels that take part.
     reason
         Why, in a sentence.
+    is_reliable
+        Whether enough roads and banks were found for regions to be the ground.
     """
 
     kind: str
     image: str | None
     share: float
     reason: str
+    is_reliable: bool = True
 
     @property
     def leaves_little(self) -> bool:
@@ -74,25 +76,24 @@ class MaskUsed:
         return f"mask: {self.kind}, {self.share:.0%} of the {self.image} take part; {self.reason}"
 
 
-def choose(strong_share: float, find: Callable[[], GroundRegions]) -> tuple[str, str]:
-    """Return the kind of mask that suits a radar image, and why.
+def choose(strong_share: float) -> tuple[str, str]:
+    """Return the kind of mask that suits a radar image beside a camera's, and why.
 
     Parameters
     ----------
     strong_share
-        Its share of strong scatterers.
-    find
-        Finds the regions on the ground; called only if the image is a dense town's.
+        The radar image's share of strong scatterers.
     """
     share = f"strong scatterers on {strong_share:.0%} of the image"
-    if not is_dense(strong_share):
-        return NONE, f"{share}: too few buildings to lead astray"
-    ground = find()
-    usable = f"{share}, and {ground.skeleton_m:.0f} m of roads and banks"
+    if is_dense(strong_share):
+        return REGIONS, f"{share}, as in a dense town"
+    return NONE, f"{share}: too few buildings to lead astray"
+
+
+def is_reliable(ground: GroundRegions) -> bool:
+    """Whether regions hold enough roads and banks to be the ground of a town."""
     side_m = float(np.sqrt(ground.extent_m2))
-    if ground.share < _LEAST_GROUND or ground.skeleton_m < _LEAST_SKELETON * side_m:
-        return THRESHOLD, f"{usable} are too little to rely on"
-    return REGIONS, f"{usable} are enough to rely on"
+    return ground.share >= _LEAST_GROUND and ground.skeleton_m >= _LEAST_SKELETON * side_m
 
 
 def is_dense(strong_share: float) -> bool:

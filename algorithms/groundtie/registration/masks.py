@@ -25,6 +25,7 @@ from ..masks.choice import (
     REGIONS,
     MaskUsed,
     choose,
+    is_reliable,
 )
 from ..masks.layer import read_layer
 from ..masks.regions import HIGH_PERCENT, WIDTH_M, GroundRegions, find_ground
@@ -141,16 +142,16 @@ def with_ground_mask(
         return Masked(pair, MaskUsed(NONE, None, 1.0, "there is no radar image beside a camera's"))
     town = _Town(pair, scene, stack, context)
     reason = "as asked for"
-    is_chosen = kind == AUTO
-    if is_chosen:
-        kind, reason = choose(scene.radar.strong_share, town.regions)
+    if kind == AUTO:
+        kind, reason = choose(scene.radar.strong_share)
     if kind == NONE:
-        # Where the choice is no mask, there is no dense town.
-        ground = None if is_chosen or not scene.is_dense_town else town.ground()
+        ground = town.ground() if scene.is_dense_town else None
         return Masked(pair, MaskUsed(NONE, None, 1.0, reason), ground)
     if kind == REGIONS:
-        masked, share = town.masked(town.regions().select)
-        return Masked(masked, MaskUsed(REGIONS, scene.radar_name, share, reason))
+        regions = town.regions()
+        masked, share = town.masked(regions.select)
+        used = MaskUsed(REGIONS, scene.radar_name, share, reason, is_reliable(regions))
+        return Masked(masked, used)
     by_level = Threshold(threshold.HIGH_PERCENT, 0.0, 0).on(town.scene, context.progress)
     masked, share = town.masked(by_level.select)
     ground = town.ground() if scene.is_dense_town else None
