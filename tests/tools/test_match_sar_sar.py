@@ -30,6 +30,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
     return write_speckled_pair(folder, SIZE, shift_on_map(70.0, -45.0))
 
 
+@pytest.mark.slow
 def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: Path) -> None:
     found = match_sar_sar(
         files.reference,
@@ -54,6 +55,7 @@ def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: 
     assert np.corrcoef(reference.ravel(), registered.ravel())[0, 1] > 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("image", ["reference", "input"])
 def test_features_that_a_classifier_leaves_out_take_no_part(
     files: TexturedPair, tmp_path: Path, image: str
@@ -82,6 +84,7 @@ def test_features_that_a_classifier_leaves_out_take_no_part(
     assert error_px(found.transform, files) < 1.0
 
 
+@pytest.mark.slow
 def test_check_points_lie_where_no_feature_was_seen(files: TexturedPair, tmp_path: Path) -> None:
     found = match_sar_sar(files.reference, files.input, tmp_path / "out.tif", refinement="none")
     points = found.points
@@ -93,6 +96,7 @@ def test_check_points_lie_where_no_feature_was_seen(files: TexturedPair, tmp_pat
     assert apart.min() > 15
 
 
+@pytest.mark.slow
 def test_another_place_is_refused_and_leaves_its_report_only(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     other = write_speckled_pair(tmp_path / "in", SIZE, shift_on_map(0, 0), input_seed=77)
@@ -104,6 +108,7 @@ def test_another_place_is_refused_and_leaves_its_report_only(tmp_path: Path) -> 
     assert not (tmp_path / "o.tif").exists()
 
 
+@pytest.mark.slow
 def test_an_image_that_may_show_a_dense_town_to_a_camera_is_in_doubt(
     files: TexturedPair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -120,6 +125,7 @@ def test_an_image_that_may_show_a_dense_town_to_a_camera_is_in_doubt(
     match_sar_sar(files.reference, files.input, tmp_path / "other.tif")
 
 
+@pytest.mark.slow
 def test_images_without_georeferencing_may_be_turned(tmp_path: Path) -> None:
     turned = write_speckled_pair(tmp_path, SIZE, shift_on_map(0, 0))
     values = np.rot90(pixels(turned.input)[0]).copy()
@@ -136,6 +142,7 @@ def test_images_without_georeferencing_may_be_turned(tmp_path: Path) -> None:
     assert np.hypot(*off.T).max() < 1.0
 
 
+@pytest.mark.slow
 def test_matches_off_the_ground_take_no_part(files: TexturedPair, tmp_path: Path) -> None:
     ground = np.ones((SIZE[1], SIZE[0]), np.uint8)
     ground[:, :90] = 0
@@ -147,6 +154,7 @@ def test_matches_off_the_ground_take_no_part(files: TexturedPair, tmp_path: Path
     assert error_px(found.transform, files) < 0.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("image", ["reference", "input"])
 def test_what_shines_in_either_image_may_be_left_out(
     files: TexturedPair, tmp_path: Path, image: str
@@ -165,6 +173,7 @@ def test_what_shines_in_either_image_may_be_left_out(
     assert error_px(found.transform, files) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("image", ["reference", "input"])
 def test_features_on_a_mask_of_either_image_take_no_part(
     files: TexturedPair, tmp_path: Path, image: str
@@ -224,6 +233,7 @@ def lifted(files: TexturedPair, folder: Path, share: float, by_px: int) -> Textu
     return replace(files, input=write_raster(folder / "lifted.tif", moved, files.grid))
 
 
+@pytest.mark.slow
 def test_what_stands_is_not_taken_for_the_ground(files: TexturedPair, tmp_path: Path) -> None:
     pair = lifted(files, tmp_path, 0.5, 9)
     with pytest.raises(NotRegisteredError) as refused:
@@ -232,6 +242,7 @@ def test_what_stands_is_not_taken_for_the_ground(files: TexturedPair, tmp_path: 
     assert "ground and what stands on it" in str(refused.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tool", [match_sar_sar, coregister])
 def test_what_leans_is_refused(
     files: TexturedPair,

@@ -28,6 +28,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return make_scene(tmp_path_factory.mktemp("scene"), DRIFT)
 
 
+@pytest.mark.slow
 def test_a_reference_and_a_terrain_model_make_the_rpcs_right(scene: Scene, tmp_path: Path) -> None:
     result = groundtie.refine_rpc(
         scene.image,
@@ -64,6 +65,7 @@ def test_a_reference_and_a_terrain_model_make_the_rpcs_right(scene: Scene, tmp_p
     assert np.median(used) < 1.5
 
 
+@pytest.mark.slow
 def test_a_refused_matching_leaves_its_report(scene: Scene, tmp_path: Path) -> None:
     """The reference shows other ground."""
     with rasterio.open(scene.reference) as source:
@@ -158,6 +160,7 @@ def bias_of(kind: str) -> Bias:
     return Bias(kind, POINTS_SIZE, coefficients, np.zeros((2 * terms,) * 2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blunders", ["robust", "worst-first"])
 @pytest.mark.parametrize("kind", ["shift", "shift_drift", "affine"])
 def test_given_points_recover_a_bias(tmp_path: Path, kind: str, blunders: str) -> None:
@@ -183,6 +186,7 @@ def test_an_image_is_copied_with_its_refined_tags(tmp_path: Path) -> None:
         assert error_px(rpc_from_tags(after.tags(ns="RPC"), "refined")) < 0.35
 
 
+@pytest.mark.slow
 def test_refined_images_orthorectify_to_where_they_belong(tmp_path: Path) -> None:
     files = write_points(tmp_path, bias_of("affine"))
     groundtie.refine_rpc(output=tmp_path / "refined.tif", dem_datum="ellipsoidal", **files)
