@@ -89,6 +89,7 @@ class TestWithoutGeoreferencing:
         # Of opposite contrast, with noise in both.
         assert np.corrcoef(reference[shown], moved[shown])[0, 1] < -0.8
 
+    @pytest.mark.slow
     def test_a_band_can_be_chosen(self, plain: tuple[Path, Path], tmp_path: Path) -> None:
         image = cv2.imread(str(plain[1]), cv2.IMREAD_UNCHANGED)
         noise = np.random.default_rng(0).integers(1, 60_000, image.shape).astype(np.uint16)
@@ -108,6 +109,7 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
 
 
 class TestWithGeoreferencing:
+    @pytest.mark.slow
     def test_what_is_found_is_the_error_of_the_claim(
         self, pair: TexturedPair, tmp_path: Path
     ) -> None:
@@ -119,6 +121,7 @@ class TestWithGeoreferencing:
         # In input pixels, two of which are a reference's.
         assert error_px(load_transform(tmp_path / "t.json"), pair) < 2
 
+    @pytest.mark.slow
     def test_limits(self, pair: TexturedPair) -> None:
         result = estimate_rotation(
             pair.reference,
@@ -134,6 +137,7 @@ class TestWithGeoreferencing:
 
 
 class TestRefusal:
+    @pytest.mark.slow
     def test_two_places(self, other_place: tuple[Path, Path], tmp_path: Path) -> None:
         outputs = {"transform": tmp_path / "t.json", "picture": tmp_path / "p.png"}
         with pytest.raises(NotRegisteredError) as refusal:
@@ -143,6 +147,7 @@ class TestRefusal:
         assert refusal.value.verdict.reason in str(refusal.value)
         assert [path.name for path in tmp_path.iterdir()] == ["p.png"]
 
+    @pytest.mark.slow
     def test_on_the_command_line(
         self, other_place: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
     ) -> None:
@@ -153,6 +158,7 @@ class TestRefusal:
 
 
 class TestSearches:
+    @pytest.mark.slow
     @pytest.mark.parametrize("search", [name for name in SEARCHES if name != "rotation-steps"])
     def test_each_finds_a_shift(self, search: str, tmp_path: Path) -> None:
         truth = Pose(shift_px=(5.0, -3.0))
@@ -171,6 +177,7 @@ class TestSearches:
             pytest.approx(-3, abs=1),
         )
 
+    @pytest.mark.slow
     def test_what_a_search_cannot_find_is_refused(self, plain: tuple[Path, Path]) -> None:
         with pytest.raises(NotRegisteredError, match="prefers"):
             estimate_rotation(*plain, "phase-correlation")
@@ -202,6 +209,7 @@ class TestBadInput:
         assert "has no georeferencing" in line
 
 
+@pytest.mark.slow
 def test_summary_and_lines_say_the_same(
     plain: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -220,6 +228,7 @@ def test_summary_and_lines_say_the_same(
     assert cv2.imread(str(picture)) is not None
 
 
+@pytest.mark.slow
 def test_simulated_radar_and_optical_image(simulated: Any, tmp_path: Path) -> None:
     """The optical image is turned by a right angle, which moves no pixel between others."""
     pair = simulated("similarity")

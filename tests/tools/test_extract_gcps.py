@@ -30,6 +30,7 @@ def call(scene: Scene, output: Path, **changes: object) -> groundtie.tools.extra
     return groundtie.extract_gcps(**(files | more | changes))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_points_lie_where_the_true_rpcs_see_them(scene: Scene, tmp_path: Path) -> None:
     result = call(scene, tmp_path / "gcps.gpkg")
     points = result.points
@@ -43,12 +44,14 @@ def test_points_lie_where_the_true_rpcs_see_them(scene: Scene, tmp_path: Path) -
     assert "accepted" in result.lines()[0]
 
 
+@pytest.mark.slow
 def test_a_mask_by_thresholds_can_be_asked_for(scene: Scene, tmp_path: Path) -> None:
     result = call(scene, tmp_path / "gcps.csv", mask="threshold")
     assert result.mask.kind == "threshold"
     assert result.mask.share == pytest.approx(0.8, abs=0.02)
 
 
+@pytest.mark.slow
 def test_what_a_classifier_leaves_out_of_the_image_takes_no_part(
     scene: Scene, tmp_path: Path
 ) -> None:
@@ -108,6 +111,7 @@ def no_rpcs(scene: Scene, folder: Path) -> dict[str, Path]:
     return {"image": write_raster(folder / "plain.tif", np.ones((50, 50), np.uint8))}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "error", "reason"),
     [
@@ -128,6 +132,7 @@ def test_what_cannot_be_matched_writes_nothing(
     assert not output.exists()
 
 
+@pytest.mark.slow
 def test_the_map_may_have_another_crs(scene: Scene, tmp_path: Path) -> None:
     from rasterio.warp import Resampling, calculate_default_transform, reproject
 

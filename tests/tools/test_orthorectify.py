@@ -49,6 +49,7 @@ def by_gdal(files: dict[str, Path], like: Path, resampling: str) -> np.ndarray:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resampling", ["bilinear", "cubic"])
 def test_positions_are_those_of_gdal(files: dict[str, Path], resampling: str) -> None:
     """The image holds its own columns and rows, so the orthoimage's values are positions."""
@@ -128,6 +129,7 @@ def test_a_cloud_optimized_geotiff_holds_the_same(files: dict[str, Path]) -> Non
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_other_rpcs_can_be_given(files: dict[str, Path], tmp_path: Path) -> None:
     write_rpc(tmp_path / "moved_RPC.TXT", RPC.shifted((7.0, -4.0)))
     plain = groundtie.orthorectify(**files, dem_datum="ellipsoidal", resampling="bilinear")

@@ -56,6 +56,7 @@ def surface_of(pair: TexturedPair, folder: Path, **values: Any) -> SurfaceResult
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("similarity", CHOICES)
 def test_every_measure_finds_the_shift(
     similarity: str, textured: TexturedPair, tmp_path: Path
@@ -80,6 +81,7 @@ def test_all_measures_can_be_chosen() -> None:
     assert len(set(CHOICES)) == len(CHOICES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "more",
     [
@@ -264,6 +266,7 @@ def test_a_flank_is_no_second_peak(textured: TexturedPair, tmp_path: Path) -> No
     assert result.second_ratio == pytest.approx(result.second.height / result.peak.height)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_surface(textured: TexturedPair, tmp_path: Path) -> None:
     small = {"similarity": "mlmi", "sample": 100, "search_radius": 30.0}
     runs = [surface_of(textured, tmp_path, seed=seed, **small).values for seed in (1, 1, 2)]

@@ -37,6 +37,7 @@ def test_all_files_are_written_and_named(tmp_path: Path) -> None:
     assert result.lines() == [f"{k}: {v}" for k, v in summary["files"].items()]
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_pair(tmp_path: Path) -> None:
     for name, seed in (("one", 3), ("two", 3), ("other", 4)):
         simulate(tmp_path / name, 80, seed=seed)
@@ -78,6 +79,7 @@ def test_parameters_reach_the_pair(tmp_path: Path) -> None:
         assert np.ptp(dem.read()) == 0
 
 
+@pytest.mark.slow
 def test_views_reach_the_pair(tmp_path: Path) -> None:
     simulate(
         tmp_path,

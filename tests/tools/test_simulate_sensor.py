@@ -17,6 +17,7 @@ def content(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
 
 
+@pytest.mark.slow
 def test_all_files_are_written_and_named(tmp_path: Path) -> None:
     result = simulate_sensor(tmp_path / "made", 96)
     assert {path.name for path in (tmp_path / "made").iterdir()} == set(NAMES.values())
@@ -25,6 +26,7 @@ def test_all_files_are_written_and_named(tmp_path: Path) -> None:
     assert result.lines() == [f"{k}: {v}" for k, v in summary["files"].items()]
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
     for name, seed in (("one", 3), ("two", 3), ("other", 4)):
         simulate_sensor(tmp_path / name, 80, seed=seed)
@@ -32,6 +34,7 @@ def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
     assert content(tmp_path / "one") != content(tmp_path / "other")
 
 
+@pytest.mark.slow
 def test_parameters_reach_the_image(tmp_path: Path) -> None:
     simulate_sensor(
         tmp_path,
@@ -95,6 +98,7 @@ def test_cancelling_writes_nothing(tmp_path: Path) -> None:
     assert not (tmp_path / "made").exists()
 
 
+@pytest.mark.slow
 def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate-sensor", str(tmp_path / "made"), "--size", "64", "--json"]) == 0
     assert set(json.loads(capsys.readouterr().out)) == {"files"}

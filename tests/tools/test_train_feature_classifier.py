@@ -90,6 +90,7 @@ def test_clouds_of_a_mask_are_learned(image: Path, tmp_path: Path, statistics: s
     assert json.loads((tmp_path / "c.json").read_text())["pixel_size_m"] == 10.0
 
 
+@pytest.mark.slow
 def test_bands_tell_clouds_from_ground_that_is_as_bright(tmp_path: Path) -> None:
     values = np.repeat(texture(SIDE, SIDE)[None], 3, axis=0) * 100 + 1000
     values[0, :, :BORDER] += 300
