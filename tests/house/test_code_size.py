@@ -8,7 +8,9 @@ from scripts.code_size import code_lines, is_apart
 
 
 def test_docstrings_comments_and_blank_lines_are_no_code() -> None:
-    source = '"""Doc."""\n\n# why\nX = """a\nb"""\n\n\ndef f():\n    """Doc\n    doc."""\n    return X\n'
+    source = (
+        '"""Doc."""\n\n# why\nX = """a\nb"""\n\n\ndef f():\n    """Doc\n    doc."""\n    return X\n'
+    )
     assert code_lines(source) == 4
 
 

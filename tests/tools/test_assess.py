@@ -278,7 +278,9 @@ class TestWithOtherTools:
         result = assess(**made, max_error=3.0)
         assert result.verdict is not None
         ours, theirs = result.verdict, registered.verdict
-        assert ours.check_points == theirs.check_points
+        # Files hold check points without a peak as rejected ones; the verdict counts them.
+        assert registered.check is not None
+        assert ours.check_points == registered.check.points.used.sum() <= theirs.check_points
         assert 0 < ours.check_points_agreeing < ours.check_points
         assert ours.check_rmse_px == pytest.approx(theirs.check_rmse_px, rel=0.1)
 

@@ -62,7 +62,7 @@ def test_table_and_picture_are_written(files: dict[str, Path], tmp_path: Path) -
         **files, refined=tmp_path / "refined_RPC.TXT", height=300.0,
         table=tmp_path / "errors.csv", picture=tmp_path / "errors.png",
     )  # fmt: skip
-    rows = list(csv.DictReader((tmp_path / "errors.csv").open()))
+    rows = list(csv.DictReader((tmp_path / "errors.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == 6
     assert float(rows[0]["before_col_px"]) == pytest.approx(12.0, abs=1e-6)
     picture = cv2.imread(str(tmp_path / "errors.png"))
