@@ -14,10 +14,10 @@ from groundtie.features.hog import HogDescriptor
 from groundtie.geometry.estimation import Estimate
 from groundtie.matching.alignment import LINEAR_CANDIDATES
 from groundtie.matching.chips import ChipMatcher
-from groundtie.matching.feature_tiles import FeatureMatcher
 from groundtie.matching.guided_fit import GuidedFit
 from groundtie.matching.held_out import HeldOut
 from groundtie.matching.keypoint_fit import KeypointFit
+from groundtie.matching.keypoints import KeypointMatcher
 from groundtie.matching.surface_fit import SurfaceFit
 from groundtie.similarity.surface import SimilaritySettings
 
@@ -63,7 +63,7 @@ def estimates(
     with files.opened() as pair, threads(2) as context:
         held_out = HeldOut.of(pair)
         chips = SurfaceFit(ChipMatcher(pair, FUSED, held_out), held_out.layout, LINEAR_CANDIDATES)
-        matcher = FeatureMatcher(pair, SiftDetector(threshold), HogDescriptor(), held_out=held_out)
+        matcher = KeypointMatcher(pair, SiftDetector(threshold), HogDescriptor(), held_out=held_out)
         keypoints = KeypointFit(matcher, chips)
         guided = GuidedFit(keypoints, chips)
         alone = keypoints.estimate(COARSE, kind, context)

@@ -16,14 +16,16 @@ from groundtie.features import tiles
 from groundtie.features.descriptors import SiftDescriptor
 from groundtie.features.detectors import SiftOctDetector
 from groundtie.features.keypoints import Keypoints
+from groundtie.features.matching import GATE_PX
 from groundtie.features.tiles import Describing, Detecting
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.models import Model
-from groundtie.matching import feature_tiles
+from groundtie.matching import keypoints
 from groundtie.matching.chips import ChipMatcher
-from groundtie.matching.feature_tiles import FeatureMatcher, FeatureMatches
 from groundtie.matching.held_out import HeldOut
 from groundtie.matching.keypoint_fit import KeypointFit
+from groundtie.matching.keypoints import KeypointMatcher, KeypointMatches, correspondences
+from groundtie.matching.matcher import Correspondences
 from groundtie.matching.surface_fit import SurfaceFit
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, ImagePair
@@ -53,7 +55,7 @@ def estimate_of(
     ratio: float = 1.0,
 ) -> Estimate:
     held_out = HeldOut.of(pair)
-    matcher = FeatureMatcher(pair, detector, descriptor, ratio, held_out=held_out)
+    matcher = KeypointMatcher(pair, detector, descriptor, ratio, held_out=held_out)
     with threads(2) as context:
         return fit_of(pair, held_out, matcher, refinement).estimate(coarse, kind, context)
 
@@ -61,7 +63,7 @@ def estimate_of(
 def fit_of(
     pair: ImagePair,
     held_out: HeldOut,
-    matcher: FeatureMatcher,
+    matcher: KeypointMatcher,
     refinement: SimilaritySettings | None,
 ) -> KeypointFit:
     chips = SurfaceFit(ChipMatcher(pair, SimilaritySettings("fused"), held_out), held_out.layout)
@@ -131,10 +133,11 @@ class Astray:
     pair: ImagePair
     held_out: HeldOut
     most_px: float = 7.0
-    gate_px: float = 16.0
     wrong_px: float = 0.0
 
-    def match(self, coarse: Model, context: object) -> FeatureMatches:
+    def match(
+        self, coarse: Model, places: object, radius_px: int, context: object
+    ) -> Correspondences:
         grid = self.pair.grid
         sides = [np.arange(30.0, size - 30, 12) for size in (grid.width, grid.height)]
         px = np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)
@@ -148,7 +151,8 @@ class Astray:
             Keypoints(at, *(np.ones(len(px)) for _ in range(3)), np.zeros(len(px), int))
             for at in (px, partner)
         ]
-        return FeatureMatches(*both, np.full(len(px), 0.5), (len(px), len(px)))
+        found = KeypointMatches(*both, np.full(len(px), 0.5), (len(px), len(px)))
+        return correspondences(found, radius_px)
 
 
 @pytest.mark.slow
@@ -179,11 +183,11 @@ def test_the_coarse_model_is_taken_where_keypoints_agree_on_a_wrong_one(
 @pytest.mark.slow
 def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.MonkeyPatch) -> None:
     with files.opened() as pair, threads(2) as context:
-        whole = FeatureMatcher(pair, *KEYPOINTS).match(COARSE, context)
+        whole = KeypointMatcher(pair, *KEYPOINTS).keypoints(COARSE, GATE_PX, context)
         monkeypatch.setattr(tiles, "_TILE_PX", 128)
-        parts = FeatureMatcher(pair, *KEYPOINTS).match(COARSE, context)
+        parts = KeypointMatcher(pair, *KEYPOINTS).keypoints(COARSE, GATE_PX, context)
 
-    def places(matches: feature_tiles.FeatureMatches) -> set[tuple[float, ...]]:
+    def places(matches: keypoints.KeypointMatches) -> set[tuple[float, ...]]:
         both = np.hstack([matches.reference.position_px, matches.input.position_px])
         return {tuple(row) for row in np.rint(both)}
 
@@ -198,9 +202,9 @@ def test_a_tile_sees_all_that_its_keypoints_see_but_not_far_beyond_the_grid() ->
     middle, last = Window(1024, 0, 1024, 1024), Window(2048, 1024, 952, 176)
     far = 16 + tiles.MARGIN_PX
     left, right, down = 1024 - far, 1024 + 2 * far, 1024 + 16 + far
-    assert feature_tiles.seen_around(middle, grid, 16) == Window(left, -16, right, down)
+    assert keypoints.seen_around(middle, grid, 16) == Window(left, -16, right, down)
     # To 16 px beyond the last column and the last row.
-    assert feature_tiles.seen_around(last, grid, 16) == Window(
+    assert keypoints.seen_around(last, grid, 16) == Window(
         2048 - far, 1024 - far, 952 + far + 16, 176 + far + 16
     )
 
@@ -211,8 +215,8 @@ def test_only_keypoints_on_the_ground_are_matched(files: TexturedPair, tmp_path:
     mask = write_raster(tmp_path / "ground.tif", shown, files.grid)
     with files.opened() as pair, open_raster(mask) as ground, threads(2) as context:
         masked = replace(pair, reference=Image(pair.reference.source, None, ground))
-        found = FeatureMatcher(pair, *KEYPOINTS, shown=masked).match(COARSE, context)
-        everywhere = FeatureMatcher(pair, *KEYPOINTS).match(COARSE, context)
+        found = KeypointMatcher(pair, *KEYPOINTS, shown=masked).keypoints(COARSE, GATE_PX, context)
+        everywhere = KeypointMatcher(pair, *KEYPOINTS).keypoints(COARSE, GATE_PX, context)
     assert 50 < len(found.reference) < len(everywhere.reference)
     assert found.reference.position_px[:, 0].min() > 99
 

@@ -13,7 +13,7 @@ Descriptors = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
 # How far a partner may lie from its predicted place ([Suri2010] 6.9.2).
-GATE_PX = 16.0
+GATE_PX = 16
 
 # So many distances are held in memory at a time.
 _BLOCK = 4_000_000

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from ..context import Context
 from ..errors import TooFewPointsError
+from ..features.matching import GATE_PX
 from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate, jackknife_spread
 from ..geometry.fitting import fit_model
 from ..geometry.models import PARAMETERS, Model
@@ -24,15 +25,12 @@ from ..geometry.transform import Transform
 from ..rasters.grid import Grid, apply_affine
 from .chips import ChipMatcher
 from .feature_fit import AUTO, Fit, fit_matches, require_no_rival
-from .feature_tiles import FeatureMatcher
 from .frames import on_grid, on_map
+from .keypoints import KeypointMatcher
 from .matcher import Correspondences, Places
 from .surface_fit import SurfaceFit
 
 FloatArray = NDArray[np.float64]
-
-# A partner without a rival in its gate is as much nearer than the next as this, at most.
-_LARGEST_SCORE = 10.0
 
 # Chips around matches: how large, and how far they are moved: by so many standard deviations of the
 # first model's predictions, within these limits.
@@ -70,7 +68,7 @@ class KeypointFit:
         stay where they were found.
     """
 
-    matcher: FeatureMatcher
+    matcher: KeypointMatcher
     chips: SurfaceFit
     refinement: ChipMatcher | None = None
 
@@ -113,15 +111,16 @@ class KeypointFit:
 
     def _match(self, coarse: Model, kind: str, context: Context) -> tuple[Correspondences, Fit]:
         """Return matches of keypoints, few enough of each place, and the model of most of them."""
-        matches = self.matcher.match(coarse, context)
-        score = 1 / np.maximum(matches.ratio, 1 / _LARGEST_SCORE)
-        area = float(np.pi * self.matcher.gate_px**2)
-        everywhere = Correspondences(
-            matches.reference.position_px, matches.input.position_px, score, area
-        )
-        found = everywhere.take(best_of_cells(everywhere.px, score, _CELL_PX, _PER_CELL))
+        everywhere = self.matcher.match(coarse, None, GATE_PX, context)
+        found = everywhere.take(best_of_cells(everywhere.px, everywhere.score, _CELL_PX, _PER_CELL))
         fit = self._fit(kind, found, coarse, context.seed)
-        require_no_rival(found.px, found.partner_px, on_grid(coarse, self._grid), fit.model, area)
+        require_no_rival(
+            found.px,
+            found.partner_px,
+            on_grid(coarse, self._grid),
+            fit.model,
+            found.window_area_px2,
+        )
         return found, fit
 
     def _refined(

@@ -22,10 +22,10 @@ from ..masks.choice import INPUT, REFERENCE, MaskUsed
 from ..matching.alignment import LINEAR_CANDIDATES
 from ..matching.check import CHECK_RADIUS_PX, Check, check_model
 from ..matching.chips import ChipMatcher
-from ..matching.feature_tiles import FeatureMatcher
 from ..matching.guided_fit import GuidedFit
 from ..matching.held_out import HeldOut
 from ..matching.keypoint_fit import KeypointFit
+from ..matching.keypoints import KeypointMatcher
 from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
 from ..matching.surface_fit import SurfaceFit
@@ -297,7 +297,7 @@ def _fit(
     presets = {KEYPOINTS: sar_keypoints, GUIDED_CHIPS: optical_keypoints}
     detector, descriptor = presets[spec.matcher]()
     masked = None if pair is images else pair
-    keypoints = FeatureMatcher(images, detector, descriptor, held_out=held_out, shown=masked)
+    keypoints = KeypointMatcher(images, detector, descriptor, held_out=held_out, shown=masked)
     chips = ChipMatcher(pair, SimilaritySettings(spec.refinement), held_out)
     if spec.matcher == KEYPOINTS:
         return KeypointFit(keypoints, SurfaceFit(matcher, layout), chips)

@@ -14,7 +14,7 @@ from ..features.keypoints import Keypoints
 from ..features.tiles import Describing, Detecting
 from ..geometry.fitting import fit_model
 from ..geometry.models import PARAMETERS
-from ..matching.feature_tiles import lying_in
+from ..matching.keypoints import lying_in
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask
 from .filtering import filter_matches

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from ..context import Context
 from ..features.detectors import seen_whole
 from ..features.keypoints import Keypoints
-from ..features.matching import GATE_PX, match_near
+from ..features.matching import match_near
 from ..features.tiles import MARGIN_PX, Describing, Detecting, inside, tiles, widened
 from ..geometry.models import Model
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
-from .chips import MaskOf
+from .matcher import Correspondences, MaskOf, Places
 
 FloatArray = NDArray[np.float64]
 
@@ -30,8 +30,12 @@ _INSIDE_SCALES = 1.5
 _MOST_PER_TILE = 6000
 
 
+# A partner without a rival in its gate is as much nearer than the next as this, at most.
+_LARGEST_SCORE = 10.0
+
+
 @dataclass(frozen=True)
-class FeatureMatches:
+class KeypointMatches:
     """Pairs of keypoints on the matching grid, the input's resampled by a coarse model.
 
     Parameters
@@ -50,7 +54,7 @@ class FeatureMatches:
     found: tuple[int, int]
 
     @classmethod
-    def concatenate(cls, parts: list[FeatureMatches]) -> FeatureMatches:
+    def concatenate(cls, parts: list[KeypointMatches]) -> KeypointMatches:
         """Return the matches of all tiles."""
         return cls(
             Keypoints.concatenate([part.reference for part in parts]),
@@ -61,7 +65,7 @@ class FeatureMatches:
 
 
 @dataclass(frozen=True)
-class FeatureMatcher:
+class KeypointMatcher:
     """Matches keypoints of a pair on its matching grid, near where a coarse model puts them.
 
     Parameters
@@ -72,8 +76,6 @@ class FeatureMatcher:
         How keypoints are found and described.
     ratio
         Largest ratio of the distances to the nearest and the next partner.
-    gate_px
-        How far a partner may lie from where the coarse model puts it.
     held_out
         Returns for a piece of the grid which pixels of the reference must not be seen; None: all
         may be.
@@ -86,26 +88,34 @@ class FeatureMatcher:
     detector: Detecting
     descriptor: Describing
     ratio: float = 1.0
-    gate_px: float = GATE_PX
     held_out: MaskOf | None = None
     shown: ImagePair | None = None
 
-    def match(self, coarse: Model, context: Context) -> FeatureMatches:
-        """Return the matches all over the matching grid.
+    def match(
+        self, model: Model, places: Places | None, radius_px: int, context: Context
+    ) -> Correspondences:
+        """Return the matches all over the matching grid, as a `matcher.Matcher`.
 
         Parameters
         ----------
-        coarse
-            The misregistration on the map; it may be wrong by `gate_px`.
+        model
+            The misregistration on the map as known so far.
+        places
+            None: keypoints are their own places.
+        radius_px
+            How far a partner may lie from where the model predicts it.
         context
-            Where tiles are matched.
+            Threads and progress.
         """
-        match_tile = partial(self._match_tile, coarse=coarse)
-        parts = context.map(match_tile, list(tiles(self.pair.grid)))
-        return FeatureMatches.concatenate(list(parts))
+        return correspondences(self.keypoints(model, radius_px, context), radius_px)
 
-    def _match_tile(self, tile: Window, coarse: Model) -> FeatureMatches:
-        gate = int(np.ceil(self.gate_px))
+    def keypoints(self, model: Model, radius_px: int, context: Context) -> KeypointMatches:
+        """Return the matched keypoints themselves; parameters as `match`."""
+        match_tile = partial(self._match_tile, coarse=model, gate=radius_px)
+        parts = context.map(match_tile, list(tiles(self.pair.grid)))
+        return KeypointMatches.concatenate(list(parts))
+
+    def _match_tile(self, tile: Window, coarse: Model, gate: int) -> KeypointMatches:
         area = seen_around(tile, self.pair.grid, gate)
         corner = area.col, area.row
         piece = self.pair.grid.window(*area)
@@ -135,10 +145,10 @@ class FeatureMatcher:
             partner_descriptors,
             points.position_px,
             partners.position_px,
-            self.gate_px,
+            gate,
             self.ratio,
         )
-        return FeatureMatches(
+        return KeypointMatches(
             points.take(matches.first).moved(corner),
             partners.take(matches.second).moved(corner),
             matches.ratio,
@@ -167,3 +177,18 @@ def seen_around(tile: Window, grid: Grid, gate: int) -> Window:
     low = np.maximum(seen[:2], most[:2])
     high = np.minimum(np.add(seen[:2], seen[2:]), np.add(most[:2], most[2:]))
     return Window(*low.tolist(), *(high - low).tolist())
+
+
+def correspondences(matches: KeypointMatches, radius_px: int) -> Correspondences:
+    """Return matched keypoints as correspondences, with a score by how much the next one is worse.
+
+    Parameters
+    ----------
+    matches
+        The keypoints.
+    radius_px
+        How far a partner was looked for.
+    """
+    score = 1 / np.maximum(matches.ratio, 1 / _LARGEST_SCORE)
+    area = float(np.pi * radius_px**2)
+    return Correspondences(matches.reference.position_px, matches.input.position_px, score, area)
