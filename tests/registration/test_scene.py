@@ -132,7 +132,7 @@ def test_facts_are_found_when_asked_for_and_never_again(
         monkeypatch.setattr(scene_module, name, counted)
     with opened(tmp_path, speckled(0.25), FIELDS) as pair:
         info = SceneInfo.of(pair)
-        assert asked == [] and info.summary() == {} and info.lines() == []
+        assert asked == [] and info.summary() == {} and info.facts() == {}
         for _ in range(2):
             assert info.is_radar_and_camera and info.is_dense_town and info.may_be_dense_town
             assert not info.is_despeckled_town(True) and not info.are_both_radar
@@ -143,7 +143,7 @@ def test_facts_are_found_when_asked_for_and_never_again(
     assert asked.count("share_of_strong_scatterers") == 1
 
 
-def test_a_summary_is_json_and_lines_are_for_people() -> None:
+def test_a_summary_is_json_and_facts_are_for_people() -> None:
     info = scene(facts(variation2=0.25, strong_share=0.25))
     assert info.is_radar_and_camera
     summary = json.loads(json.dumps(info.summary()))
@@ -153,14 +153,15 @@ def test_a_summary_is_json_and_lines_are_for_people() -> None:
         "strong_share": 0.25,
     }
     assert summary["is_radar_and_camera"] is True
-    (line,) = info.lines()
-    assert line == (
-        "the reference is a radar image beside a camera's; strong scatterers on 25% of it"
-    )
+    assert info.facts() == {
+        "radar image": "reference",
+        "equivalent number of looks": "4.0",
+        "strong scatterers": "25% of the radar image",
+    }
     assert info.radar.looks == pytest.approx(4)
     both = scene(facts(variation2=0.25), facts(variation2=0.2))
     assert both.are_both_radar
-    assert both.lines() == ["both images are a radar's"]
+    assert both.facts() == {"images": "both are a radar's"}
 
 
 def test_the_radar_image_of_every_real_pair_is_found(real_data: Path) -> None:

@@ -136,32 +136,36 @@ def _first_accepted(
 ) -> tuple[Registration, ExitStack]:
     """Return the first registration that is accepted, or the first refusal if none is."""
     tried: list[str] = []
-    refused: Registration | None = None
-    with ExitStack() as kept:
-        opened = kept.enter_context(call.open(COREGISTER, context.part(0.0, 0.02)))
+    with ExitStack() as stack:
+        opened = stack.enter_context(call.open(COREGISTER, context.part(0.0, 0.02)))
         scene = SceneInfo.of(opened.pair)
         is_georeferenced = opened.pair.input.source.grid.is_georeferenced
         ways = plan(scene, is_georeferenced)
+        found = []
         for number, way in enumerate(ways, start=1):
             part = context.part((number - 1) / len(ways), number / len(ways))
             spec = replace(way.spec, max_error_px=max_error_px, tries=number)
-            found = run(call.with_limits(opened, spec, part), spec, part, scene)
-            verdict = found.verdict
-            word = "accepted" if verdict.accepted else f"refused ({verdict.reason})"
-            tried.append(f"{way.name}, as {way.because}: {word}")
-            if verdict.accepted or verdict.rule in _FINAL:
-                refused = found
+            found.append(run(call.with_limits(opened, spec, part), spec, part, scene))
+            tried.append(_line(way.name, way.because, found[-1].verdict))
+            if found[-1].verdict.accepted or found[-1].verdict.rule in _FINAL:
                 break
-            refused = refused or found
-        assert refused is not None
-        if not refused.verdict.accepted and refused.verdict.rule not in _FINAL:
-            pose = None if is_georeferenced else _by_pose(opened, scene, len(ways) + 1, context)
+        last = found[-1].verdict
+        if not is_georeferenced and not last.accepted and last.rule not in _FINAL:
+            pose = _by_pose(opened, scene, len(ways) + 1, context)
             if pose is not None:
-                word = "accepted" if pose.verdict.accepted else f"refused ({pose.verdict.reason})"
-                tried.append(f"estimate_rotation, as the images have no georeferencing: {word}")
-                refused = pose if pose.verdict.accepted else refused
-        parameters = call.parameters or {}
-        return replace(refused, tried=tuple(tried), parameters=parameters), kept.pop_all()
+                found.append(pose)
+                because = "the images have no georeferencing"
+                tried.append(_line("estimate_rotation", because, pose.verdict))
+        chosen = found[-1] if found[-1].verdict.accepted else found[0]
+        if found[-1].verdict.rule in _FINAL:
+            chosen = found[-1]
+        chosen = replace(chosen, tried=tuple(tried), parameters=call.parameters or {})
+        return chosen, stack.pop_all()
+
+
+def _line(name: str, because: str, verdict: Verdict) -> str:
+    word = "accepted" if verdict.accepted else f"refused ({verdict.reason})"
+    return f"{name}, as {because}: {word}"
 
 
 def _by_pose(

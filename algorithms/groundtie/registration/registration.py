@@ -162,6 +162,7 @@ class Registration:
             verdict=self.verdict,
             pair=self.pair,
             mask=self.mask,
+            scene=self.scene.facts(),
             points=self.tie_points,
             transform=self.transform,
             surfaces=self.extreme_surfaces() if with_surfaces else (),

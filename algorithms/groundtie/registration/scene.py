@@ -187,17 +187,20 @@ class SceneInfo:
         known = vars(self)
         return found | {key: known[key] for key in _PAIR_FACTS if key in known}
 
-    def lines(self) -> list[str]:
-        """Return the facts that were found as lines of text."""
+    def facts(self) -> dict[str, str]:
+        """Return the facts that were found, in words for people; nothing is read."""
         known = vars(self)
         if known.get("are_both_radar"):
-            return ["both images are a radar's"]
+            return {"images": "both are a radar's"}
         if not known.get("is_radar_and_camera"):
-            return []
-        kind = "a radar image beside a camera's"
-        share = vars(self.radar).get("strong_share")
-        town = "" if share is None else f"; strong scatterers on {share:.0%} of it"
-        return [f"the {self.radar_name} is {kind}{town}"]
+            return {}
+        facts = {"radar image": self.radar_name}
+        radar = vars(self.radar)
+        if "variation2" in radar:
+            facts["equivalent number of looks"] = f"{self.radar.looks:.1f}"
+        if "strong_share" in radar:
+            facts["strong scatterers"] = f"{self.radar.strong_share:.0%} of the radar image"
+        return facts
 
 
 _FACTS = ("is_known_radar", "variation2", "strong_share")
