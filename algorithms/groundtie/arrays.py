@@ -14,7 +14,7 @@ from rasterio.errors import CRSError
 
 from .errors import GeoreferencingError, ParameterError
 
-# Types that GDAL or OpenCV do not know, and those that hold their values.
+# Types that GDAL or OpenCV do not support, and those that hold their values.
 _HELD_BY = {
     np.dtype(bool): np.dtype(np.uint8),
     np.dtype(np.float16): np.dtype(np.float32),
@@ -188,7 +188,7 @@ def in_memory(value: Any) -> Any:
 
 
 def is_dataset(value: Any) -> bool:
-    """Tell whether rasterio has opened this: a file, a `MemoryFile` or a `WarpedVRT`."""
+    """Return whether rasterio has opened this: a file, a `MemoryFile` or a `WarpedVRT`."""
     return hasattr(value, "read_masks") and hasattr(value, "nodatavals")
 
 

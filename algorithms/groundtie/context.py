@@ -24,7 +24,7 @@ class Context:
     executor
         Any `concurrent.futures.Executor` whose tasks may be closures; by default threads.
     progress
-        Receives the share of the work that is done, and knows whether it was cancelled.
+        Receives the share of the work that is done, and holds whether it was cancelled.
     seed
         Of random samples: the same seed gives the same result.
     workers

@@ -87,7 +87,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Tool:
-    """A tool: everything that the command line, Python and QGIS need to know of it."""
+    """A tool: everything that the command line, Python and QGIS need of it."""
 
     name: str
     title: str

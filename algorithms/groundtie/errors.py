@@ -1,4 +1,4 @@
-"""The errors that users meet; each says what is wrong, with which file, and what to do.
+"""The errors that users meet; each states what is wrong, with which file, and what to do.
 
 Every member also inherits the builtin that a caller would expect, and carries the exit code of
 the command line: 2 for bad input, 3 for a refused registration.
@@ -81,7 +81,7 @@ class CancelledError(GroundTieError, RuntimeError):
 
 
 class NotRegisteredError(GroundTieError, RuntimeError):
-    """The registration was refused; `verdict` tells why."""
+    """The registration was refused; `verdict` gives the reason."""
 
     exit_code = 3
 

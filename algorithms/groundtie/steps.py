@@ -50,7 +50,7 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 
-# Matches are taken to be as exact as this, in pixels, where nobody knows better.
+# Matches are taken to be as exact as this, in pixels, where no better value is given.
 _USUAL_SIGMA_PX = 0.25
 
 

@@ -121,19 +121,19 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
             if isinstance(parameter.kind, (kinds.OutputKind, kinds.FolderOut))
             and values[parameter.name] is not None
         }
-        told = {qgis_name(output.name): output.value(summary) for output in self._tool.outputs}
-        return written | {name: value for name, value in told.items() if value is not None}
+        given = {qgis_name(output.name): output.value(summary) for output in self._tool.outputs}
+        return written | {name: value for name, value in given.items() if value is not None}
 
 
 def _progress(feedback: QgsProcessingFeedback) -> Any:
     """Return the library's progress that reports to QGIS and hears its Cancel."""
-    said = ""
+    last_message = ""
 
     def report(fraction: float, message: str) -> None:
-        nonlocal said
+        nonlocal last_message
         feedback.setProgress(100 * fraction)
-        if message and message != said:
-            said = message
+        if message and message != last_message:
+            last_message = message
             feedback.pushInfo(message)
 
     return progress.Progress(report, feedback.isCanceled)

@@ -48,7 +48,7 @@ def file_filter(suffixes: tuple[str, ...]) -> str:
     return ";;".join(f"{suffix[1:].upper()} files (*{suffix})" for suffix in suffixes)
 
 
-# In Processing, "optional" says that a value may be absent: with a default there always is one.
+# In Processing, "optional" means that a value may be absent: with a default there always is one.
 def _optional(parameter: Any) -> bool:
     return not parameter.required and parameter.default is None
 

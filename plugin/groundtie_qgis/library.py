@@ -42,7 +42,7 @@ def library_module(name: str) -> ModuleType:
 
 def all_tools() -> tuple[Any, ...]:
     """Return the declarations of all tools."""
-    # what dependencies say to the library's developers is nothing for QGIS's log
+    # warnings of dependencies to the library's developers are nothing for QGIS's log
     warnings.filterwarnings("ignore", module=rf"{re.escape(library_name())}\b")
     return tuple(library_module("tools").load_tools())
 

@@ -16,7 +16,7 @@ from .unavailable import UnavailableAlgorithm, unavailable_tools
 
 
 def _tools_or_complaint() -> tuple[tuple[Any, ...], str]:
-    """Return the tools, or none of them and one line that says what to install."""
+    """Return the tools, or none of them and one line that states what to install."""
     if missing := complaint():
         return (), missing
     try:

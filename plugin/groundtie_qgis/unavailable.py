@@ -1,4 +1,4 @@
-"""Stands in for the tools where packages are missing that they need: it says what to install."""
+"""Stands in for the tools where packages are missing that they need: it states what to install."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .styling import ICON
 
 @dataclass(frozen=True)
 class UnavailableTool:
-    """What can be told of a tool without importing it."""
+    """What can be given of a tool without importing it."""
 
     name: str
     title: str
@@ -56,7 +56,7 @@ def _texts(decorator: ast.Call) -> dict[str, str]:
 
 
 class UnavailableAlgorithm(QgsProcessingAlgorithm):
-    """A tool that cannot run, and says why.
+    """A tool that cannot run, and reports why.
 
     Parameters
     ----------

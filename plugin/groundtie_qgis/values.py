@@ -86,7 +86,7 @@ class Reader:
     def _raster(self, kind: Any, name: str, given: Any) -> Any:
         layer = self._algorithm.parameterAsRasterLayer(self._parameters, name, self._context)
         if layer is None:
-            return given  # the library says better than QGIS what is wrong with it
+            return given  # the library reports better than QGIS what is wrong with it
         provider = layer.providerType()
         if provider != "gdal":
             raise errors.ParameterError(

@@ -1,6 +1,6 @@
 """How likely matches that fell anywhere would agree as well as these do (a contrario reasoning).
 
-A match that says nothing falls anywhere in its search window, and within the tolerance of a model
+A match by chance falls anywhere in its search window, and within the tolerance of a model
 with probability p = tolerance area / window area. That at least k of n such matches agree is a
 binomial tail ([Moisan2004]).
 """

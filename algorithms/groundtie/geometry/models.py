@@ -112,7 +112,7 @@ class Model(ABC):
         By Newton's method with a numerical Jacobian.
         """
         target = self.frame.enter(xy)
-        # Start from the frame's origin: inputs without georeferencing claim positions far from it.
+        # Start from the frame's origin: nominal positions without georeferencing are far from it.
         uv = self._newton_step(np.zeros_like(target), target)
         for _ in range(_INVERSE_STEPS):
             miss = target - uv - self.displacement(uv)

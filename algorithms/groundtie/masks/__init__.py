@@ -1,1 +1,1 @@
-"""What takes part: masks that keep what stands up from the ground out of the similarity."""
+"""What takes part: masks that keep elevated objects out of the similarity."""

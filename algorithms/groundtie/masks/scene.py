@@ -106,7 +106,7 @@ def write_mask(
     select
         Returns which pixels of a tile take part.
     progress
-        Is told of every tile.
+        Receives every tile.
 
     Returns
     -------

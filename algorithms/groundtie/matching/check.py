@@ -49,7 +49,7 @@ def check_model(
     layout
         Where they lie, inside the held-out blocks.
     model
-        The model that is judged.
+        The model that is checked.
     context
         Threads and progress.
 

@@ -1,8 +1,8 @@
-"""The hybrid chain's tie points ([Suri2010] 6.9): features near where a rough model puts them.
+"""The hybrid chain's tie points ([Suri2010] 6.9): keypoints near where a coarse model puts them.
 
-Mutual information on reduced images has found the rough model; features are matched without a
-limit on the ratio, but only near their prediction. Most of these matches are wrong, and fall
-anywhere in the gate; a robust fit tells the right ones. Chips around them may refine their places.
+Mutual information on reduced images has found the coarse model; keypoints are matched without a
+limit on the ratio, but only near their prediction. Most of these matches are outliers, which
+fall anywhere in the gate; a robust fit finds the inliers. Chips may refine their places.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ _ROUNDS = 3
 # Of the matches in each of so many cells a side the best is refined.
 _CHIP_CELLS = 14
 
-# Forests and cities have more features than fields, and lean. So that they do not outvote the
-# ground, no cell has more than so many matches.
+# Forests and cities have more keypoints than fields, with relief displacement. So that they do
+# not outvote the ground, no cell has more than so many matches.
 _CELL_PX, _PER_CELL = 64.0, 6
 
 # Right matches lie this near a polynomial where a thin-plate spline is to bend further.

@@ -1,7 +1,7 @@
 """Where chips lie in the matching grid, and which blocks of it are held out for the verdict.
 
 The scene is divided into cells. The middle of each, a block of 60 % of its side, is held out: its
-pixels of the reference take no part in the rough search, the tie points of the fit, the choice of
+pixels of the reference take no part in the coarse search, the tie points of the fit, the choice of
 the model or the removal of outliers. Check chips lie inside the blocks, chips of the fit on the
 lines between them.
 """
@@ -68,10 +68,10 @@ class Axis:
         return _HELD_OUT * self.pitch
 
     def held_out(self, positions: NDArray[np.float64], reach_px: float = 0.0) -> NDArray[np.bool_]:
-        """Tell which pixel positions lie in the held-out part of their cell, or within reach."""
+        """Return which pixel positions lie in the held-out part of their cell, or within reach."""
         phase = ((positions - self.first) / self.pitch) % 1.0
         inside = (positions >= self.first) & (positions <= self.first + self.cells * self.pitch)
-        # A chip of the fit may end exactly at the block, whatever the last digit says.
+        # A chip of the fit may end exactly at the block, whatever the last digit is.
         half = _HELD_OUT / 2 + reach_px / self.pitch - 1e-9
         return np.asarray(inside & (np.abs(phase - 0.5) < half))
 
@@ -151,7 +151,7 @@ class ChipLayout:
         return np.asarray(row * self.columns.cells + col)
 
     def held_out(self, positions_px: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which positions (col, row), shape (n, 2), are held out of the fit."""
+        """Return which positions (col, row), shape (n, 2), are held out of the fit."""
         return self.columns.held_out(positions_px[:, 0]) & self.rows.held_out(positions_px[:, 1])
 
     def held_out_mask(

@@ -32,7 +32,7 @@ _CHIP_RANGE_PX = (48, 80)
 # Side of the chips with a joint histogram in common.
 _POOLED_CHIP_PX = 64
 
-# Simple models are preferred unless the data speak for others: each has its number of
+# Simple models are preferred unless the data favour others: each has its number of
 # hypotheses counted against it.
 _SAMPLE_OF = {"translation": 1, "similarity": 2, "affine": 3}
 

@@ -96,8 +96,8 @@ class ChipSurfaces:
     forward
         Surfaces of reference chips in the input, shape (n, 2 r + 1, 2 r + 1).
     backward
-        Surfaces of input chips in the reference, turned so that they should peak at the same
-        place, same shape.
+        Surfaces of input chips in the reference, rotated by 180° so that they should peak at the
+        same place, same shape.
     weight
         By how much each chip's surface counts in a fit, shape (n,).
     """

@@ -24,12 +24,12 @@ _RIVAL_HEIGHT = 0.8
 _RIVAL_EVIDENCE = 0.5
 _SAME_PLACE_PX = 5.0
 
-# Above so many expected false alarms (log10) nothing was found. Local matches may still tell
-# more than large chips did, and the verdict judges what comes of them.
+# Above so many expected false alarms (log10) nothing was found. Local matches may still
+# succeed where large chips failed, and the verdict checks what comes of them.
 _HOPELESS = 0.0
 
 # How far chips are searched around a candidate, in pixels of the level; around a finer level's
-# model, as far as a level's model may be wrong, and the distortion that it does not know of.
+# model, as far as a level's model may be wrong, and the distortion that it does not model.
 _RADIUS_PX = 12
 _LEVEL_ERROR_PX, _DISTORTION_PX = 2.0, 4
 

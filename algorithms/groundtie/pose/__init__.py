@@ -1,1 +1,1 @@
-"""Rotation, scale and shift between two images that georeferencing does not know."""
+"""Rotation, scale and shift between two images beyond what georeferencing gives."""

@@ -119,7 +119,7 @@ def _final_name(path: str | os.PathLike[str]) -> str:
 def _reason(error: Exception) -> str:
     if isinstance(error, OSError) and error.errno == errno.ENOSPC:
         return "the disk is full"
-    # rasterio points to the exception before: that one says what happened.
+    # rasterio points to the exception before: that one states what happened.
     cause = error.__cause__ or error
     return getattr(cause, "strerror", None) or str(cause) or type(cause).__name__
 

@@ -44,7 +44,7 @@ class BandInfo:
     @property
     def numpy_dtype(self) -> np.dtype[Any]:
         """Type that holds the pixels."""
-        # GDAL knows complex integers; numpy does not.
+        # GDAL has complex integers; numpy has none.
         names = {"complex_int16": "complex64", "complex_int32": "complex128"}
         return np.dtype(names.get(self.dtype, self.dtype))
 
@@ -65,7 +65,7 @@ def working_dtype(dtype: np.dtype[Any]) -> np.dtype[Any]:
 
 
 def fits(value: float, dtype: np.dtype[Any]) -> bool:
-    """Tell whether `dtype` can hold `value`."""
+    """Return whether `dtype` can hold `value`."""
     if dtype.kind in "fc":
         return True
     limits = np.iinfo(dtype)

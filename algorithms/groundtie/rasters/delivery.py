@@ -139,7 +139,7 @@ def warp_raster(
     workers
         Number of threads.
     progress
-        Told of every tile.
+        Receives every tile.
 
     Raises
     ------
@@ -226,7 +226,7 @@ def write_with_geotransform(
     rpc_tags
         RPCs that locate it, as GDAL's metadata domain RPC.
     progress
-        Told of every tile.
+        Receives every tile.
 
     Raises
     ------
@@ -258,7 +258,7 @@ def _choose_nodata(source: RasterSource) -> float | None:
 
 
 def _is_covered(warp: _Warp) -> bool:
-    """Tell whether every pixel of the target is known to lie on the source."""
+    """Return whether every pixel of the target is known to lie on the source."""
     if isinstance(warp.to_input_px, DenseMap):
         return False
     grid = warp.source.grid

@@ -61,7 +61,7 @@ class Grid:
         return apply_affine(~self.centre_transform, xy)
 
     def contains(self, px: ArrayLike) -> NDArray[np.bool_]:
-        """Tell for each pixel position, shape (n, 2), whether it lies on a pixel of this grid."""
+        """Return for each pixel position, shape (n, 2), whether it lies on a pixel of this grid."""
         px = np.asarray(px, float)
         size = np.array([self.width, self.height])
         return np.asarray(np.all((px >= -0.5) & (px <= size - 0.5), axis=-1))
@@ -171,7 +171,7 @@ def reproject(xy: FloatArray, source: CRS | None, target: CRS | None) -> FloatAr
     except Exception as error:
         if not raised_by(error, "rasterio"):
             raise
-        # One position outside fails them all: halves tell which.
+        # One position outside fails them all: halves find which.
         if len(xy) == 1:
             return np.full((1, 2), np.inf)
         half = len(xy) // 2

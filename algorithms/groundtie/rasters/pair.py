@@ -228,7 +228,7 @@ def _empty_areas(values: FloatImage, valid: Mask) -> Mask:
 
     What is invalid is 0, too, so that narrow borders are found, but has no margin of its own.
 
-    Many rasters fill what they do not cover with 0 and do not say so. The borders of such areas
+    Many rasters fill what they do not cover with 0 without declaring it. The borders of such areas
     would be the strongest edges of the image, and the same in images of different places.
     """
     zero = (values == 0).astype(np.uint8)

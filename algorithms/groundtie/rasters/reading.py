@@ -27,7 +27,7 @@ from .windows import Mask, Window, read_window
 # Images without georeferencing are a supported case, see `Grid.is_georeferenced`.
 warnings.filterwarnings("ignore", category=NotGeoreferencedWarning)
 
-# GDAL keeps what it has read up to a twentieth of the machine's memory, unless it is told less.
+# GDAL keeps what it has read up to a twentieth of the machine's memory, unless it is set to less.
 # Chips are read again and again; what is written is not.
 _READING_CACHE_BYTES = 400_000_000
 CACHE_BYTES = 96_000_000
@@ -107,13 +107,13 @@ class RasterSource:
 
     @property
     def alpha_band(self) -> int | None:
-        """Number, from 1, of the band that tells opacity."""
+        """Number, from 1, of the band of opacity."""
         kinds = [band.interpretation for band in self.bands]
         return kinds.index(ColorInterp.alpha) + 1 if ColorInterp.alpha in kinds else None
 
     @property
     def says_what_is_valid(self) -> bool:
-        """Whether nodata values, a mask or an alpha band tell which pixels are valid."""
+        """Whether nodata values, a mask or an alpha band mark which pixels are valid."""
         declared = any(band.nodata is not None for band in self.bands)
         return declared or self.has_mask_band or self.alpha_band is not None
 

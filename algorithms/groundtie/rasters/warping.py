@@ -39,7 +39,7 @@ _NOWHERE = -1e9
 
 @runtime_checkable
 class DenseMap(Protocol):
-    """A map from a grid to input pixels that knows best how to find them for all of its pixels.
+    """A map from a grid to input pixels with a way of its own to find them for all of its pixels.
 
     It need not be smooth: terrain, for one, may have steps anywhere.
     """
@@ -71,7 +71,7 @@ def lattice(grid: Grid, to_input_px: ToInputPx) -> Lattice:
 
 
 def lies_within(nodes: Lattice, width: int, height: int) -> bool:
-    """Tell whether all positions of a lattice lie on pixels of an image of a size."""
+    """Return whether all positions of a lattice lie on pixels of an image of a size."""
     low, high = nodes.bounds()
     return bool(np.all((low > -0.49) & (high < np.array([width, height]) - 0.51)))
 
@@ -127,7 +127,7 @@ def resample(
     """
     px = np.asarray(px)
     dtype = image.dtype if dtype is None else dtype
-    # A few tell mostly, fast, that they do not lie on pixels.
+    # A few suffice mostly to find that they do not lie on pixels.
     if _on_pixels(px[:, ::_SPARSE, ::_SPARSE]) and _on_pixels(px):
         method = "nearest"  # every kernel gives the pixel itself
     if method != "nearest" and valid.all() and _touches_no_border(px, image.shape, method):

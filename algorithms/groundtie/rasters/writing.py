@@ -75,8 +75,8 @@ def create_like(
         require_fit(nodata, source.dtype)
     interleave = interleave or source.interleave or "pixel"
     if interleave.lower() == "band" and not GDALVersion.runtime().at_least("3.8"):
-        # Threads of older GDAL that read such a file report by an ERROR each that they do not know
-        # its bands (OSGeo/gdal issue 7921), past every handler, and are right nonetheless.
+        # Threads of older GDAL that read such a file report by an ERROR each that its bands are
+        # unknown (OSGeo/gdal issue 7921), past every handler, and are right nonetheless.
         workers = 1
     profile = _profile(source, grid, nodata, interleave, workers)
     # A mask inside the file, not beside it.
@@ -137,7 +137,7 @@ def check_complete(path: str | os.PathLike[str]) -> None:
 
 
 def _block_ends(path: str | os.PathLike[str], size: int) -> Iterator[bool]:
-    """Tell of each block, of the image and its overviews, whether it lies within the file."""
+    """Yield for each block, of the image and its overviews, whether it lies within the file."""
     with rasterio.open(path) as dataset:
         bands = dataset.indexes if dataset.interleaving.value == "BAND" else [1]
         factors = [1, *dataset.overviews(1)]

@@ -145,8 +145,8 @@ class SceneInfo:
     def may_be_dense_town(self) -> bool:
         """Whether an image may be a radar's of a dense town.
 
-        Without its speckle a radar image cannot be told from a camera's, and has fewer strong
-        scatterers; both images are looked at then, unless they are declared to be a camera's.
+        Without its speckle a radar image cannot be distinguished from a camera's, with fewer
+        strong scatterers; both images are checked then, unless they are declared to be a camera's.
         """
         if self.are_both_radar:
             return False

@@ -20,7 +20,7 @@ from ..sensor.rpc_files import rpc_of
 
 @dataclass(frozen=True)
 class Ground:
-    """Where heights come from, as a user says it.
+    """Where heights come from, as a user gives it.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Ground:
             raise ParameterError("give either a terrain model (dem) or one height")
         if self.dem is not None and (self.datum is None) == (self.geoid is None):
             raise ParameterError(
-                "say what the heights of the terrain model count from: either dem_datum "
+                "state what the heights of the terrain model count from: either dem_datum "
                 f"({', '.join(DATUMS)}) or a geoid grid"
             )
 
@@ -81,7 +81,7 @@ class Ground:
         declared = None if dem is None else declared_datum(dem)
         if declared is not None and self.datum is not None and declared != self.datum:
             raise ParameterError(
-                f"{self.dem} says that its heights count from {declared}, not {self.datum}"
+                f"{self.dem} states that its heights count from {declared}, not {self.datum}"
             )
         return orient(
             source,
@@ -138,7 +138,7 @@ def open_oriented_image(
 ) -> OrientedImage:
     """Open an image in sensor geometry and locate it on a map; by default on that of its UTM zone.
 
-    `progress` is told which heights are used.
+    `progress` receives which heights are used.
     """
     source, rpc = open_sensor_image(image, rpc_file, stack)
     heights = ground.note(rpc)

@@ -1,4 +1,4 @@
-"""What is wrong with a sensor model: where it claims the image positions of the ground to be."""
+"""The error of a sensor model: from true to nominal image positions of the ground."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class AttitudeOptions:
     drift_px : float
         How much the shift changes from the first line to the last one.
     rotation_deg : float
-        Turn about the centre of the image: an error of yaw.
+        Rotation about the centre of the image: an error of yaw.
     """
 
     shift_m: float = 60.0
@@ -42,12 +42,12 @@ class AttitudeOptions:
 
 @dataclass(frozen=True)
 class AttitudeError:
-    """An affine map from true to claimed image positions (col, row).
+    """An affine map from true to nominal image positions (col, row).
 
     Attributes
     ----------
     matrix : float64 array (2, 3)
-        Claimed position = matrix · (true column, true row, 1).
+        Nominal position = matrix · (true column, true row, 1).
     """
 
     matrix: FloatArray
@@ -68,10 +68,10 @@ class AttitudeError:
         return cls(np.column_stack([linear, moved - linear @ centre]))
 
     def __call__(self, px: FloatArray) -> FloatArray:
-        """Return the claimed positions, shape (n, 2), of true ones."""
+        """Return the nominal positions, shape (n, 2), of true ones."""
         return np.asarray(px @ self.matrix[:, :2].T + self.matrix[:, 2])
 
     def inverse(self) -> AttitudeError:
-        """Return the map from claimed to true positions."""
+        """Return the map from nominal to true positions."""
         linear = np.linalg.inv(self.matrix[:, :2])
         return AttitudeError(np.column_stack([linear, -linear @ self.matrix[:, 2]]))

@@ -49,8 +49,8 @@ class RoofPoints:
         Where the radar image shows them: nearer to the radar by height / tan(incidence) on level
         ground.
     input_px : float64 array (n, 2)
-        Where the optical image shows them: leaning away from the camera by
-        height · tan(off-nadir angle), and displaced as the ground there is.
+        Where the optical image shows them: displaced away from the camera by
+        height · tan(off-nadir angle), and moved as the ground there is.
     """
 
     px: FloatArray
@@ -117,7 +117,7 @@ def radar_position(
 ) -> FloatArray:
     """Return where the geocoded radar image shows points above the ground.
 
-    The radar knows the slant range alone, and the bare terrain says which ground has that range.
+    The radar measures the slant range alone; the bare terrain gives the ground at that range.
 
     Parameters
     ----------

@@ -93,7 +93,7 @@ class Layout(Canvas):
         """Draw the whole scene; see `Canvas.images`."""
         self.labels[:] = self._add(Cover.GRASS)
         height, width = self.labels.shape
-        # Streets follow the turned outline, which reaches beyond the scene on all sides.
+        # Streets follow the rotated outline, which reaches beyond the scene on all sides.
         half = math.hypot(height, width) / 2
         outline = rectangle((width / 2, height / 2), (half, half), self._uniform(0, math.pi / 2))
         arterial = _ARTERIAL_M[self._density] * self._scale

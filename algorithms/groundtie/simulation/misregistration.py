@@ -45,7 +45,7 @@ class DistortionOptions:
     shift_px : float
         Length of the shift in input pixels; its direction is drawn.
     rotation_deg : float
-        Turn of the content, counter-clockwise on the map ("rotation" and "similarity").
+        Rotation of the content, counter-clockwise on the map ("rotation" and "similarity").
     scale : float
         Enlargement of the content ("scale" and "similarity").
     warp_px : float
@@ -68,21 +68,21 @@ class DistortionOptions:
 
 
 def draw_misregistration(options: DistortionOptions, grid: Grid, seed: int) -> PolynomialModel:
-    """Draw where the input claims the ground to be.
+    """Draw the nominal positions of the ground in the input.
 
     Parameters
     ----------
     options : DistortionOptions
         Kind and size.
     grid : Grid
-        Georeferencing that the input claims.
+        Nominal georeferencing of the input.
     seed : int
         Seed of the direction of the shift and of the warp.
 
     Returns
     -------
     PolynomialModel
-        Reference map position -> claimed map position; turns and scales are about the centre.
+        Reference map position -> nominal map position; rotations and scales are about the centre.
     """
     generator = random_stream(seed, Stream.DISTORTION)
     frame = Frame.around(grid.pixel_to_map(grid.outline(1)))
@@ -117,9 +117,9 @@ def _drawn_warp(
     return drawn * (largest / np.hypot(*displacement.T).max())
 
 
-def needed_margin(model: Model, reference: Grid, claimed: Grid) -> int:
+def needed_margin(model: Model, reference: Grid, nominal: Grid) -> int:
     """Return how many pixels the input's ground reaches beyond the reference image."""
-    outline = Transform(model, reference.crs, claimed).inverse(claimed.outline())
+    outline = Transform(model, reference.crs, nominal).inverse(nominal.outline())
     px = reference.map_to_pixel(outline)
     beyond = np.maximum(-px, px - [reference.width - 1, reference.height - 1])
     return max(math.ceil(float(beyond.max())), 0) + _SPLINE_REACH_PX

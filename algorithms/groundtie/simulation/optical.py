@@ -1,7 +1,7 @@
 """The radiance that a camera sees from off nadir, on the pixels of the scene.
 
-Terrain is orthorectified; buildings and trees are not, so that they lean away from the camera by
-height · tan(off-nadir angle) and hide what is behind them. They cast shadows of the length
+Terrain is orthorectified; buildings and trees are not: relief displacement moves them away from the
+camera by height · tan(off-nadir angle), over what is behind them. They cast shadows of the length
 height / tan(sun elevation).
 """
 
@@ -163,9 +163,9 @@ def _illumination(scene: Scene, rows: slice, options: OpticalOptions) -> FloatIm
 
 
 def _in_shadow(objects: FloatImage, options: OpticalOptions) -> npt.NDArray[np.bool_]:
-    """Tell which surfaces have something between themselves and the sun.
+    """Return which surfaces have something between themselves and the sun.
 
-    `shaded` is the height below which a point is in shadow of what stands within some distance
+    `shaded` is the height below which a point is in cast shadow of objects within some distance
     towards the sun; each round doubles that distance. `ceiling` counts the point itself too.
     """
     longest = float(objects.max()) * options.shadow

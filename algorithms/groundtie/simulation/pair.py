@@ -73,7 +73,7 @@ class SimulatedPair:
         Optical image, 11 bit.
     truth : Transform
         Reference map position -> input pixel (col, row), exact for points on the ground;
-        `truth.input_grid` is the georeferencing that the input claims.
+        `truth.input_grid` is the nominal georeferencing of the input.
     check_points_px : float64 array (n, 2)
         Reference pixels (col, row) on open ground that the input shows.
     roof_points : RoofPoints
@@ -106,27 +106,27 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
         raise ParameterError("input_pixel_size_m must be 0.25 to 16 times the scene's pixel size")
     scene_options = options.scene
     reference_grid = map_grid(scene_options)
-    claimed = reference_grid.scaled(options.pixel_ratio)
-    model = draw_misregistration(options.distortion, claimed, scene_options.seed)
-    truth = Transform(model, reference_grid.crs, claimed)
+    nominal = reference_grid.scaled(options.pixel_ratio)
+    model = draw_misregistration(options.distortion, nominal, scene_options.seed)
+    truth = Transform(model, reference_grid.crs, nominal)
     progress.update(0.0, "laying out the scene")
     reach = object_reach_px(scene_options, options.sar, options.optical)
-    margin = in_steps(needed_margin(model, reference_grid, claimed) + reach)
+    margin = in_steps(needed_margin(model, reference_grid, nominal) + reach)
     scenes = Scenes(*generate_scenes(scene_options, margin))
     progress.update(0.25, "looking with the radar")
     reference = render_sar(scenes.radar, options.sar)
     progress.update(0.4, "looking with the camera")
     radiance = render_radiance(scenes.camera, options.optical)
     positions = SourcePositions.of(truth, scene_grid(reference_grid, margin))
-    image = np.empty((len(radiance), claimed.height, claimed.width), np.uint16)
+    image = np.empty((len(radiance), nominal.height, nominal.width), np.uint16)
     for band, light in enumerate(radiance):
         progress.update(0.5 + 0.5 * band / len(radiance), "resampling the optical image")
         # Below 0.6 px the cubic kernel could not follow the scene any more.
         blur(light, max(options.optical.psf_sigma_px * options.pixel_ratio, 0.6))
-        seen = resample(light, positions, claimed.height)
+        seen = resample(light, positions, nominal.height)
         noise = random_stream(scene_options.seed, Stream.OPTICAL_NOISE, band)
         image[band] = quantise(seen, options.optical, noise)
-    optical = OpticalImage(lambda px: truth(reference_grid.pixel_to_map(px)), claimed)
+    optical = OpticalImage(lambda px: truth(reference_grid.pixel_to_map(px)), nominal)
     return SimulatedPair(
         options=options,
         reference=reference,

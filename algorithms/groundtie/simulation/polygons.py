@@ -42,7 +42,7 @@ def clip(polygon: Polygon, point: Point, normal: Point) -> Polygon:
 
 
 def contains(polygon: Polygon, point: Point) -> bool:
-    """Tell whether a point lies inside a convex polygon."""
+    """Return whether a point lies inside a convex polygon."""
     signs = [
         (b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0]) >= 0
         for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True)
@@ -60,7 +60,7 @@ def points_along(polygon: Polygon, per_side: int) -> list[Point]:
 
 
 def rectangle(centre: Point, half: Point, angle_rad: float) -> Polygon:
-    """Return the rectangle of half side lengths `half`, turned by an angle."""
+    """Return the rectangle of half side lengths `half`, rotated by an angle."""
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
     return [

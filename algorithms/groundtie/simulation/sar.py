@@ -3,7 +3,7 @@
 The radar is far away (parallel rays), flies along the columns and looks along the rows. Power is
 accumulated over slant range, which brings foreshortening, layover, double bounce and shadow by
 itself. The image is then geocoded with the bare terrain, as products are that were corrected with
-a terrain model: ground stands at its place on the map, while roofs lean towards the sensor by
+a terrain model: ground lies at its place on the map, roofs are displaced towards the sensor by
 height / tan(incidence).
 """
 

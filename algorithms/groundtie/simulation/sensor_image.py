@@ -45,7 +45,7 @@ class SensorOptions:
     Attributes
     ----------
     scene, sar, optical, attitude
-        Options of the parts; the camera stands where `optical` says.
+        Options of the parts; the camera stands where `optical` places it.
     heading_deg : float
         Where the satellite flies to, clockwise from north.
     altitude_m : float
@@ -86,8 +86,8 @@ class SensorImage:
     exact, delivered : RPCFit
         RPCs of the camera, and those with the error.
     terrain_m : float32 array (rows, columns)
-        Height of the bare ground above the ellipsoid, beyond all that the image shows or claims
-        to show.
+        Height of the bare ground above the ellipsoid, beyond all that the image shows, in
+        truth or nominally.
     terrain_grid : Grid
         Where it lies.
     check_points_px : float64 array (n, 2)
@@ -227,7 +227,7 @@ def _camera(options: SensorOptions, grid: Grid) -> PushBroom:
 def _margin_px(options: SensorOptions, grid: Grid, camera: PushBroom, error: AttitudeError) -> int:
     """Return how far the scene goes on beyond the SAR image.
 
-    All that the image shows, and that its RPCs claim it to show, has heights and objects.
+    All that the image shows, in truth and by its RPCs, has heights and objects.
     """
     outline = Grid(PIXEL_COORDINATES, None, *options.scene.size_px).outline()
     # Hills rise up to a half above and below the range that they have over most of the scene.
@@ -266,11 +266,11 @@ def _rpcs(
         np.linspace(GROUND_M - reach_m, GROUND_M + reach_m, _RPC_HEIGHTS),
     )
     columns, rows, heights = (part.ravel() for part in np.meshgrid(*axes))
-    claimed = np.column_stack([columns, rows])
+    nominal = np.column_stack([columns, rows])
 
     def fitted(px: FloatArray) -> RPCFit:
         lon_lat = reproject(camera.localise(px, heights), grid.crs, LON_LAT)
-        return fit_rpc(lon_lat, heights, claimed)
+        return fit_rpc(lon_lat, heights, nominal)
 
     # The error moves what is seen: RPCs with it see their image's pixels elsewhere.
-    return fitted(claimed), fitted(error.inverse()(claimed))
+    return fitted(nominal), fitted(error.inverse()(nominal))

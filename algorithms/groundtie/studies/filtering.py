@@ -19,7 +19,7 @@ _ROUNDING_PX = 1e-6
 def filter_matches(
     px: FloatArray, partner_px: FloatArray, kind: str = "affine", sigmas: float = _SIGMAS
 ) -> NDArray[np.bool_]:
-    """Tell which matches remain when the worst is dropped until none is far off.
+    """Return which matches remain when the worst is dropped until none is far off.
 
     A model is fitted to all, the match with the largest residual is dropped, the model is fitted
     again, until all residuals are below so many of their standard deviations. It needs more right

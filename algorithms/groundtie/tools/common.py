@@ -129,7 +129,7 @@ HighPercent = Annotated[
     float | None,
     Number(
         label="Brightest part masked",
-        help="Share that takes no part because it shines, as walls and corners do; by default "
+        help="Share that takes no part: strong scatterers as walls and corners; by default "
         "20 % of the radar image with threshold, 10 % of what regions leave. Means over "
         "4 × 4 pixels are compared.",
         unit="%",

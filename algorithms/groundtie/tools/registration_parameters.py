@@ -112,7 +112,7 @@ OutputGrid = Annotated[
     ),
 ]
 
-# What a registration tells QGIS models.
+# What a registration returns to QGIS models.
 OUTPUTS = (
     Output("CHECK_RMSE_PX", "Error at check points (px)", "verdict.check_rmse_px"),
     Output("CHECK_CE90_M", "CE90 at check points (m)", "verdict.check_ce90_m"),

@@ -117,7 +117,7 @@ def simulate(
     """Simulate a SAR–optical pair whose misregistration is known exactly.
 
     The scene has terrain, fields, roads, water and buildings. The SAR image has layover, shadow,
-    double bounce and speckle; the optical one leaning buildings, their shadows and noise. The
+    double bounce and speckle; the optical one relief displacement, cast shadows and noise. The
     same seed gives the same pair. The file truth.json is a transform like those of coregister.
     """
     options = PairOptions(

@@ -66,7 +66,7 @@ def simulate_sensor(
         float,
         Number(
             label="Rotation",
-            help="How far they are turned about the centre of the image.",
+            help="How far they are rotated about the centre of the image.",
             unit="°",
             minimum=-1,
             maximum=1,

@@ -78,7 +78,7 @@ OffNadir = Annotated[
     float,
     Number(
         label="Off-nadir angle",
-        help="Angle between the camera's line of sight and the vertical: buildings lean by it.",
+        help="Camera's line of sight from the vertical; relief displacement grows with it.",
         unit="°",
         minimum=0,
         maximum=45,

@@ -30,10 +30,10 @@ _CONTRAST = 0.02
 
 @dataclass(frozen=True)
 class TrainingResult:
-    """The classifier, from how many points, and how well it tells points that it has not seen.
+    """The classifier, from how many points, and its accuracy at points not trained with.
 
-    The accuracy is the mean of both classes' shares that are told rightly, by classifiers without
-    the blocks in which the points lie; None if the points lie too near each other to tell.
+    The accuracy is the mean of both classes' shares classified correctly, by classifiers without
+    the blocks in which the points lie; None if the points lie too near each other.
     """
 
     output: Path
@@ -81,18 +81,18 @@ def train_feature_classifier(
         Path | None,
         VectorIn(
             label="Labelled layer",
-            help="Points, or polygons around features, with an attribute that tells their class.",
+            help="Points, or polygons around features, with an attribute that gives their class.",
         ),
     ] = None,
     label_raster: Annotated[
         Path | None,
         RasterIn(
             label="Labelled raster",
-            help="A raster whose values tell the class of features: a cloud mask.",
+            help="A raster whose values give the class of features: a cloud mask.",
         ),
     ] = None,
     field: Annotated[
-        str, Text(label="Attribute", help="The layer's attribute that tells the class.")
+        str, Text(label="Attribute", help="The layer's attribute that gives the class.")
     ] = "class",
     left_out: Annotated[
         str,
@@ -135,9 +135,9 @@ def train_feature_classifier(
 ) -> TrainingResult:
     """Train a classifier that keeps features on clouds, shadows or changes out of the matching.
 
-    A support vector machine learns to tell features that are to be kept from others by what the
-    image looks like around them. Features are found in the image and labelled by what a raster or
-    polygons say of the patch around them: a quarter of it is enough to be left out. A layer's
+    A support vector machine learns to separate features that are to be kept from others, by
+    the image around them. Features are found in the image and labelled by what a raster or
+    polygons give for the patch around them: a quarter of it is enough to be left out. A layer's
     points are taken as they are, and both their classes count alike. The classifier is for images
     of the same kind: the same bands, units and about the same pixel size.
     """
