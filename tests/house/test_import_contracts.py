@@ -15,7 +15,8 @@ pytest.importorskip("importlinter", reason="import-linter is not packaged by Deb
 ROOT = Path(__file__).resolve().parents[2]
 LINT = "from importlinter.cli import lint_imports_command; lint_imports_command()"
 PACKAGES = (
-    *("tools", "simulation", "registration", "sensor", "features", "matching"),
+    *("tools", "simulation", "registration", "report", "assessment", "studies"),
+    *("sensor", "features", "matching"),
     *("similarity", "masks", "geometry", "rasters", "speckle"),
 )
 
@@ -27,7 +28,11 @@ def package(tmp_path: Path) -> Path:
     for name in PACKAGES:
         (package / name).mkdir(parents=True)
         (package / name / "__init__.py").touch()
-    for name in ("__init__", "cli", "errors", "progress", "version"):
+    for name in ("register", "coregister", "match_sar_sar", "match_optical"):
+        (package / "tools" / f"{name}.py").touch()
+    for name in ("extract_gcps", "refine_rpc"):
+        (package / "tools" / f"{name}.py").touch()
+    for name in ("__init__", "cli", "steps", "errors", "progress", "version"):
         (package / f"{name}.py").touch()
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
     return package

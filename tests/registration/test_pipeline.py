@@ -132,7 +132,7 @@ def test_each_fact_about_an_image_is_found_once(
         before = found.copy()
         # Reports and summaries read nothing again.
         result.summary()
-        result.scene.lines()
+        result.scene.facts()
         assert found == before
 
 

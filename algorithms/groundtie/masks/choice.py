@@ -109,12 +109,12 @@ def is_perhaps_dense(strong_share: float) -> bool:
 def share_of_strong_scatterers(scene: Scene, progress: Progress = SILENT) -> float:
     """Return the share of an image, 0 to 1, that is brighter than usual by 6 dB or more.
 
-    Grey values are amplitudes; means over 4 × 4 pixels are compared with their median.
+    Grey values are amplitudes; means over 4 × 4 pixels are compared with their median. Negative
+    ones, as decibels have, are none: such an image has no share.
     """
-    parts = [
-        part.values[part.valid] ** 2 for part in scene.reduced_strips(threshold.BLOCK_PX, progress)
-    ]
-    power = np.concatenate(parts)
-    if power.size == 0:
+    parts = [part.values[part.valid] for part in scene.reduced_strips(threshold.BLOCK_PX, progress)]
+    amplitude = np.concatenate(parts)
+    if amplitude.size == 0 or amplitude.min() < 0:
         return 0.0
+    power = amplitude**2
     return float(np.mean(power > _STRONG * np.median(power)))

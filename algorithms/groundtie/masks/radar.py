@@ -21,15 +21,12 @@ LEAST_VARIATION2, LEAST_VARIATION2_RATIO = 0.05, 9.0
 def variation2_of(image: Image) -> float:
     """Return the squared coefficient of variation in an image's most homogeneous windows.
 
-    Grey values are taken for amplitudes; those of an image with negative ones are none, and its
-    variation counts as 0.
+    Grey values are taken for amplitudes.
     """
     grid = image.source.grid
     width, height = min(grid.width, _SAMPLE_PX), min(grid.height, _SAMPLE_PX)
     middle = Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
     patch = Patch(*image.source.read(middle, image.band))
-    if (patch.values[patch.valid] < 0).any():
-        return 0.0
     return homogeneous_variation2(power(patch), patch.valid)
 
 
