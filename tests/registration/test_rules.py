@@ -22,6 +22,8 @@ from evidences import (
     scene,
 )
 
+from groundtie.assessment.accuracy import AssessmentEvidence
+from groundtie.assessment.point_errors import PointErrors
 from groundtie.errors import (
     AmbiguousPlaceError,
     BandError,
@@ -45,6 +47,7 @@ from groundtie.registration.verdict import Evidence, first_refusal
 GOOD = scatter(36, 0.4)
 RANK = (
     stages.SEARCH,
+    stages.ASSESSMENT,
     stages.AGREEMENT,
     stages.ERROR,
     stages.SCENE,
@@ -92,6 +95,20 @@ def pose(height: float = 9.0, rival: float = 3.0, found: Pose = BEST) -> PoseEvi
     return PoseEvidence([PoseFound(found, height)], best, (200, 100))
 
 
+def assessed(
+    errors: np.ndarray, counted: int | None = None, **misses_px: float
+) -> AssessmentEvidence:
+    """Return the evidence of points of which so many are inliers, and of ways back."""
+    count = len(errors)
+    inliers = np.arange(count) < (count if counted is None else counted)
+    points = PointErrors(np.zeros((count, 2)), errors, np.ones(count, bool), inliers)
+    return AssessmentEvidence("check points", points, 3.0, misses_px)
+
+
+NOWHERE = np.array([[np.nan, 0.0]])
+FEW = np.zeros((3, 2))
+
+
 # Of each rule: evidence that it refuses, and evidence that it does not.
 EVIDENCE: dict[str, tuple[Any, Any]] = {
     "second place": (
@@ -106,6 +123,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         SearchEvidence(TooFewPointsError("only 3 chips could be matched")),
         SearchEvidence(BandError("there is no band 7")),
     ),
+    "points not placed": (assessed(np.concatenate([GOOD, NOWHERE])), assessed(GOOD)),
+    "few held-out points": (assessed(FEW[:2]), assessed(FEW)),
+    "few held-out inliers": (assessed(GOOD, 8), assessed(GOOD, 30)),
+    "inconsistent ways": (assessed(GOOD, way=3.1), assessed(GOOD, way=2.9)),
     "chance agreement": (evidence(np.zeros((2, 2))), evidence(np.zeros((3, 2)))),
     "small share of check points": (
         evidence(np.concatenate([scatter(14, 0.3), fallen(58)])),

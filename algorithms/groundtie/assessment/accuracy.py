@@ -8,12 +8,13 @@ section 2.5.3.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from ..errors import TooFewPointsError
-from ..geometry.judging import FEWEST_CHECK_POINTS, SMALLEST_INLIER_SHARE
-from ..registration.verdict import Verdict
+from ..registration.evidence import ASSESSMENT, ERROR, HeldOut
+from ..registration.verdict import Verdict, first_refusal
 from .point_errors import PointErrors
 
 
@@ -73,13 +74,16 @@ class Assessment:
                 "no points took no part in the fit: give check points, or tie points with the "
                 "role check"
             )
-        name = "check" if len(self.check_points) else "test"
+        name = "check points" if len(self.check_points) else "test points"
         judged = self.check_points if len(self.check_points) else self.test_points
         px, metres = judged.in_pixels, judged.in_metres
-        rule, against = self._deciding_rule(judged, f"{name} points", max_error_px)
+        ways = {"two-way": self.two_way, "three-way": self.three_way}
+        misses = {name: errors.in_pixels.rmse for name, errors in ways.items()}
+        refusal = first_refusal(AssessmentEvidence(name, judged, max_error_px, misses))
+        rule, reason = (None, f"{name} confirm the registration") if refusal is None else refusal
         return Verdict(
-            accepted=not against,
-            reason=against or f"{name} points confirm the registration",
+            accepted=rule is None,
+            reason=reason,
             fit_points=len(self.control_points),
             fit_points_used=int(self.control_points.used.sum()),
             check_points=len(judged),
@@ -89,26 +93,37 @@ class Assessment:
             check_ce90_px=px.ce90,
             check_ce90_m=metres.ce90,
             log10_chance=math.nan,
-            rule=rule,
+            rule="" if rule is None else rule.name,
+            advice="" if rule is None else rule.advice,
         )
 
-    def _deciding_rule(
-        self, judged: PointErrors, name: str, max_error_px: float
-    ) -> tuple[str, str]:
-        """Return the name of the gravest rule that refuses, and its reason; empty if none does."""
-        count, used, lost = len(judged), int(judged.used.sum()), int((~judged.placed).sum())
-        fewest = max(FEWEST_CHECK_POINTS, SMALLEST_INLIER_SHARE * count)
-        rmse = judged.in_pixels.rmse
-        above = f"px, above {max_error_px:g} px"
-        rules = [
-            ("placement", lost > 0, f"the transform cannot place {lost} of {count} {name}"),
-            ("few points", count < FEWEST_CHECK_POINTS,
-             f"{count} {name} are too few to measure anything"),
-            ("agreement", used < fewest, f"only {used} of {count} {name} agree"),
-            ("error", rmse > max_error_px, f"error at {name} is {rmse:.2f} {above}"),
-        ]  # fmt: skip
-        for label, errors in (("two-way", self.two_way), ("three-way", self.three_way)):
-            miss = errors.in_pixels.rmse
-            reason = f"{label} inconsistency is {miss:.2f} {above}"
-            rules.append((f"{label} consistency", miss > max_error_px, reason))
-        return next(((rule, reason) for rule, refuses, reason in rules if refuses), ("", ""))
+
+@dataclass(frozen=True)
+class AssessmentEvidence:
+    """What the rules read of a registration that was made before.
+
+    Parameters
+    ----------
+    name
+        What the points are called.
+    points
+        Errors at points that took no part in the fit.
+    max_error_px
+        Largest root mean square error, in input pixels.
+    misses_px
+        Root mean square inconsistency of the ways back, by name; NaN: not measured.
+    """
+
+    name: str
+    points: PointErrors
+    max_error_px: float
+    misses_px: Mapping[str, float]
+
+    stages: ClassVar = (ASSESSMENT, ERROR)
+
+    @property
+    def held_out(self) -> HeldOut:
+        """How the points agree; nothing is known of chance and of the model's spread."""
+        used, count = int(self.points.used.sum()), len(self.points)
+        rmse = self.points.in_pixels.rmse
+        return HeldOut(self.name, used, count, math.nan, math.nan, rmse, self.max_error_px, 0.0, "")

@@ -26,6 +26,7 @@ from ..geometry.model_choice import (
     left_out_scores,
 )
 from ..geometry.models import DEGREE, PARAMETERS, Frame, Model, PolynomialModel, monomials
+from ..rasters.kernels import bspline_slopes, bspline_weights
 from .belief_propagation import Surfaces
 
 FloatArray = NDArray[np.float64]
@@ -88,7 +89,7 @@ class _Field:
         place = np.clip(shift + radius, 1.0, 2 * radius - 1.001)
         inside = np.all(place == shift + radius, axis=1)
         whole = np.floor(place).astype(int)
-        (wx, dx), (wy, dy) = (_cubic_weights(place[:, k] - whole[:, k]) for k in (0, 1))
+        (wx, dx), (wy, dy) = (_cubic(place[:, k] - whole[:, k]) for k in (0, 1))
         taps = np.arange(-1, 3)
         rows, cols = whole[:, 1, None] + taps, whole[:, 0, None] + taps
         patch = self.coefficients[
@@ -179,11 +180,9 @@ def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Affine) -> list[_Fi
     return fields
 
 
-def _cubic_weights(t: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _cubic(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the cubic B-spline's four weights and their derivatives at offsets `t`, (n, 4)."""
-    weights = [(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3]
-    slopes = [-3 * (1 - t) ** 2, 9 * t**2 - 12 * t, -9 * t**2 + 6 * t + 3, 3 * t**2]
-    return np.column_stack(weights) / 6, np.column_stack(slopes) / 6
+    return bspline_weights(4, t).T, bspline_slopes(4, t).T
 
 
 def _maximise(kind: str, frame: Frame, field: _Field, start: FloatArray) -> FloatArray:

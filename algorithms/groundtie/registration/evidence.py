@@ -26,8 +26,9 @@ from ..rasters.grid import FloatArray, Grid
 from .scene import SceneInfo
 
 # Stages of a registration, in the order in which their rules are asked.
-SEARCH, AGREEMENT, ERROR, SCENE, REFINEMENT, POSE = (
+SEARCH, ASSESSMENT, AGREEMENT, ERROR, SCENE, REFINEMENT, POSE = (
     "search",
+    "assessment",
     "agreement",
     "error",
     "scene",

@@ -28,6 +28,7 @@ from ..geometry.robust import distances, find_consensus
 from ..masks.choice import LAYER, REGIONS
 from .evidence import (
     AGREEMENT,
+    ASSESSMENT,
     ERROR,
     POSE,
     REFINEMENT,
@@ -40,6 +41,7 @@ from .layover import count_on_line, scatter_along_line_px
 from .refinement_evidence import RefinementEvidence
 
 if TYPE_CHECKING:
+    from ..assessment.accuracy import AssessmentEvidence
     from .pose_verdict import PoseEvidence
 
 # Check points that agree on another transform within this distance make it a rival, if they are
@@ -128,6 +130,36 @@ def _too_few_points(evidence: SearchEvidence) -> str | None:
     return str(failure) if isinstance(failure, TooFewPointsError) else None
 
 
+def _not_placed(evidence: AssessmentEvidence) -> str | None:
+    lost = int((~evidence.points.placed).sum())
+    if lost == 0:
+        return None
+    return f"the transform cannot place {lost} of {len(evidence.points)} {evidence.name}"
+
+
+def _few_held_out(evidence: AssessmentEvidence) -> str | None:
+    count = len(evidence.points)
+    if count >= FEWEST_CHECK_POINTS:
+        return None
+    return f"{count} {evidence.name} are too few to measure anything"
+
+
+def _few_inliers(evidence: AssessmentEvidence) -> str | None:
+    points = evidence.held_out
+    fewest = max(FEWEST_CHECK_POINTS, SMALLEST_INLIER_SHARE * points.total)
+    # Too few points are another rule's.
+    if points.total < FEWEST_CHECK_POINTS or points.agreeing >= fewest:
+        return None
+    return f"only {points.agreeing} of {points.total} {points.name} agree"
+
+
+def _inconsistent(evidence: AssessmentEvidence) -> str | None:
+    for name, miss in evidence.misses_px.items():
+        if miss > evidence.max_error_px:
+            return f"{name} inconsistency is {miss:.2f} px, above {evidence.max_error_px:g} px"
+    return None
+
+
 def _by_chance(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
     points = evidence.held_out
     is_chance = points.log10_chance > points.largest_log10_chance
@@ -160,7 +192,7 @@ def _another_transform(evidence: RegistrationEvidence | RefinementEvidence) -> s
 
 def _large_error(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
     points = evidence.held_out
-    if points.rmse_px <= points.max_error_px:
+    if not points.rmse_px > points.max_error_px:
         return None
     return f"error at {points.name} is {points.rmse_px:.2f} px, above {points.max_error_px:g} px"
 
@@ -319,6 +351,39 @@ RULES: tuple[Rule, ...] = (
         "number of parameters of the model",
         "give a larger part of the scene, or a simpler model",
         _too_few_points,
+    ),
+    Rule(
+        "points not placed",
+        ASSESSMENT,
+        "the transform cannot place a held-out point",
+        "definition of a transform of the scene",
+        "give the transform of this image, and points inside its area",
+        _not_placed,
+    ),
+    Rule(
+        "few held-out points",
+        ASSESSMENT,
+        f"there are fewer than {FEWEST_CHECK_POINTS} held-out points",
+        "three points always agree on an affine model",
+        "give more points that took no part in the fit",
+        _few_held_out,
+    ),
+    Rule(
+        "few held-out inliers",
+        ASSESSMENT,
+        f"fewer than {FEWEST_CHECK_POINTS} held-out points, or less than "
+        f"{SMALLEST_INLIER_SHARE:.0%} of them, are inliers",
+        "suites simulated and real",
+        "give points that are measured in both images",
+        _few_inliers,
+    ),
+    Rule(
+        "inconsistent ways",
+        ASSESSMENT,
+        "a way there and back by other transforms misses its start by more than the largest error",
+        "the user's largest error; [Suri2010] 2.5.3",
+        "find out which of the transforms is wrong by points",
+        _inconsistent,
     ),
     Rule(
         "chance agreement",
