@@ -11,7 +11,7 @@ from groundtie.geometry.models import DEGREE, Frame, Model
 from groundtie.matching.alignment import (
     CANDIDATES,
     LINEAR_CANDIDATES,
-    _cubic_weights,
+    _cubic,
     _fields,
     _model,
     _starting,
@@ -187,9 +187,9 @@ def test_the_spline_looks_up_the_surface_itself() -> None:
     assert not slopes.any()
 
 
-def test_cubic_weights_sum_to_one_and_their_slopes_to_nothing() -> None:
+def test_cubic_sum_to_one_and_their_slopes_to_nothing() -> None:
     t = np.linspace(0, 0.999, 50)
-    weights, slopes = _cubic_weights(t)
+    weights, slopes = _cubic(t)
     np.testing.assert_allclose(weights.sum(axis=1), 1)
     np.testing.assert_allclose(slopes.sum(axis=1), 0, atol=1e-12)
     np.testing.assert_allclose(weights @ [-1, 0, 1, 2], t, atol=1e-12)
