@@ -156,8 +156,10 @@ def check_package(tree: Path) -> None:
         env=environment(tree),
         capture_output=True,
         text=True,
-        check=True,
+        check=False,
     )
+    if done.returncode:
+        raise SystemExit(f"Python finds no package in {tree}: {done.stderr.strip()[-200:]}")
     if not Path(done.stdout.strip()).is_relative_to(tree):
         raise SystemExit(f"Python takes the package in {done.stdout.strip()}, not that in {tree}")
 

@@ -101,12 +101,18 @@ def evidence(
 
 
 def facts(
-    variation2: float = 0.001, strong_share: float = 0.02, is_known_radar: bool = False
+    variation2: float = 0.001,
+    strong_share: float = 0.02,
+    is_known_radar: bool = False,
+    is_in_sensor_geometry: bool = False,
 ) -> ImageFacts:
     """Return facts about an image that need no image: by default a camera's, of fields."""
     found = ImageFacts(None, None)  # type: ignore[arg-type]
     vars(found).update(
-        variation2=variation2, strong_share=strong_share, is_known_radar=is_known_radar
+        variation2=variation2,
+        strong_share=strong_share,
+        is_known_radar=is_known_radar,
+        is_in_sensor_geometry=is_in_sensor_geometry,
     )
     return found
 

@@ -244,6 +244,17 @@ def test_ground_must_be_reliable_and_span_the_overlap() -> None:
     assert refusing(evidence(GOOD, narrow)) == []
 
 
+@pytest.mark.parametrize(("agreeing", "expected"), [(4, ["too little ground"]), (5, [])])
+def test_an_oblique_view_needs_more_check_points_on_the_ground(
+    agreeing: int, expected: list[str]
+) -> None:
+    regions = MaskUsed(REGIONS, "reference", 0.3, "as in a dense town")
+    oblique = scene(facts(variation2=0.25, strong_share=0.2), facts(is_in_sensor_geometry=True))
+    errors = scatter(agreeing, 0.3)
+    assert refusing(evidence(errors, mask=regions, scene=oblique)) == expected
+    assert refusing(evidence(errors, mask=regions)) == []
+
+
 @pytest.mark.parametrize(
     ("kind", "expected"), [(LAYER, []), (REGIONS, ["despeckled town"]), (THRESHOLD, [])]
 )

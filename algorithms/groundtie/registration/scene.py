@@ -19,6 +19,7 @@ from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import Window
+from ..sensor.orientation import SensorGrid
 from .specification import AUTO, NEITHER
 
 
@@ -51,6 +52,11 @@ class ImageFacts:
     def strong_share(self) -> float:
         """Share of strong scatterers, 0 to 1: brighter than usual by 6 dB or more."""
         return share_of_strong_scatterers(self.scene)
+
+    @cached_property
+    def is_in_sensor_geometry(self) -> bool:
+        """Whether it is located by a sensor model, so that relief displaces elevated objects."""
+        return isinstance(self.image.source.grid, SensorGrid)
 
     @property
     def has_speckle(self) -> bool:
