@@ -74,7 +74,7 @@ def test_help_text_is_text_not_markup(provider: Any) -> None:
 def test_copies_of_an_algorithm_are_alike(provider: Any) -> None:
     copy = provider.algorithm("toy").create()
     assert copy.id() == "groundtie:toy"
-    assert len(copy.parameterDefinitions()) == 15
+    assert len(copy.parameterDefinitions()) == 16
 
 
 def test_the_plugin_takes_its_provider_away(plugin: Any) -> None:
