@@ -32,6 +32,7 @@ SUITES = (
     "peaks",
     "fusion",
     "optical",
+    "attacks",
 )
 
 
@@ -42,15 +43,41 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--only", type=_suite_names, default=SUITES, help=f"suites, of {','.join(SUITES)}"
     )
     parser.add_argument("--quick", action="store_true", help="a few cases of each suite")
-    parser.add_argument("--seeds", type=int, default=20, help="simulated pairs of each kind")
+    parser.add_argument(
+        "--seeds",
+        type=_seeds,
+        default=(1, 20),
+        help="simulated pairs of each kind; for attacks also a range, A-B",
+    )
     parser.add_argument(
         "--jobs",
         type=int,
         default=1,
         help="processes for the accuracy suites, with one thread each; 1: all threads in one",
     )
+    attacks = parser.add_argument_group("attacks", "what the suite attacks runs")
+    attacks.add_argument("--sample", type=int, help="so many cases, of every class about as many")
+    attacks.add_argument(
+        "--classes", type=_names, default=(), help="classes or groups of classes, by their names"
+    )
+    attacks.add_argument("--case", default="", help="one case, by the name that a table gives")
+    attacks.add_argument("--save", type=Path, help="folder for the images of what is run")
     parser.add_argument("--results", type=Path, default=HERE / "results", help="folder of results")
     return parser.parse_args(arguments)
+
+
+def _seeds(text: str) -> tuple[int, int]:
+    """Return the first seed and how many of "20" or "3-8"."""
+    first, _, last = text.rpartition("-")
+    try:
+        seeds = int(first or 1), int(last)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither a number nor A-B") from error
+    return seeds[0], seeds[1] - seeds[0] + 1
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(","))
 
 
 def _suite_names(text: str) -> tuple[str, ...]:
@@ -94,7 +121,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from benchmarks.suites import Settings
     from benchmarks.tables import suite_markdown, write_result
 
-    settings = Settings(options.quick, options.seeds, options.jobs, data_folder(), HERE / ".cache")
+    first_seed, seeds = options.seeds
+    settings = Settings(
+        options.quick,
+        seeds,
+        options.jobs,
+        data_folder(),
+        HERE / ".cache",
+        first_seed,
+        options.sample,
+        options.classes,
+        options.case,
+        options.save,
+    )
     crashed = 0
     for name in options.only:
         print(f"== {name}", flush=True)

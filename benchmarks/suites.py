@@ -31,6 +31,9 @@ class Settings:
         Folder of the real image pairs.
     cache
         Folder of simulated pairs, which take long to make.
+    first_seed, sample, classes, case, save
+        Of `attacks` alone: the first of the seeds; how many cases, of all classes; which classes;
+        one case by its name; a folder for the images of what is run.
     """
 
     quick: bool
@@ -38,6 +41,11 @@ class Settings:
     jobs: int
     data: Path
     cache: Path
+    first_seed: int = 1
+    sample: int | None = None
+    classes: tuple[str, ...] = ()
+    case: str = ""
+    save: Path | None = None
 
 
 class Case(Protocol):

@@ -1,0 +1,69 @@
+"""Pairs that were once accepted and should not have been, beside the real pairs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..cases import SAR_OPTICAL, read_image
+from .catalogue import EXAMPLES, Attack, Setting
+from .pairs import Pair, Source, pixels
+from .scenes import Scene, to_grey
+
+FOLDER = "attacks"
+
+# Which kinds of images they show, and where the ground truly lies (right, down), in pixels; None:
+# another place, or parts that moved differently, of which nothing may be accepted.
+_OPTICAL = "optical-optical"
+_KNOWN: dict[str, tuple[str, tuple[float, float] | None]] = {
+    "caption-strip-different-places-1": (SAR_OPTICAL, None),
+    "labels-and-roads-overlay-different-places-0": (_OPTICAL, None),
+    "noise-sd-60-sim-0": (SAR_OPTICAL, (-7.3, -11.0)),
+    "seam-third-10px-oo-0": (_OPTICAL, None),
+    "watermark-different-places-1": (SAR_OPTICAL, None),
+}
+
+
+@dataclass(frozen=True)
+class Example(Scene):
+    """Two files that deceive as they are."""
+
+    folder: Path = Path()
+
+    def pair(self, seed: int, cache: Path) -> Pair:
+        """Return the pair of the files."""
+        images = (to_grey(read_image(self.folder / f"{name}.tif")) for name in "ri")
+        reference, image = images
+        shift = _KNOWN[self.name][1]
+        size = image.shape[2], image.shape[1]
+        shown = pixels(size) - (np.nan if shift is None else np.array(shift))
+        source = Source(reference, image, lambda px: px)
+        return Pair(reference, image, shown, self.kind, 0.0, source, (0, 0), self.name)
+
+
+def scenes(data: Path) -> list[Scene]:
+    """Return the examples of the folder of real pairs."""
+    return [
+        Example(name, kind, folder=data / FOLDER / name)
+        for name, (kind, _) in _KNOWN.items()
+        if (data / FOLDER / name).exists()
+    ]
+
+
+def is_example(scene: Scene) -> bool:
+    """Whether a scene is one of them."""
+    return isinstance(scene, Example)
+
+
+def as_it_is(pair: Pair, setting: Setting) -> Pair:
+    """Return the pair."""
+    return pair
+
+
+def _named(name: str) -> Attack:
+    return Attack(EXAMPLES, name, "", as_it_is, lambda scene: scene.name == name)
+
+
+ATTACKS = [_named(name) for name in _KNOWN]

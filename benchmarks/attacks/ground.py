@@ -1,0 +1,175 @@
+"""Attacks by ground that changed between the images, which lies elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cases import SAR_OPTICAL
+from .catalogue import GROUND, Attack, Make, Setting, as_text, direction
+from .effects import snow_cover
+from .overlays import cloud_deck, smooth_noise
+from .pairs import Change, Image, Pair, to_bytes
+from .scenes import SAR_SAR, Scene
+
+Shape = tuple[int, int]
+Draw = Callable[[Shape, np.random.Generator], Change]
+
+
+def _area(shape: Shape, rng: np.random.Generator, low: float, high: float) -> NDArray[np.bool_]:
+    noise = smooth_noise(shape, float(rng.uniform(10, 40)), rng)
+    return np.asarray(noise > np.quantile(noise, 1 - rng.uniform(low, high)))
+
+
+def rebuilt(shape: Shape, rng: np.random.Generator) -> Change:
+    """Replace 20 to 40 % by blocks of elsewhere in the image."""
+    share, side = rng.uniform(0.2, 0.4), int(rng.integers(20, 60))
+
+    def build(image: Image) -> Image:
+        made, rebuilt = image.copy(), np.zeros(shape, bool)
+        while rebuilt.mean() < share:
+            to, of = (rng.integers(0, np.array(shape) - side) for _ in range(2))
+            made[:, to[0] : to[0] + side, to[1] : to[1] + side] = image[
+                :, of[0] : of[0] + side, of[1] : of[1] + side
+            ]
+            rebuilt[to[0] : to[0] + side, to[1] : to[1] + side] = True
+        return made
+
+    return build
+
+
+def flooded(shape: Shape, rng: np.random.Generator) -> Change:
+    """Put 30 to 70 % under water."""
+    water = _area(shape, rng, 0.3, 0.7)
+    return lambda image: np.where(water, to_bytes(25 + 6 * rng.normal(size=shape)), image)
+
+
+def burnt(shape: Shape, rng: np.random.Generator) -> Change:
+    """Darken what burnt, and its texture."""
+    area = _area(shape, rng, 0.3, 0.6)
+    return lambda image: np.where(area, to_bytes(30 + 0.2 * image), image)
+
+
+def snow(shape: Shape, rng: np.random.Generator) -> Change:
+    """Cover most by snow."""
+    return snow_cover(shape, rng).change()
+
+
+def seasons(shape: Shape, rng: np.random.Generator) -> Change:
+    """Invert the contrast of fields."""
+    area = _area(shape, rng, 0.3, 0.7)
+    return lambda image: np.where(area, to_bytes(256.0 - image), image)
+
+
+def night(shape: Shape, rng: np.random.Generator) -> Change:
+    """Leave lights only, with noise."""
+    share, noise = rng.uniform(0.97, 0.995), rng.uniform(2, 10)
+
+    def darken(image: Image) -> Image:
+        grey = image.mean(axis=0)
+        lights = cv2.GaussianBlur(250.0 * (grey > np.quantile(grey, share)), (0, 0), 1.5)
+        return to_bytes(np.broadcast_to(15 + lights + noise * rng.normal(size=shape), image.shape))
+
+    return darken
+
+
+def glint(shape: Shape, rng: np.random.Generator) -> Change:
+    """Blind a part by the sun, with fine sparkle."""
+    rows, columns = np.indices(shape)
+    centre = rng.uniform(0.2, 0.8, 2) * shape
+    reach = rng.uniform(0.2, 0.45) * max(shape)
+    bright = np.exp(-((rows - centre[0]) ** 2 + (columns - centre[1]) ** 2) / (2 * reach**2))
+    sparkle = bright * rng.gamma(0.7, 1 / 0.7, shape)
+    return lambda image: to_bytes(image * (1 - 0.5 * bright) + 160 * sparkle)
+
+
+def clouds(shape: Shape, rng: np.random.Generator) -> Change:
+    """Cover a part by clouds with shadows."""
+    return cloud_deck(shape, rng).change()
+
+
+_INPUT_ONLY: dict[str, Draw] = {
+    "construction": rebuilt,
+    "flooded": flooded,
+    "burnt": burnt,
+    "snow on one date": snow,
+    "seasons": seasons,
+    "night": night,
+    "sun glint": glint,
+}
+
+
+def changed(draw: Draw) -> Make:
+    """The input's ground changed, and lies off."""
+
+    def make(pair: Pair, setting: Setting) -> Pair:
+        shift = direction(setting.rng, 0.0, 20.0)
+        moved = pair.moved(shift, as_text(shift))
+        return moved.changed(None, draw(pair.input.shape[1:], setting.rng))
+
+    return make
+
+
+def moving_clouds(pair: Pair, setting: Setting) -> Pair:
+    """The same clouds, moved by the wind, over ground that lies elsewhere."""
+    rng = setting.rng
+    shift, wind = direction(rng, 0.0, 15.0), np.rint(direction(rng, 5.0, 20.0)).astype(int)
+    moved = pair.moved(shift, as_text(shift))
+    deck = cloud_deck(pair.input.shape[1:], rng)
+    note = f"clouds moved by ({wind[0]:+d}, {wind[1]:+d}) px"
+    return moved.changed(deck.change(), deck.change(*(int(n) for n in wind)), note)
+
+
+def self_copy(pair: Pair, setting: Setting) -> Pair:
+    """One band of the input is the reference itself; the others show ground that lies off."""
+    rng = setting.rng
+    shift = direction(rng, 8.0, 25.0)
+    moved = pair.moved(shift, as_text(shift))
+    bands = list(np.resize(moved.input, (2, *moved.input.shape[1:])))
+    bands.insert(int(rng.integers(3)), moved.reference[0])
+    return replace(moved, input=np.stack(bands))
+
+
+def half_transparent_copy(pair: Pair, setting: Setting) -> Pair:
+    """The reference shines through the input, as in a blended export."""
+    shift = direction(setting.rng, 8.0, 25.0)
+    moved = pair.moved(shift, as_text(shift))
+    share, copy = setting.rng.uniform(0.3, 0.7), pair.reference.mean(axis=0)
+    return moved.changed(None, lambda image: to_bytes((1 - share) * image + share * copy))
+
+
+def alpha_band(pair: Pair, setting: Setting) -> Pair:
+    """A band of opacity with the same edges stands beside each image's bands."""
+    rng, shape = setting.rng, pair.input.shape[1:]
+    shift = direction(rng, 8.0, 25.0)
+    moved = pair.moved(shift, as_text(shift))
+    opaque = to_bytes(255.0 * _area(shape, rng, 0.4, 0.8))[None]
+    images = (np.concatenate([image, opaque]) for image in (moved.reference, moved.input))
+    reference, image = images
+    return replace(moved, reference=reference, input=image)
+
+
+def no_radar_input(scene: Scene) -> bool:
+    """Whether the input is a camera's image."""
+    return scene.kind != SAR_SAR
+
+
+def camera_only(scene: Scene) -> bool:
+    """Whether both are a camera's images."""
+    return scene.kind not in (SAR_OPTICAL, SAR_SAR)
+
+
+ATTACKS = [
+    *(
+        Attack(GROUND, name, "", changed(draw), no_radar_input)
+        for name, draw in _INPUT_ONLY.items()
+    ),
+    Attack(GROUND, "moving clouds", "", moving_clouds, camera_only),
+    Attack(GROUND, "reference in one band", "", self_copy),
+    Attack(GROUND, "reference shines through", "", half_transparent_copy),
+    Attack(GROUND, "band of opacity", "", alpha_band),
+]

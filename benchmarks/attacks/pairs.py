@@ -1,0 +1,238 @@
+"""A pair of small images that an attack may change, with what every input pixel truly shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import rasterio
+from affine import Affine
+from numpy.typing import NDArray
+
+import groundtie
+from groundtie.rasters.grid import Grid
+
+from ..accuracy import FloatArray, lattice
+from ..accuracy import Mapping as PixelMapping
+from ..cases import CRS, REFERENCE_TRANSFORM
+
+Image = NDArray[np.uint8]
+Change = Callable[[Image], Image]
+
+NODATA = 0
+
+# What is measured is what lies at or below this share of the errors over the overlap: a
+# registration is silently wrong if more than a tenth of the overlap is.
+ERROR_PERCENTILE = 90.0
+
+# Fewer known positions than these tell nothing.
+_FEWEST_KNOWN = 20
+
+
+@dataclass(frozen=True)
+class Source:
+    """A whole scene, of which pairs are cut.
+
+    Parameters
+    ----------
+    reference, input
+        Bands of bytes, shape (bands, rows, columns); 0 holds no data.
+    to_input
+        Input (col, row) of reference (col, row), shapes (n, 2).
+    """
+
+    reference: Image
+    input: Image
+    to_input: PixelMapping
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """A reference and an input, of which an attack makes another pair.
+
+    Parameters
+    ----------
+    reference, input
+        Bands of bytes, shape (bands, rows, columns); 0 holds no data.
+    shown
+        Which reference pixel (col, row) each pixel of the input shows, shape (rows, columns, 2);
+        NaN: none, or it is not known. All are NaN where the images show different places.
+    kind
+        Kind of the pair, of `cases.KINDS`.
+    sigma_px
+        How far the truth can be believed.
+    source, corner
+        The scene, and which of its reference pixels is the first of this reference.
+    place
+        What is shown.
+    reference_transform, input_transform, reference_crs, input_crs
+        What the georeferencing claims.
+    arguments
+        For the tool, where it takes them.
+    note
+        What was drawn, for people.
+    """
+
+    reference: Image
+    input: Image
+    shown: FloatArray
+    kind: str
+    sigma_px: float
+    source: Source
+    corner: tuple[int, int]
+    place: str
+    reference_transform: Affine = REFERENCE_TRANSFORM
+    input_transform: Affine = REFERENCE_TRANSFORM
+    reference_crs: str = CRS
+    input_crs: str = CRS
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    note: str = ""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows of the input."""
+        return self.input.shape[2], self.input.shape[1]
+
+    def moved(self, shift_px: FloatArray, note: str = "") -> Pair:
+        """Return the pair with its ground elsewhere in the input.
+
+        Parameters
+        ----------
+        shift_px
+            By how much each input pixel's ground lies right of and below its nominal place:
+            shape (2,) or (rows, columns, 2).
+        note
+            What is added to the note.
+        """
+        shown = pixels(self.size) - shift_px
+        image, known = render(self.source, shown + np.array(self.corner))
+        shown = np.where(known[..., None], shown, np.nan)
+        return replace(self, input=image, shown=shown, note=join(self.note, note))
+
+    def changed(self, reference: Change | None, input: Change | None, note: str = "") -> Pair:
+        """Return the pair with changed grey values; what holds no data stays so."""
+        images = (
+            image if change is None else _keep_nodata(image, change(image))
+            for image, change in ((self.reference, reference), (self.input, input))
+        )
+        return replace(
+            self,
+            **dict(zip(("reference", "input"), images, strict=True)),
+            note=join(self.note, note),
+        )
+
+    def both(self, change: Change, note: str = "") -> Pair:
+        """Return the pair with the same change made to both images."""
+        return self.changed(change, change, note)
+
+    def with_arguments(self, **arguments: Any) -> Pair:
+        """Return the pair with further arguments for the tool."""
+        return replace(self, arguments={**self.arguments, **arguments})
+
+    def rasters(self) -> tuple[groundtie.Raster, groundtie.Raster]:
+        """Return both images as the tools take them."""
+        return (
+            groundtie.Raster(self.reference, self.reference_transform, self.reference_crs, NODATA),
+            groundtie.Raster(self.input, self.input_transform, self.input_crs, NODATA),
+        )
+
+    def known(self) -> tuple[FloatArray, FloatArray]:
+        """Return the reference and input pixels that belong together, on a lattice, shapes (n, 2).
+
+        They are those where both images hold data.
+        """
+        at = lattice(self.size)
+        near = np.rint(at).astype(int)
+        shown = self.shown[near[:, 1], near[:, 0]] + (at - near)
+        rows, columns = self.reference.shape[1:]
+        inside = np.isfinite(shown).all(axis=1) & self.input[:, near[:, 1], near[:, 0]].any(axis=0)
+        inside[inside] = (
+            (shown[inside] >= 0) & (shown[inside] <= np.array([columns - 1, rows - 1]))
+        ).all(axis=1)
+        place = np.rint(shown[inside]).astype(int)
+        inside[inside] = self.reference[:, place[:, 1], place[:, 0]].any(axis=0)
+        return shown[inside], at[inside]
+
+    def errors_px(self, transform: Callable[[FloatArray], FloatArray]) -> tuple[float, float]:
+        """Return what 90 % of the errors do not exceed, and their root mean square.
+
+        Parameters
+        ----------
+        transform
+            Input pixels of reference map positions, shapes (n, 2).
+
+        Returns
+        -------
+        tuple
+            In input pixels; infinite where nothing could have been right.
+        """
+        shown, at = self.known()
+        if len(at) < _FEWEST_KNOWN:
+            return np.inf, np.inf
+        rows, columns = self.reference.shape[1:]
+        crs = rasterio.crs.CRS.from_user_input(self.reference_crs)
+        grid = Grid(self.reference_transform, crs, columns, rows)
+        off = np.hypot(*(transform(grid.pixel_to_map(shown)) - at).T)
+        return float(np.percentile(off, ERROR_PERCENTILE)), float(np.sqrt(np.mean(off**2)))
+
+    def save(self, folder: Path) -> None:
+        """Write r.tif and i.tif into a folder, to be looked at."""
+        folder.mkdir(parents=True, exist_ok=True)
+        images = (
+            ("r.tif", self.reference, self.reference_transform, self.reference_crs),
+            ("i.tif", self.input, self.input_transform, self.input_crs),
+        )
+        for name, image, transform, crs in images:
+            bands, rows, columns = image.shape
+            with rasterio.open(
+                folder / name,
+                "w",
+                driver="GTiff",
+                count=bands,
+                height=rows,
+                width=columns,
+                dtype=image.dtype,
+                crs=crs,
+                transform=transform,
+                nodata=NODATA,
+            ) as target:
+                target.write(image)
+
+
+def pixels(size: tuple[int, int]) -> FloatArray:
+    """Return the (col, row) of each pixel, shape (rows, columns, 2)."""
+    return np.stack(np.meshgrid(*(np.arange(side, dtype=float) for side in size)), axis=-1)
+
+
+def render(source: Source, positions: FloatArray) -> tuple[Image, NDArray[np.bool_]]:
+    """Return the input's bands at reference positions of its scene, and where it has any."""
+    at = source.to_input(positions.reshape(-1, 2)).reshape(positions.shape).astype(np.float32)
+    rows, columns = source.input.shape[1:]
+    inside = ((at >= 0) & (at <= np.array([columns - 1, rows - 1]))).all(axis=-1)
+    bands = [
+        cv2.remap(band, at[..., 0], at[..., 1], cv2.INTER_LANCZOS4, None, cv2.BORDER_REFLECT_101)
+        for band in source.input
+    ]
+    held = cv2.remap(
+        (source.input.any(axis=0) * 255).astype(np.uint8), at[..., 0], at[..., 1], cv2.INTER_LINEAR
+    )
+    inside &= held == 255
+    return np.where(inside, np.clip(np.stack(bands), 1, 255), NODATA).astype(np.uint8), inside
+
+
+def to_bytes(values: FloatArray) -> Image:
+    """Return grey values as bytes that are not nodata."""
+    return np.clip(np.rint(values), 1, 255).astype(np.uint8)
+
+
+def join(*notes: str) -> str:
+    """Return notes as one."""
+    return ", ".join(filter(None, notes))
+
+
+def _keep_nodata(before: Image, after: Image) -> Image:
+    return np.where(before.any(axis=0), after, NODATA).astype(np.uint8)

@@ -1,0 +1,177 @@
+"""Attacks by inputs of which parts moved differently."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..accuracy import FloatArray
+from .catalogue import PARTS, Attack, Make, Setting, direction
+from .overlays import smooth_noise
+from .pairs import Pair, join
+from .scenes import elsewhere
+
+_NEAREST_PX, _FARTHEST_PX = 6.0, 20.0
+# All of the input may lie off, too.
+_WHOLE_PX = 8.0
+
+Shape = tuple[int, int]
+Part = Callable[[Shape, np.random.Generator], NDArray[np.bool_]]
+
+
+def beyond_line(shape: Shape, share: float, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Return the part of an image beyond a straight seam, of a share of its pixels."""
+    rows, columns = np.indices(shape)
+    angle = rng.choice([0, 1, 2, 3]) * np.pi / 2 + rng.uniform(-0.5, 0.5) * rng.integers(0, 2)
+    along = np.cos(angle) * columns / shape[1] + np.sin(angle) * rows / shape[0]
+    return np.asarray(along > np.quantile(along, 1 - share))
+
+
+def half(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
+    return beyond_line(shape, 1 / 2, rng)
+
+
+def third(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
+    return beyond_line(shape, 1 / 3, rng)
+
+
+def quarter(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
+    return beyond_line(shape, 1 / 4, rng)
+
+
+def corner(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """A corner, a quarter or more of the image."""
+    rows, columns = (np.arange(side) / side for side in shape)
+    reach = rng.uniform(0.5, 0.65, 2)
+    flips = rng.integers(0, 2, 2)
+    down = (rows if flips[0] else 1 - rows) < reach[0]
+    right = (columns if flips[1] else 1 - columns) < reach[1]
+    return np.asarray(np.logical_and.outer(down, right))
+
+
+def strip(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """A strip across the image."""
+    rows, columns = np.indices(shape)
+    angle = rng.uniform(0, np.pi)
+    along = np.cos(angle) * columns / shape[1] + np.sin(angle) * rows / shape[0]
+    first = rng.uniform(0.1, 0.5)
+    low, high = np.quantile(along, (first, first + rng.uniform(0.25, 0.4)))
+    return np.asarray((along > low) & (along < high))
+
+
+def blob(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Irregular parts, as a mosaic of two dates has."""
+    noise = smooth_noise(shape, float(rng.uniform(25, 60)), rng)
+    return np.asarray(noise > np.quantile(noise, 1 - rng.uniform(0.25, 0.5)))
+
+
+def tiles(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Tiles of a web map, some of which are of another date."""
+    side = int(rng.choice([64, 128, 256]))
+    origin = rng.integers(0, side, 2)
+    late = rng.random((20, 20)) < rng.uniform(0.25, 0.5)
+    index = [(np.arange(n) + o) // side for n, o in zip(shape, origin, strict=True)]
+    part = late[np.ix_(*index)]
+    # At least one tile is, and not all.
+    return part if 0.15 < part.mean() < 0.85 else half(shape, rng)
+
+
+_PARTS: dict[str, Part] = {
+    "half": half,
+    "third": third,
+    "quarter": quarter,
+    "corner": corner,
+    "strip": strip,
+    "two dates": blob,
+    "map tiles": tiles,
+}
+
+
+def seam(part: Part) -> Make:
+    """A part lies off against the rest; the rest is right or lies off as well."""
+
+    def make(pair: Pair, setting: Setting) -> Pair:
+        rng = setting.rng
+        whole = direction(rng, 0.0, _WHOLE_PX) * rng.integers(0, 2)
+        low = max(_NEAREST_PX, 2 * pair.sigma_px + 4)
+        off = direction(rng, low, _FARTHEST_PX)
+        moved = part(pair.input.shape[1:], rng)
+        note = f"{moved.mean():.0%} off by ({off[0]:+.1f}, {off[1]:+.1f}) px against the rest"
+        return pair.moved(whole + moved[..., None] * off, note)
+
+    return make
+
+
+def half_of_another_place(pair: Pair, setting: Setting) -> Pair:
+    """A half of the input shows another place; the other half lies 5 to 20 px off."""
+    rng = setting.rng
+    shift = direction(rng, 5.0, 20.0)
+    moved = pair.moved(shift)
+    other = elsewhere(pair, setting.scenes, rng, setting.cache)
+    part = beyond_line(pair.input.shape[1:], rng.uniform(0.3, 0.6), rng)
+    bands = min(len(moved.input), len(other.input))
+    return replace(
+        moved,
+        input=np.where(part, other.input[:bands], moved.input[:bands]),
+        shown=np.where(part[..., None], np.nan, moved.shown),
+        note=join(f"{part.mean():.0%} of another place", other.note),
+    )
+
+
+def _along_rows(shift: FloatArray, shape: Shape) -> FloatArray:
+    return np.broadcast_to(shift[:, None, :], (*shape, 2)).copy()
+
+
+def jitter(pair: Pair, setting: Setting) -> Pair:
+    """Rows are moved by the vibrations of a camera, slow or fast."""
+    rows = pair.input.shape[1]
+    size, period = setting.rng.uniform(5, 12), setting.rng.uniform(60, 1.5 * rows)
+    along = size * np.sin(2 * np.pi * np.arange(rows) / period + setting.rng.uniform(0, 6))
+    shift = np.column_stack([along, np.zeros(rows)])
+    note = f"rows by ± {size:.0f} px, period {period:.0f} px"
+    return pair.moved(_along_rows(shift, pair.input.shape[1:]), note)
+
+
+def duplicated_rows(pair: Pair, setting: Setting) -> Pair:
+    """Some rows stand twice, so that all below lies lower; or are missing."""
+    rows, rng = pair.input.shape[1], setting.rng
+    number = int(rng.integers(7, 20)) * int(rng.choice([-1, 1]))
+    at = int(rng.uniform(0.25, 0.75) * rows)
+    below = np.arange(rows) >= at
+    down = np.where(below, np.clip(np.arange(rows) - at, 0, abs(number)) * np.sign(number), 0)
+    if number < 0:
+        down = np.where(below, number, 0)
+    shift = np.column_stack([np.zeros(rows), down])
+    note = f"{abs(number)} rows {'twice' if number > 0 else 'missing'} at row {at}"
+    return pair.moved(_along_rows(shift, pair.input.shape[1:]), note)
+
+
+def bulge(pair: Pair, setting: Setting) -> Pair:
+    """A hill that no terrain model took out displaces a part of the image."""
+    rng, shape = setting.rng, pair.input.shape[1:]
+    centre, reach = rng.uniform(0.25, 0.75, 2) * shape, rng.uniform(0.15, 0.3) * max(shape)
+    rows, columns = np.indices(shape)
+    height = np.exp(-((rows - centre[0]) ** 2 + (columns - centre[1]) ** 2) / (2 * reach**2))
+    off = direction(rng, 8.0, 18.0)
+    return pair.moved(height[..., None] * off, f"hill by ({off[0]:+.1f}, {off[1]:+.1f}) px")
+
+
+def waves(pair: Pair, setting: Setting) -> Pair:
+    """The whole input is warped smoothly, as no model of a few parameters can follow."""
+    rng, shape = setting.rng, pair.input.shape[1:]
+    length = float(rng.uniform(30, 70))
+    shift = np.stack([smooth_noise(shape, length, rng) for _ in range(2)], axis=-1)
+    return pair.moved(rng.uniform(4, 8) * shift, f"smooth warp of {length:.0f} px")
+
+
+ATTACKS = [
+    *(Attack(PARTS, "a part lies off", name, seam(part)) for name, part in _PARTS.items()),
+    Attack(PARTS, "a part shows another place", "", half_of_another_place),
+    Attack(PARTS, "jitter of rows", "", jitter),
+    Attack(PARTS, "duplicated or missing rows", "", duplicated_rows),
+    Attack(PARTS, "hill", "", bulge),
+    Attack(PARTS, "smooth warp", "", waves),
+]

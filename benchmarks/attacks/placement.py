@@ -1,0 +1,126 @@
+"""Attacks by georeferencing that is wrong, by images turned over, and by too little overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from affine import Affine
+
+from .catalogue import CONTROLS, PLACEMENT, Attack, Make, Setting, as_text, direction
+from .pairs import Pair
+from .scenes import elsewhere
+
+
+def mirrored(pair: Pair, setting: Setting) -> Pair:
+    """The input is a mirror image, which no registration allows."""
+    axis = int(setting.rng.integers(1, 3))
+    shown = np.full_like(pair.shown, np.nan)
+    return replace(pair, input=np.flip(pair.input, axis), shown=shown, note=f"axis {axis}")
+
+
+def turned(pair: Pair, setting: Setting) -> Pair:
+    """The input is turned by right angles, but not its georeferencing."""
+    turns = int(setting.rng.integers(1, 4))
+    image = np.rot90(pair.input, turns, (1, 2))
+    shown = np.rot90(pair.shown, turns, (0, 1))
+    return replace(pair, input=image, shown=shown, note=f"{90 * turns}°")
+
+
+def south_up(pair: Pair, setting: Setting) -> Pair:
+    """The input's rows run northwards, as its georeferencing states."""
+    shift = direction(setting.rng, 0.0, 15.0)
+    moved = pair.moved(shift, as_text(shift))
+    rows = moved.input.shape[1]
+    place = moved.input_transform @ Affine.translation(0, rows) @ Affine.scale(1, -1)
+    return replace(
+        moved, input=moved.input[:, ::-1], shown=moved.shown[::-1], input_transform=place
+    )
+
+
+def tiny_overlap(pair: Pair, setting: Setting) -> Pair:
+    """The images share a strip of 12 to 30 % only, in which the ground lies off."""
+    rng = setting.rng
+    shift, share = direction(rng, 0.0, 20.0), rng.uniform(0.12, 0.3)
+    moved = pair.moved(shift, as_text(shift))
+    columns = moved.input.shape[2]
+    right, left = int(columns * (0.5 + share / 2)), int(columns * (0.5 - share / 2))
+    return replace(
+        moved,
+        reference=moved.reference[:, :, :right],
+        input=moved.input[:, :, left:],
+        shown=moved.shown[:, left:],
+        input_transform=moved.input_transform @ Affine.translation(left, 0),
+        note=f"{moved.note}, {share:.0%} overlap",
+    )
+
+
+def claimed(draw: Callable[[np.random.Generator], tuple[Affine, str]]) -> Make:
+    """The input's georeferencing claims another size or rotation than it has."""
+
+    def make(pair: Pair, setting: Setting) -> Pair:
+        shift = direction(setting.rng, 0.0, 12.0)
+        moved = pair.moved(shift, as_text(shift))
+        wrong, note = draw(setting.rng)
+        centre = np.array(moved.size) / 2
+        place = (
+            moved.input_transform
+            @ Affine.translation(*centre)
+            @ wrong
+            @ Affine.translation(*-centre)
+        )
+        return replace(moved, input_transform=place, note=f"{moved.note}, {note}")
+
+    return make
+
+
+def wrong_scale(rng: np.random.Generator) -> tuple[Affine, str]:
+    """Claim pixels that are 2 to 40 % larger or smaller."""
+    scale = float((1 + rng.uniform(0.02, 0.4)) ** rng.choice([-1, 1]))
+    return Affine.scale(scale), f"scale {scale:.3f}"
+
+
+def wrong_rotation(rng: np.random.Generator) -> tuple[Affine, str]:
+    """Claim a rotation that is 1 to 30° wrong."""
+    angle = float(rng.uniform(1, 30) * rng.choice([-1, 1]))
+    return Affine.rotation(angle), f"rotation {angle:.1f}°"
+
+
+def wrong_aspect(rng: np.random.Generator) -> tuple[Affine, str]:
+    """Claim square pixels that are not."""
+    scale = float((1 + rng.uniform(0.03, 0.3)) ** rng.choice([-1, 1]))
+    return Affine.scale(scale, 1.0), f"columns {scale:.3f} as wide"
+
+
+def other_zone(pair: Pair, setting: Setting) -> Pair:
+    """The input claims the neighbouring zone with the same coordinates."""
+    return replace(pair, input_crs="EPSG:32634")
+
+
+def far_off(pair: Pair, setting: Setting) -> Pair:
+    """The ground lies 30 to 60 px off, with a radius that is smaller."""
+    shift = direction(setting.rng, 30.0, 60.0)
+    radius = float(setting.rng.uniform(8, 28))
+    return pair.moved(shift, f"{as_text(shift)}, radius {radius:.0f} px").with_arguments(
+        search_radius=radius
+    )
+
+
+def other_place(pair: Pair, setting: Setting) -> Pair:
+    """The input shows another place, and nothing else is done."""
+    return elsewhere(pair, setting.scenes, setting.rng, setting.cache)
+
+
+ATTACKS = [
+    Attack(PLACEMENT, "mirrored", "", mirrored),
+    Attack(PLACEMENT, "turned", "", turned),
+    Attack(PLACEMENT, "tiny overlap", "", tiny_overlap),
+    Attack(PLACEMENT, "wrong scale claimed", "", claimed(wrong_scale)),
+    Attack(PLACEMENT, "wrong rotation claimed", "", claimed(wrong_rotation)),
+    Attack(PLACEMENT, "wrong aspect claimed", "", claimed(wrong_aspect)),
+    Attack(PLACEMENT, "other zone", "", other_zone),
+    Attack(PLACEMENT, "beyond the radius", "", far_off),
+    Attack(PLACEMENT, "another place", "", other_place),
+    Attack(CONTROLS, "rows run northwards", "", south_up),
+]

@@ -1,0 +1,190 @@
+"""Scenes that are attacked: windows of real pairs, and simulated ones."""
+
+from __future__ import annotations
+
+import tempfile
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import groundtie
+from groundtie.simulation import files
+
+from ..attempt import on_pixels
+from ..cases import SAR_OPTICAL, RealCase, read_cases, read_image
+from ..sar_pairs import SarPair
+from ..simulations import simulator_version
+from .pairs import Image, Pair, Source, pixels, render, to_bytes
+
+SAR_SAR = "sar-sar"
+DENSITIES = ("rural", "suburban", "urban", "city")
+
+# Sides of the windows in pixels, and what is kept free around them for what lies elsewhere.
+_SIDES_PX = (300, 400)
+_MARGIN_PX = 26
+_SIMULATED_PX = _SIDES_PX[1] + 2 * _MARGIN_PX
+_LEAST_SIDE_PX = 220
+
+# Truths that may be 3 px wrong cannot tell what is 3 px wrong.
+_LARGEST_SIGMA_PX = 2.0
+
+# So many bands or more are a multispectral image: red, green and blue of them.
+_MANY_BANDS = 8
+_RGB = (3, 2, 1)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Where pairs are cut from.
+
+    Parameters
+    ----------
+    name, kind, sigma_px
+        As of a real case; simulated ones have an exact truth.
+    case
+        The real pair; None: simulated.
+    """
+
+    name: str
+    kind: str
+    sigma_px: float = 0.0
+    case: RealCase | None = None
+
+    @property
+    def place(self) -> str:
+        """What is shown."""
+        return self.name if self.case is None else self.case.place
+
+    @property
+    def density(self) -> str:
+        """How densely a simulated scene is built up; empty for real ones."""
+        return self.name.split("-", 1)[1] if self.case is None else ""
+
+    def source(self, seed: int, cache: Path) -> Source:
+        """Return the whole scene; simulated ones are made unless the folder `cache` has them."""
+        if self.case is not None:
+            return Source(
+                *_real(self.case.reference, self.case.input), self.case.reference_to_input
+            )
+        return _simulated(self.kind, self.density, seed, cache)
+
+    def pair(self, seed: int, cache: Path) -> Pair:
+        """Return a window, the same for the same seed, whose ground lies as the images claim."""
+        source = self.source(seed, cache)
+        rng = np.random.default_rng((zlib.crc32(self.name.encode()), seed))
+        most = np.array(source.reference.shape[:0:-1]) - 2 * _MARGIN_PX
+        low, high = _SIDES_PX
+        side = np.minimum(most, np.maximum(rng.integers(low, high + 1, 2), _LEAST_SIDE_PX))
+        first = _corner(source, side, most, rng)
+        window = slice(first[1], first[1] + side[1]), slice(first[0], first[0] + side[0])
+        empty = np.zeros((1, side[1], side[0]), np.uint8)
+        pair = Pair(
+            source.reference[:, window[0], window[1]],
+            empty,
+            pixels((int(side[0]), int(side[1]))),
+            self.kind,
+            self.sigma_px,
+            source,
+            (int(first[0]), int(first[1])),
+            f"{self.place} {seed if self.case is None else ''}",
+        )
+        return pair.moved(np.zeros(2))
+
+
+def _corner(
+    source: Source, side: NDArray[np.int_], most: NDArray[np.int_], rng: np.random.Generator
+) -> NDArray[np.int_]:
+    """Return the first pixel of the window of a few whose input holds most."""
+    tries = _MARGIN_PX + rng.integers(0, most - side + 1, (5, 2))
+    # Some centres of real scenes hold all there is.
+    tries = np.vstack([tries, _MARGIN_PX + (most - side) // 2])
+    shares = [
+        render(source, pixels((int(side[0]), int(side[1])))[::8, ::8] + first)[1].mean()
+        for first in tries
+    ]
+    best = int(np.argmax(np.array(shares) >= max(shares) - 0.02))
+    return np.asarray(tries[best])
+
+
+def scenes(data: Path) -> tuple[Scene, ...]:
+    """Return the scenes: of the folder of real pairs, and simulated."""
+    real = [
+        Scene(case.name, case.kind, case.sigma_px, case)
+        for case in read_cases(data)
+        if case.sigma_px <= _LARGEST_SIGMA_PX and case.name not in ("oo-burn",)
+    ]
+    simulated = [Scene(f"sim-{density}", SAR_OPTICAL) for density in DENSITIES]
+    radar = [Scene(f"simss-{density}", SAR_SAR) for density in DENSITIES[:3]]
+    return (*real, *simulated, *radar)
+
+
+def elsewhere(pair: Pair, others: Sequence[Scene], rng: np.random.Generator, cache: Path) -> Pair:
+    """Return a pair with an input of another place, of the same kind if there is one."""
+    choice = [one for one in others if one.kind == pair.kind and one.place not in pair.place]
+    for _ in range(20):
+        scene = choice[int(rng.integers(len(choice)))]
+        other = scene.source(int(rng.integers(1, 5)), cache)
+        most = np.array(other.reference.shape[:0:-1]) - np.array(pair.size)
+        corner = np.maximum(most // 2, 0) + rng.integers(-10, 11, 2)
+        image, known = render(other, pixels(pair.size) + corner)
+        if known.mean() > 0.8:
+            shown = np.full((*image.shape[1:], 2), np.nan)
+            return replace(pair, input=image, shown=shown, note=f"input of {scene.name}")
+    raise ValueError(f"no other place is as large as {pair.place}")
+
+
+@lru_cache(maxsize=40)
+def _real(reference: Path, input: Path) -> tuple[Image, Image]:
+    return to_grey(read_image(reference)), to_grey(read_image(input))
+
+
+def to_grey(image: NDArray[Any]) -> Image:
+    """Return bands as bytes from 1 to 255: what an export for people has."""
+    if len(image) >= _MANY_BANDS:
+        image = image[list(_RGB)]
+    image = image[:3]
+    if image.dtype == np.uint8:
+        return np.maximum(image, 1)
+    low, high = (np.nanpercentile(image, share, axis=(1, 2)) for share in (0.5, 99.5))
+    if image.min() >= 0:
+        # Amplitudes stay in proportion, as speckle is multiplied.
+        low = np.zeros_like(low)
+    return to_bytes((image - low[:, None, None]) / (high - low)[:, None, None] * 254 + 1)
+
+
+@lru_cache(maxsize=40)
+def _simulated(kind: str, density: str, seed: int, cache: Path) -> Source:
+    if kind == SAR_SAR:
+        looks = 1 + seed % 4
+        made = SarPair(_SIMULATED_PX, density, seed, looks, bool(seed % 2)).pair(cache)
+        found = made.reference.with_name("truth.json")
+        reference, image = (to_grey(read_image(path)) for path in (made.reference, made.input))
+        return Source(reference, image, on_pixels(groundtie.load_transform(found), made.reference))
+    folder = cache / f"attacked-{density}-{_SIMULATED_PX}-{seed}-{simulator_version()}"
+    if not folder.exists():
+        cache.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=cache) as temporary:
+            groundtie.simulate(
+                Path(temporary) / "scene",
+                size=_SIMULATED_PX,
+                density=density,
+                seed=seed,
+                shift=0.0,
+                looks=float(1 + seed % 3),
+                changed=10.0 * (seed % 2),
+                warp=2.0,
+            )
+            # Whole or not at all: other processes make it, too.
+            if not folder.exists():
+                (Path(temporary) / "scene").rename(folder)
+    reference, image = (folder / files.NAMES[key] for key in ("reference", "input"))
+    truth = groundtie.load_transform(folder / files.NAMES["truth"])
+    return Source(
+        to_grey(read_image(reference)), to_grey(read_image(image)), on_pixels(truth, reference)
+    )

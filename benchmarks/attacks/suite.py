@@ -1,0 +1,135 @@
+"""The suite of attacks: which cases are run, and what became of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..accuracy import REFUSED, SILENTLY_WRONG, VERDICTS
+from ..suites import Goal, Settings, SuiteResult, Table, run_cases
+from .cases import AttackCase, AttackOutcome, cases, find, named
+from .catalogue import CONTROLS
+
+_WANTED_RUNS = 3000
+_MOST_SEEDS = 8
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite, or the one case that is named."""
+    chosen = choose(settings)
+    if settings.save is not None:
+        for case in chosen:
+            case.make().save(settings.save / case.name.replace("/", "_").replace(" ", "-"))
+    outcomes: list[AttackOutcome] = list(run_cases(chosen, settings.jobs))
+    attacks = [o for o in outcomes if o.group != CONTROLS]
+    controls = [o for o in outcomes if o.group == CONTROLS]
+    return SuiteResult(
+        "Attacks: what deceives a registration",
+        goals(attacks),
+        (
+            verdict_table("By group", outcomes, lambda o: o.group),
+            verdict_table("By class", attacks, lambda o: f"{o.group}: {o.attack}"),
+            verdict_table("Controls", controls, lambda o: f"{o.attack}"),
+            verdict_table("Controls by kind and tool", controls, lambda o: f"{o.kind}, {o.tool}"),
+            verdict_table("Attacks by tool", attacks, lambda o: o.tool),
+            rules_table(outcomes),
+            wrong_table(outcomes),
+        ),
+        [outcome.record() for outcome in outcomes],
+        (
+            "The error is what 90 % of the errors over the overlap do not exceed, in input pixels: "
+            "silently wrong is what is accepted with more than a tenth of the overlap more than "
+            "3 px wrong (beyond how far the truth can be believed), or though the images show "
+            "different places. `--case` repeats one, `--save` keeps its images.",
+        ),
+    )
+
+
+def choose(settings: Settings) -> list[AttackCase]:
+    """Return the cases that settings ask for."""
+    if settings.case:
+        return [named(settings.case, settings.data, settings.cache)]
+    number = 1 if settings.quick else min(settings.seeds, _MOST_SEEDS)
+    seeds = range(settings.first_seed, settings.first_seed + number)
+    every = [
+        case
+        for case in cases(seeds, settings.data, settings.cache)
+        if not settings.classes or _is_of(case, settings.classes)
+    ]
+    wanted = 1 if settings.quick else settings.sample
+    return every if wanted is None else sample(every, wanted, settings.quick)
+
+
+def _is_of(case: AttackCase, classes: Sequence[str]) -> bool:
+    group = find(case.attack, case.variant).group
+    return any(name in (case.attack, group) for name in classes)
+
+
+def sample(every: Sequence[AttackCase], number: int, of_each: bool = False) -> list[AttackCase]:
+    """Return some cases: of every class about as many, but drawn by a seed.
+
+    Parameters
+    ----------
+    every
+        All cases.
+    number
+        How many; or, `of_each`, how many of each class.
+    of_each
+        See there.
+    """
+    order = np.random.default_rng(len(every)).permutation(len(every))
+    turn: Counter[str] = Counter()
+    ranked = []
+    for index in order:
+        case = every[index]
+        ranked.append((turn[case.attack], int(index)))
+        turn[case.attack] += 1
+    if of_each:
+        return [every[index] for rank, index in ranked if rank < number]
+    return [every[index] for _, index in sorted(sorted(ranked)[:number], key=lambda pair: pair[1])]
+
+
+def goals(attacks: Sequence[AttackOutcome]) -> tuple[Goal, ...]:
+    """Return the goal and what was found."""
+    wrong = sum(o.verdict == SILENTLY_WRONG for o in attacks)
+    reached = False if wrong else (True if len(attacks) >= _WANTED_RUNS else None)
+    return (
+        Goal(
+            "Silently wrong", f"0 of at least {_WANTED_RUNS}", f"{wrong} of {len(attacks)}", reached
+        ),
+    )
+
+
+def verdict_table(
+    title: str, outcomes: Sequence[AttackOutcome], key: Callable[[AttackOutcome], str]
+) -> Table:
+    """Return how many outcomes of each key have each verdict."""
+    rows = []
+    for name in sorted({key(outcome) for outcome in outcomes}):
+        some = [outcome for outcome in outcomes if key(outcome) == name]
+        counts = Counter(outcome.verdict for outcome in some)
+        seconds = np.mean([outcome.seconds for outcome in some])
+        cells = (str(counts[verdict]) for verdict in VERDICTS)
+        rows.append([name, str(len(some)), *cells, f"{seconds:.1f}"])
+    return Table(title, ("", "tried", *VERDICTS, "mean s"), rows)
+
+
+def rules_table(outcomes: Sequence[AttackOutcome]) -> Table:
+    """Return which rules refused attacks and controls."""
+    refused = [outcome for outcome in outcomes if outcome.verdict == REFUSED]
+    counts = Counter((o.rule or "no rule", o.group == CONTROLS) for o in refused)
+    names = sorted({rule for rule, _ in counts})
+    rows = [[name, str(counts[name, False]), str(counts[name, True])] for name in names]
+    return Table("Rules that refused", ("rule", "attacks", "controls"), rows)
+
+
+def wrong_table(outcomes: Sequence[AttackOutcome]) -> Table:
+    """Return what is silently wrong, by the names that repeat it."""
+    rows = [
+        [f"`{o.name}`", f"{o.error_px:.1f}", f"{o.claimed_ce90_px:.2f}", o.note]
+        for o in outcomes
+        if o.verdict == SILENTLY_WRONG
+    ]
+    return Table("Silently wrong", ("case", "error (px)", "claimed CE90 (px)", "what"), rows)
