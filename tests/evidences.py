@@ -12,6 +12,7 @@ from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.model_choice import block_folds
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
+from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.scene import ImageFacts, SceneInfo
@@ -98,6 +99,20 @@ def evidence(
     return RegistrationEvidence(
         estimate, check_points(check_errors), GRID, max_error_px, RADIUS, **more
     )
+
+
+def survey(confirming: int = 49, part: int = 0, height: float = 8.0, rival: float = 2.0) -> Survey:
+    """Return a survey of 7 × 7 chips, of which some confirm and some rows' first ones lie off."""
+    centres = np.stack(np.meshgrid(*[np.arange(7) * 70 + 40] * 2), -1).reshape(-1, 2)
+    random = np.random.default_rng(7)
+    shifts = random.uniform(5, 24, (49, 2)) * random.choice([-1, 1], (49, 2))
+    shifts[49 - confirming :] = scatter(confirming, 0.4)
+    shifts[:part] = [9.0, -5.0]
+    side = 2 * SURVEY_RADIUS_PX + 1
+    mean = np.zeros((side, side), np.float32)
+    mean[SURVEY_RADIUS_PX, SURVEY_RADIUS_PX] = height
+    mean[SURVEY_RADIUS_PX + 9, SURVEY_RADIUS_PX] = rival
+    return Survey(GRID, centres, shifts, np.array([70.0, 70.0]), mean)
 
 
 def facts(

@@ -235,9 +235,10 @@ def judge(
             without_blocks = fit_without_blocks(model.kind, px, nominal_px, np.ones(len(px)))
             estimate = Estimate(transform, points, without_blocks)
             check = stages.check(estimate, running)
+            surveys = stages.survey(estimate, running)
         except TooFewPointsError as error:
             return judge_search(SearchEvidence(error))
-        return judge_evidence(stages.evidence(estimate, check, scene))
+        return judge_evidence(stages.evidence(estimate, check, surveys, scene))
 
 
 @contextmanager

@@ -20,6 +20,7 @@ from evidences import (
     refinement,
     scatter,
     scene,
+    survey,
 )
 
 from groundtie.assessment.accuracy import AssessmentEvidence
@@ -33,6 +34,7 @@ from groundtie.errors import (
 )
 from groundtie.geometry.estimation import Estimate
 from groundtie.masks.choice import LAYER, REGIONS, THRESHOLD, MaskUsed
+from groundtie.matching.locked import Sameness
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
 from groundtie.registration.evidence import (
@@ -159,6 +161,22 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(two_thirds(20), scene=PERHAPS),
         evidence(two_thirds(26), scene=PERHAPS),
     ),
+    "part elsewhere": (
+        evidence(GOOD, survey=survey(35, part=14)),
+        evidence(GOOD, survey=survey(46, part=3)),
+    ),
+    "second place nearby": (
+        evidence(GOOD, survey=survey(rival=7.0)),
+        evidence(GOOD, survey=survey(rival=6.6)),
+    ),
+    "weak similarity": (
+        evidence(GOOD, survey=survey(height=2.9)),
+        evidence(GOOD, survey=survey(height=3.1)),
+    ),
+    "pixel-locked content": (
+        evidence(GOOD, survey=survey(), survey_of_rest=survey(5)),
+        evidence(GOOD, survey=survey(), survey_of_rest=survey(20)),
+    ),
     "narrow control": (
         refinement(control((20, -9), corner=0.2), kind="shift"),
         refinement(control((20, -9), corner=0.4), kind="shift"),
@@ -175,6 +193,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "second pose": (pose(height=9.0, rival=5.7), pose(height=9.0, rival=5.5)),
     # Three degrees move corners by 6 px, a degree by 2 px.
     "other pose": (pose(found=Pose(43.0)), pose(found=Pose(41.0))),
+    "pixel-locked pose": (
+        replace(pose(), sameness=Sameness(0.2, 0.01, 0.3, 0.2, 0.05)),
+        replace(pose(), sameness=Sameness(0.2, 0.01, 0.3, 0.5, 0.45)),
+    ),
 }
 
 
@@ -253,6 +275,26 @@ def test_an_oblique_view_needs_more_check_points_on_the_ground(
     errors = scatter(agreeing, 0.3)
     assert refusing(evidence(errors, mask=regions, scene=oblique)) == expected
     assert refusing(evidence(errors, mask=regions)) == []
+
+
+@pytest.mark.parametrize("kind", [REGIONS, LAYER])
+def test_little_ground_may_be_weakly_similar(kind: str) -> None:
+    """A mask leaves little of each chip; other rules judge what it leaves."""
+    weak = survey(height=2.0, rival=0.5)
+    assert refusing(evidence(GOOD, survey=weak, mask=masked(kind))) == []
+
+
+def test_a_part_of_which_half_confirms_is_layover_not_a_part() -> None:
+    found = survey(49, part=14)
+    shifts = found.shifts_px.copy()
+    shifts[:14:2] = 0.0
+    assert refusing(evidence(GOOD, survey=replace(found, shifts_px=shifts))) == []
+
+
+def test_without_locked_content_another_place_must_not_match_better() -> None:
+    rest = survey(20, height=4.0, rival=5.0)
+    found = evidence(GOOD, survey=survey(), survey_of_rest=rest)
+    assert refusing(found) == ["pixel-locked content"]
 
 
 @pytest.mark.parametrize(

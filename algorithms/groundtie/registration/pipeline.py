@@ -26,9 +26,11 @@ from ..matching.guided_fit import GuidedFit
 from ..matching.held_out import HeldOut
 from ..matching.keypoint_fit import KeypointFit
 from ..matching.keypoints import KeypointMatcher
+from ..matching.locked import find_locked_content
 from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
 from ..matching.surface_fit import SurfaceFit
+from ..matching.survey import Survey, survey_model, survey_places
 from ..rasters.pair import Image, ImagePair, make_pair
 from ..rasters.reading import bounded_cache, open_raster
 from ..similarity.surface import SimilaritySettings
@@ -191,10 +193,11 @@ def register(
         context.update(0.4, "matching tie points")
         estimate = stages.fit.estimate(coarse, spec.model, context.part(0.4, 0.8))
         context.update(0.8, "checking with points that took no part")
-        check = stages.check(estimate, context.part(0.8, 1.0))
+        check = stages.check(estimate, context.part(0.8, 0.9))
+        surveys = stages.survey(estimate, context.part(0.9, 1.0))
     except (NothingFoundError, TooFewPointsError) as error:
         return replace(result, verdict=judge_search(SearchEvidence(error)))
-    evidence = stages.evidence(estimate, check, scene)
+    evidence = stages.evidence(estimate, check, surveys, scene)
     return replace(result, verdict=judge(evidence), estimate=estimate, check=check)
 
 
@@ -256,7 +259,28 @@ class Stages:
         model = estimate.transform.model
         return check_model(self.checker, self.held_out.layout, model, context)
 
-    def evidence(self, estimate: Estimate, check: Check, scene: SceneInfo) -> RegistrationEvidence:
+    def survey(self, estimate: Estimate, context: Context) -> tuple[Survey, Survey | None]:
+        """Match chips all over the pair, with what its masks leave, around what was estimated.
+
+        Returns what they show, and what they show without content that is the same in both arrays;
+        None: there is none.
+        """
+        pair, transform = self.masked.pair, estimate.transform
+        chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
+        survey = survey_model(chips, transform.model, context.part(0.0, 0.5))
+        places = survey_places(pair.grid)
+        locked = find_locked_content(pair, transform, places, context.quiet())
+        if locked is None or not locked.sameness.is_evident:
+            return survey, None
+        return survey, survey_model(chips, transform.model, context.part(0.5, 1.0), locked)
+
+    def evidence(
+        self,
+        estimate: Estimate,
+        check: Check,
+        surveys: tuple[Survey, Survey | None],
+        scene: SceneInfo,
+    ) -> RegistrationEvidence:
         """Return what the rules look at."""
         is_pooled = isinstance(self.checker, PooledHistogramMatcher)
         is_apart = self.checker is not self.matcher
@@ -280,6 +304,7 @@ class Stages:
             factor if is_radar else None,
             scene,
             self.masked.used,
+            *surveys,
         )
 
 

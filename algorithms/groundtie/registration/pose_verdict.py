@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
+
+import numpy as np
 
 from ..context import Context
 from ..geometry.limits import SearchLimits
-from ..pose.pose import PoseFound
+from ..matching.locked import Sameness, sameness_near
+from ..pose.pose import Pose, PoseFound
 from ..pose.search import find_poses, moved_px
 from ..rasters.patch import Patch
 from ..similarity.surface import SimilaritySettings
 from .evidence import POSE
 from .verdict import first_refusal
+
+# A pose is a shift if rotation and scale move no corner by more, in pixels: it is no better known.
+_SHIFT_PX = 6.0
 
 
 @dataclass(frozen=True)
@@ -28,11 +34,14 @@ class PoseEvidence:
         Those of an exhaustive search over all rotations, best first.
     shape
         Rows and columns of the reference.
+    sameness
+        How much both have the same where the pose does no more than move the array; None: it does.
     """
 
     found: Sequence[PoseFound]
     exhaustive: Sequence[PoseFound]
     shape: tuple[int, int]
+    sameness: Sameness | None = None
 
     stages: ClassVar = (POSE,)
 
@@ -115,10 +124,21 @@ def judge_pose(
         wide = SearchLimits(limits.radius, 180.0, (min(low, 0.8), max(high, 1.25)))
         everything = find_poses(reference, input, wide, SimilaritySettings(), context)
     rows, cols = reference.values.shape
-    evidence = PoseEvidence(found, everything, (rows, cols))
+    sameness = _sameness(reference, input, found[0].pose) if found else None
+    evidence = PoseEvidence(found, everything, (rows, cols), sameness)
     refusal = first_refusal(evidence)
     height, ratio = evidence.height, evidence.rival_ratio
     if refusal is None:
         return PoseVerdict(True, "no other pose matches nearly as well", height, ratio)
     rule, reason = refusal
     return PoseVerdict(False, reason, height, ratio, rule.name, rule.advice)
+
+
+def _sameness(reference: Patch, input: Patch, pose: Pose) -> Sameness | None:
+    """Return how much two images have the same under a pose; None: it is no shift of the array."""
+    shapes = reference.values.shape, input.values.shape
+    shift = replace(pose, rotation_deg=0.0, scale=1.0)
+    if moved_px(pose, shift, shapes[0]) > _SHIFT_PX:
+        return None
+    offset = np.array(shift.between(*shapes)[2::3], float)
+    return sameness_near(reference, input, np.rint(offset).astype(int))

@@ -1,0 +1,232 @@
+"""Chips all over a pair, matched around a model: parts of the images that lie elsewhere by it.
+
+Points that disagree with a right model fell anywhere. Where neighbours agree with each other on
+another place, that part of an image lies elsewhere: a mosaic, another pass, layover.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+from shapely import MultiPoint, contains_xy
+
+from ..context import Context
+from ..geometry.chance import agreement_probability, log10_chance
+from ..geometry.judging import LARGEST_LOG10_CHANCE, SMALLEST_INLIER_SHARE
+from ..geometry.models import Model
+from ..rasters.grid import Grid
+from ..similarity.peak import find_peak
+from ..similarity.surface import Surface
+from .chips import ChipMatcher
+from .matcher import FloatArray, MaskOf, Places
+
+# Chips lie side by side: so many along the shorter side of the grid if their sides allow it, and no
+# more than so many along any.
+_CHIP_RANGE_PX, _ALONG, _MOST_ALONG = (40, 64), 7, 12
+
+# How far off a part may lie.
+SURVEY_RADIUS_PX = 24
+
+# Chips agree with each other, or with the model, within this distance.
+_SAME_PX = 2.0
+
+_ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
+
+# Expected false alarms (log10) below which chance does not explain a part, and how many chips of it
+# must disagree for each that confirms the model. Measured by the suites real and attacks: parts of
+# true transforms have -1.1 at least; where towns' layover has less, every third chip confirms.
+LOG10_FALSE_ALARMS = -2.0
+LEAST_PROPORTION = 2
+
+# Chips nearer to each other than so many spacings are neighbours: those at a side.
+_NEIGHBOUR_SPACINGS = 1.2
+
+
+@dataclass(frozen=True)
+class Part:
+    """Neighbouring chips that agree with each other on another place than the model has.
+
+    Parameters
+    ----------
+    where
+        In which part of the grid they lie, such as "upper left".
+    shift_px
+        By how much they lie elsewhere, (x, y) in pixels of the grid.
+    chips
+        How many they are.
+    surrounded
+        How many chips lie in their convex hull, they included.
+    confirming
+        How many of those agree with the model.
+    log10_false_alarms
+        log10 of the expected number of such parts if all chips but these agreed by chance.
+    """
+
+    where: str
+    shift_px: tuple[float, float]
+    chips: int
+    surrounded: int
+    confirming: int
+    log10_false_alarms: float
+
+    @property
+    def distance_px(self) -> float:
+        """How far off they lie."""
+        return float(np.hypot(*self.shift_px))
+
+    @property
+    def is_evident(self) -> bool:
+        """Whether chance does not explain it, and the model hardly holds among its chips."""
+        evident = self.log10_false_alarms <= LOG10_FALSE_ALARMS
+        return evident and self.chips >= LEAST_PROPORTION * self.confirming
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Where chips all over a grid match, relative to where a model has them.
+
+    Parameters
+    ----------
+    grid
+        The grid.
+    centres
+        Pixel positions (col, row) of the chips, shape (n, 2).
+    shifts_px
+        Where each matches best, (x, y) from where the model has it, shape (n, 2).
+    spacing_px
+        Distance between neighbours along columns and rows.
+    mean
+        The mean of their similarity surfaces, in robust standard deviations of one of them, shape
+        (2 r + 1, 2 r + 1).
+    """
+
+    grid: Grid
+    centres: NDArray[np.int_]
+    shifts_px: FloatArray
+    spacing_px: FloatArray
+    mean: Surface
+
+    @property
+    def confirming(self) -> int:
+        """How many chips match where the model has them."""
+        return int((np.hypot(*self.shifts_px.T) <= _SAME_PX).sum())
+
+    @property
+    def is_confirming(self) -> bool:
+        """Whether more of them do than would by chance, and a share as of check points does."""
+        count = len(self.centres)
+        chance = log10_chance(
+            self.confirming, count, agreement_probability(_SAME_PX, SURVEY_RADIUS_PX)
+        )
+        enough = self.confirming >= SMALLEST_INLIER_SHARE * count
+        return enough and chance <= LARGEST_LOG10_CHANCE
+
+    @property
+    def height(self) -> float:
+        """How high the chips' similarity is on average where the model has them."""
+        return float(self.mean[self._distance_px <= _SAME_PX].max())
+
+    @property
+    def rival_height(self) -> float:
+        """How high it is where all of them are moved elsewhere, at the best such place."""
+        return float(self.mean[self._distance_px > 2 * _SAME_PX].max())
+
+    @property
+    def _distance_px(self) -> FloatArray:
+        shift = np.arange(-SURVEY_RADIUS_PX, SURVEY_RADIUS_PX + 1)
+        return np.hypot(*np.meshgrid(shift, shift))
+
+    @cached_property
+    def parts(self) -> Sequence[Part]:
+        """Groups of neighbours that agree with each other, not with the model, largest first."""
+        free = np.hypot(*self.shifts_px.T) > 2 * _SAME_PX
+        found = []
+        while free.any():
+            groups = [self._group(int(seed), free) for seed in np.flatnonzero(free)]
+            largest = max(groups, key=len)
+            if len(largest) < 2:
+                break
+            found.append(self._part(largest))
+            free[largest] = False
+        return found
+
+    def _group(self, seed: int, free: NDArray[np.bool_]) -> NDArray[np.int_]:
+        """Return the chips, by number, that are connected to one and lie where it does."""
+        apart = np.hypot(*(self.shifts_px - self.shifts_px[seed]).T)
+        alike = np.flatnonzero(free & (apart <= _SAME_PX))
+        between = np.abs(self.centres[alike][:, None] - self.centres[alike]) / self.spacing_px
+        _, label = connected_components(between.max(axis=-1) <= _NEIGHBOUR_SPACINGS)
+        return alike[label == label[np.searchsorted(alike, seed)]]
+
+    def _part(self, group: NDArray[np.int_]) -> Part:
+        # A corner's chips lie on the hull, whatever the last digit is.
+        hull = MultiPoint(self.centres[group]).convex_hull.buffer(1.0)
+        inside = contains_xy(hull, *self.centres.T)
+        confirming = int((np.hypot(*self.shifts_px[inside].T) <= _SAME_PX).sum())
+        surrounded = int(inside.sum())
+        # About as many parts as boxes of chips may be; one of the chips gives the place.
+        boxes = np.prod([_pairs(len(np.unique(self.centres[:, k]))) for k in (0, 1)])
+        chance = agreement_probability(_SAME_PX, SURVEY_RADIUS_PX)
+        alarms = np.log10(boxes * surrounded) + log10_chance(len(group) - 1, surrounded - 1, chance)
+        shift = np.median(self.shifts_px[group], axis=0)
+        return Part(
+            _where(self.grid, self.centres[group].mean(axis=0)),
+            (float(shift[0]), float(shift[1])),
+            len(group),
+            surrounded,
+            confirming,
+            float(alarms),
+        )
+
+
+def _where(grid: Grid, px: FloatArray) -> str:
+    """Return in which third of a grid along each axis a position (col, row) lies."""
+    size = grid.width, grid.height
+    col, row = (min(int(3 * at / side), 2) for at, side in zip(px, size, strict=True))
+    return " ".join(filter(None, (_ROWS[row], _COLUMNS[col]))) or "middle"
+
+
+def _pairs(count: int) -> int:
+    return count * (count + 1) // 2
+
+
+def survey_places(grid: Grid) -> Places:
+    """Return chips all over a grid, side by side, or farther apart where it is large."""
+    chip = int(np.clip(min(grid.width, grid.height) / _ALONG, *_CHIP_RANGE_PX))
+    cols, rows = np.meshgrid(*(_along(size, chip) for size in (grid.width, grid.height)))
+    return Places(grid, np.column_stack([cols.ravel(), rows.ravel()]), chip)
+
+
+def survey_model(
+    matcher: ChipMatcher, model: Model, context: Context, without: MaskOf | None = None
+) -> Survey:
+    """Match chips all over a pair around what a model on the map predicts.
+
+    Parameters
+    ----------
+    matcher
+        What the chips are matched by.
+    model
+        The model.
+    context
+        Threads and progress.
+    without
+        Returns for a piece of the grid which pixels of the reference are left out; None: none.
+    """
+    grid, places = matcher.pair.grid, survey_places(matcher.pair.grid)
+    blind = replace(matcher, held_out=without)
+    kept, surfaces = blind.match_forward(model, places, SURVEY_RADIUS_PX, context)
+    shifts = np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
+    spacing = [float(np.diff(np.unique(places.centres[:, axis])).max(initial=1)) for axis in (0, 1)]
+    return Survey(grid, kept, shifts, np.array(spacing), surfaces.sum(axis=0) / max(len(kept), 1))
+
+
+def _along(size: int, chip_px: int) -> NDArray[np.int_]:
+    """Return the centres of chips along a side of a grid."""
+    count = int(np.clip(size // chip_px, 1, _MOST_ALONG))
+    return np.rint(np.linspace(chip_px / 2, size - chip_px / 2, count)).astype(int)

@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from affine import Affine
+from raster_files import utm_grid, write_raster
+from textured_pairs import shift_on_map, texture
+
+from groundtie.context import Context
+from groundtie.geometry.models import Frame, Model, PolynomialModel
+from groundtie.geometry.transform import Transform
+from groundtie.matching.locked import LockedContent, find_locked_content
+from groundtie.matching.survey import survey_places
+from groundtie.rasters.pair import Image, make_pair
+from groundtie.rasters.reading import open_raster
+
+SIDE = 320
+
+
+def looked_at(
+    folder: Path,
+    reference: np.ndarray,
+    input: np.ndarray,
+    context: Context,
+    model: Model | None = None,
+) -> LockedContent | None:
+    """Look for content that two arrays of one grid have in common under a model."""
+    grid = utm_grid(SIDE, SIDE)
+    paths = [
+        write_raster(folder / f"{name}.tif", np.rint(2000 + 300 * values).astype(np.uint16), grid)
+        for name, values in (("reference", reference), ("input", input))
+    ]
+    with open_raster(paths[0]) as one, open_raster(paths[1]) as other:
+        pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
+        transform = Transform(model or shift_on_map(0.0, 0.0), pair.grid.crs, other.grid)
+        return find_locked_content(pair, transform, survey_places(pair.grid), context)
+
+
+def drawn_into(values: np.ndarray, offset: tuple[int, int] = (0, 0)) -> np.ndarray:
+    """Return an array with lines drawn at columns and rows, moved by an offset."""
+    made = values.copy()
+    for at in (40, 110, 190, 260):
+        made[at + offset[1] : at + offset[1] + 4] = 8.0
+        made[:, at + offset[0] : at + offset[0] + 4] = 8.0
+    return made
+
+
+def sensed(seed: int, noise: float = 0.4, place: int = 1) -> np.ndarray:
+    """Return one view of a place, with noise of its own."""
+    ground = texture(SIDE, SIDE, place)
+    return ground + noise * np.random.default_rng(seed).normal(size=ground.shape)
+
+
+@pytest.mark.parametrize("offset", [(0, 0), (7, -3)])
+def test_lines_that_are_drawn_over_different_ground_are_found(
+    tmp_path: Path, context: Context, offset: tuple[int, int]
+) -> None:
+    reference, input = drawn_into(sensed(1)), drawn_into(sensed(2, place=9), offset)
+    # The grid has rows from north to south and pixels of 10 m.
+    model = shift_on_map(10.0 * offset[0], -10.0 * offset[1])
+    locked = looked_at(tmp_path, reference, input, context, model)
+    assert locked is not None and locked.sameness.is_evident
+    assert locked.offset_px == offset
+    assert locked.sameness.gradients > 10 * locked.sameness.chance
+
+
+def test_its_mask_covers_the_lines_and_little_else(tmp_path: Path, context: Context) -> None:
+    reference, input = drawn_into(sensed(1)), drawn_into(sensed(2, place=9))
+    locked = looked_at(tmp_path, reference, input, context)
+    assert locked is not None
+    with open_raster(tmp_path / "reference.tif") as one, open_raster(tmp_path / "input.tif") as two:
+        pair = make_pair(Image(one), Image(two), search_radius_m=500.0)
+        grid = one.grid.window(20, 0, 200, 200)
+        mask = LockedContent(pair, locked.offset_px, locked.sameness)(grid)
+    drawn = drawn_into(np.zeros((SIDE, SIDE)))[:200, 20:220] > 0
+    assert mask[drawn].mean() > 0.95
+    assert mask[60:90, 40:70].mean() < 0.2
+
+
+@pytest.mark.parametrize("place", [1, 9])
+def test_views_without_anything_drawn_have_none(
+    tmp_path: Path, context: Context, place: int
+) -> None:
+    locked = looked_at(tmp_path, sensed(1), -sensed(2, place=place), context)
+    assert locked is not None and not locked.sameness.is_evident
+
+
+def test_one_sensors_views_of_one_ground_are_no_such_content(
+    tmp_path: Path, context: Context
+) -> None:
+    """Most gradients are the same; so are reduced images where single pixels are not."""
+    locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
+    assert locked is not None and locked.sameness.gradients > 0.1
+    assert not locked.sameness.is_evident
+
+
+def test_a_copy_is_no_such_content(tmp_path: Path, context: Context) -> None:
+    locked = looked_at(tmp_path, sensed(1), sensed(1), context)
+    assert locked is not None and locked.sameness.gradients > 0.9
+    assert not locked.sameness.is_evident
+
+
+def test_one_pattern_of_noise_over_different_ground_is_found(
+    tmp_path: Path, context: Context
+) -> None:
+    pattern = 2 * np.random.default_rng(5).normal(size=(SIDE, SIDE))
+    reference, input = sensed(1, 0.1) + pattern, sensed(2, 0.1, place=9) + pattern
+    locked = looked_at(tmp_path, reference, input, context)
+    assert locked is not None and locked.sameness.is_evident
+
+
+@pytest.mark.parametrize("side_m", [10.0, 12.0])
+def test_arrays_that_are_resampled_have_none(
+    tmp_path: Path, context: Context, side_m: float
+) -> None:
+    paths = [
+        write_raster(tmp_path / name, (2000 + 300 * sensed(1)).astype(np.uint16), grid)
+        for name, grid in (
+            ("reference.tif", utm_grid(SIDE, SIDE)),
+            ("input.tif", utm_grid(SIDE, SIDE).scaled(side_m / 10.0)),
+        )
+    ]
+    with open_raster(paths[0]) as one, open_raster(paths[1]) as other:
+        pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
+        turned = PolynomialModel(
+            "affine",
+            Frame(Affine.identity()),
+            np.array([[50.0, -30.0], [1e-3, 2e-2], [-2e-2, 1e-3]]),
+        )
+        model = turned if side_m == 10.0 else shift_on_map(0.0, 0.0)
+        transform = Transform(model, pair.grid.crs, other.grid)
+        assert find_locked_content(pair, transform, survey_places(pair.grid), context) is None
