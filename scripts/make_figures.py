@@ -14,6 +14,7 @@ from typing import Any
 import cv2
 import numpy as np
 import rasterio
+from affine import Affine
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Rectangle
@@ -21,9 +22,19 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import groundtie
+from groundtie.arrays import Raster
+from groundtie.context import threads
 from groundtie.geometry.chance import agreement_probability, log10_chance
+from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.matching import belief_propagation
+from groundtie.matching.chips import ChipMatcher
+from groundtie.matching.survey import Survey, survey_model
+from groundtie.rasters.pair import Image as PairImage
+from groundtie.rasters.pair import make_pair
 from groundtie.rasters.patch import Patch
+from groundtie.rasters.reading import open_raster
+from groundtie.similarity.sameness import same_windows
+from groundtie.similarity.surface import SimilaritySettings
 from groundtie.studies.sift_variants import sift_detector
 
 FIGURES = Path(__file__).resolve().parents[1] / "docs" / "figures"
@@ -319,6 +330,46 @@ def verdict(_: Scenes) -> Figure:
     return figure
 
 
+def survey(scenes: Scenes) -> Figure:
+    """Chips of an image of which a part lies off, and content that two images share."""
+    figure, axes = _canvas(8, 3.6, 2)
+    image = 255 * _stretched(_band(scenes.rural() / "input.tif"))
+    moved = image.copy()
+    moved[:, :170] = np.roll(image, (12, -9), (0, 1))[:, :170]
+    found = _surveyed(image, moved)
+    axes[0].imshow(moved, cmap="gray")
+    confirming = np.hypot(*found.shifts_px.T) <= 2
+    apart = np.hypot(*(found.shifts_px - found.parts[0].shift_px).T) <= 2
+    for chosen, colour in ((confirming, BLUE), (apart, ORANGE), (~confirming & ~apart, GREY)):
+        axes[0].plot(*found.centres[chosen].T, ".", color=colour, markersize=5)
+        _arrows(axes[0], found.centres[chosen], found.shifts_px[chosen], 2, colour)
+    axes[0].set_title("the left third lies 15 px off", fontsize=9)
+    other = 255 * _stretched(_band(scenes.speckled() / "input.tif"))
+    places = [of[:300, :300].astype(np.uint8) for of in (image, other)]
+    for place in places:
+        for at in (60, 150, 240):
+            cv2.line(place, (0, at), (299, at - 20), 255.0, 3)
+            cv2.putText(place, "ROAD", (at - 40, at + 30), cv2.FONT_HERSHEY_PLAIN, 1.6, 255.0, 2)
+    patches = [Patch(place.astype(np.float32), np.ones(place.shape, bool)) for place in places]
+    axes[1].imshow(np.hstack(places), cmap="gray")
+    same = np.hstack([same_windows(patches[0], patches[1])] * 2)
+    axes[1].imshow(np.where(same, 1.0, np.nan), cmap="autumn", alpha=0.5)
+    axes[1].set_title("two places, the same drawing", fontsize=9)
+    return figure
+
+
+def _surveyed(reference: FloatArray, input: FloatArray) -> Survey:
+    """Survey two arrays of one place around no shift at all."""
+    rasters = [
+        Raster(image.astype(np.float32), Affine(1, 0, 0, 0, -1, 0), "EPSG:32633")
+        for image in (reference, input)
+    ]
+    with open_raster(rasters[0]) as one, open_raster(rasters[1]) as other, threads() as context:
+        matcher = ChipMatcher(make_pair(PairImage(one), PairImage(other)), SimilaritySettings())
+        none = PolynomialModel("translation", Frame(Affine.identity()), np.zeros((1, 2)))
+        return survey_model(matcher, none, context)
+
+
 DRAWN: Mapping[str, Callable[[Scenes], Figure]] = {
     "architecture": pipeline,
     "method-similarity": similarity,
@@ -329,6 +380,7 @@ DRAWN: Mapping[str, Callable[[Scenes], Figure]] = {
     "method-masks": masks,
     "method-rotation": rotation,
     "method-rpc": rpc,
+    "method-survey": survey,
     "method-verdict": verdict,
 }
 
