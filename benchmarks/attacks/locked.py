@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 from affine import Affine
 
+from groundtie.rasters.grid import compose
+
 from . import effects
 from .catalogue import CONTROLS, LOCKED, Attack, Make, Setting, as_text, direction
 from .overlays import OVERLAYS, Draw
@@ -44,7 +46,7 @@ def placed_right(draw: Draw) -> Make:
         shift = direction(setting.rng, _NEAREST_PX, _FARTHEST_PX)
         moved = pair.moved(shift, f"{as_text(shift)}, rightly georeferenced")
         made = moved.both(draw(moved.reference.shape[1:], setting.rng).change())
-        place = made.reference_transform @ Affine.translation(*-shift)
+        place = compose(made.reference_transform, Affine.translation(*-shift))
         return replace(made, input_transform=place)
 
     return make
@@ -56,7 +58,7 @@ def on_the_map(draw: Draw) -> Make:
     def make(pair: Pair, setting: Setting) -> Pair:
         made = displaced(draw)(pair, setting)
         right, down = (int(n) for n in setting.rng.integers(5, 40, 2))
-        place = made.input_transform @ Affine.translation(right, down)
+        place = compose(made.input_transform, Affine.translation(right, down))
         return replace(
             made,
             input=made.input[:, down:, right:],

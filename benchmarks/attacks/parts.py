@@ -141,9 +141,10 @@ def duplicated_rows(pair: Pair, setting: Setting) -> Pair:
     number = int(rng.integers(7, 20)) * int(rng.choice([-1, 1]))
     at = int(rng.uniform(0.25, 0.75) * rows)
     below = np.arange(rows) >= at
-    down = np.where(below, np.clip(np.arange(rows) - at, 0, abs(number)) * np.sign(number), 0)
-    if number < 0:
-        down = np.where(below, number, 0)
+    down = np.where(below, number, 0)
+    if number > 0 and rng.random() < 0.5:
+        # One row fills all that was lost.
+        down = np.clip(np.arange(rows) - at, 0, number)
     shift = np.column_stack([np.zeros(rows), down])
     note = f"{abs(number)} rows {'twice' if number > 0 else 'missing'} at row {at}"
     return pair.moved(_along_rows(shift, pair.input.shape[1:]), note)

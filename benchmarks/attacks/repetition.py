@@ -100,9 +100,9 @@ def repeating(name: str) -> Make:
             float(rng.choice([5.0, period, 0.6 * length, 0.9 * length, 1.5 * length])),
             _LEAST_RADIUS_PX,
         )
-        note = f"{name} of {period:.1f} px, radius {radius:.1f} px"
+        note = f"{name} of {period:.1f} px"
         made = replace(moved, reference=reference, input=image, note=join(moved.note, note))
-        return made.with_arguments(search_radius=radius)
+        return made.within(radius)
 
     return make
 

@@ -11,13 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from affine import Affine
 from numpy.typing import NDArray
 
 import groundtie
+from groundtie.rasters.grid import compose
 from groundtie.simulation import files
 
 from ..attempt import on_pixels
-from ..cases import SAR_OPTICAL, RealCase, read_cases, read_image
+from ..cases import REFERENCE_TRANSFORM, SAR_OPTICAL, RealCase, read_cases, read_image
 from ..sar_pairs import SarPair
 from ..simulations import simulator_version
 from .pairs import Image, Pair, Source, pixels, render, to_bytes
@@ -30,6 +32,10 @@ _SIDES_PX = (300, 400)
 _MARGIN_PX = 26
 _SIMULATED_PX = _SIDES_PX[1] + 2 * _MARGIN_PX
 _LEAST_SIDE_PX = 220
+
+# Scenes that satellites of medium resolution have seen, and a pixel of theirs.
+_COARSE = ("so-sentinel", "so-cloudy-sentinel", "oo-cloudy-sentinel", "oo-nanjing", "oi-sardinia")
+_COARSE_M = 10.0
 
 # Truths that may be 3 px wrong cannot tell what is 3 px wrong.
 _LARGEST_SIGMA_PX = 2.0
@@ -83,6 +89,8 @@ class Scene:
         side = np.minimum(most, np.maximum(rng.integers(low, high + 1, 2), _LEAST_SIDE_PX))
         first = _corner(source, side, most, rng)
         window = slice(first[1], first[1] + side[1]), slice(first[0], first[0] + side[0])
+        scale = Affine.scale(_COARSE_M if self.name.startswith(_COARSE) else 1.0)
+        place = compose(REFERENCE_TRANSFORM, scale)
         empty = np.zeros((1, side[1], side[0]), np.uint8)
         pair = Pair(
             source.reference[:, window[0], window[1]],
@@ -93,6 +101,8 @@ class Scene:
             source,
             (int(first[0]), int(first[1])),
             f"{self.place} {seed if self.case is None else ''}",
+            place,
+            place,
         )
         return pair.moved(np.zeros(2))
 

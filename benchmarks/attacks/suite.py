@@ -9,8 +9,12 @@ import numpy as np
 
 from ..accuracy import REFUSED, SILENTLY_WRONG, VERDICTS
 from ..suites import Goal, Settings, SuiteResult, Table, run_cases
-from .cases import AttackCase, AttackOutcome, cases, find, named
+from .cases import AttackCase, cases, named
 from .catalogue import CONTROLS
+from .sensors import SensorCase
+from .tries import AttackOutcome
+
+AnyCase = AttackCase | SensorCase
 
 _WANTED_RUNS = 3000
 _MOST_SEEDS = 8
@@ -21,7 +25,7 @@ def run(settings: Settings) -> SuiteResult:
     chosen = choose(settings)
     if settings.save is not None:
         for case in chosen:
-            case.make().save(settings.save / case.name.replace("/", "_").replace(" ", "-"))
+            case.save(settings.save / case.name.replace("/", "_").replace(" ", "-"))
     outcomes: list[AttackOutcome] = list(run_cases(chosen, settings.jobs))
     attacks = [o for o in outcomes if o.group != CONTROLS]
     controls = [o for o in outcomes if o.group == CONTROLS]
@@ -47,7 +51,7 @@ def run(settings: Settings) -> SuiteResult:
     )
 
 
-def choose(settings: Settings) -> list[AttackCase]:
+def choose(settings: Settings) -> list[AnyCase]:
     """Return the cases that settings ask for."""
     if settings.case:
         return [named(settings.case, settings.data, settings.cache)]
@@ -62,12 +66,11 @@ def choose(settings: Settings) -> list[AttackCase]:
     return every if wanted is None else sample(every, wanted, settings.quick)
 
 
-def _is_of(case: AttackCase, classes: Sequence[str]) -> bool:
-    group = find(case.attack, case.variant).group
-    return any(name in (case.attack, group) for name in classes)
+def _is_of(case: AnyCase, classes: Sequence[str]) -> bool:
+    return any(name in (case.attack, case.group) for name in classes)
 
 
-def sample(every: Sequence[AttackCase], number: int, of_each: bool = False) -> list[AttackCase]:
+def sample(every: Sequence[AnyCase], number: int, of_each: bool = False) -> list[AnyCase]:
     """Return some cases: of every class about as many, but drawn by a seed.
 
     Parameters
