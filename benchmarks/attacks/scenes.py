@@ -19,7 +19,7 @@ from groundtie.rasters.grid import compose
 from groundtie.simulation import files
 
 from ..attempt import on_pixels
-from ..cases import REFERENCE_TRANSFORM, SAR_OPTICAL, RealCase, read_cases, read_image
+from ..cases import REFERENCE_TRANSFORM, SAR_OPTICAL, RealCase, image_size, read_cases, read_image
 from ..sar_pairs import SarPair
 from ..simulations import simulator_version
 from .pairs import Image, Pair, Source, pixels, render, to_bytes
@@ -31,7 +31,7 @@ DENSITIES = ("rural", "suburban", "urban", "city")
 _SIDES_PX = (300, 400)
 _MARGIN_PX = 26
 _SIMULATED_PX = _SIDES_PX[1] + 2 * _MARGIN_PX
-_LEAST_SIDE_PX = 220
+_LEAST_SIDE_PX = 200
 
 # Scenes that satellites of medium resolution have seen, and a pixel of theirs.
 _COARSE = ("so-sentinel", "so-cloudy-sentinel", "oo-cloudy-sentinel", "oo-nanjing", "oi-sardinia")
@@ -70,7 +70,7 @@ class Scene:
     @property
     def density(self) -> str:
         """How densely a simulated scene is built up; empty for real ones."""
-        return self.name.split("-", 1)[1] if self.case is None else ""
+        return self.name.partition("-")[2] if self.case is None else ""
 
     def source(self, seed: int, cache: Path) -> Source:
         """Return the whole scene; simulated ones are made unless the folder `cache` has them."""
@@ -127,7 +127,8 @@ def scenes(data: Path) -> tuple[Scene, ...]:
     real = [
         Scene(case.name, case.kind, case.sigma_px, case)
         for case in read_cases(data)
-        if case.sigma_px <= _LARGEST_SIGMA_PX and case.name not in ("oo-burn",)
+        if case.sigma_px <= _LARGEST_SIGMA_PX
+        and min(image_size(case.reference)) >= _LEAST_SIDE_PX + 2 * _MARGIN_PX
     ]
     simulated = [Scene(f"sim-{density}", SAR_OPTICAL) for density in DENSITIES]
     radar = [Scene(f"simss-{density}", SAR_SAR) for density in DENSITIES[:3]]
