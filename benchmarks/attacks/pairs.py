@@ -112,6 +112,28 @@ class Pair:
         shown = np.where(known[..., None], shown, np.nan)
         return replace(self, input=image, shown=shown, note=join(self.note, note))
 
+    def swapped(self) -> Pair:
+        """Return the pair with the images' roles exchanged; each keeps its georeferencing."""
+        columns, rows = self.reference.shape[2], self.reference.shape[1]
+        shown = np.full((rows, columns, 2), np.nan)
+        known = np.isfinite(self.shown).all(axis=-1)
+        at, place = pixels(self.size)[known], self.shown[known]
+        near = np.rint(place).astype(int)
+        inside = ((near >= 0) & (near < [columns, rows])).all(axis=1)
+        at, place, near = at[inside], place[inside], near[inside]
+        shown[near[:, 1], near[:, 0]] = at + (near - place)
+        return replace(
+            self,
+            reference=self.input,
+            input=self.reference,
+            shown=shown,
+            reference_transform=self.input_transform,
+            input_transform=self.reference_transform,
+            reference_crs=self.input_crs,
+            input_crs=self.reference_crs,
+            note=join(self.note, "reference and input exchanged"),
+        )
+
     def changed(self, reference: Change | None, input: Change | None, note: str = "") -> Pair:
         """Return the pair with changed grey values; what holds no data stays so."""
         images = (

