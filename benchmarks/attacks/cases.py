@@ -19,7 +19,7 @@ from ..accuracy import CORRECT, SILENTLY_WRONG, classify
 from ..cases import SAR_OPTICAL
 from ..rotated_pairs import LARGEST_ERROR_PX
 from . import examples, ground, locked, noise, parts, placement, repetition
-from .catalogue import Attack, Setting
+from .catalogue import DRAWS, LOCKED, Attack, Setting
 from .pairs import Pair
 from .scenes import SAR_SAR, Scene, scenes
 from .sensors import SensorCase, sensor_cases
@@ -41,6 +41,9 @@ POSES = "estimate_rotation"
 _POSE_SIDE_PX = 256
 _POSE_LIMITS = {kind.removesuffix("-rotated"): limit for kind, limit in LARGEST_ERROR_PX.items()}
 _OTHER_POSE_LIMIT = min(_POSE_LIMITS.values())
+
+# Controls with overlays.
+_HALVED = ("overlay on aligned ground",)
 
 # How often a tool is told how far to search, though the attack does not need it, and how far.
 _WITH_RADIUS = 0.4
@@ -153,11 +156,15 @@ def named(name: str, data: Path, cache: Path) -> AttackCase | SensorCase:
 
 
 def cases(seeds: Sequence[int], data: Path, cache: Path) -> list[AttackCase | SensorCase]:
-    """Return the cases: each seed draws a scene for each attack, which is tried on all tools."""
+    """Return the cases: each seed draws scenes for each attack, which is tried on all tools."""
     made: list[AttackCase | SensorCase] = list(sensor_cases(seeds, cache))
     every = all_scenes(data)
     for seed in seeds:
-        for attack in ATTACKS:
+        for number, attack in enumerate(ATTACKS):
+            # Overlays are many: each seed has every other.
+            is_overlay = attack.group == LOCKED or attack.name in _HALVED
+            if (is_overlay and (number + seed) % 2) or (attack.is_example and seed != seeds[0]):
+                continue
             key = zlib.crc32(f"{attack.group}/{attack.name}/{attack.variant}".encode())
             rng = np.random.default_rng((key, seed))
             fitting = [
@@ -165,12 +172,12 @@ def cases(seeds: Sequence[int], data: Path, cache: Path) -> list[AttackCase | Se
                 for scene in every.values()
                 if attack.fits(scene) and examples.is_example(scene) == attack.is_example
             ]
-            if not fitting or (attack.is_example and seed != seeds[0]):
-                continue
-            scene = draw_scene(fitting, rng)
+            draws = DRAWS.get(attack.group, 1) if fitting else 0
+            names = dict.fromkeys(draw_scene(fitting, rng).name for _ in range(draws))
             made += [
-                AttackCase(attack.name, attack.variant, scene.name, tool, seed, data, cache)
-                for tool in tools_of(scene.kind)
+                AttackCase(attack.name, attack.variant, name, tool, seed, data, cache)
+                for name in names
+                for tool in tools_of(every[name].kind)
             ]
     return made
 

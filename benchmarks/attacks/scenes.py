@@ -37,6 +37,9 @@ _LEAST_SIDE_PX = 200
 _COARSE = ("so-sentinel", "so-cloudy-sentinel", "oo-cloudy-sentinel", "oo-nanjing", "oi-sardinia")
 _COARSE_M = 10.0
 
+# Seeds of further simulated scenes of a kind: far from one another, odd, so that looks differ.
+_FURTHER_SEEDS = 1001
+
 # Truths that may be 3 px wrong cannot tell what is 3 px wrong.
 _LARGEST_SIGMA_PX = 2.0
 
@@ -70,7 +73,7 @@ class Scene:
     @property
     def density(self) -> str:
         """How densely a simulated scene is built up; empty for real ones."""
-        return self.name.partition("-")[2] if self.case is None else ""
+        return self.name.partition("-")[2].rstrip("23") if self.case is None else ""
 
     def source(self, seed: int, cache: Path) -> Source:
         """Return the whole scene; simulated ones are made unless the folder `cache` has them."""
@@ -78,7 +81,8 @@ class Scene:
             return Source(
                 *_real(self.case.reference, self.case.input), self.case.reference_to_input
             )
-        return _simulated(self.kind, self.density, seed, cache)
+        further = int(self.name[-1]) if self.name[-1].isdigit() else 0
+        return _simulated(self.kind, self.density, seed + _FURTHER_SEEDS * further, cache)
 
     def pair(self, seed: int, cache: Path) -> Pair:
         """Return a window, the same for the same seed, whose ground lies as the images claim."""
@@ -130,7 +134,8 @@ def scenes(data: Path) -> tuple[Scene, ...]:
         if case.sigma_px <= _LARGEST_SIGMA_PX
         and min(image_size(case.reference)) >= _LEAST_SIDE_PX + 2 * _MARGIN_PX
     ]
-    simulated = [Scene(f"sim-{density}", SAR_OPTICAL) for density in DENSITIES]
+    names = (*DENSITIES, "city2", "city3", "urban2", "suburban2")
+    simulated = [Scene(f"sim-{name}", SAR_OPTICAL) for name in names]
     radar = [Scene(f"simss-{density}", SAR_SAR) for density in DENSITIES[:3]]
     return (*real, *simulated, *radar)
 

@@ -91,7 +91,8 @@ def sample(every: Sequence[AnyCase], number: int, of_each: bool = False) -> list
         turn[case.attack] += 1
     if of_each:
         return [every[index] for rank, index in ranked if rank < number]
-    return [every[index] for _, index in sorted(sorted(ranked)[:number], key=lambda pair: pair[1])]
+    # One of each class first, so that what was run until somebody stops is a sample, too.
+    return [every[index] for _, index in sorted(ranked)[:number]]
 
 
 def goals(attacks: Sequence[AttackOutcome]) -> tuple[Goal, ...]:
