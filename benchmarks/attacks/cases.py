@@ -42,6 +42,9 @@ _POSE_SIDE_PX = 256
 _POSE_LIMITS = {kind.removesuffix("-rotated"): limit for kind, limit in LARGEST_ERROR_PX.items()}
 _OTHER_POSE_LIMIT = min(_POSE_LIMITS.values())
 
+# Errors in columns and rows of a root mean square σ lie within this times σ in 90 of 100.
+_CE90_PER_RMS = math.sqrt(math.log(10))
+
 # Controls with overlays.
 _HALVED = ("overlay on aligned ground",)
 
@@ -101,7 +104,7 @@ class AttackCase:
         def call() -> Any:
             return getattr(groundtie, self.tool)(*pair.rasters(), workers=workers, **arguments)
 
-        result, outcome = attempted(self, pair.kind, pair.note, call)
+        result, outcome = attempted(self, pair.kind, pair.sigma_px, pair.note, call)
         if result is None:
             return outcome
         error_px, rmse_px = pair.errors_px(result.transform)
@@ -120,10 +123,11 @@ class AttackCase:
 
 def judge(tool: str, pair: Pair, error_px: float) -> str:
     """Return what an accepted result is; a pose is a start, and right or wrong."""
+    believed = pair.sigma_px * _CE90_PER_RMS
     if tool != POSES:
-        return classify(True, error_px, pair.sigma_px)
+        return classify(True, error_px, believed)
     limit = _POSE_LIMITS.get(pair.kind, _OTHER_POSE_LIMIT) * max(pair.size) / _POSE_SIDE_PX
-    return CORRECT if error_px <= max(limit, pair.sigma_px + 1) else SILENTLY_WRONG
+    return CORRECT if error_px <= limit + believed else SILENTLY_WRONG
 
 
 @lru_cache

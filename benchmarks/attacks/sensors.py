@@ -164,7 +164,7 @@ class SensorCase:
                     workers=workers,
                 )
 
-            result, outcome = attempted(self, "rpc", "", call)
+            result, outcome = attempted(self, "rpc", 0.0, "", call)
             outcome = replace(outcome, seconds=time.perf_counter() - started)
             if result is None:
                 return outcome

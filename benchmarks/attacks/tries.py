@@ -26,6 +26,8 @@ class AttackOutcome:
         Which case.
     verdict
         One of `accuracy.VERDICTS`; `ACCEPTED` until it is judged.
+    sigma_px
+        How far the truth can be believed.
     error_px, rmse_px
         What 90 % of the errors do not exceed, and their root mean square; NaN if refused.
     claimed_ce90_px
@@ -47,6 +49,7 @@ class AttackOutcome:
     tool: str
     seed: int
     verdict: str
+    sigma_px: float
     error_px: float
     rmse_px: float
     claimed_ce90_px: float
@@ -89,7 +92,7 @@ class Named(Protocol):
 
 
 def attempted(
-    case: Named, kind: str, note: str, call: Callable[[], Any]
+    case: Named, kind: str, sigma_px: float, note: str, call: Callable[[], Any]
 ) -> tuple[Any, AttackOutcome]:
     """Call a tool; return its result, None if there is none, and the outcome before it is judged.
 
@@ -97,7 +100,7 @@ def attempted(
     ----------
     case
         What is tried.
-    kind, note
+    kind, sigma_px, note
         Of its pair.
     call
         Calls the tool.
@@ -127,6 +130,7 @@ def attempted(
         case.tool,
         case.seed,
         verdict,
+        sigma_px,
         math.nan,
         math.nan,
         math.nan,
