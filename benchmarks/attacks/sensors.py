@@ -34,7 +34,8 @@ TOOLS = ("refine_rpc", "extract_gcps")
 _SIDES_PX = (420, 560)
 _SHIFT_M = 40.0
 
-# Of an image's bands: what it is changed to, and by how much content moved at positions (n, 2).
+# Of an image's bands: what it is changed to, and by how much content moved at positions (n, 2);
+# NaN: it is no longer shown.
 Moved = Callable[[FloatArray], FloatArray]
 Change = Callable[[Image, np.random.Generator], tuple[Image, Moved]]
 
@@ -63,7 +64,8 @@ def lower_part(image: Image, rng: np.random.Generator) -> tuple[Image, Moved]:
     made[:, first:] = moved[:, first:]
 
     def by(px: FloatArray) -> FloatArray:
-        return np.where((px[:, 1] + down >= first)[:, None], np.array([right, down]), 0.0)
+        moved, kept = (px[:, 1] + down >= first)[:, None], (px[:, 1] < first)[:, None]
+        return np.where(moved, np.array([right, down]), np.where(kept, 0.0, np.nan))
 
     return made, by
 
@@ -169,6 +171,7 @@ class SensorCase:
             if result is None:
                 return outcome
             off = np.hypot(*errors_px(scene, output, moved).T)
+            off = off[np.isfinite(off)]
         error_px = float(np.percentile(off, ERROR_PERCENTILE))
         return replace(
             outcome,
