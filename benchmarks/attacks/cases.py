@@ -91,8 +91,9 @@ class AttackCase:
         pair = every[self.scene].pair(self.seed, self.cache)
         others = [scene for name, scene in every.items() if not examples.is_example(scene)]
         setting = Setting(rng, others, self.cache)
-        made = find(self.attack, self.variant).make(pair, setting)
-        if made.radius_px is None and rng.random() < _WITH_RADIUS:
+        attack = find(self.attack, self.variant)
+        made = attack.make(pair, setting)
+        if made.radius_px is None and not attack.is_example and rng.random() < _WITH_RADIUS:
             made = made.within(float(rng.uniform(*_RADII_PX)))
         return made
 
