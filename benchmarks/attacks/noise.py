@@ -121,7 +121,10 @@ def no_city(scene: Scene) -> bool:
 
 
 ATTACKS = [
-    Attack(NOISE, "40 to 90 grey levels over a town", "", noisy(gaussian), built_up),
+    *(
+        Attack(NOISE, "40 to 90 grey levels over a town", f"{n}", noisy(gaussian), built_up)
+        for n in range(3)
+    ),
     *(Attack(NOISE, name, "", noisy(draw)) for name, draw in _NOISES.items()),
     Attack(NOISE, "40 to 90 grey levels on the input", "", noisy_input),
     Attack(CITIES, "dense city", "", plain, is_city),

@@ -29,8 +29,9 @@ DENSITIES = ("rural", "suburban", "urban", "city")
 
 # Sides of the windows in pixels, and what is kept free around them for what lies elsewhere.
 _SIDES_PX = (300, 400)
+_SIMULATED_SIDES_PX = (320, 480)
 _MARGIN_PX = 26
-_SIMULATED_PX = _SIDES_PX[1] + 2 * _MARGIN_PX
+_SIMULATED_PX = _SIMULATED_SIDES_PX[1] + 2 * _MARGIN_PX
 _LEAST_SIDE_PX = 200
 
 # Scenes that satellites of medium resolution have seen, and a pixel of theirs.
@@ -89,7 +90,7 @@ class Scene:
         source = self.source(seed, cache)
         rng = np.random.default_rng((zlib.crc32(self.name.encode()), seed))
         most = np.array(source.reference.shape[:0:-1]) - 2 * _MARGIN_PX
-        low, high = _SIDES_PX
+        low, high = _SIDES_PX if self.case is not None else _SIMULATED_SIDES_PX
         side = np.minimum(most, np.maximum(rng.integers(low, high + 1, 2), _LEAST_SIDE_PX))
         first = _corner(source, side, most, rng)
         window = slice(first[1], first[1] + side[1]), slice(first[0], first[0] + side[0])
