@@ -58,7 +58,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     attacks = parser.add_argument_group("attacks", "what the suite attacks runs")
     attacks.add_argument("--sample", type=int, help="so many cases, of every class about as many")
     attacks.add_argument(
-        "--classes", type=_names, default=(), help="classes or groups of classes, by their names"
+        "--classes", nargs="+", default=(), help="classes or groups of classes, by their names"
     )
     attacks.add_argument("--case", default="", help="one case, by the name that a table gives")
     attacks.add_argument("--save", type=Path, help="folder for the images of what is run")
@@ -74,10 +74,6 @@ def _seeds(text: str) -> tuple[int, int]:
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"{text!r} is neither a number nor A-B") from error
     return seeds[0], seeds[1] - seeds[0] + 1
-
-
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in text.split(","))
 
 
 def _suite_names(text: str) -> tuple[str, ...]:
@@ -130,7 +126,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         HERE / ".cache",
         first_seed,
         options.sample,
-        options.classes,
+        tuple(options.classes),
         options.case,
         options.save,
     )

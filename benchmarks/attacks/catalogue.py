@@ -75,6 +75,10 @@ EXAMPLES = "examples"
 SENSOR = "images with RPCs"
 
 
+# How many scenes a seed draws for each attack of a group, if not one.
+DRAWS = {PARTS: 2, NOISE: 3, CITIES: 3, REPETITION: 3, GROUND: 2, PLACEMENT: 2}
+
+
 def direction(rng: np.random.Generator, low: float, high: float) -> np.ndarray:
     """Return a shift (right, down) of a length between two limits, in any direction."""
     angle, length = rng.uniform(0, 2 * np.pi), rng.uniform(low, high)

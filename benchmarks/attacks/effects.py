@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from .overlays import OVERLAYS, Canvas, Overlay, overlay, smooth_noise
 from .pairs import NODATA, Change
@@ -218,9 +219,8 @@ def snow_cover(shape: Shape, rng: np.random.Generator) -> Overlay:
 def parcels(shape: Shape, rng: np.random.Generator) -> Overlay:
     """Draw a cadastre: irregular polygons over all of the image."""
     seeds = rng.uniform(0, shape, (int(rng.integers(40, 200)), 2))
-    rows, columns = np.indices(shape)
-    away = (rows[..., None] - seeds[:, 0]) ** 2 + (columns[..., None] - seeds[:, 1]) ** 2
-    cell = np.argmin(away, axis=-1).astype(np.float32)
+    _, nearest = cKDTree(seeds).query(np.moveaxis(np.indices(shape), 0, -1))
+    cell = nearest.astype(np.float32)
     edge = cv2.dilate(cell, np.ones((2, 2))) != cv2.erode(cell, np.ones((2, 2)))
     return Overlay(np.full(shape, float(rng.choice([0, 255]))), edge * rng.uniform(0.6, 1.0))
 

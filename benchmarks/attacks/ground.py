@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..cases import SAR_OPTICAL
 from .catalogue import GROUND, Attack, Make, Setting, as_text, direction
 from .effects import snow_cover
-from .overlays import cloud_deck, smooth_noise
+from .overlays import Overlay, cloud_deck, smooth_noise
 from .pairs import Change, Image, Pair, to_bytes
 from .scenes import SAR_SAR, Scene
 
@@ -124,6 +124,20 @@ def moving_clouds(pair: Pair, setting: Setting) -> Pair:
     return moved.changed(deck.change(), deck.change(*(int(n) for n in wind)), note)
 
 
+def water_moved(pair: Pair, setting: Setting) -> Pair:
+    """A river or shore moved as a whole, by other than the ground lies off."""
+    rng, shape = setting.rng, pair.input.shape[1:]
+    shift, by = direction(rng, 0.0, 10.0), np.rint(direction(rng, 8.0, 20.0)).astype(int)
+    moved = pair.moved(shift, as_text(shift))
+    noise = smooth_noise(shape, float(rng.uniform(18, 45)), rng)
+    water = np.abs(noise) < rng.uniform(0.15, 0.5) if rng.random() < 0.5 else noise > 0.4
+    grey = float(rng.choice([20, 45]))
+    drawn = Overlay(grey + 5 * rng.normal(size=shape), water.astype(float))
+    right, down = (int(n) for n in np.rint(shift + by))
+    note = f"water moved by ({by[0]:+d}, {by[1]:+d}) px against the ground"
+    return moved.changed(drawn.change(), drawn.change(right, down), note)
+
+
 def self_copy(pair: Pair, setting: Setting) -> Pair:
     """One band of the input is the reference itself; the others show ground that lies off."""
     rng = setting.rng
@@ -168,6 +182,7 @@ ATTACKS = [
         Attack(GROUND, name, "", changed(draw), no_radar_input)
         for name, draw in _INPUT_ONLY.items()
     ),
+    Attack(GROUND, "water moved", "", water_moved),
     Attack(GROUND, "moving clouds", "", moving_clouds, camera_only),
     Attack(GROUND, "reference in one band", "", self_copy),
     Attack(GROUND, "reference shines through", "", half_transparent_copy),

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 from affine import Affine
+from numpy.typing import NDArray
 
-from . import effects
+from groundtie.rasters.grid import compose
+
+from . import cartography, effects
 from .catalogue import CONTROLS, LOCKED, Attack, Make, Setting, as_text, direction
 from .overlays import OVERLAYS, Draw
-from .pairs import Pair
+from .pairs import Change, Pair
 from .scenes import elsewhere
 
 _NEAREST_PX, _FARTHEST_PX = 8.0, 25.0
@@ -44,7 +48,7 @@ def placed_right(draw: Draw) -> Make:
         shift = direction(setting.rng, _NEAREST_PX, _FARTHEST_PX)
         moved = pair.moved(shift, f"{as_text(shift)}, rightly georeferenced")
         made = moved.both(draw(moved.reference.shape[1:], setting.rng).change())
-        place = made.reference_transform @ Affine.translation(*-shift)
+        place = compose(made.reference_transform, Affine.translation(*-shift))
         return replace(made, input_transform=place)
 
     return make
@@ -56,7 +60,7 @@ def on_the_map(draw: Draw) -> Make:
     def make(pair: Pair, setting: Setting) -> Pair:
         made = displaced(draw)(pair, setting)
         right, down = (int(n) for n in setting.rng.integers(5, 40, 2))
-        place = made.input_transform @ Affine.translation(right, down)
+        place = compose(made.input_transform, Affine.translation(right, down))
         return replace(
             made,
             input=made.input[:, down:, right:],
@@ -73,9 +77,9 @@ def at_an_offset(draw: Draw) -> Make:
 
     def make(pair: Pair, setting: Setting) -> Pair:
         rng = setting.rng
-        shift, other = direction(rng, 0.0, 15.0), np.rint(direction(rng, 4.0, 15.0))
+        shift, other = direction(rng, 0.0, 20.0), np.rint(direction(rng, 1.0, 15.0))
         while np.hypot(*(shift - other)) < _NEAREST_PX:
-            shift, other = direction(rng, 0.0, 15.0), np.rint(direction(rng, 4.0, 15.0))
+            shift, other = direction(rng, 0.0, 20.0), np.rint(direction(rng, 1.0, 15.0))
         moved = pair.moved(shift, as_text(shift))
         drawn = draw(moved.reference.shape[1:], rng)
         right, down = (int(n) for n in other)
@@ -83,6 +87,30 @@ def at_an_offset(draw: Draw) -> Make:
         return moved.changed(drawn.change(), drawn.change(right, down), note)
 
     return make
+
+
+def restyled(draw: Draw) -> Make:
+    """What is locked has other colours in the input, and both were compressed."""
+
+    def make(pair: Pair, setting: Setting) -> Pair:
+        rng = setting.rng
+        shift = direction(rng, _NEAREST_PX, _FARTHEST_PX)
+        moved = pair.moved(shift, as_text(shift))
+        drawn = draw(moved.reference.shape[1:], rng)
+        other = replace(drawn, values=np.clip(rng.choice([0, 255]) - drawn.values, 0, 255))
+        other = replace(other, alpha=drawn.alpha * rng.uniform(0.6, 1.0))
+        made = moved.changed(drawn.change(), other.change(), "other colours, compressed")
+        return made.changed(*(_compressed(int(rng.integers(30, 85))) for _ in range(2)))
+
+    return make
+
+
+def _compressed(quality: int) -> Change:
+    def compress(band: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        _, code = cv2.imencode(".jpg", band, [cv2.IMWRITE_JPEG_QUALITY, quality])
+        return np.asarray(cv2.imdecode(code, cv2.IMREAD_GRAYSCALE))
+
+    return effects.each_band(compress).change()
 
 
 def aligned(draw: Draw) -> Make:
@@ -100,7 +128,14 @@ _WAYS = {
     "rightly placed": placed_right,
     "on the map": on_the_map,
     "at an offset": at_an_offset,
+    "restyled": restyled,
 }
+
+# What cannot be done to a function of the whole array.
+_OVERLAYS_ONLY = ("at an offset", "restyled")
+
+# Where more is put in the list of overlays.
+_DRAWN_IN = (effects, cartography)
 
 # What moves with the array only if it is no function of the image: see `effects`.
 ATTACKS = [
@@ -108,7 +143,7 @@ ATTACKS = [
         Attack(LOCKED, name, variant, way(draw))
         for name, draw in OVERLAYS.items()
         for variant, way in _WAYS.items()
-        if variant != "at an offset" or name not in effects.OF_THE_ARRAY
+        if variant not in _OVERLAYS_ONLY or name not in effects.OF_THE_ARRAY
     ),
     *(
         Attack(CONTROLS, "overlay on aligned ground", name, aligned(draw))

@@ -78,6 +78,17 @@ def noisy(draw: Draw) -> Make:
     return make
 
 
+def noisy_input(pair: Pair, setting: Setting) -> Pair:
+    """The input alone has noise of 40 to 90 grey levels."""
+    moved = plain(pair, setting)
+    return moved.changed(None, gaussian(moved.input, setting.rng))
+
+
+def exchanged(pair: Pair, setting: Setting) -> Pair:
+    """The camera's image is the reference."""
+    return plain(pair, setting).swapped()
+
+
 def built_up(scene: Scene) -> bool:
     """Whether walls and roofs are what noise leaves."""
     return scene.density in ("suburban", "urban") or scene.name in (
@@ -110,10 +121,17 @@ def no_city(scene: Scene) -> bool:
 
 
 ATTACKS = [
-    Attack(NOISE, "40 to 90 grey levels over a town", "", noisy(gaussian), built_up),
+    *(
+        Attack(NOISE, "40 to 90 grey levels over a town", f"{n}", noisy(gaussian), built_up)
+        for n in range(3)
+    ),
     *(Attack(NOISE, name, "", noisy(draw)) for name, draw in _NOISES.items()),
+    Attack(NOISE, "40 to 90 grey levels on the input", "", noisy_input),
     Attack(CITIES, "dense city", "", plain, is_city),
+    Attack(CITIES, "dense city", "exchanged", exchanged, is_city),
+    Attack(CITIES, "dense city", "haze", noisy(haze), is_city),
     Attack(CITIES, "dense city", "rightly placed", untouched, is_city),
     *(Attack(CONTROLS, "ground elsewhere", f"{n}", plain, no_city) for n in range(4)),
+    *(Attack(CONTROLS, "images exchanged", f"{n}", exchanged, no_city) for n in range(2)),
     *(Attack(CONTROLS, "aligned ground", f"{n}", untouched, no_city) for n in range(4)),
 ]

@@ -189,9 +189,11 @@ def caption_strip(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
     canvas = Canvas(shape)
     rows, columns = shape
     height = int(rng.integers(35, 80))
-    canvas.box((0, rows - height), (columns, rows), int(rng.choice([1, 20, 255])))
+    ground = int(rng.choice([1, 20, 255]))
+    canvas.box((0, rows - height), (columns, rows), ground)
     for line, words in enumerate(_CAPTIONS):
-        canvas.text(words, (8, rows - height + 16 + 19 * line), 230 - 200 * (height > 70), 0.55, 0)
+        at = (8, rows - height + 16 + 19 * line)
+        canvas.text(words, at, 20 if ground > 128 else 230, 0.55, 0)
     if rng.random() < 0.5:
         canvas.box((0, 0), (columns, 26), 60)
         for left in range(6, columns - 20, 28):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -71,8 +70,8 @@ class Pair:
         What is shown.
     reference_transform, input_transform, reference_crs, input_crs
         What the georeferencing claims.
-    arguments
-        For the tool, where it takes them.
+    radius_px
+        How far the tool is to search, where it can be asked to; None: as far as it does by itself.
     note
         What was drawn, for people.
     """
@@ -89,7 +88,7 @@ class Pair:
     input_transform: Affine = REFERENCE_TRANSFORM
     reference_crs: str = CRS
     input_crs: str = CRS
-    arguments: Mapping[str, Any] = field(default_factory=dict)
+    radius_px: float | None = None
     note: str = ""
 
     @property
@@ -113,6 +112,28 @@ class Pair:
         shown = np.where(known[..., None], shown, np.nan)
         return replace(self, input=image, shown=shown, note=join(self.note, note))
 
+    def swapped(self) -> Pair:
+        """Return the pair with the images' roles exchanged; each keeps its georeferencing."""
+        columns, rows = self.reference.shape[2], self.reference.shape[1]
+        shown = np.full((rows, columns, 2), np.nan)
+        known = np.isfinite(self.shown).all(axis=-1)
+        at, place = pixels(self.size)[known], self.shown[known]
+        near = np.rint(place).astype(int)
+        inside = ((near >= 0) & (near < [columns, rows])).all(axis=1)
+        at, place, near = at[inside], place[inside], near[inside]
+        shown[near[:, 1], near[:, 0]] = at + (near - place)
+        return replace(
+            self,
+            reference=self.input,
+            input=self.reference,
+            shown=shown,
+            reference_transform=self.input_transform,
+            input_transform=self.reference_transform,
+            reference_crs=self.input_crs,
+            input_crs=self.reference_crs,
+            note=join(self.note, "reference and input exchanged"),
+        )
+
     def changed(self, reference: Change | None, input: Change | None, note: str = "") -> Pair:
         """Return the pair with changed grey values; what holds no data stays so."""
         images = (
@@ -129,9 +150,16 @@ class Pair:
         """Return the pair with the same change made to both images."""
         return self.changed(change, change, note)
 
-    def with_arguments(self, **arguments: Any) -> Pair:
-        """Return the pair with further arguments for the tool."""
-        return replace(self, arguments={**self.arguments, **arguments})
+    def within(self, radius_px: float) -> Pair:
+        """Return the pair with a radius for the tool."""
+        note = join(self.note, f"radius {radius_px:.1f} px")
+        return replace(self, radius_px=radius_px, note=note)
+
+    def arguments(self) -> dict[str, float]:
+        """Return the arguments for a tool that can be told how far to search."""
+        if self.radius_px is None:
+            return {}
+        return {"search_radius": self.radius_px * self.reference_transform.a}
 
     def rasters(self) -> tuple[groundtie.Raster, groundtie.Raster]:
         """Return both images as the tools take them."""

@@ -105,6 +105,21 @@ def seam(part: Part) -> Make:
     return make
 
 
+def in_the_reference(make: Make) -> Make:
+    """Make the reference the image of which parts moved."""
+    return lambda pair, setting: make(pair, setting).swapped()
+
+
+def own_strips(pair: Pair, setting: Setting) -> Pair:
+    """Each of several strips lies elsewhere."""
+    rng, shape = setting.rng, pair.input.shape[1:]
+    number, axis = int(rng.integers(3, 6)), int(rng.integers(2))
+    offs = np.stack([direction(rng, 0.0, 16.0) for _ in range(number)])
+    index = np.arange(shape[axis]) * number // shape[axis]
+    shift = np.expand_dims(offs[index], 1 - axis)
+    return pair.moved(np.broadcast_to(shift, (*shape, 2)).copy(), f"{number} strips")
+
+
 def half_of_another_place(pair: Pair, setting: Setting) -> Pair:
     """A half of the input shows another place; the other half lies 5 to 20 px off."""
     rng = setting.rng
@@ -141,9 +156,10 @@ def duplicated_rows(pair: Pair, setting: Setting) -> Pair:
     number = int(rng.integers(7, 20)) * int(rng.choice([-1, 1]))
     at = int(rng.uniform(0.25, 0.75) * rows)
     below = np.arange(rows) >= at
-    down = np.where(below, np.clip(np.arange(rows) - at, 0, abs(number)) * np.sign(number), 0)
-    if number < 0:
-        down = np.where(below, number, 0)
+    down = np.where(below, number, 0)
+    if number > 0 and rng.random() < 0.5:
+        # One row fills all that was lost.
+        down = np.clip(np.arange(rows) - at, 0, number)
     shift = np.column_stack([np.zeros(rows), down])
     note = f"{abs(number)} rows {'twice' if number > 0 else 'missing'} at row {at}"
     return pair.moved(_along_rows(shift, pair.input.shape[1:]), note)
@@ -169,6 +185,12 @@ def waves(pair: Pair, setting: Setting) -> Pair:
 
 ATTACKS = [
     *(Attack(PARTS, "a part lies off", name, seam(part)) for name, part in _PARTS.items()),
+    *(
+        Attack(PARTS, "a part of the reference lies off", name, in_the_reference(seam(part)))
+        for name, part in _PARTS.items()
+        if name in ("half", "third", "map tiles")
+    ),
+    Attack(PARTS, "strips lie off each by itself", "", own_strips),
     Attack(PARTS, "a part shows another place", "", half_of_another_place),
     Attack(PARTS, "jitter of rows", "", jitter),
     Attack(PARTS, "duplicated or missing rows", "", duplicated_rows),

@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 from affine import Affine
 
+from groundtie.rasters.grid import compose
+
 from .catalogue import CONTROLS, PLACEMENT, Attack, Make, Setting, as_text, direction
 from .pairs import Pair
 from .scenes import elsewhere
@@ -33,7 +35,7 @@ def south_up(pair: Pair, setting: Setting) -> Pair:
     shift = direction(setting.rng, 0.0, 15.0)
     moved = pair.moved(shift, as_text(shift))
     rows = moved.input.shape[1]
-    place = moved.input_transform @ Affine.translation(0, rows) @ Affine.scale(1, -1)
+    place = compose(moved.input_transform, Affine.translation(0, rows), Affine.scale(1, -1))
     return replace(
         moved, input=moved.input[:, ::-1], shown=moved.shown[::-1], input_transform=place
     )
@@ -51,7 +53,7 @@ def tiny_overlap(pair: Pair, setting: Setting) -> Pair:
         reference=moved.reference[:, :, :right],
         input=moved.input[:, :, left:],
         shown=moved.shown[:, left:],
-        input_transform=moved.input_transform @ Affine.translation(left, 0),
+        input_transform=compose(moved.input_transform, Affine.translation(left, 0)),
         note=f"{moved.note}, {share:.0%} overlap",
     )
 
@@ -64,12 +66,8 @@ def claimed(draw: Callable[[np.random.Generator], tuple[Affine, str]]) -> Make:
         moved = pair.moved(shift, as_text(shift))
         wrong, note = draw(setting.rng)
         centre = np.array(moved.size) / 2
-        place = (
-            moved.input_transform
-            @ Affine.translation(*centre)
-            @ wrong
-            @ Affine.translation(*-centre)
-        )
+        to, back = Affine.translation(*centre), Affine.translation(*-centre)
+        place = compose(moved.input_transform, to, wrong, back)
         return replace(moved, input_transform=place, note=f"{moved.note}, {note}")
 
     return make
@@ -101,10 +99,7 @@ def other_zone(pair: Pair, setting: Setting) -> Pair:
 def far_off(pair: Pair, setting: Setting) -> Pair:
     """The ground lies 30 to 60 px off, with a radius that is smaller."""
     shift = direction(setting.rng, 30.0, 60.0)
-    radius = float(setting.rng.uniform(8, 28))
-    return pair.moved(shift, f"{as_text(shift)}, radius {radius:.0f} px").with_arguments(
-        search_radius=radius
-    )
+    return pair.moved(shift, as_text(shift)).within(float(setting.rng.uniform(8, 28)))
 
 
 def other_place(pair: Pair, setting: Setting) -> Pair:

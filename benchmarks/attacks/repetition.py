@@ -11,7 +11,7 @@ from ..accuracy import FloatArray
 from ..cases import SAR_OPTICAL
 from .catalogue import REPETITION, Attack, Make, Setting, as_text, direction
 from .overlays import smooth_noise
-from .pairs import Image, Pair, join, pixels, to_bytes
+from .pairs import Image, Pair, join, pixels, render, to_bytes
 from .scenes import SAR_SAR
 
 # Of positions along and across the rows, in periods: how bright it is, from 0 to 1.
@@ -100,11 +100,37 @@ def repeating(name: str) -> Make:
             float(rng.choice([5.0, period, 0.6 * length, 0.9 * length, 1.5 * length])),
             _LEAST_RADIUS_PX,
         )
-        note = f"{name} of {period:.1f} px, radius {radius:.1f} px"
+        note = f"{name} of {period:.1f} px"
         made = replace(moved, reference=reference, input=image, note=join(moved.note, note))
-        return made.with_arguments(search_radius=radius)
+        return made.within(radius)
 
     return make
 
 
-ATTACKS = [Attack(REPETITION, name, "", repeating(name)) for name in _PATTERNS]
+def repeated_patch(pair: Pair, setting: Setting) -> Pair:
+    """The same piece of ground all over, as both images truly show it; a frame may be its own."""
+    rng = setting.rng
+    shift, side = direction(rng, 5.0, 20.0), int(rng.integers(24, 70))
+    moved = pair.moved(shift, as_text(shift))
+    shape = np.array(pair.reference.shape[:0:-1])
+    first, frame = rng.integers(30, shape - side - 30), int(rng.choice([0, 0, 30]))
+
+    def patch(px: FloatArray) -> FloatArray:
+        inner = ((px >= frame) & (px < shape - frame)).all(axis=-1)
+        return np.where(inner[..., None], first + (px - first) % side, px)
+
+    corner = np.array(pair.corner)
+    at = patch(pixels(tuple(shape))).astype(int)
+    reference = pair.reference[:, at[..., 1], at[..., 0]]
+    image, known = render(pair.source, patch(pixels(pair.size) - shift) + corner)
+    shown = np.where(known[..., None], moved.shown, np.nan)
+    made = replace(moved, reference=reference, input=image, shown=shown)
+    radii = [5.0, side, 0.6 * np.hypot(*shift), 1.5 * np.hypot(*shift)]
+    made = replace(made, note=join(made.note, f"every {side} px"))
+    return made.within(max(float(rng.choice(radii)), _LEAST_RADIUS_PX))
+
+
+ATTACKS = [
+    *(Attack(REPETITION, name, "", repeating(name)) for name in _PATTERNS),
+    Attack(REPETITION, "the same patch all over", "", repeated_patch),
+]

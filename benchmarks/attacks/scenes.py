@@ -11,13 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from affine import Affine
 from numpy.typing import NDArray
 
 import groundtie
+from groundtie.rasters.grid import compose
 from groundtie.simulation import files
 
 from ..attempt import on_pixels
-from ..cases import SAR_OPTICAL, RealCase, read_cases, read_image
+from ..cases import REFERENCE_TRANSFORM, SAR_OPTICAL, RealCase, image_size, read_cases, read_image
 from ..sar_pairs import SarPair
 from ..simulations import simulator_version
 from .pairs import Image, Pair, Source, pixels, render, to_bytes
@@ -27,9 +29,17 @@ DENSITIES = ("rural", "suburban", "urban", "city")
 
 # Sides of the windows in pixels, and what is kept free around them for what lies elsewhere.
 _SIDES_PX = (300, 400)
+_SIMULATED_SIDES_PX = (320, 480)
 _MARGIN_PX = 26
-_SIMULATED_PX = _SIDES_PX[1] + 2 * _MARGIN_PX
-_LEAST_SIDE_PX = 220
+_SIMULATED_PX = _SIMULATED_SIDES_PX[1] + 2 * _MARGIN_PX
+_LEAST_SIDE_PX = 200
+
+# Scenes that satellites of medium resolution have seen, and a pixel of theirs.
+_COARSE = ("so-sentinel", "so-cloudy-sentinel", "oo-cloudy-sentinel", "oo-nanjing", "oi-sardinia")
+_COARSE_M = 10.0
+
+# Seeds of further simulated scenes of a kind: far from one another, odd, so that looks differ.
+_FURTHER_SEEDS = 1001
 
 # Truths that may be 3 px wrong cannot tell what is 3 px wrong.
 _LARGEST_SIGMA_PX = 2.0
@@ -64,7 +74,7 @@ class Scene:
     @property
     def density(self) -> str:
         """How densely a simulated scene is built up; empty for real ones."""
-        return self.name.split("-", 1)[1] if self.case is None else ""
+        return self.name.partition("-")[2].rstrip("23") if self.case is None else ""
 
     def source(self, seed: int, cache: Path) -> Source:
         """Return the whole scene; simulated ones are made unless the folder `cache` has them."""
@@ -72,17 +82,20 @@ class Scene:
             return Source(
                 *_real(self.case.reference, self.case.input), self.case.reference_to_input
             )
-        return _simulated(self.kind, self.density, seed, cache)
+        further = int(self.name[-1]) if self.name[-1].isdigit() else 0
+        return _simulated(self.kind, self.density, seed + _FURTHER_SEEDS * further, cache)
 
     def pair(self, seed: int, cache: Path) -> Pair:
         """Return a window, the same for the same seed, whose ground lies as the images claim."""
         source = self.source(seed, cache)
         rng = np.random.default_rng((zlib.crc32(self.name.encode()), seed))
         most = np.array(source.reference.shape[:0:-1]) - 2 * _MARGIN_PX
-        low, high = _SIDES_PX
+        low, high = _SIDES_PX if self.case is not None else _SIMULATED_SIDES_PX
         side = np.minimum(most, np.maximum(rng.integers(low, high + 1, 2), _LEAST_SIDE_PX))
         first = _corner(source, side, most, rng)
         window = slice(first[1], first[1] + side[1]), slice(first[0], first[0] + side[0])
+        scale = Affine.scale(_COARSE_M if self.name.startswith(_COARSE) else 1.0)
+        place = compose(REFERENCE_TRANSFORM, scale)
         empty = np.zeros((1, side[1], side[0]), np.uint8)
         pair = Pair(
             source.reference[:, window[0], window[1]],
@@ -93,6 +106,8 @@ class Scene:
             source,
             (int(first[0]), int(first[1])),
             f"{self.place} {seed if self.case is None else ''}",
+            place,
+            place,
         )
         return pair.moved(np.zeros(2))
 
@@ -117,9 +132,11 @@ def scenes(data: Path) -> tuple[Scene, ...]:
     real = [
         Scene(case.name, case.kind, case.sigma_px, case)
         for case in read_cases(data)
-        if case.sigma_px <= _LARGEST_SIGMA_PX and case.name not in ("oo-burn",)
+        if case.sigma_px <= _LARGEST_SIGMA_PX
+        and min(image_size(case.reference)) >= _LEAST_SIDE_PX + 2 * _MARGIN_PX
     ]
-    simulated = [Scene(f"sim-{density}", SAR_OPTICAL) for density in DENSITIES]
+    names = (*DENSITIES, "city2", "city3", "urban2", "suburban2")
+    simulated = [Scene(f"sim-{name}", SAR_OPTICAL) for name in names]
     radar = [Scene(f"simss-{density}", SAR_SAR) for density in DENSITIES[:3]]
     return (*real, *simulated, *radar)
 

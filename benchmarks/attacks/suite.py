@@ -9,11 +9,17 @@ import numpy as np
 
 from ..accuracy import REFUSED, SILENTLY_WRONG, VERDICTS
 from ..suites import Goal, Settings, SuiteResult, Table, run_cases
-from .cases import AttackCase, AttackOutcome, cases, find, named
+from .cases import AttackCase, cases, named
 from .catalogue import CONTROLS
+from .sensors import SensorCase
+from .tries import AttackOutcome
+
+AnyCase = AttackCase | SensorCase
 
 _WANTED_RUNS = 3000
-_MOST_SEEDS = 8
+# Seeds of the whole suite: as many as give the wanted runs. Of a sample or of classes, any number.
+_SEEDS = 4
+_QUICK = 20
 
 
 def run(settings: Settings) -> SuiteResult:
@@ -21,7 +27,7 @@ def run(settings: Settings) -> SuiteResult:
     chosen = choose(settings)
     if settings.save is not None:
         for case in chosen:
-            case.make().save(settings.save / case.name.replace("/", "_").replace(" ", "-"))
+            case.save(settings.save / case.name.replace("/", "_").replace(" ", "-"))
     outcomes: list[AttackOutcome] = list(run_cases(chosen, settings.jobs))
     attacks = [o for o in outcomes if o.group != CONTROLS]
     controls = [o for o in outcomes if o.group == CONTROLS]
@@ -47,48 +53,38 @@ def run(settings: Settings) -> SuiteResult:
     )
 
 
-def choose(settings: Settings) -> list[AttackCase]:
+def choose(settings: Settings) -> list[AnyCase]:
     """Return the cases that settings ask for."""
     if settings.case:
         return [named(settings.case, settings.data, settings.cache)]
-    number = 1 if settings.quick else min(settings.seeds, _MOST_SEEDS)
+    is_whole = not (settings.sample or settings.classes)
+    number = min(settings.seeds, _SEEDS) if is_whole else settings.seeds
     seeds = range(settings.first_seed, settings.first_seed + number)
-    every = [
-        case
-        for case in cases(seeds, settings.data, settings.cache)
-        if not settings.classes or _is_of(case, settings.classes)
-    ]
-    wanted = 1 if settings.quick else settings.sample
-    return every if wanted is None else sample(every, wanted, settings.quick)
+    every = cases(seeds, settings.data, settings.cache)
+    known = {name for case in every for name in (case.attack, case.group)}
+    for name in settings.classes:
+        if name not in known:
+            raise ValueError(f"no class {name!r}; there are {', '.join(sorted(known))}")
+    every = [case for case in every if not settings.classes or _is_of(case, settings.classes)]
+    wanted = _QUICK if settings.quick else settings.sample
+    return every if wanted is None else sample(every, wanted)
 
 
-def _is_of(case: AttackCase, classes: Sequence[str]) -> bool:
-    group = find(case.attack, case.variant).group
-    return any(name in (case.attack, group) for name in classes)
+def _is_of(case: AnyCase, classes: Sequence[str]) -> bool:
+    return any(name in (case.attack, case.group) for name in classes)
 
 
-def sample(every: Sequence[AttackCase], number: int, of_each: bool = False) -> list[AttackCase]:
-    """Return some cases: of every class about as many, but drawn by a seed.
+def sample(every: Sequence[AnyCase], number: int) -> list[AnyCase]:
+    """Return some cases, the same every time: of every class about as many.
 
-    Parameters
-    ----------
-    every
-        All cases.
-    number
-        How many; or, `of_each`, how many of each class.
-    of_each
-        See there.
+    One of each class comes first, so that what was run until somebody stops is a sample, too.
     """
-    order = np.random.default_rng(len(every)).permutation(len(every))
     turn: Counter[str] = Counter()
     ranked = []
-    for index in order:
-        case = every[index]
-        ranked.append((turn[case.attack], int(index)))
-        turn[case.attack] += 1
-    if of_each:
-        return [every[index] for rank, index in ranked if rank < number]
-    return [every[index] for _, index in sorted(sorted(ranked)[:number], key=lambda pair: pair[1])]
+    for place, index in enumerate(np.random.default_rng(len(every)).permutation(len(every))):
+        ranked.append((turn[every[index].attack], place, index))
+        turn[every[index].attack] += 1
+    return [every[index] for _, _, index in sorted(ranked)[:number]]
 
 
 def goals(attacks: Sequence[AttackOutcome]) -> tuple[Goal, ...]:

@@ -52,6 +52,16 @@ def test_options_reach_the_suites(suites: dict[str, list[Settings]], tmp_path: P
     assert settings.cache.parent == SCRIPT.parent
 
 
+def test_attacks_are_chosen(suites: dict[str, list[Settings]], tmp_path: Path) -> None:
+    options = ["--only", "attacks", "--seeds", "4-6", "--sample", "9", "--results", str(tmp_path)]
+    run.main([*options, "--classes", "watermark", "dense city", "--case", "a/-/b/c/1"])
+    (settings,) = suites["attacks"]
+    assert (settings.first_seed, settings.seeds, settings.sample) == (4, 3, 9)
+    assert (settings.classes, settings.case) == (("watermark", "dense city"), "a/-/b/c/1")
+    with pytest.raises(SystemExit):
+        run.main(["--seeds", "few"])
+
+
 def test_a_goal_that_is_missed_is_a_result_and_a_crash_a_failure(
     suites: dict[str, list[Settings]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

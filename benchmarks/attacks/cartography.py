@@ -1,0 +1,132 @@
+"""More that is locked to pixels: what maps, viewers and prints put over images."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .effects import Effect, Shape, each_band, effect
+from .overlays import Canvas, Overlay, overlay, smooth_noise
+
+
+@overlay("building outlines")
+def buildings(shape: Shape, rng: np.random.Generator) -> Overlay:
+    """Draw the outlines or areas of houses along streets, as a town's map has them."""
+    canvas = Canvas(shape)
+    turn, step = rng.uniform(0, np.pi / 2), rng.uniform(18, 34)
+    axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    reach = int(np.hypot(*shape) / step)
+    for row in range(-reach, reach):
+        for column in range(-reach, reach):
+            if rng.random() < 0.35:
+                continue
+            first = np.array([column, row]) * step + rng.uniform(-4, 4, 2)
+            size = rng.uniform(0.35, 0.7, 2) * step
+            corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]) * size + first
+            canvas.line(corners @ axes + np.array(shape[::-1]) / 2, 240, 2)
+    return canvas.overlay(float(rng.uniform(0.6, 1.0)))
+
+
+@overlay("tracks and pins")
+def tracks(shape: Shape, rng: np.random.Generator) -> Overlay:
+    """Draw a few tracks of a receiver, thick, and pins."""
+    canvas = Canvas(shape)
+    for _ in range(int(rng.integers(2, 6))):
+        steps = smooth_noise((200, 1), 12, rng)[:, 0] * 0.25
+        heading = np.cumsum(steps) + rng.uniform(0, 2 * np.pi)
+        path = 5 * np.cumsum(np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
+        canvas.line(path + rng.uniform(0.1, 0.9, 2) * shape[::-1], 255, int(rng.integers(4, 9)))
+    for _ in range(int(rng.integers(4, 16))):
+        at = rng.uniform(0.05, 0.95, 2) * shape[::-1]
+        canvas.line(np.array([at, at - [0, 12]]), 30, 4)
+        canvas.box(*(tuple(int(n) for n in at + d) for d in ([-7, -24], [7, -12])), 200)
+    return canvas.overlay()
+
+
+@overlay("viewer's window")
+def window(shape: Shape, rng: np.random.Generator) -> Overlay:
+    """Put the panels, buttons and text of a viewer around and over the image."""
+    canvas = Canvas(shape)
+    rows, columns = shape
+    side = int(rng.uniform(0.12, 0.3) * columns)
+    canvas.box((0, 0), (side, rows), 235)
+    canvas.box((0, 0), (columns, 22), 50)
+    for line in range(36, rows - 6, 17):
+        width = int(rng.uniform(0.3, 0.9) * side)
+        canvas.box((8, line), (8 + width, line + 7), int(rng.integers(40, 160)))
+    for button in range(4):
+        top = 40 + 34 * button
+        canvas.box((columns - 34, top), (columns - 8, top + 26), 250)
+        canvas.text("+-ox"[button], (columns - 28, top + 19), 20, 0.6, 0)
+    return canvas.overlay()
+
+
+@overlay("lines of text")
+def text(shape: Shape, rng: np.random.Generator) -> Overlay:
+    """Write many lines over a part of the image."""
+    canvas = Canvas(shape)
+    first, grey = int(rng.uniform(0.0, 0.4) * shape[0]), int(rng.choice([0, 255]))
+    for line in range(first + 14, first + int(0.55 * shape[0]), int(rng.integers(15, 26))):
+        words = " ".join(rng.choice(["orbit", "1234", "pass", "UTC", "sensor", "no. 7"], 14))
+        canvas.text(words, (6, line), grey, 0.42, 0)
+    return canvas.overlay(float(rng.uniform(0.6, 1.0)))
+
+
+@overlay("heat map")
+def heat_map(shape: Shape, rng: np.random.Generator) -> Overlay:
+    """Tint the image by blobs with steps, as a layer of statistics does."""
+    heat = smooth_noise(shape, float(rng.uniform(12, 35)), rng)
+    steps = np.floor(heat * rng.uniform(1, 3))
+    alpha = np.where(steps > 0, rng.uniform(0.25, 0.6), 0.0)
+    return Overlay(np.clip(80 + 45 * steps, 0, 255), alpha)
+
+
+@overlay("screen of a print")
+def halftone(shape: Shape, rng: np.random.Generator) -> Overlay:
+    """Print the image by a screen of dots."""
+    rows, columns = np.indices(shape)
+    period, turn = rng.uniform(3.5, 9), rng.uniform(0, np.pi / 2)
+    along = rows * np.cos(turn) + columns * np.sin(turn)
+    across = columns * np.cos(turn) - rows * np.sin(turn)
+    wave = np.cos(2 * np.pi * along / period) + np.cos(2 * np.pi * across / period)
+    return Overlay(np.zeros(shape), np.zeros(shape), 1 + rng.uniform(0.1, 0.3) * wave, 12 * wave)
+
+
+@overlay("gaps between tiles")
+def tile_gaps(shape: Shape, rng: np.random.Generator) -> Overlay:
+    """Leave thin lines between the tiles of a web map, and tiles that were not loaded."""
+    canvas = Canvas(shape)
+    side, grey = int(rng.choice([64, 64, 128])), int(rng.choice([1, 200, 255]))
+    origin = rng.integers(0, side, 2)
+    for top in range(int(origin[0]) - side, shape[0], side):
+        for left in range(int(origin[1]) - side, shape[1], side):
+            if rng.random() < 0.15:
+                canvas.box((left, top), (left + side, top + side), grey)
+    for axis in (0, 1):
+        for at in range(int(origin[axis]), shape[axis], side):
+            ends = [[0, at], [shape[1], at]] if axis == 0 else [[at, 0], [at, shape[0]]]
+            canvas.line(np.array(ends), grey, int(rng.integers(1, 3)))
+    return canvas.overlay()
+
+
+@effect("tiles of lower resolution")
+def coarse_tiles(shape: Shape, rng: np.random.Generator) -> Effect:
+    """Blur the same tiles, of which finer ones were not loaded."""
+    side, size = int(rng.choice([32, 64])), float(rng.uniform(2, 6))
+    late = rng.random((40, 40)) < rng.uniform(0.3, 0.6)
+    tile = late[np.ix_(*(np.arange(n) // side for n in shape))]
+
+    def soften(band: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        return np.where(tile, cv2.GaussianBlur(band, (0, 0), size), band)
+
+    return each_band(soften)
+
+
+@effect("interlaced rows")
+def interlaced(shape: Shape, rng: np.random.Generator) -> Effect:
+    """Darken every other row, or few, of another exposure in each block of rows."""
+    period = int(rng.integers(2, 5))
+    rows = (np.arange(shape[0]) % period == 0)[:, None]
+    gain = np.repeat(rng.uniform(0.3, 0.8, shape[0] // 20 + 1), 20)[: shape[0], None]
+    return each_band(lambda band: np.where(rows, band * gain, band).astype(np.uint8))
