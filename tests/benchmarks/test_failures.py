@@ -83,6 +83,7 @@ def test_a_sample_on_full_disks(careful: Job, tmp_path: Path) -> None:
 def test_careless_jobs_are_found(careless: Job, tmp_path: Path) -> None:
     old, work, found = before(careless, tmp_path), tmp_path / "work", Findings()
     failures.kill(careless, old, 2, found, work)
+    failures.kill(careless, old, 5, found, work)
     failures.limit(careless, old, 30, found, work)
     text = "\n".join(found.wrong)
     assert "out.tif is not whole" in text

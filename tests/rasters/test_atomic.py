@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -85,6 +86,17 @@ def test_neighbours_with_alike_names_are_left_alone(tmp_path: Path) -> None:
     assert len(os.listdir(tmp_path)) == 4
 
 
+def test_sidecars_go_along(tmp_path: Path) -> None:
+    final, beside = tmp_path / "image.tif", tmp_path / "image.tif.aux.xml"
+    beside.write_text("old")
+    with Outputs() as outputs:
+        staged = outputs.stage(final)
+        staged.write_text("new")
+        staged.with_name(staged.name + ".aux.xml").write_text("new")
+    assert sorted(os.listdir(tmp_path)) == [final.name, beside.name]
+    assert beside.read_text() == "new"
+
+
 class Refusal:
     """Stands for `os.replace` where one file is open in another program."""
 
@@ -117,19 +129,27 @@ def test_all_is_as_before_if_a_file_cannot_be_replaced(
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == before
 
 
-def test_an_error_is_told_where_a_disk_knows_no_second_names(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_disk_without_second_names_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: bool
 ) -> None:
+    """What was replaced there cannot be undone; each name still has a whole file."""
+
     def no_link(source: Path, target: Path) -> None:
         raise PermissionError(1, "Operation not permitted")
 
+    finals = [tmp_path / name for name in ("a.tif", "b.csv")]
+    for final in finals:
+        final.write_text("old")
     monkeypatch.setattr(atomic.os, "link", no_link)
-    final = tmp_path / "a.tif"
-    final.write_text("old")
-    with Outputs() as outputs:
-        outputs.stage(final).write_text("new")
-    assert final.read_text() == "new"
-    assert os.listdir(tmp_path) == ["a.tif"]
+    expected = pytest.raises(OutputError) if fails else contextlib.nullcontext()
+    with expected, Outputs() as outputs:
+        for final in finals:
+            outputs.stage(final).write_text("new")
+        if fails:
+            monkeypatch.setattr(atomic.os, "replace", Refusal(finals[1]))
+    assert [final.read_text() for final in finals] == ["new", "old" if fails else "new"]
+    assert sorted(os.listdir(tmp_path)) == ["a.tif", "b.csv"]
 
 
 def test_no_final_name_is_ever_missing_and_the_order_is_that_of_staging(

@@ -14,14 +14,17 @@ import numpy as np
 import pytest
 import rasterio
 import rasterio.windows
+from affine import Affine
 from numpy.typing import NDArray
 from raster_files import full_disk, utm_grid, write_raster
+from rasterio.crs import CRS
 from rasterio.enums import Resampling
 
 from groundtie.errors import OutputError
 from groundtie.rasters import tiff
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.delivery import warp_raster
+from groundtie.rasters.grid import Grid
 from groundtie.rasters.reading import open_raster
 from groundtie.rasters.windows import Window
 from groundtie.rasters.writing import create_like
@@ -117,6 +120,17 @@ def test_a_palette_has_overviews_of_its_own_values(tmp_path: Path) -> None:
         dataset.write_colormap(1, {1: (9, 9, 9, 255), 200: (7, 8, 9, 255)})
     with rasterio.open(copied(path), overview_level=1) as overview:
         assert set(np.unique(overview.read())) == {1, 200}
+
+
+def test_what_geotiff_cannot_hold_lies_beside_it(tmp_path: Path) -> None:
+    """A rotated pole; without it nobody knows where the pixels lie."""
+    pole = CRS.from_user_input("+proj=ob_tran +o_proj=longlat +o_lat_p=40 +o_lon_p=0 +lon_0=180")
+    grid = Grid(Affine(0.1, 0, 10, 0, -0.1, 20), pole, 60, 50)
+    path = write_raster(tmp_path / "a.tif", NOISE[:50, :60], grid)
+    with rasterio.open(path) as source, rasterio.open(copied(path)) as dataset:
+        assert dataset.crs == source.crs == pole
+    names = ["a.tif", "a.tif.aux.xml", "out-2.tif", "out-2.tif.aux.xml"]
+    assert sorted(os.listdir(tmp_path)) == names
 
 
 @pytest.mark.parametrize("big", [False, True])

@@ -36,8 +36,9 @@ class Outputs:
 
     Inside the `with` block they are written under hidden names in the folders of their final
     names. Leaving the block renames them, in the order in which they were staged; leaving it by an
-    exception removes them. What other programs keep beside a file (`.aux.xml`, `-wal`, …)
-    disappears when that is replaced. What runs that died left in these folders is removed.
+    exception removes them. Sidecar files (`.aux.xml`) go along, just before their files; those of a
+    file that is replaced (`.msk`, `-wal`, …) disappear. What runs that died left in these folders
+    is removed.
     """
 
     def __init__(self) -> None:
@@ -89,7 +90,8 @@ class Outputs:
         finally:
             # After a commit there are but the old files.
             for path in (*self._staged.values(), *self._scratch, *self._aside.values()):
-                remove(path)
+                for present in (*_sidecars(path), path):
+                    remove(present)
             for claim in self._claims.values():
                 claim.close()
 
@@ -114,8 +116,9 @@ class Outputs:
             raise OutputError(f"output was not written: {missing[0]}")
         for staged in self._staged.values():
             with writing(staged):
-                _flush(staged)
-        placed: list[Path] = []
+                for path in (*_sidecars(staged), staged):
+                    _flush(path)
+        made: list[Path] = []
         final = Path()
         try:
             for final, staged in self._staged.items():
@@ -123,10 +126,13 @@ class Outputs:
                 # Before it is replaced: statistics or a mask of another file would be wrong.
                 for sidecar in _sidecars(final):
                     sidecar.unlink()
-                os.replace(staged, final)
-                placed.append(final)
+                for path in (*_sidecars(staged), staged):
+                    place = _beside(final, path.name[len(staged.name) :])
+                    is_new = not os.path.lexists(place) and place not in self._aside
+                    os.replace(path, place)
+                    made += [place] if is_new else []
         except BaseException as error:
-            self._undo(placed)
+            self._undo(made)
             if isinstance(error, OSError):
                 raise OutputError(f"cannot write {final}: {_reason(error)}") from error
             raise
@@ -144,10 +150,9 @@ class Outputs:
                 os.link(old, aside)
                 self._aside[old] = aside
 
-    def _undo(self, placed: list[Path]) -> None:
-        for final in placed:
-            if final not in self._aside:
-                remove(final)
+    def _undo(self, made: list[Path]) -> None:
+        for path in made:
+            remove(path)
         for old, aside in self._aside.items():
             with contextlib.suppress(OSError):
                 os.replace(aside, old)
@@ -258,8 +263,12 @@ def _reason(error: Exception) -> str:
 
 
 def _sidecars(path: Path) -> list[Path]:
-    names = [path.with_name(path.name + suffix) for suffix in SIDECARS]
+    names = [_beside(path, suffix) for suffix in SIDECARS]
     return [name for name in names if os.path.lexists(name)]
+
+
+def _beside(path: Path, suffix: str) -> Path:
+    return path.with_name(path.name + suffix)
 
 
 def _flush(path: Path) -> None:

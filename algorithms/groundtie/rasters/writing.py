@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import rasterio.shutil
 from rasterio.enums import ColorInterp
 from rasterio.io import MemoryFile
 
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
 from ..runs import RUN_TAG, run_tags
+from .atomic import scratch_folder, writing
 from .bands import BandInfo, fits
 from .blocks import PixelType
 from .grid import PIXEL_COORDINATES, Grid
@@ -94,7 +96,8 @@ def create_like(
     names = {band.dtype for band in source.bands}
     # GDAL's complex integers have no name in numpy.
     pixels = PixelType(names.pop() if len(names) == 1 else source.dtype.name, source.dtype)
-    template = _template(source, grid, _profile(source, grid, nodata, interleave, pixels), rpc_tags)
+    profile = _profile(source, grid, nodata, interleave, pixels)
+    template, beside = _template(source, profile, rpc_tags)
     base = base_image(template, grid.width, grid.height)
     raster = Level(base, base.mask() if masked else None)
     levels = [raster, *(raster.overview(factor) for factor in _overviews(grid))]
@@ -107,6 +110,9 @@ def create_like(
         file.finish(len(levels))
         if cog is not None:
             file.copy_as_cog(Path(path))
+    if beside is not None:
+        with writing(path):
+            Path(f"{os.fspath(path)}.aux.xml").write_bytes(beside)
 
 
 def one_band(source: RasterSource, dtype: str) -> RasterSource:
@@ -149,19 +155,25 @@ def _profile(
 
 
 def _template(
-    source: RasterSource,
-    grid: Grid,
-    profile: dict[str, Any],
-    rpc_tags: Mapping[str, str] | None,
-) -> bytes:
-    """Return a GeoTIFF in memory, of one block, that states what the raster is to state."""
-    with MemoryFile() as memory:
+    source: RasterSource, profile: dict[str, Any], rpc_tags: Mapping[str, str] | None
+) -> tuple[bytes, bytes | None]:
+    """Return a GeoTIFF of one block that states what the raster is to state.
+
+    Beside it, in GDAL's `.aux.xml`, stands what GeoTIFF cannot hold, as some CRSs; None: nothing.
+    """
+    with MemoryFile(ext=".tif") as memory:
         with memory.open(**profile) as dataset:
             _describe(dataset, source)
             dataset.update_tags(**run_tags(RUN_TAG))
             if rpc_tags is not None:
                 dataset.update_tags(ns="RPC", **rpc_tags)
-        return bytes(memory.getbuffer())
+        with memory.open() as dataset:
+            is_alone = not any(name.endswith(".aux.xml") for name in dataset.files)
+        if is_alone:
+            return bytes(memory.getbuffer()), None
+        with scratch_folder() as folder:
+            rasterio.shutil.copyfiles(memory.name, folder / "a.tif")
+            return bytes(memory.getbuffer()), (folder / "a.tif.aux.xml").read_bytes()
 
 
 def _describe(dataset: Any, source: RasterSource) -> None:
