@@ -8,6 +8,7 @@ PY := $(VENV)/bin/python
 PLUGIN := dist/groundtie_qgis.zip
 
 .PHONY: help install demo check test test-newest test-debian lint bench plugin clean
+.PHONY: failures
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -47,6 +48,9 @@ lint: $(VENV)/.installed-dev ## ruff, mypy, import contracts
 
 bench: $(VENV)/.installed-dev ## accuracy on real pairs, speed
 	$(PY) benchmarks/run.py
+
+failures: $(VENV)/.installed-dev ## kill jobs at each step, fill their disks (as root: those are mounted)
+	$(PY) -m benchmarks.failures
 
 plugin: $(VENV)/.installed ## build dist/groundtie_qgis.zip
 	$(PY) scripts/build_plugin.py $(PLUGIN)

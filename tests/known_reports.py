@@ -17,6 +17,7 @@ from raster_files import utm_grid, wave_image, write_raster
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
+from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
@@ -158,7 +159,8 @@ def refused(pair: ImagePair, **changes: Any) -> Report:
 
 
 def written(report: Report, folder: Path) -> Page:
-    report.write(folder / "report.html", folder / "report.json")
+    with Outputs() as outputs:
+        report.write(outputs, folder / "report.html")
     return Page((folder / "report.html").read_text(encoding="utf-8"))
 
 

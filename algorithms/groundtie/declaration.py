@@ -16,7 +16,8 @@ from dataclasses import dataclass
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 from .errors import ParameterError
-from .kinds import Kind, RasterIn, check_different, check_paths
+from .kinds import FolderOut, Kind, OutputKind, RasterIn, check_different, check_paths
+from .runs import run_of_call, running
 
 
 class ToolResult(Protocol):
@@ -102,6 +103,15 @@ class Tool:
         """Return the parameter called `name`."""
         return next(parameter for parameter in self.parameters if parameter.name == name)
 
+    def run_of_call(self, checked: Mapping[str, Any]) -> str:
+        """Return the id that all files of a call with these checked values carry (see `runs`)."""
+        inputs = {
+            p.name: checked[p.name]
+            for p in self.parameters
+            if p.name != "workers" and not isinstance(p.kind, (OutputKind, FolderOut))
+        }
+        return run_of_call(self.name, inputs)
+
     def check(
         self,
         values: Mapping[str, Any],
@@ -167,7 +177,8 @@ def tool(
             progress = {key: bound.pop(key) for key in ("progress",) if key in bound}
             values = declared.check(bound, in_python=True)
             given = {"parameters": values} if "parameters" in signature.parameters else {}
-            return cast(Callable[..., R], function)(**values, **given, **progress)
+            with running(declared.run_of_call(values)):
+                return cast(Callable[..., R], function)(**values, **given, **progress)
 
         declared = _declare(function, signature, checked, title, group, outputs)
         checked.__signature__ = signature.replace(  # type: ignore[attr-defined]

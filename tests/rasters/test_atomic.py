@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -39,8 +42,8 @@ def test_nothing_remains_after_an_exception(tmp_path: Path, error: BaseException
     def fail() -> None:
         with Outputs() as outputs:
             staged = outputs.stage(tmp_path / "image.tif")
-            for suffix in ("", ".aux.xml", ".ovr", ".msk", "-wal", "-shm", "-journal"):
-                (tmp_path / (staged.name + suffix)).write_text("half")
+            staged.write_text("half")
+            outputs.scratch(tmp_path / "image.tif").write_text("half")
             raise error
 
     with pytest.raises(type(error)) as raised:
@@ -64,18 +67,15 @@ def test_an_old_file_stays_when_the_job_fails(tmp_path: Path) -> None:
     assert final.read_text() == "old"
 
 
-def test_sidecars_go_along_and_replace_those_of_the_old_file(tmp_path: Path) -> None:
-    final = tmp_path / "points.gpkg"
-    for suffix in ("", ".aux.xml", "-wal"):
+def test_sidecars_of_the_old_file_disappear(tmp_path: Path) -> None:
+    """They hold statistics or masks of another file."""
+    final = tmp_path / "image.tif"
+    for suffix in ("", ".aux.xml", ".ovr", ".msk", "-wal", "-shm", "-journal"):
         (tmp_path / (final.name + suffix)).write_text("old")
     with Outputs() as outputs:
-        staged = outputs.stage(final)
-        staged.write_text("new")
-        (tmp_path / (staged.name + "-wal")).write_text("new")
-    # The old .aux.xml held statistics of another file.
-    assert sorted(os.listdir(tmp_path)) == ["points.gpkg", "points.gpkg-wal"]
+        outputs.stage(final).write_text("new")
+    assert os.listdir(tmp_path) == ["image.tif"]
     assert final.read_text() == "new"
-    assert (tmp_path / "points.gpkg-wal").read_text() == "new"
 
 
 def test_neighbours_with_alike_names_are_left_alone(tmp_path: Path) -> None:
@@ -86,29 +86,144 @@ def test_neighbours_with_alike_names_are_left_alone(tmp_path: Path) -> None:
     assert len(os.listdir(tmp_path)) == 4
 
 
-def test_all_old_files_come_back_if_one_cannot_be_replaced(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_sidecars_go_along(tmp_path: Path) -> None:
+    final, beside = tmp_path / "image.tif", tmp_path / "image.tif.aux.xml"
+    beside.write_text("old")
+    with Outputs() as outputs:
+        staged = outputs.stage(final)
+        staged.write_text("new")
+        staged.with_name(staged.name + ".aux.xml").write_text("new")
+    assert sorted(os.listdir(tmp_path)) == [final.name, beside.name]
+    assert beside.read_text() == "new"
+
+
+class Refusal:
+    """Stands for `os.replace` where one file is open in another program."""
+
+    def __init__(self, refused: Path) -> None:
+        self._refused, self._replace = refused, os.replace
+
+    def __call__(self, source: Path, target: Path) -> None:
+        if target == self._refused and "-new" in source.name:
+            raise PermissionError(13, f"{target.name} is open in another program")
+        self._replace(source, target)
+
+
+@pytest.mark.parametrize("new", [False, True])
+def test_all_is_as_before_if_a_file_cannot_be_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, new: bool
 ) -> None:
     finals = [tmp_path / name for name in ("a.tif", "b.csv")]
-    for final in finals:
-        final.write_text("old")
-    replace = os.replace
-
-    def refuse_b(source: Path, target: Path) -> None:
-        if target == finals[1] and "-new" in source.name:
-            raise PermissionError(13, "b.csv is open in another program")
-        replace(source, target)
+    before = {} if new else {"a.tif": "old", "a.tif.msk": "old mask", "b.csv": "old"}
+    for name, text in before.items():
+        (tmp_path / name).write_text(text)
 
     def work() -> None:
         with Outputs() as outputs:
             for final in finals:
                 outputs.stage(final).write_text("new")
-            monkeypatch.setattr(atomic.os, "replace", refuse_b)
+            monkeypatch.setattr(atomic.os, "replace", Refusal(finals[1]))
 
     with pytest.raises(OutputError, match=r"b\.csv: b\.csv is open"):
         work()
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_disk_without_second_names_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: bool
+) -> None:
+    """What was replaced there cannot be undone; each name still has a whole file."""
+
+    def no_link(source: Path, target: Path) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    finals = [tmp_path / name for name in ("a.tif", "b.csv")]
+    for final in finals:
+        final.write_text("old")
+    monkeypatch.setattr(atomic.os, "link", no_link)
+    expected = pytest.raises(OutputError) if fails else contextlib.nullcontext()
+    with expected, Outputs() as outputs:
+        for final in finals:
+            outputs.stage(final).write_text("new")
+        if fails:
+            monkeypatch.setattr(atomic.os, "replace", Refusal(finals[1]))
+    assert [final.read_text() for final in finals] == ["new", "old" if fails else "new"]
     assert sorted(os.listdir(tmp_path)) == ["a.tif", "b.csv"]
-    assert [final.read_text() for final in finals] == ["old", "old"]
+
+
+def test_no_final_name_is_ever_missing_and_the_order_is_that_of_staging(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = ["points.csv", "image.tif", "report.html"]
+    for name in names:
+        (tmp_path / name).write_text("old")
+    seen: list[str] = []
+
+    def watched(change: Callable[..., None]) -> Callable[..., None]:
+        def changed(*args: Any, **more: Any) -> None:
+            change(*args, **more)
+            seen.append("".join((tmp_path / name).read_text()[0] for name in names))
+
+        return changed
+
+    with Outputs() as outputs:
+        for name in names:
+            outputs.stage(tmp_path / name).write_text("new")
+        for name in ("replace", "link", "unlink", "rename"):
+            monkeypatch.setattr(atomic.os, name, watched(getattr(os, name)))
+    assert list(dict.fromkeys(seen)) == ["ooo", "noo", "nno", "nnn"]
+
+
+def test_all_files_are_on_the_disk_before_the_first_gets_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[str] = []
+    fsync, replace = os.fsync, os.replace
+
+    def flushed(descriptor: int) -> None:
+        fsync(descriptor)
+        done.append("flush")
+
+    def placed(source: Path, target: Path) -> None:
+        replace(source, target)
+        done.append(Path(target).name)
+
+    with Outputs() as outputs:
+        for name in ("a.tif", "b.csv"):
+            outputs.stage(tmp_path / name).write_text("new")
+        monkeypatch.setattr(atomic.os, "fsync", flushed)
+        monkeypatch.setattr(atomic.os, "replace", placed)
+    # The folder comes last: it holds the names.
+    assert done == ["flush", "flush", "a.tif", "b.csv", "flush"]
+
+
+def test_a_file_that_does_not_get_onto_the_disk_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Disks of a network may tell only then that they are full."""
+    (tmp_path / "a.tif").write_text("old")
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    def work() -> None:
+        with Outputs() as outputs:
+            outputs.stage(tmp_path / "a.tif").write_text("new")
+            monkeypatch.setattr(atomic.os, "fsync", full)
+
+    with pytest.raises(OutputError, match="no space left on"):
+        work()
+    assert os.listdir(tmp_path) == ["a.tif"]
+    assert (tmp_path / "a.tif").read_text() == "old"
+
+
+def test_names_may_be_as_long_as_the_system_allows(tmp_path: Path) -> None:
+    names = ["ä" * 120 + ".tif", "a" * 250 + ".csv"]
+    with Outputs() as outputs:
+        for name in names:
+            outputs.stage(tmp_path / name).write_text("new")
+    assert sorted(os.listdir(tmp_path)) == sorted(names)
 
 
 def test_an_output_that_was_never_written_is_an_error(tmp_path: Path) -> None:
@@ -144,7 +259,7 @@ def test_a_full_disk_is_named(tmp_path: Path) -> None:
     if not os.path.exists("/dev/full"):
         pytest.skip("this system has no /dev/full")
     with (
-        pytest.raises(OutputError, match=r"cannot write big\.tif: the disk is full"),
+        pytest.raises(OutputError, match=r"no space left on \.: .* free \(writing big\.tif\)"),
         writing("big.tif"),
         open("/dev/full", "w") as file,
     ):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -26,10 +27,11 @@ from known_reports import (
     transform_of,
     written,
 )
-from raster_files import utm_grid, wave_image, write_raster
+from raster_files import full_disk, utm_grid, wave_image, write_raster
 
 from groundtie.errors import OutputError
 from groundtie.geometry.transform import Transform
+from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.report.page import versions
@@ -225,10 +227,12 @@ def test_the_page_is_small_even_for_large_noisy_images(tmp_path: Path) -> None:
 
 
 def test_a_report_that_cannot_be_written(pair: ImagePair, tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match=r"cannot write .*nowhere/report\.html"):
-        report_of(pair).write(tmp_path / "nowhere" / "report.html", tmp_path / "report.json")
-    with pytest.raises(OutputError, match=r"cannot write .*nowhere/report\.json"):
-        report_of(pair).write(tmp_path / "report.html", tmp_path / "nowhere" / "report.json")
+    (tmp_path / "report.html").write_text("old")
+    full = full_disk(2000)
+    with pytest.raises(OutputError, match=r"cannot write .*/report\."), full, Outputs() as outputs:
+        report_of(pair).write(outputs, tmp_path / "report.html")
+    assert (tmp_path / "report.html").read_text() == "old"
+    assert os.listdir(tmp_path) == ["report.html"]
 
 
 def test_the_template_is_found_from_everywhere(

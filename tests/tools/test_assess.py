@@ -215,6 +215,7 @@ class TestReport:
         likeness = [np.corrcoef(p.ravel(), pictures[0].ravel())[0, 1] for p in pictures[1:]]
         assert likeness[0] < 0.9 < 0.99 < likeness[1]
         numbers = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
+        assert len(numbers.pop("run")) == 16
         assert {**numbers, "files": result.files} == result.summary()
         assert numbers["check_points"]["rmse_px"] == pytest.approx(0.5)
         assert numbers["parameters"]["check_points"] == str(files.path("check.csv"))

@@ -224,7 +224,7 @@ class TestBadCalls:
     def test_a_full_disk_keeps_the_old_report(self, files: Files, tmp_path: Path) -> None:
         (tmp_path / "r.html").write_text("old")
         before = listing(tmp_path)
-        with full_disk(4096), pytest.raises(OutputError, match=r"cannot write .*r\.html"):
+        with full_disk(4096), pytest.raises(OutputError, match=r"cannot write .*r\.json"):
             assess(
                 files.path("t.json"),
                 check_points=files.path("check.csv"),

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ParameterError
-from ..rasters.atomic import writing
+from ..rasters.atomic import write_json
 from ..rasters.patch import Patch
 from .patch_statistics import BAND_RATIOS, NO_BANDS, STATISTICS, FloatImage, patch_statistics
 
@@ -123,8 +123,7 @@ class FeatureClassifier:
             "weights": self.weights.tolist(),
             "vectors": self.vectors.tolist(),
         }
-        with writing(path):
-            path.write_text(json.dumps(values), encoding="utf-8")
+        write_json(path, values, indent=None)
 
 
 def read_classifier(path: Path) -> FeatureClassifier:

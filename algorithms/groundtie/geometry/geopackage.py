@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import fiona
-from fiona.errors import FionaError, TransactionError
+from fiona.io import MemoryFile
 from rasterio.crs import CRS
 
 from ..errors import raised_by
@@ -38,28 +38,21 @@ def write_layer(
         Not everything could be written.
     """
     try:
-        with fiona.open(
-            path,
-            "w",
-            driver="GPKG",
-            layer=name,
-            crs_wkt="" if crs is None else crs.to_wkt(),
-            schema={"geometry": "LineString", "properties": properties},
-        ) as layer:
-            layer.writerecords(records)
-        # SQLite may meet a full disk in silence.
-        with fiona.open(path, layer=name) as layer:
-            complete = len(layer) == len(records)
-    except (TransactionError, RuntimeError):
-        complete = False
-    except FionaError as error:
-        raise OSError(str(error)) from error
+        # In memory: SQLite may meet a full disk in silence.
+        with MemoryFile(ext=".gpkg") as memory:
+            with memory.open(
+                driver="GPKG",
+                layer=name,
+                crs_wkt="" if crs is None else crs.to_wkt(),
+                schema={"geometry": "LineString", "properties": properties},
+            ) as layer:
+                layer.writerecords(records)
+            content = bytes(memory.getbuffer())
     except Exception as error:
         if not raised_by(error, "fiona"):
             raise
-        complete = False
-    if not complete:
-        raise OSError("the file is not complete; is the disk full?")
+        raise OSError(str(error)) from error
+    path.write_bytes(content)
 
 
 def read_layer(path: Path) -> tuple[list[dict[str, Any]], CRS | None]:

@@ -16,8 +16,9 @@ from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
 from ..errors import OutputError, TransformFileError
-from ..rasters.atomic import writing
+from ..rasters.atomic import write_json, writing
 from ..rasters.grid import Grid, reproject
+from ..runs import run_tags
 from .georeferencer import Row, positions, read_georeferencer, unmeasured, write_georeferencer
 from .tie_point_frames import NUMBERS, TEXTS, tie_point_columns
 from .tie_points import USED, TiePoints
@@ -126,7 +127,8 @@ def _suffix(path: Path, verb: str, error: type[OutputError | TransformFileError]
 
 def _rows(points: TiePoints, transform: Transform) -> list[Row]:
     columns = {**tie_point_columns(points, transform), **points.more}
-    texts = {"reference_crs": "" if transform.crs is None else transform.crs.to_string()}
+    crs = "" if transform.crs is None else transform.crs.to_string()
+    texts = {"reference_crs": crs, **run_tags()}
     return [
         dict(zip(columns, values, strict=True)) | texts
         for values in zip(*(column.tolist() for column in columns.values()), strict=True)
@@ -150,19 +152,19 @@ def _features(rows: list[Row], crs: CRS | None, target: CRS | None) -> list[dict
 def _write_gpkg(path: Path, rows: list[Row], numbers: Sequence[str], crs: CRS | None) -> None:
     from .geopackage import write_layer  # heavy
 
-    properties = dict.fromkeys(numbers, "float") | dict.fromkeys(_TEXTS, "str")
+    properties = dict.fromkeys(numbers, "float") | dict.fromkeys((*_TEXTS, *run_tags()), "str")
     write_layer(path, _LAYER, _features(rows, crs, crs), properties, crs)
 
 
 def _write_geojson(path: Path, rows: list[Row], crs: CRS | None) -> None:
     features = _features(rows, crs, _GEOJSON_CRS)
     collection = {"type": "FeatureCollection", "name": _LAYER, "features": features}
-    path.write_text(json.dumps(collection, indent=1, allow_nan=False), encoding="utf-8")
+    write_json(path, collection)
 
 
 def _write_csv(path: Path, rows: list[Row], numbers: Sequence[str]) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.DictWriter(file, (*numbers, *_TEXTS), lineterminator="\n")
+        table = csv.DictWriter(file, (*numbers, *_TEXTS, *run_tags()), lineterminator="\n")
         table.writeheader()
         table.writerows(rows)
 

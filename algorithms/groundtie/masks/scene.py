@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import rasterio.windows
 
 from ..progress import SILENT, Progress
 from ..rasters.averaging import area_average
@@ -116,11 +115,11 @@ def write_mask(
     like = one_band(scene.like, "uint8")
     places = list(tiles(scene.grid))
     selected = valid = 0
-    with create_like(like, scene.grid, path, nodata=None) as dataset:
+    with create_like(like, scene.grid, path, nodata=None) as file:
         for i, tile in enumerate(places):
             chosen = select(tile)
             selected += int(np.count_nonzero(chosen.part))
             valid += int(np.count_nonzero(chosen.valid))
-            dataset.write(chosen.part.astype(np.uint8), 1, window=rasterio.windows.Window(*tile))
+            file.write(chosen.part.astype(np.uint8), window=tile)
             progress.update((i + 1) / len(places))
     return selected / max(valid, 1)

@@ -4,32 +4,50 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import itertools
+import json
 import os
 import re
-import secrets
-from collections.abc import Iterable, Iterator
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 from ..errors import GroundTieError, OutputError, raised_by
+from ..runs import run_tags
+from .leftovers import Claim, hidden_name, new_token, remove
 
 # What GDAL and SQLite put beside a file, appended to its whole name.
 SIDECARS = (".aux.xml", ".ovr", ".msk", "-wal", "-shm", "-journal")
 
-_HIDDEN = re.compile(r"\.([^/\\]*)\.groundtie-[0-9a-f]{8}-new(\.[^/\\]*)?$")
+_HIDDEN = re.compile(r"\.([^/\\]*)\.groundtie-[0-9a-f]{16}-[a-z]+(\.[^/\\]*)?$")
+
+# Of Linux and Windows, in bytes or characters; the rest of a hidden name takes up to 40.
+_LONGEST_NAME = 255 - 40
+
+_FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
 
 
 class Outputs:
     """The output files of one job, which appear together when all of them are complete.
 
     Inside the `with` block they are written under hidden names in the folders of their final
-    names. Leaving the block renames them; leaving it by an exception removes them. Sidecar files
-    (`.aux.xml`, `-wal`, …) go along, and those of a file that is replaced disappear with it.
+    names. Leaving the block renames them, in the order in which they were staged; leaving it by an
+    exception removes them. Sidecar files (`.aux.xml`) go along, just before their files; those of a
+    file that is replaced (`.msk`, `-wal`, …) disappear. What runs that died left in these folders
+    is removed.
     """
 
     def __init__(self) -> None:
-        self._token = secrets.token_hex(4)
+        self._token = new_token()
+        self._claims: dict[Path, Claim] = {}
         self._staged: dict[Path, Path] = {}
+        self._aside: dict[Path, Path] = {}
+        self._scratch: list[Path] = []
+        self._names = itertools.count()
 
     def __enter__(self) -> Outputs:
         return self
@@ -40,7 +58,8 @@ class Outputs:
         Raises
         ------
         OutputError
-            `path` is a folder, lies in none, or was staged already.
+            `path` is a folder, lies in none or in one that cannot be written to, or was staged
+            already.
         """
         final = Path(os.path.abspath(path))
         if final in self._staged:
@@ -49,8 +68,15 @@ class Outputs:
             raise OutputError(f"output is a folder, not a file: {path}")
         if not final.parent.is_dir():
             raise OutputError(f"the folder of the output does not exist: {final.parent}")
-        self._staged[final] = final.with_name(self._hidden(final, "new"))
-        return self._staged[final]
+        staged = self._hidden(final, "new")
+        self._staged[final] = staged
+        return staged
+
+    def scratch(self, path: str | os.PathLike[str]) -> Path:
+        """Return the name of a file beside the output `path` that is needed in this job alone."""
+        made = self._hidden(Path(os.path.abspath(path)), "tmp")
+        self._scratch.append(made)
+        return made
 
     def __exit__(
         self,
@@ -62,45 +88,86 @@ class Outputs:
             if kind is None:
                 self._commit()
         finally:
-            # After a commit nothing carries the temporary names any more.
-            _remove(self._staged.values())
+            # After a commit there are but the old files.
+            for path in (*self._staged.values(), *self._scratch, *self._aside.values()):
+                for present in (*_sidecars(path), path):
+                    remove(present)
+            for claim in self._claims.values():
+                claim.close()
 
-    def _hidden(self, final: Path, role: str) -> str:
+    def _hidden(self, final: Path, role: str) -> Path:
+        folder = final.parent
+        if folder not in self._claims:
+            with writing(final):
+                self._claims[folder] = Claim(folder, self._token)
+        fits = len(os.fsencode(final.name)) <= _LONGEST_NAME
+        stem = final.stem if fits else f"output-{next(self._names)}"
         # `_HIDDEN` finds the final name in this one.
-        return f".{final.stem}.groundtie-{self._token}-{role}{final.suffix}"
+        return folder / hidden_name(self._token, role, stem, final.suffix)
 
     def _commit(self) -> None:
-        """Move old files aside and new ones in their place; if one cannot be moved, undo all."""
+        """Put all files in their places, one by one; if one cannot be, undo all.
+
+        At no moment is a final name missing that was there: a file is replaced in one step. For
+        this, all must be on the disk before the first is.
+        """
         missing = [final for final, staged in self._staged.items() if not staged.exists()]
         if missing:
             raise OutputError(f"output was not written: {missing[0]}")
-        aside = {final: final.with_name(self._hidden(final, "old")) for final in self._staged}
-        moved: list[tuple[Path, Path]] = []
+        for staged in self._staged.values():
+            with writing(staged):
+                for path in (*_sidecars(staged), staged):
+                    _flush(path)
+        made: list[Path] = []
         final = Path()
         try:
             for final, staged in self._staged.items():
-                for source, target in ((final, aside[final]), (staged, final)):
-                    for present in _with_sidecars(source):
-                        destination = target.with_name(
-                            target.name + present.name[len(source.name) :]
-                        )
-                        os.replace(present, destination)
-                        moved.append((present, destination))
-        except OSError as error:
-            for present, destination in reversed(moved):
-                os.replace(destination, present)
-            raise OutputError(f"cannot write {final}: {_reason(error)}") from error
-        _remove(aside.values())
+                self._keep(final)
+                # Before it is replaced: statistics or a mask of another file would be wrong.
+                for sidecar in _sidecars(final):
+                    sidecar.unlink()
+                for path in (*_sidecars(staged), staged):
+                    place = _beside(final, path.name[len(staged.name) :])
+                    is_new = not os.path.lexists(place) and place not in self._aside
+                    os.replace(path, place)
+                    made += [place] if is_new else []
+        except BaseException as error:
+            self._undo(made)
+            if isinstance(error, OSError):
+                raise OutputError(f"cannot write {final}: {_reason(error)}") from error
+            raise
+        for folder in self._claims:
+            # Not all systems open folders, nor do all disks need it.
+            with contextlib.suppress(OSError):
+                _flush(folder)
+
+    def _keep(self, final: Path) -> None:
+        """Give a file and what is beside it a second name, by which to undo that it is replaced."""
+        for old in (final, *_sidecars(final)):
+            aside = self._hidden(old, "old")
+            # Some disks know no second names: what is replaced there cannot be undone.
+            with contextlib.suppress(OSError):
+                os.link(old, aside)
+                self._aside[old] = aside
+
+    def _undo(self, made: list[Path]) -> None:
+        for path in made:
+            remove(path)
+        for old, aside in self._aside.items():
+            with contextlib.suppress(OSError):
+                os.replace(aside, old)
 
 
 @contextlib.contextmanager
-def writing(path: str | os.PathLike[str]) -> Iterator[None]:
+def writing(path: str | os.PathLike[str], needed: int | None = None) -> Iterator[None]:
     """Turn what goes wrong while `path` is written into `OutputError`, with the name and reason.
 
     Parameters
     ----------
     path
         The output; for one that is staged the message gives its final name.
+    needed
+        Its size in bytes, where that is known.
     """
     try:
         yield
@@ -109,29 +176,105 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
     except Exception as error:
         if not (isinstance(error, OSError) or raised_by(error, "rasterio")):
             raise
-        raise OutputError(f"cannot write {_final_name(path)}: {_reason(error)}") from error
+        if isinstance(error, OSError) and error.errno in _FULL:
+            raise no_space(path, needed) from error
+        raise OutputError(f"cannot write {final_name(path)}: {_reason(error)}") from error
 
 
-def _final_name(path: str | os.PathLike[str]) -> str:
+def write_json(path: Path, values: Mapping[str, Any], indent: int | None = 1) -> None:
+    """Write values, and the id of the call that makes them (see `runs`), as strict JSON.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    text = json.dumps({**values, **run_tags()}, indent=indent, allow_nan=False, ensure_ascii=False)
+    with writing(path):
+        path.write_text(text, encoding="utf-8")
+
+
+@contextlib.contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """Make a folder for files that nobody else needs, among the system's temporary ones.
+
+    Raises
+    ------
+    OutputError
+        There is no place for it.
+    """
+    parent, token = Path(tempfile.gettempdir()), new_token()
+    folder = parent / hidden_name(token, "tmp", "scratch")
+    with writing(folder):
+        claim = Claim(parent, token)
+    try:
+        with writing(folder):
+            folder.mkdir(mode=0o700)
+        yield folder
+    finally:
+        remove(folder)
+        claim.close()
+
+
+def no_space(path: str | os.PathLike[str], needed: float | None = None) -> OutputError:
+    """Return the error that a disk is full.
+
+    Parameters
+    ----------
+    path
+        What is written, complete or not.
+    needed
+        How many bytes it would have, if that is known.
+    """
+    final = Path(final_name(path))
+    free = free_bytes(path)
+    sizes = f"{_size(free)} free"
+    if needed is not None:
+        sizes = f"{_size(needed)} needed, {sizes}"
+    return OutputError(f"no space left on {final.parent}: {sizes} (writing {final.name})")
+
+
+def free_bytes(path: str | os.PathLike[str]) -> int:
+    """Return how large a file may become, which may be there in part."""
+    path = Path(path)
+    taken = path.stat().st_size if path.exists() else 0
+    usage = shutil.disk_usage(path.parent)
+    # Some network disks do not tell.
+    return usage.free + taken if usage.total else sys.maxsize
+
+
+def _size(count: float) -> str:
+    unit, in_units = next(
+        (found for found in (("kB", count / 1e3), ("MB", count / 1e6)) if found[1] < 999.5),
+        ("GB", count / 1e9),
+    )
+    return f"{in_units:.3g} {unit}" if in_units < 999.5 else f"{in_units:.0f} {unit}"
+
+
+def final_name(path: str | os.PathLike[str]) -> str:
+    """Return the final name of a file that may be staged."""
     return _HIDDEN.sub(r"\1\2", os.fspath(path))
 
 
 def _reason(error: Exception) -> str:
-    if isinstance(error, OSError) and error.errno == errno.ENOSPC:
-        return "the disk is full"
     # rasterio points to the exception before: that one states what happened.
     cause = error.__cause__ or error
     return getattr(cause, "strerror", None) or str(cause) or type(cause).__name__
 
 
-def _with_sidecars(path: Path) -> list[Path]:
-    names = [path, *(path.with_name(path.name + suffix) for suffix in SIDECARS)]
+def _sidecars(path: Path) -> list[Path]:
+    names = [_beside(path, suffix) for suffix in SIDECARS]
     return [name for name in names if os.path.lexists(name)]
 
 
-def _remove(paths: Iterable[Path]) -> None:
-    for path in paths:
-        for present in _with_sidecars(path):
-            # A file that is still open elsewhere must not hide why the job failed.
-            with contextlib.suppress(OSError):
-                present.unlink()
+def _beside(path: Path, suffix: str) -> Path:
+    return path.with_name(path.name + suffix)
+
+
+def _flush(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk."""
+    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -6,10 +6,10 @@ import os
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rasterio.windows
 from numpy.typing import NDArray
 
 from ..arrays import Raster
@@ -110,6 +110,7 @@ def warp_raster(
     resampling: str = "cubic",
     *,
     nodata: float | None = None,
+    cog: Path | None = None,
     workers: int = 2,
     progress: Progress = SILENT,
 ) -> None:
@@ -136,6 +137,8 @@ def warp_raster(
         the mean over the area is taken first (not with `nearest`).
     nodata
         Another nodata value for the result.
+    cog
+        See `writing.create_like`.
     workers
         Number of threads.
     progress
@@ -158,15 +161,22 @@ def warp_raster(
     pixels = progress.part(0, 1 - _OVERVIEWS)
     with (
         create_like(
-            source, target, path, nodata=warp.nodata, interleave=interleave, workers=workers
-        ) as dataset,
+            source,
+            target,
+            path,
+            nodata=warp.nodata,
+            interleave=interleave,
+            masked=masked,
+            cog=cog,
+            workers=workers,
+            progress=progress.part(1 - _OVERVIEWS, 1),
+        ) as file,
         ThreadPoolExecutor(workers) as pool,
     ):
         for tile, group, values, known in warp.tiles(pool, workers + 1, pixels):
-            place = rasterio.windows.Window(*tile)
-            dataset.write(values, list(group), window=place)
+            file.write(values, group, window=tile)
             if masked and group is warp.groups[0]:
-                dataset.write_mask(known, window=place)
+                file.write_mask(known, window=tile)
     progress.update(1.0)
 
 
@@ -237,15 +247,15 @@ def write_with_geotransform(
         raise ValueError("a new geotransform does not change the size of a raster")
     nodata = source.bands[0].nodata
     places = list(tiles(grid))
-    with create_like(source, grid, path, nodata=nodata) as dataset:
-        if rpc_tags is not None:
-            dataset.update_tags(ns="RPC", **rpc_tags)
+    masked, overviews = source.has_mask_band, progress.part(1 - _OVERVIEWS, 1)
+    with create_like(
+        source, grid, path, nodata=nodata, masked=masked, rpc_tags=rpc_tags, progress=overviews
+    ) as file:
         for i, tile in enumerate(places):
-            place = rasterio.windows.Window(*tile)
             values, mask = source.read_untouched(tile)
-            dataset.write(values, window=place)
-            if source.has_mask_band:
-                dataset.write_mask(mask, window=place)
+            file.write(values, window=tile)
+            if masked:
+                file.write_mask(mask, window=tile)
             progress.update((i + 1) / len(places) * (1 - _OVERVIEWS))
     progress.update(1.0)
 

@@ -9,8 +9,8 @@ from typing import TypeVar
 
 from .grid import Grid
 from .reading import RasterSource
+from .tiff import BLOCK
 from .windows import Window
-from .writing import BLOCK
 
 # Tiles are blocks of the file, small enough for those of a small raster to be worked side by side.
 _TILE = BLOCK

@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rasterio
 import rasterio.shutil
-from rasterio.enums import ColorInterp, Resampling
-from rasterio.env import GDALVersion
+from rasterio.enums import ColorInterp
+from rasterio.io import MemoryFile
 
-from ..errors import ParameterError, raised_by
-from .atomic import writing
+from ..errors import ParameterError
+from ..progress import SILENT, Progress
+from ..runs import RUN_TAG, run_tags
+from .atomic import scratch_folder, writing
 from .bands import BandInfo, fits
+from .blocks import PixelType
 from .grid import PIXEL_COORDINATES, Grid
-from .reading import CACHE_BYTES, RasterSource
-
-BLOCK = 512
+from .overviews import Reduced
+from .reading import RasterSource
+from .tiff import BLOCK, base_image
+from .tiled_file import Level, TiledFile, require_space
+from .tiling import in_order
 
 # Metadata that belong to the file, or locate the pixels, of the input only.
 _OWN_DOMAINS = ("IMAGE_STRUCTURE", "DERIVED_SUBDATASETS", "SUBDATASETS", "RPC", "GEOLOCATION")
-_OWN_TAGS = ("NODATA_VALUES",)
+_OWN_TAGS = ("NODATA_VALUES", RUN_TAG)
 
 
 @contextlib.contextmanager
@@ -37,12 +41,17 @@ def create_like(
     *,
     nodata: float | None,
     interleave: str | None = None,
+    masked: bool = False,
+    rpc_tags: Mapping[str, str] | None = None,
+    cog: Path | None = None,
     workers: int = 2,
-) -> Iterator[Any]:
+    progress: Progress = SILENT,
+) -> Iterator[TiledFile]:
     """Create a tiled, compressed GeoTIFF with overviews, with the bands and metadata of a raster.
 
     Bands, dtype, colour interpretation, palette, descriptions, units, scales, offsets and tags
-    are those of `source`. RPCs, GCPs and statistics are left out: they are no longer true.
+    are those of `source`. RPCs, GCPs and statistics are left out: they are no longer true. The
+    file is the same for any number of workers.
 
     Parameters
     ----------
@@ -56,13 +65,22 @@ def create_like(
         Value of pixels without data, or None.
     interleave
         "pixel" or "band"; by default as in the source.
+    masked
+        Whether a mask is written, too.
+    rpc_tags
+        RPCs that locate it, as GDAL's metadata domain RPC.
+    cog
+        Where the blocks are written first (see `atomic.Outputs.scratch`), to be copied into a
+        Cloud Optimized GeoTIFF; None: it need not be one.
     workers
         Threads that compress.
+    progress
+        Receives every tile of the overviews, which are made when the block ends.
 
     Yields
     ------
-    rasterio dataset, open for writing
-        Overviews (averages; nearest for palettes) are made when the block ends.
+    TiledFile
+        To which all pixels are to be written. Overviews are averages; nearest for palettes.
 
     Raises
     ------
@@ -73,25 +91,28 @@ def create_like(
     """
     if nodata is not None:
         require_fit(nodata, source.dtype)
-    interleave = interleave or source.interleave or "pixel"
-    if interleave.lower() == "band" and not GDALVersion.runtime().at_least("3.8"):
-        # Threads of older GDAL that read such a file report by an ERROR each that its bands are
-        # unknown (OSGeo/gdal issue 7921), past every handler, and are right nonetheless.
-        workers = 1
-    profile = _profile(source, grid, nodata, interleave, workers)
-    # A mask inside the file, not beside it.
-    options = {
-        "GDAL_TIFF_INTERNAL_MASK": True,
-        "GDAL_CACHEMAX": CACHE_BYTES,
-        "GDAL_NUM_THREADS": workers,
-    }
-    with writing(path), rasterio.Env(**options):
-        with rasterio.open(path, "w", **profile) as dataset:
-            _describe(dataset, source)
-            yield dataset
-            # Before it is closed: the compression is that of the pixels.
-            _add_overviews(dataset, nearest=source.colormap is not None)
-        check_complete(path)
+    first = Path(path if cog is None else cog)
+    require_space(first, grid.width * grid.height * source.count * source.dtype.itemsize)
+    names = {band.dtype for band in source.bands}
+    # GDAL's complex integers have no name in numpy.
+    pixels = PixelType(names.pop() if len(names) == 1 else source.dtype.name, source.dtype)
+    profile = _profile(source, grid, nodata, interleave, pixels)
+    template, beside = _template(source, profile, rpc_tags)
+    base = base_image(template, grid.width, grid.height)
+    raster = Level(base, base.mask() if masked else None)
+    levels = [raster, *(raster.overview(factor) for factor in _overviews(grid))]
+    with (
+        ThreadPoolExecutor(workers) as pool,
+        TiledFile(first, levels, pixels, source.count, pool, 2 * workers) as file,
+    ):
+        yield file
+        _write_overviews(file, nearest=source.colormap is not None, progress=progress)
+        file.finish(len(levels))
+        if cog is not None:
+            file.copy_as_cog(Path(path))
+    if beside is not None:
+        with writing(path):
+            Path(f"{os.fspath(path)}.aux.xml").write_bytes(beside)
 
 
 def one_band(source: RasterSource, dtype: str) -> RasterSource:
@@ -100,100 +121,59 @@ def one_band(source: RasterSource, dtype: str) -> RasterSource:
     return replace(source, bands=(band,), has_mask_band=False, colormap=None, tags={})
 
 
-def write_cog(source: str | os.PathLike[str], path: str | os.PathLike[str], workers: int) -> None:
-    """Copy a GeoTIFF of `create_like` into a Cloud Optimized GeoTIFF.
-
-    Parameters
-    ----------
-    source, path
-        The file that is read, and the one that is written; see `atomic.Outputs.stage`.
-    workers
-        Threads that compress.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written completely.
-    """
-    options = {"blocksize": BLOCK, "compress": "deflate", "level": 1, "bigtiff": "if_safer"}
-    with writing(path), rasterio.Env(GDAL_CACHEMAX=CACHE_BYTES):
-        rasterio.shutil.copy(
-            source, path, driver="COG", predictor="yes", num_threads=workers, **options
-        )
-        check_complete(path)
-
-
-def check_complete(path: str | os.PathLike[str]) -> None:
-    """Raise `OutputError` if a GeoTIFF lacks pixels: GDAL may meet a full disk in silence."""
-    with writing(path):
-        try:
-            complete = all(_block_ends(path, Path(path).stat().st_size))
-        except Exception as error:
-            if not raised_by(error, "rasterio"):
-                raise
-            complete = False
-        if not complete:
-            raise OSError("the file is not complete; is the disk full?")
-
-
-def _block_ends(path: str | os.PathLike[str], size: int) -> Iterator[bool]:
-    """Yield for each block, of the image and its overviews, whether it lies within the file."""
-    with rasterio.open(path) as dataset:
-        bands = dataset.indexes if dataset.interleaving.value == "BAND" else [1]
-        factors = [1, *dataset.overviews(1)]
-        for level, factor in zip([None, *range(len(factors))], factors, strict=False):
-            rows = _blocks(-(-dataset.height // factor))
-            cols = _blocks(-(-dataset.width // factor))
-            for band, row, col in itertools.product(bands, range(rows), range(cols)):
-                end = _block_end(dataset, band, level, col, row)
-                yield end is not None and end <= size
-
-
-def _blocks(pixels: int) -> int:
-    return -(-pixels // BLOCK)
-
-
-def _block_end(dataset: Any, band: int, level: int | None, col: int, row: int) -> int | None:
-    place = f"{col}_{row}"
-    start, length = (
-        dataset.get_tag_item(f"BLOCK_{what}_{place}", "TIFF", bidx=band, ovr=level)
-        for what in ("OFFSET", "SIZE")
-    )
-    return None if start is None or length is None else int(start) + int(length)
-
-
 def _profile(
-    source: RasterSource, grid: Grid, nodata: float | None, interleave: str, workers: int
+    source: RasterSource,
+    grid: Grid,
+    nodata: float | None,
+    interleave: str | None,
+    pixels: PixelType,
 ) -> dict[str, Any]:
-    kind, bits = source.dtype.kind, source.dtype.itemsize * 8
-    by_kind = {"f": 3, "c": 1}
-    predictor = by_kind.get(kind, 2 if bits < 64 else 1)
-    names = {band.dtype for band in source.bands}
     colours = [band.interpretation for band in source.bands]
     rgb = colours[:3] == [ColorInterp.red, ColorInterp.green, ColorInterp.blue]
+    by_band = (interleave or source.interleave or "").lower() == "band"
     profile = {
         "driver": "GTiff",
-        "width": grid.width,
-        "height": grid.height,
+        "width": BLOCK,
+        "height": BLOCK,
         "count": source.count,
-        # GDAL's complex integers have no name in numpy.
-        "dtype": names.pop() if len(names) == 1 else source.dtype.name,
+        "dtype": pixels.name,
         "nodata": nodata,
         "crs": grid.crs,
         "tiled": True,
         "blockxsize": BLOCK,
         "blockysize": BLOCK,
         "compress": "deflate",
-        "zlevel": 1,
-        "predictor": predictor,
-        "interleave": interleave,
-        "bigtiff": "IF_SAFER",
-        "num_threads": workers,
+        "predictor": pixels.predictor,
+        "interleave": "band" if by_band else "pixel",
         "photometric": "RGB" if rgb else "MINISBLACK",
+        "endianness": "LITTLE",
+        "sparse_ok": True,
     }
     if grid.crs is not None or grid.transform != PIXEL_COORDINATES:
         profile["transform"] = grid.transform
     return profile
+
+
+def _template(
+    source: RasterSource, profile: dict[str, Any], rpc_tags: Mapping[str, str] | None
+) -> tuple[bytes, bytes | None]:
+    """Return a GeoTIFF of one block that states what the raster is to state.
+
+    Beside it, in GDAL's `.aux.xml`, stands what GeoTIFF cannot hold, as some CRSs; None: nothing.
+    """
+    with MemoryFile(ext=".tif") as memory:
+        with memory.open(**profile) as dataset:
+            _describe(dataset, source)
+            dataset.update_tags(**run_tags(RUN_TAG))
+            if rpc_tags is not None:
+                dataset.update_tags(ns="RPC", **rpc_tags)
+        with memory.open() as dataset:
+            is_alone = not any(name.endswith(".aux.xml") for name in dataset.files)
+        if is_alone:
+            return bytes(memory.getbuffer()), None
+        with scratch_folder() as folder:
+            rasterio.shutil.copyfiles(memory.name, folder / "a.tif")
+            return bytes(memory.getbuffer()), (folder / "a.tif.aux.xml").read_bytes()
 
 
 def _describe(dataset: Any, source: RasterSource) -> None:
@@ -217,14 +197,33 @@ def _describe(dataset: Any, source: RasterSource) -> None:
         dataset.units = [band.unit or "" for band in bands]
 
 
-def _add_overviews(dataset: Any, *, nearest: bool) -> None:
+def _overviews(grid: Grid) -> list[int]:
+    """Return by how much each overview is smaller than the raster."""
     factors: list[int] = []
-    size = max(dataset.width, dataset.height)
+    size = max(grid.width, grid.height)
     while size > BLOCK:
         factors.append(2 << len(factors))
         size = -(-size // 2)
-    if factors:
-        dataset.build_overviews(factors, Resampling.nearest if nearest else Resampling.average)
+    return factors
+
+
+def _write_overviews(file: TiledFile, *, nearest: bool, progress: Progress) -> None:
+    """Write all overviews, each from the level before."""
+    count = len(file.levels)
+    for number in range(1, count):
+        file.finish(number)
+        reduced = Reduced(
+            file.path, file.levels[number - 1], file.levels[number], nearest, number - 1
+        )
+        tasks = reduced.tasks(file.bands)
+        part = progress.part((number - 1) / (count - 1), number / (count - 1))
+        for i, found in enumerate(in_order(file.executor, reduced.read, tasks, file.ahead)):
+            values, valid = found
+            bands, window = tasks[i]
+            file.write(values, bands, window=window, level=number)
+            if valid is not None:
+                file.write_mask(valid, window=window, level=number)
+            part.update((i + 1) / len(tasks))
 
 
 def require_fit(nodata: float, dtype: np.dtype[Any]) -> None:

@@ -6,7 +6,6 @@ characteristics" as future work.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, fields, replace
@@ -21,7 +20,7 @@ from ..masks.choice import AUTO, NONE, MaskUsed
 from ..pose.rotation_windows import read_windows
 from ..pose.search import find_poses
 from ..progress import Progress
-from ..rasters.atomic import Outputs
+from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster
 from ..sensor.rpc_files import rpc_of
 from ..similarity.surface import SimilaritySettings
@@ -214,8 +213,8 @@ def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> Orthorectifie
         "residuals": given["tie_points"],
     }
     output = Path(given["output"])
-    with tempfile.TemporaryDirectory(prefix="groundtie-") as folder:
-        refined = Path(folder) / "refined_RPC.TXT"
+    with scratch_folder() as folder:
+        refined = folder / "refined_RPC.TXT"
         result = refine({**given, "output": refined}, progress.part(0.0, 0.7))
         _orthorectify(given, refined, output, progress.part(0.7, 1.0))
     files = {**result.files, "output": str(output)}

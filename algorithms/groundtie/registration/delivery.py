@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import weakref
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -15,7 +14,7 @@ from ..context import Context, threads
 from ..errors import NotRegisteredError, SameFileError
 from ..geometry.tie_point_files import write_tie_points
 from ..progress import SILENT, Progress
-from ..rasters.atomic import Outputs, writing
+from ..rasters.atomic import Outputs, write_json
 from ..rasters.reading import bounded_cache
 from .pipeline import OpenPair, open_pair, pair_images, run
 from .registered_output import RegisteredOutput, model_for_grid
@@ -58,24 +57,25 @@ class RegistrationFiles:
     def write(self, registration: Registration, context: Context) -> None:
         """Write all files, or those of a refused registration: the report."""
         with Outputs() as outputs:
+            if registration.verdict.accepted:
+                self._write_results(registration, outputs, context)
+            # Last: who finds it finds all that it is about.
             if self.report is not None:
-                numbers = self.report.with_suffix(".json")
-                registration.page().write(outputs.stage(self.report), outputs.stage(numbers))
-            if not registration.verdict.accepted:
-                return
-            transform, points = registration.accepted(), registration.tie_points
-            if self.tie_points is not None and points is not None:
-                write_tie_points(outputs.stage(self.tie_points), points, transform)
-            if self.transform is not None:
-                staged = outputs.stage(self.transform)
-                with writing(staged):
-                    text = json.dumps(transform.to_json(), indent=1)
-                    staged.write_text(text, encoding="utf-8")
-            if self.output is not None:
-                context.update(0.0, "writing the registered image")
-                source = registration.pair.input.source
-                reference = registration.pair.reference.source.grid
-                self.output.write(source, reference, transform, outputs, context)
+                registration.page().write(outputs, self.report)
+
+    def _write_results(
+        self, registration: Registration, outputs: Outputs, context: Context
+    ) -> None:
+        transform, points = registration.accepted(), registration.tie_points
+        if self.tie_points is not None and points is not None:
+            write_tie_points(outputs.stage(self.tie_points), points, transform)
+        if self.transform is not None:
+            write_json(outputs.stage(self.transform), transform.to_json())
+        if self.output is not None:
+            context.update(0.0, "writing the registered image")
+            source = registration.pair.input.source
+            reference = registration.pair.reference.source.grid
+            self.output.write(source, reference, transform, outputs, context)
 
 
 @dataclass(frozen=True)

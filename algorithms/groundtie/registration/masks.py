@@ -6,7 +6,6 @@ radar image, it becomes the same thing: a raster that masks one image of the pai
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -31,6 +30,7 @@ from ..masks.layer import read_layer
 from ..masks.regions import HIGH_PERCENT, WIDTH_M, GroundRegions, find_ground
 from ..masks.scene import Scene, Selection, write_mask
 from ..masks.threshold import Threshold
+from ..rasters.atomic import scratch_folder
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.reading import Window, open_raster
@@ -207,7 +207,7 @@ def _masked(
 
     The mask is a file until the stack is closed.
     """
-    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="groundtie-")))
+    folder = stack.enter_context(scratch_folder())
     share = write_mask(scene, folder / "mask.tif", select, context.quiet().progress)
     mask = stack.enter_context(open_raster(folder / "mask.tif"))
     return replace(pair, **{name: replace(getattr(pair, name), mask=mask)}), share

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from ..rasters.delivery import warp_raster
 from ..rasters.grid import Grid
 from ..rasters.reading import RasterSource
 from ..rasters.target_grids import covering_grid, registered_grid
-from ..rasters.writing import write_cog
 from ..sensor.dense import DenseOrientation
 from ..sensor.orientation import Orientation
 
@@ -76,18 +74,15 @@ class Orthorectification:
         cog
             Whether it is copied into a Cloud Optimized GeoTIFF.
         """
-        target, staged = self.target, outputs.stage(output)
-        with tempfile.TemporaryDirectory(dir=output.resolve().parent) as folder:
-            written = Path(folder) / "ortho.tif" if cog else staged
-            warp_raster(
-                self.source,
-                DenseOrientation(self.orientation),
-                target,
-                written,
-                resampling,
-                workers=context.workers,
-                progress=context.part(0.0, 0.8 if cog else 1.0).progress,
-            )
-            if cog:
-                write_cog(written, staged, context.workers)
+        target = self.target
+        warp_raster(
+            self.source,
+            DenseOrientation(self.orientation),
+            target,
+            outputs.stage(output),
+            resampling,
+            cog=outputs.scratch(output) if cog else None,
+            workers=context.workers,
+            progress=context.progress,
+        )
         return target

@@ -99,10 +99,6 @@ class RefinementFiles:
         """
         image, accepted = refinement.image, refinement.judged.verdict.accepted
         with Outputs() as outputs:
-            if self.report is not None:
-                _report(refinement, heights, found, call).write(
-                    outputs.stage(self.report), outputs.stage(self.report.with_suffix(".json"))
-                )
             if accepted:
                 fit = refinement.accepted()
                 _write_rpcs(image, fit, outputs.stage(self.output), progress)
@@ -110,6 +106,9 @@ class RefinementFiles:
                     by_refined = image.orientation.with_rpc(fit.rpc)
                     staged = outputs.stage(self.residuals)
                     refinement.points.write(staged, by_refined, image.source.grid)
+            # Last: who finds it finds all that it is about.
+            if self.report is not None:
+                _report(refinement, heights, found, call).write(outputs, self.report)
         return refinement.accepted()
 
 

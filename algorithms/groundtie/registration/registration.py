@@ -152,7 +152,7 @@ class Registration:
         """
         html = Path(path)
         with Outputs() as outputs:
-            self.page().write(outputs.stage(html), outputs.stage(html.with_suffix(".json")))
+            self.page().write(outputs, html)
 
     def page(self, with_surfaces: bool = True) -> Report:
         """Return the report; without surfaces, its numbers are the same."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
 import platform
 from pathlib import Path
 from typing import Any, ClassVar
@@ -16,7 +14,8 @@ import scipy
 
 from ..geometry.judging import TOLERANCE_PX
 from ..kinds import plainly
-from ..rasters.atomic import writing
+from ..rasters.atomic import Outputs, write_json, writing
+from ..runs import RUN, run_tags
 from ..version import __version__
 from .figures import CHECK_COLOUR, FIT_COLOUR, REJECTED_COLOUR
 
@@ -45,8 +44,8 @@ class Page:
         made = {"parameters": self.parameters, "versions": versions(), "seconds": self.seconds}
         return {name: plain(value) for name, value in (self.numbers() | made).items()}
 
-    def write(self, html_path: str | os.PathLike[str], json_path: str | os.PathLike[str]) -> None:
-        """Write the page and its numbers.
+    def write(self, outputs: Outputs, path: Path) -> None:
+        """Write the page, an HTML file, and before it its numbers, the JSON file beside it.
 
         Raises
         ------
@@ -55,12 +54,12 @@ class Page:
         """
         summary = self.summary()
         shared = {name: summary[name] for name in ("parameters", "versions", "seconds")}
-        page = _rendered(self.template, title=self.title, **shared, **self.values())
-        with writing(html_path):
-            Path(html_path).write_text(page, encoding="utf-8")
-        with writing(json_path):
-            text = json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False)
-            Path(json_path).write_text(text, encoding="utf-8")
+        run = run_tags().get(RUN)
+        page = _rendered(self.template, title=self.title, run=run, **shared, **self.values())
+        write_json(outputs.stage(path.with_suffix(".json")), summary)
+        staged = outputs.stage(path)
+        with writing(staged):
+            staged.write_text(page, encoding="utf-8")
 
 
 def versions() -> dict[str, str]:

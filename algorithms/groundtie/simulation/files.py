@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -11,11 +10,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import rasterio
+from rasterio.io import MemoryFile
 
 from ..geometry.models import DEGREE
-from ..rasters.atomic import Outputs, writing
+from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.grid import Grid
+from ..runs import RUN_TAG, run_tags
 from ..sensor.rpc import RPC
 from ..sensor.rpc_tags import rpc_to_tags
 from .pair import SimulatedPair
@@ -65,7 +65,7 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
         write_raster(staged["input"], pair.input, pair.truth.input_grid, bands)
         terrain = pair.scene.terrain_m[pair.scene.window]
         write_raster(staged["dem"], terrain[None], pair.reference_grid, ["Height of ground (m)"])
-        staged["truth"].write_text(json.dumps(truth_json(pair), indent=1), encoding="utf-8")
+        write_json(staged["truth"], truth_json(pair))
         write_table(staged["check_points"], CHECK_POINT_COLUMNS, _check_points(pair))
         write_table(staged["roof_points"], ROOF_POINT_COLUMNS, _roof_points(pair))
     return paths
@@ -124,12 +124,17 @@ def write_raster(
     }
     if grid.is_georeferenced:
         profile |= {"crs": grid.crs, "transform": grid.transform}
-    with rasterio.open(path, "w", **profile) as raster:
-        raster.write(image)
-        for band, name in enumerate(band_names, start=1):
-            raster.set_band_description(band, name)
-        if rpc is not None:
-            raster.update_tags(ns="RPC", **rpc_to_tags(rpc))
+    # In memory: a full disk is no exception within GDAL (see `rasters.tiff`).
+    with MemoryFile() as memory:
+        with memory.open(**profile) as raster:
+            raster.write(image)
+            raster.update_tags(**run_tags(RUN_TAG))
+            for band, name in enumerate(band_names, start=1):
+                raster.set_band_description(band, name)
+            if rpc is not None:
+                raster.update_tags(ns="RPC", **rpc_to_tags(rpc))
+        with writing(path, len(memory.getbuffer())):
+            path.write_bytes(memory.getbuffer())
 
 
 def _check_points(pair: SimulatedPair) -> FloatArray:

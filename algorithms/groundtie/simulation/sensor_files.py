@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..rasters.atomic import Outputs, writing
+from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.grid import PIXEL_COORDINATES, Grid
 from ..sensor.rpc_files import write_rpc
 from .files import write_raster, write_table
@@ -58,7 +57,7 @@ def write_sensor_image(made: SensorImage, folder: str | Path) -> dict[str, Path]
         heights = ["Height of ground above the ellipsoid (m)"]
         write_raster(staged["dem"], made.terrain_m[None], made.terrain_grid, heights)
         write_rpc(staged["exact_rpc"], made.exact.rpc)
-        staged["truth"].write_text(json.dumps(truth_json(made), indent=1), encoding="utf-8")
+        write_json(staged["truth"], truth_json(made))
         write_table(staged["check_points"], CHECK_POINT_COLUMNS, _check_points(made))
         write_table(staged["roof_points"], ROOF_POINT_COLUMNS, _roof_points(made))
     return paths

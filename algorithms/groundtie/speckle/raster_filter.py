@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rasterio.windows
 from numpy.typing import NDArray
 
 from ..context import Context
@@ -55,13 +54,15 @@ class RasterFilter:
         # Without speckle, only the tag identifies it as a radar image.
         like = with_speckle_filter(like, f"{self.filter.name}, {self.filter.window_px} px")
         workers = context.workers
-        with create_like(like, source.grid, path, nodata=nodata, workers=workers) as dataset:
+        masked = source.has_mask_band
+        with create_like(
+            like, source.grid, path, nodata=nodata, masked=masked, workers=workers
+        ) as file:
             filtered = in_order(context.executor, self.tile, places, workers + 1)
             for i, (bands, valid) in enumerate(filtered):
-                place = rasterio.windows.Window(*places[i])
-                dataset.write(bands, window=place)
-                if source.has_mask_band:
-                    dataset.write_mask(valid, window=place)
+                file.write(bands, window=places[i])
+                if masked:
+                    file.write_mask(valid, window=places[i])
                 context.update((i + 1) / len(places))
 
     def tile(self, tile: Window) -> tuple[NDArray[Any], Mask]:

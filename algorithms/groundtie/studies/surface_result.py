@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,10 @@ from numpy.typing import NDArray
 from rasterio.io import MemoryFile
 
 from ..context import Context
-from ..rasters.atomic import Outputs, writing
+from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.grid import Grid
-from ..rasters.writing import BLOCK
+from ..rasters.tiff import BLOCK
+from ..runs import RUN_TAG, run_tags
 from ..similarity.peak import Peak, find_peak
 from ..similarity.surface import Surface
 from .window_surface import SurfaceSettings, Window, second_peak
@@ -85,9 +85,7 @@ class SurfaceResult:
             if "picture" in staged:
                 _draw(staged["picture"], self)
             if "numbers" in staged:
-                with writing(staged["numbers"]):
-                    text = json.dumps(self.summary(), indent=1)
-                    staged["numbers"].write_text(text, encoding="utf-8")
+                write_json(staged["numbers"], self.summary())
 
     @property
     def second_ratio(self) -> float | None:
@@ -167,6 +165,7 @@ def _write(path: Path, result: SurfaceResult) -> None:
             compress="deflate",
         ) as dataset:
             dataset.write(bands)
+            dataset.update_tags(**run_tags(RUN_TAG))
             dataset.set_band_description(1, result.similarity)
             dataset.set_band_description(2, "robust standard deviations")
         with writing(path):

@@ -246,7 +246,7 @@ def assess(
     progress.update(0.8, "writing")
     with Outputs() as outputs:
         if report is not None:
-            page.write(outputs.stage(report), outputs.stage(report.with_suffix(".json")))
+            page.write(outputs, report)
     if verdict is not None and not verdict.accepted:
         raise NotRegisteredError(f"{subject} is refused: {verdict.reason}", verdict)
     written = {} if report is None else {"report": str(report)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from ..errors import ParameterError
 from ..geometry.transform import Transform, load_transform
 from ..kinds import Choice, FileIn, FileOut, Number, Text
 from ..progress import SILENT, Progress
-from ..rasters.atomic import Outputs, writing
+from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import bounded_cache
@@ -201,9 +200,7 @@ def detector_repeatability(
         if picture is not None:
             draw_evaluations(outputs.stage(picture), evaluations)
         if numbers is not None:
-            staged = outputs.stage(numbers)
-            with writing(staged):
-                staged.write_text(json.dumps(result.summary(), indent=1), encoding="utf-8")
+            write_json(outputs.stage(numbers), result.summary())
     return result
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from ..kinds import Choice, Distance, FileOut, Number
 from ..pose.pose import Pose
 from ..pose.rotation_windows import PoseWindows, read_windows
 from ..progress import SILENT, Progress
-from ..rasters.atomic import Outputs, writing
+from ..rasters.atomic import Outputs, write_json
 from ..rasters.pair import Image
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.pose_verdict import PoseVerdict, judge_pose
@@ -261,6 +260,4 @@ def _result(
 
 def _write_transform(outputs: Outputs, path: Path | None, transform: Transform) -> None:
     if path is not None:
-        staged = outputs.stage(path)
-        with writing(staged):
-            staged.write_text(json.dumps(transform.to_json(), indent=1), encoding="utf-8")
+        write_json(outputs.stage(path), transform.to_json())

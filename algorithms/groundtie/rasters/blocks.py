@@ -1,0 +1,89 @@
+"""The bytes of a block of pixels in a TIFF file: predicted, and compressed.
+
+Source: [Adobe1992] section 14, [Adobe2005].
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .tiff import BLOCK
+from .windows import Mask
+
+# The fastest: the next ones take twice the time for a few percent.
+LEVEL = 1
+
+_NO_PREDICTOR, _DIFFERENCES, _FLOATS = 1, 2, 3
+
+# Complex integers, which numpy lacks, are pairs of these.
+_PAIRS = {"complex_int16": "<i2", "complex_int32": "<i4"}
+
+
+@dataclass(frozen=True)
+class PixelType:
+    """How pixels are stored.
+
+    Parameters
+    ----------
+    name
+        rasterio's name of their type.
+    memory
+        The type that holds them in memory.
+    """
+
+    name: str
+    memory: np.dtype[Any]
+
+    @property
+    def predictor(self) -> int:
+        """What is compressed: the values, differences of integers, or those of parts of floats."""
+        kind, bits = self.memory.kind, self.memory.itemsize * 8
+        if kind == "f":
+            return _FLOATS
+        return _DIFFERENCES if kind in "iu" and bits < 64 else _NO_PREDICTOR
+
+    def encoded(self, values: NDArray[Any]) -> bytes:
+        """Return a block, shape (h, w, samples), at most `BLOCK` high and wide, as stored."""
+        values = _whole(values)
+        if self.name in _PAIRS:
+            parts = np.rint(np.stack([values.real, values.imag], axis=-1))
+            limits = np.iinfo(_PAIRS[self.name])
+            stored = np.clip(parts, limits.min, limits.max).astype(_PAIRS[self.name])
+        else:
+            stored = np.ascontiguousarray(values, self.memory.newbyteorder("<"))
+        if self.predictor == _DIFFERENCES:
+            stored = _differences(stored.view(f"<u{stored.dtype.itemsize}"))
+        elif self.predictor == _FLOATS:
+            stored = _split(stored)
+        return zlib.compress(stored.data, LEVEL)
+
+
+def encoded_mask(valid: Mask) -> bytes:
+    """Return a block of a mask, shape (h, w), as stored: one bit a pixel."""
+    return zlib.compress(np.packbits(_whole(valid), axis=1).data, LEVEL)
+
+
+def _whole(values: NDArray[Any]) -> NDArray[Any]:
+    """Return a block at the border of the image with what lies beyond: the nearest pixels."""
+    beyond = [(0, BLOCK - size) for size in values.shape[:2]]
+    return np.pad(values, beyond + [(0, 0)] * (values.ndim - 2), "edge")
+
+
+def _differences(values: NDArray[Any]) -> NDArray[Any]:
+    """Return each pixel minus the one left of it, shape (h, w, samples)."""
+    out = values.copy()
+    out[:, 1:] -= values[:, :-1]
+    return out
+
+
+def _split(values: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return rows of floats with all first bytes in front, then the second ones, as differences."""
+    height, width, samples = values.shape
+    parts = values.view(np.uint8).reshape(height, width * samples, -1)
+    planes = parts[:, :, ::-1].transpose(0, 2, 1).reshape(height, -1, samples)
+    return _differences(np.ascontiguousarray(planes))

@@ -1,0 +1,219 @@
+"""The directories of a TIFF file: which blocks of which image lie where.
+
+GDAL makes the tags, all but size and blocks (see `tags_of`); the pixels are written by Python (see
+`tiled_file`), where a full disk is an exception. Within GDAL it is met by libtiff: that may end the
+process, or write a file that lacks pixels and says nothing.
+
+Source: [Adobe1992], [OGC2023].
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+BLOCK = 512
+
+# Tags, and the types of values with their sizes.
+_KIND, _WIDTH, _HEIGHT, _BITS, _COMPRESSION, _COLOURS = 254, 256, 257, 258, 259, 262
+_SAMPLES, _PLANES, _PALETTE, _OFFSETS, _COUNTS = 277, 284, 320, 324, 325
+_PREDICTOR, _TILE_WIDTH, _TILE_HEIGHT, _EXTRA, _FORMAT, _NODATA = 317, 322, 323, 338, 339, 42113
+_SHORT, _LONG, _LONG8 = 3, 4, 16
+_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 6: 1, 7: 1, 8: 2, 9: 4, 10: 8, 11: 4, 12: 8, 16: 8, 17: 8}
+
+# What an overview states as its image does, besides its size.
+_SHARED = (_BITS, _COMPRESSION, _COLOURS, _SAMPLES, _PLANES, _PREDICTOR, _PALETTE, _TILE_WIDTH,
+           _TILE_HEIGHT, _EXTRA, _FORMAT, _NODATA)  # fmt: skip
+
+# Kinds of images, which may add up.
+_OVERVIEW, _MASK = 1, 4
+_COLOURS_OF_MASK, _UNSIGNED = 4, 1
+
+# BigTIFF begins where the offsets of TIFF end; as GDAL's IF_SAFER, well before.
+_LARGEST_CLASSIC = 2_000_000_000
+
+# What a Cloud Optimized GeoTIFF states of its blocks: in front of each lies its size, behind it its
+# last bytes again. Source: [OGC2023].
+_COG = b"""LAYOUT=IFDS_BEFORE_DATA
+BLOCK_ORDER=ROW_MAJOR
+BLOCK_LEADER=SIZE_AS_UINT4
+BLOCK_TRAILER=LAST_4_BYTES_REPEATED
+KNOWN_INCOMPATIBLE_EDITION=NO
+ """
+AROUND_COG_BLOCK = 4
+
+Tag = tuple[int, int, bytes]
+Tags = dict[int, Tag]
+
+
+@dataclass
+class Image:
+    """One image of a file: the raster, an overview, or the mask of one.
+
+    Parameters
+    ----------
+    width, height
+        In pixels.
+    tags
+        Type, count and bytes of what it states, by number.
+    planes
+        In how many planes its bands lie: 1, or one each.
+    offsets, counts
+        Where each block lies and how many bytes it has, shape (planes, rows, cols); 0: not yet.
+    """
+
+    width: int
+    height: int
+    tags: Tags
+    planes: int = 1
+    offsets: NDArray[np.uint64] = field(init=False)
+    counts: NDArray[np.uint64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        shape = (self.planes, -(-self.height // BLOCK), -(-self.width // BLOCK))
+        self.offsets, self.counts = np.zeros(shape, np.uint64), np.zeros(shape, np.uint64)
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels."""
+        return self.width * self.height
+
+    def overview(self, factor: int) -> Image:
+        """Return a reduced image of this one, without blocks yet."""
+        width, height = -(-self.width // factor), -(-self.height // factor)
+        kind = _OVERVIEW | _number(self.tags.get(_KIND, _short(0)))
+        shared = {tag: self.tags[tag] for tag in _SHARED if tag in self.tags}
+        return Image(width, height, {**shared, _KIND: _long(kind)}, self.planes)
+
+    def mask(self) -> Image:
+        """Return the mask of this image, one bit a pixel, without blocks yet."""
+        tags = {
+            _KIND: _long(_MASK),
+            _BITS: _short(1),
+            _COMPRESSION: self.tags[_COMPRESSION],
+            _COLOURS: _short(_COLOURS_OF_MASK),
+            _SAMPLES: _short(1),
+            _PLANES: _short(1),
+            _TILE_WIDTH: _short(BLOCK),
+            _TILE_HEIGHT: _short(BLOCK),
+            _FORMAT: _short(_UNSIGNED),
+        }
+        return Image(self.width, self.height, tags)
+
+    def entries(self, big: bool) -> list[tuple[int, Tag]]:
+        """Return all that a directory states, in the order of the tags."""
+        kind, dtype = (_LONG8, "<u8") if big else (_LONG, "<u4")
+        size = self.offsets.size
+        made: Tags = {
+            _WIDTH: _long(self.width),
+            _HEIGHT: _long(self.height),
+            _OFFSETS: (kind, size, self.offsets.astype(dtype).tobytes()),
+            _COUNTS: (_LONG, size, self.counts.astype("<u4").tobytes()),
+        }
+        return sorted({**self.tags, **made}.items())
+
+
+def base_image(template: bytes, width: int, height: int) -> Image:
+    """Return a raster's image of a size with what a template states, without blocks yet.
+
+    Parameters
+    ----------
+    template
+        A classic TIFF file, little endian, of the same bands and blocks.
+    width, height
+        In pixels.
+    """
+    tags = tags_of(template)
+    separate = _number(tags[_PLANES]) == 2
+    return Image(width, height, tags, _number(tags[_SAMPLES]) if separate else 1)
+
+
+def tags_of(content: bytes) -> Tags:
+    """Return the tags of the first image of a classic TIFF file, little endian."""
+    order, version, start = struct.unpack_from("<2sHI", content)
+    if (order, version) != (b"II", 42):
+        raise ValueError("not a classic TIFF file, little endian")
+    (count,) = struct.unpack_from("<H", content, start)
+    tags: Tags = {}
+    for i in range(count):
+        place = start + 2 + 12 * i
+        tag, kind, number = struct.unpack_from("<HHI", content, place)
+        size = _SIZES[kind] * number
+        where = place + 8 if size <= 4 else struct.unpack_from("<I", content, place + 8)[0]
+        tags[tag] = (kind, number, content[where : where + size])
+    return tags
+
+
+def needs_big(images: Iterable[Image], raw_bytes: int) -> bool:
+    """Return whether a file may grow beyond what a classic TIFF can hold.
+
+    Parameters
+    ----------
+    images
+        All of them.
+    raw_bytes
+        Of their pixels, not compressed.
+    """
+    return raw_bytes + sum(16 * image.offsets.size for image in images) > _LARGEST_CLASSIC
+
+
+def header(images: Sequence[Image], big: bool, cog: bool = False) -> bytes:
+    """Return the start of a file: the directories of its images, before all blocks.
+
+    Its length depends on the images' sizes alone, and not on where the blocks lie; the header of
+    the first images of several has the same start.
+
+    Parameters
+    ----------
+    images
+        The raster first, each mask behind its image.
+    big
+        Whether offsets have 64 bits.
+    cog
+        Whether the blocks are ordered as in a Cloud Optimized GeoTIFF.
+    """
+    ghost = b"GDAL_STRUCTURAL_METADATA_SIZE=%06d bytes\n" % len(_COG) + _COG if cog else b""
+    start = (16 if big else 8) + len(ghost)
+    start += start % 2
+    first = struct.pack("<2sHHHQ", b"II", 43, 8, 0, start) if big else None
+    parts = [first or struct.pack("<2sHI", b"II", 42, start), ghost]
+    parts.append(bytes(start - sum(map(len, parts))))
+    for i, image in enumerate(images):
+        directory = _directory(image.entries(big), start, big, last=i == len(images) - 1)
+        parts.append(directory)
+        start += len(directory)
+    return b"".join(parts)
+
+
+def _directory(entries: list[tuple[int, Tag]], start: int, big: bool, last: bool) -> bytes:
+    """Return a directory that lies at `start`, with its values behind it, and the next behind."""
+    count, entry, word = ("<Q", "<HHQ", "<Q") if big else ("<H", "<HHI", "<I")
+    width = struct.calcsize(word)
+    behind = start + struct.calcsize(count) + len(entries) * (4 + 2 * width) + width
+    table, values = [struct.pack(count, len(entries))], [b""]
+    for tag, (kind, number, content) in entries:
+        if len(content) <= width:
+            place = content.ljust(width, b"\0")
+        else:
+            place = struct.pack(word, behind)
+            values.append(content + bytes(len(content) % 2))
+            behind += len(values[-1])
+        table.append(struct.pack(entry, tag, kind, number) + place)
+    table.append(struct.pack(word, 0 if last else behind))
+    return b"".join([*table, *values])
+
+
+def _short(value: int) -> Tag:
+    return _SHORT, 1, struct.pack("<H", value)
+
+
+def _long(value: int) -> Tag:
+    return _LONG, 1, struct.pack("<I", value)
+
+
+def _number(tag: Tag) -> int:
+    return int.from_bytes(tag[2][: _SIZES[tag[0]]], "little")

@@ -1,0 +1,307 @@
+"""TIFF files, written block by block by Python itself: what goes wrong is an exception.
+
+The blocks lie in the file in the order in which they were completed, whatever the number of threads
+that compress: the same pixels make the same bytes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .atomic import free_bytes, no_space, writing
+from .blocks import PixelType, encoded_mask
+from .tiff import AROUND_COG_BLOCK, BLOCK, Image, header, needs_big
+from .windows import Window
+
+# Deflate makes no more than this out of a byte: two bits for 258 of them, [Deutsch1996] 3.2.5.
+_BEST_COMPRESSION = 1032
+
+
+@dataclass(frozen=True)
+class Level:
+    """An image in one of the sizes that a file holds, and its mask, if there is one."""
+
+    image: Image
+    mask: Image | None
+
+    @property
+    def images(self) -> list[Image]:
+        """Both, in the order of their directories."""
+        return [self.image] if self.mask is None else [self.image, self.mask]
+
+    def overview(self, factor: int) -> Level:
+        """Return this level reduced by a factor, without blocks yet."""
+        mask = None if self.mask is None else self.mask.overview(factor)
+        return Level(self.image.overview(factor), mask)
+
+
+@dataclass
+class _Open:
+    """A block of which a part is known."""
+
+    values: NDArray[Any]
+    missing: int
+
+
+@dataclass(frozen=True)
+class _Coming:
+    """A block that is being compressed."""
+
+    image: Image
+    place: tuple[int, int, int]
+    raw_bytes: int
+    content: Future[bytes]
+
+
+def require_space(path: Path, raw_bytes: int) -> None:
+    """Raise `OutputError` if pixels cannot fit on the disk, however well they compress.
+
+    Parameters
+    ----------
+    path
+        The file.
+    raw_bytes
+        Of its pixels, not compressed.
+    """
+    least = raw_bytes // _BEST_COMPRESSION
+    with writing(path):
+        if least > free_bytes(path):
+            raise no_space(path, least)
+
+
+@dataclass
+class TiledFile:
+    """A raster that is being written.
+
+    Parameters
+    ----------
+    path
+        The file; see `atomic.Outputs.stage`.
+    levels
+        The raster and its overviews.
+    pixels
+        The type of its pixels.
+    bands
+        How many there are.
+    executor
+        Where blocks are compressed.
+    ahead
+        How many wait to be written, at most.
+    """
+
+    path: Path
+    levels: Sequence[Level]
+    pixels: PixelType
+    bands: int
+    executor: Executor
+    ahead: int
+    _file: IO[bytes] = field(init=False)
+    _open: dict[tuple[int, int, int, int], _Open] = field(init=False, default_factory=dict)
+    _coming: deque[_Coming] = field(init=False, default_factory=deque)
+    _done_bytes: int = field(init=False, default=0)
+
+    def __enter__(self) -> TiledFile:
+        with writing(self.path):
+            # Without a buffer: what cannot be written must not be tried again when it is closed.
+            self._file = self.path.open("w+b", buffering=0)
+            try:
+                _write(self._file, bytes(self._start))
+            except OSError:
+                self._file.close()
+                raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for coming in self._coming:
+            coming.content.cancel()
+        self._file.close()
+
+    def write(
+        self,
+        values: NDArray[Any],
+        indexes: int | Sequence[int] | None = None,
+        *,
+        window: Window | None = None,
+        level: int = 0,
+    ) -> None:
+        """Write pixels of some bands; each must be written once, and not change any more.
+
+        Parameters
+        ----------
+        values
+            Shape (bands, h, w), or (h, w) for a single band.
+        indexes
+            The bands, from 1; None: all. Where all lie in one plane they must be all.
+        window
+            Their place; None: the whole image.
+        level
+            0: the raster; else its overviews in the order of their sizes.
+        """
+        image = self.levels[level].image
+        window = window or Window(0, 0, image.width, image.height)
+        values = values.reshape(-1, *values.shape[-2:])
+        if image.planes == 1:
+            if len(values) != self.bands:
+                raise ValueError("all bands of a plane are written together")
+            self._put(image, 0, np.moveaxis(values, 0, -1), window, self.pixels.encoded)
+            return
+        numbers = range(1, self.bands + 1) if indexes is None else np.atleast_1d(indexes)
+        for number, band in zip(numbers, values, strict=True):
+            self._put(image, int(number) - 1, band[:, :, None], window, self.pixels.encoded)
+
+    def write_mask(self, valid: NDArray[Any], *, window: Window, level: int = 0) -> None:
+        """Write which pixels, shape (h, w), are valid: all but 0."""
+        mask = self.levels[level].mask
+        if mask is None:
+            raise ValueError("this file has no mask")
+        self._put(mask, 0, np.asarray(valid) != 0, window, encoded_mask)
+
+    def finish(self, levels: int) -> None:
+        """Write all blocks that were given, and let readers know the first levels."""
+        self._write_coming(0)
+        images = [image for level in self.levels[:levels] for image in level.images]
+        if not all(image.counts.all() for image in images):
+            raise ValueError("not all blocks were written")
+        with writing(self.path):
+            self._file.seek(0)
+            _write(self._file, header(images, self._big))
+            self._file.seek(0, os.SEEK_END)
+
+    def copy_as_cog(self, path: Path) -> None:
+        """Write a Cloud Optimized GeoTIFF of what is finished: the smallest level first."""
+        order = [image for level in self.levels for image in level.images]
+        start, copied = len(header(order, self._big, cog=True)), []
+        for level in reversed(self.levels):
+            for image in level.images:
+                copied.append((image.offsets.copy(), image.counts))
+                ends = start + np.cumsum(image.counts.ravel() + np.uint64(2 * AROUND_COG_BLOCK))
+                starts = ends - image.counts.ravel() - np.uint64(AROUND_COG_BLOCK)
+                image.offsets[:] = starts.reshape(image.offsets.shape)
+                start = int(ends[-1])
+        with writing(path, start), path.open("wb", buffering=0) as file:
+            _write(file, header(order, self._big, cog=True))
+            for offsets, counts in copied:
+                for offset, count in zip(offsets.flat, counts.flat, strict=True):
+                    self._file.seek(int(offset))
+                    block = self._file.read(int(count))
+                    leader = len(block).to_bytes(AROUND_COG_BLOCK, "little")
+                    _write(file, leader + block + block[-AROUND_COG_BLOCK:])
+
+    @cached_property
+    def _images(self) -> list[Image]:
+        return [image for level in self.levels for image in level.images]
+
+    @cached_property
+    def _raw_bytes(self) -> int:
+        """Bytes of all pixels, not compressed."""
+        pixel = self.bands * self.pixels.memory.itemsize
+        raw = sum(level.image.pixels * pixel for level in self.levels)
+        return raw + sum(level.mask.pixels // 8 for level in self.levels if level.mask is not None)
+
+    @cached_property
+    def _big(self) -> bool:
+        return needs_big(self._images, self._raw_bytes)
+
+    @cached_property
+    def _start(self) -> int:
+        return len(header(self._images, self._big))
+
+    def _put(
+        self,
+        image: Image,
+        plane: int,
+        values: NDArray[Any],
+        window: Window,
+        encode: Callable[[NDArray[Any]], bytes],
+    ) -> None:
+        """Add pixels, shape (h, w, …), to the blocks in which they lie."""
+        for place in _blocks(window):
+            whole = _extent(image, *place)
+            part = _common(window, whole)
+            rows, cols = _slices(part, window)
+            block = self._completed(image, (plane, *place), values[rows, cols], part, whole)
+            if block is not None:
+                raw_bytes = block.size // 8 if encode is encoded_mask else block.nbytes
+                content = self.executor.submit(encode, block)
+                self._coming.append(_Coming(image, (plane, *place), raw_bytes, content))
+                self._write_coming(self.ahead)
+
+    def _completed(
+        self,
+        image: Image,
+        place: tuple[int, int, int],
+        values: NDArray[Any],
+        part: Window,
+        whole: Window,
+    ) -> NDArray[Any] | None:
+        """Return a block to which a part was added, if it is complete by that."""
+        if part == whole:
+            return values
+        key = (id(image), *place)
+        block = self._open.get(key)
+        if block is None:
+            shape = (whole.height, whole.width, *values.shape[2:])
+            block = _Open(np.zeros(shape, values.dtype), whole.width * whole.height)
+            self._open[key] = block
+        block.values[_slices(part, whole)] = values
+        block.missing -= part.width * part.height
+        return None if block.missing else self._open.pop(key).values
+
+    def _write_coming(self, most: int) -> None:
+        """Write blocks, in the order in which they were completed, until few are left."""
+        while len(self._coming) > most:
+            coming = self._coming.popleft()
+            content = coming.content.result()
+            coming.image.offsets[coming.place] = self._file.tell()
+            self._done_bytes += coming.raw_bytes
+            self._append(content)
+            coming.image.counts[coming.place] = len(content)
+
+    def _append(self, content: bytes) -> None:
+        size = self._file.tell() + len(content)
+        # If the rest compresses as well as what is done.
+        share = min(self._done_bytes / self._raw_bytes, 1)
+        with writing(self.path, round(size / share) if share else None):
+            _write(self._file, content)
+
+
+def _write(file: IO[bytes], content: bytes) -> None:
+    left = memoryview(content)
+    while left:
+        left = left[file.write(left) :]
+
+
+def _blocks(window: Window) -> Iterator[tuple[int, int]]:
+    """Return the row and column of each block that a window touches."""
+    for row in range(window.row // BLOCK, -(-(window.row + window.height) // BLOCK)):
+        for col in range(window.col // BLOCK, -(-(window.col + window.width) // BLOCK)):
+            yield row, col
+
+
+def _extent(image: Image, row: int, col: int) -> Window:
+    """Return the pixels of an image in a block."""
+    left, top = col * BLOCK, row * BLOCK
+    return Window(left, top, min(BLOCK, image.width - left), min(BLOCK, image.height - top))
+
+
+def _common(one: Window, other: Window) -> Window:
+    left, top = max(one.col, other.col), max(one.row, other.row)
+    right = min(one.col + one.width, other.col + other.width)
+    bottom = min(one.row + one.height, other.row + other.height)
+    return Window(left, top, right - left, bottom - top)
+
+
+def _slices(part: Window, whole: Window) -> tuple[slice, slice]:
+    """Return the rows and columns of a window within another."""
+    inside = part._replace(col=part.col - whole.col, row=part.row - whole.row)
+    return inside.slices
