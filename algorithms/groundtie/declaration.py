@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
-from .errors import ParameterError
+from .errors import MemoryLimitError, ParameterError
 from .kinds import Kind, RasterIn, check_different, check_paths
 
 
@@ -167,7 +167,10 @@ def tool(
             progress = {key: bound.pop(key) for key in ("progress",) if key in bound}
             values = declared.check(bound, in_python=True)
             given = {"parameters": values} if "parameters" in signature.parameters else {}
-            return cast(Callable[..., R], function)(**values, **given, **progress)
+            try:
+                return cast(Callable[..., R], function)(**values, **given, **progress)
+            except MemoryError as error:
+                raise MemoryLimitError(f"memory does not suffice: {error}") from error
 
         declared = _declare(function, signature, checked, title, group, outputs)
         checked.__signature__ = signature.replace(  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""Layers of lines in a GeoPackage. Importing this is slow: it loads fiona."""
+"""Writing layers of lines in a GeoPackage. Importing this is slow: it loads fiona."""
 
 from __future__ import annotations
 
@@ -60,21 +60,3 @@ def write_layer(
         complete = False
     if not complete:
         raise OSError("the file is not complete; is the disk full?")
-
-
-def read_layer(path: Path) -> tuple[list[dict[str, Any]], CRS | None]:
-    """Return the properties of all features of the first layer, and its CRS.
-
-    Raises
-    ------
-    OSError
-        The file cannot be read.
-    """
-    try:
-        with fiona.open(path) as layer:
-            crs = CRS.from_wkt(layer.crs_wkt) if layer.crs_wkt else None
-            return [dict(feature["properties"]) for feature in layer], crs
-    except Exception as error:
-        if not raised_by(error, "fiona"):
-            raise
-        raise OSError(str(error)) from error

@@ -12,7 +12,7 @@ from affine import Affine
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, require_map
 from .tie_points import USED, TiePoints
 from .transform import Transform
 
@@ -45,13 +45,26 @@ def read_georeferencer(path: Path, input_grid: Grid) -> TiePoints:
     while lines and lines[0].startswith("#"):
         comment = lines.pop(0)
         if comment.startswith("#CRS:"):
-            crs = CRS.from_user_input(comment.removeprefix("#CRS:").strip())
-    rows: list[Row] = list(csv.DictReader(lines))
+            crs = require_map(CRS.from_user_input(comment.removeprefix("#CRS:").strip()))
+    rows = table_rows(lines)
     # Older versions of QGIS called the columns so.
     x, y = ("pixelX", "pixelY") if rows and "pixelX" in rows[0] else ("sourceX", "sourceY")
     input_px = _source_grid(input_grid).map_to_pixel(positions(rows, x, y))
-    states = [USED if row["enable"].strip() != "0" else "rejected: disabled" for row in rows]
+    # As in QGIS, a point of which nothing is said is enabled.
+    enabled = [(row.get("enable") or "1").strip() for row in rows]
+    states = ["rejected: disabled" if word == "0" else USED for word in enabled]
     return unmeasured(positions(rows, "mapX", "mapY"), input_px, states, crs)
+
+
+def table_rows(lines: Iterable[str]) -> list[Row]:
+    """Return the rows of a CSV table by the names of its columns.
+
+    Fields beyond those of the first line are left out.
+    """
+    rows = [dict(row) for row in csv.DictReader(lines)]
+    for row in rows:
+        row.pop(None, None)
+    return rows
 
 
 def unmeasured(

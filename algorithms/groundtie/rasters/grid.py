@@ -17,7 +17,7 @@ from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 from rasterio.crs import CRS
 
-from ..errors import raised_by
+from ..errors import GeoreferencingError, raised_by
 
 FloatArray = NDArray[np.float64]
 
@@ -139,6 +139,29 @@ class Grid:
             ]
         )
         return np.asarray(unit * [self.width, self.height] - 0.5)
+
+
+def is_invertible(transform: Affine) -> bool:
+    """Return whether a transform takes different positions to different, finite ones."""
+    if not np.isfinite(transform[:6]).all() or transform.is_degenerate:
+        return False
+    return bool(np.isfinite((~transform)[:6]).all())
+
+
+def require_map(crs: CRS | None) -> CRS | None:
+    """Return a CRS if it is one of maps: projected or geographic, or none at all.
+
+    Raises
+    ------
+    GeoreferencingError
+        It is local (engineering), geocentric or vertical: nothing leads from it to a map.
+    """
+    if crs is None or crs.is_projected or crs.is_geographic:
+        return crs
+    raise GeoreferencingError(
+        f"a CRS is neither projected nor geographic ({crs.to_wkt()[:40]}…); give it the CRS of its "
+        "map, or none (gdal_edit.py -a_srs)"
+    )
 
 
 # The product is `*` in affine 2; affine 3 has `@` and warns of `*`.

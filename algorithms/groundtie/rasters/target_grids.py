@@ -9,13 +9,20 @@ from affine import Affine
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from ..errors import NoOverlapError
+from ..errors import GridSizeError, NoOverlapError
 from .grid import Grid
 
 FloatArray = NDArray[np.float64]
 
 # A footprint that reaches into a further row or column by less than this does not need it.
 _TOLERANCE_PX = 1e-3
+
+# GDAL counts the pixels of a side in 32 bits.
+_MOST_PX = 2.0**31 - 1
+
+# A registered raster is larger than its centre's pixels say by what its model bends, in either
+# direction: the largest scale that is searched for is 4, either way, so 16 is none's.
+_LARGEST_STRETCH = 16.0
 
 
 def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Grid:
@@ -34,10 +41,15 @@ def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Gri
     ------
     NoOverlapError
         Nothing is left.
+    GridSizeError
+        It would have more pixels a side than rasters can have.
     """
     px = lattice.map_to_pixel(xy[np.isfinite(xy).all(axis=1)])
     if len(px) == 0:
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")
+    if not (np.abs(px) < _MOST_PX).all() and not within:
+        raise GridSizeError("the result would have more pixels a side than a raster can have")
+    px = np.clip(px, -_MOST_PX, _MOST_PX)
     low = np.floor(px.min(axis=0) + 0.5 + _TOLERANCE_PX).astype(int)
     high = np.ceil(px.max(axis=0) + 0.5 - _TOLERANCE_PX).astype(int)
     if within:
@@ -76,14 +88,16 @@ def registered_grid(
     ------
     NoOverlapError
         The raster lies outside of the domain of the CRS.
+    GridSizeError
+        The transform bends the raster out of all proportion, or the pixels are too many.
     """
     footprint = px_to_map(input_grid.outline())
+    _require_size(input_grid, px_to_map, footprint)
     if pixel_size_m is None and crs == input_grid.crs:
         return covering_grid(input_grid, footprint)
     if not input_grid.is_georeferenced and crs is None:
         return covering_grid(input_grid.scaled(pixel_size_m or 1.0), footprint)
-    col, row = input_grid.centre_px
-    corners = px_to_map(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) + [col, row])
+    corners = _centre_pixel(input_grid, px_to_map)
     centre = corners.mean(axis=0)
     if not np.isfinite(centre).all():
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")
@@ -96,3 +110,26 @@ def registered_grid(
         pixel_size_m = float(np.sqrt(area * metres.prod()))
     width, height = pixel_size_m / metres
     return covering_grid(Grid(Affine(width, 0, 0, 0, -height, 0), crs, 1, 1), footprint)
+
+
+def _centre_pixel(grid: Grid, px_to_map: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Return the map positions of the corners of the pixel at a grid's centre, shape (4, 2)."""
+    around = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    return px_to_map(around + grid.centre_px)
+
+
+def _require_size(
+    grid: Grid, px_to_map: Callable[[FloatArray], FloatArray], footprint: FloatArray
+) -> None:
+    """Raise if a raster becomes far larger than its pixels: its transform is not for it."""
+    pixel = _centre_pixel(grid, px_to_map)
+    extent = footprint[np.isfinite(footprint).all(axis=1)]
+    if not len(extent) or not np.isfinite(pixel).all():
+        return  # it lies outside of the projection, as is told elsewhere
+    size = np.hypot(grid.width, grid.height) * np.hypot(*np.ptp(pixel, axis=0))
+    extended = np.hypot(*np.ptp(extent, axis=0))
+    if not extended <= _LARGEST_STRETCH * size:
+        raise GridSizeError(
+            f"the transform would stretch the raster {extended / size:.2g} times: it is damaged, "
+            "or not for this raster"
+        )

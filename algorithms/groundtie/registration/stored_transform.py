@@ -128,6 +128,11 @@ def transform_of(found: Transform, source: RasterSource, name: object) -> Transf
         It lies elsewhere.
     """
     own, registered = source.grid, found.input_grid
+    if own.crs is not None and found.crs is None:
+        raise GeoreferencingError(
+            f"{name} does not state the CRS of its map, but {source.path} has one: take the "
+            "raster that it was made with, or one without georeferencing"
+        )
     if own.is_georeferenced and registered.is_georeferenced:
         if (own.crs is None) != (registered.crs is None):
             raise GeoreferencingError(f"only one of {source.path} and {name} has a CRS")

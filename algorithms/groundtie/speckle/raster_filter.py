@@ -14,7 +14,7 @@ from ..context import Context
 from ..errors import RasterContentError
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
-from ..rasters.tiling import in_order, tiles
+from ..rasters.tiling import in_order, tile_count, tiles
 from ..rasters.writing import create_like, fill_value
 from .filters import SpeckleFilter
 from .statistics import estimate_looks
@@ -49,20 +49,25 @@ class RasterFilter:
 
     def write(self, path: Path, context: Context) -> None:
         """Write the filtered raster, tile by tile; see `atomic.Outputs.stage`."""
-        source, places = self.source, list(tiles(self.source.grid))
+        source = self.source
         nodata = None if source.is_complex else source.bands[0].nodata
         like = _as_amplitudes(source) if source.is_complex else source
         # Without speckle, only the tag identifies it as a radar image.
         like = with_speckle_filter(like, f"{self.filter.name}, {self.filter.window_px} px")
         workers = context.workers
         with create_like(like, source.grid, path, nodata=nodata, workers=workers) as dataset:
-            filtered = in_order(context.executor, self.tile, places, workers + 1)
-            for i, (bands, valid) in enumerate(filtered):
-                place = rasterio.windows.Window(*places[i])
+            filtered = in_order(
+                context.executor,
+                lambda tile: (tile, *self.tile(tile)),
+                tiles(source.grid),
+                workers + 1,
+            )
+            for i, (tile, bands, valid) in enumerate(filtered):
+                place = rasterio.windows.Window(*tile)
                 dataset.write(bands, window=place)
                 if source.has_mask_band:
                     dataset.write_mask(valid, window=place)
-                context.update((i + 1) / len(places))
+                context.update((i + 1) / tile_count(source.grid))
 
     def tile(self, tile: Window) -> tuple[NDArray[Any], Mask]:
         """Return all bands of a tile, filtered, and which pixels of the first are valid."""
