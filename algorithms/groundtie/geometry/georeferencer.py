@@ -19,6 +19,9 @@ from .transform import Transform
 FloatArray = NDArray[np.float64]
 Row = dict[str, Any]
 
+# No position on a map of the Earth, in any unit, nor in an image is farther off.
+_FARTHEST = 1e10
+
 # It counts pixels from the image's corner, and rows downwards from 0.
 _PIXELS = Grid(Affine.scale(1, -1), None, 1, 1)
 
@@ -49,11 +52,12 @@ def read_georeferencer(path: Path, input_grid: Grid) -> TiePoints:
     rows = table_rows(lines)
     # Older versions of QGIS called the columns so.
     x, y = ("pixelX", "pixelY") if rows and "pixelX" in rows[0] else ("sourceX", "sourceY")
-    input_px = _source_grid(input_grid).map_to_pixel(positions(rows, x, y))
+    input_px = _source_grid(input_grid).map_to_pixel(require_places(positions(rows, x, y)))
     # As in QGIS, a point of which nothing is said is enabled.
     enabled = [(row.get("enable") or "1").strip() for row in rows]
     states = ["rejected: disabled" if word == "0" else USED for word in enabled]
-    return unmeasured(positions(rows, "mapX", "mapY"), input_px, states, crs)
+    reference_xy = require_places(positions(rows, "mapX", "mapY"))
+    return unmeasured(reference_xy, input_px, states, crs)
 
 
 def table_rows(lines: Iterable[str]) -> list[Row]:
@@ -87,6 +91,20 @@ def unmeasured(
 def positions(rows: Iterable[Row], x: str, y: str) -> FloatArray:
     """Return the positions in two columns of a table, shape (n, 2)."""
     return np.array([[float(row[x]), float(row[y])] for row in rows], float).reshape(-1, 2)
+
+
+def require_places(places: FloatArray) -> FloatArray:
+    """Return positions, shape (n, 2), that a file holds.
+
+    Raises
+    ------
+    ValueError
+        One is so far off that it lies on no map, or is not finite.
+    """
+    lost = int((~(np.abs(places) < _FARTHEST)).any(axis=1).sum())
+    if lost:
+        raise ValueError(f"{lost} of {len(places)} positions lie on no map")
+    return places
 
 
 def _source_grid(input_grid: Grid) -> Grid:

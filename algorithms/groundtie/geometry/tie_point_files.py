@@ -23,6 +23,7 @@ from .georeferencer import (
     Row,
     positions,
     read_georeferencer,
+    require_places,
     table_rows,
     unmeasured,
     write_georeferencer,
@@ -200,7 +201,10 @@ def _from_rows(
     states = [str(row.get("state", USED)) for row in rows]
     sigma = np.column_stack([_numbers(rows, f"sigma_{axis}_px") for axis in "xy"])
     points = unmeasured(
-        positions(rows, "reference_x", "reference_y"), _input_px(rows, input_grid, crs), states, crs
+        require_places(positions(rows, "reference_x", "reference_y")),
+        require_places(_input_px(rows, input_grid, crs)),
+        states,
+        crs,
     )
     return replace(
         points,

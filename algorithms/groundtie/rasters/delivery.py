@@ -61,7 +61,8 @@ class _Warp:
         nodata = _choose_nodata(source) if nodata is None else nodata
         if nodata is not None:
             require_fit(nodata, source.dtype)
-        factor = (1, 1) if method == "nearest" else reduction(target, to_input_px)
+        size = source.grid.width, source.grid.height
+        factor = (1, 1) if method == "nearest" else reduction(target, to_input_px, size)
         return cls(source, to_input_px, target, method, nodata, factor, band_groups(source))
 
     @property

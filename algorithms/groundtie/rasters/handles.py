@@ -131,6 +131,8 @@ def _reading(name: str) -> Iterator[None]:
     try:
         yield
     # Not all of them are RasterioErrors: neither are GDAL's own, nor CRSError.
+    except UnicodeDecodeError as error:
+        raise RasterOpenError(f"cannot read {name}: what it states is no UTF-8") from error
     except Exception as error:
         if not raised_by(error, "rasterio"):
             raise

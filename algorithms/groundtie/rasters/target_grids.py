@@ -20,8 +20,8 @@ _TOLERANCE_PX = 1e-3
 # GDAL counts the pixels of a side in 32 bits.
 _MOST_PX = 2.0**31 - 1
 
-# A registered raster is larger than its centre's pixels say by what its model bends, in either
-# direction: the largest scale that is searched for is 4, either way, so 16 is none's.
+# A registered raster has a diagonal of so many times as many pixels as the input has. The largest
+# scale that is searched for is 4, and a projection may double that again.
 _LARGEST_STRETCH = 16.0
 
 
@@ -89,15 +89,33 @@ def registered_grid(
     NoOverlapError
         The raster lies outside of the domain of the CRS.
     GridSizeError
-        The transform bends the raster out of all proportion, or the pixels are too many.
+        The transform stretches the raster out of all proportion, or the pixels are too many.
     """
+    usual = _registered_grid(input_grid, px_to_map, crs, None)
+    stretch = np.hypot(usual.width, usual.height) / np.hypot(input_grid.width, input_grid.height)
+    if stretch > _LARGEST_STRETCH:
+        raise GridSizeError(
+            f"the transform stretches the raster {stretch:.3g} times: it is damaged, or not for "
+            "this raster"
+        )
+    if pixel_size_m is None:
+        return usual
+    return _registered_grid(input_grid, px_to_map, crs, pixel_size_m)
+
+
+def _registered_grid(
+    input_grid: Grid,
+    px_to_map: Callable[[FloatArray], FloatArray],
+    crs: CRS | None,
+    pixel_size_m: float | None,
+) -> Grid:
     footprint = px_to_map(input_grid.outline())
-    _require_size(input_grid, px_to_map, footprint)
     if pixel_size_m is None and crs == input_grid.crs:
         return covering_grid(input_grid, footprint)
     if not input_grid.is_georeferenced and crs is None:
         return covering_grid(input_grid.scaled(pixel_size_m or 1.0), footprint)
-    corners = _centre_pixel(input_grid, px_to_map)
+    col, row = input_grid.centre_px
+    corners = px_to_map(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) + [col, row])
     centre = corners.mean(axis=0)
     if not np.isfinite(centre).all():
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")
@@ -110,26 +128,3 @@ def registered_grid(
         pixel_size_m = float(np.sqrt(area * metres.prod()))
     width, height = pixel_size_m / metres
     return covering_grid(Grid(Affine(width, 0, 0, 0, -height, 0), crs, 1, 1), footprint)
-
-
-def _centre_pixel(grid: Grid, px_to_map: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Return the map positions of the corners of the pixel at a grid's centre, shape (4, 2)."""
-    around = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
-    return px_to_map(around + grid.centre_px)
-
-
-def _require_size(
-    grid: Grid, px_to_map: Callable[[FloatArray], FloatArray], footprint: FloatArray
-) -> None:
-    """Raise if a raster becomes far larger than its pixels: its transform is not for it."""
-    pixel = _centre_pixel(grid, px_to_map)
-    extent = footprint[np.isfinite(footprint).all(axis=1)]
-    if not len(extent) or not np.isfinite(pixel).all():
-        return  # it lies outside of the projection, as is told elsewhere
-    size = np.hypot(grid.width, grid.height) * np.hypot(*np.ptp(pixel, axis=0))
-    extended = np.hypot(*np.ptp(extent, axis=0))
-    if not extended <= _LARGEST_STRETCH * size:
-        raise GridSizeError(
-            f"the transform would stretch the raster {extended / size:.2g} times: it is damaged, "
-            "or not for this raster"
-        )
