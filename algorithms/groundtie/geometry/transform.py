@@ -13,7 +13,7 @@ from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
 from ..errors import TransformFileError
-from ..rasters.grid import Grid, is_invertible, reproject, require_map
+from ..rasters.grid import MOST_PX, Grid, is_invertible, reproject, require_map
 from ..strict_json import read_json
 from .models import Model, PolynomialModel, model_from_json
 
@@ -102,8 +102,9 @@ class Transform:
                 int(stored["width"]),
                 int(stored["height"]),
             )
-            if not is_invertible(grid.transform) or min(grid.width, grid.height) < 1:
-                raise ValueError("the input has no size")
+            is_sized = all(1 <= side < MOST_PX for side in (grid.width, grid.height))
+            if not is_sized or not is_invertible(grid.transform):
+                raise ValueError("the input's grid is none of a raster")
             return cls(model_from_json(values["model"]), _crs_from_text(values["crs"]), grid)
         except (KeyError, TypeError, ValueError, CRSError, OverflowError) as error:
             if isinstance(error, TransformFileError):

@@ -24,6 +24,9 @@ FloatArray = NDArray[np.float64]
 # Metres per degree on the sphere of the Earth's mean radius: for sizes and search radii only.
 METRES_PER_DEGREE = 111_195.0
 
+# GDAL counts the pixels of a side in 32 bits.
+MOST_PX = 2**31 - 1
+
 # Geotransform of images without georeferencing: map positions are then pixel coordinates.
 PIXEL_COORDINATES = Affine.translation(-0.5, -0.5)
 

@@ -10,15 +10,12 @@ from numpy.typing import NDArray
 from rasterio.crs import CRS
 
 from ..errors import GridSizeError, NoOverlapError
-from .grid import Grid
+from .grid import MOST_PX, Grid
 
 FloatArray = NDArray[np.float64]
 
 # A footprint that reaches into a further row or column by less than this does not need it.
 _TOLERANCE_PX = 1e-3
-
-# GDAL counts the pixels of a side in 32 bits.
-_MOST_PX = 2.0**31 - 1
 
 # A registered raster has a diagonal of so many times as many pixels as the input has. The largest
 # scale that is searched for is 4, and a projection may double that again.
@@ -47,9 +44,9 @@ def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Gri
     px = lattice.map_to_pixel(xy[np.isfinite(xy).all(axis=1)])
     if len(px) == 0:
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")
-    if not (np.abs(px) < _MOST_PX).all() and not within:
+    if not (np.abs(px) < MOST_PX).all() and not within:
         raise GridSizeError("the result would have more pixels a side than a raster can have")
-    px = np.clip(px, -_MOST_PX, _MOST_PX)
+    px = np.clip(px, -MOST_PX, MOST_PX)
     low = np.floor(px.min(axis=0) + 0.5 + _TOLERANCE_PX).astype(int)
     high = np.ceil(px.max(axis=0) + 0.5 - _TOLERANCE_PX).astype(int)
     if within:
