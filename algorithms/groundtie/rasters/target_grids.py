@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rasterio.crs import CRS
 
 from ..errors import GridSizeError, NoOverlapError
-from .grid import MOST_PX, Grid
+from .grid import MOST_PX, Grid, is_invertible
 
 FloatArray = NDArray[np.float64]
 
@@ -124,4 +124,7 @@ def _registered_grid(
         area = abs(along[0] * across[1] - along[1] * across[0]) / 2
         pixel_size_m = float(np.sqrt(area * metres.prod()))
     width, height = pixel_size_m / metres
-    return covering_grid(Grid(Affine(width, 0, 0, 0, -height, 0), crs, 1, 1), footprint)
+    lattice = Grid(Affine(width, 0, 0, 0, -height, 0), crs, 1, 1)
+    if not is_invertible(lattice.transform):
+        raise GridSizeError("the transform gives the raster's pixels no size on the map")
+    return covering_grid(lattice, footprint)

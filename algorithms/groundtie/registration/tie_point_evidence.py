@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import TooFewPointsError
 from ..geometry.chance import log10_false_alarms
 from ..geometry.fitting import fit_model
-from ..geometry.models import DEGREE, PARAMETERS, Frame, Model, monomials
+from ..geometry.models import DEGREE, PARAMETERS, Frame, monomials
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid, apply_affine
@@ -118,6 +118,11 @@ class TiePointEvidence:
         return int(self.taken.sum())
 
     @property
+    def judged_by(self) -> str:
+        """The model that shows how the points agree: a spline bends to any, its affine part not."""
+        return "affine" if self.kind == "tps" else self.kind
+
+    @property
     def side_px(self) -> int:
         """The raster's longer side."""
         return max(self.input_grid.width, self.input_grid.height)
@@ -137,8 +142,7 @@ class TiePointEvidence:
         if self.kind in ("rigid", "similarity"):
             design, at = (np.column_stack([np.ones(len(p)), p @ [1, 1j]]) for p in (uv, border))
         else:
-            degree = DEGREE.get(self.kind, 1)
-            design, at = (monomials(p, degree) for p in (uv, border))
+            design, at = (monomials(p, DEGREE[self.judged_by]) for p in (uv, border))
         _, sizes, axes = np.linalg.svd(design, full_matrices=False)
         if sizes[-1] <= _ROUNDING * sizes[0]:
             return math.inf
@@ -148,13 +152,12 @@ class TiePointEvidence:
     @cached_property
     def transform(self) -> Transform:
         """The transform that the model is, fitted by least squares."""
-        return Transform(self._model(), self.points.crs, self.input_grid)
+        return self._fitted(self.kind)
 
-    @cached_property
-    def residuals_px(self) -> FloatArray:
-        """Residuals of all points, shape (n,), in input pixels."""
+    def residuals_px(self, transform: Transform) -> FloatArray:
+        """Return the residuals of all points, shape (n,), in input pixels."""
         with np.errstate(all="ignore"):
-            return np.asarray(np.hypot(*self.points.residual_px(self.transform).T))
+            return np.asarray(np.hypot(*self.points.residual_px(transform).T))
 
     @cached_property
     def log10_chance(self) -> float | None:
@@ -164,20 +167,21 @@ class TiePointEvidence:
         """
         if self.count <= self.needed:
             return None
-        radii = np.sort(self.residuals_px[self.taken])[self.needed :]
+        sample = -(-PARAMETERS[self.judged_by] // 2)
+        residuals = self.residuals_px(self._fitted(self.judged_by))[self.taken]
+        radii = np.nan_to_num(np.sort(residuals)[sample:], nan=np.inf)
         area = self.input_grid.width * self.input_grid.height
+        probabilities = np.minimum(math.pi * radii**2 / area, 1.0).tolist()
         chances = [
-            log10_false_alarms(agreeing, self.count, probability, self.needed)
-            for agreeing, probability in enumerate(
-                np.minimum(math.pi * np.nan_to_num(radii, nan=np.inf) ** 2 / area, 1.0).tolist(),
-                start=self.needed + 1,
-            )
+            log10_false_alarms(agreeing, self.count, probability, sample)
+            for agreeing, probability in enumerate(probabilities, start=sample + 1)
         ]
         return min(chances) + math.log10(len(chances))
 
     def fit(self) -> TiePointFit:
         """Return how the transform fits the points."""
-        squared, check = self.residuals_px**2, self.points.used & self.points.is_check
+        squared = self.residuals_px(self.transform) ** 2
+        check = self.points.used & self.points.is_check
         return TiePointFit(
             points=self.count,
             rmse_px=float(np.sqrt(squared[self.taken].mean())),
@@ -192,7 +196,7 @@ class TiePointEvidence:
         nominal = Transform.nominal(self.points.crs, self.input_grid)
         return nominal.nominal_xy(self.points.input_px)
 
-    def _model(self) -> Model:
+    def _fitted(self, kind: str) -> Transform:
         """Fit a model in metres, so that rigid ones preserve shapes also on maps in degrees."""
         reference_xy = self.points.reference_xy[self.taken]
         centre = reference_xy.mean(axis=0)
@@ -202,4 +206,5 @@ class TiePointEvidence:
         xy, nominal_xy = (
             apply_affine(~metres, places) for places in (reference_xy, self._nominal_xy[self.taken])
         )
-        return fit_model(self.kind, xy, nominal_xy).on_map(metres)
+        model = fit_model(kind, xy, nominal_xy).on_map(metres)
+        return Transform(model, self.points.crs, self.input_grid)
