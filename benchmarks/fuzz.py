@@ -224,6 +224,8 @@ def _run_batch(
                 yield number, outcome
                 break
             yield number, line
+            if line in FAILURES:
+                break  # the process has ended, so that what it wrote can be kept
     os.waitpid(process, 0)
 
 
@@ -256,6 +258,8 @@ def _child(
             ):
                 outcome = MEMORY
             os.write(writing, f"{outcome}\n".encode())
+            if outcome in FAILURES:
+                break
         code = 0
     finally:
         os._exit(code)

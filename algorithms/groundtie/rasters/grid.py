@@ -24,6 +24,9 @@ FloatArray = NDArray[np.float64]
 # Metres per degree on the sphere of the Earth's mean radius: for sizes and search radii only.
 METRES_PER_DEGREE = 111_195.0
 
+# Units of maps lie between millimetres and thousands of kilometres, in metres.
+_LARGEST_UNIT_M = 1e6
+
 # GDAL counts the pixels of a side in 32 bits.
 MOST_PX = 2**31 - 1
 
@@ -157,9 +160,15 @@ def require_map(crs: CRS | None) -> CRS | None:
     Raises
     ------
     GeoreferencingError
-        It is local (engineering), geocentric or vertical: nothing leads from it to a map.
+        It is local (engineering), geocentric or vertical: nothing leads from it to a map. Or its
+        unit is none of lengths.
     """
-    if crs is None or crs.is_projected or crs.is_geographic:
+    if crs is None or crs.is_geographic:
+        return crs
+    if crs.is_projected:
+        unit, metres = crs.linear_units_factor
+        if not 1 / _LARGEST_UNIT_M <= metres <= _LARGEST_UNIT_M:
+            raise GeoreferencingError(f"a CRS has a unit ({unit[:40]}) of {metres:g} m")
         return crs
     raise GeoreferencingError(
         f"a CRS is neither projected nor geographic ({crs.to_wkt()[:40]}…); give it the CRS of its "
