@@ -278,7 +278,11 @@ def main() -> int:
         numbers = range(given.case, given.case + 1)
     counts: Counter[tuple[str, str]] = Counter()
     started = time.monotonic()
-    with tempfile.TemporaryDirectory(prefix="fuzz-seeds-") as folder:
+    # Ctrl-C ends with what was found so far.
+    with (
+        tempfile.TemporaryDirectory(prefix="fuzz-seeds-") as folder,
+        contextlib.suppress(KeyboardInterrupt),
+    ):
         write_seeds(Path(folder))
         for number, target, outcome in run_cases(
             numbers, Path(folder), given.only.split(","), RESULTS
@@ -286,7 +290,7 @@ def main() -> int:
             counts[target, outcome] += 1
             if outcome in FAILURES or given.case is not None:
                 print(f"case {number}: {target}: {outcome}", flush=True)
-    print(_table(counts), f"\n{len(numbers)} cases in {time.monotonic() - started:.0f} s")
+    print(_table(counts), f"\n{sum(counts.values())} cases in {time.monotonic() - started:.0f} s")
     return int(any(outcome in FAILURES for _, outcome in counts))
 
 
