@@ -133,6 +133,22 @@ class TestRasters:
             assert dataset.dtypes == ("complex64", "complex64")
             np.testing.assert_array_equal(dataset.read(1), dataset.read(2))
 
+    @pytest.mark.parametrize(
+        "words", ["warp {} out.tif --transform affine.json", "mask-threshold {} out.tif",
+                  "mask-regions {} out.tif", "filter-speckle {} out.tif"],
+    )  # fmt: skip
+    def test_more_pixels_than_anybody_has(
+        self, files: Path, words: str, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        """As map services state of their rasters."""
+        side = 2**31 - 1
+        text = (files / "image.vrt").read_text()
+        text = text.replace(f'rasterXSize="{SIDE}" rasterYSize="{SIDE}"',
+                            f'rasterXSize="{side}" rasterYSize="{side}"')  # fmt: skip
+        (files / "image.vrt").write_text(text)
+        line = refused(capsys, words.format("image.vrt"))
+        assert "pixels" in line
+
     def test_text_that_is_no_utf8(self, files: Path, capsys: pytest.CaptureFixture[str]) -> None:
         content = (files / "image.vrt").read_bytes()
         (files / "image.vrt").write_bytes(content.replace(b"<VRTDataset", b"<VRTDat\xed\xdb\xfc"))
@@ -269,6 +285,14 @@ class TestRpcs:
         started = time.monotonic()
         refused(capsys, f"{ORTHO} --rpc rpc.rpb")
         assert time.monotonic() - started < 5
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4978", "EPSG:5773", LOCAL, "EPSG:0", "nonsense"])
+def test_a_crs_that_is_asked_for_must_be_a_maps(
+    files: Path, crs: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = refused(capsys, [*ORTHO.split(), "--crs", crs])
+    assert "crs is not understood" in line
 
 
 class TestNames:

@@ -226,7 +226,9 @@ class Band(Kind):
 
 
 def _is_gdal_name(value: Any) -> bool:
-    return isinstance(value, str) and bool(_GDAL_NAME.match(value)) and _mode("", value) is None
+    if not isinstance(value, str) or not _GDAL_NAME.match(value):
+        return False
+    return _mode("a raster", value) is None
 
 
 def _mode(name: str, path: str | Path) -> int | None:

@@ -12,7 +12,7 @@ import rasterio.windows
 
 from ..progress import SILENT, Progress
 from ..rasters.averaging import area_average
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, require_workable
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask, RasterSource, Window
 from ..rasters.tiling import tile_count, tiles
@@ -51,7 +51,8 @@ class Scene:
     @classmethod
     def of(cls, source: RasterSource, band: int | None = None) -> Scene:
         """Return a raster as a scene; `band` as `RasterSource.read` takes it."""
-        return cls(source.grid, lambda window: Patch(*source.read(window, band)), source)
+        grid = require_workable(source.grid, source.path)
+        return cls(grid, lambda window: Patch(*source.read(window, band)), source)
 
     @property
     def whole(self) -> Window:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rasterio.crs import CRS
 
 from ..errors import GridSizeError, NoOverlapError
-from .grid import MOST_PX, Grid, is_invertible
+from .grid import MOST_PX, Grid, is_invertible, require_workable
 
 FloatArray = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Gri
     NoOverlapError
         Nothing is left.
     GridSizeError
-        It would have more pixels a side than rasters can have.
+        It would have more pixels than a raster can have, or than can be worked through.
     """
     px = lattice.map_to_pixel(xy[np.isfinite(xy).all(axis=1)])
     if len(px) == 0:
@@ -55,7 +55,8 @@ def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Gri
     if np.any(high <= low):
         raise NoOverlapError("the footprint of the image does not lie on the grid")
     width, height = high - low
-    return lattice.window(int(low[0]), int(low[1]), int(width), int(height))
+    found = lattice.window(int(low[0]), int(low[1]), int(width), int(height))
+    return require_workable(found, "the result")
 
 
 def registered_grid(

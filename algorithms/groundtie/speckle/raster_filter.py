@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..errors import RasterContentError
+from ..rasters.grid import require_workable
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
 from ..rasters.tiling import in_order, tile_count, tiles
@@ -50,6 +51,7 @@ class RasterFilter:
     def write(self, path: Path, context: Context) -> None:
         """Write the filtered raster, tile by tile; see `atomic.Outputs.stage`."""
         source = self.source
+        require_workable(source.grid, source.path)
         nodata = None if source.is_complex else source.bands[0].nodata
         like = _as_amplitudes(source) if source.is_complex else source
         # Without speckle, only the tag identifies it as a radar image.
