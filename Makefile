@@ -7,8 +7,7 @@ VENV := .venv
 PY := $(VENV)/bin/python
 PLUGIN := dist/groundtie_qgis.zip
 
-.PHONY: help install demo check test test-newest test-debian lint bench plugin clean
-.PHONY: failures
+.PHONY: help install demo check test test-newest test-debian lint bench fuzz failures plugin clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -51,6 +50,9 @@ bench: $(VENV)/.installed-dev ## accuracy on real pairs, speed
 
 failures: $(VENV)/.installed-dev ## kill jobs at each step, fill their disks (as root: those are mounted)
 	$(PY) -m benchmarks.failures
+
+fuzz: $(VENV)/.installed-dev ## read 20,000 damaged files; failures are kept in benchmarks/results/fuzz
+	$(PY) -m benchmarks.fuzz --cases 20000
 
 plugin: $(VENV)/.installed ## build dist/groundtie_qgis.zip
 	$(PY) scripts/build_plugin.py $(PLUGIN)

@@ -15,7 +15,7 @@ from raster_files import utm_grid, write_raster
 from toys import RETURNING_TOY, TOY, returning_toy, toy
 
 from groundtie.declaration import Output, Parameter, tool, tool_of
-from groundtie.errors import OutputError, ParameterError, SameFileError
+from groundtie.errors import MemoryLimitError, OutputError, ParameterError, SameFileError
 from groundtie.kinds import Flag, MaskIn, Number, RasterIn, RasterOut
 from groundtie.progress import SILENT, Progress
 from groundtie.report.page import plain
@@ -45,6 +45,16 @@ def test_parameters_follow_the_signature_without_progress() -> None:
         default = signature[parameter.name].default
         assert parameter.required == (default is inspect.Parameter.empty)
         assert parameter.default == (None if parameter.required else default)
+
+
+def test_what_does_not_fit_into_memory_is_an_error_in_one_line() -> None:
+    @tool(title="Large", group="Toys")
+    def large(size: Annotated[int, Number(label="Size", help="Size.", integer=True)]) -> Any:
+        """Take memory."""
+        return np.empty((size, size, size))
+
+    with pytest.raises(MemoryLimitError, match="memory does not suffice: Unable to allocate"):
+        large(10**6)
 
 
 def test_required_parameters_are_positional_unless_they_are_options() -> None:

@@ -29,7 +29,7 @@ BUILTINS = {
 @pytest.mark.parametrize("error", ALL)
 def test_every_error_can_be_caught_as_a_builtin(error: type[GroundTieError]) -> None:
     if error is not GroundTieError:
-        assert issubclass(error, (ValueError, OSError, IndexError, RuntimeError))
+        assert issubclass(error, (ValueError, OSError, IndexError, RuntimeError, MemoryError))
 
 
 @pytest.mark.parametrize(("name", "builtin"), BUILTINS.items())

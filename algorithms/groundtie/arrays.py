@@ -66,6 +66,9 @@ class Raster:
             raise ParameterError(
                 f"transform must be an affine.Affine, not {type(self.transform).__name__}"
             )
+        # Also false where one of them is NaN.
+        if self.transform is not None and not 0 < abs(self.transform.determinant) < np.inf:
+            raise GeoreferencingError("the array's transform gives its pixels no size")
 
     @classmethod
     def from_xarray(cls, array: Any) -> Raster:

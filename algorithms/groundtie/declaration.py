@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
-from .errors import ParameterError
+from .errors import MemoryLimitError, ParameterError
 from .kinds import FolderOut, Kind, OutputKind, RasterIn, check_different, check_paths
 from .runs import run_of_call, running
 
@@ -177,8 +177,11 @@ def tool(
             progress = {key: bound.pop(key) for key in ("progress",) if key in bound}
             values = declared.check(bound, in_python=True)
             given = {"parameters": values} if "parameters" in signature.parameters else {}
-            with running(declared.run_of_call(values)):
-                return cast(Callable[..., R], function)(**values, **given, **progress)
+            try:
+                with running(declared.run_of_call(values)):
+                    return cast(Callable[..., R], function)(**values, **given, **progress)
+            except MemoryError as error:
+                raise MemoryLimitError(f"memory does not suffice: {error}") from error
 
         declared = _declare(function, signature, checked, title, group, outputs)
         checked.__signature__ = signature.replace(  # type: ignore[attr-defined]

@@ -42,6 +42,14 @@ class GeoreferencingError(GroundTieError, ValueError):
     """Georeferencing is missing, contradictory or of a kind that is not supported."""
 
 
+class GridSizeError(GroundTieError, ValueError):
+    """A result would be larger than it can sensibly be."""
+
+
+class MemoryLimitError(GroundTieError, MemoryError):
+    """What was asked for does not fit into memory."""
+
+
 class NoOverlapError(GroundTieError, ValueError):
     """Reference and input do not overlap."""
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import re
+import stat
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,18 +46,27 @@ class PathKind(Kind):
     def check(self, name: str, value: Any) -> Path:
         if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
             raise ParameterError(f"{name} must be a path, not {value!r}")
-        return Path(value)
+        path = Path(value)
+        _mode(name, path)  # so that whatever cannot be a name is found here
+        return path
 
 
 class InputKind(PathKind):
-    """A file that is read."""
+    """A file that is read; neither a pipe, which may never end, nor a device."""
+
+    def check(self, name: str, value: Any) -> Any:
+        path = super().check(name, value)
+        mode = _mode(name, path)
+        if mode is not None and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+            raise ParameterError(f"{name} is neither a file nor a folder: {path}")
+        return path
 
     def check_raster(self, name: str, value: Any) -> Any:
         """Check what may be a raster: a path, one of GDAL's names, or a raster in memory."""
         if _is_gdal_name(value):
             return value
         if isinstance(value, (str, os.PathLike)):
-            return PathKind.check(self, name, value)
+            return InputKind.check(self, name, value)
         return _in_memory(name, value)
 
 
@@ -215,7 +226,32 @@ class Band(Kind):
 
 
 def _is_gdal_name(value: Any) -> bool:
-    return isinstance(value, str) and bool(_GDAL_NAME.match(value)) and not Path(value).exists()
+    if not isinstance(value, str) or not _GDAL_NAME.match(value):
+        return False
+    return _mode("a raster", value) is None
+
+
+def _mode(name: str, path: str | Path) -> int | None:
+    """Return what kind of thing a path is, as `os.stat` has it; None if there is none.
+
+    Raises
+    ------
+    ParameterError
+        Nothing can have that name: it is too long, or GDAL and reports cannot write it.
+    """
+    try:
+        os.fspath(path).encode("utf-8")
+        return os.stat(path).st_mode
+    except UnicodeEncodeError as error:
+        raise ParameterError(f"{name} has a name that is not UTF-8: {str(path)!a}") from error
+    except ValueError as error:
+        raise ParameterError(f"{name} has a name that no file has: {str(path)!a}") from error
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            raise ParameterError(
+                f"{name} has a name that is too long: {str(path)[:60]}…"
+            ) from error
+        return None
 
 
 def _in_memory(name: str, value: Any) -> Any:

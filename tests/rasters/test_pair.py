@@ -387,3 +387,14 @@ def test_a_narrow_border_of_zeros_is_empty_and_the_images_own_border_is_not(file
     around = pair.reference_patch(GRID.window(-10, -10, 140, 120))
     assert not around.valid[10:16, 10:130].any()
     assert around.valid[17:110, 10:130].all()
+
+
+@pytest.mark.parametrize("asked_m", [500.0, 1e5, 1e9])
+def test_nothing_is_searched_where_the_images_cannot_overlap(files: Files, asked_m: float) -> None:
+    pair = make_pair(files.image(), files.image(GRID.shifted(200, 0)), search_radius_m=asked_m)
+    # The far corners are 1200 m + 200 m, and 1000 m apart; pixels have 10 m.
+    farthest = float(np.hypot(1400, 1000))
+    assert pair.limits.radius == pytest.approx(min(asked_m, farthest), abs=15)
+    whole = make_pair(files.image(), files.image(GRID.shifted(200, 0)), search_radius_m=farthest)
+    if asked_m > farthest:
+        assert (pair.grid, pair.surroundings) == (whole.grid, whole.surroundings)

@@ -10,11 +10,13 @@ import pytest
 import rasterio
 import rasterio.shutil
 from raster_files import UTM, utm_grid, write_raster
+from rasterio._err import CPLE_AppDefinedError
 from rasterio.control import GroundControlPoint
 from rasterio.enums import ColorInterp
 
 from groundtie.errors import BandError, GeoreferencingError, RasterOpenError
 from groundtie.rasters import averaging
+from groundtie.rasters.bands import BandInfo, stated
 from groundtie.rasters.grid import PIXEL_COORDINATES
 from groundtie.rasters.reading import Window, open_raster
 
@@ -312,3 +314,33 @@ def test_a_closed_source_lets_go_of_its_file(tmp_path: Path) -> None:
     with open_raster(path) as source:
         source.read(source.window)
     assert source._handles._free == []
+
+
+def test_no_property_of_all_bands_is_asked_for_each_band(tmp_path: Path) -> None:
+    """Each costs calls of GDAL for every band: asked for each, opening is quadratic work."""
+    path = write_raster(tmp_path / "a.tif", np.zeros((9, 4, 4), np.uint8), GRID)
+    asked: list[str] = []
+
+    class Asked:
+        def __init__(self, dataset: object) -> None:
+            self._dataset = dataset
+
+        def __getattr__(self, name: str) -> object:
+            asked.append(name)
+            return getattr(self._dataset, name)
+
+    with rasterio.open(path) as dataset:
+        bands = BandInfo.all_of(Asked(dataset))
+    assert len(bands) == 9
+    assert {name for name in asked if asked.count(name) > 1} == {"tags"}
+
+
+def test_an_old_message_of_gdal_is_no_failure() -> None:
+    left = ["an odd tag"]
+
+    def read() -> str:
+        if left:
+            raise CPLE_AppDefinedError(1, 1, left.pop())
+        return "grey"
+
+    assert stated(read) == "grey"

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from raster_files import UTM, utm_grid
 from rasterio.crs import CRS
 
-from groundtie.errors import NoOverlapError
-from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, compose, reproject
+from groundtie.errors import GridSizeError, NoOverlapError
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose, reproject
 from groundtie.rasters.target_grids import covering_grid, registered_grid
 
 GRID = utm_grid(40, 30)
@@ -99,3 +99,38 @@ def test_pixel_coordinates_stay_pixel_coordinates() -> None:
 def test_a_footprint_outside_of_the_projection() -> None:
     with pytest.raises(NoOverlapError, match="projection"):
         registered_grid(GRID, lambda px: px * np.inf, WGS84)
+
+
+@pytest.mark.parametrize(("scale", "fits"), [(15.0, True), (17.0, False), (1e9, False)])
+def test_a_transform_that_stretches_a_raster_out_of_all_proportion(
+    scale: float, fits: bool
+) -> None:
+    def stretch(px: np.ndarray) -> np.ndarray:
+        return GRID.pixel_to_map(px * scale)
+
+    if fits:
+        found = registered_grid(GRID, stretch, UTM)
+        assert found.width == pytest.approx(40 * scale, abs=2)
+        return
+    with pytest.raises(GridSizeError, match=r"stretches the raster|more pixels a side"):
+        registered_grid(GRID, stretch, UTM)
+
+
+def test_a_strip_may_be_rotated() -> None:
+    """Its box has many times its pixels then, but its diagonal stays."""
+    strip = utm_grid(4000, 20)
+
+    def rotate(px: np.ndarray) -> np.ndarray:
+        return apply_affine(Affine.rotation(45), strip.pixel_to_map(px))
+
+    assert registered_grid(strip, rotate, UTM).height > 2800
+
+
+def test_pixels_that_have_no_size_on_the_map() -> None:
+    def one_place(px: np.ndarray) -> np.ndarray:
+        return np.full((len(px), 2), 7.0)
+
+    with pytest.raises(GridSizeError, match="no size on the map"):
+        registered_grid(GRID, one_place, WGS84)
+    with pytest.raises(GridSizeError, match="more pixels a side"):
+        covering_grid(GRID, np.array([[0.0, 0.0], [1e30, 1e30]]))

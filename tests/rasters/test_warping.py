@@ -197,14 +197,16 @@ def test_complex_values_keep_their_phase() -> None:
 )
 def test_reduction_by_pixel_size(map_size: float, expected: tuple[int, int]) -> None:
     grid = utm_grid(300, 300)
-    assert reduction(utm_grid(50, 50, map_size), grid.map_to_pixel) == expected
+    assert reduction(utm_grid(50, 50, map_size), grid.map_to_pixel, (99, 99)) == expected
 
 
 def test_reduction_does_not_mind_rotation_nor_infinity() -> None:
     turn = compose(Affine.rotation(40), Affine.scale(2, 5))
-    assert reduction(PLANE, lambda xy: apply_affine(Affine.rotation(45), xy)) == (1, 1)
-    assert reduction(PLANE, lambda xy: apply_affine(turn, xy)) == (4, 4)
-    assert reduction(PLANE, lambda xy: xy * np.inf) == (1, 1)
+    assert reduction(PLANE, lambda xy: apply_affine(Affine.rotation(45), xy), (9, 9)) == (1, 1)
+    assert reduction(PLANE, lambda xy: apply_affine(turn, xy), (9, 9)) == (4, 4)
+    assert reduction(PLANE, lambda xy: xy * np.inf, (9, 9)) == (1, 1)
+    # An image has no more pixels to average than it has.
+    assert reduction(PLANE, lambda xy: xy * 1e30, (9, 7)) == (9, 7)
 
 
 def test_the_source_window_holds_the_kernel_and_starts_at_multiples() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from evidences import (
+    GRID,
     control,
     displaced,
     estimated,
@@ -17,6 +18,7 @@ from evidences import (
     fallen,
     fit_points,
     fit_with,
+    points,
     refinement,
     scatter,
     scene,
@@ -44,10 +46,12 @@ from groundtie.registration.evidence import (
 from groundtie.registration.pose_verdict import PoseEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
+from groundtie.registration.tie_point_evidence import TiePointEvidence
 from groundtie.registration.verdict import Evidence, first_refusal
 
 GOOD = scatter(36, 0.4)
 RANK = (
+    stages.TIE_POINTS,
     stages.SEARCH,
     stages.ASSESSMENT,
     stages.AGREEMENT,
@@ -111,8 +115,26 @@ NOWHERE = np.array([[np.nan, 0.0]])
 FEW = np.zeros((3, 2))
 
 
+def stored(px: np.ndarray, errors: np.ndarray, kind: str = "affine") -> TiePointEvidence:
+    """Return the evidence of stored tie points of a raster of 600 × 500 px."""
+    return TiePointEvidence.of(points(px, errors, check=False), kind, GRID)
+
+
+RANDOM = np.random.default_rng(7)
+ANYWHERE = RANDOM.uniform(0, 499, (50, 2))
+
+
 # Of each rule: evidence that it refuses, and evidence that it does not.
 EVIDENCE: dict[str, tuple[Any, Any]] = {
+    # 50 points within n px of a line: of 600 px, 60 px are a tenth.
+    "tie points too near": (
+        stored(ANYWHERE * [1, 0.001] + [0, 200], np.zeros((50, 2))),
+        stored(ANYWHERE * [1, 0.02] + [0, 200], np.zeros((50, 2))),
+    ),
+    "tie points at random": (
+        stored(ANYWHERE, RANDOM.uniform(0, 499, (50, 2)) - ANYWHERE),
+        stored(ANYWHERE, 20 * RANDOM.normal(size=(50, 2))),
+    ),
     "second place": (
         SearchEvidence(AmbiguousPlaceError("two places match about as well")),
         SearchEvidence(NothingFoundError("nothing in common was found")),

@@ -18,6 +18,7 @@ from groundtie.errors import (
     CancelledError,
     GeoreferencingError,
     NoOverlapError,
+    NotRegisteredError,
     ParameterError,
     RasterOpenError,
     SameFileError,
@@ -25,6 +26,7 @@ from groundtie.errors import (
     TransformFileError,
 )
 from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.models import PARAMETERS
 from groundtie.geometry.tie_point_files import write_tie_points
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
@@ -264,6 +266,69 @@ def test_unusable_transforms(
     transform.write_text(content["text"])
     with pytest.raises(error):
         warp(path, tmp_path / "out.tif", transform)
+
+
+KINDS_OF_MODELS = ("rigid", "similarity", "affine", "polynomial2", "polynomial3", "tps")
+
+
+def table_of(path: Path, reference_px: np.ndarray, input_px: np.ndarray) -> Path:
+    lines = ["reference_x,reference_y,input_col,input_row"]
+    places = np.hstack([GRID.pixel_to_map(reference_px), input_px])
+    path.write_text("\n".join([*lines, *(",".join(map(repr, row)) for row in places.tolist())]))
+    return path
+
+
+@pytest.mark.parametrize("model", KINDS_OF_MODELS)
+def test_fifty_times_one_point_is_refused(tmp_path: Path, model: str) -> None:
+    px = np.tile([50.0, 40.0], (50, 1))
+    table = table_of(tmp_path / "t.csv", px, px + 1)
+    with pytest.raises(NotRegisteredError, match=r"no .* model follows from them"):
+        warp(misregistered(tmp_path / "a.tif"), tmp_path / "out.tif", table, model=model)
+    assert not (tmp_path / "out.tif").exists()
+
+
+@pytest.mark.parametrize("model", KINDS_OF_MODELS)
+def test_points_along_a_line_hold_rigid_models_alone(tmp_path: Path, model: str) -> None:
+    px = np.linspace([10, 20], [100, 80], 30)
+    table = table_of(tmp_path / "t.csv", px, px + 1)
+    path = misregistered(tmp_path / "a.tif")
+    if model in ("rigid", "similarity"):
+        warp(path, tmp_path / "out.tif", table, model=model)
+        return
+    with pytest.raises(NotRegisteredError, match="tie points lie"):
+        warp(path, tmp_path / "out.tif", table, model=model)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("model", ("translation", *KINDS_OF_MODELS))
+def test_random_points_are_refused(tmp_path: Path, model: str, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    table = table_of(tmp_path / "t.csv", *random.uniform(0, 100, (2, 25, 2)))
+    with pytest.raises(NotRegisteredError, match="no better than random ones"):
+        warp(misregistered(tmp_path / "a.tif"), tmp_path / "out.tif", table, model=model)
+
+
+@pytest.mark.parametrize("model", ("translation", *KINDS_OF_MODELS))
+def test_points_set_by_hand_pass(tmp_path: Path, model: str) -> None:
+    """Twice as many as the model needs, all over the raster, each a pixel off."""
+    random = np.random.default_rng(3)
+    px = np.stack(np.meshgrid(np.linspace(5, 115, 5), np.linspace(5, 95, 4)), -1).reshape(-1, 2)
+    px = random.permuted(px, axis=0)[: PARAMETERS[model] + 2] if PARAMETERS[model] < 18 else px
+    table = table_of(tmp_path / "t.csv", px, px + 3 + 0.7 * random.normal(size=px.shape))
+    result = warp(misregistered(tmp_path / "a.tif"), tmp_path / "out.tif", table, model=model)
+    assert result.fit is not None
+    assert result.fit.log10_chance is not None
+    assert result.fit.log10_chance < -3
+
+
+def test_points_that_the_model_needs_all_are_warned_of(tmp_path: Path) -> None:
+    px = np.array([[10.0, 10.0], [100.0, 20.0], [30.0, 90.0]])
+    table = table_of(tmp_path / "t.csv", px, px + 3)
+    result = warp(misregistered(tmp_path / "a.tif"), tmp_path / "out.tif", table)
+    assert result.fit is not None
+    assert result.fit.log10_chance is None
+    assert any(line.startswith("warning: the model needs all") for line in result.lines())
+    json.dumps(result.summary(), allow_nan=False)
 
 
 def test_bad_calls(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ It is kept as complete JSON, and needs no scikit-learn to be used.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from ..errors import ParameterError
 from ..rasters.atomic import write_json
 from ..rasters.patch import Patch
+from ..strict_json import read_json
 from .patch_statistics import BAND_RATIOS, NO_BANDS, STATISTICS, FloatImage, patch_statistics
 
 FloatArray = NDArray[np.float64]
@@ -135,10 +135,10 @@ def read_classifier(path: Path) -> FeatureClassifier:
         The file is none, or cannot be read.
     """
     try:
-        return _from_json(json.loads(path.read_text(encoding="utf-8")))
+        return _from_json(read_json(path))
     except OSError as error:
         raise ParameterError(f"{path} cannot be read: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, OverflowError) as error:
         raise ParameterError(f"{path} is no feature classifier: {error}") from error
 
 

@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from rasterio.crs import CRS
-from rasterio.warp import transform_geom
 
 from ..context import Context
-from ..errors import GeoreferencingError, ParameterError, VectorLayerError
+from ..errors import ParameterError, VectorLayerError
+from ..geometry.vector_layers import read_vector_layer
 from ..rasters.grid import Grid, reproject
 from ..rasters.pair import Image
 from ..rasters.reading import RasterSource, Window
@@ -176,29 +176,16 @@ def layer_labels(
     GeoreferencingError
         Only one of layer and image has a CRS.
     """
-    import fiona
-    from fiona.errors import FionaError
-
-    try:
-        with fiona.open(os.fspath(path)) as layer:
-            crs = CRS.from_wkt(layer.crs_wkt) if layer.crs_wkt else None
-            if field not in layer.schema["properties"]:
-                names = ", ".join(layer.schema["properties"]) or "none"
-                raise VectorLayerError(f"{path} has no attribute {field!r}; it has: {names}")
-            items = [
-                (_plain(item["geometry"]), item["properties"][field])
-                for item in layer
-                if item["geometry"] is not None and item["properties"][field] is not None
-            ]
-    except (FionaError, OSError) as error:
-        raise VectorLayerError(f"cannot read the vector layer {path}: {error}") from error
-    if (crs is None) != (grid.crs is None):
-        raise GeoreferencingError(f"only one of {path} and the image has a CRS")
+    layer = read_vector_layer(path).on_map(grid.crs)
+    if field not in layer.fields:
+        names = ", ".join(layer.fields) or "none"
+        raise VectorLayerError(f"{path} has no attribute {field!r}; it has: {names}")
     areas, xy, labels = [], [], []
-    for geometry, value in items:
+    for feature in layer.features:
+        geometry, value = feature["geometry"], feature["properties"].get(field)
+        if value is None:
+            continue
         label = LEFT_OUT if _is_one_of(value, left_out) else KEPT
-        if crs is not None and crs != grid.crs:
-            geometry = transform_geom(crs, grid.crs, geometry)
         if geometry["type"] in ("Polygon", "MultiPolygon"):
             areas.append((geometry, label))
         elif geometry["type"] in ("Point", "MultiPoint"):
@@ -208,10 +195,6 @@ def layer_labels(
     if not areas and not xy:
         raise VectorLayerError(f"{path} has neither points nor polygons with a class")
     return LayerLabels(tuple(areas), np.array(xy).reshape(-1, 2), np.array(labels, np.int8))
-
-
-def _plain(geometry: Any) -> dict[str, Any]:
-    return {"type": geometry["type"], "coordinates": geometry["coordinates"]}
 
 
 def _is_one_of(value: Any, texts: Sequence[str]) -> bool:

@@ -1,11 +1,10 @@
-"""Layers of lines in a GeoPackage. Importing this is slow: it loads fiona."""
+"""Writing layers of lines in a GeoPackage. Importing this is slow: it loads fiona."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-import fiona
 from fiona.io import MemoryFile
 from rasterio.crs import CRS
 
@@ -53,21 +52,3 @@ def write_layer(
             raise
         raise OSError(str(error)) from error
     path.write_bytes(content)
-
-
-def read_layer(path: Path) -> tuple[list[dict[str, Any]], CRS | None]:
-    """Return the properties of all features of the first layer, and its CRS.
-
-    Raises
-    ------
-    OSError
-        The file cannot be read.
-    """
-    try:
-        with fiona.open(path) as layer:
-            crs = CRS.from_wkt(layer.crs_wkt) if layer.crs_wkt else None
-            return [dict(feature["properties"]) for feature in layer], crs
-    except Exception as error:
-        if not raised_by(error, "fiona"):
-            raise
-        raise OSError(str(error)) from error

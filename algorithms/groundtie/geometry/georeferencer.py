@@ -12,12 +12,15 @@ from affine import Affine
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, require_map
 from .tie_points import USED, TiePoints
 from .transform import Transform
 
 FloatArray = NDArray[np.float64]
 Row = dict[str, Any]
+
+# No position on a map of the Earth, in any unit, nor in an image is farther off.
+_FARTHEST = 1e10
 
 # It counts pixels from the image's corner, and rows downwards from 0.
 _PIXELS = Grid(Affine.scale(1, -1), None, 1, 1)
@@ -45,13 +48,27 @@ def read_georeferencer(path: Path, input_grid: Grid) -> TiePoints:
     while lines and lines[0].startswith("#"):
         comment = lines.pop(0)
         if comment.startswith("#CRS:"):
-            crs = CRS.from_user_input(comment.removeprefix("#CRS:").strip())
-    rows: list[Row] = list(csv.DictReader(lines))
+            crs = require_map(CRS.from_user_input(comment.removeprefix("#CRS:").strip()))
+    rows = table_rows(lines)
     # Older versions of QGIS called the columns so.
     x, y = ("pixelX", "pixelY") if rows and "pixelX" in rows[0] else ("sourceX", "sourceY")
-    input_px = _source_grid(input_grid).map_to_pixel(positions(rows, x, y))
-    states = [USED if row["enable"].strip() != "0" else "rejected: disabled" for row in rows]
-    return unmeasured(positions(rows, "mapX", "mapY"), input_px, states, crs)
+    input_px = _source_grid(input_grid).map_to_pixel(require_places(positions(rows, x, y)))
+    # As in QGIS, a point of which nothing is said is enabled.
+    enabled = [(row.get("enable") or "1").strip() for row in rows]
+    states = ["rejected: disabled" if word == "0" else USED for word in enabled]
+    reference_xy = require_places(positions(rows, "mapX", "mapY"))
+    return unmeasured(reference_xy, input_px, states, crs)
+
+
+def table_rows(lines: Iterable[str]) -> list[Row]:
+    """Return the rows of a CSV table by the names of its columns.
+
+    Fields beyond those of the first line are left out.
+    """
+    rows = [dict(row) for row in csv.DictReader(lines)]
+    for row in rows:
+        row.pop(None, None)
+    return rows
 
 
 def unmeasured(
@@ -74,6 +91,20 @@ def unmeasured(
 def positions(rows: Iterable[Row], x: str, y: str) -> FloatArray:
     """Return the positions in two columns of a table, shape (n, 2)."""
     return np.array([[float(row[x]), float(row[y])] for row in rows], float).reshape(-1, 2)
+
+
+def require_places(places: FloatArray) -> FloatArray:
+    """Return positions, shape (n, 2), that a file holds.
+
+    Raises
+    ------
+    ValueError
+        One is so far off that it lies on no map, or is not finite.
+    """
+    lost = int((~(np.abs(places) < _FARTHEST)).any(axis=1).sum())
+    if lost:
+        raise ValueError(f"{lost} of {len(places)} positions lie on no map")
+    return places
 
 
 def _source_grid(input_grid: Grid) -> Grid:

@@ -14,7 +14,7 @@ import numpy as np
 from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 
-from ..rasters.grid import apply_affine, compose
+from ..rasters.grid import apply_affine, compose, is_invertible
 
 FloatArray = NDArray[np.float64]
 
@@ -216,16 +216,27 @@ def thin_plate_kernel(uv: FloatArray, knots: FloatArray) -> FloatArray:
 
 
 def model_from_json(values: dict[str, Any]) -> Model:
-    """Return the model that `to_json` described; raises KeyError or ValueError if it cannot be."""
-    kind, frame = values["kind"], Frame(Affine(*values["frame"]))
+    """Return the model that `to_json` described.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        The values describe none.
+    """
+    kind, frame = values["kind"], Frame(Affine(*(float(number) for number in values["frame"])))
+    if not is_invertible(frame.to_map):
+        raise ValueError("the model's frame has no size")
     if kind == "tps":
-        return ThinPlateSpline(
-            kind,
-            frame,
-            np.asarray(values["knots"], float).reshape(-1, 2),
-            np.asarray(values["weights"], float).reshape(-1, 2),
-            np.asarray(values["affine"], float).reshape(3, 2),
-        )
+        knots, weights = _pairs(values["knots"]), _pairs(values["weights"])
+        if len(knots) != len(weights):
+            raise ValueError(f"{len(knots)} knots have {len(weights)} weights")
+        return ThinPlateSpline(kind, frame, knots, weights, _pairs(values["affine"], 3))
     terms = (DEGREE[kind] + 1) * (DEGREE[kind] + 2) // 2
-    coefficients = np.asarray(values["coefficients"], float).reshape(terms, 2)
-    return PolynomialModel(kind, frame, coefficients)
+    return PolynomialModel(kind, frame, _pairs(values["coefficients"], terms))
+
+
+def _pairs(values: Any, count: int = -1) -> FloatArray:
+    pairs = np.asarray(values, float).reshape(count, 2)
+    if not np.isfinite(pairs).all():
+        raise ValueError("a number of the model is not finite")
+    return pairs

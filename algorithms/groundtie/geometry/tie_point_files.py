@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,12 +16,22 @@ from rasterio.errors import CRSError
 
 from ..errors import OutputError, TransformFileError
 from ..rasters.atomic import write_json, writing
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import Grid, reproject, require_map
 from ..runs import run_tags
-from .georeferencer import Row, positions, read_georeferencer, unmeasured, write_georeferencer
+from ..strict_json import read_json
+from .georeferencer import (
+    Row,
+    positions,
+    read_georeferencer,
+    require_places,
+    table_rows,
+    unmeasured,
+    write_georeferencer,
+)
 from .tie_point_frames import NUMBERS, TEXTS, tie_point_columns
 from .tie_points import USED, TiePoints
 from .transform import Transform
+from .vector_layers import read_vector_layer
 
 FloatArray = NDArray[np.float64]
 
@@ -113,7 +122,7 @@ def read_tie_points(
         if crs is None and suffix != ".gpkg":
             crs = (table_crs if suffix == ".csv" else None) or input_grid.crs
         return _from_rows(rows, input_grid, crs, more)
-    except (OSError, ValueError, KeyError, TypeError, CRSError, csv.Error) as error:
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, CRSError, csv.Error) as error:
         reason = f"column {error} is missing" if isinstance(error, KeyError) else error
         raise TransformFileError(f"cannot read the tie points {path}: {reason}") from error
 
@@ -172,14 +181,13 @@ def _write_csv(path: Path, rows: list[Row], numbers: Sequence[str]) -> None:
 def _read_rows(path: Path, suffix: str) -> tuple[list[Row], CRS | None]:
     """Return the rows of a file, and the CRS of its layer, if it has one on the map."""
     if suffix == ".gpkg":
-        from .geopackage import read_layer  # heavy
-
-        return read_layer(path)
+        layer = read_vector_layer(path)
+        return [feature["properties"] for feature in layer.features], layer.crs
     if suffix == ".geojson":
-        features = json.loads(path.read_text(encoding="utf-8"))["features"]
-        return [feature["properties"] for feature in features], None
+        features = read_json(path)["features"]
+        return [dict(feature["properties"]) for feature in features], None
     with path.open(encoding="utf-8-sig", newline="") as file:
-        return list(csv.DictReader(file)), None
+        return table_rows(file), None
 
 
 def _from_rows(
@@ -190,11 +198,14 @@ def _from_rows(
     if len(named) > 1:
         raise ValueError("the points have several CRSs")
     text = named.pop() if named else None
-    crs = usual_crs if text is None else CRS.from_user_input(text) if text else None
+    crs = usual_crs if text is None else require_map(CRS.from_user_input(text)) if text else None
     states = [str(row.get("state", USED)) for row in rows]
     sigma = np.column_stack([_numbers(rows, f"sigma_{axis}_px") for axis in "xy"])
     points = unmeasured(
-        positions(rows, "reference_x", "reference_y"), _input_px(rows, input_grid, crs), states, crs
+        require_places(positions(rows, "reference_x", "reference_y")),
+        require_places(_input_px(rows, input_grid, crs)),
+        states,
+        crs,
     )
     return replace(
         points,

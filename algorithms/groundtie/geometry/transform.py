@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,8 @@ from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
 from ..errors import TransformFileError
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import MOST_PX, Grid, is_invertible, reproject, require_map
+from ..strict_json import read_json
 from .models import Model, PolynomialModel, model_from_json
 
 FloatArray = NDArray[np.float64]
@@ -94,16 +94,19 @@ class Transform:
         """
         try:
             if values["format"] != FORMAT:
-                raise TransformFileError(f"not a {FORMAT} file but {values['format']!r}")
+                raise TransformFileError(f"not a {FORMAT} file but {values['format']!r:.60}")
             stored = values["input"]
             grid = Grid(
-                Affine.from_gdal(*stored["geotransform"]),
+                Affine.from_gdal(*(float(number) for number in stored["geotransform"])),
                 _crs_from_text(stored["crs"]),
                 int(stored["width"]),
                 int(stored["height"]),
             )
+            is_sized = all(1 <= side < MOST_PX for side in (grid.width, grid.height))
+            if not is_sized or not is_invertible(grid.transform):
+                raise ValueError("the input's grid is none of a raster")
             return cls(model_from_json(values["model"]), _crs_from_text(values["crs"]), grid)
-        except (KeyError, TypeError, ValueError, CRSError) as error:
+        except (KeyError, TypeError, ValueError, CRSError, OverflowError) as error:
             if isinstance(error, TransformFileError):
                 raise
             raise TransformFileError(f"not a transform: {error!r}") from error
@@ -118,11 +121,11 @@ def load_transform(path: str | Path) -> Transform:
         The file cannot be read or does not hold a transform.
     """
     try:
-        return Transform.from_json(json.loads(Path(path).read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise TransformFileError(f"cannot read the transform {path}: {error}") from error
+        return Transform.from_json(read_json(Path(path)))
     except TransformFileError as error:
         raise TransformFileError(f"{path}: {error}") from error
+    except (OSError, ValueError) as error:
+        raise TransformFileError(f"cannot read the transform {path}: {error}") from error
 
 
 def _crs_to_text(crs: CRS | None) -> str | None:
@@ -130,4 +133,4 @@ def _crs_to_text(crs: CRS | None) -> str | None:
 
 
 def _crs_from_text(text: str | None) -> CRS | None:
-    return None if text is None else CRS.from_wkt(text)
+    return None if text is None else require_map(CRS.from_wkt(text))

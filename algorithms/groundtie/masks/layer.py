@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from rasterio.crs import CRS
-from rasterio.errors import CRSError
-from rasterio.warp import transform_geom
 
-from ..errors import GeoreferencingError, VectorLayerError
+from ..errors import VectorLayerError
+from ..geometry.vector_layers import read_vector_layer
 from ..rasters.reading import Mask, Window
 from .scene import Scene, Selection
 from .threshold import grown
@@ -84,39 +82,13 @@ def read_layer(path: str | os.PathLike[str], scene: Scene, width_m: float) -> La
     GeoreferencingError
         Only one of layer and scene has a CRS.
     """
-    import fiona
-    from fiona.errors import FionaError
-
-    try:
-        with fiona.open(os.fspath(path)) as layer:
-            crs = _crs(layer.crs_wkt)
-            every = [item["geometry"] for item in layer if item["geometry"] is not None]
-    except (FionaError, OSError, ValueError) as error:
-        raise VectorLayerError(f"cannot read the vector layer {path}: {error}") from error
-    grid = scene.grid
-    if (crs is None) != (grid.crs is None):
-        raise GeoreferencingError(f"only one of {path} and {scene.like.path} has a CRS")
-    found = [_plain(geometry) for geometry in every if geometry["type"] in _AREAS + _LINES]
-    if crs is not None and crs != grid.crs:
-        found = [transform_geom(crs, grid.crs, geometry) for geometry in found]
+    layer = read_vector_layer(path).on_map(scene.grid.crs)
+    every = [feature["geometry"] for feature in layer.features]
+    found = [geometry for geometry in every if geometry["type"] in _AREAS + _LINES]
     areas, lines = (
         tuple(geometry for geometry in found if geometry["type"] in kinds)
         for kinds in (_AREAS, _LINES)
     )
     if not areas and not lines:
         raise VectorLayerError(f"the vector layer {path} has neither polygons nor lines")
-    return LayerMask(scene, areas, lines, int(width_m / grid.pixel_size_m / 2))
-
-
-def _plain(geometry: Any) -> dict[str, Any]:
-    """Return a geometry of fiona as GeoJSON has it."""
-    return {"type": geometry["type"], "coordinates": geometry["coordinates"]}
-
-
-def _crs(text: str) -> CRS | None:
-    if not text:
-        return None
-    try:
-        return CRS.from_wkt(text)
-    except CRSError as error:
-        raise VectorLayerError(f"the vector layer's CRS cannot be understood: {error}") from error
+    return LayerMask(scene, areas, lines, int(width_m / scene.grid.pixel_size_m / 2))

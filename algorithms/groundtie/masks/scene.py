@@ -11,10 +11,10 @@ import numpy as np
 
 from ..progress import SILENT, Progress
 from ..rasters.averaging import area_average
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, require_workable
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask, RasterSource, Window
-from ..rasters.tiling import tiles
+from ..rasters.tiling import tile_count, tiles
 from ..rasters.writing import create_like, one_band
 
 
@@ -50,7 +50,8 @@ class Scene:
     @classmethod
     def of(cls, source: RasterSource, band: int | None = None) -> Scene:
         """Return a raster as a scene; `band` as `RasterSource.read` takes it."""
-        return cls(source.grid, lambda window: Patch(*source.read(window, band)), source)
+        grid = require_workable(source.grid, source.path)
+        return cls(grid, lambda window: Patch(*source.read(window, band)), source)
 
     @property
     def whole(self) -> Window:
@@ -113,13 +114,13 @@ def write_mask(
         Share of the valid pixels that take part, 0 to 1.
     """
     like = one_band(scene.like, "uint8")
-    places = list(tiles(scene.grid))
+    count = tile_count(scene.grid)
     selected = valid = 0
     with create_like(like, scene.grid, path, nodata=None) as file:
-        for i, tile in enumerate(places):
+        for i, tile in enumerate(tiles(scene.grid)):
             chosen = select(tile)
             selected += int(np.count_nonzero(chosen.part))
             valid += int(np.count_nonzero(chosen.valid))
             file.write(chosen.part.astype(np.uint8), window=tile)
-            progress.update((i + 1) / len(places))
+            progress.update((i + 1) / count)
     return selected / max(valid, 1)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from rasterio.enums import ColorInterp
+
+from ..errors import raised_by
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -28,18 +33,20 @@ class BandInfo:
         return cls(dtype, nodata, ColorInterp.gray, None, None, 1.0, 0.0, {})
 
     @classmethod
-    def of(cls, dataset: Any, index: int) -> BandInfo:
-        """Return what a rasterio dataset states of the band with an index, from 0."""
-        return cls(
-            dtype=dataset.dtypes[index],
-            nodata=dataset.nodatavals[index],
-            interpretation=dataset.colorinterp[index],
-            description=dataset.descriptions[index],
-            unit=dataset.units[index],
-            scale=dataset.scales[index],
-            offset=dataset.offsets[index],
-            tags=dataset.tags(index + 1),
+    def all_of(cls, dataset: Any) -> tuple[BandInfo, ...]:
+        """Return what a rasterio dataset states of each of its bands."""
+        # Each of these properties asks all bands, so none is asked for one band.
+        columns = (
+            stated(lambda: dataset.dtypes),
+            stated(lambda: dataset.nodatavals),
+            stated(lambda: dataset.colorinterp),
+            stated(lambda: dataset.descriptions),
+            stated(lambda: dataset.units),
+            stated(lambda: dataset.scales),
+            stated(lambda: dataset.offsets),
+            [tags_of(dataset, bidx=number) for number in range(1, dataset.count + 1)],
         )
+        return tuple(cls(*band) for band in zip(*columns, strict=True))
 
     @property
     def numpy_dtype(self) -> np.dtype[Any]:
@@ -49,11 +56,36 @@ class BandInfo:
         return np.dtype(names.get(self.dtype, self.dtype))
 
 
+def stated(read: Callable[[], T]) -> T:
+    """Return what a rasterio dataset states, in spite of what GDAL has warned of before.
+
+    rasterio takes any older message of GDAL's, such as on an odd tag, for a failure of some of its
+    properties, and forgets the message then.
+    """
+    try:
+        return read()
+    except Exception as error:
+        if not raised_by(error, "rasterio"):
+            raise
+        return read()
+
+
+def tags_of(dataset: Any, **which: Any) -> dict[str, str]:
+    """Return the tags of a domain (`ns`) or band (`bidx`) of a rasterio dataset.
+
+    None where they are no UTF-8: then nobody can read them.
+    """
+    try:
+        return dict(stated(lambda: dataset.tags(**which)))
+    except UnicodeDecodeError:
+        return {}
+
+
 def colormap(dataset: Any) -> dict[int, tuple[int, ...]] | None:
     """Return the palette of a rasterio dataset's first band, or None."""
-    if dataset.colorinterp[0] is not ColorInterp.palette:
+    if stated(lambda: dataset.colorinterp[0]) is not ColorInterp.palette:
         return None
-    return dict(dataset.colormap(1))
+    return dict(stated(lambda: dataset.colormap(1)))
 
 
 def working_dtype(dtype: np.dtype[Any]) -> np.dtype[Any]:

@@ -16,7 +16,7 @@ from ..arrays import Raster
 from ..progress import SILENT, Progress
 from .grid import PIXEL_COORDINATES, Grid
 from .reading import RasterSource
-from .tiling import band_groups, in_order, tiles
+from .tiling import band_groups, in_order, tile_count, tiles
 from .warping import (
     DenseMap,
     ToInputPx,
@@ -61,7 +61,8 @@ class _Warp:
         nodata = _choose_nodata(source) if nodata is None else nodata
         if nodata is not None:
             require_fit(nodata, source.dtype)
-        factor = (1, 1) if method == "nearest" else reduction(target, to_input_px)
+        size = source.grid.width, source.grid.height
+        factor = (1, 1) if method == "nearest" else reduction(target, to_input_px, size)
         return cls(source, to_input_px, target, method, nodata, factor, band_groups(source))
 
     @property
@@ -74,10 +75,13 @@ class _Warp:
         self, pool: ThreadPoolExecutor, ahead: int, progress: Progress
     ) -> Iterator[tuple[Window, tuple[int, ...], NDArray[Any], Mask]]:
         """Yield all tiles in groups of bands: place, bands, and what `tile` returns."""
-        tasks = [(tile, group) for tile in tiles(self.target) for group in self.groups]
-        for i, found in enumerate(in_order(pool, self.tile, tasks, ahead)):
-            yield *tasks[i], *found
-            progress.update((i + 1) / len(tasks))
+        count = tile_count(self.target) * len(self.groups)
+        # One by one: there may be any number of them.
+        tasks = ((tile, group) for tile in tiles(self.target) for group in self.groups)
+        found = in_order(pool, lambda task: (*task, *self.tile(task)), tasks, ahead)
+        for i, tile in enumerate(found):
+            yield tile
+            progress.update((i + 1) / count)
 
     def tile(self, task: tuple[Window, tuple[int, ...]]) -> tuple[NDArray[Any], Mask]:
         """Return some bands of a tile, (bands, h, w), and the validity of the first, (h, w)."""
@@ -246,17 +250,17 @@ def write_with_geotransform(
     if (grid.width, grid.height) != (source.grid.width, source.grid.height):
         raise ValueError("a new geotransform does not change the size of a raster")
     nodata = source.bands[0].nodata
-    places = list(tiles(grid))
+    count = tile_count(grid)
     masked, overviews = source.has_mask_band, progress.part(1 - _OVERVIEWS, 1)
     with create_like(
         source, grid, path, nodata=nodata, masked=masked, rpc_tags=rpc_tags, progress=overviews
     ) as file:
-        for i, tile in enumerate(places):
+        for i, tile in enumerate(tiles(grid)):
             values, mask = source.read_untouched(tile)
             file.write(values, window=tile)
             if masked:
                 file.write_mask(mask, window=tile)
-            progress.update((i + 1) / len(places) * (1 - _OVERVIEWS))
+            progress.update((i + 1) / count * (1 - _OVERVIEWS))
     progress.update(1.0)
 
 

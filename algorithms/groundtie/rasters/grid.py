@@ -17,12 +17,22 @@ from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 from rasterio.crs import CRS
 
-from ..errors import raised_by
+from ..errors import GeoreferencingError, GridSizeError, raised_by
 
 FloatArray = NDArray[np.float64]
 
 # Metres per degree on the sphere of the Earth's mean radius: for sizes and search radii only.
 METRES_PER_DEGREE = 111_195.0
+
+# Units of maps lie between millimetres and thousands of kilometres, in metres.
+_LARGEST_UNIT_M = 1e6
+
+# GDAL counts the pixels of a side in 32 bits.
+MOST_PX = 2**31 - 1
+
+# Pixels that are worked through one by one: a day at 10 million a second. A file of a map service
+# may state more of them than there are bytes on Earth; parts of it are no worse than of any other.
+_MOST_PIXELS = 1e12
 
 # Geotransform of images without georeferencing: map positions are then pixel coordinates.
 PIXEL_COORDINATES = Affine.translation(-0.5, -0.5)
@@ -139,6 +149,51 @@ class Grid:
             ]
         )
         return np.asarray(unit * [self.width, self.height] - 0.5)
+
+
+def is_invertible(transform: Affine) -> bool:
+    """Return whether a transform takes different positions to different, finite ones."""
+    if not np.isfinite(transform[:6]).all() or transform.is_degenerate:
+        return False
+    return bool(np.isfinite((~transform)[:6]).all())
+
+
+def require_workable(grid: Grid, what: str) -> Grid:
+    """Return a grid whose pixels can be worked through one by one.
+
+    Raises
+    ------
+    GridSizeError
+        They are too many; `what` is what the message calls the grid.
+    """
+    if grid.width * grid.height > _MOST_PIXELS:
+        raise GridSizeError(
+            f"{what} has {grid.width} × {grid.height} pixels, more than can be worked through: "
+            "take a part (gdal_translate -projwin) or larger pixels"
+        )
+    return grid
+
+
+def require_map(crs: CRS | None) -> CRS | None:
+    """Return a CRS if it is one of maps: projected or geographic, or none at all.
+
+    Raises
+    ------
+    GeoreferencingError
+        It is local (engineering), geocentric or vertical: nothing leads from it to a map. Or its
+        unit is none of lengths.
+    """
+    if crs is None or crs.is_geographic:
+        return crs
+    if crs.is_projected:
+        unit, metres = crs.linear_units_factor
+        if not 1 / _LARGEST_UNIT_M <= metres <= _LARGEST_UNIT_M:
+            raise GeoreferencingError(f"a CRS has a unit ({unit[:40]}) of {metres:g} m")
+        return crs
+    raise GeoreferencingError(
+        f"a CRS is neither projected nor geographic ({crs.to_wkt()[:40]}…); give it the CRS of its "
+        "map, or none (gdal_edit.py -a_srs)"
+    )
 
 
 # The product is `*` in affine 2; affine 3 has `@` and warns of `*`.

@@ -12,10 +12,9 @@ import numpy as np
 import rasterio
 from numpy.typing import NDArray
 from rasterio.env import env_ctx_if_needed
-from rasterio.errors import RasterioError, RasterioIOError
 
 from ..arrays import Raster
-from ..errors import RasterOpenError
+from ..errors import RasterOpenError, raised_by
 
 
 class Handles(Protocol):
@@ -131,7 +130,11 @@ class ArrayHandles:
 def _reading(name: str) -> Iterator[None]:
     try:
         yield
-    # RasterioIOError is no RasterioError before rasterio 1.4.
-    except (RasterioError, RasterioIOError) as error:
+    # Not all of them are RasterioErrors: neither are GDAL's own, nor CRSError.
+    except UnicodeDecodeError as error:
+        raise RasterOpenError(f"cannot read {name}: what it states is no UTF-8") from error
+    except Exception as error:
+        if not raised_by(error, "rasterio"):
+            raise
         reason = error.__cause__ or error
         raise RasterOpenError(f"cannot read {name}: {reason}") from error

@@ -179,22 +179,31 @@ def make_pair(
     factor = wanted / ref.grid.pixel_size_m
     grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
     radius = default_radius_m(grid) if search_radius_m is None else search_radius_m
-    limits = SearchLimits(radius, rotation_deg, (1 / scale, scale))
+    is_shift = SearchLimits(radius, rotation_deg, (1 / scale, scale)).is_shift
     outline = _nominal_pixels(inp.grid, ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
     nominal = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
-    if not limits.is_shift and not ref.grid.is_georeferenced:
+    if not is_shift and not ref.grid.is_georeferenced:
         outline = outline + np.subtract(ref.grid.centre_px, inp.grid.centre_px)
     outline = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
     overlap = _box(grid, outline, 0.0)
     if overlap is None:
         raise NoOverlapError(f"{ref.path} and {inp.path} do not overlap")
-    if not limits.is_shift:
+    if not is_shift:
         outline = _rotated(outline, rotation_deg, scale)
+    radius = min(radius, _farthest_px(grid, outline) * grid.pixel_size_m)
+    limits = SearchLimits(radius, rotation_deg, (1 / scale, scale))
     reach = _box(grid, outline, radius / grid.pixel_size_m)
     assert reach is not None
     matching, overlap_px = grid.window(*reach), (overlap.width, overlap.height)
-    around = _surroundings(reach, radius / grid.pixel_size_m, None if limits.is_shift else nominal)
+    around = _surroundings(reach, radius / grid.pixel_size_m, None if is_shift else nominal)
     return ImagePair(reference, input, matching, overlap_px, grid.window(*around), limits)
+
+
+def _farthest_px(grid: Grid, outline_px: FloatArray) -> float:
+    """Return the shift from which on an image with an outline, (n, 2), shows nothing of a grid."""
+    finite = outline_px[np.isfinite(outline_px).all(axis=1)]
+    size = np.array([grid.width, grid.height])
+    return float(np.hypot(*np.maximum(size - finite.min(axis=0), finite.max(axis=0))))
 
 
 def _rotated(outline_px: FloatArray, largest_deg: float, largest_scale: float) -> FloatArray:

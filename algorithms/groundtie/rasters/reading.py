@@ -17,9 +17,10 @@ from rasterio.enums import ColorInterp, MaskFlags
 from rasterio.errors import NotGeoreferencedWarning
 
 from ..arrays import Raster, in_memory
-from ..errors import BandError, GeoreferencingError, RasterOpenError
+from ..errors import BandError, RasterOpenError
 from .averaging import average_by_strips
-from .bands import BandInfo, colormap, working_dtype
+from .bands import BandInfo, colormap, stated, tags_of, working_dtype
+from .georeferencing import grid_of
 from .grid import PIXEL_COORDINATES, Grid
 from .handles import ArrayHandles, FileHandles, Handles, OpenDataset
 from .windows import Mask, Window, read_window
@@ -31,6 +32,10 @@ warnings.filterwarnings("ignore", category=NotGeoreferencedWarning)
 # Chips are read again and again; what is written is not.
 _READING_CACHE_BYTES = 400_000_000
 CACHE_BYTES = 96_000_000
+
+# Ten years of daily images are 3653 bands. Each band costs calls of GDAL, which one file of 14 kB
+# can ask for 65,535 times.
+MOST_BANDS = 4096
 
 FloatImage = NDArray[np.float32]
 
@@ -109,7 +114,9 @@ class RasterSource:
     def alpha_band(self) -> int | None:
         """Number, from 1, of the band of opacity."""
         kinds = [band.interpretation for band in self.bands]
-        return kinds.index(ColorInterp.alpha) + 1 if ColorInterp.alpha in kinds else None
+        # What a band that stands alone is called, it is the image.
+        is_there = ColorInterp.alpha in kinds and len(kinds) > 1
+        return kinds.index(ColorInterp.alpha) + 1 if is_there else None
 
     @property
     def says_what_is_valid(self) -> bool:
@@ -227,9 +234,9 @@ def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSou
     Raises
     ------
     RasterOpenError
-        There is no such file, or it cannot be read.
+        There is no such file, it cannot be read, or it has too many bands.
     GeoreferencingError
-        The image is located by RPCs or GCPs only.
+        See `georeferencing.grid_of`.
     """
     held = in_memory(value)
     if isinstance(held, Raster):
@@ -240,20 +247,22 @@ def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSou
         if dataset.count == 0:
             inner = ", ".join(dataset.subdatasets[:3]) or "none"
             raise RasterOpenError(f"{name} holds no bands itself; open a raster inside it: {inner}")
-        transform = dataset.transform
-        if dataset.crs is None and transform.is_identity:
-            if not allow_sensor_geometry:
-                _refuse_sensor_geometry(name, dataset)
-            transform = PIXEL_COORDINATES
-        flags = dataset.mask_flag_enums[0]
+        if dataset.count > MOST_BANDS:
+            raise RasterOpenError(
+                f"{name} has {dataset.count} bands; at most {MOST_BANDS} are read"
+            )
+        flags = stated(lambda: dataset.mask_flag_enums[0])
+        interleaving = stated(lambda: dataset.interleaving)
         return RasterSource(
             path=name,
-            grid=Grid(transform, dataset.crs, dataset.width, dataset.height),
-            bands=tuple(BandInfo.of(dataset, i) for i in range(dataset.count)),
+            grid=grid_of(name, dataset, allow_sensor_geometry=allow_sensor_geometry),
+            bands=BandInfo.all_of(dataset),
             has_mask_band=MaskFlags.per_dataset in flags and MaskFlags.alpha not in flags,
-            interleave=dataset.interleaving.value.lower() if dataset.interleaving else None,
+            interleave=interleaving.value.lower() if interleaving else None,
             colormap=colormap(dataset),
-            tags={ns: dataset.tags(ns=ns or None) for ns in ("", *dataset.tag_namespaces())},
+            tags={
+                ns: tags_of(dataset, ns=ns or None) for ns in ("", *stated(dataset.tag_namespaces))
+            },
             _handles=handles,
         )
 
@@ -278,14 +287,6 @@ def _source_of_array(raster: Raster) -> RasterSource:
 def bounded_cache() -> Any:
     """Return the environment in which GDAL keeps a bounded amount of what it has read."""
     return rasterio.Env(GDAL_CACHEMAX=_READING_CACHE_BYTES)
-
-
-def _refuse_sensor_geometry(name: str, dataset: Any) -> None:
-    located_by = "RPCs" if dataset.rpcs else "ground control points" if dataset.gcps[0] else ""
-    if located_by:
-        raise GeoreferencingError(
-            f"{name} is located by {located_by} only; orthorectify it first (gdalwarp -rpc or -tps)"
-        )
 
 
 def _averaged(

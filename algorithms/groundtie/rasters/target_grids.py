@@ -9,13 +9,17 @@ from affine import Affine
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from ..errors import NoOverlapError
-from .grid import Grid
+from ..errors import GridSizeError, NoOverlapError
+from .grid import MOST_PX, Grid, is_invertible, require_workable
 
 FloatArray = NDArray[np.float64]
 
 # A footprint that reaches into a further row or column by less than this does not need it.
 _TOLERANCE_PX = 1e-3
+
+# A registered raster has a diagonal of so many times as many pixels as the input has. The largest
+# scale that is searched for is 4, and a projection may double that again.
+_LARGEST_STRETCH = 16.0
 
 
 def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Grid:
@@ -34,10 +38,15 @@ def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Gri
     ------
     NoOverlapError
         Nothing is left.
+    GridSizeError
+        It would have more pixels than a raster can have, or than can be worked through.
     """
     px = lattice.map_to_pixel(xy[np.isfinite(xy).all(axis=1)])
     if len(px) == 0:
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")
+    if not (np.abs(px) < MOST_PX).all() and not within:
+        raise GridSizeError("the result would have more pixels a side than a raster can have")
+    px = np.clip(px, -MOST_PX, MOST_PX)
     low = np.floor(px.min(axis=0) + 0.5 + _TOLERANCE_PX).astype(int)
     high = np.ceil(px.max(axis=0) + 0.5 - _TOLERANCE_PX).astype(int)
     if within:
@@ -46,7 +55,8 @@ def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Gri
     if np.any(high <= low):
         raise NoOverlapError("the footprint of the image does not lie on the grid")
     width, height = high - low
-    return lattice.window(int(low[0]), int(low[1]), int(width), int(height))
+    found = lattice.window(int(low[0]), int(low[1]), int(width), int(height))
+    return require_workable(found, "the result")
 
 
 def registered_grid(
@@ -76,7 +86,27 @@ def registered_grid(
     ------
     NoOverlapError
         The raster lies outside of the domain of the CRS.
+    GridSizeError
+        The transform stretches the raster out of all proportion, or the pixels are too many.
     """
+    usual = _registered_grid(input_grid, px_to_map, crs, None)
+    stretch = np.hypot(usual.width, usual.height) / np.hypot(input_grid.width, input_grid.height)
+    if stretch > _LARGEST_STRETCH:
+        raise GridSizeError(
+            f"the transform stretches the raster {stretch:.3g} times: it is damaged, or not for "
+            "this raster"
+        )
+    if pixel_size_m is None:
+        return usual
+    return _registered_grid(input_grid, px_to_map, crs, pixel_size_m)
+
+
+def _registered_grid(
+    input_grid: Grid,
+    px_to_map: Callable[[FloatArray], FloatArray],
+    crs: CRS | None,
+    pixel_size_m: float | None,
+) -> Grid:
     footprint = px_to_map(input_grid.outline())
     if pixel_size_m is None and crs == input_grid.crs:
         return covering_grid(input_grid, footprint)
@@ -95,4 +125,7 @@ def registered_grid(
         area = abs(along[0] * across[1] - along[1] * across[0]) / 2
         pixel_size_m = float(np.sqrt(area * metres.prod()))
     width, height = pixel_size_m / metres
-    return covering_grid(Grid(Affine(width, 0, 0, 0, -height, 0), crs, 1, 1), footprint)
+    lattice = Grid(Affine(width, 0, 0, 0, -height, 0), crs, 1, 1)
+    if not is_invertible(lattice.transform):
+        raise GridSizeError("the transform gives the raster's pixels no size on the map")
+    return covering_grid(lattice, footprint)

@@ -29,6 +29,11 @@ def tiles(grid: Grid) -> Iterator[Window]:
             yield Window(col, row, min(_TILE, grid.width - col), min(_TILE, grid.height - row))
 
 
+def tile_count(grid: Grid) -> int:
+    """Return the number of tiles of a grid."""
+    return -(-grid.height // _TILE) * -(-grid.width // _TILE)
+
+
 def band_groups(source: RasterSource) -> tuple[tuple[int, ...], ...]:
     """Return the numbers, from 1, of a raster's bands in groups of which a tile is not too much."""
     most = max(_TILE_BYTES // (_TILE * _TILE * source.dtype.itemsize), 1)

@@ -156,15 +156,21 @@ def resample(
     return _rounded(values, dtype), known
 
 
-def reduction(grid: Grid, to_input_px: ToInputPx) -> tuple[int, int]:
-    """Return how many input columns and rows a pixel at the grid's centre spans, rounded, >= 1."""
+def reduction(grid: Grid, to_input_px: ToInputPx, size: tuple[int, int]) -> tuple[int, int]:
+    """Return how many input columns and rows a pixel at the grid's centre spans, rounded, >= 1.
+
+    No more than the input's width and height, `size`.
+    """
     col, row = grid.centre_px
     around = [[col - 0.5, row], [col + 0.5, row], [col, row - 0.5], [col, row + 0.5]]
     left, right, above, below = to_input_px(grid.pixel_to_map(around))
     if not np.isfinite([left, right, above, below]).all():
         return 1, 1
     span = np.hypot(right - left, below - above)
-    return max(round(float(span[0])), 1), max(round(float(span[1])), 1)
+    cols, rows = (
+        max(round(min(float(length), most)), 1) for length, most in zip(span, size, strict=True)
+    )
+    return cols, rows
 
 
 def source_window(
@@ -222,8 +228,9 @@ def sample(
         Shape (height, width) of the grid; float32, 0 where invalid, and bool.
     """
     px = coordinates(grid, to_input_px)
-    factor = (1, 1) if method == "nearest" else reduction(grid, to_input_px)
-    window = source_window(px, (source.grid.width, source.grid.height), method, factor)
+    size = (source.grid.width, source.grid.height)
+    factor = (1, 1) if method == "nearest" else reduction(grid, to_input_px, size)
+    window = source_window(px, size, method, factor)
     if not window.width or not window.height:
         shape = (grid.height, grid.width)
         return np.zeros(shape, np.float32), np.zeros(shape, bool)

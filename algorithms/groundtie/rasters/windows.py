@@ -55,7 +55,7 @@ def read_window(
     if inside.width <= 0 or inside.height <= 0:
         return np.zeros(shape, source.dtype), np.zeros(shape, bool)
     place = rasterio.windows.Window(*inside)
-    values = dataset.read(list(bands), window=place, out_dtype=source.dtype)
+    values = _read(dataset, source, place, bands)
     valid = _validity(dataset, source, place, bands, values)
     if inside == window:
         return values, valid
@@ -64,6 +64,13 @@ def read_window(
     cols = slice(left - window.col, right - window.col)
     padded[:, rows, cols], padded_valid[:, rows, cols] = values, valid
     return padded, padded_valid
+
+
+def _read(dataset: Any, source: RasterSource, place: Any, bands: Sequence[int]) -> NDArray[Any]:
+    if len({source.bands[number - 1].dtype for number in bands}) == 1:
+        return np.asarray(dataset.read(list(bands), window=place, out_dtype=source.dtype))
+    # rasterio reads bands of several types one by one only.
+    return np.stack([dataset.read(n, window=place, out_dtype=source.dtype) for n in bands])
 
 
 def _validity(

@@ -27,7 +27,8 @@ from ..rasters.grid import FloatArray, Grid
 from .scene import SceneInfo
 
 # Stages of a registration, in the order in which their rules are asked.
-SEARCH, ASSESSMENT, AGREEMENT, ERROR, SCENE, REFINEMENT, POSE = (
+TIE_POINTS, SEARCH, ASSESSMENT, AGREEMENT, ERROR, SCENE, REFINEMENT, POSE = (
+    "tie points",
     "search",
     "assessment",
     "agreement",

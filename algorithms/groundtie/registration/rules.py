@@ -36,6 +36,7 @@ from .evidence import (
     REFINEMENT,
     SCENE,
     SEARCH,
+    TIE_POINTS,
     RegistrationEvidence,
     SearchEvidence,
 )
@@ -45,6 +46,7 @@ from .refinement_evidence import RefinementEvidence
 if TYPE_CHECKING:
     from ..assessment.accuracy import AssessmentEvidence
     from .pose_verdict import PoseEvidence
+    from .tie_point_evidence import TiePointEvidence
 
 # Check points that agree on another transform within this distance make it a rival, if they are
 # more by so many, as three always agree on an affine model and one or two more may by chance, and
@@ -94,6 +96,11 @@ _SAME_SHARE = 0.02
 _LARGEST_FOLDING_PX = 0.01
 
 
+# Stored tie points must hold a model so well that an error of 1 px changes the raster by no more
+# than this share of its side: it would not look like itself.
+_LARGEST_BORDER_SPREAD = 0.1
+
+
 @dataclass(frozen=True)
 class Rule:
     """A reason to refuse.
@@ -120,6 +127,25 @@ class Rule:
     source: str
     advice: str
     reason: Callable[[Any], str | None]
+
+
+def _points_too_near(evidence: TiePointEvidence) -> str | None:
+    spread = evidence.border_spread_px
+    if spread <= _LARGEST_BORDER_SPREAD * evidence.side_px:
+        return None
+    if not np.isfinite(spread):
+        return f"the tie points lie so that no {evidence.kind} model follows from them"
+    return (
+        f"the tie points lie so near to each other, or to a line, that an error of 1 px moves the "
+        f"raster's border by {spread:.0f} px"
+    )
+
+
+def _points_at_random(evidence: TiePointEvidence) -> str | None:
+    chance = evidence.log10_chance
+    if chance is None or chance <= LARGEST_LOG10_CHANCE:
+        return None
+    return f"the {evidence.count} tie points fit each other no better than random ones"
 
 
 def _ambiguous(evidence: SearchEvidence) -> str | None:
@@ -386,6 +412,24 @@ _WITHOUT = "give images, or masks, without what is drawn over the ground"
 _GROUND = "give a mask of the ground, such as roads and waters"
 
 RULES: tuple[Rule, ...] = (
+    Rule(
+        "tie points too near",
+        TIE_POINTS,
+        "an error of 1 px in stored tie points moves the border of the raster by more than "
+        f"{_LARGEST_BORDER_SPREAD:.0%} of its longer side: they lie at one place or along a line",
+        "leverage; [Hastie2009] 3.2",
+        "give points all over the raster, or a simpler model",
+        _points_too_near,
+    ),
+    Rule(
+        "tie points at random",
+        TIE_POINTS,
+        "as many random points would fit the model as well with a probability above "
+        f"10^{LARGEST_LOG10_CHANCE:.0f}",
+        "expected false alarms; [Moisan2004]",
+        "take out points that are wrong, or give those of this raster",
+        _points_at_random,
+    ),
     Rule(
         "second place",
         SEARCH,

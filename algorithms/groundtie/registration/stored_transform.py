@@ -2,54 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from affine import Affine
 from numpy.typing import NDArray
 
-from ..errors import GeoreferencingError, NoOverlapError, TransformFileError
-from ..geometry.fitting import fit_model
-from ..geometry.models import Model
+from ..errors import (
+    GeoreferencingError,
+    NoOverlapError,
+    NotRegisteredError,
+    TransformFileError,
+)
 from ..geometry.tie_point_files import read_tie_points
-from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform, load_transform
-from ..rasters.grid import Grid, apply_affine, reproject
+from ..rasters.grid import Grid, reproject
 from ..rasters.reading import RasterSource
+from .tie_point_evidence import TiePointEvidence, TiePointFit
+from .verdict import first_refusal
 
 FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class TiePointFit:
-    """How the transform that was fitted to tie points fits them.
-
-    Parameters
-    ----------
-    points
-        Number of points that it was fitted to.
-    rmse_px
-        Root mean square of their residuals in input pixels: no measure of accuracy.
-    check_points
-        Number of points that were held out.
-    check_rmse_px
-        Root mean square of their residuals; None if there are none.
-    """
-
-    points: int
-    rmse_px: float
-    check_points: int
-    check_rmse_px: float | None
-
-    def lines(self) -> list[str]:
-        """Return the fit as lines of text."""
-        residuals = f"residuals of {self.rmse_px:.2f} px (RMSE)"
-        lines = [f"fitted to {self.points} tie points with {residuals}"]
-        if self.check_rmse_px is not None:
-            error = f"{self.check_rmse_px:.2f} px (RMSE)"
-            lines.append(f"error at {self.check_points} check points: {error}")
-        return lines
 
 
 def load_stored(
@@ -72,39 +43,24 @@ def load_stored(
         The file cannot be read or understood.
     TooFewPointsError
         There are too few tie points for the model.
+    NotRegisteredError
+        A rule refuses the tie points.
     """
     if path.suffix.lower() == ".json":
         return load_transform(path), None
     points = read_tie_points(path, source.grid)
     if points.crs is None and source.grid.crs is not None:
         raise TransformFileError(f"{path} does not state the CRS of its map positions")
-    found = Transform(_fit(points, model, source.grid), points.crs, source.grid)
-    return found, _assess(found, points)
-
-
-def _fit(points: TiePoints, kind: str, input_grid: Grid) -> Model:
-    """Fit a model in metres, so that rigid ones preserve shapes also on maps in degrees."""
-    nominal = Transform.nominal(points.crs, input_grid).nominal_xy(points.input_px)
-    taken = points.used & ~points.is_check
-    centre = points.reference_xy[taken].mean(axis=0) if taken.any() else np.zeros(2)
-    here = Grid(Affine.translation(*(centre - 0.5)), points.crs, 1, 1)
-    width, height = here.metres_per_unit
-    metres = Affine(1 / width, 0, centre[0], 0, 1 / height, centre[1])
-    xy, nominal_xy = (
-        apply_affine(~metres, positions[taken]) for positions in (points.reference_xy, nominal)
-    )
-    return fit_model(kind, xy, nominal_xy).on_map(metres)
-
-
-def _assess(found: Transform, points: TiePoints) -> TiePointFit:
-    squared = np.sum(points.residual_px(found) ** 2, axis=1)
-    fitted, check = points.used & ~points.is_check, points.used & points.is_check
-    return TiePointFit(
-        points=int(fitted.sum()),
-        rmse_px=float(np.sqrt(squared[fitted].mean())),
-        check_points=int(check.sum()),
-        check_rmse_px=float(np.sqrt(squared[check].mean())) if check.any() else None,
-    )
+    if not np.isfinite(
+        Transform.nominal(points.crs, source.grid).nominal_xy(points.input_px)
+    ).all():
+        raise TransformFileError(f"{path} holds points that lie outside of their map's projection")
+    evidence = TiePointEvidence.of(points, model, source.grid)
+    refusal = first_refusal(evidence)
+    if refusal is not None:
+        rule, reason = refusal
+        raise NotRegisteredError(f"{path}: {reason}; {rule.advice}")
+    return evidence.transform, evidence.fit()
 
 
 def transform_of(found: Transform, source: RasterSource, name: object) -> Transform:
@@ -128,6 +84,11 @@ def transform_of(found: Transform, source: RasterSource, name: object) -> Transf
         It lies elsewhere.
     """
     own, registered = source.grid, found.input_grid
+    if own.crs is not None and found.crs is None:
+        raise GeoreferencingError(
+            f"{name} does not state the CRS of its map, but {source.path} has one: take the "
+            "raster that it was made with, or one without georeferencing"
+        )
     if own.is_georeferenced and registered.is_georeferenced:
         if (own.crs is None) != (registered.crs is None):
             raise GeoreferencingError(f"only one of {source.path} and {name} has a CRS")

@@ -9,7 +9,7 @@ from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 from rasterio.crs import CRS
 
-from ..errors import NoOverlapError
+from ..errors import GeoreferencingError, NoOverlapError
 from ..rasters.grid import Grid, reproject
 from ..rasters.reading import RasterSource
 from .heights import ConstantHeight, Heights, terrain_heights
@@ -187,11 +187,20 @@ def orient(
 
 
 def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODES) -> FloatArray:
-    """Return longitudes and latitudes all over an image, (n, 2), at a height; none is NaN."""
+    """Return longitudes and latitudes all over an image, (n, 2), at a height; none is NaN.
+
+    Raises
+    ------
+    GeoreferencingError
+        The RPCs see no ground: they are not the image's.
+    """
     along = [np.linspace(-0.5, side - 0.5, nodes) for side in size]
     px = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
     lon_lat = rpc.localise(px, height_m)
-    return lon_lat[np.isfinite(lon_lat).all(axis=1)]
+    seen = lon_lat[np.isfinite(lon_lat).all(axis=1)]
+    if not len(seen):
+        raise GeoreferencingError("the RPCs lead no pixel of the image to the ground")
+    return seen
 
 
 def sensor_grid(source: RasterSource, orientation: Orientation) -> SensorGrid:

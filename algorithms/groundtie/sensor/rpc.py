@@ -205,6 +205,16 @@ class RPC:
         lost = ~np.all(np.abs(miss) * size < _PRECISION_PX, axis=0)
         lph[:2, lost] = np.nan
 
+    @property
+    def is_regular(self) -> bool:
+        """Whether no denominator vanishes within the scales, and the ground has an image there."""
+        values = np.array(self._polynomials) @ _lattice_terms()[1]
+        low, high = values[2:].min(axis=1), values[2:].max(axis=1)
+        if not (low * high > 0).all():
+            return False
+        extent = np.ptp(values[:2] / values[2:], axis=1)
+        return bool(np.isfinite(extent).all() and (extent > 0).all())
+
     @cached_property
     def _start(self) -> _Start:
         return _Start.of(self)
@@ -225,10 +235,7 @@ class _Start:
     @classmethod
     def of(cls, rpc: RPC) -> _Start:
         """Fit the polynomials to a lattice on the ground."""
-        axes = [np.linspace(-1, 1, nodes) for nodes in _START_NODES]
-        lph = np.stack(np.meshgrid(*axes, indexing="ij")).reshape(3, -1)
-        terms = np.empty((TERMS, lph.shape[1]))
-        fill_terms(lph, terms)
+        lph, terms = _lattice_terms()
         values = rpc._coefficients @ terms
         image = values[:2] / values[2:]
         low, high = image.min(axis=1, keepdims=True), image.max(axis=1, keepdims=True)
@@ -240,6 +247,15 @@ class _Start:
         """Return normalised longitude and latitude, (2, n), near those of image positions."""
         fill_terms(np.vstack([_unit(target, self.low, self.span), height]), terms)
         return self.coefficients @ terms
+
+
+def _lattice_terms() -> tuple[FloatArray, FloatArray]:
+    """Return normalised ground positions all over the scales, (3, n), and their terms, (20, n)."""
+    axes = [np.linspace(-1, 1, nodes) for nodes in _START_NODES]
+    lph = np.stack(np.meshgrid(*axes, indexing="ij")).reshape(3, -1)
+    terms = np.empty((TERMS, lph.shape[1]))
+    fill_terms(lph, terms)
+    return lph, terms
 
 
 def _unit(image: FloatArray, low: FloatArray, span: FloatArray) -> FloatArray:

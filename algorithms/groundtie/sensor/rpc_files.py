@@ -138,7 +138,8 @@ def _read_rpb(text: str) -> Tags:
     kind = re.search(r'SpecId\s*=\s*"?(\w+)', text, re.IGNORECASE)
     if kind and kind[1].upper() != "RPC00B":
         raise ValueError(f"coefficients of kind {kind[1]} are not supported, only RPC00B")
-    found = re.findall(r"(\w+)\s*=\s*(\([^)]*\)|[^;\n]*)", text)
+    # From the start of a word only: a text of one long word is none of quadratic work.
+    found = re.findall(r"\b(\w+)\s*=\s*(\([^)]*\)|[^;\n]*)", text)
     return {_RPB_NAMES[key]: value.strip("() \r;") for key, value in found if key in _RPB_NAMES}
 
 

@@ -11,6 +11,12 @@ from ..errors import GeoreferencingError
 from .polynomials import TERMS
 from .rpc import RPC
 
+# Bounds of offsets and scales: all round the Earth, the height of its atmosphere, and the pixels
+# that GDAL counts along a side.
+_LARGEST_DEG = 360.0
+_LARGEST_M = 1e5
+_LARGEST_PX = 2.0**31
+
 
 def rpc_from_tags(tags: Mapping[str, str], name: str) -> RPC:
     """Return the RPCs that tags hold.
@@ -36,7 +42,7 @@ def rpc_from_tags(tags: Mapping[str, str], name: str) -> RPC:
         return None if not tags.get(key) or number(key) < 0 else number(key)
 
     try:
-        return RPC(
+        rpc = RPC(
             (number("LONG_OFF"), number("LAT_OFF"), number("HEIGHT_OFF")),
             (number("LONG_SCALE"), number("LAT_SCALE"), number("HEIGHT_SCALE")),
             (number("SAMP_OFF"), number("LINE_OFF")),
@@ -48,10 +54,26 @@ def rpc_from_tags(tags: Mapping[str, str], name: str) -> RPC:
             error_m("ERR_BIAS"),
             error_m("ERR_RAND"),
         )
+        _require_earthly(rpc)
+        return rpc
     except KeyError as error:
         raise GeoreferencingError(f"the RPCs of {name} lack {error.args[0]}") from error
     except (ValueError, IndexError) as error:
         raise GeoreferencingError(f"the RPCs of {name} cannot be understood: {error}") from error
+
+
+def _require_earthly(rpc: RPC) -> None:
+    """Raise ValueError for RPCs that are of no image of the Earth."""
+    for name, largest, numbers in (
+        ("longitude", _LARGEST_DEG, (rpc.offset[0], rpc.scale[0])),
+        ("latitude", _LARGEST_DEG / 4, (rpc.offset[1], rpc.scale[1])),
+        ("height", _LARGEST_M, (rpc.offset[2], rpc.scale[2])),
+        ("pixel", _LARGEST_PX, (*rpc.image_offset, *rpc.image_scale)),
+    ):
+        if max(map(abs, numbers)) > largest:
+            raise ValueError(f"{max(numbers, key=abs):g} is the {name} of no image")
+    if not rpc.is_regular:
+        raise ValueError("a denominator vanishes, or all the ground has one place in the image")
 
 
 def rpc_to_tags(rpc: RPC) -> dict[str, str]:

@@ -173,6 +173,11 @@ def surface_over(source: RasterSource, lon_lat: FloatArray, margin_px: int = 2) 
 
     size = np.array([grid.width, grid.height])
     px = exact(lon_lat)
+    px = px[np.isfinite(px).all(axis=1)]
+    if not len(px):
+        raise NoOverlapError(f"{source.path} does not cover the image")
+    # Where the image sees nothing of the raster, its pixels may be any number.
+    px = np.clip(px, -margin_px - 1, size + margin_px)
     low = np.clip(np.floor(px.min(axis=0)).astype(int) - margin_px, 0, size)
     high = np.clip(np.ceil(px.max(axis=0)).astype(int) + margin_px + 1, 0, size)
     if (high <= low).any():

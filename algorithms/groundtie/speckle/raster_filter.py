@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..errors import RasterContentError
+from ..rasters.grid import require_workable
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
-from ..rasters.tiling import in_order, tiles
+from ..rasters.tiling import in_order, tile_count, tiles
 from ..rasters.writing import create_like, fill_value
 from .filters import SpeckleFilter
 from .statistics import estimate_looks
@@ -48,7 +49,8 @@ class RasterFilter:
 
     def write(self, path: Path, context: Context) -> None:
         """Write the filtered raster, tile by tile; see `atomic.Outputs.stage`."""
-        source, places = self.source, list(tiles(self.source.grid))
+        source = self.source
+        require_workable(source.grid, source.path)
         nodata = None if source.is_complex else source.bands[0].nodata
         like = _as_amplitudes(source) if source.is_complex else source
         # Without speckle, only the tag identifies it as a radar image.
@@ -58,12 +60,17 @@ class RasterFilter:
         with create_like(
             like, source.grid, path, nodata=nodata, masked=masked, workers=workers
         ) as file:
-            filtered = in_order(context.executor, self.tile, places, workers + 1)
-            for i, (bands, valid) in enumerate(filtered):
-                file.write(bands, window=places[i])
+            filtered = in_order(
+                context.executor,
+                lambda tile: (tile, *self.tile(tile)),
+                tiles(source.grid),
+                workers + 1,
+            )
+            for i, (tile, bands, valid) in enumerate(filtered):
+                file.write(bands, window=tile)
                 if masked:
-                    file.write_mask(valid, window=places[i])
-                context.update((i + 1) / len(places))
+                    file.write_mask(valid, window=tile)
+                context.update((i + 1) / tile_count(source.grid))
 
     def tile(self, tile: Window) -> tuple[NDArray[Any], Mask]:
         """Return all bands of a tile, filtered, and which pixels of the first are valid."""

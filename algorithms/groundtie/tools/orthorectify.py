@@ -16,6 +16,7 @@ from ..errors import GeoreferencingError, ParameterError
 from ..kinds import Flag, RasterOut, Text
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
+from ..rasters.grid import require_map
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.orthorectification import Orthorectification
 from ..registration.sensor_input import Ground, open_sensor_image, utm_of
@@ -110,6 +111,6 @@ def orthorectify(
 
 def _crs(text: str | None) -> CRS | None:
     try:
-        return None if text is None else CRS.from_user_input(text)
+        return None if text is None else require_map(CRS.from_user_input(text))
     except (CRSError, ValueError) as error:
         raise ParameterError(f"crs is not understood: {text}") from error

@@ -1,0 +1,48 @@
+"""Reading a vector layer by fiona: the part that runs in a process of its own.
+
+`vector_layers` starts this file as a script, so it imports nothing of the package.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+
+def layer_of(path: str) -> dict[str, Any]:
+    """Return the first layer of a vector file as values that JSON can carry.
+
+    The keys are `crs_wkt`, `fields` (names of the attributes) and `features`, each with `geometry`
+    (None, or `type` and `coordinates` as GeoJSON has them) and `properties`; or `error`, why the
+    file cannot be read.
+    """
+    import fiona
+
+    try:
+        with fiona.open(path) as layer:
+            return {
+                "crs_wkt": layer.crs_wkt,
+                "fields": list(layer.schema["properties"]),
+                "features": [
+                    {
+                        "geometry": _plain(feature["geometry"]),
+                        "properties": dict(feature["properties"]),
+                    }
+                    for feature in layer
+                ],
+            }
+    # What a damaged file makes of GDAL's answers is no matter of this package: any class of error.
+    except Exception as error:
+        return {"error": str(error) or type(error).__name__}
+
+
+def _plain(geometry: Any) -> dict[str, Any] | None:
+    if geometry is None or geometry.get("coordinates") is None:
+        return None
+    return {"type": geometry["type"], "coordinates": geometry["coordinates"]}
+
+
+if __name__ == "__main__":
+    # Dates and binary attributes are of no use: as text they do no harm.
+    json.dump(layer_of(sys.argv[1]), sys.stdout, default=str)

@@ -1,0 +1,138 @@
+"""Vector layers, read where a damaged file cannot take the job down.
+
+GDAL's vector drivers, or fiona around them, may crash on damaged files: a GeoPackage of 144 kB ends
+the interpreter. Neither fiona nor GDAL offers a check beforehand, and SQLite's own check of a
+GeoPackage passes some of these files. So another process reads the layer, and its end is an error
+of that layer. It is a new one: a fork of QGIS, or of a process with GDAL's threads, would be none
+that works.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from rasterio.crs import CRS
+from rasterio.errors import CRSError
+from rasterio.warp import transform_geom
+
+from ..errors import GeoreferencingError, VectorLayerError, raised_by
+from ..rasters.grid import require_map
+from . import layer_reader
+
+# The layers that masks and tie points come from are read in seconds.
+_PATIENCE_S = 120
+
+
+@dataclass(frozen=True)
+class VectorLayer:
+    """The first layer of a vector file.
+
+    Parameters
+    ----------
+    path
+        What messages call it.
+    crs
+        Its CRS; None: unknown.
+    fields
+        Names of the attributes.
+    features
+        Dictionaries with `geometry` (None, or `type` and `coordinates` as in GeoJSON) and
+        `properties`.
+    """
+
+    path: str
+    crs: CRS | None
+    fields: tuple[str, ...]
+    features: tuple[dict[str, Any], ...]
+
+    def on_map(self, crs: CRS | None) -> VectorLayer:
+        """Return the features that have a geometry, in the CRS of a map.
+
+        Raises
+        ------
+        GeoreferencingError
+            Only one of the layer and the map has a CRS.
+        VectorLayerError
+            A geometry cannot be taken to the map.
+        """
+        if (self.crs is None) != (crs is None):
+            raise GeoreferencingError(f"only one of {self.path} and the image has a CRS")
+        located = [feature for feature in self.features if feature["geometry"] is not None]
+        if self.crs is not None and self.crs != crs:
+            try:
+                moved = transform_geom(self.crs, crs, [item["geometry"] for item in located])
+            except Exception as error:
+                if not isinstance(error, ValueError) and not raised_by(error, "rasterio"):
+                    raise
+                raise VectorLayerError(f"cannot reproject {self.path}: {error}") from error
+            located = [
+                {**item, "geometry": geometry}
+                for item, geometry in zip(located, moved, strict=True)
+            ]
+        return replace(self, crs=crs, features=tuple(located))
+
+
+def read_vector_layer(path: str | os.PathLike[str]) -> VectorLayer:
+    """Read the first layer of any vector file that fiona reads.
+
+    Raises
+    ------
+    VectorLayerError
+        The file cannot be read, or is damaged.
+    """
+    name = os.fspath(path)
+    found = _read_apart(name)
+    if found is None:
+        found = layer_reader.layer_of(name)
+    if "error" in found:
+        raise VectorLayerError(f"cannot read the vector layer {name}: {found['error']}")
+    try:
+        crs = require_map(CRS.from_wkt(found["crs_wkt"])) if found["crs_wkt"] else None
+    except (CRSError, GeoreferencingError) as error:
+        raise VectorLayerError(f"the CRS of {name} cannot be understood: {error}") from error
+    return VectorLayer(name, crs, tuple(found["fields"]), tuple(found["features"]))
+
+
+def _read_apart(name: str) -> dict[str, Any] | None:
+    """Return what `layer_reader` finds in a process of its own; None where none can be started."""
+    python = _python()
+    if python is None:
+        return None
+    # It finds fiona where this process does: in QGIS the plugin's folder is on the path.
+    folders = os.pathsep.join(folder for folder in sys.path if folder)
+    try:
+        done = subprocess.run(
+            [python, "-P", layer_reader.__file__, name],
+            env={**os.environ, "PYTHONPATH": folders},
+            check=False,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=_PATIENCE_S,
+            # Ctrl-C is for this process, which then ends its work in order.
+            start_new_session=True,
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )
+    except subprocess.TimeoutExpired:
+        return {"error": f"it took more than {_PATIENCE_S} s"}
+    if done.returncode == 0:
+        return dict(json.loads(done.stdout))
+    # Python's own failures have code 1: an interpreter without fiona is none.
+    return None if done.returncode == 1 else {"error": "it is damaged: GDAL crashes on it"}
+
+
+def _python() -> Path | None:
+    """Return Python's interpreter: within QGIS `sys.executable` may be QGIS, or empty."""
+    own = Path(sys.executable or "-")
+    beside = [
+        Path(folder) / name
+        for folder in (sys.exec_prefix, sys.base_exec_prefix)
+        for name in ("python.exe", "bin/python3")
+    ]
+    named = [own] if own.stem.lower().startswith("python") else []
+    return next((path for path in [*named, *beside] if path.is_file()), None)

@@ -1,0 +1,210 @@
+"""What speaks for tie points that a transform is fitted to: how they lie, and how they agree."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+
+from ..errors import TooFewPointsError
+from ..geometry.chance import log10_false_alarms
+from ..geometry.fitting import fit_model
+from ..geometry.models import DEGREE, PARAMETERS, Frame, monomials
+from ..geometry.tie_points import TiePoints
+from ..geometry.transform import Transform
+from ..rasters.grid import Grid, apply_affine
+from .evidence import TIE_POINTS
+
+FloatArray = NDArray[np.float64]
+
+# Singular values below this share of the largest are rounding errors.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class TiePointFit:
+    """How the transform that was fitted to tie points fits them.
+
+    Parameters
+    ----------
+    points
+        Number of points that it was fitted to.
+    rmse_px
+        Root mean square of their residuals in input pixels: no measure of accuracy.
+    check_points
+        Number of points that were held out.
+    check_rmse_px
+        Root mean square of their residuals; None if there are none.
+    border_spread_px
+        By how much the border of the raster moves, at most, if points err by 1 px.
+    log10_chance
+        log10 of the expected number of models that random points would fit as well; None: the
+        points are no more than the model needs, and fit any.
+    """
+
+    points: int
+    rmse_px: float
+    check_points: int
+    check_rmse_px: float | None
+    border_spread_px: float
+    log10_chance: float | None
+
+    def lines(self) -> list[str]:
+        """Return the fit as lines of text."""
+        residuals = f"residuals of {self.rmse_px:.2f} px (RMSE)"
+        lines = [f"fitted to {self.points} tie points with {residuals}"]
+        if self.log10_chance is None:
+            lines.append("warning: the model needs all of these points; none is left to check it")
+        if self.check_rmse_px is not None:
+            error = f"{self.check_rmse_px:.2f} px (RMSE)"
+            lines.append(f"error at {self.check_points} check points: {error}")
+        return lines
+
+
+@dataclass(frozen=True)
+class TiePointEvidence:
+    """Tie points that a person or a program set, and the model that is fitted to them.
+
+    Parameters
+    ----------
+    points
+        All points, with the CRS of their map.
+    kind
+        The model, one of `models.KINDS`.
+    input_grid
+        The raster's own grid.
+    """
+
+    points: TiePoints
+    kind: str
+    input_grid: Grid
+
+    stages: ClassVar = (TIE_POINTS,)
+
+    @classmethod
+    def of(cls, points: TiePoints, kind: str, input_grid: Grid) -> TiePointEvidence:
+        """Return the evidence of points.
+
+        Raises
+        ------
+        TooFewPointsError
+            They are fewer than the model needs.
+        """
+        found = cls(points, kind, input_grid)
+        if found.count < found.needed:
+            raise TooFewPointsError(
+                f"the {kind} model needs at least {found.needed} points; there are {found.count}"
+            )
+        return found
+
+    @property
+    def needed(self) -> int:
+        """How many points determine the model."""
+        return -(-PARAMETERS[self.kind] // 2)
+
+    @cached_property
+    def taken(self) -> NDArray[np.bool_]:
+        """Which points the model is fitted to, shape (n,)."""
+        return self.points.used & ~self.points.is_check
+
+    @property
+    def count(self) -> int:
+        """How many points the model is fitted to."""
+        return int(self.taken.sum())
+
+    @property
+    def judged_by(self) -> str:
+        """The model that shows how the points agree: a spline bends to any, its affine part not."""
+        return "affine" if self.kind == "tps" else self.kind
+
+    @property
+    def side_px(self) -> int:
+        """The raster's longer side."""
+        return max(self.input_grid.width, self.input_grid.height)
+
+    @cached_property
+    def border_spread_px(self) -> float:
+        """By how much the raster's border moves, at most, if points err by 1 px; may be infinite.
+
+        The square root of the largest leverage ([Hastie2009] 3.2) of the border; of a spline, that
+        of its affine part.
+        """
+        places = self.input_grid.map_to_pixel(self._nominal_xy)[self.taken]
+        if not np.isfinite(places).all():
+            return math.inf
+        frame = Frame.around(places)
+        uv, border = frame.enter(places), frame.enter(self.input_grid.outline())
+        if self.kind in ("rigid", "similarity"):
+            design, at = (np.column_stack([np.ones(len(p)), p @ [1, 1j]]) for p in (uv, border))
+        else:
+            design, at = (monomials(p, DEGREE[self.judged_by]) for p in (uv, border))
+        _, sizes, axes = np.linalg.svd(design, full_matrices=False)
+        if sizes[-1] <= _ROUNDING * sizes[0]:
+            return math.inf
+        leverage = (np.abs(at @ axes.conj().T / sizes) ** 2).sum(axis=1)
+        return float(np.sqrt(leverage.max()))
+
+    @cached_property
+    def transform(self) -> Transform:
+        """The transform that the model is, fitted by least squares."""
+        return self._fitted(self.kind)
+
+    def residuals_px(self, transform: Transform) -> FloatArray:
+        """Return the residuals of all points, shape (n,), in input pixels."""
+        with np.errstate(all="ignore"):
+            return np.asarray(np.hypot(*self.points.residual_px(transform).T))
+
+    @cached_property
+    def log10_chance(self) -> float | None:
+        """log10 of the expected number of models that random points fit as well; None: any.
+
+        Points agree within whatever radius is the least likely ([Moisan2004]).
+        """
+        if self.count <= self.needed:
+            return None
+        sample = -(-PARAMETERS[self.judged_by] // 2)
+        residuals = self.residuals_px(self._fitted(self.judged_by))[self.taken]
+        radii = np.nan_to_num(np.sort(residuals)[sample:], nan=np.inf)
+        area = self.input_grid.width * self.input_grid.height
+        probabilities = np.minimum(math.pi * radii**2 / area, 1.0).tolist()
+        chances = [
+            log10_false_alarms(agreeing, self.count, probability, sample)
+            for agreeing, probability in enumerate(probabilities, start=sample + 1)
+        ]
+        return min(chances) + math.log10(len(chances))
+
+    def fit(self) -> TiePointFit:
+        """Return how the transform fits the points."""
+        squared = self.residuals_px(self.transform) ** 2
+        check = self.points.used & self.points.is_check
+        return TiePointFit(
+            points=self.count,
+            rmse_px=float(np.sqrt(squared[self.taken].mean())),
+            check_points=int(check.sum()),
+            check_rmse_px=float(np.sqrt(squared[check].mean())) if check.any() else None,
+            border_spread_px=self.border_spread_px,
+            log10_chance=self.log10_chance,
+        )
+
+    @cached_property
+    def _nominal_xy(self) -> FloatArray:
+        nominal = Transform.nominal(self.points.crs, self.input_grid)
+        return nominal.nominal_xy(self.points.input_px)
+
+    def _fitted(self, kind: str) -> Transform:
+        """Fit a model in metres, so that rigid ones preserve shapes also on maps in degrees."""
+        reference_xy = self.points.reference_xy[self.taken]
+        centre = reference_xy.mean(axis=0)
+        here = Grid(Affine.translation(*(centre - 0.5)), self.points.crs, 1, 1)
+        width, height = here.metres_per_unit
+        metres = Affine(1 / width, 0, centre[0], 0, 1 / height, centre[1])
+        xy, nominal_xy = (
+            apply_affine(~metres, places) for places in (reference_xy, self._nominal_xy[self.taken])
+        )
+        model = fit_model(kind, xy, nominal_xy).on_map(metres)
+        return Transform(model, self.points.crs, self.input_grid)

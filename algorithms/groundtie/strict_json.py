@@ -1,0 +1,45 @@
+"""JSON from files that anybody may have written: what is no plain JSON is an error, not a surprise.
+
+Python reads more than JSON: infinity and NaN, and whole numbers of any length, which become
+neither a float nor the size of an array.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+
+def read_json(path: Path) -> Any:
+    """Return what a JSON file holds; all of its numbers are finite.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    ValueError
+        It is no JSON, holds numbers that are not finite, or is nested too deeply.
+    """
+    try:
+        return json.loads(
+            path.read_text(encoding="utf-8-sig"),
+            parse_float=_finite,
+            parse_int=_whole,
+            parse_constant=_finite,
+        )
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:20]} is no finite number")
+    return number
+
+
+def _whole(text: str) -> int | float:
+    # A float has 15 digits; whole numbers beyond count nothing.
+    return int(text) if len(text) <= 15 else _finite(text)

@@ -1,0 +1,111 @@
+"""Vector layers are read where a crash ends another process only."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import fiona
+import pytest
+from raster_files import UTM
+from rasterio.crs import CRS
+
+from groundtie.errors import GeoreferencingError, VectorLayerError
+from groundtie.geometry import layer_reader, vector_layers
+from groundtie.geometry.vector_layers import read_vector_layer
+
+RING = [(9.0, 45.0), (9.1, 45.0), (9.1, 45.1), (9.0, 45.0)]
+
+
+@pytest.fixture
+def layer(tmp_path: Path) -> Path:
+    path = tmp_path / "areas.gpkg"
+    schema = {"geometry": "Polygon", "properties": {"class": "int", "day": "date"}}
+    with fiona.open(path, "w", driver="GPKG", crs="EPSG:4326", schema=schema) as file:
+        for geometry in ({"type": "Polygon", "coordinates": [RING]}, None):
+            properties = {"class": 3, "day": "2026-11-22"}
+            file.write({"type": "Feature", "geometry": geometry, "properties": properties})
+    return path
+
+
+def started_as(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, source: str) -> None:
+    """Let another script run in place of the reader."""
+    script = tmp_path / "reader.py"
+    script.write_text(source)
+    monkeypatch.setattr(layer_reader, "__file__", str(script))
+
+
+def never(path: str) -> dict[str, object]:
+    raise AssertionError("the layer is read in this process")
+
+
+def test_what_a_layer_holds(layer: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(layer_reader, "layer_of", never)
+    found = read_vector_layer(layer)
+    assert found.crs == CRS.from_epsg(4326)
+    assert found.fields == ("class", "day")
+    first, second = found.features
+    assert first["geometry"]["coordinates"] == [[list(corner) for corner in RING]]
+    assert (first["properties"]["class"], second["geometry"]) == (3, None)
+    (moved,) = found.on_map(UTM).features
+    assert moved["geometry"]["coordinates"][0][0] == pytest.approx((500_000, 4_982_950), abs=5)
+    with pytest.raises(GeoreferencingError, match="only one of"):
+        found.on_map(None)
+
+
+def test_a_crash_is_an_error_of_the_layer(
+    layer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    crash = "import os, signal\nos.kill(os.getpid(), signal.SIGSEGV)\n"
+    started_as(monkeypatch, tmp_path, crash)
+    with pytest.raises(VectorLayerError, match=r"areas\.gpkg: it is damaged: GDAL crashes on it"):
+        read_vector_layer(layer)
+
+
+def test_one_that_takes_too_long(
+    layer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started_as(monkeypatch, tmp_path, "import time\ntime.sleep(60)\n")
+    monkeypatch.setattr(vector_layers, "_PATIENCE_S", 0.3)
+    with pytest.raises(VectorLayerError, match=r"took more than 0\.3 s"):
+        read_vector_layer(layer)
+
+
+def test_without_an_interpreter_it_is_read_here(
+    layer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # As in a program that embeds Python, and where the interpreter finds no fiona.
+    monkeypatch.setattr(vector_layers, "_python", lambda: None)
+    assert len(read_vector_layer(layer).features) == 2
+    monkeypatch.undo()
+    started_as(monkeypatch, tmp_path, "import nothing_of_that_name\n")
+    assert len(read_vector_layer(layer).features) == 2
+
+
+def test_within_qgis_the_interpreter_is_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    python = tmp_path / "bin" / "python3"
+    python.parent.mkdir()
+    python.touch()
+    monkeypatch.setattr(sys, "exec_prefix", str(tmp_path))
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "qgis-bin.exe"))
+    assert vector_layers._python() == python
+
+
+@pytest.mark.parametrize("content", [b"", b"SQLite format 3\0", b"{}", b"x" * 1000])
+def test_what_is_no_layer(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "a.gpkg"
+    path.write_bytes(content)
+    with pytest.raises(VectorLayerError, match=r"cannot read the vector layer .*a\.gpkg"):
+        read_vector_layer(path)
+
+
+def test_a_crs_that_is_no_maps(tmp_path: Path) -> None:
+    path = tmp_path / "a.geojson"
+    collection = {"type": "FeatureCollection", "features": []}
+    path.write_text(json.dumps(collection | {"crs": {"type": "name", "properties": {
+        "name": "urn:ogc:def:crs:EPSG::4978"}}}))  # fmt: skip
+    with pytest.raises(VectorLayerError, match="neither projected nor geographic"):
+        read_vector_layer(path)
