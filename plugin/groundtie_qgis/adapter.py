@@ -20,7 +20,7 @@ from .definitions import definition, qgis_name
 from .dependencies import rasterio_env
 from .library import errors, kinds, plugin_metadata, progress
 from .styling import ICON, style_when_loaded
-from .values import Reader
+from .values import Reader, with_layers_as_files
 
 
 class ToolAlgorithm(QgsProcessingAlgorithm):
@@ -29,6 +29,7 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
     def __init__(self, tool: Any) -> None:
         super().__init__()
         self._tool = tool
+        self._given: dict[str, Any] = {}
 
     def createInstance(self) -> ToolAlgorithm:
         return ToolAlgorithm(self._tool)
@@ -77,12 +78,24 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         if not valid:
             return valid, message
         scratch = QgsProcessingContext()  # so that a mere check has no layer loaded afterwards
-        reader = Reader(self, parameters, context, scratch, QgsProcessingFeedback())
         try:
-            self._check(reader)
+            given = with_layers_as_files(self, self._tool, parameters, context)
+            self._check(Reader(self, given, context, scratch, QgsProcessingFeedback()))
         except errors.GroundTieError as error:
             return False, error.one_line()
         return True, ""
+
+    def prepareAlgorithm(
+        self,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+    ) -> bool:
+        try:
+            self._given = with_layers_as_files(self, self._tool, parameters, context)
+        except errors.GroundTieError as error:
+            raise QgsProcessingException(error.one_line()) from error
+        return True
 
     def processAlgorithm(
         self,
@@ -91,7 +104,7 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
         try:
-            values = self._check(Reader(self, parameters, context, context, feedback))
+            values = self._check(Reader(self, self._given, context, context, feedback))
             with rasterio_env():
                 result = self._tool.run(**values, progress=_progress(feedback))
         except errors.GroundTieError as error:

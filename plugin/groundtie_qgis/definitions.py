@@ -95,8 +95,17 @@ def _mask_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefi
     )
 
 
+def takes_layers(kind: Any) -> bool:
+    """Whether a parameter is a file that may hold a vector layer: tie points, control points."""
+    return isinstance(kind, kinds.FileIn) and ".gpkg" in kind.suffixes
+
+
 @_make.register(kinds.FileIn)
 def _file_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    if takes_layers(kind):
+        return LayerOrFile(
+            name, kind.label, optional=not parameter.required, types=[compat.ANY_VECTOR]
+        )
     return QgsProcessingParameterFile(
         name,
         kind.label,

@@ -62,8 +62,8 @@ def write_layer(
         raise OSError("the file is not complete; is the disk full?")
 
 
-def read_layer(path: Path) -> tuple[list[dict[str, Any]], CRS | None]:
-    """Return the properties of all features of the first layer, and its CRS.
+def read_layer(path: Path) -> tuple[list[dict[str, Any]], list[Any], CRS | None]:
+    """Return the properties and geometries of the first layer's features, and its CRS.
 
     Raises
     ------
@@ -72,9 +72,13 @@ def read_layer(path: Path) -> tuple[list[dict[str, Any]], CRS | None]:
     """
     try:
         with fiona.open(path) as layer:
-            crs = CRS.from_wkt(layer.crs_wkt) if layer.crs_wkt else None
-            return [dict(feature["properties"]) for feature in layer], crs
+            wkt = layer.crs_wkt
+            features = list(layer)
     except Exception as error:
         if not raised_by(error, "fiona"):
             raise
         raise OSError(str(error)) from error
+    # So GDAL calls the two that stand for none in every GeoPackage (OGC 12-128r18, 1.1.2.1.2).
+    crs = None if not wkt or '"Undefined ' in wkt else CRS.from_wkt(wkt)
+    properties = [dict(feature["properties"]) for feature in features]
+    return properties, [feature["geometry"] for feature in features], crs

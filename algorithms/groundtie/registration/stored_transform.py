@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import GeoreferencingError, NoOverlapError, TransformFileError
 from ..geometry.fitting import fit_model
 from ..geometry.models import Model
-from ..geometry.tie_point_files import read_tie_points
+from ..geometry.tie_point_files import EDITED, read_tie_points
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform, load_transform
 from ..rasters.grid import Grid, apply_affine, reproject
@@ -35,12 +35,15 @@ class TiePointFit:
         Number of points that were held out.
     check_rmse_px
         Root mean square of their residuals; None if there are none.
+    edited
+        Number of points whose lines were moved or drawn by a person.
     """
 
     points: int
     rmse_px: float
     check_points: int
     check_rmse_px: float | None
+    edited: int = 0
 
     def lines(self) -> list[str]:
         """Return the fit as lines of text."""
@@ -49,6 +52,10 @@ class TiePointFit:
         if self.check_rmse_px is not None:
             error = f"{self.check_rmse_px:.2f} px (RMSE)"
             lines.append(f"error at {self.check_points} check points: {error}")
+        if self.edited:
+            lines.append(
+                f"edited by hand: {self.edited} points; their lines count, not their columns"
+            )
         return lines
 
 
@@ -104,6 +111,7 @@ def _assess(found: Transform, points: TiePoints) -> TiePointFit:
         rmse_px=float(np.sqrt(squared[fitted].mean())),
         check_points=int(check.sum()),
         check_rmse_px=float(np.sqrt(squared[check].mean())) if check.any() else None,
+        edited=int(np.sum(points.more.get(EDITED, 0.0))),
     )
 
 
