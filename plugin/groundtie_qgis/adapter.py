@@ -19,7 +19,8 @@ from qgis.PyQt.QtGui import QIcon
 from .definitions import definition, qgis_name
 from .dependencies import rasterio_env
 from .library import errors, kinds, plugin_metadata, progress
-from .styling import ICON, style_when_loaded
+from .results import forget_layers, show_report
+from .styling import ICON, LoadedLayers
 from .values import Reader, with_layers_as_files
 
 
@@ -30,6 +31,8 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         super().__init__()
         self._tool = tool
         self._given: dict[str, Any] = {}
+        self._alike: dict[str, Any] = {}
+        self._about = ""
 
     def createInstance(self) -> ToolAlgorithm:
         return ToolAlgorithm(self._tool)
@@ -95,6 +98,12 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
             self._given = with_layers_as_files(self, self._tool, parameters, context)
         except errors.GroundTieError as error:
             raise QgsProcessingException(error.one_line()) from error
+        for parameter in self._tool.parameters:
+            like = getattr(parameter.kind, "like", "")
+            layer = self.parameterAsRasterLayer(parameters, qgis_name(like), context)
+            if like and layer is not None:
+                self._alike[parameter.name] = layer.renderer().clone()
+                self._about = layer.name()
         return True
 
     def processAlgorithm(
@@ -103,29 +112,46 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
+        values: dict[str, Any] = {}
         try:
-            values = self._check(Reader(self, self._given, context, context, feedback))
+            values |= self._check(Reader(self, self._given, context, context, feedback))
             with rasterio_env():
                 result = self._tool.run(**values, progress=_progress(feedback))
-        except errors.GroundTieError as error:
-            raise QgsProcessingException(error.one_line()) from error
         except Exception as error:
+            forget_layers(context, map(str, values.values()))
+            if isinstance(error, errors.NotRegisteredError):
+                self._show_reports(values, feedback)
+            if isinstance(error, errors.GroundTieError):
+                raise QgsProcessingException(error.one_line()) from error
             feedback.pushDebugInfo(traceback.format_exc())
             what = f"{type(error).__name__}: {error}"
             raise QgsProcessingException(f"this is a bug in GroundTie: {what}") from error
         for line in result.lines():
             feedback.pushInfo(line)
-        self._style(values, context)
+        self._finish_layers(values, context)
         return self._results(values, result.summary())
 
     def _check(self, reader: Reader) -> dict[str, Any]:
         read = {parameter.name: reader.read(parameter) for parameter in self._tool.parameters}
         return dict(self._tool.check(read, spell=lambda parameter: parameter.kind.label))
 
-    def _style(self, values: dict[str, Any], context: QgsProcessingContext) -> None:
+    def _show_reports(self, values: dict[str, Any], feedback: QgsProcessingFeedback) -> None:
+        """Show the report on what was refused: QGIS shows none of a run that failed."""
         for parameter in self._tool.parameters:
-            if isinstance(parameter.kind, kinds.VectorOut) and values[parameter.name]:
-                style_when_loaded(parameter.name, str(values[parameter.name]), context)
+            kind, path = parameter.kind, values[parameter.name]
+            if isinstance(kind, kinds.FileOut) and ".html" in kind.suffixes and path is not None:
+                feedback.pushInfo(f"{parameter.name}: {path}")
+                show_report(f"{self._tool.title}: refused", path)
+
+    def _finish_layers(self, values: dict[str, Any], context: QgsProcessingContext) -> None:
+        """Have the layers that are loaded styled and grouped."""
+        title = self._tool.title
+        layers = LoadedLayers(f"{title}: {self._about}" if self._about else title)
+        for parameter in self._tool.parameters:
+            path, kind = values[parameter.name], parameter.kind
+            if path is not None and isinstance(kind, (kinds.RasterOut, kinds.VectorOut)):
+                style = getattr(kind, "style", "")
+                layers.add(str(path), context, style, self._alike.get(parameter.name))
 
     def _results(self, values: dict[str, Any], summary: dict[str, Any]) -> dict[str, Any]:
         written = {

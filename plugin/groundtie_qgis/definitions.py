@@ -136,12 +136,13 @@ def _file_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDef
 
 @_make.register(kinds.FolderOut)
 def _folder_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterFolderDestination(name, kind.label, None, *_wanted(parameter))
+    required = parameter.required
+    return QgsProcessingParameterFolderDestination(name, kind.label, None, not required, required)
 
 
 def _wanted(parameter: Any) -> tuple[bool, bool]:
     """Return a destination's `optional` and `createByDefault`."""
-    return not parameter.required, parameter.required
+    return not parameter.required, parameter.required or parameter.kind.shown
 
 
 @_make.register(kinds.Number)

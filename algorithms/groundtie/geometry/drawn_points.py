@@ -87,7 +87,7 @@ def follow_lines(
         A nominal position on the map has no place in an input without georeferencing.
     """
     stated = np.stack([columns(rows, *NOMINAL), columns(rows, *_REFERENCE)], axis=1)
-    drawn = np.isfinite(ends).all(axis=(1, 2))
+    drawn = np.asarray(np.isfinite(ends).all(axis=(1, 2)))
     moved = drawn[:, None] & ~_same(ends, _projected(stated, crs, layer_crs))
     # A table that locates its points in the input otherwise has no nominal positions to compare.
     elsewhere = np.isfinite(columns(rows, *INPUT)) | np.isfinite(columns(rows, *PIXEL))
