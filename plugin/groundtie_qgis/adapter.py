@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import traceback
+from pathlib import Path
 from typing import Any
 
 from qgis.core import (
@@ -17,10 +18,11 @@ from qgis.core import (
 from qgis.PyQt.QtGui import QIcon
 
 from .definitions import definition, qgis_name
-from .dependencies import rasterio_env
-from .library import errors, kinds, plugin_metadata, progress
+from .dependencies import complaint, missing_for, rasterio_env
+from .library import LazyTool, errors, kinds, plugin_metadata, progress
 from .results import forget_layers, show_report
 from .styling import ICON, LoadedLayers
+from .unavailable import UnavailableAlgorithm, broken
 from .values import Reader, with_layers_as_files
 
 
@@ -34,7 +36,11 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         self._alike: dict[str, Any] = {}
         self._about = ""
 
-    def createInstance(self) -> ToolAlgorithm:
+    def createInstance(self) -> QgsProcessingAlgorithm:
+        try:
+            self._tool.parameters  # noqa: B018 - imports a lazy tool
+        except ImportError as error:  # a package is there, but broken
+            return UnavailableAlgorithm(self._tool, broken(error))
         return ToolAlgorithm(self._tool)
 
     def name(self) -> str:
@@ -68,6 +74,8 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         return str(ICON)
 
     def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:
+        if isinstance(self._tool, LazyTool) and not self._tool.loaded():
+            return  # the provider's own: what runs, or shows a dialog, is made from it
         for parameter in self._tool.parameters:
             self.addParameter(definition(parameter))
         for output in self._tool.outputs:
@@ -133,7 +141,11 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
 
     def _check(self, reader: Reader) -> dict[str, Any]:
         read = {parameter.name: reader.read(parameter) for parameter in self._tool.parameters}
-        return dict(self._tool.check(read, spell=lambda parameter: parameter.kind.label))
+        values = dict(self._tool.check(read, spell=lambda parameter: parameter.kind.label))
+        paths = [value for value in values.values() if isinstance(value, Path)]
+        if missing := missing_for(self._tool.name, paths):
+            raise errors.ParameterError(complaint(missing))
+        return values
 
     def _show_reports(self, values: dict[str, Any], feedback: QgsProcessingFeedback) -> None:
         """Show the report on what was refused: QGIS shows none of a run that failed."""
