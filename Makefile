@@ -48,8 +48,8 @@ lint: $(VENV)/.installed-dev ## ruff, mypy, import contracts
 bench: $(VENV)/.installed-dev ## accuracy on real pairs, speed
 	$(PY) benchmarks/run.py
 
-plugin: $(VENV)/.installed ## build dist/groundtie_qgis.zip
-	$(PY) scripts/build_plugin.py $(PLUGIN)
+plugin: ## build dist/groundtie_qgis.zip
+	$(or $(wildcard $(PY)),python3) scripts/build_plugin.py $(PLUGIN)
 
 clean: ## remove everything that can be made again
 	rm -rf $(VENV) build demo dist algorithms/*.egg-info

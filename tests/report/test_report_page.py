@@ -194,3 +194,9 @@ def test_surfaces_show_their_peaks(page: Page) -> None:
     # Pixel (col, row) = (8 + 1, 8 - 2) has its centre half a pixel further.
     assert [(p["cx"], p["cy"]) for p in peaks] == [("9.50", "6.50"), ("14.50", "11.50")]
     assert "± 8 px; peak 9.0 σ at (1.0, -2.0) px" in page.text
+
+
+def test_the_sliders_ends_show_what_they_are_called(page: Page) -> None:
+    """The line at the left end leaves the input alone to be seen, which is right of it."""
+    html = " ".join(page.text.split())
+    assert html.index("Input Reference Compare by") > 0

@@ -85,8 +85,8 @@ def _turn(nominal: NDArray[np.float64], xy: NDArray[np.float64], grid: Grid) -> 
     """Return rotation (degrees) and scale of the affine map that fits a move best."""
     # Metres, with y upwards as it is seen.
     seen = np.array(grid.metres_per_unit) * ([1, 1] if grid.is_georeferenced else [1, -1])
-    moved = [(places - places.mean(axis=0)) * seen for places in (nominal, xy)]
-    (a, b), (c, d) = np.linalg.lstsq(*moved, rcond=None)[0].T
+    before, after = ((places - places.mean(axis=0)) * seen for places in (nominal, xy))
+    (a, b), (c, d) = np.linalg.lstsq(before, after, rcond=None)[0].T
     return float(np.rad2deg(np.arctan2(c - b, a + d))), float(np.sqrt(abs(a * d - b * c)))
 
 
