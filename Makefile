@@ -54,8 +54,8 @@ failures: $(VENV)/.installed-dev ## kill jobs at each step, fill their disks (as
 fuzz: $(VENV)/.installed-dev ## read 20,000 damaged files; failures are kept in benchmarks/results/fuzz
 	$(PY) -m benchmarks.fuzz --cases 20000
 
-plugin: $(VENV)/.installed ## build dist/groundtie_qgis.zip
-	$(PY) scripts/build_plugin.py $(PLUGIN)
+plugin: ## build dist/groundtie_qgis.zip
+	$(or $(wildcard $(PY)),python3) scripts/build_plugin.py $(PLUGIN)
 
 clean: ## remove everything that can be made again
 	rm -rf $(VENV) build demo dist algorithms/*.egg-info

@@ -231,7 +231,10 @@ def _parameters(function: Callable[..., Any], signature: inspect.Signature) -> l
     for name, argument in signature.parameters.items():
         if name in ("parameters", "progress"):
             continue
-        kinds = [m for m in getattr(hints[name], "__metadata__", ()) if isinstance(m, Kind)]
+        # Python 3.10 wraps the type of what has the default None in one more Optional.
+        parts = (hints[name], *typing.get_args(hints[name]))
+        notes = [note for part in parts for note in getattr(part, "__metadata__", ())]
+        kinds = [note for note in notes if isinstance(note, Kind)]
         if len(kinds) != 1:
             raise TypeError(f"{function.__name__}: parameter {name} has no kind")
         found.append(_parameter(name, kinds[0], argument.default))

@@ -72,9 +72,13 @@ class InputKind(PathKind):
 
 @dataclass(frozen=True, kw_only=True)
 class OutputKind(PathKind):
-    """A file that is written; `suffixes` are the endings it may have, the usual one first."""
+    """A file that is written; `suffixes` are the endings it may have, the usual one first.
+
+    What is `shown` can be looked at: dialogs have it made even if it is not asked for.
+    """
 
     suffixes: tuple[str, ...]
+    shown: bool = False
 
     def check(self, name: str, value: Any) -> Path:
         path = super().check(name, value)
@@ -119,16 +123,18 @@ class FileIn(InputKind):
 
 @dataclass(frozen=True, kw_only=True)
 class RasterOut(OutputKind):
-    """A raster that is written."""
+    """A raster that is written; its values mean what those of the raster parameter `like` mean."""
 
     suffixes: tuple[str, ...] = (".tif", ".tiff")
+    like: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
 class VectorOut(OutputKind):
-    """A vector layer that is written."""
+    """A vector layer that is written; on maps it is drawn in the plugin's style of that name."""
 
     suffixes: tuple[str, ...] = (".gpkg", ".geojson")
+    style: str = ""
 
 
 class FileOut(OutputKind):

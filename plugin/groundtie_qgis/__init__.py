@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
+
+OLDEST_PYTHON = (3, 10)
 
 
 def classFactory(iface: Any) -> Any:
     """Return the plugin (called by QGIS; `iface` is None without a desktop)."""
+    if sys.version_info < OLDEST_PYTHON:
+        # Nothing else can be imported there.
+        from .old_python import OldPython
+
+        return OldPython(iface, OLDEST_PYTHON)
     from .plugin import GroundTiePlugin
 
     return GroundTiePlugin()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import traceback
+from pathlib import Path
 from typing import Any
 
 from qgis.core import (
@@ -17,10 +18,12 @@ from qgis.core import (
 from qgis.PyQt.QtGui import QIcon
 
 from .definitions import definition, qgis_name
-from .dependencies import rasterio_env
-from .library import errors, kinds, plugin_metadata, progress
-from .styling import ICON, style_when_loaded
-from .values import Reader
+from .dependencies import complaint, missing_for, rasterio_env
+from .library import LazyTool, errors, kinds, plugin_metadata, progress
+from .results import forget_layers, show_report
+from .styling import ICON, LoadedLayers
+from .unavailable import UnavailableAlgorithm, broken
+from .values import Reader, with_layers_as_files
 
 
 class ToolAlgorithm(QgsProcessingAlgorithm):
@@ -29,8 +32,15 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
     def __init__(self, tool: Any) -> None:
         super().__init__()
         self._tool = tool
+        self._given: dict[str, Any] = {}
+        self._alike: dict[str, Any] = {}
+        self._about = ""
 
-    def createInstance(self) -> ToolAlgorithm:
+    def createInstance(self) -> QgsProcessingAlgorithm:
+        try:
+            self._tool.parameters  # noqa: B018 - imports a lazy tool
+        except ImportError as error:  # a package is there, but broken
+            return UnavailableAlgorithm(self._tool, broken(error))
         return ToolAlgorithm(self._tool)
 
     def name(self) -> str:
@@ -64,6 +74,8 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         return str(ICON)
 
     def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:
+        if isinstance(self._tool, LazyTool) and not self._tool.loaded():
+            return  # the provider's own: what runs, or shows a dialog, is made from it
         for parameter in self._tool.parameters:
             self.addParameter(definition(parameter))
         for output in self._tool.outputs:
@@ -77,12 +89,30 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         if not valid:
             return valid, message
         scratch = QgsProcessingContext()  # so that a mere check has no layer loaded afterwards
-        reader = Reader(self, parameters, context, scratch, QgsProcessingFeedback())
         try:
-            self._check(reader)
+            given = with_layers_as_files(self, self._tool, parameters, context)
+            self._check(Reader(self, given, context, scratch, QgsProcessingFeedback()))
         except errors.GroundTieError as error:
             return False, error.one_line()
         return True, ""
+
+    def prepareAlgorithm(
+        self,
+        parameters: dict[str, Any],
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+    ) -> bool:
+        try:
+            self._given = with_layers_as_files(self, self._tool, parameters, context)
+        except errors.GroundTieError as error:
+            raise QgsProcessingException(error.one_line()) from error
+        for parameter in self._tool.parameters:
+            like = getattr(parameter.kind, "like", "")
+            layer = self.parameterAsRasterLayer(parameters, qgis_name(like), context)
+            if like and layer is not None:
+                self._alike[parameter.name] = layer.renderer().clone()
+                self._about = layer.name()
+        return True
 
     def processAlgorithm(
         self,
@@ -90,29 +120,50 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
+        values: dict[str, Any] = {}
         try:
-            values = self._check(Reader(self, parameters, context, context, feedback))
+            values |= self._check(Reader(self, self._given, context, context, feedback))
             with rasterio_env():
                 result = self._tool.run(**values, progress=_progress(feedback))
-        except errors.GroundTieError as error:
-            raise QgsProcessingException(error.one_line()) from error
         except Exception as error:
+            forget_layers(context, map(str, values.values()))
+            if isinstance(error, errors.NotRegisteredError):
+                self._show_reports(values, feedback)
+            if isinstance(error, errors.GroundTieError):
+                raise QgsProcessingException(error.one_line()) from error
             feedback.pushDebugInfo(traceback.format_exc())
             what = f"{type(error).__name__}: {error}"
             raise QgsProcessingException(f"this is a bug in GroundTie: {what}") from error
         for line in result.lines():
             feedback.pushInfo(line)
-        self._style(values, context)
+        self._finish_layers(values, context)
         return self._results(values, result.summary())
 
     def _check(self, reader: Reader) -> dict[str, Any]:
         read = {parameter.name: reader.read(parameter) for parameter in self._tool.parameters}
-        return dict(self._tool.check(read, spell=lambda parameter: parameter.kind.label))
+        values = dict(self._tool.check(read, spell=lambda parameter: parameter.kind.label))
+        paths = [value for value in values.values() if isinstance(value, Path)]
+        if missing := missing_for(self._tool.name, paths):
+            raise errors.ParameterError(complaint(missing))
+        return values
 
-    def _style(self, values: dict[str, Any], context: QgsProcessingContext) -> None:
+    def _show_reports(self, values: dict[str, Any], feedback: QgsProcessingFeedback) -> None:
+        """Show the report on what was refused: QGIS shows none of a run that failed."""
         for parameter in self._tool.parameters:
-            if isinstance(parameter.kind, kinds.VectorOut) and values[parameter.name]:
-                style_when_loaded(parameter.name, str(values[parameter.name]), context)
+            kind, path = parameter.kind, values[parameter.name]
+            if isinstance(kind, kinds.FileOut) and ".html" in kind.suffixes and path is not None:
+                feedback.pushInfo(f"{parameter.name}: {path}")
+                show_report(f"{self._tool.title}: refused", path)
+
+    def _finish_layers(self, values: dict[str, Any], context: QgsProcessingContext) -> None:
+        """Have the layers that are loaded styled and grouped."""
+        title = self._tool.title
+        layers = LoadedLayers(f"{title}: {self._about}" if self._about else title)
+        for parameter in self._tool.parameters:
+            path, kind = values[parameter.name], parameter.kind
+            if path is not None and isinstance(kind, (kinds.RasterOut, kinds.VectorOut)):
+                style = getattr(kind, "style", "")
+                layers.add(str(path), context, style, self._alike.get(parameter.name))
 
     def _results(self, values: dict[str, Any], summary: dict[str, Any]) -> dict[str, Any]:
         written = {

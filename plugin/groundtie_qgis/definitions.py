@@ -95,8 +95,17 @@ def _mask_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefi
     )
 
 
+def takes_layers(kind: Any) -> bool:
+    """Whether a parameter is a file that may hold a vector layer: tie points, control points."""
+    return isinstance(kind, kinds.FileIn) and ".gpkg" in kind.suffixes
+
+
 @_make.register(kinds.FileIn)
 def _file_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    if takes_layers(kind):
+        return LayerOrFile(
+            name, kind.label, optional=not parameter.required, types=[compat.ANY_VECTOR]
+        )
     return QgsProcessingParameterFile(
         name,
         kind.label,
@@ -127,12 +136,13 @@ def _file_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDef
 
 @_make.register(kinds.FolderOut)
 def _folder_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterFolderDestination(name, kind.label, None, *_wanted(parameter))
+    required = parameter.required
+    return QgsProcessingParameterFolderDestination(name, kind.label, None, not required, required)
 
 
 def _wanted(parameter: Any) -> tuple[bool, bool]:
     """Return a destination's `optional` and `createByDefault`."""
-    return not parameter.required, parameter.required
+    return not parameter.required, parameter.required or parameter.kind.shown
 
 
 @_make.register(kinds.Number)

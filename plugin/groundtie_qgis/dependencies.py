@@ -6,7 +6,7 @@ import importlib.util
 import os
 import re
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -20,17 +20,39 @@ _NAMES = {
 _LOCK = threading.RLock()
 
 
+# What only some of the tools need, or only some of their outputs: by the endings of files.
+_NEEDED_BY_TOOL = {"train_feature_classifier": ("scikit-learn",)}
+_NEEDED_BY_FILE = {
+    ".html": ("jinja2", "matplotlib"),
+    ".png": ("matplotlib",),
+    ".gpkg": ("fiona",),
+}
+# rasterio needs click itself; the tools do not.
+_NOT_BY_ALL = {"click", "scikit-learn", "jinja2", "matplotlib", "fiona"}
+
+
 def missing_packages() -> list[str]:
-    """Return the distributions of requirements.txt whose modules cannot be found."""
+    """Return the distributions of requirements.txt that all tools need and that are not found."""
     path = FOLDER / "requirements.txt"  # made when the plugin is built
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
     names = [match.group() for line in lines if (match := re.match(r"[\w.-]+", line))]
+    return _not_found(name for name in names if name not in _NOT_BY_ALL)
+
+
+def missing_for(tool: str, paths: Iterable[Path]) -> list[str]:
+    """Return the distributions that are not found of those that a call of a tool needs beside."""
+    needed = [*_NEEDED_BY_TOOL.get(tool, ())]
+    for path in paths:
+        needed += _NEEDED_BY_FILE.get(path.suffix.lower(), ())
+    return _not_found(dict.fromkeys(needed))
+
+
+def _not_found(names: Iterable[str]) -> list[str]:
     return [name for name in names if importlib.util.find_spec(_module(name)) is None]
 
 
-def complaint() -> str:
+def complaint(missing: list[str]) -> str:
     """Return one line that names what is missing and how to install it; empty if all is there."""
-    missing = missing_packages()
     if not missing:
         return ""
     noun = "package" if len(missing) == 1 else "packages"

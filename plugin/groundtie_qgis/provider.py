@@ -4,26 +4,37 @@ from __future__ import annotations
 
 from typing import Any
 
+import qgis.utils
 from qgis.core import QgsMessageLog, QgsProcessingProvider
 from qgis.PyQt.QtGui import QIcon
 
 from .adapter import ToolAlgorithm
 from .compat import WARNING
-from .dependencies import complaint, rasterio_env
-from .library import all_tools, kinds, plugin_metadata
+from .dependencies import complaint, missing_packages, rasterio_env
+from .library import LazyTool, all_tools, plugin_metadata
 from .styling import ICON
-from .unavailable import UnavailableAlgorithm, unavailable_tools
+from .unavailable import UnavailableAlgorithm, broken, named_tools
+
+# The endings, without dot, that outputs of the tools may have, the usual one first: to ask the
+# tools would import them all.
+RASTERS = ("tif", "tiff")
+VECTORS = ("gpkg", "geojson", "csv", "points", "txt")
 
 
 def _tools_or_complaint() -> tuple[tuple[Any, ...], str]:
-    """Return the tools, or none of them and one line that states what to install."""
-    if missing := complaint():
+    """Return the tools, or none of them and one line that states what to install.
+
+    In the desktop, which shall start soon, a tool is imported when it is opened.
+    """
+    if missing := complaint(missing_packages()):
         return (), missing
+    if qgis.utils.iface is not None:
+        return tuple(LazyTool(**vars(tool)) for tool in named_tools()), ""
     try:
         with rasterio_env():
             return all_tools(), ""
     except ImportError as error:  # a package is there, but broken
-        return (), f"GroundTie cannot use a Python package: {' '.join(str(error).split())}"
+        return (), broken(error)
 
 
 class GroundTieProvider(QgsProcessingProvider):
@@ -56,25 +67,14 @@ class GroundTieProvider(QgsProcessingProvider):
             self.addAlgorithm(ToolAlgorithm(tool))
         if self._missing:
             QgsMessageLog.logMessage(self._missing, "GroundTie", WARNING)
-            for unavailable in unavailable_tools():
+            for unavailable in named_tools():
                 self.addAlgorithm(UnavailableAlgorithm(unavailable, self._missing))
 
     def supportsNonFileBasedOutput(self) -> bool:
         return False
 
     def supportedOutputRasterLayerExtensions(self) -> list[str]:
-        return self._extensions(kinds.RasterOut) or super().supportedOutputRasterLayerExtensions()
+        return list(RASTERS)
 
     def supportedOutputVectorLayerExtensions(self) -> list[str]:
-        return self._extensions(kinds.VectorOut) or super().supportedOutputVectorLayerExtensions()
-
-    def _extensions(self, kind: type) -> list[str]:
-        """Return the endings, without dot, that outputs of a kind may have, the usual first."""
-        found = [
-            suffix[1:]
-            for tool in self._tools
-            for parameter in tool.parameters
-            if isinstance(parameter.kind, kind)
-            for suffix in parameter.kind.suffixes
-        ]
-        return list(dict.fromkeys(found))
+        return list(VECTORS)

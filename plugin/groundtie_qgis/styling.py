@@ -1,13 +1,17 @@
-"""The icon, and the styles of layers: `styles/NAME.qml` is for the output parameter NAME."""
+"""How the layers of a run look and where they lie: `styles/NAME.qml` is the style NAME."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from qgis.core import (
+    QgsLayerTreeGroup,
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingLayerPostProcessorInterface,
+    QgsProject,
+    QgsRasterLayer,
+    QgsRasterRenderer,
     QgsVectorLayer,
 )
 from qgis.PyQt import sip
@@ -18,34 +22,105 @@ from .library import FOLDER
 ICON = FOLDER / "icons" / "groundtie.svg"
 
 
-class Styler(QgsProcessingLayerPostProcessorInterface):
-    """Gives a layer of lines the style of a file."""
+class LoadedLayers:
+    """The layers that one run loads: several come into one group, what is drawn over rasters first.
 
-    def __init__(self, style: str) -> None:
+    Parameters
+    ----------
+    title
+        Name of the group.
+    """
+
+    def __init__(self, title: str) -> None:
+        self._title = title
+        self._count = 0
+        self._group: QgsLayerTreeGroup | None = None
+
+    def add(
+        self,
+        path: str,
+        context: QgsProcessingContext,
+        style: str = "",
+        renderer: QgsRasterRenderer | None = None,
+    ) -> None:
+        """Have the layer of the file `path` finished, if the run's context loads it.
+
+        Lines get the style of a name, rasters the renderer of another raster.
+        """
+        if context.willLoadLayerOnCompletion(path):
+            details = context.layerToLoadOnCompletionDetails(path)
+            processor = LayerFinisher(self, details.project, style, renderer)
+            self._count += 1
+            _keep(processor)
+            details.setPostProcessor(processor)
+
+    def place(self, layer: Any, project: QgsProject) -> None:
+        """Put a layer into the group of the run."""
+        node = project.layerTreeRoot().findLayer(layer.id()) if project is not None else None
+        if node is None or self._count < 2:
+            return
+        parent = node.parent()
+        if self._group is None or sip.isdeleted(self._group):
+            self._group = parent.insertGroup(0, self._title)
+        top = isinstance(layer, QgsVectorLayer)
+        self._group.insertChildNode(0 if top else len(self._group.children()), node.clone())
+        parent.removeChildNode(node)
+
+
+class LayerFinisher(QgsProcessingLayerPostProcessorInterface):
+    """Gives one layer its look and its place."""
+
+    def __init__(
+        self,
+        layers: LoadedLayers,
+        project: QgsProject,
+        style: str = "",
+        renderer: QgsRasterRenderer | None = None,
+    ) -> None:
         super().__init__()
+        self._layers = layers
+        self._project = project
         self._style = style
+        self._renderer = renderer
 
     def postProcessLayer(
         self, layer: Any, context: QgsProcessingContext, feedback: QgsProcessingFeedback
     ) -> None:
-        """Style `layer` (called by QGIS in the main thread)."""
-        if not isinstance(layer, QgsVectorLayer) or layer.geometryType() != LINE:
+        """Finish `layer` (called by QGIS in the main thread)."""
+        if layer is None:
             return
-        message, loaded = layer.loadNamedStyle(self._style)
-        if loaded:
-            layer.triggerRepaint()
-        else:
-            feedback.pushWarning(f"the layer {layer.name()} is not styled: {message}")
+        if self._style and isinstance(layer, QgsVectorLayer) and layer.geometryType() == LINE:
+            _load_style(layer, self._style, feedback)
+        if self._renderer is not None and isinstance(layer, QgsRasterLayer):
+            draw_alike(layer, self._renderer)
+        self._layers.place(layer, self._project)
+
+
+def _load_style(layer: QgsVectorLayer, style: str, feedback: QgsProcessingFeedback) -> None:
+    message, loaded = layer.loadNamedStyle(str(FOLDER / "styles" / f"{style}.qml"))
+    if loaded:
+        layer.triggerRepaint()
+    else:
+        feedback.pushWarning(f"the layer {layer.name()} is not styled: {message}")
+
+
+def draw_alike(layer: QgsRasterLayer, renderer: QgsRasterRenderer) -> None:
+    """Draw a raster as another one with the same values: same bands, colours and stretch.
+
+    A stretch of its own would count what lies outside of its mask.
+    """
+    if max(renderer.usesBands(), default=0) > layer.bandCount():
+        return
+    alike = renderer.clone()
+    # a mask of its own is transparent
+    alike.setAlphaBand(layer.renderer().alphaBand())
+    layer.setRenderer(alike)
+    layer.triggerRepaint()
 
 
 # The context deletes the post-processor at its end; until then its Python half must be kept.
-_kept: list[Styler] = []
+_kept: list[LayerFinisher] = []
 
 
-def style_when_loaded(name: str, path: str, context: QgsProcessingContext) -> None:
-    """Have the layer of output parameter `name`, written to `path`, styled if it is loaded."""
-    style = FOLDER / "styles" / f"{name}.qml"
-    if style.exists() and context.willLoadLayerOnCompletion(path):
-        styler = Styler(str(style))
-        _kept[:] = [kept for kept in _kept if not sip.isdeleted(kept)] + [styler]
-        context.layerToLoadOnCompletionDetails(path).setPostProcessor(styler)
+def _keep(processor: LayerFinisher) -> None:
+    _kept[:] = [kept for kept in _kept if not sip.isdeleted(kept)] + [processor]

@@ -21,15 +21,16 @@ from .styling import ICON
 
 
 @dataclass(frozen=True)
-class UnavailableTool:
+class NamedTool:
     """What can be given of a tool without importing it."""
 
     name: str
     title: str
     group: str
+    summary: str
 
 
-def unavailable_tools() -> list[UnavailableTool]:
+def named_tools() -> list[NamedTool]:
     """Read names, titles and groups of the tools from their source."""
     spec = importlib.util.find_spec(f"{library_name()}.tools")
     folders = spec.submodule_search_locations if spec is not None else None
@@ -37,10 +38,19 @@ def unavailable_tools() -> list[UnavailableTool]:
     return [tool for path in sources for tool in _declared(path.read_text(encoding="utf-8"))]
 
 
-def _declared(source: str) -> list[UnavailableTool]:
+def broken(error: ImportError) -> str:
+    """Return one line that states which package cannot be used."""
+    return f"GroundTie cannot use a Python package: {' '.join(str(error).split())}"
+
+
+def _declared(source: str) -> list[NamedTool]:
     functions = [node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]
     return [
-        UnavailableTool(function.name, **_texts(decorator))
+        NamedTool(
+            function.name,
+            **_texts(decorator),
+            summary=(ast.get_docstring(function) or "").partition("\n")[0],
+        )
         for function in functions
         for decorator in function.decorator_list
         if isinstance(decorator, ast.Call) and ast.unparse(decorator.func) == "tool"
@@ -66,7 +76,7 @@ class UnavailableAlgorithm(QgsProcessingAlgorithm):
         What is missing, in one line.
     """
 
-    def __init__(self, tool: UnavailableTool, reason: str) -> None:
+    def __init__(self, tool: NamedTool, reason: str) -> None:
         super().__init__()
         self._tool = tool
         self._reason = reason

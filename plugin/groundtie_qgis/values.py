@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,13 @@ from qgis.core import (
     QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingFeedback,
+    QgsProcessingUtils,
     QgsProviderRegistry,
+    QgsVectorFileWriter,
     QgsVectorLayer,
 )
 
-from .definitions import qgis_name
+from .definitions import qgis_name, takes_layers
 from .library import errors, kinds
 
 
@@ -108,6 +111,53 @@ class Reader:
             self._parameters, name, self._context, ["gpkg", "geojson"], "gpkg", self._feedback
         )
         return path or given
+
+
+def with_layers_as_files(
+    algorithm: QgsProcessingAlgorithm,
+    tool: Any,
+    parameters: dict[str, Any],
+    context: QgsProcessingContext,
+) -> dict[str, Any]:
+    """Return the parameters of a call with layers of points written to files, as they are now.
+
+    Edits that are not saved count, and so does the layer's filter. To be called in the main
+    thread, where the layers live.
+
+    Raises
+    ------
+    ParameterError
+        A layer cannot be written.
+    """
+    written = dict(parameters)
+    for parameter in tool.parameters:
+        name = qgis_name(parameter.name)
+        given = parameters.get(name)
+        if not takes_layers(parameter.kind) or (isinstance(given, str) and Path(given).is_file()):
+            continue
+        layer = algorithm.parameterAsLayer(parameters, name, context)
+        if isinstance(layer, QgsVectorLayer):
+            written[name] = _snapshot(layer, parameter.kind.label, context)
+    return written
+
+
+def _snapshot(layer: QgsVectorLayer, label: str, context: QgsProcessingContext) -> str:
+    options = QgsVectorFileWriter.SaveVectorOptions()
+    options.driverName = "GPKG"
+    # Those of new features are not numbers yet.
+    options.attributes = [
+        index for index, field in enumerate(layer.fields()) if field.name().lower() != "fid"
+    ]
+    options.skipAttributeCreation = not options.attributes
+    name = re.sub(r"[^\w-]+", "_", layer.name()) or "layer"
+    path = QgsProcessingUtils.generateTempFilename(f"{name}.gpkg")
+    transforms = context.transformContext()
+    failed, message, *_ = QgsVectorFileWriter.writeAsVectorFormatV3(
+        layer, path, transforms, options
+    )
+    if failed:
+        raise errors.ParameterError(f"{label}: the layer {layer.name()} cannot be read: {message}")
+    return str(path)
 
 
 def _without_options(source: str) -> str:

@@ -218,6 +218,44 @@ class TestFailure:
         assert message == "refused: too few points agree"
         assert not Path(values["OUTPUT"]).exists()
 
+    def test_a_refusal_shows_its_report(
+        self,
+        algorithm: Any,
+        values: dict[str, Any],
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        """In the desktop, whose Results Viewer lists nothing of runs that failed by itself."""
+        import qgis.utils
+        from processing.core.ProcessingResults import resultsList
+        from qgis.core import QgsProcessingFeedback
+
+        monkeypatch.setattr(qgis.utils, "iface", object())
+        monkeypatch.setattr(resultsList, "results", [])
+        feedback, report = QgsProcessingFeedback(), str(tmp_path / "r.html")
+        self.failure(algorithm, {**values, "MODE": "refuse", "REPORT": report}, feedback)
+        (shown,) = resultsList.getResults()
+        assert (shown.name, shown.filename) == ("Toy tool: refused", report)
+        assert f"report: {report}" in feedback.textLog()
+
+    def test_layers_that_were_not_made_are_not_loaded(
+        self, algorithm: Any, values: dict[str, Any]
+    ) -> None:
+        from qgis.core import (
+            QgsProcessingContext,
+            QgsProcessingException,
+            QgsProcessingFeedback,
+            QgsProcessingOutputLayerDefinition,
+            QgsProject,
+        )
+
+        context = QgsProcessingContext()
+        sink = QgsProcessingOutputLayerDefinition(values["OUTPUT"], QgsProject.instance())
+        refused = {**values, "MODE": "refuse", "OUTPUT": sink}
+        with pytest.raises(QgsProcessingException):
+            algorithm.run(refused, context, QgsProcessingFeedback(), catchExceptions=False)
+        assert not context.layersToLoadOnCompletion()
+
     def test_a_bug_has_its_traceback_in_the_log(
         self, algorithm: Any, values: dict[str, Any]
     ) -> None:

@@ -62,6 +62,16 @@ def test_defaults(definitions: dict[str, Any]) -> None:
     assert defaults == {**dict.fromkeys(TYPES), **given}
 
 
+def test_what_can_be_looked_at_is_made_by_default(provider: Any) -> None:
+    for name in ("register", "coregister", "match_sar_sar", "match_optical"):
+        shown = {
+            d.name()
+            for d in provider.algorithm(name).parameterDefinitions()
+            if d.isDestination() and d.createByDefault()
+        }
+        assert shown == {"OUTPUT", "TIE_POINTS", "REPORT"}
+
+
 def test_labels_carry_units_and_helps_are_filled_in(definitions: dict[str, Any]) -> None:
     assert definitions["SIZE"].description() == "Size (px)"
     assert definitions["SEARCH_RADIUS"].description() == "Search radius (m)"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,7 @@ def test_nothing_is_missing_here(plugin: Any) -> None:
     from groundtie_qgis.dependencies import complaint, missing_packages
 
     assert missing_packages() == []
-    assert complaint() == ""
+    assert complaint([]) == ""
 
 
 def test_the_provider_loads_and_names_what_is_missing(provider_without: Any) -> None:
@@ -63,6 +64,95 @@ def test_the_algorithms_can_be_found_but_not_run(provider_without: Any, provider
     whole = provider.algorithm("coregister")
     assert algorithm.displayName() == whole.displayName()
     assert (algorithm.group(), algorithm.groupId()) == (whole.group(), whole.groupId())
+
+
+def test_what_few_need_does_not_keep_the_others_from_working(
+    provider_without: Any, tmp_path: Path
+) -> None:
+    from groundtie_qgis.dependencies import missing_for
+
+    for module in ("sklearn", "fiona", "jinja2", "matplotlib"):
+        provider = provider_without(module)
+    assert provider.warningMessage() == ""
+    assert provider.algorithm("coregister").create().canExecute()[0]
+    assert missing_for("coregister", [tmp_path / "o.tif"]) == []
+    assert missing_for("coregister", [tmp_path / "p.gpkg"]) == ["fiona"]
+    assert missing_for("coregister", [tmp_path / "r.html"]) == ["jinja2", "matplotlib"]
+    assert missing_for("train_feature_classifier", []) == ["scikit-learn"]
+
+
+def test_a_missing_package_for_a_report_is_told_before_the_work(
+    provider_without: Any, provider: Any, tmp_path: Path
+) -> None:
+    from noise_pairs import write_pair
+    from qgis.core import QgsProcessingContext
+
+    provider_without("jinja2")
+    write_pair(tmp_path, 0)
+    values = {
+        "REFERENCE": str(tmp_path / "reference.tif"),
+        "INPUT": str(tmp_path / "input.tif"),
+        "OUTPUT": str(tmp_path / "o.tif"),
+    }
+    algorithm = provider.algorithm("coregister").create()
+    assert algorithm.checkParameterValues(values, QgsProcessingContext()) == (True, "")
+    values["REPORT"] = str(tmp_path / "r.html")
+    valid, message = algorithm.checkParameterValues(values, QgsProcessingContext())
+    assert not valid
+    assert message.startswith("GroundTie needs the Python package jinja2, which QGIS's Python")
+
+
+IN_THE_DESKTOP = """
+import sys
+sys.path[:0] = [{plugins!r}]
+from qgis.core import QgsApplication
+app = QgsApplication([], False)
+QgsApplication.initQgis()
+import qgis.utils
+qgis.utils.iface = object()
+import groundtie_qgis
+plugin = groundtie_qgis.classFactory(None)
+plugin.initProcessing()
+algorithms = plugin.provider.algorithms()
+print(len(algorithms), sorted({{"cv2", "scipy", "rasterio", "numpy"}} & set(sys.modules)))
+made = plugin.provider.algorithm("mask_threshold").create()
+print(len(made.parameterDefinitions()) > 3, plugin.provider.algorithm("warp").shortDescription())
+loaded = [name for name in sys.modules if ".groundtie.tools." in name]
+print("warp" in " ".join(loaded), "mask_threshold" in " ".join(loaded))
+sys.stdout.flush()
+import os
+os._exit(0)
+"""
+
+
+def test_the_desktop_starts_without_importing_the_tools(plugin_folder: Path) -> None:
+    """A tool is imported when its dialog is opened."""
+    from groundtie.tools import NAMES
+
+    script = IN_THE_DESKTOP.format(plugins=str(plugin_folder))
+    command = [sys.executable, "-c", script]
+    called = subprocess.run(command, text=True, capture_output=True, check=True, timeout=300)
+    expected = [
+        f"{len(NAMES)} []",
+        "True Apply a stored transform or tie points to a raster.",
+        "False True",
+    ]
+    assert called.stdout.splitlines() == expected, called.stdout
+
+
+def test_an_old_python_is_named(plugin: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from unittest.mock import MagicMock
+
+    import groundtie_qgis
+
+    monkeypatch.setattr(sys, "version_info", (3, 9, 18))
+    iface = MagicMock()
+    stand_in = groundtie_qgis.classFactory(iface)
+    stand_in.initGui()
+    ((_, sentence, *_), _) = iface.messageBar().pushMessage.call_args
+    assert sentence.startswith("GroundTie needs Python 3.10 or newer, and this QGIS (3.")
+    assert "has Python 3.9.18: install a newer QGIS" in sentence
+    stand_in.unload()
 
 
 def test_a_broken_package_is_told_too(

@@ -102,3 +102,20 @@ def test_qgis_process_lists_the_tools(qgis_process: Any) -> None:
     assert listed.stderr == ""
     offered = set(re.findall(r"\bgroundtie:(\w+)", listed.stdout))
     assert offered >= TOOLS
+
+
+def test_the_endings_are_those_of_the_tools(plugin: Any) -> None:
+    from groundtie_qgis.provider import RASTERS, VECTORS
+
+    from groundtie.kinds import RasterOut, VectorOut
+    from groundtie.tools import load_tools
+
+    for kind, endings in ((RasterOut, RASTERS), (VectorOut, VECTORS)):
+        found = {
+            suffix[1:]
+            for tool in load_tools()
+            for parameter in tool.parameters
+            if isinstance(parameter.kind, kind)
+            for suffix in parameter.kind.suffixes
+        }
+        assert set(endings) == found

@@ -41,13 +41,17 @@ def tie_points(*rows: tuple[str, str, float]) -> Any:
 
 def process(layer: Any) -> str:
     """Have the post-processor of tie points style a layer; return the log."""
-    from groundtie_qgis.library import FOLDER
-    from groundtie_qgis.styling import Styler
-    from qgis.core import QgsProcessingContext, QgsProcessingFeedback
+    return finish(layer, style="tie_points")
 
-    feedback = QgsProcessingFeedback()
-    styler = Styler(str(FOLDER / "styles" / "tie_points.qml"))
-    styler.postProcessLayer(layer, QgsProcessingContext(), feedback)
+
+def finish(layer: Any, **how: Any) -> str:
+    """Finish a layer that is in no project; return the log."""
+    from groundtie_qgis.styling import LayerFinisher, LoadedLayers
+    from qgis.core import QgsProcessingContext, QgsProcessingFeedback, QgsProject
+
+    context, feedback = QgsProcessingContext(), QgsProcessingFeedback()
+    finisher = LayerFinisher(LoadedLayers("run"), QgsProject(), **how)
+    finisher.postProcessLayer(layer, context, feedback)
     return str(feedback.textLog())
 
 
@@ -133,59 +137,140 @@ def test_other_layers_are_left_alone(plugin: Any) -> None:
     assert process(None) == ""
 
 
-def test_a_style_that_cannot_be_read_is_told(plugin: Any, tmp_path: Path) -> None:
-    from groundtie_qgis.styling import Styler
-    from qgis.core import QgsProcessingContext, QgsProcessingFeedback
-
-    feedback = QgsProcessingFeedback()
-    (tmp_path / "broken.qml").write_text("<qgis><unclosed></qgis>")
-    Styler(str(tmp_path / "broken.qml")).postProcessLayer(
-        tie_points(("fit", "used", 1.0)), QgsProcessingContext(), feedback
-    )
-    assert "the layer tie_points is not styled" in feedback.textLog()
+def test_a_style_that_cannot_be_read_is_told(plugin: Any) -> None:
+    log = finish(tie_points(("fit", "used", 1.0)), style="no_such_style")
+    assert "the layer tie_points is not styled" in log
 
 
-@pytest.mark.parametrize(
-    ("name", "wanted", "styled"),
-    [("tie_points", True, True), ("tie_points", False, False), ("other", True, False)],
-)
-def test_only_layers_to_be_loaded_get_a_post_processor(
-    plugin: Any, tmp_path: Path, name: str, wanted: bool, styled: bool
-) -> None:
-    from groundtie_qgis.styling import style_when_loaded
+def run_of(paths: list[Path]) -> tuple[Any, Any, Any]:
+    """Return a context and a project in which files are to be loaded, and the run's layers."""
+    from groundtie_qgis.styling import LoadedLayers
     from qgis.core import QgsProcessingContext, QgsProject
 
-    context, path = QgsProcessingContext(), str(tmp_path / "points.gpkg")
-    if wanted:
-        details = QgsProcessingContext.LayerDetails("points", QgsProject.instance(), "points")
-        context.addLayerToLoadOnCompletion(path, details)
-    style_when_loaded(name, path, context)
-    processor = context.layerToLoadOnCompletionDetails(path).postProcessor() if wanted else None
-    assert (processor is not None) == styled
+    context, project = QgsProcessingContext(), QgsProject()
+    for path in paths:
+        details = QgsProcessingContext.LayerDetails(path.stem, project, path.stem)
+        context.addLayerToLoadOnCompletion(str(path), details)
+    return context, project, LoadedLayers("Register images: optical")
+
+
+def processor_of(context: Any, path: Path) -> Any:
+    return context.layerToLoadOnCompletionDetails(str(path)).postProcessor()
+
+
+def test_only_layers_to_be_loaded_get_a_post_processor(plugin: Any, tmp_path: Path) -> None:
+    wanted, other = tmp_path / "a.gpkg", tmp_path / "b.gpkg"
+    context, project, layers = run_of([wanted])
+    layers.add(str(wanted), context, "tie_points")
+    layers.add(str(other), context, "tie_points")
+    assert processor_of(context, wanted) is not None
+    assert list(context.layersToLoadOnCompletion()) == [str(wanted)]
+    del project
 
 
 def test_every_run_has_a_post_processor_of_its_own(plugin: Any, tmp_path: Path) -> None:
     from groundtie_qgis import styling
-    from qgis.core import QgsProcessingContext, QgsProject
 
-    path = str(tmp_path / "points.gpkg")
+    path = tmp_path / "points.gpkg"
 
     def context_with_style() -> Any:
-        context = QgsProcessingContext()
-        details = QgsProcessingContext.LayerDetails("points", QgsProject.instance(), "points")
-        context.addLayerToLoadOnCompletion(path, details)
-        styling.style_when_loaded("tie_points", path, context)
-        return context
+        context, project, layers = run_of([path])
+        layers.add(str(path), context, "tie_points")
+        return context, project
 
     first = context_with_style()
     del first  # QGIS deletes the post-processor with its context
     second, third = context_with_style(), context_with_style()
-    processors = [
-        context.layerToLoadOnCompletionDetails(path).postProcessor() for context in (second, third)
-    ]
+    processors = [processor_of(context, path) for context, _ in (second, third)]
     assert processors == styling._kept[-2:]
     assert processors[0] is not processors[1]
     del second, third, processors
     kept = context_with_style()
     assert len(styling._kept) == 1
     del kept
+
+
+@pytest.mark.parametrize("points_first", [True, False])
+def test_points_lie_over_the_raster_in_one_group_on_top(
+    plugin: Any, tmp_path: Path, points_first: bool
+) -> None:
+    from qgis.core import QgsProcessingFeedback, QgsRasterLayer
+
+    raster, points = write(tmp_path / "a.tif"), tmp_path / "p.gpkg"
+    context, project, layers = run_of([raster, points])
+    loaded = {
+        raster: QgsRasterLayer(str(raster), "Registered image"),
+        points: tie_points(("fit", "used", 1.0)),
+    }
+    project.addMapLayer(QgsRasterLayer(str(raster), "what was there"))
+    for path in loaded:
+        layers.add(str(path), context)
+    order = [points, raster] if points_first else [raster, points]
+    for path in order:  # as QGIS does when the algorithm has ended
+        project.addMapLayer(loaded[path])
+        feedback = QgsProcessingFeedback()
+        processor_of(context, path).postProcessLayer(loaded[path], context, feedback)
+    top, below = project.layerTreeRoot().children()
+    assert top.name() == "Register images: optical"
+    assert [node.name() for node in top.children()] == ["tie_points", "Registered image"]
+    assert below.name() == "what was there"
+    drawn = [layer.name() for layer in project.layerTreeRoot().layerOrder()]
+    assert drawn == ["tie_points", "Registered image", "what was there"]
+    project.clear()
+
+
+def test_a_single_layer_needs_no_group(plugin: Any, tmp_path: Path) -> None:
+    from qgis.core import QgsProcessingFeedback, QgsRasterLayer
+
+    path = write(tmp_path / "a.tif")
+    context, project, layers = run_of([path])
+    layers.add(str(path), context)
+    layer = QgsRasterLayer(str(path), "Filtered image")
+    project.addMapLayer(layer)
+    processor_of(context, path).postProcessLayer(layer, context, QgsProcessingFeedback())
+    assert [node.name() for node in project.layerTreeRoot().children()] == ["Filtered image"]
+    project.clear()
+
+
+def write(path: Path, masked: bool = False) -> Path:
+    """Write an image of 100 to 200, the left half of which is masked if asked for, and then 0."""
+    import numpy as np
+    import rasterio
+
+    values = np.linspace(100, 200, 40 * 40).reshape(1, 40, 40).astype("uint8")
+    grid = {"transform": rasterio.Affine(1, 0, 0, 0, -1, 40), "crs": "EPSG:32633"}
+    with (
+        rasterio.Env(GDAL_TIFF_INTERNAL_MASK=True),
+        rasterio.open(path, "w", "GTiff", 40, 40, 1, dtype="uint8", **grid) as raster,
+    ):
+        known = np.ones((40, 40), bool)
+        known[:, :20] = not masked
+        raster.write(values * known)
+        if masked:
+            raster.write_mask(known)
+    return path
+
+
+def test_a_registered_raster_is_drawn_as_the_input(plugin: Any, tmp_path: Path) -> None:
+    """Not stretched from the zeros outside of its mask, which stays transparent."""
+    from qgis.core import QgsRasterLayer
+
+    given = QgsRasterLayer(str(write(tmp_path / "a.tif")), "input")
+    made = QgsRasterLayer(str(write(tmp_path / "b.tif", masked=True)), "registered")
+    alpha = made.renderer().alphaBand()
+    assert alpha > 0
+    stretch = made.renderer().contrastEnhancement()
+    assert stretch.minimumValue() < 50
+    assert finish(made, renderer=given.renderer().clone()) == ""
+    stretch = made.renderer().contrastEnhancement()
+    assert stretch.minimumValue() > 90
+    assert made.renderer().alphaBand() == alpha
+
+
+def test_a_raster_with_fewer_bands_keeps_its_own_renderer(plugin: Any, tmp_path: Path) -> None:
+    from qgis.core import QgsRasterLayer, QgsSingleBandGrayRenderer
+
+    made = QgsRasterLayer(str(write(tmp_path / "a.tif")), "registered")
+    fourth = QgsSingleBandGrayRenderer(made.dataProvider(), 4)
+    finish(made, renderer=fourth)
+    assert made.renderer().usesBands() == [1]

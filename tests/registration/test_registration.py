@@ -69,18 +69,20 @@ def test_a_registration_is_lines_for_people_and_json_for_programs(
     assert "tried" not in summary
     lines = found.lines()
     verdict = registration.verdict
-    assert lines[0] == "accepted: check points confirm the registration"
-    assert f"{verdict.fit_points_used} of {verdict.fit_points} points" in lines[1]
-    assert f"{verdict.check_points_agreeing} of {verdict.check_points}" in lines[3]
+    assert lines[0].startswith("correction: ") and " m) at the centre: " in lines[0]
+    assert lines[1] == "accepted: check points confirm the registration"
+    assert f"{verdict.fit_points_used} of {verdict.fit_points} points" in lines[2]
+    assert f"{verdict.check_points_agreeing} of {verdict.check_points}" in lines[4]
     assert lines[-1] == "output: out.tif"
     # 10 m pixels, in both units.
-    assert f"RMSE {verdict.check_rmse_px:.2f} px ({10 * verdict.check_rmse_px:.2f} m)" in lines[2]
+    assert f"RMSE {verdict.check_rmse_px:.2f} px ({10 * verdict.check_rmse_px:.2f} m)" in lines[3]
 
 
-def test_what_was_tried_before_stands_first(registration: Registration) -> None:
+def test_what_was_tried_before_stands_after_the_correction(registration: Registration) -> None:
     found = replace(registration, tried=("tried chips: refused",))
-    assert found.lines()[0] == "tried chips: refused"
-    assert found.lines()[1].startswith("accepted: ")
+    assert found.lines()[0].startswith("correction: ")
+    assert found.lines()[1] == "tried chips: refused"
+    assert found.lines()[2].startswith("accepted: ")
     assert found.summary()["tried"] == ["tried chips: refused"]
 
 

@@ -114,7 +114,7 @@ def test_versions() -> None:
 def test_the_json_is_the_summary(variants: list[Variant]) -> None:
     for variant in variants:
         assert variant.numbers == variant.report.summary()
-        keys = ["verdict", "transform", "mask", "parameters", "versions", "seconds"]
+        keys = ["verdict", "correction", "transform", "mask", "parameters", "versions", "seconds"]
         assert list(variant.numbers) == keys
         assert variant.numbers["verdict"] == variant.report.verdict.summary()
 

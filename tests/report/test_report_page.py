@@ -21,6 +21,7 @@ from known_reports import (
 )
 from raster_files import write_raster
 
+from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.pair import ImagePair
 from groundtie.rasters.reading import open_raster
@@ -83,6 +84,23 @@ def test_the_correction_is_the_first_line_with_its_direction(
     changes = {"transform": transform_of(pair), "points": None}
     refusal = written(refused(pair, **changes), tmp_path)
     assert "The refused transform moves the input by" in refusal.text
+
+
+@pytest.mark.parametrize("georeferenced", [True, False])
+def test_rotation_and_scale_are_those_of_the_transform(
+    pair: ImagePair, ungeoreferenced: ImagePair, georeferenced: bool
+) -> None:
+    """The input is shown turned by 2° clockwise and 3 % too large: the correction undoes that."""
+    grid = (pair if georeferenced else ungeoreferenced).grid
+    up = 1 if georeferenced else -1  # of y
+    angle = np.deg2rad(-2 * up)
+    linear = 1.03 * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    xy = grid.pixel_to_map(np.random.default_rng(0).uniform(0, 50, (20, 2)))
+    model = fit_model("affine", xy, (xy - xy.mean(axis=0)) @ linear.T + xy.mean(axis=0))
+    found = Correction.of(Transform(model, grid.crs, grid), grid)
+    assert found.rotation_deg == pytest.approx(2, abs=1e-6)
+    assert found.scale == pytest.approx(1 / 1.03, rel=1e-6)
+    assert "turned by 2.00° anticlockwise, scaled by 0.9709" in found.text()
 
 
 def test_the_direction_without_georeferencing(ungeoreferenced: ImagePair) -> None:
@@ -176,3 +194,9 @@ def test_surfaces_show_their_peaks(page: Page) -> None:
     # Pixel (col, row) = (8 + 1, 8 - 2) has its centre half a pixel further.
     assert [(p["cx"], p["cy"]) for p in peaks] == [("9.50", "6.50"), ("14.50", "11.50")]
     assert "± 8 px; peak 9.0 σ at (1.0, -2.0) px" in page.text
+
+
+def test_the_sliders_ends_show_what_they_are_called(page: Page) -> None:
+    """The line at the left end leaves the input alone to be seen, which is right of it."""
+    html = " ".join(page.text.split())
+    assert html.index("Input Reference Compare by") > 0

@@ -372,3 +372,15 @@ def test_the_summary_is_for_programs(tmp_path: Path) -> None:
     for output in tool_of(warp).outputs:
         assert output.value(summary) is not None
     assert any("EPSG:32632" in line for line in result.lines())
+
+
+def test_edited_lines_are_told(tmp_path: Path) -> None:
+    path = misregistered(tmp_path / "a.tif")
+    points = stored(tmp_path / "t.geojson")
+    collection = json.loads(points.read_text())
+    for feature in collection["features"][:4]:
+        feature["geometry"]["coordinates"][1][0] += 1e-3
+    points.write_text(json.dumps(collection))
+    result = warp(path, tmp_path / "out.tif", points)
+    assert "edited by hand: 4 points; their lines count, not their columns" in result.lines()
+    assert result.summary()["tie_points"]["edited"] == 4

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 
 from ..rasters.grid import apply_affine, compose, is_invertible
+
+if TYPE_CHECKING:
+    from typing import Self  # Python 3.11; annotations alone need it
 
 FloatArray = NDArray[np.float64]
 

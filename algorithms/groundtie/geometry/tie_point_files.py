@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import logging
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,8 +20,8 @@ from ..rasters.atomic import write_json, writing
 from ..rasters.grid import Grid, reproject, require_map
 from ..runs import run_tags
 from ..strict_json import read_json
+from .drawn_points import INPUT, NOMINAL, PIXEL, Row, columns, follow_lines, line_ends
 from .georeferencer import (
-    Row,
     positions,
     read_georeferencer,
     require_places,
@@ -35,8 +36,10 @@ from .vector_layers import read_vector_layer
 
 FloatArray = NDArray[np.float64]
 
+_LOG = logging.getLogger(__name__)
 _SUFFIXES = (".gpkg", ".geojson", ".csv", ".points")
 _LAYER = "tie_points"
+EDITED = "edited"
 _TEXTS = (*TEXTS, "reference_crs")
 
 # Longitude and latitude, as GeoJSON demands (RFC 7946).
@@ -105,7 +108,9 @@ def read_tie_points(
     Returns
     -------
     TiePoints
-        With the CRS of their map; numbers that the file lacks are NaN.
+        With the CRS of their map; numbers that the file lacks are NaN. The column `edited` of
+        `more` is 1 where a line of a layer was moved or drawn by a person: its ends count then,
+        and not the columns.
 
     Raises
     ------
@@ -118,10 +123,16 @@ def read_tie_points(
         if suffix == ".points":
             points = read_georeferencer(path, input_grid)
             return replace(points, more={name: np.full(len(points), np.nan) for name in more})
-        rows, crs = _read_rows(path, suffix)
-        if crs is None and suffix != ".gpkg":
-            crs = (table_crs if suffix == ".csv" else None) or input_grid.crs
-        return _from_rows(rows, input_grid, crs, more)
+        rows, ends, layer_crs = _read_rows(path, suffix)
+        usual_crs = layer_crs
+        if suffix != ".gpkg":
+            usual_crs = (table_crs if suffix == ".csv" else None) or input_grid.crs
+        crs = _map_crs(rows, usual_crs, empty_is_none=suffix != ".gpkg")
+        rows, edited = follow_lines(rows, ends, layer_crs, crs, input_grid)
+        if edited.any():
+            _LOG.info("%s: %d of %d lines were moved or drawn", path, edited.sum(), len(rows))
+        points = _from_rows(rows, input_grid, crs, more)
+        return replace(points, more={**points.more, EDITED: edited.astype(float)})
     except (OSError, ValueError, KeyError, TypeError, OverflowError, CRSError, csv.Error) as error:
         reason = f"column {error} is missing" if isinstance(error, KeyError) else error
         raise TransformFileError(f"cannot read the tie points {path}: {reason}") from error
@@ -178,28 +189,47 @@ def _write_csv(path: Path, rows: list[Row], numbers: Sequence[str]) -> None:
         table.writerows(rows)
 
 
-def _read_rows(path: Path, suffix: str) -> tuple[list[Row], CRS | None]:
-    """Return the rows of a file, and the CRS of its layer, if it has one on the map."""
+def _read_rows(path: Path, suffix: str) -> tuple[list[Row], FloatArray, CRS | None]:
+    """Return the rows of a file, the ends of their lines, and the CRS of these."""
     if suffix == ".gpkg":
         layer = read_vector_layer(path)
-        return [feature["properties"] for feature in layer.features], layer.crs
+        rows = [feature["properties"] for feature in layer.features]
+        return rows, line_ends([feature["geometry"] for feature in layer.features]), layer.crs
     if suffix == ".geojson":
-        features = read_json(path)["features"]
-        return [dict(feature["properties"]) for feature in features], None
+        collection = read_json(path)
+        features = collection["features"]
+        rows = [dict(feature["properties"]) for feature in features]
+        ends = line_ends([feature.get("geometry") for feature in features])
+        # Older than RFC 7946, but QGIS writes it.
+        named = collection.get("crs")
+        crs = CRS.from_user_input(named["properties"]["name"]) if named else _GEOJSON_CRS
+        return rows, ends, require_map(crs)
     with path.open(encoding="utf-8-sig", newline="") as file:
-        return table_rows(file), None
+        rows = table_rows(file)
+    return rows, line_ends([None] * len(rows)), None
+
+
+def _map_crs(rows: list[Row], usual: CRS | None, empty_is_none: bool) -> CRS | None:
+    """Return the CRS of a table's map positions.
+
+    It is the one that the column `reference_crs` names, and the usual one where this is empty or
+    missing; but GeoJSON and CSV that we wrote of images without a CRS have an empty text.
+    """
+    named = {str(row["reference_crs"]) for row in rows if row.get("reference_crs")}
+    if len(named) > 1:
+        raise ValueError("the points have several CRSs")
+    if named:
+        return require_map(CRS.from_user_input(named.pop()))
+    none = empty_is_none and rows and all(row.get("reference_crs") == "" for row in rows)
+    return None if none else usual
 
 
 def _from_rows(
-    rows: list[Row], input_grid: Grid, usual_crs: CRS | None, more: Sequence[str]
+    rows: list[Row], input_grid: Grid, crs: CRS | None, more: Sequence[str]
 ) -> TiePoints:
-    """Return the points of a table; without a column `reference_crs` the map has the usual CRS."""
-    named = {str(row["reference_crs"] or "") for row in rows if "reference_crs" in row}
-    if len(named) > 1:
-        raise ValueError("the points have several CRSs")
-    text = named.pop() if named else None
-    crs = usual_crs if text is None else require_map(CRS.from_user_input(text)) if text else None
-    states = [str(row.get("state", USED)) for row in rows]
+    """Return the points of a table."""
+    # A drawn line has empty columns.
+    states = [str(row.get("state") or USED) for row in rows]
     sigma = np.column_stack([_numbers(rows, f"sigma_{axis}_px") for axis in "xy"])
     points = unmeasured(
         require_places(positions(rows, "reference_x", "reference_y")),
@@ -219,13 +249,16 @@ def _from_rows(
 
 def _input_px(rows: list[Row], input_grid: Grid, crs: CRS | None) -> FloatArray:
     """Return where the points of a table are in the input (col, row), shape (n, 2)."""
-    names = rows[0] if rows else {}
-    if input_grid.is_georeferenced and "nominal_x" in names:
-        nominal = positions(rows, "nominal_x", "nominal_y")
-        return input_grid.map_to_pixel(reproject(nominal, crs, input_grid.crs))
-    if "input_x" in names:
-        return input_grid.map_to_pixel(positions(rows, "input_x", "input_y"))
-    return positions(rows, "input_col", "input_row")
+    names = set().union(*rows)
+    px = np.full((len(rows), 2), np.nan)
+    if input_grid.is_georeferenced and NOMINAL[0] in names:
+        px = input_grid.map_to_pixel(reproject(columns(rows, *NOMINAL), crs, input_grid.crs))
+    if INPUT[0] in names:
+        on_map = input_grid.map_to_pixel(columns(rows, *INPUT))
+        px = np.where(np.isfinite(px), px, on_map)
+    missing = [row for row, known in zip(rows, np.isfinite(px).all(1), strict=True) if not known]
+    px[~np.isfinite(px).all(1)] = positions(missing, *PIXEL)
+    return px
 
 
 def _numbers(rows: list[Row], name: str) -> FloatArray:

@@ -93,7 +93,10 @@ def read_vector_layer(path: str | os.PathLike[str]) -> VectorLayer:
     if "error" in found:
         raise VectorLayerError(f"cannot read the vector layer {name}: {found['error']}")
     try:
-        crs = require_map(CRS.from_wkt(found["crs_wkt"])) if found["crs_wkt"] else None
+        wkt = found["crs_wkt"]
+        # So GDAL calls the two that stand for none in a GeoPackage (OGC 12-128r18, 1.1.2.1.2).
+        is_known = wkt and '"Undefined ' not in wkt
+        crs = require_map(CRS.from_wkt(wkt)) if is_known else None
     except (CRSError, GeoreferencingError) as error:
         raise VectorLayerError(f"the CRS of {name} cannot be understood: {error}") from error
     return VectorLayer(name, crs, tuple(found["fields"]), tuple(found["features"]))

@@ -22,6 +22,7 @@ from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_to_array
 from ..rasters.pair import ImagePair
 from ..rasters.reading import open_raster
+from ..report.correction import Correction
 from ..report.report import Report
 from ..similarity.surface import Surface
 from .registered_output import RegisteredOutput, resampled_onto
@@ -196,6 +197,8 @@ class Registration:
         v, transform = self.verdict, self.transform
         word = "accepted" if v.accepted else "refused"
         lines = [*self.tried, f"{word}: {v.sentence()}"]
+        if transform is not None:
+            lines.insert(0, f"correction: {Correction.of(transform, self.pair.grid).text()}")
         if v.accepted and transform is not None:
             lines += [
                 f"model: {transform.model.kind}, {v.fit_points_used} of {v.fit_points} points",

@@ -15,6 +15,7 @@ from ..errors import TooFewPointsError
 from ..geometry.chance import log10_false_alarms
 from ..geometry.fitting import fit_model
 from ..geometry.models import DEGREE, PARAMETERS, Frame, monomials
+from ..geometry.tie_point_files import EDITED
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid, apply_affine
@@ -45,6 +46,8 @@ class TiePointFit:
     log10_chance
         log10 of the expected number of models that random points would fit as well; None: the
         points are no more than the model needs, and fit any.
+    edited
+        Number of points whose lines were moved or drawn by a person.
     """
 
     points: int
@@ -53,6 +56,7 @@ class TiePointFit:
     check_rmse_px: float | None
     border_spread_px: float
     log10_chance: float | None
+    edited: int = 0
 
     def lines(self) -> list[str]:
         """Return the fit as lines of text."""
@@ -63,6 +67,10 @@ class TiePointFit:
         if self.check_rmse_px is not None:
             error = f"{self.check_rmse_px:.2f} px (RMSE)"
             lines.append(f"error at {self.check_points} check points: {error}")
+        if self.edited:
+            lines.append(
+                f"edited by hand: {self.edited} points; their lines count, not their columns"
+            )
         return lines
 
 
@@ -189,6 +197,7 @@ class TiePointEvidence:
             check_rmse_px=float(np.sqrt(squared[check].mean())) if check.any() else None,
             border_spread_px=self.border_spread_px,
             log10_chance=self.log10_chance,
+            edited=int(np.sum(self.points.more.get(EDITED, 0.0))),
         )
 
     @cached_property

@@ -1,8 +1,9 @@
-"""How far, and in which direction, a transform moves the input."""
+"""How far, and in which direction, a transform moves the input, and how it turns and scales it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +25,21 @@ class Correction:
         Lengths at the centre of the matching grid, and over it.
     direction
         The move at the centre along the axes of the map, in words.
+    rotation_deg
+        By how much the input is turned, anticlockwise as it is seen.
+    scale
+        By which factor it is enlarged.
+    metres_per_px
+        Size of a matching pixel; None without georeferencing.
     """
 
     centre_px: float
     least_px: float
     most_px: float
     direction: str
+    rotation_deg: float
+    scale: float
+    metres_per_px: float | None
 
     @classmethod
     def of(cls, transform: Transform, grid: Grid) -> Correction:
@@ -42,8 +52,42 @@ class Correction:
         centre = len(px) // 2
         move = xy[centre] - nominal[centre]
         return cls(
-            float(lengths[centre]), float(lengths.min()), float(lengths.max()), _words(move, grid)
+            float(lengths[centre]),
+            float(lengths.min()),
+            float(lengths.max()),
+            _words(move, grid),
+            *_turn(nominal, xy, grid),
+            grid.pixel_size_m if grid.is_georeferenced else None,
         )
+
+    def text(self) -> str:
+        """Return the size of the correction in words, in the order of what is looked for first."""
+        size, in_metres = f"{self.centre_px:.1f} px", ""
+        if self.metres_per_px is not None:
+            in_metres = f" ({self.centre_px * self.metres_per_px:.1f} m)"
+        direction = f": {self.direction}" if self.direction else ""
+        turned = "not turned"
+        # what two decimals show
+        if abs(self.rotation_deg) >= 0.005:
+            sense = "anticlockwise" if self.rotation_deg > 0 else "clockwise"
+            turned = f"turned by {abs(self.rotation_deg):.2f}° {sense}"
+        return (
+            f"{size}{in_metres} at the centre{direction}; by {self.least_px:.1f} to "
+            f"{self.most_px:.1f} px over the grid; {turned}, scaled by {self.scale:.4f}"
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Return the correction as values that JSON can carry."""
+        return {name: value for name, value in vars(self).items() if name != "metres_per_px"}
+
+
+def _turn(nominal: NDArray[np.float64], xy: NDArray[np.float64], grid: Grid) -> tuple[float, float]:
+    """Return rotation (degrees) and scale of the affine map that fits a move best."""
+    # Metres, with y upwards as it is seen.
+    seen = np.array(grid.metres_per_unit) * ([1, 1] if grid.is_georeferenced else [1, -1])
+    before, after = ((places - places.mean(axis=0)) * seen for places in (nominal, xy))
+    (a, b), (c, d) = np.linalg.lstsq(before, after, rcond=None)[0].T
+    return float(np.rad2deg(np.arctan2(c - b, a + d))), float(np.sqrt(abs(a * d - b * c)))
 
 
 def _words(move: NDArray[np.float64], grid: Grid) -> str:

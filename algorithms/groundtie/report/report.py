@@ -63,12 +63,18 @@ class Report(Page):
 
     def numbers(self) -> dict[str, Any]:
         """Return what was measured, by name."""
+        moved = self.correction()
         return {
             "verdict": self.verdict.summary(),
+            "correction": None if moved is None else moved.summary(),
             "transform": None if self.transform is None else self.transform.to_json(),
             "mask": None if self.mask is None else self.mask.summary(),
             **({} if self.scene is None else {"scene": dict(self.scene)}),
         }
+
+    def correction(self) -> Correction | None:
+        """Return how far the transform moves the input; None without one."""
+        return None if self.transform is None else Correction.of(self.transform, self.pair.grid)
 
     def values(self) -> dict[str, Any]:
         """Return what the template shows."""
@@ -79,7 +85,7 @@ class Report(Page):
             "notes": [*self.pair.notes(), *([] if self.mask is None else [self.mask.line()])],
             "metres": _metres_per_px(grid),
             "model": None if found is None else found.model.kind,
-            "correction": None if found is None else Correction.of(found, grid),
+            "correction": self.correction(),
             "pictures": Comparison.of(self.pair, found),
             "residuals": None if self.points is None else self._residual_figures(self.points),
             "surfaces": [_shown_surface(label, surface) for label, surface in self.surfaces],

@@ -169,6 +169,7 @@ def assess(
             help="A page with the errors and, if both images are given, swipe and checkerboard; "
             "its numbers are put beside it as JSON. It is written for a refusal, too.",
             suffixes=(".html",),
+            shown=True,
         ),
     ] = None,
     onward_transform: Annotated[

@@ -18,6 +18,7 @@ Input = Annotated[Path, RasterIn(label="Input image", help="The image to be regi
 _OUTPUT = RasterOut(
     label="Registered image",
     help="GeoTIFF with the input's bands, data type, nodata value, colours and metadata.",
+    like="input",
 )
 Output = Annotated[Path, _OUTPUT]
 OptionalOutput = Annotated[Path | None, replace(_OUTPUT, optional_in_python=True)]

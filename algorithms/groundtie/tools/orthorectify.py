@@ -52,6 +52,7 @@ def orthorectify(
         RasterOut(
             label="Orthoimage",
             help="GeoTIFF with the image's bands, data type, nodata value, colours and metadata.",
+            like="image",
         ),
     ],
     dem: Dem = None,

@@ -88,6 +88,8 @@ def refine_rpc(
             help="The points with lines from where the refined RPCs see them on the map to where "
             "they are.",
             suffixes=SUFFIXES[:3],
+            shown=True,
+            style="tie_points",
         ),
     ] = None,
     report: Annotated[
@@ -97,7 +99,7 @@ def refine_rpc(
             help="A page that shows errors before and after and how far to trust them; its numbers "
             "are put beside it as JSON. It is written for refused RPCs, too.",
             suffixes=(".html",),
-            advanced=True,
+            shown=True,
         ),
     ] = None,
     height: Height = None,

@@ -38,6 +38,8 @@ TiePointsOut = Annotated[
         label="Tie points",
         help="Lines from where a point of the input nominally lies to where it is.",
         suffixes=(".gpkg", ".geojson", ".csv", ".points"),
+        shown=True,
+        style="tie_points",
     ),
 ]
 ReportOut = Annotated[
@@ -47,6 +49,7 @@ ReportOut = Annotated[
         help="A page that shows the result and how far to trust it; its numbers are put "
         "beside it as JSON. It is written for a refused registration, too.",
         suffixes=(".html",),
+        shown=True,
     ),
 ]
 SearchRadius = Annotated[

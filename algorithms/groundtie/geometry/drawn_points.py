@@ -1,0 +1,133 @@
+"""Tie points as lines on a map: what a person moved or drew there counts over the columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rasterio.crs import CRS
+
+from ..rasters.grid import Grid, reproject
+
+FloatArray = NDArray[np.float64]
+Row = dict[str, Any]
+
+# GeoJSON is usually written with 7 decimals of a degree (RFC 7946, section 11.2), doubles have 15
+# digits: what differs by no more was not moved.
+_RELATIVE, _ABSOLUTE = 1e-9, 1e-7
+
+# Where a row states the place in the input: on the reference map, on its own map, and its pixel.
+NOMINAL, INPUT, PIXEL = (
+    ("nominal_x", "nominal_y"),
+    ("input_x", "input_y"),
+    ("input_col", "input_row"),
+)
+_REFERENCE = ("reference_x", "reference_y")
+
+
+def line_ends(geometries: Sequence[Any]) -> FloatArray:
+    """Return the first and the last position of lines, shape (n, 2, 2).
+
+    NaN stands for what is no line, such as a row without a geometry.
+
+    Parameters
+    ----------
+    geometries
+        As GeoJSON has them, or None.
+
+    Raises
+    ------
+    ValueError
+        A line has several parts.
+    """
+    ends = np.full((len(geometries), 2, 2), np.nan)
+    for end, geometry in zip(ends, geometries, strict=True):
+        kind = "" if geometry is None else geometry["type"]
+        if kind.endswith("LineString"):
+            end[:] = _ends(geometry["coordinates"], kind.startswith("Multi"))
+    return ends
+
+
+def _ends(coordinates: Any, several: bool) -> FloatArray:
+    if several:
+        if len(coordinates) != 1:
+            raise ValueError("a line has several parts: draw one line for each point")
+        (coordinates,) = coordinates
+    return np.array([coordinates[0][:2], coordinates[-1][:2]], float)
+
+
+def follow_lines(
+    rows: list[Row], ends: FloatArray, layer_crs: CRS | None, crs: CRS | None, input_grid: Grid
+) -> tuple[list[Row], NDArray[np.bool_]]:
+    """Return the rows of a table with the positions that their lines have.
+
+    Parameters
+    ----------
+    rows
+        The table.
+    ends
+        Nominal and reference position of each row's line, shape (n, 2, 2); NaN: it has none.
+    layer_crs, crs
+        CRS of the lines, and of the map positions in the table.
+    input_grid
+        Grid of the input.
+
+    Returns
+    -------
+    list
+        The table; what agrees with its line is as it was.
+    NDArray
+        Which rows follow a line that was moved or drawn, shape (n,).
+
+    Raises
+    ------
+    ValueError
+        A nominal position on the map has no place in an input without georeferencing.
+    """
+    stated = np.stack([columns(rows, *NOMINAL), columns(rows, *_REFERENCE)], axis=1)
+    drawn = np.asarray(np.isfinite(ends).all(axis=(1, 2)))
+    moved = drawn[:, None] & ~_same(ends, _projected(stated, crs, layer_crs))
+    # A table that locates its points in the input otherwise has no nominal positions to compare.
+    elsewhere = np.isfinite(columns(rows, *INPUT)) | np.isfinite(columns(rows, *PIXEL))
+    moved[:, 0] &= np.isfinite(stated[:, 0]).all(1) | ~elsewhere.all(1)
+    on_map = _projected(ends, layer_crs, crs)
+    is_lattice = not input_grid.is_georeferenced and _is_lattice(rows, stated[:, 0])
+    if moved[:, 0].any() and not input_grid.is_georeferenced and not is_lattice:
+        raise ValueError(
+            "the start of a line was moved or drawn, which has no place in an image without "
+            "georeferencing: fill input_col and input_row"
+        )
+    nominal = PIXEL if is_lattice else NOMINAL
+    found = [dict(row) for row in rows]
+    for end, names in enumerate((nominal, _REFERENCE)):
+        for index in np.flatnonzero(moved[:, end]):
+            found[index] |= zip(names, on_map[index, end].tolist(), strict=True)
+    return found, np.asarray(moved.any(axis=1))
+
+
+def _is_lattice(rows: list[Row], nominal: FloatArray) -> bool:
+    """Whether the nominal positions of a table are pixels of the input."""
+    stated = np.isfinite(nominal).all(1)
+    px = columns(rows, *PIXEL)
+    return bool(stated.any() and _same(nominal[stated], px[stated]).all())
+
+
+def _same(one: FloatArray, other: FloatArray) -> NDArray[np.bool_]:
+    return np.asarray(np.isclose(one, other, _RELATIVE, _ABSOLUTE).all(-1))
+
+
+def columns(rows: list[Row], x: str, y: str) -> FloatArray:
+    """Return the positions in two columns, shape (n, 2); NaN where there is none."""
+    values = [[row.get(x), row.get(y)] for row in rows]
+    numbers = [[np.nan if v in (None, "") else float(v) for v in pair] for pair in values]
+    return np.array(numbers, float).reshape(-1, 2)
+
+
+def _projected(places: FloatArray, source: CRS | None, target: CRS | None) -> FloatArray:
+    """Return positions, shape (n, 2, 2), in another CRS; what is not finite is NaN."""
+    known = np.isfinite(places).all(axis=-1)
+    found = np.full_like(places, np.nan)
+    found[known] = reproject(places[known], source, target)
+    return found
