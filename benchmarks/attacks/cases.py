@@ -90,7 +90,7 @@ class AttackCase:
         every = all_scenes(self.data)
         pair = every[self.scene].pair(self.seed, self.cache)
         others = [scene for name, scene in every.items() if not examples.is_example(scene)]
-        setting = Setting(rng, others, self.cache)
+        setting = Setting(rng, others, self.seed, self.cache)
         attack = find(self.attack, self.variant)
         made = attack.make(pair, setting)
         if made.radius_px is None and not attack.is_example and rng.random() < _WITH_RADIUS:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .pairs import Pair
-from .scenes import Scene
+from .scenes import Scene, elsewhere
 
 
 @dataclass(frozen=True)
@@ -20,13 +20,18 @@ class Setting:
     ----------
     rng
         Random numbers of this case alone.
-    scenes, cache
-        Other places.
+    scenes, seed, cache
+        Other places, and which of each.
     """
 
     rng: np.random.Generator
     scenes: Sequence[Scene]
+    seed: int
     cache: Path
+
+    def elsewhere(self, pair: Pair) -> Pair:
+        """Return a pair with an input of another place."""
+        return elsewhere(pair, self.scenes, self.rng, self.seed, self.cache)
 
 
 Make = Callable[[Pair, Setting], Pair]

@@ -15,7 +15,6 @@ from . import cartography, effects
 from .catalogue import CONTROLS, LOCKED, Attack, Make, Setting, as_text, direction
 from .overlays import OVERLAYS, Draw
 from .pairs import Change, Pair
-from .scenes import elsewhere
 
 _NEAREST_PX, _FARTHEST_PX = 8.0, 25.0
 
@@ -35,7 +34,7 @@ def other_place(draw: Draw) -> Make:
     """The input shows another place."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
-        other = elsewhere(pair, setting.scenes, setting.rng, setting.cache)
+        other = setting.elsewhere(pair)
         return other.both(draw(other.reference.shape[1:], setting.rng).change())
 
     return make

@@ -12,7 +12,6 @@ from ..accuracy import FloatArray
 from .catalogue import PARTS, Attack, Make, Setting, direction
 from .overlays import smooth_noise
 from .pairs import Pair, join
-from .scenes import elsewhere
 
 _NEAREST_PX, _FARTHEST_PX = 6.0, 20.0
 # All of the input may lie off, too.
@@ -125,7 +124,7 @@ def half_of_another_place(pair: Pair, setting: Setting) -> Pair:
     rng = setting.rng
     shift = direction(rng, 5.0, 20.0)
     moved = pair.moved(shift)
-    other = elsewhere(pair, setting.scenes, rng, setting.cache)
+    other = setting.elsewhere(pair)
     part = beyond_line(pair.input.shape[1:], rng.uniform(0.3, 0.6), rng)
     bands = min(len(moved.input), len(other.input))
     return replace(

@@ -12,7 +12,6 @@ from groundtie.rasters.grid import compose
 
 from .catalogue import CONTROLS, PLACEMENT, Attack, Make, Setting, as_text, direction
 from .pairs import Pair
-from .scenes import elsewhere
 
 
 def mirrored(pair: Pair, setting: Setting) -> Pair:
@@ -104,7 +103,7 @@ def far_off(pair: Pair, setting: Setting) -> Pair:
 
 def other_place(pair: Pair, setting: Setting) -> Pair:
     """The input shows another place, and nothing else is done."""
-    return elsewhere(pair, setting.scenes, setting.rng, setting.cache)
+    return setting.elsewhere(pair)
 
 
 ATTACKS = [

@@ -141,12 +141,14 @@ def scenes(data: Path) -> tuple[Scene, ...]:
     return (*real, *simulated, *radar)
 
 
-def elsewhere(pair: Pair, others: Sequence[Scene], rng: np.random.Generator, cache: Path) -> Pair:
+def elsewhere(
+    pair: Pair, others: Sequence[Scene], rng: np.random.Generator, seed: int, cache: Path
+) -> Pair:
     """Return a pair with an input of another place, of the same kind if there is one."""
     choice = [one for one in others if one.kind == pair.kind and one.place not in pair.place]
     for _ in range(20):
         scene = choice[int(rng.integers(len(choice)))]
-        other = scene.source(int(rng.integers(1, 5)), cache)
+        other = scene.source(seed, cache)
         most = np.array(other.reference.shape[:0:-1]) - np.array(pair.size)
         corner = np.maximum(most // 2, 0) + rng.integers(-10, 11, 2)
         image, known = render(other, pixels(pair.size) + corner)

@@ -57,7 +57,7 @@ SCENES = (
 
 
 def setting(seed: int = 1) -> Setting:
-    return Setting(np.random.default_rng(seed), SCENES, Path())
+    return Setting(np.random.default_rng(seed), SCENES, seed, Path())
 
 
 @pytest.fixture
