@@ -38,6 +38,7 @@ from groundtie.masks.layer import read_layer
 from groundtie.masks.scene import Scene
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import open_raster
+from groundtie.tools import load_tool
 
 from .fuzz_files import SIDE, write_seeds
 from .fuzz_mutations import mutate
@@ -75,6 +76,13 @@ class Target:
     arguments: str | Callable[[Path], None]
     beside: tuple[str, ...] = ()
     weight: float = 1.0
+
+    @property
+    def tool(self) -> str | None:
+        """Name of the tool that reads it; None: a function does."""
+        if not isinstance(self.arguments, str):
+            return None
+        return self.arguments.split()[0].replace("-", "_")
 
 
 def _decide(path: Path) -> None:
@@ -181,6 +189,9 @@ def run_cases(
     patience_s: float = _PATIENCE_S,
 ) -> Iterator[tuple[int, str, str]]:
     """Yield number, target and outcome of each case; `keep` receives the files of failures."""
+    # Before a process is forked, so that none imports them again.
+    for tool in {TARGETS[name].tool for name in only} - {None}:
+        load_tool(tool)
     waiting = list(numbers)
     while waiting:
         batch, waiting = waiting[:_BATCH], waiting[_BATCH:]
@@ -188,6 +199,10 @@ def run_cases(
         with tempfile.TemporaryDirectory(prefix="fuzz-") as folder:
             for number, outcome in _run_batch(batch, seeds, only, Path(folder), patience_s):
                 case = Case.of(number, seeds, only)
+                if outcome == HANG:  # or the machine is busy: once more, alone
+                    with tempfile.TemporaryDirectory(prefix="fuzz-") as alone:
+                        again = _run_batch([number], seeds, only, Path(alone), patience_s)
+                        _, outcome = next(iter(list(again)))
                 if outcome in FAILURES and keep is not None:
                     _keep(case, outcome, seeds, keep, Path(folder))
                 done += 1

@@ -103,7 +103,7 @@ def require_places(places: FloatArray) -> FloatArray:
     """
     lost = int((~(np.abs(places) < _FARTHEST)).any(axis=1).sum())
     if lost:
-        raise ValueError(f"{lost} of {len(places)} positions lie on no map")
+        raise ValueError(f"{lost} of {len(places)} positions are not finite, or on no map")
     return places
 
 

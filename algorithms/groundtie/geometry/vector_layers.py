@@ -1,10 +1,10 @@
 """Vector layers, read where a damaged file cannot take the job down.
 
 GDAL's vector drivers, or fiona around them, may crash on damaged files: a GeoPackage of 144 kB ends
-the interpreter. Neither fiona nor GDAL offers a check beforehand, and SQLite's own check of a
-GeoPackage passes some of these files. So another process reads the layer, and its end is an error
-of that layer. It is a new one: a fork of QGIS, or of a process with GDAL's threads, would be none
-that works.
+the interpreter by fiona 1.10. SQLite could check a GeoPackage beforehand, but that reads all of it,
+shows nothing of the geometries, and there is no such check of the other formats. So another process
+reads the layer, and its end is an error of that layer. It is a new one: a fork of QGIS, or of a
+process with GDAL's threads, would be none that works.
 """
 
 from __future__ import annotations

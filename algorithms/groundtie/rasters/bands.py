@@ -13,6 +13,10 @@ from ..errors import raised_by
 
 T = TypeVar("T")
 
+# Ten years of daily images are 3653 bands. Each band costs calls of GDAL, which one file of 14 kB
+# can ask for 65,535 times.
+MOST_BANDS = 4096
+
 
 @dataclass(frozen=True)
 class BandInfo:

@@ -19,7 +19,7 @@ from rasterio.errors import NotGeoreferencedWarning
 from ..arrays import Raster, in_memory
 from ..errors import BandError, RasterOpenError
 from .averaging import average_by_strips
-from .bands import BandInfo, colormap, stated, tags_of, working_dtype
+from .bands import MOST_BANDS, BandInfo, colormap, stated, tags_of, working_dtype
 from .georeferencing import grid_of
 from .grid import PIXEL_COORDINATES, Grid
 from .handles import ArrayHandles, FileHandles, Handles, OpenDataset
@@ -32,10 +32,6 @@ warnings.filterwarnings("ignore", category=NotGeoreferencedWarning)
 # Chips are read again and again; what is written is not.
 _READING_CACHE_BYTES = 400_000_000
 CACHE_BYTES = 96_000_000
-
-# Ten years of daily images are 3653 bands. Each band costs calls of GDAL, which one file of 14 kB
-# can ask for 65,535 times.
-MOST_BANDS = 4096
 
 FloatImage = NDArray[np.float32]
 
