@@ -17,8 +17,8 @@ from typing import IO, Any
 from groundtie.errors import OutputError
 from groundtie.rasters import tiled_file
 
-# Nothing here takes a second on an idle machine.
-_TIME_LIMIT_S = 60
+# Nothing here takes more than seconds on an idle machine; a busy one may be twenty times slower.
+_TIME_LIMIT_S = 300
 
 # How a child ends: all written, refused as it should be, or by an exception that is a bug.
 _DONE, _TOLD, _BUG = 0, 2, 1

@@ -11,7 +11,6 @@ import rasterio.windows
 from numpy.typing import NDArray
 from rasterio.enums import Resampling
 
-from .tiff import BLOCK
 from .tiled_file import Level
 from .windows import Mask, Window
 
@@ -49,9 +48,8 @@ class Reduced:
         together = [list(range(1, bands + 1))]
         groups = together if image.planes == 1 else [[band] for band in together[0]]
         return [
-            (group, Window(col, row, min(BLOCK, image.width - col), min(BLOCK, image.height - row)))
-            for row in range(0, image.height, BLOCK)
-            for col in range(0, image.width, BLOCK)
+            (group, place)
+            for _, _, place in image.blocks(Window(0, 0, image.width, image.height))
             for group in groups
         ]
 

@@ -10,11 +10,13 @@ Source: [Adobe1992], [OGC2023].
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .windows import Window
 
 BLOCK = 512
 
@@ -103,6 +105,14 @@ class Image:
             _FORMAT: _short(_UNSIGNED),
         }
         return Image(self.width, self.height, tags)
+
+    def blocks(self, window: Window) -> Iterator[tuple[int, int, Window]]:
+        """Return the row and column of each block that a window touches, and its pixels."""
+        for row in range(window.row // BLOCK, -(-(window.row + window.height) // BLOCK)):
+            for col in range(window.col // BLOCK, -(-(window.col + window.width) // BLOCK)):
+                left, top = col * BLOCK, row * BLOCK
+                size = min(BLOCK, self.width - left), min(BLOCK, self.height - top)
+                yield row, col, Window(left, top, *size)
 
     def entries(self, big: bool) -> list[tuple[int, Tag]]:
         """Return all that a directory states, in the order of the tags."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from .atomic import free_bytes, no_space, writing
 from .blocks import PixelType, encoded_mask
-from .tiff import AROUND_COG_BLOCK, BLOCK, Image, header, needs_big
+from .tiff import AROUND_COG_BLOCK, Image, header, needs_big
 from .windows import Window
 
 # Deflate makes no more than this out of a byte: two bits for 258 of them, [Deutsch1996] 3.2.5.
@@ -225,15 +225,15 @@ class TiledFile:
         encode: Callable[[NDArray[Any]], bytes],
     ) -> None:
         """Add pixels, shape (h, w, …), to the blocks in which they lie."""
-        for place in _blocks(window):
-            whole = _extent(image, *place)
+        for row, col, whole in image.blocks(window):
+            place = (plane, row, col)
             part = _common(window, whole)
             rows, cols = _slices(part, window)
-            block = self._completed(image, (plane, *place), values[rows, cols], part, whole)
+            block = self._completed(image, place, values[rows, cols], part, whole)
             if block is not None:
                 raw_bytes = block.size // 8 if encode is encoded_mask else block.nbytes
                 content = self.executor.submit(encode, block)
-                self._coming.append(_Coming(image, (plane, *place), raw_bytes, content))
+                self._coming.append(_Coming(image, place, raw_bytes, content))
                 self._write_coming(self.ahead)
 
     def _completed(
@@ -279,19 +279,6 @@ def _write(file: IO[bytes], content: bytes) -> None:
     left = memoryview(content)
     while left:
         left = left[file.write(left) :]
-
-
-def _blocks(window: Window) -> Iterator[tuple[int, int]]:
-    """Return the row and column of each block that a window touches."""
-    for row in range(window.row // BLOCK, -(-(window.row + window.height) // BLOCK)):
-        for col in range(window.col // BLOCK, -(-(window.col + window.width) // BLOCK)):
-            yield row, col
-
-
-def _extent(image: Image, row: int, col: int) -> Window:
-    """Return the pixels of an image in a block."""
-    left, top = col * BLOCK, row * BLOCK
-    return Window(left, top, min(BLOCK, image.width - left), min(BLOCK, image.height - top))
 
 
 def _common(one: Window, other: Window) -> Window:
