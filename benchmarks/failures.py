@@ -270,6 +270,7 @@ def jobs(scene: Path) -> Iterator[Job]:
 
     yield tool(groundtie.warp, "out.tif", moved, transform=pair / "truth.json", workers=2)
     yield tool(groundtie.filter_speckle, "out.tif", reference, workers=2)
+    yield tool(groundtie.mask_threshold, "out.tif", reference)
     yield tool(
         groundtie.orthorectify,
         "out.tif",
