@@ -41,6 +41,9 @@ _FREE = (0, 1, 2, 5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60, 65, 70, 75, 80,
          98, 99, 101, 110)  # fmt: skip
 _PAGE = 4096
 
+# For what a disk needs itself, and for hidden names.
+_SPARE = 16 * _PAGE
+
 # After each so many kills the same job runs again; after the others one that is shorter.
 _AGAIN = 5
 
@@ -204,13 +207,13 @@ def fill(job: Job, before: Path, percent: int, found: Findings, folder: Path) ->
     old = job.contents(before)
     taken = sum(-(-len(content) // _PAGE) * _PAGE for content in old.values())
     free = max(taken * percent // 100, 1)
-    with disk(folder, taken + 16 * _PAGE + free):
+    with disk(folder, taken + _SPARE + free):
         for name, content in old.items():
             (folder / name).write_bytes(content)
         end = in_child(partial(job.as_run, folder, NEW))
         faults = faults_of_error(job, folder, end, old)
     folder.rmdir()
-    if percent < 85 and end.how == "done":
+    if _SPARE + free < 0.85 * taken and end.how == "done":
         faults.append("it fits on a disk that is too small")
     found.add("full disks", faults, f"{job.name}, {percent} % of the disk free")
 
@@ -270,6 +273,7 @@ def jobs(scene: Path) -> Iterator[Job]:
 
     yield tool(groundtie.warp, "out.tif", moved, transform=pair / "truth.json", workers=2)
     yield tool(groundtie.filter_speckle, "out.tif", reference, workers=2)
+    yield tool(groundtie.mask_threshold, "out.tif", reference)
     yield tool(
         groundtie.orthorectify,
         "out.tif",
