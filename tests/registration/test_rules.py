@@ -302,8 +302,9 @@ def test_an_oblique_view_needs_more_check_points_on_the_ground(
 @pytest.mark.parametrize("kind", [REGIONS, LAYER])
 def test_little_ground_may_be_weakly_similar(kind: str) -> None:
     """A mask leaves little of each chip; other rules judge what it leaves."""
-    weak = survey(height=2.0, rival=0.5)
+    weak = survey(height=2.0, rival=1.9)
     assert refusing(evidence(GOOD, survey=weak, mask=masked(kind))) == []
+    assert refusing(evidence(GOOD, survey=weak)) == ["second place nearby", "weak similarity"]
 
 
 def test_a_part_of_which_half_confirms_is_layover_not_a_part() -> None:

@@ -100,7 +100,7 @@ def test_rotation_and_scale_are_those_of_the_transform(
     found = Correction.of(Transform(model, grid.crs, grid), grid)
     assert found.rotation_deg == pytest.approx(2, abs=1e-6)
     assert found.scale == pytest.approx(1 / 1.03, rel=1e-6)
-    assert "turned by 2.00° anticlockwise, scaled by 0.9709" in found.text()
+    assert "rotated by 2.00° anticlockwise, scaled by 0.9709" in found.text()
 
 
 def test_the_direction_without_georeferencing(ungeoreferenced: ImagePair) -> None:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
-from shapely import MultiPoint, contains_xy
+from scipy.spatial import Delaunay, QhullError
 
 from ..context import Context
 from ..geometry.chance import agreement_probability, log10_chance
@@ -164,9 +164,7 @@ class Survey:
         return alike[label == label[np.searchsorted(alike, seed)]]
 
     def _part(self, group: NDArray[np.int_]) -> Part:
-        # A corner's chips lie on the hull, whatever the last digit is.
-        hull = MultiPoint(self.centres[group]).convex_hull.buffer(1.0)
-        inside = contains_xy(hull, *self.centres.T)
+        inside = _inside_hull(self.centres, self.centres[group])
         confirming = int((np.hypot(*self.shifts_px[inside].T) <= _SAME_PX).sum())
         surrounded = int(inside.sum())
         # About as many parts as boxes of chips may be; one of the chips gives the place.
@@ -182,6 +180,15 @@ class Survey:
             confirming,
             float(alarms),
         )
+
+
+def _inside_hull(px: NDArray[np.int_], of: NDArray[np.int_]) -> NDArray[np.bool_]:
+    """Return which positions lie in the convex hull of some of them; in their box, on a line."""
+    try:
+        # Corners lie on the hull, whatever the last digit is.
+        return np.asarray(Delaunay(of).find_simplex(px, tol=1e-6) >= 0)
+    except (QhullError, ValueError):
+        return np.asarray(((px >= of.min(axis=0)) & (px <= of.max(axis=0))).all(axis=1))
 
 
 def _where(grid: Grid, px: FloatArray) -> str:

@@ -140,5 +140,5 @@ def _sameness(reference: Patch, input: Patch, pose: Pose) -> Sameness | None:
     shift = replace(pose, rotation_deg=0.0, scale=1.0)
     if moved_px(pose, shift, shapes[0]) > _SHIFT_PX:
         return None
-    offset = np.array(shift.between(*shapes)[2::3], float)
-    return sameness_near(reference, input, np.rint(offset).astype(int))
+    between = shift.between(*shapes)
+    return sameness_near(reference, input, np.rint([between.c, between.f]).astype(int))

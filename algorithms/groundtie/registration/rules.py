@@ -326,7 +326,9 @@ def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
 
 def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
     survey = evidence.survey
-    if survey is None or survey.rival_height < _RIVAL_HEIGHT * survey.height:
+    if survey is None or evidence.mask.kind in (REGIONS, LAYER):
+        return None
+    if survey.rival_height < _RIVAL_HEIGHT * survey.height:
         return None
     return "moved elsewhere as a whole, chips all over match about as well"
 
@@ -600,8 +602,8 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "second place nearby",
         SCENE,
-        f"moved elsewhere as a whole, within {SURVEY_RADIUS_PX} px, chips all over match at least "
-        f"{_RIVAL_HEIGHT:g} times as well",
+        "without a mask of the ground, chips all over match at least "
+        f"{_RIVAL_HEIGHT:g} times as well if all are moved elsewhere, within {SURVEY_RADIUS_PX} px",
         "suites real and attacks",
         "give a larger part of the scene, which shows more than what repeats",
         _second_place_nearby,

@@ -26,7 +26,7 @@ class Correction:
     direction
         The move at the centre along the axes of the map, in words.
     rotation_deg
-        By how much the input is turned, anticlockwise as it is seen.
+        By how much the input is rotated, anticlockwise as it is seen.
     scale
         By which factor it is enlarged.
     metres_per_px
@@ -66,14 +66,14 @@ class Correction:
         if self.metres_per_px is not None:
             in_metres = f" ({self.centre_px * self.metres_per_px:.1f} m)"
         direction = f": {self.direction}" if self.direction else ""
-        turned = "not turned"
+        rotated = "not rotated"
         # what two decimals show
         if abs(self.rotation_deg) >= 0.005:
             sense = "anticlockwise" if self.rotation_deg > 0 else "clockwise"
-            turned = f"turned by {abs(self.rotation_deg):.2f}° {sense}"
+            rotated = f"rotated by {abs(self.rotation_deg):.2f}° {sense}"
         return (
             f"{size}{in_metres} at the centre{direction}; by {self.least_px:.1f} to "
-            f"{self.most_px:.1f} px over the grid; {turned}, scaled by {self.scale:.4f}"
+            f"{self.most_px:.1f} px over the grid; {rotated}, scaled by {self.scale:.4f}"
         )
 
     def summary(self) -> dict[str, Any]:

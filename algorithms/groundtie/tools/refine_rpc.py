@@ -99,6 +99,7 @@ def refine_rpc(
             help="A page that shows errors before and after and how far to trust them; its numbers "
             "are put beside it as JSON. It is written for refused RPCs, too.",
             suffixes=(".html",),
+            advanced=True,
             shown=True,
         ),
     ] = None,
