@@ -188,12 +188,12 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(46, part=3)),
     ),
     "second place nearby": (
-        evidence(GOOD, survey=survey(rival=7.0)),
-        evidence(GOOD, survey=survey(rival=6.6)),
+        evidence(GOOD, survey=survey(rival=6.5)),
+        evidence(GOOD, survey=survey(rival=6.3)),
     ),
     "weak similarity": (
-        evidence(GOOD, survey=survey(height=2.9)),
-        evidence(GOOD, survey=survey(height=3.1)),
+        evidence(GOOD, survey=survey(height=1.9, rival=1.0)),
+        evidence(GOOD, survey=survey(height=2.1, rival=1.0)),
     ),
     "pixel-locked content": (
         evidence(GOOD, survey=survey(), survey_of_rest=survey(5)),
@@ -302,7 +302,7 @@ def test_an_oblique_view_needs_more_check_points_on_the_ground(
 @pytest.mark.parametrize("kind", [REGIONS, LAYER])
 def test_little_ground_may_be_weakly_similar(kind: str) -> None:
     """A mask leaves little of each chip; other rules judge what it leaves."""
-    weak = survey(height=2.0, rival=1.9)
+    weak = survey(height=1.9, rival=1.8)
     assert refusing(evidence(GOOD, survey=weak, mask=masked(kind))) == []
     assert refusing(evidence(GOOD, survey=weak)) == ["second place nearby", "weak similarity"]
 

@@ -28,7 +28,7 @@ _log = logging.getLogger(__name__)
 _LEAST_VALID, _LEAST_VALID_MASKED = 0.4, 0.1
 
 # The background alone reaches about this many robust standard deviations.
-LEAST_HEIGHT = 3.0
+_LEAST_HEIGHT = 3.0
 
 # Neighbours within this many spacings exchange beliefs.
 _NEIGHBOUR_SPACINGS = 1.5
@@ -194,4 +194,4 @@ def _equal_weight(surfaces: Surfaces) -> FloatArray:
 
     The highest peaks are those of buildings, which are displaced by layover.
     """
-    return 1 / np.maximum(surfaces.max(axis=(1, 2), initial=0.0), LEAST_HEIGHT).astype(float)
+    return 1 / np.maximum(surfaces.max(axis=(1, 2), initial=0.0), _LEAST_HEIGHT).astype(float)
