@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any
 
 import numpy as np
@@ -39,6 +41,7 @@ from groundtie.masks.choice import LAYER, REGIONS, THRESHOLD, MaskUsed
 from groundtie.matching.locked import Sameness
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
+from groundtie.registration import rules
 from groundtie.registration.evidence import (
     RegistrationEvidence,
     SearchEvidence,
@@ -248,6 +251,15 @@ def test_a_rule_lets_pass_what_is_just_within_its_limit(rule: Rule) -> None:
     assert rule.name not in refusing(passed)
     # Of a search, any failure is refused or no refusal.
     assert rule.stage == stages.SEARCH or refusing(passed) == []
+
+
+def test_every_rule_of_every_module_is_asked() -> None:
+    modules = [
+        import_module(f"{rules.__name__}.{one.name}") for one in iter_modules(rules.__path__)
+    ]
+    tuples = [value for one in modules for value in vars(one).values() if isinstance(value, tuple)]
+    written = [item.name for one in tuples for item in one if isinstance(item, Rule)]
+    assert sorted(written) == sorted(rule.name for rule in RULES)
 
 
 def test_names_are_unique_and_stages_follow_one_another() -> None:

@@ -25,7 +25,7 @@ from groundtie.features.classifier_training import Training, train_classifier
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
-from groundtie.registration import rules
+from groundtie.registration.rules import scene as scene_rules
 from groundtie.registration.scene import ImageFacts, SceneInfo
 from groundtie.registration.specification import MATCHERS, OPTICAL
 
@@ -105,7 +105,7 @@ def test_a_radar_image_that_may_show_a_dense_town_is_in_doubt(
     monkeypatch.setattr(SceneInfo, "is_radar_and_camera", radar)
     # Too few strong scatterers for a mask of the ground, too many for a town to be ruled out.
     monkeypatch.setattr(ImageFacts, "strong_share", 0.1)
-    monkeypatch.setattr(rules, "_CLEAR_SHARE", 1.1)
+    monkeypatch.setattr(scene_rules, "_CLEAR_SHARE", 1.1)
     expected = pytest.raises(NotRegisteredError, match="as roofs may") if refused else nullcontext()
     with expected:
         match_optical(files.reference, files.input, tmp_path / "out.tif")

@@ -19,7 +19,7 @@ from groundtie.errors import NotRegisteredError
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
-from groundtie.registration import rules
+from groundtie.registration.rules import scene as scene_rules
 from groundtie.registration.specification import SAR_SAR
 
 SIZE = (300, 280)
@@ -114,7 +114,7 @@ def test_an_image_that_may_show_a_dense_town_to_a_camera_is_in_doubt(
     calm = write_raster(tmp_path / "in.tif", bright, files.truth.input_grid)
     found = match_sar_sar(files.reference, calm, tmp_path / "out.tif")
     assert error_px(found.transform, files) < 1.0
-    monkeypatch.setattr(rules, "_CLEAR_SHARE", 1.1)
+    monkeypatch.setattr(scene_rules, "_CLEAR_SHARE", 1.1)
     with pytest.raises(NotRegisteredError, match="as roofs may"):
         match_sar_sar(files.reference, calm, tmp_path / "other.tif")
     # Two radar images are judged by layover alone.
@@ -195,7 +195,7 @@ def test_layover_is_refused(
     monkeypatch: pytest.MonkeyPatch,
     tool: Callable[..., object],
 ) -> None:
-    monkeypatch.setattr(rules, "scatter_along_line_px", lambda _: 99.0)
+    monkeypatch.setattr(scene_rules, "scatter_along_line_px", lambda _: 99.0)
     report = tmp_path / "report.html"
     with pytest.raises(NotRegisteredError, match="as layover scatters heights"):
         tool(files.reference, files.input, tmp_path / "out.tif", report=report)

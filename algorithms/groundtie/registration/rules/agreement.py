@@ -1,0 +1,84 @@
+"""Rules on how many held-out points agree with a registration or with refined RPCs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...geometry.judging import (
+    FEWEST_CHECK_POINTS,
+    LARGEST_LOG10_CHANCE,
+    LOG10_CHANCE_ON_GROUND,
+    SMALLEST_INLIER_SHARE,
+)
+from ...geometry.robust import distances, find_consensus
+from ..evidence import AGREEMENT, RegistrationEvidence
+from ..refinement_evidence import RefinementEvidence
+from .rule import Rule
+
+# Check points that agree on another transform within this distance make it a rival, if they are
+# more by so many, as three always agree on an affine model and one or two more may by chance, and
+# by this factor. Measured by the suites real and crossings.
+_RIVAL_TOLERANCE_PX = 3.0
+_RIVAL_POINTS = 3
+_RIVAL_SHARE = 1.25
+
+
+def _by_chance(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+    points = evidence.held_out
+    is_chance = points.log10_chance > points.largest_log10_chance
+    if not is_chance and points.agreeing >= FEWEST_CHECK_POINTS:
+        return None
+    return f"{points.agreeing} of {points.total} {points.name} agree, as they may by chance"
+
+
+def _few_agree(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+    points = evidence.held_out
+    if points.agreeing >= SMALLEST_INLIER_SHARE * points.total:
+        return None
+    return f"only {points.agreeing} of {points.total} {points.name} agree"
+
+
+def _another_transform(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+    if isinstance(evidence, RefinementEvidence):
+        return None
+    residuals = evidence.residuals_px
+    if len(residuals) < _RIVAL_POINTS:
+        return None
+    own = int((np.hypot(*residuals.T) <= _RIVAL_TOLERANCE_PX).sum())
+    px = evidence.grid.map_to_pixel(evidence.counted.reference_xy)
+    rival = find_consensus(px, px + residuals, _RIVAL_TOLERANCE_PX)
+    others = int((distances(rival, px, px + residuals) <= _RIVAL_TOLERANCE_PX).sum())
+    if others < max(own + _RIVAL_POINTS, _RIVAL_SHARE * own):
+        return None
+    return f"{others} of {evidence.held_out.total} check points agree on another transform"
+
+
+AGREEMENT_RULES: tuple[Rule, ...] = (
+    Rule(
+        "chance agreement",
+        AGREEMENT,
+        f"fewer than {FEWEST_CHECK_POINTS} held-out points agree, or as many as agree would by "
+        f"chance with a probability above 10^{LARGEST_LOG10_CHANCE:.0f} "
+        f"(10^{LOG10_CHANCE_ON_GROUND:.0f} where the ground of a dense town was matched)",
+        "[Moisan2004]; suites crossings and city",
+        "give a larger part of the scene: more check points then confirm it",
+        _by_chance,
+    ),
+    Rule(
+        "small share of check points",
+        AGREEMENT,
+        f"less than {SMALLEST_INLIER_SHARE:.0%} of the held-out points agree",
+        "suites simulated and real",
+        "mask clouds and changes; give bands that show the same",
+        _few_agree,
+    ),
+    Rule(
+        "another transform",
+        AGREEMENT,
+        f"check points agree on another transform: {_RIVAL_POINTS} more than on this one, and "
+        f"{_RIVAL_SHARE:g} times as many",
+        "suites real and crossings",
+        "give parts of a mosaic one by one, or a more flexible model",
+        _another_transform,
+    ),
+)

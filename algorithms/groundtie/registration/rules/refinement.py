@@ -1,0 +1,62 @@
+"""Rules on refined RPCs alone."""
+
+from __future__ import annotations
+
+from ..evidence import REFINEMENT
+from ..refinement_evidence import RefinementEvidence
+from .rule import Rule
+
+# Control must spread over so much of each side of an image (suite rpc).
+_SMALLEST_EXTENT = 0.25
+
+# A bias that is folded into new RPCs may be missed by so much, in pixels.
+_LARGEST_FOLDING_PX = 0.01
+
+
+def _narrow_control(evidence: RefinementEvidence) -> str | None:
+    if evidence.extent >= _SMALLEST_EXTENT:
+        return None
+    share = f"{100 * evidence.extent:.0f} %"
+    return f"the control points spread over {share} of a side of the image only"
+
+
+def _not_nearer(evidence: RefinementEvidence) -> str | None:
+    before, after = evidence.rms_before_px, evidence.rms_after_px
+    if before > after:
+        return None
+    name = evidence.held_out.name
+    return f"{name} are not nearer than before: {after:.2f} px, {before:.2f} px as delivered"
+
+
+def _not_folded(evidence: RefinementEvidence) -> str | None:
+    if evidence.folding_px <= _LARGEST_FOLDING_PX:
+        return None
+    return f"RPCs cannot take up the bias: they miss it by {evidence.folding_px:.3f} px"
+
+
+REFINEMENT_RULES: tuple[Rule, ...] = (
+    Rule(
+        "narrow control",
+        REFINEMENT,
+        f"control points spread over less than {_SMALLEST_EXTENT:.0%} of a side of the image",
+        "suite rpc",
+        "give control all over the image",
+        _narrow_control,
+    ),
+    Rule(
+        "not nearer than before",
+        REFINEMENT,
+        "held-out points are no nearer by the refined RPCs than by the delivered ones",
+        "definition of a refinement",
+        "keep the delivered RPCs",
+        _not_nearer,
+    ),
+    Rule(
+        "bias not folded",
+        REFINEMENT,
+        f"new RPCs miss the bias by more than {_LARGEST_FOLDING_PX:g} px",
+        "a hundredth of a pixel is below what control measures",
+        "give a simpler model of the bias",
+        _not_folded,
+    ),
+)

@@ -1,0 +1,38 @@
+"""What a rule is, and the advice that rules of several stages give."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+WIDER = "check the band and the overlap; give a larger search radius, or allow rotation"
+WITHOUT = "give images, or masks, without what is drawn over the ground"
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A reason to refuse.
+
+    Parameters
+    ----------
+    name
+        What it is called in verdicts and in the documentation.
+    stage
+        Which kind of evidence it reads.
+    refuses
+        What it refuses, with its limit, for the documentation.
+    source
+        Where the limit comes from.
+    advice
+        What a user can do that is safe.
+    reason
+        Returns why it refuses, in a sentence; None: it does not.
+    """
+
+    name: str
+    stage: str
+    refuses: str
+    source: str
+    advice: str
+    reason: Callable[[Any], str | None]

@@ -1,0 +1,167 @@
+"""Rules on what the images are: dense towns, their ground, and layover."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...geometry.judging import TOLERANCE_PX
+from ...masks.choice import LAYER, REGIONS
+from ..evidence import SCENE, RegistrationEvidence
+from ..layover import count_on_line, scatter_along_line_px
+from .rule import Rule
+
+# What the ground shows of a fit that was not made on it: it is itself good to a pixel or two.
+# Measured by the suite city.
+_LARGEST_GROUND_SHIFT_PX = 1.0
+
+# Less ground than this, or points over less of the overlap, does not hold a model. Measured on the
+# seeds 1 to 12 of the suite rpc_city: accepted and more than 3 px wrong at 7 % of ground, and with
+# 61 % extrapolated; right from 12 %, and up to 35 %.
+_LEAST_GROUND_SHARE, _LARGEST_EXTRAPOLATED = 0.10, 0.5
+
+# An oblique view displaces fit and check points alike: where four sums of check chips all agree, as
+# in images of 700 px, the suite rpc_city has errors up to 6 px; with five and more, below 1 px.
+_FEWEST_IN_SENSOR_GEOMETRY = 5
+
+# Check points along a line, over those that agree: from here on it is open which are the ground.
+# Measured on pairs that were registered right: up to 0.56; on others: from 0.78 (suite sar_sar).
+_LAYOVER_SHARE = 2 / 3
+
+# From this share of agreeing check points on, more agree than roofs alone do. Measured where a
+# dense town was matched whole and a wrong registration accepted: 28 to 56 %; on other scenes with
+# as many strong scatterers: from 72 % (suite city).
+_CLEAR_SHARE = 2 / 3
+
+_GROUND = "give a mask of the ground, such as roads and waters"
+
+
+def _little_ground(evidence: RegistrationEvidence) -> str | None:
+    mask = evidence.mask
+    if mask.kind != REGIONS:
+        return None
+    if not mask.is_reliable:
+        return "too few roads and banks were found to be the ground of a town"
+    if mask.share < _LEAST_GROUND_SHARE:
+        return f"only {mask.share:.0%} of the {mask.image} is ground that was found"
+    agreeing = evidence.held_out.agreeing
+    is_oblique = evidence.scene is not None and evidence.scene.input.is_in_sensor_geometry
+    if is_oblique and agreeing < _FEWEST_IN_SENSOR_GEOMETRY:
+        return f"only {agreeing} check points on the ground agree, where the view is oblique"
+    if evidence.extrapolated_share > _LARGEST_EXTRAPOLATED:
+        share = f"{evidence.extrapolated_share:.0%}"
+        return f"{share} of the overlap lies beyond the ground that was matched"
+    return None
+
+
+def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
+    if evidence.ground_shift_px <= _LARGEST_GROUND_SHIFT_PX:
+        return None
+    return f"the ground alone matches {evidence.ground_shift_px:.1f} px elsewhere"
+
+
+def _layover_of_check_points(evidence: RegistrationEvidence) -> str | None:
+    if evidence.layover_factor is None:
+        return None
+    residuals = evidence.check.residual_on(evidence.grid, evidence.estimate.transform)
+    agreeing = int((np.hypot(*residuals.T) <= TOLERANCE_PX).sum())
+    on_line = count_on_line(residuals, evidence.radius_px)
+    if on_line < max(_LAYOVER_SHARE * agreeing, 1):
+        return None
+    return (
+        f"{on_line} of {len(residuals)} check points lie along a line beside the {agreeing} that "
+        "agree, as layover displaces elevated objects"
+    )
+
+
+def _layover_of_fit_points(evidence: RegistrationEvidence) -> str | None:
+    if evidence.layover_factor is None:
+        return None
+    used = evidence.estimate.points.take(evidence.estimate.points.used)
+    scatter = scatter_along_line_px(used.residual_on(evidence.grid, evidence.estimate.transform))
+    if evidence.layover_factor * scatter <= evidence.max_error_px:
+        return None
+    return (
+        f"matched points scatter by {scatter:.1f} px along a line more than across it, as layover "
+        "scatters heights"
+    )
+
+
+def _despeckled_town(evidence: RegistrationEvidence) -> str | None:
+    kind = evidence.mask.kind
+    if evidence.scene is None or kind == LAYER:
+        return None
+    if not evidence.scene.is_despeckled_town(masked_by_regions=kind == REGIONS):
+        return None
+    return "the radar image of a dense town has no speckle, by which its ground is found"
+
+
+def _town_matched_whole(evidence: RegistrationEvidence) -> str | None:
+    points = evidence.held_out
+    is_ground = evidence.mask.kind in (REGIONS, LAYER) or evidence.is_ground_checked
+    if evidence.scene is None or is_ground or points.agreeing >= _CLEAR_SHARE * points.total:
+        return None
+    if not evidence.scene.may_be_dense_town:
+        return None
+    return (
+        f"only {points.agreeing} of {points.total} check points agree, as roofs may, and an image "
+        "has as many strong scatterers as a radar's of a dense town"
+    )
+
+
+SCENE_RULES: tuple[Rule, ...] = (
+    Rule(
+        "too little ground",
+        SCENE,
+        "where the regions of a radar image were taken for its ground: too few roads and banks, "
+        f"less than {_LEAST_GROUND_SHARE:.0%} of the image, points over less than "
+        f"{1 - _LARGEST_EXTRAPOLATED:.0%} of the overlap, or, in an image with RPCs, fewer than "
+        f"{_FEWEST_IN_SENSOR_GEOMETRY} check points that agree",
+        "suite rpc_city",
+        _GROUND,
+        _little_ground,
+    ),
+    Rule(
+        "ground elsewhere",
+        SCENE,
+        f"the ground of a dense town alone matches more than {_LARGEST_GROUND_SHIFT_PX:g} px from "
+        "the transform",
+        "suite city",
+        _GROUND,
+        _ground_elsewhere,
+    ),
+    Rule(
+        "layover of check points",
+        SCENE,
+        "between two radar images, check points that disagree lie along one line, "
+        f"{_LAYOVER_SHARE:.2f} times as many as agree",
+        "suite sar_sar",
+        _GROUND,
+        _layover_of_check_points,
+    ),
+    Rule(
+        "layover of fit points",
+        SCENE,
+        "between two radar images, points of the fit scatter so far along one line that heights "
+        "displace the model by more than the largest error",
+        "[Mauchly1940]; suite sar_sar",
+        _GROUND,
+        _layover_of_fit_points,
+    ),
+    Rule(
+        "despeckled town",
+        SCENE,
+        "a radar image of a dense town has no speckle, by which its ground is found",
+        "suite city",
+        f"give the radar image unfiltered; {_GROUND}",
+        _despeckled_town,
+    ),
+    Rule(
+        "town matched whole",
+        SCENE,
+        f"less than {_CLEAR_SHARE:.0%} of the check points agree, an image may be a radar's of a "
+        "dense town, and its ground did not confirm the transform",
+        "suite city",
+        f"if it is a town, give the radar image unfiltered; {_GROUND}",
+        _town_matched_whole,
+    ),
+)

@@ -1,0 +1,97 @@
+"""Rules of the scene on the survey: what chips all over the overlap match."""
+
+from __future__ import annotations
+
+from ...masks.choice import LAYER, REGIONS
+from ...matching.survey import LEAST_PROPORTION, LOG10_FALSE_ALARMS, SURVEY_RADIUS_PX
+from ..evidence import SCENE, RegistrationEvidence
+from .rule import WITHOUT, Rule
+
+# Chips all over are similar to a second place from this share on, and weakly similar below so many
+# robust standard deviations. Measured on pairs that were registered right: up to 0.76, and from
+# 2.2 on; on images with much noise that were registered wrong: 0.43 to 0.98, and 1.5 to 2.9 (suites
+# real and attacks).
+_RIVAL_HEIGHT = 0.8
+_WEAK_HEIGHT = 2.0
+
+
+def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
+    parts = [] if evidence.survey is None else evidence.survey.parts
+    evident = [part for part in parts if part.is_evident]
+    if not evident:
+        return None
+    part = max(evident, key=lambda one: one.chips)
+    distance = f"{part.distance_px:.1f} px off"
+    return f"{part.chips} neighbouring chips in the {part.where} agree on a place {distance}"
+
+
+def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
+    survey = evidence.survey
+    if survey is None or evidence.mask.kind in (REGIONS, LAYER):
+        return None
+    if survey.rival_height < _RIVAL_HEIGHT * survey.height:
+        return None
+    return "moved elsewhere as a whole, chips all over match about as well"
+
+
+def _weak(evidence: RegistrationEvidence) -> str | None:
+    survey = evidence.survey
+    if survey is None or evidence.mask.kind in (REGIONS, LAYER):
+        return None
+    if survey.height >= _WEAK_HEIGHT:
+        return None
+    return (
+        f"only {survey.confirming} of {len(survey.centres)} chips all over match where the "
+        "transform has them, and all of them weakly"
+    )
+
+
+def _locked(evidence: RegistrationEvidence) -> str | None:
+    rest = evidence.survey_of_rest
+    if rest is None or (rest.is_confirming and rest.height > rest.rival_height):
+        return None
+    return (
+        "both images have the same content at the same columns and rows; without it, only "
+        f"{rest.confirming} of {len(rest.centres)} chips match where the transform has them"
+    )
+
+
+SURVEY_RULES: tuple[Rule, ...] = (
+    Rule(
+        "part elsewhere",
+        SCENE,
+        "neighbouring chips agree with each other on another place, too many for chance "
+        f"(10^{LOG10_FALSE_ALARMS:.0f} such parts expected) and {LEAST_PROPORTION} for each that "
+        "confirms the transform",
+        "[Moisan2004]; suites real and attacks",
+        "register the parts of a mosaic one by one; in a town, give a mask of the ground",
+        _part_elsewhere,
+    ),
+    Rule(
+        "second place nearby",
+        SCENE,
+        "without a mask of the ground, chips all over match at least "
+        f"{_RIVAL_HEIGHT:g} times as well if all are moved elsewhere, within {SURVEY_RADIUS_PX} px",
+        "suites real and attacks",
+        "give a larger part of the scene, which shows more than what repeats",
+        _second_place_nearby,
+    ),
+    Rule(
+        "weak similarity",
+        SCENE,
+        "without a mask of the ground, the mean similarity of chips all over, where the transform "
+        f"has them, is below {_WEAK_HEIGHT:g} robust standard deviations of one of them",
+        "suites real and attacks",
+        "give images with less noise, or a larger pixel size for matching",
+        _weak,
+    ),
+    Rule(
+        "pixel-locked content",
+        SCENE,
+        "both images have the same content at the same columns and rows, such as labels or clouds, "
+        "and what else they show does not confirm the transform",
+        "suites real and attacks",
+        WITHOUT,
+        _locked,
+    ),
+)
