@@ -52,10 +52,21 @@ def test_files_of_an_accepted_registration(
     np.testing.assert_array_equal(
         load_transform(tmp_path / "t.json")(points.reference_xy), transform(points.reference_xy)
     )
-    assert set(files.named()) == {"tie_points", "transform", "report"}
-    assert RegistrationFiles().named() == {}
+    assert set(files.named(registration)) == {"tie_points", "transform", "report"}
+    assert RegistrationFiles().named(registration) == {}
     output = RegisteredOutput(tmp_path / "o.tif", "reference", "cubic")
-    assert RegistrationFiles(output).named() == {"output": tmp_path / "o.tif"}
+    assert RegistrationFiles(output).named(registration) == {"output": tmp_path / "o.tif"}
+
+
+def test_files_that_a_registration_without_points_does_not_have_are_not_named(
+    registration: Registration, tmp_path: Path, context: Context
+) -> None:
+    """A pose is accepted without tie points."""
+    posed = replace(registration, check=None)
+    kept = Call("", "", files_in(tmp_path)).deliver(posed, context, ExitStack())
+    assert set(listing(tmp_path)) == {"t.json", "r.html", "r.json"}
+    assert kept.files == {"transform": tmp_path / "t.json", "report": tmp_path / "r.html"}
+    assert set(kept.summary()["files"]) == {"transform", "report"}
 
 
 def test_a_refused_registration_writes_its_report_and_raises(
@@ -70,6 +81,7 @@ def test_a_refused_registration_writes_its_report_and_raises(
     assert error.value.verdict is LOST
     assert LOST.advice in str(error.value)
     assert set(listing(tmp_path)) == {"r.html", "r.json"}
+    assert call.files.named(lost) == {"report": tmp_path / "r.html"}
     numbers = json.loads((tmp_path / "r.json").read_text())
     assert numbers["verdict"]["accepted"] is False
     assert numbers["verdict"]["rule"] == "nothing in common"
@@ -158,6 +170,6 @@ def test_a_tools_parameters_go_into_the_specification_and_the_report(
     assert (spec.matcher, spec.radar) == (SAR_SAR.matcher, SAR_SAR.radar)
     call = Call.of(parameters, delivery.SILENT)
     assert (call.bands, call.workers, call.parameters) == ((None, 1), 2, parameters)
-    assert call.files.named() == {}
+    assert call.files == RegistrationFiles()
     drawn = Call.of(parameters | {"output": tmp_path / "o.tif"}, delivery.SILENT).files
-    assert drawn.named() == {"output": tmp_path / "o.tif"}
+    assert drawn == RegistrationFiles(RegisteredOutput(tmp_path / "o.tif", "untouched", "cubic"))

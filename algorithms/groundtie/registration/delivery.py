@@ -43,15 +43,15 @@ class RegistrationFiles:
                 f"the transform would be written over the report's numbers: {self.transform}"
             )
 
-    def named(self) -> dict[str, Path]:
-        """Return what is written, by name."""
-        output = None if self.output is None else self.output.path
-        named = {
-            "output": output,
-            "tie_points": self.tie_points,
+    def named(self, registration: Registration) -> dict[str, Path]:
+        """Return what `write` writes of a registration, by name."""
+        results = {
+            "output": None if self.output is None else self.output.path,
+            # A pose has none.
+            "tie_points": None if registration.tie_points is None else self.tie_points,
             "transform": self.transform,
-            "report": self.report,
         }
+        named = {**(results if registration.verdict.accepted else {}), "report": self.report}
         return {name: path for name, path in named.items() if path is not None}
 
     def write(self, registration: Registration, context: Context) -> None:
@@ -175,7 +175,7 @@ class Call:
                 self.files.write(registration, context)
             require_accepted(registration)
             rasters = stack.pop_all()
-        kept = replace(registration, files=self.files.named(), rasters=rasters)
+        kept = replace(registration, files=self.files.named(registration), rasters=rasters)
         weakref.finalize(kept, rasters.close)
         return kept
 

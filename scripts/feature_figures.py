@@ -1,0 +1,97 @@
+"""Figures on what is matched: keypoints, directions, masks."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+
+import groundtie
+from groundtie.rasters.patch import Patch
+from groundtie.studies.sift_variants import sift_detector
+from scripts.drawing import BLUE, GREY, ORANGE, FloatArray, Scenes, canvas, read_band, stretched
+
+
+def features(scenes: Scenes) -> Figure:
+    """Keypoints of SIFT on a radar image, by octave."""
+    values = read_band(scenes.speckled() / "reference.tif")[20:110, 60:180]
+    window = Patch(values.astype(np.float32), np.ones(values.shape, bool))
+    figure, axes = canvas(5.8, 2.5, 2)
+    for each, name in zip(axes, ("sift", "sift-oct"), strict=True):
+        found = sift_detector(name).detect(window)
+        first = found.octave < 0
+        each.imshow(stretched(np.log(values + 1.0)), cmap="gray")
+        for chosen, colour in ((first, ORANGE), (~first, BLUE)):
+            for (col, row), scale in zip(
+                found.position_px[chosen], found.scale_px[chosen], strict=True
+            ):
+                each.add_patch(Circle((col, row), 2 * scale, fill=False, color=colour, lw=0.9))
+        each.set_title(f"{name}: {len(first)} keypoints", fontsize=9)
+    return figure
+
+
+def hog(scenes: Scenes) -> Figure:
+    """One patch in red and near infrared, and the histograms of their directions."""
+    row, col = 88, 76
+    patches = [
+        read_band(scenes.rural() / "input.tif", number)[row - 20 : row + 21, col - 20 : col + 21]
+        for number in (3, 4)
+    ]
+    figure, axes = canvas(8, 2.3, 4)
+    for number, (patch, name) in enumerate(zip(patches, ("red", "near infrared"), strict=True)):
+        axes[2 * number].imshow(stretched(patch), cmap="gray")
+        axes[2 * number].set_title(name, fontsize=9)
+        _draw_histograms(axes[2 * number + 1], _histograms(patch.astype(np.float64)))
+    return figure
+
+
+def masks(scenes: Scenes) -> Figure:
+    """A radar image of a city, and two masks of it."""
+    radar = scenes.city() / "reference.tif"
+    figure, axes = canvas(8, 2.85, 3)
+    window = np.s_[90:310:2, 90:310:2]
+    power = cv2.blur(read_band(radar) ** 2, (3, 3))
+    grey = stretched(np.log(power + 1.0))[window]
+    axes[0].imshow(grey, cmap="gray")
+    axes[0].set_title("radar image", fontsize=9)
+    for each, tool, name in (
+        (axes[1], groundtie.mask_threshold, "threshold"),
+        (axes[2], groundtie.mask_regions, "regions"),
+    ):
+        path = scenes.folder / f"{name}.tif"
+        tool(radar, path)
+        taken = read_band(path)
+        colours = np.repeat(grey[:, :, None], 3, axis=2) * 0.75
+        colours[taken[window] == 0] = (0.84, 0.37, 0.0)
+        each.imshow(colours)
+        each.set_title(f"{name}: {np.mean(taken > 0):.0%} take part", fontsize=9)
+    return figure
+
+
+def _draw_histograms(axes: Axes, histograms: FloatArray) -> None:
+    """Draw the directions of 3 × 3 cells as bars through the cells' middles."""
+    for row in range(3):
+        for col in range(3):
+            for number, value in enumerate(histograms[row, col]):
+                angle = np.deg2rad((number + 0.5) * 20)
+                reach = 0.46 * value / histograms.max()
+                dx, dy = reach * np.cos(angle), reach * np.sin(angle)
+                axes.plot((col - dx, col + dx), (row - dy, row + dy), color=BLUE, linewidth=1.6)
+            axes.add_patch(Rectangle((col - 0.5, row - 0.5), 1, 1, fill=False, color=GREY, lw=0.6))
+    axes.set(xlim=(-0.55, 2.55), ylim=(2.55, -0.55))
+    axes.set_aspect("equal")
+    axes.set_title("its directions", fontsize=9)
+
+
+def _histograms(patch: FloatArray) -> FloatArray:
+    """Return directions without sign in 3 × 3 cells, shape (3, 3, 9)."""
+    smooth = cv2.GaussianBlur(patch, (0, 0), 2.0)
+    down, right = np.gradient(smooth)
+    number = ((np.rad2deg(np.arctan2(down, right)) % 180) // 20).astype(int)
+    strength = np.hypot(right, down)
+    cell = np.minimum(np.indices(patch.shape) * 3 // len(patch), 2)
+    histograms = np.zeros((3, 3, 9))
+    np.add.at(histograms, (cell[0], cell[1], number % 9), strength)
+    return histograms
