@@ -97,7 +97,8 @@ def create_like(
     # GDAL's complex integers have no name in numpy.
     pixels = PixelType(names.pop() if len(names) == 1 else source.dtype.name, source.dtype)
     profile = _profile(source, grid, nodata, interleave, pixels)
-    template, beside = _template(source, profile, rpc_tags)
+    with writing(path):
+        template, beside = _template(source, profile, rpc_tags)
     base = base_image(template, grid.width, grid.height)
     raster = Level(base, base.mask() if masked else None)
     levels = [raster, *(raster.overview(factor) for factor in _overviews(grid))]
