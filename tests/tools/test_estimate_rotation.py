@@ -179,8 +179,11 @@ class TestSearches:
 
     @pytest.mark.slow
     def test_what_a_search_cannot_find_is_refused(self, plain: tuple[Path, Path]) -> None:
-        with pytest.raises(NotRegisteredError, match="prefers"):
+        with pytest.raises(NotRegisteredError, match="prefers") as refusal:
             estimate_rotation(*plain, "phase-correlation")
+        assert refusal.value.verdict is not None
+        assert refusal.value.verdict.rule == "other pose"
+        assert str(refusal.value).endswith(refusal.value.verdict.advice)
 
     def test_climbing_needs_a_histogram(self, plain: tuple[Path, Path]) -> None:
         with pytest.raises(ParameterError, match="needs the similarity nmi"):

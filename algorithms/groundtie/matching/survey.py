@@ -27,7 +27,7 @@ from .matcher import FloatArray, MaskOf, Places
 
 # Chips lie side by side: so many along the shorter side of the grid if their sides allow it, and no
 # more than so many along any.
-_CHIP_RANGE_PX, _ALONG, _MOST_ALONG = (40, 64), 7, 12
+_CHIP_RANGE_PX, _ALONG, _MOST_ALONG = (40, 64), 7, 9
 
 # How far off a part may lie.
 SURVEY_RADIUS_PX = 24

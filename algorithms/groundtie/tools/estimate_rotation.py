@@ -213,9 +213,9 @@ def estimate_rotation(
             result = _result(windows, pose, verdict, search, files)
             _write_transform(outputs, transform, result.transform)
             return result
+    refused = Verdict(False, verdict.reason, rule=verdict.rule, advice=verdict.advice)
     raise NotRegisteredError(
-        f"no rotation of {input} against {reference} was found: {verdict.reason}",
-        Verdict(False, verdict.reason),
+        f"no rotation of {input} against {reference} was found: {refused.sentence()}", refused
     )
 
 
