@@ -96,12 +96,12 @@ class TestRasters:
     def test_a_crs_that_cannot_be_written(
         self, files: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        """Its degrees have no size."""
+        """Its degrees have no size: nothing lies anywhere by it, or it cannot be written."""
         text = (files / "spline.json").read_text()
         degree = "0.0174532925199433"
         assert degree in text
         (files / "spline.json").write_text(text.replace(degree, "0"))
-        assert "out.tif" in refused(capsys, f"{WARP} spline.json")
+        assert ".tif" in refused(capsys, f"{WARP} spline.json")
 
     @pytest.mark.parametrize(
         "transform", ["0, 0, 0, 0, 0, 0", "0, 10, 20, 0, 5, 10", "nan, 10, 0, 0, 0, -10",

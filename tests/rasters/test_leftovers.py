@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import groundtie
 from groundtie.errors import OutputError
 from groundtie.rasters import atomic
 from groundtie.rasters.atomic import Outputs, scratch_folder
@@ -33,7 +34,9 @@ with Outputs() as outputs:
 def start(folder: Path) -> subprocess.Popen[str]:
     """Start a run, and wait until it has staged its files."""
     command = [sys.executable, "-c", RUN, str(folder)]
-    run = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    # Where the package is not installed, pytest alone has it on its path.
+    environment = {**os.environ, "PYTHONPATH": str(Path(groundtie.__file__).parents[1])}
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
     assert run.stdout is not None
     assert run.stdout.readline() == "staged\n"
     return run
