@@ -28,6 +28,8 @@ SUITES = (
     "rpc_city",
     "sar_sar",
     "speed",
+    "guard",
+    "kernels",
     "methods",
     "peaks",
     "fusion",
