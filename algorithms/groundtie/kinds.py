@@ -220,6 +220,10 @@ class Text(Kind):
         return value
 
 
+class Crs(Text):
+    """A coordinate reference system: an authority's code or WKT."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Band(Kind):
     """The number of a band, from 1, of the raster that the parameter `of` names."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib.util
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ class NamedTool:
     summary: str
 
 
+@cache
 def named_tools() -> list[NamedTool]:
     """Read names, titles and groups of the tools from their source."""
     spec = importlib.util.find_spec(f"{library_name()}.tools")

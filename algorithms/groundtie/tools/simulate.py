@@ -118,7 +118,7 @@ def simulate(
 
     The scene has terrain, fields, roads, water and buildings. The SAR image has layover, shadow,
     double bounce and speckle; the optical one relief displacement, cast shadows and noise. The
-    same seed gives the same pair. The file truth.json is a transform like those of coregister.
+    same seed gives the same pair. The file truth.json is a transform like those of `coregister`.
     """
     options = PairOptions(
         scene=SceneOptions((size, size), pixel_size, density, relief, seed, changed / 100),
