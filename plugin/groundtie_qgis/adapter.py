@@ -20,6 +20,7 @@ from qgis.PyQt.QtGui import QIcon
 from .definitions import definition, qgis_name
 from .dependencies import complaint, missing_for, rasterio_env
 from .library import LazyTool, errors, kinds, plugin_metadata, progress
+from .pages import help_url
 from .preselection import NOTHING, preselect
 from .results import forget_layers, show_report
 from .styling import ICON, LoadedLayers
@@ -67,7 +68,7 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         return help_html(self._tool)
 
     def helpUrl(self) -> str:
-        return plugin_metadata().get("homepage", "")
+        return help_url(self.name())
 
     def icon(self) -> QIcon:
         return QIcon(str(ICON))

@@ -18,6 +18,7 @@ from qgis.core import (
 from qgis.PyQt.QtGui import QIcon
 
 from .library import library_name
+from .pages import help_url
 from .styling import ICON
 
 
@@ -100,6 +101,9 @@ class UnavailableAlgorithm(QgsProcessingAlgorithm):
 
     def shortHelpString(self) -> str:
         return self._reason
+
+    def helpUrl(self) -> str:
+        return help_url("qgis")
 
     def icon(self) -> QIcon:
         return QIcon(str(ICON))
