@@ -141,8 +141,14 @@ class FileOut(OutputKind):
     """Any other file that is written."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class FolderOut(PathKind):
-    """A folder that is written into, made if it is missing."""
+    """A folder that is written into, made if it is missing.
+
+    Of what comes into it, rasters of the names `shows` can be looked at: the first on top.
+    """
+
+    shows: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,7 @@ from .dependencies import complaint, missing_for, rasterio_env
 from .library import LazyTool, errors, kinds, plugin_metadata, progress
 from .pages import help_url
 from .preselection import NOTHING, preselect
-from .results import forget_layers, show_report
+from .results import forget_layers, load_on_completion, show_report
 from .styling import ICON, LoadedLayers
 from .unavailable import UnavailableAlgorithm, broken, named_tools
 from .values import Reader, with_layers_as_files
@@ -173,6 +173,9 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
             if path is not None and isinstance(kind, (kinds.RasterOut, kinds.VectorOut)):
                 style = getattr(kind, "style", "")
                 layers.add(str(path), context, style, self._alike.get(parameter.name))
+            for name in getattr(kind, "shows", ()) if path is not None else ():
+                load_on_completion(path / name, context)
+                layers.add(str(path / name), context)
 
     def _results(self, values: dict[str, Any], summary: dict[str, Any]) -> dict[str, Any]:
         written = {
@@ -194,7 +197,8 @@ def _progress(feedback: QgsProcessingFeedback) -> Any:
         feedback.setProgress(100 * fraction)
         if message and message != last_message:
             last_message = message
-            feedback.pushInfo(message)
+            heard = feedback.pushWarning if message.startswith("warning: ") else feedback.pushInfo
+            heard(message)
 
     return progress.Progress(report, feedback.isCanceled)
 

@@ -37,6 +37,7 @@ def simulate(
             label="Folder",
             help="Gets reference.tif (SAR), input.tif (optical), dem.tif, truth.json, "
             "check_points.csv and roof_points.csv.",
+            shows=("input.tif", "reference.tif"),
         ),
     ],
     size: Size = 1000,
