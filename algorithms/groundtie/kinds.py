@@ -198,11 +198,13 @@ class Distance(Number):
 
 @dataclass(frozen=True, kw_only=True)
 class Choice(Kind):
-    """One of several words."""
+    """One of several words; tools' names among them may have hyphens, as on the command line."""
 
     choices: tuple[str, ...]
 
     def check(self, name: str, value: Any) -> str:
+        if isinstance(value, str) and value.replace("-", "_") in self.choices:
+            return value.replace("-", "_")
         if value not in self.choices:
             raise ParameterError(f"{name} must be one of {', '.join(self.choices)}, not {value!r}")
         return str(value)
