@@ -80,7 +80,7 @@ class CheckResiduals:
 
     @cached_property
     def neighbours(self) -> FloatArray:
-        """By how much two points count as neighbours, shape (n, n): their weights' product, or 0."""
+        """The product of weights of points that are neighbours, 0 of others, shape (n, n)."""
         if len(self.px) < 2:
             return np.zeros((len(self.px),) * 2)
         apart = np.hypot(*(self.px[:, None] - self.px).transpose(2, 0, 1))

@@ -125,9 +125,7 @@ class RefinementEvidence:
             max_error_px,
             _spread_px(adjustment, control.size),
             "the image",
-            predict_accuracy(
-                adjustment.fold_biases, _nodes(control.size), residuals, np.zeros(2)
-            ),
+            predict_accuracy(adjustment.fold_biases, _nodes(control.size), residuals, np.zeros(2)),
         )
         used_px = control.found_px[adjustment.used]
         return cls(

@@ -204,6 +204,7 @@ def _plot_axes(width_in: float) -> Any:
 
 
 def map_axes(grid: Grid) -> Any:
+    """Return axes whose edges are the grid's, rows downwards."""
     from matplotlib.figure import Figure
 
     inches = 8 / max(grid.width, grid.height)
@@ -216,6 +217,7 @@ def map_axes(grid: Grid) -> Any:
 def draw_arrows(
     axes: Any, start_px: FloatArray, vector_px: FloatArray, colour: str, strength: float = 1.0
 ) -> None:
+    """Draw arrows from positions of the grid, shape (n, 2), along vectors, shape (n, 2)."""
     axes.quiver(
         *start_px.T,
         *vector_px.T,
@@ -234,6 +236,7 @@ def draw_arrows(
 
 
 def draw_scale(axes: Any, arrows: Arrows, grid: Grid) -> None:
+    """Draw the arrow that a round residual has, at the lower left."""
     from matplotlib.patches import Rectangle
 
     unit = max(grid.width, grid.height) / 100
