@@ -209,7 +209,9 @@ def register(
     except (NothingFoundError, TooFewPointsError) as error:
         return replace(result, verdict=judge_search(SearchEvidence(error)))
     evidence = stages.evidence(estimate, check, surveys, scene)
-    return replace(result, verdict=judge(evidence), estimate=estimate, check=check)
+    return replace(
+        result, verdict=judge(evidence), estimate=estimate, check=check, survey=surveys[0]
+    )
 
 
 @dataclass(frozen=True)
