@@ -161,10 +161,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     ),
     "another transform": (evidence(beside(15, 20)), evidence(beside(20, 16))),
     "error at held-out points": (
-        evidence(scatter(72, 0.3) + [1.2, 0.0], max_error_px=1.0),
-        evidence(scatter(72, 0.3) + [1.2, 0.0], max_error_px=1.5),
+        evidence(scatter(72, 0.9), max_error_px=1.0),
+        evidence(scatter(72, 0.9), max_error_px=1.5),
     ),
-    "loose model": (evidence(GOOD, loose(2.0)), evidence(GOOD, loose(1.0))),
+    "uncertain transform": (evidence(GOOD, loose(2.0)), evidence(GOOD, loose(1.0))),
     "too little ground": (
         evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.08, "as in a dense town")),
         evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.12, "as in a dense town")),
@@ -274,6 +274,17 @@ def test_names_are_unique_and_stages_follow_one_another() -> None:
 def test_a_rule_states_its_limit_its_source_and_what_to_try(rule: Rule) -> None:
     for text in (rule.name, rule.refuses, rule.source, rule.advice):
         assert text and text == text.strip() and not text.endswith(".")
+
+
+def test_what_heights_may_displace_all_points_by_is_refused() -> None:
+    """Chips that scatter evenly along a line by ± n px may be n px off, all of them."""
+
+    def along(reach_px: float) -> RegistrationEvidence:
+        seen = survey()
+        return evidence(GOOD, survey=replace(seen, shifts_px=displaced(49, -reach_px, reach_px)))
+
+    assert refusing(along(2.0)) == []
+    assert refusing(along(3.5)) == ["uncertain transform"]
 
 
 @pytest.mark.parametrize("kind", [REGIONS, LAYER])

@@ -35,7 +35,7 @@ def test_the_verdict_comes_first(page: Page) -> None:
     assert "Check points confirm the registration." in page.text
     assert page.numbers == {
         "Error at check points (RMSE)": "0.61 px 6.10 m",
-        "90 % of errors within (CE90)": "0.93 px 9.30 m",
+        "Accuracy of the transform (CE90)": "0.93 px 9.30 m (0.70 to 1.40)",
         "Check points that agree": "8 of 9",
         "Agreement by chance": "1 in 1014",  # 10 to the 14th: the exponent is raised
         "Points used in the fit": "11 of 12",
@@ -44,7 +44,7 @@ def test_the_verdict_comes_first(page: Page) -> None:
         "Extrapolated": "18 % of the overlap",
     }
     assert [e.text for e in page.all("sup")] == ["14"]
-    assert "90 % of inliers lie within 0.93 px (9.30 m) of where" in page.text
+    assert "less than 0.93 px (9.30 m) with 90 %, by less than 0.45 px with 50 %" in page.text
     assert "18 % of the overlap lies outside" in page.text
 
 
@@ -181,8 +181,8 @@ def test_the_viewer_can_be_used_by_keyboard(page: Page) -> None:
 def test_figures_of_errors(page: Page) -> None:
     alts = [str(e.attributes["alt"]) for e in page.all("img")]
     assert any("11 of 12 points used in the fit, 8 of 9 check points agree" in a for a in alts)
-    assert any(a.startswith("Histogram") and "RMSE 0.61 px, CE90 0.93 px" in a for a in alts)
-    assert any("a circle of radius 0.93 px, the CE90" in a for a in alts)
+    assert any(a.startswith("Histogram") and "RMSE 0.61 px" in a for a in alts)
+    assert any("a circle that holds 90 % of them" in a for a in alts)
     # The figures reach to 3 px; one check point is 12.5 px off.
     assert "the 9 check points that were matched" in page.text
     assert "1 more than 3.0 px are not shown" in page.text

@@ -65,6 +65,8 @@ class Part:
         How many of those agree with the model.
     log10_false_alarms
         log10 of the expected number of such parts if all chips but these agreed by chance.
+    members
+        Which chips of the survey they are, by number.
     """
 
     where: str
@@ -73,6 +75,7 @@ class Part:
     surrounded: int
     confirming: int
     log10_false_alarms: float
+    members: tuple[int, ...] = ()
 
     @property
     def distance_px(self) -> float:
@@ -112,9 +115,14 @@ class Survey:
     mean: Surface
 
     @property
+    def is_confirming_chip(self) -> NDArray[np.bool_]:
+        """Which chips match where the model has them, shape (n,)."""
+        return np.asarray(np.hypot(*self.shifts_px.T) <= _SAME_PX)
+
+    @property
     def confirming(self) -> int:
         """How many chips match where the model has them."""
-        return int((np.hypot(*self.shifts_px.T) <= _SAME_PX).sum())
+        return int(self.is_confirming_chip.sum())
 
     @property
     def is_confirming(self) -> bool:
@@ -179,6 +187,7 @@ class Survey:
             surrounded,
             confirming,
             float(alarms),
+            tuple(int(chip) for chip in group),
         )
 
 
