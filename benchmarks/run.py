@@ -28,6 +28,7 @@ SUITES = (
     "rpc_city",
     "sar_sar",
     "speed",
+    "batch",
     "methods",
     "peaks",
     "fusion",

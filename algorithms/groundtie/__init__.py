@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .geometry.transform import load_transform
     from .tools.assess import assess
     from .tools.assess_sensor import assess_sensor
+    from .tools.batch import batch
     from .tools.coregister import coregister
     from .tools.detector_repeatability import detector_repeatability
     from .tools.estimate_rotation import estimate_rotation
@@ -43,6 +44,7 @@ __all__ = [
     "__version__",
     "assess",
     "assess_sensor",
+    "batch",
     "coregister",
     "detector_repeatability",
     "estimate_rotation",

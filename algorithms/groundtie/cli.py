@@ -46,7 +46,7 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
         try:
             group = _all_tools() if tools is None else _these_tools(tools)
             command = click.version_option(__version__, message="%(prog)s %(version)s")(group)
-            command.main(args, prog_name="groundtie", standalone_mode=False, obj=received)
+            code = command.main(args, prog_name="groundtie", standalone_mode=False, obj=received)
         except click.ClickException as error:
             return _fail(_usage(error), error.exit_code)
         except (CancelledError, KeyboardInterrupt) as error:
@@ -54,7 +54,7 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
             return _fail(str(error) or "cancelled", 128 + number)
         except GroundTieError as error:
             return _fail(error.one_line(), error.exit_code)
-    return 0
+    return int(code or 0)
 
 
 def _all_tools() -> ToolGroup:
@@ -190,7 +190,7 @@ class ToolCommand(click.Command):
             click.Option(["--quiet"], is_flag=True, help="Show no progress."),
         ]
 
-    def _run(self, as_json: bool, quiet: bool, **values: Any) -> None:
+    def _run(self, as_json: bool, quiet: bool, **values: Any) -> int:
         given = {name: value for name, value in values.items() if value is not None}
         checked = self.tool.check(given, spell=spelled)
         context = click.get_current_context()
@@ -207,6 +207,7 @@ class ToolCommand(click.Command):
             _echo_json(result.summary())
         else:
             click.echo("\n".join(result.lines()))
+        return getattr(result, "exit_code", 0)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the arguments, the options, and then the options for experts."""
@@ -279,6 +280,8 @@ def _synopsis(parameter: Parameter) -> str:
 
 def _describe(parameter: Parameter) -> str:
     notes = []
+    if isinstance(parameter.kind, Choice) and parameter.positional:
+        notes.append("|".join(parameter.kind.choices))
     if isinstance(parameter.kind, Number):
         notes += [note for note in (parameter.kind.unit, parameter.kind.range_text) if note]
     if isinstance(parameter.kind, Flag):

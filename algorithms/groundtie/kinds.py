@@ -141,8 +141,14 @@ class FileOut(OutputKind):
     """Any other file that is written."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class FolderOut(PathKind):
-    """A folder that is written into, made if it is missing."""
+    """A folder that is written into, made if it is missing.
+
+    Of what comes into it, rasters of the names `shows` can be looked at: the first on top.
+    """
+
+    shows: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,11 +198,13 @@ class Distance(Number):
 
 @dataclass(frozen=True, kw_only=True)
 class Choice(Kind):
-    """One of several words."""
+    """One of several words; tools' names among them may have hyphens, as on the command line."""
 
     choices: tuple[str, ...]
 
     def check(self, name: str, value: Any) -> str:
+        if isinstance(value, str) and value.replace("-", "_") in self.choices:
+            return value.replace("-", "_")
         if value not in self.choices:
             raise ParameterError(f"{name} must be one of {', '.join(self.choices)}, not {value!r}")
         return str(value)
@@ -218,6 +226,10 @@ class Text(Kind):
         if not isinstance(value, str):
             raise ParameterError(f"{name} must be a text, not {value!r}")
         return value
+
+
+class Crs(Text):
+    """A coordinate reference system: an authority's code or WKT."""
 
 
 @dataclass(frozen=True, kw_only=True)

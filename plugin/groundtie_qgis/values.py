@@ -66,6 +66,10 @@ class Reader:
             return self._vector(name, given)
         if isinstance(kind, kinds.MaskIn):
             return self._mask(kind, name, given)
+        if isinstance(kind, kinds.Choice):
+            return self._word(name)
+        if isinstance(kind, kinds.Crs):
+            return self._crs(name)
         read, context = self._method(kind)
         return read(self._parameters, name, context)
 
@@ -78,13 +82,19 @@ class Reader:
             return algorithm.parameterAsFileOutput, self._outputs
         if isinstance(kind, kinds.Flag):
             return algorithm.parameterAsBool, self._context
-        if isinstance(kind, kinds.Choice):
-            return algorithm.parameterAsEnumString, self._context
         if isinstance(kind, kinds.Band) or (isinstance(kind, kinds.Number) and kind.integer):
             return algorithm.parameterAsInt, self._context
         if isinstance(kind, kinds.Number):
             return algorithm.parameterAsDouble, self._context
         return algorithm.parameterAsString, self._context
+
+    def _word(self, name: str) -> str:
+        given = self._algorithm.parameterAsString(self._parameters, name, self._context)
+        return self._algorithm.parameterDefinition(name).word(given) or given
+
+    def _crs(self, name: str) -> str | None:
+        crs = self._algorithm.parameterAsCrs(self._parameters, name, self._context)
+        return (crs.authid() or crs.toWkt()) if crs.isValid() else None
 
     def _raster(self, kind: Any, name: str, given: Any) -> Any:
         layer = self._algorithm.parameterAsRasterLayer(self._parameters, name, self._context)

@@ -109,6 +109,17 @@ def open_pair(
         yield pair_images(opened[0], opened[1], spec, context, masks, stack, started)
 
 
+def _reach_notes(images: ImagePair, asked_m: float | None) -> list[str]:
+    """Return a warning where a search was asked for that goes beyond the images."""
+    reach_m = images.limits.radius
+    if asked_m is None or asked_m <= reach_m:
+        return []
+    return [
+        f"warning: a search radius of {asked_m:.6g} m reaches beyond the images: all shifts up to "
+        f"{reach_m:.4g} m are searched, which may take minutes; a smaller one is faster and safer"
+    ]
+
+
 def pair_images(
     reference: Image,
     input: Image,
@@ -134,7 +145,7 @@ def pair_images(
         0.0 if rotation_deg is None else rotation_deg,
         1.0 if scale is None else scale,
     )
-    for note in images.notes():
+    for note in (*_reach_notes(images, radius_m), *images.notes()):
         context.update(0.0, note)
     named = dict(zip((REFERENCE, INPUT), masks, strict=True))
     rasters = {

@@ -20,6 +20,7 @@ NAMES = (
     "orthorectify",
     "assess",
     "assess_sensor",
+    "batch",
     "similarity_surface",
     "detector_repeatability",
     "filter_speckle",
