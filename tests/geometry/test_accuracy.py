@@ -59,12 +59,10 @@ def test_an_error_that_no_block_shows_is_seen_by_check_points() -> None:
     assert accuracy.ce90_px > 2.0
 
 
-def test_heights_may_displace_all_points_by_the_width_that_they_spread_over() -> None:
+def test_heights_may_displace_all_points_evenly_up_to_the_largest() -> None:
     folds = [partial(np.add, (0.01 * k, 0.0)) for k in range(5)]
     check = CheckResiduals(CHECK, np.zeros_like(CHECK), np.ones(len(CHECK)))
-    # Evenly over a width of 4 px.
-    heights = 4.0 / math.sqrt(12) * np.array([0.6, 0.8])
-    accuracy = predict_accuracy(folds, PLACES, check, heights)
+    accuracy = predict_accuracy(folds, PLACES, check, 4.0 * np.array([0.6, 0.8]))
     assert accuracy.ce50_px == pytest.approx(2.0, rel=0.05)
     assert accuracy.ce90_px == pytest.approx(3.6, rel=0.05)
 

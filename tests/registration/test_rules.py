@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from evidences import (
     GRID,
+    RANGE,
     control,
     displaced,
     estimated,
@@ -285,6 +287,20 @@ def test_what_heights_may_displace_all_points_by_is_refused() -> None:
 
     assert refusing(along(2.0)) == []
     assert refusing(along(3.5)) == ["uncertain transform"]
+
+
+@pytest.mark.parametrize(
+    ("more", "expected_px"),
+    [({}, 6.0), ({"mask": masked(REGIONS)}, 3.0), ({"layover_factor": 3.0}, 6.0 * math.sqrt(3))],
+)
+def test_heights_that_spread_evenly_displace_by_their_width(
+    more: dict[str, Any], expected_px: float
+) -> None:
+    """Chips that spread by ± 3 px along the range: the ground is the lowest, or the middle."""
+    seen = replace(survey(), shifts_px=displaced(49, -3.0, 3.0))
+    found = evidence(GOOD, survey=seen, **more).displacement_px
+    assert np.hypot(*found) == pytest.approx(expected_px, rel=0.15)
+    assert abs(found @ RANGE) == pytest.approx(np.hypot(*found), rel=0.01)
 
 
 @pytest.mark.parametrize("kind", [REGIONS, LAYER])

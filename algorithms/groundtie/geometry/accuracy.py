@@ -18,9 +18,6 @@ from scipy.special import gammaincinv
 
 FloatArray = NDArray[np.float64]
 
-# What spreads evenly over a width has this standard deviation of it: 1 / √12.
-_WIDTH_OVER_SIGMA = math.sqrt(12)
-
 # Points at a side or a corner of each other are neighbours: √2 spacings are the farthest.
 _NEIGHBOUR_SPACINGS = 1.5
 
@@ -104,15 +101,14 @@ def predict_accuracy(
     fold_models: Sequence[Callable[[FloatArray], FloatArray]],
     places_px: FloatArray,
     check: CheckResiduals,
-    heights_px: FloatArray,
+    displacement_px: FloatArray,
 ) -> Accuracy:
     """Predict the error of a transform at a random one of some places.
 
     Its random part is that of the models without one block of points after the other
     ([Efron1993]), with the mean of two variances at the check points: theirs, and what the check
     points share. It has Student's distribution, with one degree of freedom less than there are
-    blocks. Its common part lies along the line that heights scatter points on: they spread
-    over a width, and the ground lies within as much of their middle, anywhere.
+    blocks. Its common part is what heights displace all points by: evenly up to the largest.
 
     Parameters
     ----------
@@ -122,9 +118,8 @@ def predict_accuracy(
         Places all over the overlap, shape (m, 2).
     check
         Points that took no part.
-    heights_px
-        Direction of displacement by heights, as long as the standard deviation of what they
-        scatter points by, shape (2,).
+    displacement_px
+        The most that heights may displace all points by, to either side, shape (2,).
     """
     count = len(fold_models)
     if count < 2 or len(check.px) == 0:
@@ -134,7 +129,7 @@ def predict_accuracy(
     random = np.random.default_rng(0)
     parts = random.standard_normal((_DRAWS, count)) * factor
     moved = np.einsum("dk,kmx->dmx", parts, _deviations(fold_models, places_px))
-    common = _WIDTH_OVER_SIGMA * random.uniform(-1, 1, (_DRAWS, 1, 1)) * heights_px
+    common = random.uniform(-1, 1, (_DRAWS, 1, 1)) * displacement_px
 
     def radii(scale: FloatArray | float, shares: Sequence[float]) -> list[float]:
         error = moved * scale + common

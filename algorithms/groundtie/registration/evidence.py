@@ -22,10 +22,10 @@ from ..geometry.judging import (
 )
 from ..geometry.robust import Mixture, fit_mixture
 from ..geometry.tie_points import TiePoints
-from ..masks.choice import NONE, MaskUsed
+from ..masks.choice import LAYER, NONE, REGIONS, MaskUsed
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..rasters.grid import FloatArray, Grid
-from .layover import scatter_along_line
+from .layover import EVEN_MEAN_OVER_SCATTER, scatter_along_line
 from .scene import SceneInfo
 
 # Stages of a registration, in the order in which their rules are asked.
@@ -190,18 +190,24 @@ class RegistrationEvidence:
                     self.residuals_px,
                     mixture.probability,
                 ),
-                self.heights_px,
+                self.displacement_px,
             ),
         )
 
     @property
-    def heights_px(self) -> FloatArray:
-        """What heights scatter matches by: their standard deviation, along their line, (2,)."""
+    def displacement_px(self) -> FloatArray:
+        """The most that heights may displace all matches by, to either side, shape (2,).
+
+        By what they scatter the survey's chips by: twice their mean where the ground may be the
+        lowest of what matched, their mean where a mask left more ground than heights.
+        """
         if self.survey is None or len(self.survey.shifts_px) == 0:
             return np.zeros(2)
         shifts = self.survey.shifts_px
         weights = self._mixture(shifts, SURVEY_RADIUS_PX).probability
-        return scatter_along_line(shifts, weights, _LOG10_SIGNIFICANCE)
+        scatter = scatter_along_line(shifts, weights, _LOG10_SIGNIFICANCE)
+        mean = (self.layover_factor or EVEN_MEAN_OVER_SCATTER) * scatter
+        return mean if self.mask.kind in (REGIONS, LAYER) else 2 * mean
 
     def _mixture(self, residuals_px: FloatArray, radius_px: int) -> Mixture:
         area = (2 * radius_px + 1) ** 2

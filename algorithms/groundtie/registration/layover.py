@@ -25,6 +25,9 @@ _LINE_PX = 1.0
 KEYPOINTS_MEAN_OVER_SCATTER = 3.0
 CHIPS_MEAN_OVER_SCATTER = 6.0
 
+# The same of heights that spread evenly from the ground up: mean over standard deviation.
+EVEN_MEAN_OVER_SCATTER = math.sqrt(3)
+
 
 def count_on_line(residuals_px: FloatArray, radius_px: int) -> int:
     """Return how many residuals beyond the tolerance lie on one line through zero.

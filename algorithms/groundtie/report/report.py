@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ..assessment.comparison import Comparison
+from ..assessment.comparison import Comparison, without_masks
 from ..assessment.point_errors import PointErrors
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
@@ -16,7 +16,7 @@ from ..rasters.pair import ImagePair
 from ..registration.verdict import Verdict
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
-from . import figures, pictures
+from . import details, figures, pictures
 from .correction import Correction
 from .page import Page
 from .parts import Parts
@@ -95,8 +95,16 @@ class Report(Page):
             "residuals": None if self.points is None else self._residual_figures(self.points),
             "surfaces": [_shown_surface(label, surface) for label, surface in self.surfaces],
             "scene": self.scene or {},
+            "details": self._details(),
             "parts": None if self.parts is None else self.parts.shown(),
         }
+
+    def _details(self) -> list[dict[str, Any]]:
+        """Return chips at full resolution; none without a transform."""
+        if self.transform is None or self.points is None:
+            return []
+        errors = PointErrors.on_grid(self.points, self.transform, self.pair.grid)
+        return details.shown(without_masks(self.pair), self.transform, errors)
 
     def _residual_figures(self, points: TiePoints) -> dict[str, Any]:
         """Return the figures that the points allow."""

@@ -5,6 +5,9 @@ for (const viewer of document.querySelectorAll(".viewer")) {
   const place = () => viewer.style.setProperty("--at", slider.value);
   slider.addEventListener("input", place);
   viewer.addEventListener("change", (event) => {
+    if (event.target.type === "checkbox") {
+      viewer.dataset[event.target.name] = event.target.checked ? "shown" : "hidden";
+    }
     if (event.target.type === "radio") viewer.dataset[event.target.name] = event.target.value;
   });
   const drag = (event) => {
