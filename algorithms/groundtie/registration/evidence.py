@@ -27,15 +27,16 @@ from ..rasters.grid import FloatArray, Grid
 from .scene import SceneInfo
 
 # Stages of a registration, in the order in which their rules are asked.
-TIE_POINTS, SEARCH, ASSESSMENT, AGREEMENT, ERROR, SCENE, REFINEMENT, POSE = (
+TIE_POINTS, SEARCH, ASSESSMENT, POSE, AGREEMENT, ERROR, SCENE, SURVEY, REFINEMENT = (
     "tie points",
     "search",
     "assessment",
+    "pose",
     "agreement",
     "error",
     "scene",
+    "survey",
     "refinement",
-    "pose",
 )
 
 _LATTICE = 9
@@ -146,7 +147,7 @@ class RegistrationEvidence:
     survey: Survey | None = None
     survey_of_rest: Survey | None = None
 
-    stages: ClassVar = (AGREEMENT, ERROR, SCENE)
+    stages: ClassVar = (AGREEMENT, ERROR, SCENE, SURVEY)
 
     @cached_property
     def counted(self) -> TiePoints:
