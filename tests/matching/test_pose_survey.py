@@ -23,7 +23,9 @@ def surveyed(folder: Path, pose: Pose, context: Context, **more: int) -> PoseSur
     """Survey a pair whose true pose is `TRUTH` around a pose."""
     with ExitStack() as stack:
         images = []
-        for name, window in zip("ri", turned_pair(TRUTH, (250, 250), (260, 260), **more), strict=True):
+        for name, window in zip(
+            "ri", turned_pair(TRUTH, (250, 250), (260, 260), **more), strict=True
+        ):
             values = np.clip(window.values, 1, 65_535).astype(np.uint16)
             path = write_raster(folder / f"{name}.tif", values)
             images.append(Image(stack.enter_context(open_raster(path))))
