@@ -19,6 +19,7 @@ from groundtie.kinds import (
     Number,
     OutputKind,
     RasterIn,
+    RastersIn,
     Text,
     VectorIn,
 )
@@ -149,6 +150,7 @@ def values(kind: Kind) -> str:
         FolderOut: "folder",
         MaskIn: "raster, vector layer or classifier",
         RasterIn: "raster",
+        RastersIn: "rasters",
         Text: "text",
         VectorIn: "vector layer",
     }

@@ -49,6 +49,7 @@ from groundtie.registration.evidence import (
 from groundtie.registration.pose_verdict import PoseEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
+from groundtie.registration.series_evidence import DateEvidence
 from groundtie.registration.tie_point_evidence import TiePointEvidence
 from groundtie.registration.verdict import Evidence, first_refusal
 
@@ -62,6 +63,7 @@ RANK = (
     stages.SCENE,
     stages.REFINEMENT,
     stages.POSE,
+    stages.SERIES,
 )
 
 # Dense towns: of a radar with speckle, of a radar whose speckle a filter took, of who knows what.
@@ -221,6 +223,19 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "pixel-locked pose": (
         replace(pose(), sameness=Sameness(0.2, 0.01, 0.3, 0.2, 0.05)),
         replace(pose(), sameness=Sameness(0.2, 0.01, 0.3, 0.5, 0.45)),
+    ),
+    "date not readable": (DateEvidence("no such file"), DateEvidence(links=1)),
+    "date not linked": (
+        DateEvidence(refusals=["nothing in common was found"], is_reached=False),
+        DateEvidence(refusals=["nothing in common was found"], links=1),
+    ),
+    "loops do not close": (
+        DateEvidence(links=1, rejected=1, open_loops=1, loops=1),
+        DateEvidence(links=2, rejected=1, open_loops=1, loops=2, is_confirmed=True),
+    ),
+    "one way alone": (
+        DateEvidence(links=1, is_refused_by_hub=True),
+        DateEvidence(links=2, is_refused_by_hub=True, is_confirmed=True),
     ),
 }
 

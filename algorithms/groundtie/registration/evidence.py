@@ -27,7 +27,7 @@ from ..rasters.grid import FloatArray, Grid
 from .scene import SceneInfo
 
 # Stages of a registration, in the order in which their rules are asked.
-TIE_POINTS, SEARCH, ASSESSMENT, AGREEMENT, ERROR, SCENE, REFINEMENT, POSE = (
+TIE_POINTS, SEARCH, ASSESSMENT, AGREEMENT, ERROR, SCENE, REFINEMENT, POSE, SERIES = (
     "tie points",
     "search",
     "assessment",
@@ -36,6 +36,7 @@ TIE_POINTS, SEARCH, ASSESSMENT, AGREEMENT, ERROR, SCENE, REFINEMENT, POSE = (
     "scene",
     "refinement",
     "pose",
+    "series",
 )
 
 _LATTICE = 9

@@ -12,6 +12,7 @@ NAMES = (
     "coregister",
     "match_sar_sar",
     "match_optical",
+    "coregister_series",
     "train_feature_classifier",
     "estimate_rotation",
     "warp",

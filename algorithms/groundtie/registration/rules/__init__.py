@@ -20,6 +20,7 @@ from .refinement import REFINEMENT_RULES
 from .rule import Rule
 from .scene import SCENE_RULES
 from .search import SEARCH_RULES
+from .series import SERIES_RULES
 from .survey import SURVEY_RULES
 from .tie_points import TIE_POINT_RULES
 
@@ -35,4 +36,5 @@ RULES: tuple[Rule, ...] = (
     *SURVEY_RULES,
     *REFINEMENT_RULES,
     *POSE_RULES,
+    *SERIES_RULES,
 )
