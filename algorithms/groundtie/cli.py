@@ -21,7 +21,7 @@ import click
 
 from .declaration import Parameter, Tool
 from .errors import CancelledError, GroundTieError, NotRegisteredError
-from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind
+from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind, RastersIn
 from .progress import Progress
 from .version import __version__
 
@@ -255,6 +255,8 @@ class KindType(click.ParamType):
 
 def _click_parameter(parameter: Parameter) -> click.Parameter:
     name, flag = parameter.name, spelled(parameter)
+    if parameter.positional and isinstance(parameter.kind, RastersIn):
+        return click.Argument([name], type=str, nargs=-1, required=True, metavar=f"{flag}…")
     if parameter.positional:
         return click.Argument([name], type=KindType(parameter), metavar=flag)
     need = {"required": True} if parameter.required else {"default": parameter.default}

@@ -22,7 +22,7 @@ TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
 def surveyed(folder: Path, pose: Pose, context: Context, **more: int) -> PoseSurvey:
     """Survey a pair whose true pose is `TRUTH` around a pose."""
     with ExitStack() as stack:
-        images, turned = [], turned_pair(TRUTH, (250, 250), (260, 260), **more)
+        images = []
         for name, window in zip(
             "ri", turned_pair(TRUTH, (250, 250), (260, 260), **more), strict=True
         ):

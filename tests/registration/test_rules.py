@@ -52,6 +52,7 @@ from groundtie.registration.evidence import (
 from groundtie.registration.pose_verdict import PoseEvidence, PoseSurveyEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
+from groundtie.registration.series_evidence import DateEvidence
 from groundtie.registration.tie_point_evidence import TiePointEvidence
 from groundtie.registration.verdict import Evidence, first_refusal
 
@@ -66,6 +67,7 @@ RANK = (
     stages.SCENE,
     stages.SURVEY,
     stages.REFINEMENT,
+    stages.SERIES,
 )
 
 # Dense towns: of a radar with speckle, of a radar whose speckle a filter took, of who knows what.
@@ -221,6 +223,19 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "bias not folded": (
         refinement(CONTROL, folding_px=0.02),
         refinement(CONTROL, folding_px=0.005),
+    ),
+    "date not readable": (DateEvidence("no such file"), DateEvidence(links=1)),
+    "date not linked": (
+        DateEvidence(refusals=["nothing in common was found"], is_reached=False),
+        DateEvidence(refusals=["nothing in common was found"], links=1),
+    ),
+    "loops do not close": (
+        DateEvidence(links=1, rejected=1, open_loops=1, loops=1),
+        DateEvidence(links=2, rejected=1, open_loops=1, loops=2, is_confirmed=True),
+    ),
+    "one way alone": (
+        DateEvidence(links=1, is_refused_by_hub=True),
+        DateEvidence(links=2, is_refused_by_hub=True, is_confirmed=True),
     ),
 }
 

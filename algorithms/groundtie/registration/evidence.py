@@ -29,7 +29,7 @@ from .layover import EVEN_MEAN_OVER_SCATTER, scatter_along_line
 from .scene import SceneInfo
 
 # Stages of a registration, in the order in which their rules are asked.
-TIE_POINTS, SEARCH, ASSESSMENT, POSE, AGREEMENT, ERROR, SCENE, SURVEY, REFINEMENT = (
+TIE_POINTS, SEARCH, ASSESSMENT, POSE, AGREEMENT, ERROR, SCENE, SURVEY, REFINEMENT, SERIES = (
     "tie points",
     "search",
     "assessment",
@@ -39,6 +39,7 @@ TIE_POINTS, SEARCH, ASSESSMENT, POSE, AGREEMENT, ERROR, SCENE, SURVEY, REFINEMEN
     "scene",
     "survey",
     "refinement",
+    "series",
 )
 
 _LATTICE = 9

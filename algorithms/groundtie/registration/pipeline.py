@@ -331,7 +331,7 @@ def _fit(
     """Return what fits the model, by the name of the specification's matcher."""
     layout = held_out.layout
     if spec.matcher == CHIPS:
-        return SurfaceFit(matcher, layout)
+        return SurfaceFit(matcher, layout, spec.candidates)
     presets = {KEYPOINTS: sar_keypoints, GUIDED_CHIPS: optical_keypoints}
     detector, descriptor = presets[spec.matcher]()
     masked = None if pair is images else pair

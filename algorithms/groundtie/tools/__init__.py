@@ -15,6 +15,7 @@ NAMES = (
     "coregister",
     "match_sar_sar",
     "match_optical",
+    "coregister_series",
     "train_feature_classifier",
     "estimate_rotation",
     "warp",
