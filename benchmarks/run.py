@@ -32,6 +32,7 @@ SUITES = (
     "peaks",
     "fusion",
     "optical",
+    "series",
     "attacks",
 )
 
