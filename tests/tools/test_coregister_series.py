@@ -197,29 +197,25 @@ def test_a_refused_series_leaves_its_report_and_exits_3(
 
 
 @pytest.mark.slow
-def test_a_damaged_file_costs_its_date_alone(tmp_path: Path) -> None:
-    dates = write_dates(tmp_path / "dates", 3, SIZE)
-    dates.files[1].write_bytes(b"no raster")
+def test_a_damaged_file_costs_its_date_alone_and_its_raster(run: Run, tmp_path: Path) -> None:
+    out, inputs = tmp_path / "out", tmp_path / "dates"
+    shutil.copytree(run.folder, out)
+    shutil.copytree(run.dates.folder, inputs)
+    names, damaged = run.dates.names, GOOD[-1]
+    assert (out / f"{names[damaged]}_registered.tif").is_file()
+    (inputs / run.dates.files[damaged].name).write_bytes(b"no raster")
     result = coregister_series(
-        tmp_path / "out", [dates.folder], reference=dates.files[0], **OPTIONS
+        out,
+        [path for k, path in enumerate(run.dates.files) if k != damaged]
+        + [inputs / run.dates.files[damaged].name],
+        reference=run.dates.files[0],
+        **OPTIONS,
     )
-    assert [one.name for one in result.registered] == [dates.names[2]]
-    (left,) = result.left_out
-    assert (left.name, left.verdict.rule) == (dates.names[1], "date not readable")
-
-
-@pytest.mark.slow
-def test_a_date_that_is_left_out_later_loses_its_raster(tmp_path: Path) -> None:
-    dates = write_dates(tmp_path / "dates", 3, SIZE)
-    out = tmp_path / "out"
-    coregister_series(out, [dates.folder], reference=dates.files[0], **OPTIONS)
-    raster = out / f"{dates.names[1]}_registered.tif"
-    assert raster.is_file()
-    other = write_dates(tmp_path / "other", 3, SIZE, elsewhere=[1])
-    shutil.copy(other.files[1], dates.files[1])
-    result = coregister_series(out, [dates.folder], reference=dates.files[0], **OPTIONS)
-    assert [one.name for one in result.left_out] == [dates.names[1]]
-    assert not raster.exists()
+    assert [one.name for one in result.registered] == [names[k] for k in GOOD[1:-1]]
+    left = {one.name: one.verdict.rule for one in result.left_out}
+    assert left[names[damaged]] == "date not readable"
+    # It must not lie there as if it was registered.
+    assert not (out / f"{names[damaged]}_registered.tif").exists()
 
 
 def test_cancelling_leaves_nothing(tmp_path: Path) -> None:
