@@ -276,7 +276,9 @@ class Stages:
         locked = find_locked_content(pair, transform, places, context.quiet())
         if locked is None or not locked.sameness.is_evident:
             return survey, None
-        return survey, survey_model(chips, transform.model, context.part(0.5, 1.0), locked)
+        # What a mask leaves is little: one measure alone would miss most of it.
+        rest = replace(chips, settings=SimilaritySettings())
+        return survey, survey_model(rest, transform.model, context.part(0.5, 1.0), locked)
 
     def evidence(
         self,
