@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +17,7 @@ from groundtie.geometry.tie_point_files import EDITED
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.grid import Grid
-from groundtie.review import MOST_SPLINE_POINTS, SWITCHED_OFF, Review, refine_click
+from groundtie.review import MOST_SPLINE_POINTS, SWITCHED_OFF, Review, refine_click, without_points
 from groundtie.tools.warp import warp
 
 CRS_33 = CRS.from_epsg(32633)
@@ -104,11 +103,7 @@ def test_points_of_a_person_are_marked_in_the_file_and_by_warp(tmp_path: Path) -
     ]
     # The georeferencing is off by SHIFT: what lies there is seen at these pixels.
     seen = true_input_px(reference_xy)
-    with rasterio.open(tmp_path / "input.tif") as source:
-        grid = Grid(source.transform, source.crs, source.width, source.height)
-    nothing = TiePoints.none()
-    review = Review(nothing, grid)
-    review = Review(Review(_with_crs(nothing, grid.crs), grid).points, grid)
+    review = without_points(tmp_path / "reference.tif", tmp_path / "input.tif")
     for xy, px in zip(reference_xy, seen, strict=True):
         review = review.add(xy, px)
     fit = review.fit("translation")
@@ -124,12 +119,6 @@ def test_points_of_a_person_are_marked_in_the_file_and_by_warp(tmp_path: Path) -
     assert "edited by hand: 4 points" in "\n".join(result.lines())
     shift = result.transform.nominal_xy(seen) - reference_xy
     np.testing.assert_allclose(shift, [SHIFT] * 4, atol=1e-6)
-
-
-def _with_crs(points: TiePoints, crs: Any) -> TiePoints:
-    from dataclasses import replace
-
-    return replace(points, crs=crs)
 
 
 def test_an_added_point_keeps_the_other_columns() -> None:

@@ -106,10 +106,19 @@ class Review:
         """Which points a person moved or added, shape (n,)."""
         return np.asarray(self.points.more.get(EDITED, np.zeros(len(self.points))) > 0)
 
+    @property
+    def nominal(self) -> Transform:
+        """The transform by the input's own georeferencing."""
+        return Transform.nominal(self.points.crs, self.input_grid)
+
     @cached_property
     def nominal_xy(self) -> FloatArray:
         """Nominal positions on the reference map, shape (n, 2)."""
-        return Transform.nominal(self.points.crs, self.input_grid).nominal_xy(self.points.input_px)
+        return self.nominal.nominal_xy(self.points.input_px)
+
+    def input_px(self, nominal_xy: ArrayLike) -> FloatArray:
+        """Return the input pixel (col, row) at a nominal position on the reference map."""
+        return self.nominal(np.asarray(nominal_xy, float).reshape(1, 2)).ravel()
 
     def switch(self, which: Sequence[int], on: bool) -> Review:
         """Return the review with points taking part, or not."""
@@ -218,6 +227,12 @@ class Review:
 
 def _root_mean_square(residuals: FloatArray) -> float:
     return float(np.sqrt(np.mean(residuals**2)))
+
+
+def without_points(reference: Any, input: Any) -> Review:
+    """Return the review of two images between which there are no points yet."""
+    with open_raster(reference) as one, open_raster(input) as other:
+        return Review(replace(TiePoints.none(), crs=one.grid.crs), other.grid)
 
 
 def refine_click(
