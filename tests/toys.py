@@ -149,5 +149,11 @@ def returning_toy(
 TOY: Tool = tool_of(toy)
 RETURNING_TOY: Tool = tool_of(returning_toy)
 
+
+def load_toy(name: str) -> Tool:
+    """Return a toy by its name, also in another process."""
+    return {tool.name: tool for tool in (TOY, RETURNING_TOY)}[name]
+
+
 if __name__ == "__main__":
     sys.exit(main(tools=[TOY]))

@@ -143,8 +143,10 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
             feedback.pushDebugInfo(traceback.format_exc())
             what = f"{type(error).__name__}: {error}"
             raise QgsProcessingException(f"this is a bug in GroundTie: {what}") from error
+        # A batch in which rows failed ran to its end, but not to a good one.
+        bad = getattr(result, "exit_code", 0) != 0
         for line in result.lines():
-            feedback.pushInfo(line)
+            feedback.reportError(line) if bad else feedback.pushInfo(line)
         self._finish_layers(values, context)
         return self._results(values, result.summary())
 
