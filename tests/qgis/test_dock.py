@@ -258,6 +258,7 @@ def test_repair_moves_switches_and_writes(
     assert after.left_out_px > before.left_out_px
     assert repair.review.edited[index]
     assert "1 set by hand" in repair.text.text()
+    assert "9 of 9 check points agree within 2 px" in repair.text.text()
     desktop.picture("5_dragged")
 
     # The worst stands first in the sorted table; switched off, it takes no part.
@@ -294,7 +295,7 @@ def test_a_point_is_added_by_a_click_in_each_image(
     repair.add.click()
     place = QgsPointXY(ORIGIN[0] + 200, ORIGIN[1] - 180)
     repair._clicked_on_map(place)
-    assert dock.overlay._layers == [repair._input]
+    assert [layer.source() for layer in dock.overlay._layers] == [repair._input.source()]
     desktop.picture("7_second_click")
     # Where the input's georeferencing has the place, and 3 px off.
     repair._clicked_on_map(QgsPointXY(place.x() + SHIFT[0] + 3, place.y() + SHIFT[1] - 2))
