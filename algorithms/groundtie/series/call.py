@@ -108,7 +108,7 @@ class SeriesCall:
         footprints = Footprints.of(dates, frame.grid.crs)
         matching = Matching(dates, footprints, frame, self.settings, stored.pairs, context)
         if hub is None:
-            hub, datum = matching.freely(), "so that their mean displacement is zero"
+            hub, datum = matching.freely(), "to each other (mean displacement zero)"
         else:
             matching.from_hub(hub)
             datum = f"to {home.name}"

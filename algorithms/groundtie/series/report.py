@@ -56,7 +56,7 @@ class SeriesReport(Page):
     def of(cls, series: Series) -> SeriesReport:
         """Return the report on a series."""
         given = {name: value for name, value in series.parameters.items() if value is not None}
-        title = f"Series of {len(series.dates)} dates, {series.datum}"
+        title = f"Series of {len(series.dates)} dates, registered {series.datum}"
         return cls(series, title, given, series.seconds)
 
     def numbers(self) -> dict[str, Any]:
@@ -155,7 +155,7 @@ def closure_figure(series: Series) -> Figure:
         if closures:
             places = [one.expected_px for one in closures], [one.error_px for one in closures]
             axes.plot(*places, mark, color=colour, ms=5, label=label)
-    reach = max(*axes.get_xlim(), 1e-6)
+    reach = 1.05 * max(*axes.get_xlim(), 1e-6)
     axes.plot([0, reach], [0, reach], color="#bbbbbb", lw=0.8, zorder=0)
     axes.set(xlim=(0, reach), ylim=(0, None), xlabel="expected (px)", ylabel="error of loop (px)")
     axes.legend(fontsize=8, edgecolor="white")
