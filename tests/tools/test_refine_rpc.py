@@ -251,6 +251,25 @@ def test_points_that_tell_too_little_are_refused(
     assert not (tmp_path / "refined.RPB").exists()
 
 
+def test_a_shift_by_surveyed_points_needs_no_spread(tmp_path: Path) -> None:
+    """Five of them, within a sixth of a side."""
+    files = write_points(tmp_path, bias_of("shift"), 5, corner=0.16)
+    refined, call = tmp_path / "refined.RPB", {"dem_datum": "ellipsoidal", **files}
+    with pytest.raises(NotRegisteredError, match="spread over"):
+        groundtie.refine_rpc(output=refined, **call)
+    result = groundtie.refine_rpc(output=refined, model="shift", **call)
+    assert result.judged.verdict.fit_points_used == 5
+    assert error_px(read_rpc(refined)) < 0.35
+
+
+def test_points_outside_of_the_image_count(tmp_path: Path) -> None:
+    """A surveyor's points of the whole strip serve for a part of it."""
+    files = write_points(tmp_path, bias_of("shift"), corner=3.0)
+    result = groundtie.refine_rpc(output=tmp_path / "refined.RPB", dem_datum="ellipsoidal", **files)
+    assert result.judged.verdict.fit_points_used == 40
+    assert error_px(read_rpc(tmp_path / "refined.RPB")) < 0.35
+
+
 def test_heights_that_contradict_the_terrain_model_are_told(tmp_path: Path) -> None:
     """The points have heights above the ellipsoid, the terrain model as said, too."""
     files = write_points(tmp_path, bias_of("shift"))
