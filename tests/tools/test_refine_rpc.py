@@ -63,6 +63,27 @@ def test_a_reference_and_a_terrain_model_make_the_rpcs_right(scene: Scene, tmp_p
     assert np.median(used) < 1.5
 
 
+@pytest.mark.slow
+def test_a_terrain_model_of_a_part_serves_for_matching_that_part(
+    scene: Scene, tmp_path: Path
+) -> None:
+    with rasterio.open(scene.dem) as dem:
+        profile, heights = dem.profile, dem.read(1)
+    profile["width"] = int(dem.width * 0.52)
+    with rasterio.open(tmp_path / "part.tif", "w", **profile) as part:
+        part.write(heights[:, : profile["width"]], 1)
+    result = groundtie.refine_rpc(
+        scene.image,
+        tmp_path / "refined_RPC.TXT",
+        scene.reference,
+        dem=tmp_path / "part.tif",
+        dem_datum="ellipsoidal",
+        model="shift_drift",
+    )
+    assert "part.tif above ellipsoidal, which covers" in result.ground
+    assert scene.error_px(read_rpc(tmp_path / "refined_RPC.TXT")) < 1.0
+
+
 def test_a_refused_matching_leaves_its_report(scene: Scene, tmp_path: Path) -> None:
     """The reference shows other ground."""
     with rasterio.open(scene.reference) as source:
