@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from evidences import (
     GRID,
+    RANGE,
     control,
     displaced,
     estimated,
@@ -38,7 +40,8 @@ from groundtie.errors import (
 )
 from groundtie.geometry.estimation import Estimate
 from groundtie.masks.choice import LAYER, REGIONS, THRESHOLD, MaskUsed
-from groundtie.matching.locked import Sameness
+from groundtie.matching.pose_survey import PoseSurvey
+from groundtie.matching.survey import Survey
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
 from groundtie.registration import rules
@@ -46,9 +49,10 @@ from groundtie.registration.evidence import (
     RegistrationEvidence,
     SearchEvidence,
 )
-from groundtie.registration.pose_verdict import PoseEvidence
+from groundtie.registration.pose_verdict import PoseEvidence, PoseSurveyEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
+from groundtie.registration.series_evidence import DateEvidence
 from groundtie.registration.tie_point_evidence import TiePointEvidence
 from groundtie.registration.verdict import Evidence, first_refusal
 
@@ -57,11 +61,13 @@ RANK = (
     stages.TIE_POINTS,
     stages.SEARCH,
     stages.ASSESSMENT,
+    stages.POSE,
     stages.AGREEMENT,
     stages.ERROR,
     stages.SCENE,
+    stages.SURVEY,
     stages.REFINEMENT,
-    stages.POSE,
+    stages.SERIES,
 )
 
 # Dense towns: of a radar with speckle, of a radar whose speckle a filter took, of who knows what.
@@ -154,6 +160,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "few held-out points": (assessed(FEW[:2]), assessed(FEW)),
     "few held-out inliers": (assessed(GOOD, 8), assessed(GOOD, 30)),
     "inconsistent ways": (assessed(GOOD, way=3.1), assessed(GOOD, way=2.9)),
+    "pose by chance": (pose(height=4.9, rival=3.0), pose(height=5.1, rival=3.0)),
+    "second pose": (pose(height=9.0, rival=5.7), pose(height=9.0, rival=5.5)),
+    # Three degrees move corners by 6 px, a degree by 2 px.
+    "other pose": (pose(found=Pose(43.0)), pose(found=Pose(41.0))),
     "chance agreement": (evidence(np.zeros((2, 2))), evidence(np.zeros((3, 2)))),
     "small share of check points": (
         evidence(np.concatenate([scatter(14, 0.3), fallen(58)])),
@@ -161,10 +171,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     ),
     "another transform": (evidence(beside(15, 20)), evidence(beside(20, 16))),
     "error at held-out points": (
-        evidence(scatter(72, 0.3) + [1.2, 0.0], max_error_px=1.0),
-        evidence(scatter(72, 0.3) + [1.2, 0.0], max_error_px=1.5),
+        evidence(scatter(72, 0.9), max_error_px=1.0),
+        evidence(scatter(72, 0.9), max_error_px=1.5),
     ),
-    "loose model": (evidence(GOOD, loose(2.0)), evidence(GOOD, loose(1.0))),
+    "uncertain transform": (evidence(GOOD, loose(2.0)), evidence(GOOD, loose(1.0))),
     "too little ground": (
         evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.08, "as in a dense town")),
         evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.12, "as in a dense town")),
@@ -214,13 +224,18 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         refinement(CONTROL, folding_px=0.02),
         refinement(CONTROL, folding_px=0.005),
     ),
-    "pose by chance": (pose(height=4.9, rival=3.0), pose(height=5.1, rival=3.0)),
-    "second pose": (pose(height=9.0, rival=5.7), pose(height=9.0, rival=5.5)),
-    # Three degrees move corners by 6 px, a degree by 2 px.
-    "other pose": (pose(found=Pose(43.0)), pose(found=Pose(41.0))),
-    "pixel-locked pose": (
-        replace(pose(), sameness=Sameness(0.2, 0.01, 0.3, 0.2, 0.05)),
-        replace(pose(), sameness=Sameness(0.2, 0.01, 0.3, 0.5, 0.45)),
+    "date not readable": (DateEvidence("no such file"), DateEvidence(links=1)),
+    "date not linked": (
+        DateEvidence(refusals=["nothing in common was found"], is_reached=False),
+        DateEvidence(refusals=["nothing in common was found"], links=1),
+    ),
+    "loops do not close": (
+        DateEvidence(links=1, rejected=1, open_loops=1, loops=1),
+        DateEvidence(links=2, rejected=1, open_loops=1, loops=2, is_confirmed=True),
+    ),
+    "one way alone": (
+        DateEvidence(links=1, is_refused_by_hub=True),
+        DateEvidence(links=2, is_refused_by_hub=True, is_confirmed=True),
     ),
 }
 
@@ -274,6 +289,31 @@ def test_names_are_unique_and_stages_follow_one_another() -> None:
 def test_a_rule_states_its_limit_its_source_and_what_to_try(rule: Rule) -> None:
     for text in (rule.name, rule.refuses, rule.source, rule.advice):
         assert text and text == text.strip() and not text.endswith(".")
+
+
+def test_what_heights_may_displace_all_points_by_is_refused() -> None:
+    """Chips that scatter evenly along a line by ± n px may be n px off, all of them."""
+
+    def along(reach_px: float) -> RegistrationEvidence:
+        seen = survey()
+        return evidence(GOOD, survey=replace(seen, shifts_px=displaced(49, -reach_px, reach_px)))
+
+    assert refusing(along(2.0)) == []
+    assert refusing(along(3.5)) == ["uncertain transform"]
+
+
+@pytest.mark.parametrize(
+    ("more", "expected_px"),
+    [({}, 6.0), ({"mask": masked(REGIONS)}, 3.0), ({"layover_factor": 3.0}, 6.0 * math.sqrt(3))],
+)
+def test_heights_that_spread_evenly_displace_by_their_width(
+    more: dict[str, Any], expected_px: float
+) -> None:
+    """Chips that spread by ± 3 px along the range: the ground is the lowest, or the middle."""
+    seen = replace(survey(), shifts_px=displaced(49, -3.0, 3.0))
+    found = evidence(GOOD, survey=seen, **more).displacement_px
+    assert np.hypot(*found) == pytest.approx(expected_px, rel=0.15)
+    assert abs(found @ RANGE) == pytest.approx(np.hypot(*found), rel=0.01)
 
 
 @pytest.mark.parametrize("kind", [REGIONS, LAYER])
@@ -343,9 +383,35 @@ def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list
 def test_only_rules_of_the_evidence_are_asked() -> None:
     """Rules of agreement and error judge refinements, too; those of scenes do not."""
     assert SearchEvidence.stages == (stages.SEARCH,)
-    assert RegistrationEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.SCENE)
+    assert RegistrationEvidence.stages == (
+        stages.AGREEMENT,
+        stages.ERROR,
+        stages.SCENE,
+        stages.SURVEY,
+    )
     assert RefinementEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.REFINEMENT)
     assert PoseEvidence.stages == (stages.POSE,)
+    assert PoseSurveyEvidence.stages == (stages.AGREEMENT, stages.SURVEY)
+
+
+@pytest.mark.parametrize(
+    ("agreeing", "found", "rest", "expected"),
+    [
+        (7, survey(), None, []),
+        (5, survey(), None, ["small share of check points"]),
+        (4, survey(), None, ["chance agreement", "small share of check points"]),
+        (7, survey(35, part=14), None, ["part elsewhere"]),
+        (7, survey(height=4.0, rival=3.5), None, ["second place nearby"]),
+        (7, survey(height=1.9, rival=0.5), None, ["weak similarity"]),
+        (7, survey(), survey(5), ["pixel-locked content"]),
+    ],
+)
+def test_rules_of_registrations_judge_poses(
+    agreeing: int, found: Survey, rest: Survey | None, expected: list[str]
+) -> None:
+    """Of 21 chips, about as many agree as at the worst real pose that is right."""
+    errors = np.where(np.arange(21) < agreeing, 4.9, 5.1)
+    assert refusing(PoseSurveyEvidence(PoseSurvey(errors, found, rest))) == expected
 
 
 def test_a_failure_that_is_no_refusal_decides_nothing() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..context import Context, threads
-from ..errors import NotRegisteredError, SameFileError
+from ..errors import NotRegisteredError
 from ..geometry.tie_point_files import write_tie_points
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
@@ -25,24 +25,12 @@ from .user_masks import UserMask
 
 @dataclass(frozen=True)
 class RegistrationFiles:
-    """The files of a registration; None: not asked for.
-
-    Raises
-    ------
-    SameFileError
-        The transform would be written where the report's numbers go.
-    """
+    """The files of a registration; None: not asked for."""
 
     output: RegisteredOutput | None = None
     tie_points: Path | None = None
     transform: Path | None = None
     report: Path | None = None
-
-    def __post_init__(self) -> None:
-        if self.report is not None and self.report.with_suffix(".json") == self.transform:
-            raise SameFileError(
-                f"the transform would be written over the report's numbers: {self.transform}"
-            )
 
     def named(self, registration: Registration) -> dict[str, Path]:
         """Return what `write` writes of a registration, by name."""
@@ -62,7 +50,7 @@ class RegistrationFiles:
                 self._write_results(registration, outputs, context)
             # Last: who finds it finds all that it is about.
             if self.report is not None:
-                registration.page().write(outputs, self.report)
+                registration.page().write(outputs, self.report, self.transform)
 
     def _write_results(
         self, registration: Registration, outputs: Outputs, context: Context

@@ -110,6 +110,17 @@ def open_pair(
         yield pair_images(opened[0], opened[1], spec, context, masks, stack, started)
 
 
+def _reach_notes(images: ImagePair, asked_m: float | None) -> list[str]:
+    """Return a warning where a search was asked for that goes beyond the images."""
+    reach_m = images.limits.radius
+    if asked_m is None or asked_m <= reach_m:
+        return []
+    return [
+        f"warning: a search radius of {asked_m:.6g} m reaches beyond the images: all shifts up to "
+        f"{reach_m:.4g} m are searched, which may take minutes; a smaller one is faster and safer"
+    ]
+
+
 def pair_images(
     reference: Image,
     input: Image,
@@ -135,7 +146,7 @@ def pair_images(
         0.0 if rotation_deg is None else rotation_deg,
         1.0 if scale is None else scale,
     )
-    for note in images.notes():
+    for note in (*_reach_notes(images, radius_m), *images.notes()):
         context.update(0.0, note)
     pair, used = with_user_masks(images, named_masks(masks), stack, context.part(0.0, 0.02))
     require_one_mask(spec.mask, used)
@@ -189,7 +200,9 @@ def register(
     except (NothingFoundError, TooFewPointsError) as error:
         return replace(result, verdict=judge_search(SearchEvidence(error)))
     evidence = stages.evidence(estimate, check, surveys, scene)
-    return replace(result, verdict=judge(evidence), estimate=estimate, check=check)
+    return replace(
+        result, verdict=judge(evidence), estimate=estimate, check=check, survey=surveys[0]
+    )
 
 
 @dataclass(frozen=True)
@@ -309,7 +322,7 @@ def _fit(
     """Return what fits the model, by the name of the specification's matcher."""
     layout = held_out.layout
     if spec.matcher == CHIPS:
-        return SurfaceFit(matcher, layout)
+        return SurfaceFit(matcher, layout, spec.candidates)
     presets = {KEYPOINTS: sar_keypoints, GUIDED_CHIPS: optical_keypoints}
     detector, descriptor = presets[spec.matcher]()
     masked = None if pair is images else pair

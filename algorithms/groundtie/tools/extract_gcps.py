@@ -79,7 +79,7 @@ def extract_gcps(
 ) -> GcpResult:
     """Extract ground control for an image with RPCs from a reference image and a terrain model.
 
-    The image is projected onto the reference's map by its RPCs and matched there as coregister
+    The image is projected onto the reference's map by its RPCs and matched there as `coregister`
     does; what is found is carried back into the image. A coarse error of the RPCs within the search
     radius is found first. Held-out points decide whether the points can be trusted; if not,
     nothing is written.

@@ -56,7 +56,7 @@ def register(
     """Register an image to another one of the same place; the images decide how.
 
     Radar images, a camera's images and pairs of both are matched as match_sar_sar, match_optical
-    and coregister do; if that is refused, another way that makes sense is tried, and rotation and
+    and `coregister` do; if that is refused, another way that makes sense is tried, and rotation and
     scale are searched for. An image with RPCs has them refined, and is orthorectified, by a
     terrain model if one is given. The result names what was tried, and why; the probability of
     agreement by chance counts all of it. A refused registration writes no image.
