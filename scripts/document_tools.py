@@ -20,6 +20,7 @@ from groundtie.kinds import (
     Number,
     OutputKind,
     RasterIn,
+    RastersIn,
     Text,
     VectorIn,
 )
@@ -151,6 +152,7 @@ def values(kind: Kind) -> str:
         FolderOut: "folder",
         MaskIn: "raster, vector layer or classifier",
         RasterIn: "raster",
+        RastersIn: "rasters",
         Text: "text",
         VectorIn: "vector layer",
     }

@@ -18,6 +18,7 @@ from scripts.calibration_figures import calibration
 from scripts.drawing import Scenes, write
 from scripts.feature_figures import features, hog, masks
 from scripts.search_figures import propagation, rotation, search, similarity
+from scripts.series_figures import series
 from scripts.verdict_figures import pipeline, rpc, survey, verdict
 
 FIGURES = Path(__file__).resolve().parents[1] / "docs" / "figures"
@@ -33,6 +34,7 @@ DRAWN: Mapping[str, Callable[[Scenes], Figure]] = {
     "method-masks": masks,
     "method-rotation": rotation,
     "method-rpc": rpc,
+    "method-series": series,
     "method-survey": survey,
     "method-verdict": verdict,
 }

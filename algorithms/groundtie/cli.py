@@ -21,7 +21,7 @@ import click
 
 from .declaration import Parameter, Tool
 from .errors import CancelledError, GroundTieError, NotRegisteredError
-from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind
+from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind, RastersIn
 from .progress import Progress
 from .version import __version__
 
@@ -58,14 +58,14 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
 
 
 def _all_tools() -> ToolGroup:
-    from .tools import NAMES, load_tool
+    from .tools import NAMES, load_tool, summary_of
 
-    return ToolGroup(NAMES, load_tool)
+    return ToolGroup(NAMES, load_tool, summary_of)
 
 
 def _these_tools(tools: Sequence[Tool]) -> ToolGroup:
     by_name = {tool.name: tool for tool in tools}
-    return ToolGroup(tuple(by_name), by_name.__getitem__)
+    return ToolGroup(tuple(by_name), by_name.__getitem__, lambda name: by_name[name].summary)
 
 
 def _fail(message: str, exit_code: int) -> int:
@@ -117,7 +117,12 @@ def _signals() -> Iterator[list[int]]:
 class ToolGroup(click.Group):
     """The command `groundtie`; a tool is loaded, with all that it imports, when it is needed."""
 
-    def __init__(self, names: Sequence[str], load: Callable[[str], Tool]) -> None:
+    def __init__(
+        self,
+        names: Sequence[str],
+        load: Callable[[str], Tool],
+        summarise: Callable[[str], str],
+    ) -> None:
         super().__init__(
             "groundtie",
             help="Register satellite images to one another.",
@@ -133,7 +138,7 @@ class ToolGroup(click.Group):
             context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
         )
         self._names = {_command_name(name): name for name in names}
-        self._load = load
+        self._load, self._summarise = load, summarise
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of the tools in the order in which they are declared."""
@@ -143,6 +148,12 @@ class ToolGroup(click.Group):
         """Return the command of a tool; None if there is no such tool."""
         name = self._names.get(cmd_name)
         return None if name is None else ToolCommand(self._load(name))
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write a line for each tool; none of them is loaded for it."""
+        rows = [(command, self._summarise(name)) for command, name in self._names.items()]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
 
 
 def _command_name(tool: str) -> str:
@@ -181,7 +192,6 @@ class ToolCommand(click.Command):
         super().__init__(
             _command_name(tool.name),
             help=f"{tool.summary}\n\n{tool.description}",
-            short_help=tool.summary,
             params=[_click_parameter(parameter) for parameter in tool.parameters],
             callback=self._run,
         )
@@ -245,6 +255,8 @@ class KindType(click.ParamType):
 
 def _click_parameter(parameter: Parameter) -> click.Parameter:
     name, flag = parameter.name, spelled(parameter)
+    if parameter.positional and isinstance(parameter.kind, RastersIn):
+        return click.Argument([name], type=str, nargs=-1, required=True, metavar=f"{flag}…")
     if parameter.positional:
         return click.Argument([name], type=KindType(parameter), metavar=flag)
     need = {"required": True} if parameter.required else {"default": parameter.default}

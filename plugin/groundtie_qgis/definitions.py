@@ -19,6 +19,7 @@ from qgis.core import (
     QgsProcessingParameterFileDestination,
     QgsProcessingParameterFolderDestination,
     QgsProcessingParameterMapLayer,
+    QgsProcessingParameterMultipleLayers,
     QgsProcessingParameterNumber,
     QgsProcessingParameterRasterDestination,
     QgsProcessingParameterRasterLayer,
@@ -63,6 +64,13 @@ def _make(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinit
 @_make.register(kinds.RasterIn)
 def _raster_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     return QgsProcessingParameterRasterLayer(name, kind.label, optional=not parameter.required)
+
+
+@_make.register(kinds.RastersIn)
+def _rasters_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterMultipleLayers(
+        name, kind.label, layerType=compat.RASTER, optional=not parameter.required
+    )
 
 
 @_make.register(kinds.VectorIn)

@@ -21,14 +21,17 @@ _LOCK = threading.RLock()
 
 
 # What only some of the tools need, or only some of their outputs: by the endings of files.
-_NEEDED_BY_TOOL = {"train_feature_classifier": ("scikit-learn",)}
+_NEEDED_BY_TOOL = {
+    "train_feature_classifier": ("scikit-learn",),
+    "coregister_series": ("shapely", "fiona"),
+}
 _NEEDED_BY_FILE = {
     ".html": ("jinja2", "matplotlib"),
     ".png": ("matplotlib",),
     ".gpkg": ("fiona",),
 }
 # rasterio needs click itself; the tools do not.
-_NOT_BY_ALL = {"click", "scikit-learn", "jinja2", "matplotlib", "fiona"}
+_NOT_BY_ALL = {"click", "scikit-learn", "jinja2", "matplotlib", "fiona", "shapely"}
 
 
 def missing_packages() -> list[str]:

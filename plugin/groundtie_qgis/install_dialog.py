@@ -30,7 +30,7 @@ class InstallDialog(QDialog):
         self._folder, self._finished = folder, finished
         self._command = pip_command(missing_requirements(), folder)
         self._process = QProcess(self)
-        self._process.setProcessChannelMode(QProcess.MergedChannels)
+        self._process.setProcessChannelMode(QProcess.ProcessChannelMode.MergedChannels)
         self._process.readyRead.connect(self._show_output)
         self._process.finished.connect(self._end)
         self._process.errorOccurred.connect(self._fail)
@@ -40,11 +40,11 @@ class InstallDialog(QDialog):
         layout = QVBoxLayout(self)
         self.text = QLabel(self._question())
         self.text.setWordWrap(True)
-        self.text.setTextInteractionFlags(Qt.TextSelectableByMouse)
+        self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.log = QPlainTextEdit(as_typed(self._command) if missing_requirements() else "")
         self.log.setReadOnly(True)
-        self.buttons = QDialogButtonBox(QDialogButtonBox.Cancel)
-        self.install = self.buttons.addButton("Install", QDialogButtonBox.ActionRole)
+        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+        self.install = self.buttons.addButton("Install", QDialogButtonBox.ButtonRole.ActionRole)
         self.install.setEnabled(bool(missing_requirements()))
         self.install.clicked.connect(self._start)
         self.buttons.rejected.connect(self.reject)
@@ -75,7 +75,7 @@ class InstallDialog(QDialog):
         self.log.appendPlainText(text.rstrip())
 
     def _fail(self, error: Any) -> None:
-        if error == QProcess.FailedToStart:
+        if error == QProcess.ProcessError.FailedToStart:
             self.text.setText(f"Python was not found: {self._command[0]} cannot be started.")
 
     def _end(self, code: int, *_: Any) -> None:
@@ -85,12 +85,12 @@ class InstallDialog(QDialog):
             self.install.setEnabled(True)
             return
         self.text.setText("All is installed. GroundTie's tools are ready.")
-        self.buttons.button(QDialogButtonBox.Cancel).setText("Close")
+        self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setText("Close")
         self._finished()
 
     def reject(self) -> None:
         """Close; a pip that runs is stopped."""
-        if self._process.state() != QProcess.NotRunning:
+        if self._process.state() != QProcess.ProcessState.NotRunning:
             self._process.kill()
             self._process.waitForFinished(3000)
         super().reject()

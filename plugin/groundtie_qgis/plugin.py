@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from qgis.core import QgsApplication
-from qgis.PyQt.QtCore import QUrl
+from qgis.PyQt.QtCore import Qt, QUrl
 from qgis.PyQt.QtGui import QDesktopServices, QIcon
 from qgis.PyQt.QtWidgets import QAction
 
@@ -35,6 +35,7 @@ class GroundTiePlugin:
         self._iface = iface
         self._packages = packages
         self.actions: list[QAction] = []
+        self.dock: Any = None
 
     def initProcessing(self) -> None:
         """Register the provider (qgis_process calls this and nothing else)."""
@@ -44,6 +45,8 @@ class GroundTiePlugin:
     def initGui(self) -> None:
         """Start in the desktop."""
         self.initProcessing()
+        self._add_action("Register and review…", self.toggle_dock)
+        self._iface.addToolBarIcon(self.actions[0])
         self._add_action("Install what is missing…", self.install)
         self._add_action("Help", self.show_help)
         if self.provider is not None and self.provider.warningMessage():
@@ -54,13 +57,33 @@ class GroundTiePlugin:
         """Take the provider and the menu away again."""
         for action in self.actions:
             self._iface.removePluginRasterMenu(MENU, action)
+        if self.actions:
+            self._iface.removeToolBarIcon(self.actions[0])
+        if self.dock is not None:
+            self.dock.take_away()
+            self._iface.removeDockWidget(self.dock)
+            self.dock = None
         self.actions = []
         self._remove_provider()
+
+    def toggle_dock(self) -> None:
+        """Open the dock, or close it."""
+        if self.provider is not None and self.provider.warningMessage():
+            self.install()
+            return
+        if self.dock is None:
+            from .dock import GroundTieDock
+
+            self.dock = GroundTieDock(self._iface)
+            self._iface.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, self.dock)
+            self.dock.show()
+            return
+        self.dock.setVisible(not self.dock.isVisible())
 
     def install(self) -> None:
         """Offer to install what is missing."""
         dialog = InstallDialog(self._packages, self._start_again, self._iface.mainWindow())
-        dialog.exec_()
+        dialog.exec()
 
     def show_help(self) -> None:
         """Open the page on the plugin."""

@@ -62,6 +62,8 @@ class Reader:
             return None
         if isinstance(kind, kinds.RasterIn):
             return self._raster(kind, name, given)
+        if isinstance(kind, kinds.RastersIn):
+            return self._rasters(kind, name, given)
         if isinstance(kind, kinds.VectorIn):
             return self._vector(name, given)
         if isinstance(kind, kinds.MaskIn):
@@ -100,13 +102,14 @@ class Reader:
         layer = self._algorithm.parameterAsRasterLayer(self._parameters, name, self._context)
         if layer is None:
             return given  # the library reports better than QGIS what is wrong with it
-        provider = layer.providerType()
-        if provider != "gdal":
-            raise errors.ParameterError(
-                f"{kind.label} must be a raster file, not the layer {layer.name()} of the "
-                f"provider {provider}; export it to a file first"
-            )
-        return _without_options(layer.source())
+        return _file_of(layer, kind)
+
+    def _rasters(self, kind: Any, name: str, given: Any) -> Any:
+        layers = self._algorithm.parameterAsLayerList(self._parameters, name, self._context)
+        names = [given] if isinstance(given, str) else list(given)
+        if len(layers) < len(names):
+            return names  # folders, patterns and tables are no layers
+        return [_file_of(layer, kind) for layer in layers]
 
     def _mask(self, kind: Any, name: str, given: Any) -> Any:
         if isinstance(given, str) and Path(given).is_file():
@@ -168,6 +171,17 @@ def _snapshot(layer: QgsVectorLayer, label: str, context: QgsProcessingContext) 
     if failed:
         raise errors.ParameterError(f"{label}: the layer {layer.name()} cannot be read: {message}")
     return str(path)
+
+
+def _file_of(layer: Any, kind: Any) -> str:
+    """Return the file of a raster layer; raise `ParameterError` if it has none."""
+    provider = layer.providerType()
+    if provider != "gdal":
+        raise errors.ParameterError(
+            f"{kind.label} must be a raster file, not the layer {layer.name()} of the "
+            f"provider {provider}; export it to a file first"
+        )
+    return _without_options(layer.source())
 
 
 def _without_options(source: str) -> str:

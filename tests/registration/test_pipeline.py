@@ -29,7 +29,7 @@ from groundtie.matching.surface_fit import SurfaceFit
 from groundtie.progress import Progress
 from groundtie.registration import masks, pipeline, verdict
 from groundtie.registration import scene as scene_module
-from groundtie.registration.evidence import AGREEMENT, ERROR, REFINEMENT, SCENE, SEARCH
+from groundtie.registration.evidence import AGREEMENT, ERROR, REFINEMENT, SCENE, SEARCH, SURVEY
 from groundtie.registration.masks import Masked
 from groundtie.registration.pipeline import Stages, mask_pair, open_pair, run
 from groundtie.registration.registration import Registration
@@ -236,7 +236,7 @@ def refused_by_house_rules(
     return house.asked
 
 
-SEARCHED, CHECKED = (SEARCH,), (AGREEMENT, ERROR, SCENE)
+SEARCHED, CHECKED = (SEARCH,), (AGREEMENT, ERROR, SCENE, SURVEY)
 
 
 @pytest.mark.parametrize("tool", [*PRESETS, "register"])

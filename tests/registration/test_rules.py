@@ -40,7 +40,8 @@ from groundtie.errors import (
 )
 from groundtie.geometry.estimation import Estimate
 from groundtie.masks.choice import LAYER, REGIONS, THRESHOLD, MaskUsed
-from groundtie.matching.locked import Sameness
+from groundtie.matching.pose_survey import PoseSurvey
+from groundtie.matching.survey import Survey
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
 from groundtie.registration import rules
@@ -48,9 +49,10 @@ from groundtie.registration.evidence import (
     RegistrationEvidence,
     SearchEvidence,
 )
-from groundtie.registration.pose_verdict import PoseEvidence
+from groundtie.registration.pose_verdict import PoseEvidence, PoseSurveyEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
+from groundtie.registration.series_evidence import DateEvidence
 from groundtie.registration.tie_point_evidence import TiePointEvidence
 from groundtie.registration.verdict import Evidence, first_refusal
 
@@ -59,11 +61,13 @@ RANK = (
     stages.TIE_POINTS,
     stages.SEARCH,
     stages.ASSESSMENT,
+    stages.POSE,
     stages.AGREEMENT,
     stages.ERROR,
     stages.SCENE,
+    stages.SURVEY,
     stages.REFINEMENT,
-    stages.POSE,
+    stages.SERIES,
 )
 
 # Dense towns: of a radar with speckle, of a radar whose speckle a filter took, of who knows what.
@@ -156,6 +160,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "few held-out points": (assessed(FEW[:2]), assessed(FEW)),
     "few held-out inliers": (assessed(GOOD, 8), assessed(GOOD, 30)),
     "inconsistent ways": (assessed(GOOD, way=3.1), assessed(GOOD, way=2.9)),
+    "pose by chance": (pose(height=4.9, rival=3.0), pose(height=5.1, rival=3.0)),
+    "second pose": (pose(height=9.0, rival=5.7), pose(height=9.0, rival=5.5)),
+    # Three degrees move corners by 6 px, a degree by 2 px.
+    "other pose": (pose(found=Pose(43.0)), pose(found=Pose(41.0))),
     "chance agreement": (evidence(np.zeros((2, 2))), evidence(np.zeros((3, 2)))),
     "small share of check points": (
         evidence(np.concatenate([scatter(14, 0.3), fallen(58)])),
@@ -216,13 +224,18 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         refinement(CONTROL, folding_px=0.02),
         refinement(CONTROL, folding_px=0.005),
     ),
-    "pose by chance": (pose(height=4.9, rival=3.0), pose(height=5.1, rival=3.0)),
-    "second pose": (pose(height=9.0, rival=5.7), pose(height=9.0, rival=5.5)),
-    # Three degrees move corners by 6 px, a degree by 2 px.
-    "other pose": (pose(found=Pose(43.0)), pose(found=Pose(41.0))),
-    "pixel-locked pose": (
-        replace(pose(), sameness=Sameness(0.2, 0.01, 0.3, 0.2, 0.05)),
-        replace(pose(), sameness=Sameness(0.2, 0.01, 0.3, 0.5, 0.45)),
+    "date not readable": (DateEvidence("no such file"), DateEvidence(links=1)),
+    "date not linked": (
+        DateEvidence(refusals=["nothing in common was found"], is_reached=False),
+        DateEvidence(refusals=["nothing in common was found"], links=1),
+    ),
+    "loops do not close": (
+        DateEvidence(links=1, rejected=1, open_loops=1, loops=1),
+        DateEvidence(links=2, rejected=1, open_loops=1, loops=2, is_confirmed=True),
+    ),
+    "one way alone": (
+        DateEvidence(links=1, is_refused_by_hub=True),
+        DateEvidence(links=2, is_refused_by_hub=True, is_confirmed=True),
     ),
 }
 
@@ -370,9 +383,35 @@ def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list
 def test_only_rules_of_the_evidence_are_asked() -> None:
     """Rules of agreement and error judge refinements, too; those of scenes do not."""
     assert SearchEvidence.stages == (stages.SEARCH,)
-    assert RegistrationEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.SCENE)
+    assert RegistrationEvidence.stages == (
+        stages.AGREEMENT,
+        stages.ERROR,
+        stages.SCENE,
+        stages.SURVEY,
+    )
     assert RefinementEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.REFINEMENT)
     assert PoseEvidence.stages == (stages.POSE,)
+    assert PoseSurveyEvidence.stages == (stages.AGREEMENT, stages.SURVEY)
+
+
+@pytest.mark.parametrize(
+    ("agreeing", "found", "rest", "expected"),
+    [
+        (7, survey(), None, []),
+        (5, survey(), None, ["small share of check points"]),
+        (4, survey(), None, ["chance agreement", "small share of check points"]),
+        (7, survey(35, part=14), None, ["part elsewhere"]),
+        (7, survey(height=4.0, rival=3.5), None, ["second place nearby"]),
+        (7, survey(height=1.9, rival=0.5), None, ["weak similarity"]),
+        (7, survey(), survey(5), ["pixel-locked content"]),
+    ],
+)
+def test_rules_of_registrations_judge_poses(
+    agreeing: int, found: Survey, rest: Survey | None, expected: list[str]
+) -> None:
+    """Of 21 chips, about as many agree as at the worst real pose that is right."""
+    errors = np.where(np.arange(21) < agreeing, 4.9, 5.1)
+    assert refusing(PoseSurveyEvidence(PoseSurvey(errors, found, rest))) == expected
 
 
 def test_a_failure_that_is_no_refusal_decides_nothing() -> None:

@@ -29,6 +29,7 @@ from groundtie.registration.evidence import (
     AGREEMENT,
     ERROR,
     SCENE,
+    SURVEY,
     RegistrationEvidence,
     SearchEvidence,
 )
@@ -231,7 +232,7 @@ def test_what_the_model_predicts_is_judged_not_the_nominal_place() -> None:
     assert not judged(check_points(scatter(40, 0.3)), moved).accepted
 
 
-@pytest.mark.parametrize("stage", [AGREEMENT, ERROR, SCENE])
+@pytest.mark.parametrize("stage", [AGREEMENT, ERROR, SCENE, SURVEY])
 def test_a_rule_at_any_stage_refuses(stage: str, monkeypatch: pytest.MonkeyPatch) -> None:
     rule = Rule("house rule", stage, "all", "this test", "go", lambda _: "forbidden")
     good = evidence(scatter(72, 0.3))

@@ -55,7 +55,7 @@ class Comparison:
         masks = {}
         if pair.reference.mask is not None:
             masks["reference"] = _tint(reference, pair.reference_patch(grid))
-        ways = {"nominal": pair.nominal_px}
+        ways: dict[str, pictures.ToPixel] = {"nominal": pair.nominal_px}
         if to_input_px is not None:
             ways["registered"] = pictures.overview_positions(to_input_px, grid)
         for name, to_px in ways.items():

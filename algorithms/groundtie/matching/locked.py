@@ -20,9 +20,6 @@ from ..rasters.patch import Patch
 from ..similarity.sameness import Gradients, count_same, reduced, same_windows, without
 from .matcher import FloatArray, Places
 
-# A pose may be wrong by so much.
-_NEAR_PX = 3
-
 # A transform that moves all of the overlap by whole pixels, but for this, may be content's.
 _LARGEST_BEND_PX = 1.5
 
@@ -138,41 +135,6 @@ def find_locked_content(
 
     looks = list(context.map(look, list(places.centres)))
     return LockedContent(pair, offset, _sameness(looks))
-
-
-def sameness_near(reference: Patch, input: Patch, offset_px: NDArray[np.int_]) -> Sameness:
-    """Return how much two whole images have the same, at the best offset near one.
-
-    Parameters
-    ----------
-    reference, input
-        The images, without georeferencing.
-    offset_px
-        Input (col, row) − reference (col, row).
-    """
-    near = np.arange(-_NEAR_PX, _NEAR_PX + 1)
-    offsets = [offset_px + (x, y) for y in near for x in near]
-    strong = tuple(_strong([Gradients.of(image)]) for image in (reference, input))
-
-    def share(offset: NDArray[np.int_]) -> float:
-        one, other = (Gradients.of(image) for image in _overlap(reference, input, offset))
-        return _share([count_same(one, other, (strong[0], strong[1]))])
-
-    return _sameness([_Look.of(*_overlap(reference, input, max(offsets, key=share)))])
-
-
-def _overlap(reference: Patch, input: Patch, offset_px: NDArray[np.int_]) -> tuple[Patch, Patch]:
-    """Return what two images show of each other where the input lies at an offset."""
-    low = np.maximum(-offset_px, 0)
-    sizes = [np.array(image.values.shape[::-1]) for image in (reference, input)]
-    high = np.maximum(np.minimum(sizes[0], sizes[1] - offset_px), low)
-
-    def cut(image: Patch, by: NDArray[np.int_]) -> Patch:
-        (left, top), (right, bottom) = low + by, high + by
-        window = np.s_[top:bottom, left:right]
-        return Patch(image.values[window], image.valid[window])
-
-    return cut(reference, np.zeros(2, int)), cut(input, offset_px)
 
 
 def _sameness(looks: list[_Look]) -> Sameness:

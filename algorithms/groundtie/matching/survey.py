@@ -106,6 +106,8 @@ class Survey:
     mean
         The mean of their similarity surfaces, in robust standard deviations of one of them, shape
         (2 r + 1, 2 r + 1).
+    claimed_px
+        Chips nearer to where the model has them lie where it claims.
     """
 
     grid: Grid
@@ -113,6 +115,7 @@ class Survey:
     shifts_px: FloatArray
     spacing_px: FloatArray
     mean: Surface
+    claimed_px: float = 2 * _SAME_PX
 
     @property
     def is_confirming_chip(self) -> NDArray[np.bool_]:
@@ -142,7 +145,7 @@ class Survey:
     @property
     def rival_height(self) -> float:
         """How high it is where all of them are moved elsewhere, at the best such place."""
-        return float(self.mean[self._distance_px > 2 * _SAME_PX].max())
+        return float(self.mean[self._distance_px > self.claimed_px].max())
 
     @property
     def _distance_px(self) -> FloatArray:
@@ -152,7 +155,7 @@ class Survey:
     @cached_property
     def parts(self) -> Sequence[Part]:
         """Groups of neighbours that agree with each other, not with the model, largest first."""
-        free = np.hypot(*self.shifts_px.T) > 2 * _SAME_PX
+        free = np.hypot(*self.shifts_px.T) > self.claimed_px
         found = []
         while free.any():
             groups = [self._group(int(seed), free) for seed in np.flatnonzero(free)]
@@ -219,7 +222,12 @@ def survey_places(grid: Grid) -> Places:
 
 
 def survey_model(
-    matcher: ChipMatcher, model: Model, context: Context, without: MaskOf | None = None
+    matcher: ChipMatcher,
+    model: Model,
+    context: Context,
+    without: MaskOf | None = None,
+    places: Places | None = None,
+    claimed_px: float = 2 * _SAME_PX,
 ) -> Survey:
     """Match chips all over a pair around what a model on the map predicts.
 
@@ -233,13 +241,18 @@ def survey_model(
         Threads and progress.
     without
         Returns for a piece of the grid which pixels of the reference are left out; None: none.
+    places
+        The chips, on a regular layout; None: side by side on the matching grid.
+    claimed_px
+        See `Survey`.
     """
-    grid, places = matcher.pair.grid, survey_places(matcher.pair.grid)
+    places = places or survey_places(matcher.pair.grid)
     blind = replace(matcher, held_out=without)
     kept, surfaces = blind.match_forward(model, places, SURVEY_RADIUS_PX, context)
     shifts = np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
     spacing = [float(np.diff(np.unique(places.centres[:, axis])).max(initial=1)) for axis in (0, 1)]
-    return Survey(grid, kept, shifts, np.array(spacing), surfaces.sum(axis=0) / max(len(kept), 1))
+    mean = surfaces.sum(axis=0) / max(len(kept), 1)
+    return Survey(places.grid, kept, shifts, np.array(spacing), mean, claimed_px)
 
 
 def _along(size: int, chip_px: int) -> NDArray[np.int_]:

@@ -14,21 +14,15 @@ from typing import Any
 
 from ..context import Context, threads
 from ..errors import GeoreferencingError, ParameterError
-from ..geometry.estimation import Estimate
-from ..geometry.tie_points import TiePoints
-from ..masks.choice import AUTO, NONE, MaskUsed
-from ..pose.rotation_windows import read_windows
-from ..pose.search import find_poses
+from ..masks.choice import AUTO
 from ..progress import Progress
 from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster
 from ..sensor.rpc_files import rpc_of
-from ..similarity.surface import SimilaritySettings
 from .delivery import Call
-from .evidence import SCENE
+from .evidence import SCENE, SURVEY
 from .orthorectification import Orthorectification
-from .pipeline import OpenPair, run
-from .pose_verdict import judge_pose
+from .pipeline import run
 from .registration import Registration
 from .rules import RULES
 from .scene import SceneInfo
@@ -44,7 +38,7 @@ _DOUBTED_DEG, _DOUBTED_SCALE = 10.0, 1.1
 _ANYWHERE = FreeSearch(0.25, 180.0, 2.0)
 
 # Rules of the scene refuse what matches well, but not the ground: no other matcher may try again.
-_FINAL = {rule.name for rule in RULES if rule.stage == SCENE}
+_FINAL = {rule.name for rule in RULES if rule.stage in (SCENE, SURVEY)}
 
 
 @dataclass(frozen=True)
@@ -94,7 +88,10 @@ def plan(scene: SceneInfo, is_georeferenced: bool) -> tuple[Try, ...]:
     else:
         wider = replace(first.spec, free=_ANYWHERE)
         because = "with any rotation and scale"
-    return (*tries, Try(first.name, wider, because))
+    tries.append(Try(first.name, wider, because))
+    if not is_georeferenced and first.name != chips.name:
+        tries.append(replace(chips, spec=replace(chips.spec, free=_ANYWHERE), because=because))
+    return tuple(tries)
 
 
 @dataclass(frozen=True)
@@ -148,13 +145,6 @@ def _first_accepted(
             tried.append(_line(way.name, way.because, found[-1].verdict))
             if found[-1].verdict.accepted or found[-1].verdict.rule in _FINAL:
                 break
-        last = found[-1].verdict
-        if not is_georeferenced and not last.accepted and last.rule not in _FINAL:
-            pose = _by_pose(opened, scene, len(ways) + 1, context)
-            if pose is not None:
-                found.append(pose)
-                because = "the images have no georeferencing"
-                tried.append(_line("estimate_rotation", because, pose.verdict))
         chosen = found[-1] if found[-1].verdict.accepted else found[0]
         if found[-1].verdict.rule in _FINAL:
             chosen = found[-1]
@@ -165,26 +155,6 @@ def _first_accepted(
 def _line(name: str, because: str, verdict: Verdict) -> str:
     word = "accepted" if verdict.accepted else f"refused ({verdict.reason})"
     return f"{name}, as {because}: {word}"
-
-
-def _by_pose(
-    opened: OpenPair, scene: SceneInfo, tries: int, context: Context
-) -> Registration | None:
-    """Return what an exhaustive search over rotation, scale and shift finds; None: nothing."""
-    pair = opened.pair
-    quiet = context.quiet()
-    windows = read_windows(pair.reference, pair.input, (1 / _ANYWHERE.scale, _ANYWHERE.scale))
-    limits = windows.limits(180.0, (1 / _ANYWHERE.scale, _ANYWHERE.scale))
-    images = windows.reference, windows.input
-    found = find_poses(*images, limits, SimilaritySettings(), quiet)
-    if not found:
-        return None
-    judged = judge_pose(*images, limits, found, True, quiet)
-    verdict = Verdict(judged.accepted, judged.reason, rule=judged.rule, advice=judged.advice)
-    estimate = Estimate(windows.transform(found[0].pose), TiePoints.none(), ())
-    spec = replace(COREGISTER, tries=tries)
-    used = MaskUsed(NONE, None, 1.0, "as rotation is searched for")
-    return Registration(pair, spec, scene, used, verdict, estimate, started=opened.started)
 
 
 def _needs_rpcs(raster: Any) -> bool:
@@ -210,6 +180,7 @@ def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> Orthorectifie
         "image": given["input"],
         "image_band": given["input_band"],
         "image_mask": given["input_mask"],
+        "image_mask_values": given["input_mask_values"],
         "residuals": given["tie_points"],
     }
     output = Path(given["output"])

@@ -20,6 +20,7 @@ from .pipeline import OpenPair, open_pair, pair_images, run
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import Registration
 from .specification import Specification
+from .user_masks import UserMask
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class Call:
             given["input"],
             RegistrationFiles(output, given["tie_points"], given["transform"], given["report"]),
             (given["reference_band"], given["input_band"]),
-            (given["reference_mask"], given["input_mask"]),
+            asked_masks(given, "input"),
             parameters,
             given["workers"],
             progress,
@@ -169,7 +170,12 @@ class Call:
 
 
 # What tools may leave out that do not ask for it.
-_USUAL: Mapping[str, Any] = {"output_grid": "reference", "resampling": "cubic"}
+_USUAL: Mapping[str, Any] = {
+    "output_grid": "reference",
+    "resampling": "cubic",
+    "reference_mask_values": None,
+    "input_mask_values": None,
+}
 
 
 def register_as(
@@ -192,6 +198,15 @@ def register_as(
         The registration was refused.
     """
     return Call.of(parameters, progress).register(specified(preset, parameters))
+
+
+def asked_masks(given: Mapping[str, Any], image: str) -> tuple[UserMask | None, UserMask | None]:
+    """Return the masks of the reference and of `image`, by the values of a tool's parameters."""
+    reference, other = (
+        UserMask.of(given[name], given[f"{name}_mask"], given[f"{name}_mask_values"])
+        for name in ("reference", image)
+    )
+    return reference, other
 
 
 def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specification:

@@ -29,15 +29,17 @@ from .layover import EVEN_MEAN_OVER_SCATTER, scatter_along_line
 from .scene import SceneInfo
 
 # Stages of a registration, in the order in which their rules are asked.
-TIE_POINTS, SEARCH, ASSESSMENT, AGREEMENT, ERROR, SCENE, REFINEMENT, POSE = (
+TIE_POINTS, SEARCH, ASSESSMENT, POSE, AGREEMENT, ERROR, SCENE, SURVEY, REFINEMENT, SERIES = (
     "tie points",
     "search",
     "assessment",
+    "pose",
     "agreement",
     "error",
     "scene",
+    "survey",
     "refinement",
-    "pose",
+    "series",
 )
 
 _LATTICE = 9
@@ -154,7 +156,7 @@ class RegistrationEvidence:
     survey: Survey | None = None
     survey_of_rest: Survey | None = None
 
-    stages: ClassVar = (AGREEMENT, ERROR, SCENE)
+    stages: ClassVar = (AGREEMENT, ERROR, SCENE, SURVEY)
 
     @cached_property
     def counted(self) -> TiePoints:

@@ -18,7 +18,7 @@ from ..features.presets import optical_keypoints, sar_keypoints
 from ..geometry.estimation import Estimate
 from ..geometry.judging import LARGEST_LOG10_CHANCE, LOG10_CHANCE_ON_GROUND
 from ..geometry.models import Model
-from ..masks.choice import INPUT, REFERENCE, MaskUsed
+from ..masks.choice import MaskUsed
 from ..matching.alignment import LINEAR_CANDIDATES
 from ..matching.check import CHECK_RADIUS_PX, Check, check_model
 from ..matching.chips import ChipMatcher
@@ -36,10 +36,11 @@ from ..rasters.reading import bounded_cache, open_raster
 from ..similarity.surface import SimilaritySettings
 from .evidence import RegistrationEvidence, SearchEvidence
 from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
-from .masks import Masked, is_raster_mask, require_one_mask, with_ground_mask, with_user_masks
+from .masks import Masked, require_one_mask, with_ground_mask
 from .registration import Registration
 from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
+from .user_masks import named_masks, with_user_masks
 from .verdict import judge, judge_search
 
 
@@ -97,8 +98,8 @@ def open_pair(
     bands
         Numbers of the bands that are matched, from 1; None: the mean of all.
     masks
-        For each image a raster whose zeros take no part, a vector layer of what takes part, or a
-        classifier; None: all takes part.
+        For each image a `UserMask`, or a raster whose zeros take no part, a vector layer of what
+        takes part, or a classifier; None: all takes part.
     """
     started = time.perf_counter()
     with ExitStack() as stack:
@@ -147,17 +148,7 @@ def pair_images(
     )
     for note in (*_reach_notes(images, radius_m), *images.notes()):
         context.update(0.0, note)
-    named = dict(zip((REFERENCE, INPUT), masks, strict=True))
-    rasters = {
-        name: stack.enter_context(open_raster(mask))
-        for name, mask in named.items()
-        if is_raster_mask(mask)
-    }
-    pair = replace(
-        images,
-        **{name: replace(getattr(images, name), mask=mask) for name, mask in rasters.items()},
-    )
-    pair, used = with_user_masks(pair, named, stack, context.part(0.0, 0.02))
+    pair, used = with_user_masks(images, named_masks(masks), stack, context.part(0.0, 0.02))
     require_one_mask(spec.mask, used)
     return OpenPair(images, pair, used, stack, started)
 
@@ -285,7 +276,9 @@ class Stages:
         locked = find_locked_content(pair, transform, places, context.quiet())
         if locked is None or not locked.sameness.is_evident:
             return survey, None
-        return survey, survey_model(chips, transform.model, context.part(0.5, 1.0), locked)
+        # What a mask leaves is little: one measure alone would miss most of it.
+        rest = replace(chips, settings=SimilaritySettings())
+        return survey, survey_model(rest, transform.model, context.part(0.5, 1.0), locked)
 
     def evidence(
         self,
@@ -331,7 +324,7 @@ def _fit(
     """Return what fits the model, by the name of the specification's matcher."""
     layout = held_out.layout
     if spec.matcher == CHIPS:
-        return SurfaceFit(matcher, layout)
+        return SurfaceFit(matcher, layout, spec.candidates)
     presets = {KEYPOINTS: sar_keypoints, GUIDED_CHIPS: optical_keypoints}
     detector, descriptor = presets[spec.matcher]()
     masked = None if pair is images else pair

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
@@ -9,17 +10,21 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..context import Context
+from ..geometry.chance import agreement_probability, log10_chance
+from ..geometry.judging import LARGEST_LOG10_CHANCE
 from ..geometry.limits import SearchLimits
-from ..matching.locked import Sameness, sameness_near
+from ..masks.choice import NONE, MaskUsed
+from ..matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey, survey_pose
+from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..pose.pose import Pose, PoseFound
+from ..pose.rotation_windows import PoseWindows
 from ..pose.search import find_poses, moved_px
+from ..rasters.pair import Image, make_pair
 from ..rasters.patch import Patch
 from ..similarity.surface import SimilaritySettings
-from .evidence import POSE
+from .evidence import AGREEMENT, POSE, SURVEY, HeldOut
+from .rules.pose import SAME_SHARE
 from .verdict import first_refusal
-
-# A pose is a shift if rotation and scale move no corner by more, in pixels: it is no better known.
-_SHIFT_PX = 6.0
 
 
 @dataclass(frozen=True)
@@ -34,14 +39,11 @@ class PoseEvidence:
         Those of an exhaustive search over all rotations, best first.
     shape
         Rows and columns of the reference.
-    sameness
-        How much both have the same where the pose does no more than move the array; None: it does.
     """
 
     found: Sequence[PoseFound]
     exhaustive: Sequence[PoseFound]
     shape: tuple[int, int]
-    sameness: Sameness | None = None
 
     stages: ClassVar = (POSE,)
 
@@ -124,8 +126,7 @@ def judge_pose(
         wide = SearchLimits(limits.radius, 180.0, (min(low, 0.8), max(high, 1.25)))
         everything = find_poses(reference, input, wide, SimilaritySettings(), context)
     rows, cols = reference.values.shape
-    sameness = _sameness(reference, input, found[0].pose) if found else None
-    evidence = PoseEvidence(found, everything, (rows, cols), sameness)
+    evidence = PoseEvidence(found, everything, (rows, cols))
     refusal = first_refusal(evidence)
     height, ratio = evidence.height, evidence.rival_ratio
     if refusal is None:
@@ -134,11 +135,77 @@ def judge_pose(
     return PoseVerdict(False, reason, height, ratio, rule.name, rule.advice)
 
 
-def _sameness(reference: Patch, input: Patch, pose: Pose) -> Sameness | None:
-    """Return how much two images have the same under a pose; None: it is no shift of the array."""
-    shapes = reference.values.shape, input.values.shape
-    shift = replace(pose, rotation_deg=0.0, scale=1.0)
-    if moved_px(pose, shift, shapes[0]) > _SHIFT_PX:
-        return None
-    between = shift.between(*shapes)
-    return sameness_near(reference, input, np.rint([between.c, between.f]).astype(int))
+@dataclass(frozen=True)
+class PoseSurveyEvidence:
+    """What chips all over a pair show of a pose that a search found.
+
+    Parameters
+    ----------
+    found
+        What they show.
+    """
+
+    found: PoseSurvey
+
+    stages: ClassVar = (AGREEMENT, SURVEY)
+    mask: ClassVar = MaskUsed(NONE, None, 1.0, "a pose is searched for without a mask")
+
+    @property
+    def survey(self) -> Survey:
+        """Where the chips match around the pose."""
+        return self.found.survey
+
+    @property
+    def survey_of_rest(self) -> Survey | None:
+        """The same without content that is the same in both arrays."""
+        return self.found.survey_of_rest
+
+    @property
+    def held_out(self) -> HeldOut:
+        """How each chip agrees with the pose as the others have it."""
+        agrees = self.found.errors_px <= POSE_TOLERANCE_PX
+        agreeing, total = int(agrees.sum()), len(agrees)
+        probability = agreement_probability(POSE_TOLERANCE_PX, SURVEY_RADIUS_PX)
+        return HeldOut(
+            "chips all over",
+            agreeing,
+            total,
+            min(log10_chance(agreeing, total, probability), 0.0),
+            LARGEST_LOG10_CHANCE,
+            float(np.sqrt(np.mean(self.found.errors_px[agrees] ** 2))) if agreeing else math.nan,
+            POSE_TOLERANCE_PX,
+            math.nan,
+            "the overlap",
+        )
+
+
+def confirm_pose(
+    verdict: PoseVerdict,
+    images: tuple[Image, Image],
+    windows: PoseWindows,
+    pose: Pose,
+    context: Context,
+) -> PoseVerdict:
+    """Return the verdict on a pose that the search believes, by chips all over the images.
+
+    Parameters
+    ----------
+    verdict
+        That of the search, which accepted it.
+    images
+        Reference and input.
+    windows
+        What the pose was found in.
+    pose
+        The pose.
+    context
+        Threads to work in.
+    """
+    scale = max(pose.scale, 1 / pose.scale)
+    pair = make_pair(*images, None, windows.radius_m, 180.0, scale)
+    found = survey_pose(pair, windows.transform(pose), SAME_SHARE, context)
+    refusal = first_refusal(PoseSurveyEvidence(found))
+    if refusal is None:
+        return verdict
+    rule, reason = refusal
+    return replace(verdict, accepted=False, reason=reason, rule=rule.name, advice=rule.advice)

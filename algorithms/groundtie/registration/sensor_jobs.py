@@ -19,6 +19,7 @@ from ..sensor.adjustment import Adjustment
 from ..sensor.control_points import ControlPoints, read_control_points
 from ..sensor.height_check import HeightCheck
 from ..sensor.rpc_fit import RPCFit
+from .delivery import asked_masks
 from .ground_control import GroundControl, match_ground_control, require_crs
 from .refinement import Refinement
 from .refinement_output import Call, RefinementFiles
@@ -219,5 +220,5 @@ def _matched(
         matching_pixel_size_m=given["matching_pixel_size"],
     )
     bands = given["reference_band"], given["image_band"]
-    masks = given["reference_mask"], given["image_mask"]
+    masks = asked_masks(given, "image")
     return sensor, match_ground_control(sensor, reference, spec, bands, masks, stack, context)

@@ -103,7 +103,7 @@ def surface_uri(surface: Surface) -> str:
     low, high = float(surface.min()), float(surface.max())
     levels = ((surface - low) / max(high - low, 1e-9) * 255).astype(np.uint8)
     colours = cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS)
-    return png_uri(colours)
+    return png_uri(np.asarray(colours, np.uint8))
 
 
 def png_uri(picture: Picture) -> str:

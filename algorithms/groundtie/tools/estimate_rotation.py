@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +20,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.pair import Image
 from ..rasters.reading import bounded_cache, open_raster
-from ..registration.pose_verdict import PoseVerdict, judge_pose
+from ..registration.pose_verdict import PoseVerdict, confirm_pose, judge_pose
 from ..registration.verdict import Verdict
 from ..report.rotation_picture import draw_rotation
 from ..similarity.surface import SimilaritySettings
@@ -187,24 +187,35 @@ def estimate_rotation(
     what is found is a start for a registration, not its end.
 
     Whatever the search, its pose is accepted only if an exhaustive search over all rotations
-    finds it, too, and nothing nearly as good elsewhere.
+    finds it, too, and nothing nearly as good elsewhere, and if pieces all over the images match
+    there, each by itself.
     """
     if smallest_scale > largest_scale:
         raise ParameterError("the smallest scale is larger than the largest")
     settings = SimilaritySettings(_similarity(search, similarity))
     scales = smallest_scale, largest_scale
-    with threads(workers, progress) as context, Outputs() as outputs:
+    with (
+        threads(workers, progress) as context,
+        Outputs() as outputs,
+        bounded_cache(),
+        ExitStack() as opened,
+    ):
         context.update(0.0, "reading")
         rasters = (reference, reference_band), (input, input_band)
-        windows = _read(rasters, scales, search_radius)
+        own, other = (
+            Image(opened.enter_context(open_raster(path)), band) for path, band in rasters
+        )
+        windows = read_windows(own, other, scales, search_radius)
         pair, limits = (windows.reference, windows.input), windows.limits(largest_rotation, scales)
         context.update(0.1, "searching")
         found = SEARCHES[search](*pair, limits, settings, context.quiet())
         context.update(0.5, "checking")
         exhaustive = search == DEFAULT_SEARCH
         verdict = judge_pose(*pair, limits, found, exhaustive, context.quiet())
-        context.update(0.8, "writing")
         pose = found[0].pose if found else None
+        if verdict.accepted and pose is not None:
+            verdict = confirm_pose(verdict, (own, other), windows, pose, context.quiet())
+        context.update(0.8, "writing")
         if picture is not None:
             title = f"{'accepted' if verdict.accepted else 'refused'}: {verdict.reason}"
             draw_rotation(outputs.stage(picture), *pair, limits, pose, title, context.quiet())
@@ -217,17 +228,6 @@ def estimate_rotation(
     raise NotRegisteredError(
         f"no rotation of {input} against {reference} was found: {refused.sentence()}", refused
     )
-
-
-def _read(
-    rasters: Sequence[tuple[Path, int | None]],
-    scales: tuple[float, float],
-    radius: float | None,
-) -> PoseWindows:
-    with ExitStack() as stack:
-        stack.enter_context(bounded_cache())
-        images = [Image(stack.enter_context(open_raster(path)), band) for path, band in rasters]
-        return read_windows(images[0], images[1], scales, radius)
 
 
 def _similarity(search: str, wanted: str) -> str:

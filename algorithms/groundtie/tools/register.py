@@ -22,8 +22,10 @@ from .common import (
 from .registration_parameters import (
     OUTPUTS,
     InputMask,
+    InputMaskValues,
     MaxError,
     ReferenceMask,
+    ReferenceMaskValues,
     ReportOut,
     TiePointsOut,
 )
@@ -44,7 +46,9 @@ def register(
     reference_band: ReferenceBand = None,
     input_band: InputBand = None,
     reference_mask: ReferenceMask = None,
+    reference_mask_values: ReferenceMaskValues = None,
     input_mask: InputMask = None,
+    input_mask_values: InputMaskValues = None,
     workers: Workers = None,
     progress: Progress = SILENT,
     parameters: Mapping[str, Any] = MappingProxyType({}),

@@ -4,10 +4,9 @@ A rule looks at evidence and returns why it refuses, in a sentence, or None. Its
 which kind of evidence it reads (see `evidence`); `verdict.judge` asks all rules of the evidence's
 stages in their order, and the first one that refuses decides.
 
-Each stage has a module here, with its limits and their sources; the rules of the scene that read
-the survey have their own. To add a rule, write a function and put a `Rule` in the tuple of its
-module. docs/method-verdict.md is made from this list, and a test asks for evidence that triggers
-it and evidence that does not.
+Each stage has a module here, with its limits and their sources. To add a rule, write a function
+and put a `Rule` in the tuple of its module. docs/method-verdict.md is made from this list, and a
+test asks for evidence that triggers it and evidence that does not.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from .refinement import REFINEMENT_RULES
 from .rule import Rule
 from .scene import SCENE_RULES
 from .search import SEARCH_RULES
+from .series import SERIES_RULES
 from .survey import SURVEY_RULES
 from .tie_points import TIE_POINT_RULES
 
@@ -29,10 +29,11 @@ RULES: tuple[Rule, ...] = (
     *TIE_POINT_RULES,
     *SEARCH_RULES,
     *ASSESSMENT_RULES,
+    *POSE_RULES,
     *AGREEMENT_RULES,
     *ERROR_RULES,
     *SCENE_RULES,
     *SURVEY_RULES,
     *REFINEMENT_RULES,
-    *POSE_RULES,
+    *SERIES_RULES,
 )

@@ -39,7 +39,7 @@ def _few_agree(evidence: RegistrationEvidence | RefinementEvidence) -> str | Non
 
 
 def _another_transform(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
-    if isinstance(evidence, RefinementEvidence):
+    if not isinstance(evidence, RegistrationEvidence):
         return None
     residuals = evidence.residuals_px
     if len(residuals) < _RIVAL_POINTS:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..evidence import POSE
-from .rule import WIDER, WITHOUT, Rule
+from .rule import WIDER, Rule
 
 if TYPE_CHECKING:
     from ..pose_verdict import PoseEvidence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 # by less than this share of its longer side.
 _LEAST_HEIGHT = 5.0
 _LEAST_RIVAL_RATIO = 1.6
-_SAME_SHARE = 0.02
+SAME_SHARE = 0.02
 
 
 def _no_pose(evidence: PoseEvidence) -> str | None:
@@ -37,19 +37,13 @@ def _second_pose(evidence: PoseEvidence) -> str | None:
 
 
 def _not_exhaustive(evidence: PoseEvidence) -> str | None:
-    if evidence.apart_px <= _SAME_SHARE * max(evidence.shape):
+    if evidence.apart_px <= SAME_SHARE * max(evidence.shape):
         return None
     best = evidence.exhaustive[0].pose
     return (
         f"a search over all rotations prefers {best.rotation_deg:.1f}° and scale "
         f"{best.scale:.3f}, {evidence.apart_px:.0f} px away"
     )
-
-
-def _locked_pose(evidence: PoseEvidence) -> str | None:
-    if evidence.sameness is None or not evidence.sameness.is_evident:
-        return None
-    return "both images have the same content at the same columns and rows"
 
 
 POSE_RULES: tuple[Rule, ...] = (
@@ -75,18 +69,9 @@ POSE_RULES: tuple[Rule, ...] = (
         "other pose",
         POSE,
         "an exhaustive search over all rotations finds another pose, whose corners are more than "
-        f"{_SAME_SHARE:.0%} of the reference's longer side away",
+        f"{SAME_SHARE:.0%} of the reference's longer side away",
         "suite rotated_pairs",
         "take the exhaustive search",
         _not_exhaustive,
-    ),
-    Rule(
-        "pixel-locked pose",
-        POSE,
-        "a pose that only shifts the image lies where both have the same content at the same "
-        "columns and rows, such as labels or clouds",
-        "suite attacks",
-        WITHOUT,
-        _locked_pose,
     ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...masks.choice import LAYER, REGIONS
 from ...matching.survey import LEAST_PROPORTION, LOG10_FALSE_ALARMS, SURVEY_RADIUS_PX
-from ..evidence import SCENE, RegistrationEvidence
+from ..evidence import SURVEY, RegistrationEvidence
 from .rule import WITHOUT, Rule
 
 # Chips all over are similar to a second place from this share on, and weakly similar below so many
@@ -59,7 +59,7 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
 SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "part elsewhere",
-        SCENE,
+        SURVEY,
         "neighbouring chips agree with each other on another place, too many for chance "
         f"(10^{LOG10_FALSE_ALARMS:.0f} such parts expected) and {LEAST_PROPORTION} for each that "
         "confirms the transform",
@@ -69,7 +69,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "second place nearby",
-        SCENE,
+        SURVEY,
         "without a mask of the ground, chips all over match at least "
         f"{_RIVAL_HEIGHT:g} times as well if all are moved elsewhere, within {SURVEY_RADIUS_PX} px",
         "suites real and attacks",
@@ -78,7 +78,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "weak similarity",
-        SCENE,
+        SURVEY,
         "without a mask of the ground, the mean similarity of chips all over, where the transform "
         f"has them, is below {_WEAK_HEIGHT:g} robust standard deviations of one of them",
         "suites real and attacks",
@@ -87,7 +87,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "pixel-locked content",
-        SCENE,
+        SURVEY,
         "both images have the same content at the same columns and rows, such as labels or clouds, "
         "and what else they show does not confirm the transform",
         "suites real and attacks",

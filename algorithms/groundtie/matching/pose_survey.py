@@ -1,0 +1,141 @@
+"""Chips all over a pair that confirm a pose, or show what it does not hold for.
+
+A pose is a start, good to a hundredth or two of the image. So its chips are larger than those that
+survey a registration, a pose is first moved to where they agree, and each chip is compared with a
+pose that was moved without it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+
+from ..context import Context
+from ..geometry.models import Model
+from ..geometry.transform import Transform
+from ..rasters.grid import Grid
+from ..rasters.pair import ImagePair
+from ..similarity.peak import find_peak
+from ..similarity.surface import SimilaritySettings
+from .alignment import align
+from .belief_propagation import Surfaces
+from .chips import ChipMatcher
+from .coarse_shift import level_factor
+from .frames import compose
+from .locked import find_locked_content
+from .matcher import FloatArray, Places
+from .survey import SURVEY_RADIUS_PX, Survey, survey_model, survey_places
+
+# Chips along the shorter side. Of the 29 shared rotated pairs, at their poses: four are too few to
+# show parts, six so small that radar hardly matches.
+_ALONG = 5
+
+# A chip agrees with a pose within this: 2 % of the smallest images that poses are asked for.
+POSE_TOLERANCE_PX = 5.0
+
+# Fewer chips than this hold no similarity transform, whose four parameters need two.
+_FEWEST = 4
+
+
+@dataclass(frozen=True)
+class PoseSurvey:
+    """What chips all over a pair show of a pose.
+
+    Parameters
+    ----------
+    errors_px
+        Distance of each chip's match from where a pose has it that was moved without the chip,
+        shape (n,).
+    survey
+        Where they match around the pose that was moved by all of them.
+    survey_of_rest
+        The same without content that is the same in both arrays; None: there is none.
+    """
+
+    errors_px: FloatArray
+    survey: Survey
+    survey_of_rest: Survey | None
+
+
+def survey_pose(
+    pair: ImagePair, transform: Transform, claimed_share: float, context: Context
+) -> PoseSurvey:
+    """Match chips all over a pair around a pose.
+
+    Parameters
+    ----------
+    pair
+        The images.
+    transform
+        The pose, as a transform between them.
+    claimed_share
+        How good it claims to be, as a share of the reference's longer side.
+    context
+        Threads and progress.
+    """
+    matcher = ChipMatcher(pair, SimilaritySettings())
+    places = _places(_covered(pair.grid, transform))
+    level = places.grid
+    quiet = context.quiet()
+    kept, surfaces = matcher.match_forward(transform.model, places, SURVEY_RADIUS_PX, quiet)
+    errors = _cross_fitted_px(kept, surfaces, places.chip_px)
+    model = transform.model
+    if len(kept) >= _FEWEST:
+        model = compose(model, _moved(kept, surfaces), level)
+    claimed_px = max(claimed_share * max(level.width, level.height), POSE_TOLERANCE_PX)
+    survey = survey_model(matcher, model, quiet, None, places, claimed_px)
+    moved = Transform(model, transform.crs, transform.input_grid)
+    locked = find_locked_content(pair, moved, survey_places(pair.grid), quiet)
+    rest = None
+    if locked is not None and locked.sameness.is_evident:
+        rest = survey_model(matcher, model, quiet, locked, places, claimed_px)
+    return PoseSurvey(errors, survey, rest)
+
+
+def _covered(grid: Grid, transform: Transform) -> Grid:
+    """Return the part of a grid in which a transform has the input."""
+    outline = transform.inverse(transform.input_grid.outline())
+    px = grid.map_to_pixel(outline)
+    px = px[np.isfinite(px).all(axis=1)]
+    size = np.array([grid.width, grid.height])
+    if len(px) == 0:
+        return grid
+    low = np.clip(np.floor(px.min(axis=0)), 0, size - 1).astype(int)
+    high = np.clip(np.ceil(px.max(axis=0)) + 1, low + 1, size).astype(int)
+    return grid.window(int(low[0]), int(low[1]), *(int(side) for side in high - low))
+
+
+def _places(grid: Grid) -> Places:
+    """Return chips side by side on a grid, reduced if it is large."""
+    factor = level_factor(grid)
+    level = grid if factor == 1 else grid.scaled(factor)
+    chip = max(min(level.width, level.height) // _ALONG, 1)
+    sides = [
+        np.rint(np.linspace(chip / 2, side - chip / 2, side // chip)).astype(int)
+        for side in (level.width, level.height)
+    ]
+    cols, rows = np.meshgrid(*sides)
+    return Places(level, np.column_stack([cols.ravel(), rows.ravel()]), chip)
+
+
+def _moved(px: NDArray[np.int_], surfaces: Surfaces) -> Model:
+    """Return the similarity transform of a grid's pixels on which chips' surfaces agree."""
+    # Every chip counts the same; none is as low as 1, but for those that show nothing.
+    equal = surfaces / np.maximum(surfaces.max(axis=(1, 2), keepdims=True), 1)
+    return align("similarity", px, equal, Affine.identity(), np.copy).model
+
+
+def _cross_fitted_px(px: NDArray[np.int_], surfaces: Surfaces, pitch_px: int) -> FloatArray:
+    """Return how far each chip matches from where every other chip, as on a chessboard, has it."""
+    is_black = (px // pitch_px).sum(axis=1) % 2 == 0
+    errors = np.full(len(px), np.inf)
+    if min(is_black.sum(), (~is_black).sum()) < _FEWEST:
+        return errors
+    found = px + np.array([find_peak(surface).shift_px for surface in surfaces])
+    for which in (is_black, ~is_black):
+        model = _moved(px[~which], surfaces[~which])
+        errors[which] = np.hypot(*(found[which] - model(px[which].astype(float))).T)
+    return errors

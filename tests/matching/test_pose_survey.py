@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from raster_files import write_raster
+from turned_pairs import turned_pair
+
+from groundtie.context import Context
+from groundtie.matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey, survey_pose
+from groundtie.pose.pose import Pose
+from groundtie.pose.rotation_windows import read_windows
+from groundtie.rasters.pair import Image, make_pair
+from groundtie.rasters.reading import open_raster
+
+TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
+
+
+def surveyed(folder: Path, pose: Pose, context: Context, **more: int) -> PoseSurvey:
+    """Survey a pair whose true pose is `TRUTH` around a pose."""
+    with ExitStack() as stack:
+        images = []
+        for name, window in zip(
+            "ri", turned_pair(TRUTH, (250, 250), (260, 260), **more), strict=True
+        ):
+            values = np.clip(window.values, 1, 65_535).astype(np.uint16)
+            path = write_raster(folder / f"{name}.tif", values)
+            images.append(Image(stack.enter_context(open_raster(path))))
+        windows = read_windows(*images, (0.8, 1.25))
+        pair = make_pair(*images, None, windows.radius_m, 180.0, 1.25)
+        return survey_pose(pair, windows.transform(pose), 0.02, context)
+
+
+# What a pose claims, and what it may be wrong by.
+@pytest.mark.parametrize("pose", [TRUTH, replace(TRUTH, rotation_deg=51.5)])
+def test_chips_confirm_a_pose(pose: Pose, tmp_path: Path, context: Context) -> None:
+    found = surveyed(tmp_path, pose, context)
+    assert len(found.errors_px) >= 15
+    assert (found.errors_px <= POSE_TOLERANCE_PX).mean() > 0.9
+    assert found.survey.confirming > 0.9 * len(found.errors_px)
+    assert found.survey.parts == []
+    assert found.survey_of_rest is None
+
+
+@pytest.mark.parametrize(
+    ("pose", "more"),
+    [
+        (replace(TRUTH, rotation_deg=-130.0), {}),
+        (TRUTH, {"input_seed": 99}),
+    ],
+)
+def test_chips_confirm_no_wrong_pose(
+    pose: Pose, more: dict[str, int], tmp_path: Path, context: Context
+) -> None:
+    found = surveyed(tmp_path, pose, context, **more)
+    assert (found.errors_px <= POSE_TOLERANCE_PX).mean() < 0.25
+
+
+def test_images_that_hardly_overlap_confirm_nothing(tmp_path: Path, context: Context) -> None:
+    found = surveyed(tmp_path, replace(TRUTH, shift_px=(170.0, 150.0)), context)
+    assert (found.errors_px <= POSE_TOLERANCE_PX).mean() < 0.25
