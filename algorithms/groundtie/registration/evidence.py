@@ -22,6 +22,7 @@ from ..geometry.judging import (
 from ..geometry.robust import fit_mixture
 from ..geometry.tie_points import TiePoints
 from ..masks.choice import NONE, MaskUsed
+from ..matching.rest import Rest
 from ..matching.survey import Survey
 from ..rasters.grid import FloatArray, Grid
 from .scene import SceneInfo
@@ -128,7 +129,7 @@ class RegistrationEvidence:
         The mask that was used.
     survey
         Where chips all over the overlap match; None: not looked at, as in tests of other rules.
-    survey_of_rest
+    rest
         The same without content that is the same in both arrays; None: there is none.
     """
 
@@ -145,7 +146,7 @@ class RegistrationEvidence:
     scene: SceneInfo | None = None
     mask: MaskUsed = field(default_factory=lambda: MaskUsed(NONE, None, 1.0, ""))
     survey: Survey | None = None
-    survey_of_rest: Survey | None = None
+    rest: Rest | None = None
 
     stages: ClassVar = (AGREEMENT, ERROR, SCENE, SURVEY)
 
