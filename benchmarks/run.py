@@ -28,11 +28,16 @@ SUITES = (
     "rpc_city",
     "sar_sar",
     "speed",
+    "guard",
+    "kernels",
+    "batch",
     "methods",
     "peaks",
     "fusion",
     "optical",
+    "series",
     "attacks",
+    "calibration",
 )
 
 
@@ -47,7 +52,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--seeds",
         type=_seeds,
         default=(1, 20),
-        help="simulated pairs of each kind; for attacks also a range, A-B",
+        help="simulated pairs of each kind; for attacks and calibration also a range, A-B",
     )
     parser.add_argument(
         "--jobs",

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import configparser
 import os
+import re
+import sys
 import tomllib
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from scripts.help_pages import can_make_pages, help_pages
+
 TOP = "groundtie_qgis"
 # The oldest date that a zip can hold: the same tree gives the same bytes on every day.
 DATE = (1980, 1, 1, 0, 0, 0)
+NO_PAGES = "without the pages of its help, which need the package markdown-it-py to be built"
 
 
 def build(root: Path, target: Path) -> Path:
@@ -65,6 +72,9 @@ def collect(root: Path) -> dict[str, bytes]:
     for name in ("metadata.txt", "LICENSE"):
         add(contents, name, (root / name).read_bytes())
     add(contents, "requirements.txt", requirements(root / "pyproject.toml").encode())
+    if can_make_pages():
+        for name, data in help_pages(root / "docs").items():
+            add(contents, f"help/{name}", data)
     return contents
 
 
@@ -89,12 +99,37 @@ def requirements(pyproject: Path) -> str:
     return "".join(f"{dependency}\n" for dependency in project["dependencies"])
 
 
-def main() -> None:
+def obstacles(root: Path) -> list[str]:
+    """Return why a tree cannot be released: what is still a placeholder, or cannot be made."""
+    parser = configparser.ConfigParser(interpolation=None)
+    parser.read(root / "metadata.txt", encoding="utf-8")
+    general = parser["general"]
+    found = [
+        f"metadata.txt: {key} is a placeholder: {general[key]}"
+        for key in ("homepage", "tracker", "repository", "email")
+        if re.search(r"\bexample\.(org|com|net)\b", general[key])
+    ]
+    if not can_make_pages():
+        found.append(NO_PAGES)
+    return found
+
+
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("target", type=Path)
-    target = build(Path(__file__).resolve().parents[1], parser.parse_args().target)
+    parser.add_argument(
+        "--release", action="store_true", help="refuse to build what must not be released"
+    )
+    root, arguments = Path(__file__).resolve().parents[1], parser.parse_args()
+    if arguments.release and (found := obstacles(root)):
+        print("not built, as it is no release:", *found, sep="\n  ", file=sys.stderr)
+        return 1
+    target = build(root, arguments.target)
     print(f"{target}: {target.stat().st_size / 1e6:.2f} MB")
+    if not can_make_pages():
+        print(NO_PAGES, file=sys.stderr)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

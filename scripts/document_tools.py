@@ -11,6 +11,7 @@ from groundtie.declaration import Parameter, Tool
 from groundtie.kinds import (
     Band,
     Choice,
+    Crs,
     FileIn,
     Flag,
     FolderOut,
@@ -19,6 +20,7 @@ from groundtie.kinds import (
     Number,
     OutputKind,
     RasterIn,
+    RastersIn,
     Text,
     VectorIn,
 )
@@ -145,10 +147,12 @@ def values(kind: Kind) -> str:
         return "file: " + ", ".join(f"`{suffix}`" for suffix in kind.suffixes)
     words: dict[type[Kind], str] = {
         Band: "band number, from 1",
+        Crs: "CRS, as `EPSG:32632` or WKT",
         Flag: "yes or no",
         FolderOut: "folder",
         MaskIn: "raster, vector layer or classifier",
         RasterIn: "raster",
+        RastersIn: "rasters",
         Text: "text",
         VectorIn: "vector layer",
     }

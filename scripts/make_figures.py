@@ -14,15 +14,18 @@ if not __package__:
     # Run as a file, Python looks for modules beside it; the scripts are a package.
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
+from scripts.calibration_figures import calibration
 from scripts.drawing import Scenes, write
 from scripts.feature_figures import features, hog, masks
 from scripts.search_figures import propagation, rotation, search, similarity
+from scripts.series_figures import series
 from scripts.verdict_figures import pipeline, rpc, survey, verdict
 
 FIGURES = Path(__file__).resolve().parents[1] / "docs" / "figures"
 
 DRAWN: Mapping[str, Callable[[Scenes], Figure]] = {
     "architecture": pipeline,
+    "calibration": calibration,
     "method-similarity": similarity,
     "method-search": search,
     "method-belief-propagation": propagation,
@@ -31,6 +34,7 @@ DRAWN: Mapping[str, Callable[[Scenes], Figure]] = {
     "method-masks": masks,
     "method-rotation": rotation,
     "method-rpc": rpc,
+    "method-series": series,
     "method-survey": survey,
     "method-verdict": verdict,
 }

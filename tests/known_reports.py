@@ -43,6 +43,9 @@ ACCEPTED = Verdict(
     log10_chance=-14.2,
     spread_px=0.21,
     extrapolated_share=0.18,
+    ce50_px=0.45,
+    ce95_px=1.2,
+    ce90_range_px=(0.7, 1.4),
 )
 
 

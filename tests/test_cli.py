@@ -23,6 +23,7 @@ from toys import TOY
 
 from groundtie import load_transform
 from groundtie.cli import main
+from groundtie.tools import NAMES, load_tool, summary_of
 from groundtie.version import __version__
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -78,6 +79,7 @@ def test_json_is_the_summary(capsys: pytest.CaptureFixture[str]) -> None:
         "regions": "r.gpkg",
         "transform": None,
         "mask": None,
+        "others": None,
         "seed": 9,
     }
 
@@ -148,12 +150,18 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr() == (f"groundtie {__version__}\n", "")
 
 
-def test_the_version_is_told_without_loading_the_tools() -> None:
+@pytest.mark.parametrize("option", ["--version", "--help"])
+def test_the_command_starts_without_loading_the_tools(option: str) -> None:
     code = (
-        "import sys; from groundtie.cli import main; main(['--version']); "
-        "sys.exit('numpy' in sys.modules)"
+        f"import sys; from groundtie.cli import main; main(['{option}']); "
+        "sys.exit(bool({'numpy', 'rasterio', 'cv2'} & set(sys.modules)))"
     )
     subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT, check=True, capture_output=True)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_summary_in_the_list_of_tools_is_the_declared_one(name: str) -> None:
+    assert summary_of(name) == load_tool(name).summary
 
 
 def test_help_of_a_tool_tells_everything_of_its_parameters(

@@ -208,3 +208,11 @@ class TestPaths:
             check_different({"reference": tmp_path / "a.tif", "input": tmp_path / "link.tif"})
         with pytest.raises(SameFileError, match="/vsimem/a"):
             check_different({"reference": "/vsimem/a", "input": "/vsimem/a"})
+
+
+def test_a_choice_of_names_may_have_hyphens() -> None:
+    kind = Choice(label="Tool", help="It.", choices=("match_sar_sar", "low-pass"))
+    assert kind.check("tool", "match-sar-sar") == "match_sar_sar"
+    assert kind.check("tool", "low-pass") == "low-pass"
+    with pytest.raises(ParameterError, match="must be one of"):
+        kind.check("tool", "low_pass")

@@ -25,6 +25,7 @@ from groundtie.kinds import (
     Number,
     RasterIn,
     RasterOut,
+    RastersIn,
     Text,
     VectorIn,
     VectorOut,
@@ -102,6 +103,9 @@ def toy(
     mask: Annotated[
         Path | None, MaskIn(label="Mask", help="What takes part.", advanced=True)
     ] = None,
+    others: Annotated[
+        tuple[Path, ...] | None, RastersIn(label="Others", help="More of them.", advanced=True)
+    ] = None,
     seed: Annotated[
         int, Number(label="Seed", help="For chance.", integer=True, minimum=0, advanced=True)
     ] = 7,
@@ -148,6 +152,12 @@ def returning_toy(
 
 TOY: Tool = tool_of(toy)
 RETURNING_TOY: Tool = tool_of(returning_toy)
+
+
+def load_toy(name: str) -> Tool:
+    """Return a toy by its name, also in another process."""
+    return {tool.name: tool for tool in (TOY, RETURNING_TOY)}[name]
+
 
 if __name__ == "__main__":
     sys.exit(main(tools=[TOY]))

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from .geometry.transform import load_transform
     from .tools.assess import assess
     from .tools.assess_sensor import assess_sensor
+    from .tools.batch import batch
     from .tools.coregister import coregister
+    from .tools.coregister_series import coregister_series, register_series
     from .tools.detector_repeatability import detector_repeatability
     from .tools.estimate_rotation import estimate_rotation
     from .tools.extract_gcps import extract_gcps
@@ -43,7 +45,9 @@ __all__ = [
     "__version__",
     "assess",
     "assess_sensor",
+    "batch",
     "coregister",
+    "coregister_series",
     "detector_repeatability",
     "estimate_rotation",
     "extract_gcps",
@@ -56,6 +60,7 @@ __all__ = [
     "orthorectify",
     "refine_rpc",
     "register",
+    "register_series",
     "similarity_surface",
     "simulate",
     "simulate_sensor",
@@ -64,7 +69,11 @@ __all__ = [
 ]
 
 # Loaded on first use: importing groundtie must stay cheap for the command line's help and QGIS.
-_HOMES = {"Raster": ".arrays", "load_transform": ".geometry.transform"}
+_HOMES = {
+    "Raster": ".arrays",
+    "load_transform": ".geometry.transform",
+    "register_series": ".tools.coregister_series",
+}
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())
 

@@ -21,7 +21,7 @@ import click
 
 from .declaration import Parameter, Tool
 from .errors import CancelledError, GroundTieError, NotRegisteredError
-from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind
+from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind, RastersIn
 from .progress import Progress
 from .version import __version__
 
@@ -46,7 +46,7 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
         try:
             group = _all_tools() if tools is None else _these_tools(tools)
             command = click.version_option(__version__, message="%(prog)s %(version)s")(group)
-            command.main(args, prog_name="groundtie", standalone_mode=False, obj=received)
+            code = command.main(args, prog_name="groundtie", standalone_mode=False, obj=received)
         except click.ClickException as error:
             return _fail(_usage(error), error.exit_code)
         except (CancelledError, KeyboardInterrupt) as error:
@@ -54,18 +54,18 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
             return _fail(str(error) or "cancelled", 128 + number)
         except GroundTieError as error:
             return _fail(error.one_line(), error.exit_code)
-    return 0
+    return int(code or 0)
 
 
 def _all_tools() -> ToolGroup:
-    from .tools import NAMES, load_tool
+    from .tools import NAMES, load_tool, summary_of
 
-    return ToolGroup(NAMES, load_tool)
+    return ToolGroup(NAMES, load_tool, summary_of)
 
 
 def _these_tools(tools: Sequence[Tool]) -> ToolGroup:
     by_name = {tool.name: tool for tool in tools}
-    return ToolGroup(tuple(by_name), by_name.__getitem__)
+    return ToolGroup(tuple(by_name), by_name.__getitem__, lambda name: by_name[name].summary)
 
 
 def _fail(message: str, exit_code: int) -> int:
@@ -117,7 +117,12 @@ def _signals() -> Iterator[list[int]]:
 class ToolGroup(click.Group):
     """The command `groundtie`; a tool is loaded, with all that it imports, when it is needed."""
 
-    def __init__(self, names: Sequence[str], load: Callable[[str], Tool]) -> None:
+    def __init__(
+        self,
+        names: Sequence[str],
+        load: Callable[[str], Tool],
+        summarise: Callable[[str], str],
+    ) -> None:
         super().__init__(
             "groundtie",
             help="Register satellite images to one another.",
@@ -133,7 +138,7 @@ class ToolGroup(click.Group):
             context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
         )
         self._names = {_command_name(name): name for name in names}
-        self._load = load
+        self._load, self._summarise = load, summarise
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of the tools in the order in which they are declared."""
@@ -143,6 +148,12 @@ class ToolGroup(click.Group):
         """Return the command of a tool; None if there is no such tool."""
         name = self._names.get(cmd_name)
         return None if name is None else ToolCommand(self._load(name))
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write a line for each tool; none of them is loaded for it."""
+        rows = [(command, self._summarise(name)) for command, name in self._names.items()]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
 
 
 def _command_name(tool: str) -> str:
@@ -181,7 +192,6 @@ class ToolCommand(click.Command):
         super().__init__(
             _command_name(tool.name),
             help=f"{tool.summary}\n\n{tool.description}",
-            short_help=tool.summary,
             params=[_click_parameter(parameter) for parameter in tool.parameters],
             callback=self._run,
         )
@@ -190,7 +200,7 @@ class ToolCommand(click.Command):
             click.Option(["--quiet"], is_flag=True, help="Show no progress."),
         ]
 
-    def _run(self, as_json: bool, quiet: bool, **values: Any) -> None:
+    def _run(self, as_json: bool, quiet: bool, **values: Any) -> int:
         given = {name: value for name, value in values.items() if value is not None}
         checked = self.tool.check(given, spell=spelled)
         context = click.get_current_context()
@@ -207,6 +217,7 @@ class ToolCommand(click.Command):
             _echo_json(result.summary())
         else:
             click.echo("\n".join(result.lines()))
+        return getattr(result, "exit_code", 0)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the arguments, the options, and then the options for experts."""
@@ -244,6 +255,8 @@ class KindType(click.ParamType):
 
 def _click_parameter(parameter: Parameter) -> click.Parameter:
     name, flag = parameter.name, spelled(parameter)
+    if parameter.positional and isinstance(parameter.kind, RastersIn):
+        return click.Argument([name], type=str, nargs=-1, required=True, metavar=f"{flag}…")
     if parameter.positional:
         return click.Argument([name], type=KindType(parameter), metavar=flag)
     need = {"required": True} if parameter.required else {"default": parameter.default}
@@ -279,6 +292,8 @@ def _synopsis(parameter: Parameter) -> str:
 
 def _describe(parameter: Parameter) -> str:
     notes = []
+    if isinstance(parameter.kind, Choice) and parameter.positional:
+        notes.append("|".join(parameter.kind.choices))
     if isinstance(parameter.kind, Number):
         notes += [note for note in (parameter.kind.unit, parameter.kind.range_text) if note]
     if isinstance(parameter.kind, Flag):

@@ -21,7 +21,10 @@ from .runs import run_of_call, running
 
 
 class ToolResult(Protocol):
-    """What a tool returns: numbers for programs, lines for people."""
+    """What a tool returns: numbers for programs, lines for people.
+
+    One that ran but not to a good end, as some rows of a table, has an `exit_code` besides.
+    """
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
@@ -32,6 +35,9 @@ class ToolResult(Protocol):
 
 P = ParamSpec("P")
 R = TypeVar("R", bound=ToolResult)
+
+# Keywords of a tool's function that are no parameters: handed through from Python unchecked.
+HANDED_THROUGH = ("progress", "executor")
 
 
 @dataclass(frozen=True)
@@ -163,9 +169,9 @@ def tool(
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Declare the decorated function as a tool (see `tool_of`).
 
-    Its keyword `progress` is handed through unchecked; every other parameter must be annotated
-    with a `Kind`. If the function has a keyword `parameters`, it is given the checked values of
-    all parameters by name, for its report; callers do not see this keyword.
+    Its keywords `progress` and `executor` are handed through unchecked; every other parameter
+    must be annotated with a `Kind`. If the function has a keyword `parameters`, it is given the
+    checked values of all parameters by name, for its report; callers do not see this keyword.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -174,12 +180,12 @@ def tool(
         @functools.wraps(function)
         def checked(*args: P.args, **kwargs: P.kwargs) -> R:
             bound = signature.bind(*args, **kwargs).arguments
-            progress = {key: bound.pop(key) for key in ("progress",) if key in bound}
+            through = {key: bound.pop(key) for key in HANDED_THROUGH if key in bound}
             values = declared.check(bound, in_python=True)
             given = {"parameters": values} if "parameters" in signature.parameters else {}
             try:
                 with running(declared.run_of_call(values)):
-                    return cast(Callable[..., R], function)(**values, **given, **progress)
+                    return cast(Callable[..., R], function)(**values, **given, **through)
             except MemoryError as error:
                 raise MemoryLimitError(f"memory does not suffice: {error}") from error
 
@@ -229,7 +235,7 @@ def _parameters(function: Callable[..., Any], signature: inspect.Signature) -> l
     hints = typing.get_type_hints(function, include_extras=True)
     found = []
     for name, argument in signature.parameters.items():
-        if name in ("parameters", "progress"):
+        if name in ("parameters", *HANDED_THROUGH):
             continue
         # Python 3.10 wraps the type of what has the default None in one more Optional.
         parts = (hints[name], *typing.get_args(hints[name]))

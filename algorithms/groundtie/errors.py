@@ -82,6 +82,14 @@ class AmbiguousPlaceError(NothingFoundError):
     """More than one place was found at which the images match."""
 
 
+class SchedulerError(GroundTieError, ConnectionError):
+    """A cluster's scheduler cannot be reached or used."""
+
+
+class WorkerLostError(GroundTieError, ChildProcessError):
+    """The process that did the work was ended from outside, again and again."""
+
+
 class CancelledError(GroundTieError, RuntimeError):
     """The user cancelled the work."""
 

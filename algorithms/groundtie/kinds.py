@@ -97,6 +97,23 @@ class RasterIn(InputKind):
         return self.check_raster(name, value)
 
 
+@dataclass(frozen=True, kw_only=True)
+class RastersIn(Kind):
+    """One or several rasters that are read, or files, folders and patterns that stand for them.
+
+    The value is a tuple of paths; GDAL's own names stay text.
+    """
+
+    def check(self, name: str, value: Any) -> tuple[Any, ...]:
+        given = (value,) if isinstance(value, (str, os.PathLike)) else value
+        if not isinstance(given, (list, tuple)):
+            raise ParameterError(f"{name} must be paths, not {value!r}")
+        if not given:
+            raise ParameterError(f"{name} is missing")
+        kind = InputKind(label=self.label, help=self.help)
+        return tuple(one if _is_gdal_name(one) else kind.check(name, one) for one in given)
+
+
 class VectorIn(InputKind):
     """A vector layer that is read; GDAL's own names stay text."""
 
@@ -141,8 +158,14 @@ class FileOut(OutputKind):
     """Any other file that is written."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class FolderOut(PathKind):
-    """A folder that is written into, made if it is missing."""
+    """A folder that is written into, made if it is missing.
+
+    Of what comes into it, rasters of the names `shows` can be looked at: the first on top.
+    """
+
+    shows: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,11 +215,13 @@ class Distance(Number):
 
 @dataclass(frozen=True, kw_only=True)
 class Choice(Kind):
-    """One of several words."""
+    """One of several words; tools' names among them may have hyphens, as on the command line."""
 
     choices: tuple[str, ...]
 
     def check(self, name: str, value: Any) -> str:
+        if isinstance(value, str) and value.replace("-", "_") in self.choices:
+            return value.replace("-", "_")
         if value not in self.choices:
             raise ParameterError(f"{name} must be one of {', '.join(self.choices)}, not {value!r}")
         return str(value)
@@ -218,6 +243,10 @@ class Text(Kind):
         if not isinstance(value, str):
             raise ParameterError(f"{name} must be a text, not {value!r}")
         return value
+
+
+class Crs(Text):
+    """A coordinate reference system: an authority's code or WKT."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -314,13 +343,16 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
     """
     taken: dict[Hashable, str] = {}
     outputs: list[tuple[str, Path]] = []
+    made: set[Path] = set()
     for name, kind, value in values:
         if isinstance(kind, InputKind) and value is not None:
             taken[_identity(value)] = name
         elif isinstance(kind, OutputKind) and value is not None:
             outputs.append((name, value))
-        elif isinstance(kind, FolderOut) and value is not None and value.is_file():
-            raise OutputError(f"{name} is a file, not a folder: {value}")
+        elif isinstance(kind, FolderOut) and value is not None:
+            if value.is_file():
+                raise OutputError(f"{name} is a file, not a folder: {value}")
+            made.add(value.resolve())
     for name, path in outputs:
         other = taken.setdefault(path.resolve(), name)
         if other != name:
@@ -328,6 +360,8 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
         folder = path.resolve().parent
         if path.is_dir():
             raise OutputError(f"{name} is a folder, not a file: {path}")
+        if folder in made and not folder.exists():
+            continue
         if not folder.is_dir():
             raise OutputError(f"the folder of {name} does not exist: {folder}")
         if not os.access(folder, os.W_OK):

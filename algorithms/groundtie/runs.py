@@ -62,6 +62,8 @@ def _facts(value: Any) -> Any:
         except OSError:
             return str(value)
         return value.name, found.st_size, found.st_mtime_ns
-    if value is None or isinstance(value, (str, int, float, tuple)):
+    if isinstance(value, tuple):
+        return tuple(map(_facts, value))
+    if value is None or isinstance(value, (str, int, float)):
         return value
     return secrets.token_hex(8)

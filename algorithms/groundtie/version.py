@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import configparser
-from importlib import metadata
 from pathlib import Path
 
 __all__ = ["__version__", "find_version"]
@@ -33,6 +32,8 @@ def find_version(package: Path) -> str:
         version = _read(folder / "metadata.txt")
         if version is not None:
             return version
+    from importlib import metadata  # a third of the command line's start, and hardly ever needed
+
     return metadata.version("groundtie")
 
 

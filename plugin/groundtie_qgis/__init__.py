@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import Any
 
 OLDEST_PYTHON = (3, 10)
@@ -15,6 +16,12 @@ def classFactory(iface: Any) -> Any:
         from .old_python import OldPython
 
         return OldPython(iface, OLDEST_PYTHON)
+    from qgis.core import QgsApplication
+
+    from .installing import packages_folder, use_packages
+
+    packages = packages_folder(Path(QgsApplication.qgisSettingsDirPath()))
+    use_packages(packages)
     from .plugin import GroundTiePlugin
 
-    return GroundTiePlugin()
+    return GroundTiePlugin(iface, packages)

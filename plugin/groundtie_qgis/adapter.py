@@ -20,10 +20,13 @@ from qgis.PyQt.QtGui import QIcon
 from .definitions import definition, qgis_name
 from .dependencies import complaint, missing_for, rasterio_env
 from .library import LazyTool, errors, kinds, plugin_metadata, progress
-from .results import forget_layers, show_report
+from .pages import help_url
+from .preselection import NOTHING, preselect
+from .results import forget_layers, load_on_completion, show_report
 from .styling import ICON, LoadedLayers
-from .unavailable import UnavailableAlgorithm, broken
+from .unavailable import UnavailableAlgorithm, broken, named_tools
 from .values import Reader, with_layers_as_files
+from .wording import in_words
 
 
 class ToolAlgorithm(QgsProcessingAlgorithm):
@@ -65,7 +68,7 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         return help_html(self._tool)
 
     def helpUrl(self) -> str:
-        return plugin_metadata().get("homepage", "")
+        return help_url(self.name())
 
     def icon(self) -> QIcon:
         return QIcon(str(ICON))
@@ -77,7 +80,10 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         if isinstance(self._tool, LazyTool) and not self._tool.loaded():
             return  # the provider's own: what runs, or shows a dialog, is made from it
         for parameter in self._tool.parameters:
-            self.addParameter(definition(parameter))
+            made = definition(parameter)
+            made.setHelp(in_words(parameter.kind.help, self._tool, named_tools()))
+            self.addParameter(made)
+        preselect(self, self._tool)
         for output in self._tool.outputs:
             made = QgsProcessingOutputString if output.text else QgsProcessingOutputNumber
             self.addOutput(made(qgis_name(output.name), output.label))
@@ -85,6 +91,9 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
     def checkParameterValues(
         self, parameters: dict[str, Any], context: QgsProcessingContext
     ) -> tuple[bool, str]:
+        for parameter in self._tool.parameters:
+            if parameters.get(qgis_name(parameter.name)) == NOTHING:
+                return False, f"{parameter.kind.label} is missing"
         valid, message = super().checkParameterValues(parameters, context)
         if not valid:
             return valid, message
@@ -134,8 +143,10 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
             feedback.pushDebugInfo(traceback.format_exc())
             what = f"{type(error).__name__}: {error}"
             raise QgsProcessingException(f"this is a bug in GroundTie: {what}") from error
+        # A batch in which rows failed ran to its end, but not to a good one.
+        bad = getattr(result, "exit_code", 0) != 0
         for line in result.lines():
-            feedback.pushInfo(line)
+            feedback.reportError(line) if bad else feedback.pushInfo(line)
         self._finish_layers(values, context)
         return self._results(values, result.summary())
 
@@ -164,6 +175,9 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
             if path is not None and isinstance(kind, (kinds.RasterOut, kinds.VectorOut)):
                 style = getattr(kind, "style", "")
                 layers.add(str(path), context, style, self._alike.get(parameter.name))
+            for name in getattr(kind, "shows", ()) if path is not None else ():
+                load_on_completion(path / name, context)
+                layers.add(str(path / name), context)
 
     def _results(self, values: dict[str, Any], summary: dict[str, Any]) -> dict[str, Any]:
         written = {
@@ -185,17 +199,22 @@ def _progress(feedback: QgsProcessingFeedback) -> Any:
         feedback.setProgress(100 * fraction)
         if message and message != last_message:
             last_message = message
-            feedback.pushInfo(message)
+            heard = feedback.pushWarning if message.startswith("warning: ") else feedback.pushInfo
+            heard(message)
 
     return progress.Progress(report, feedback.isCanceled)
 
 
 def help_html(tool: Any) -> str:
     """Return the help of a tool and of its parameters as HTML."""
+
+    def worded(text: str) -> str:
+        return _escaped(in_words(text, tool, named_tools()))
+
     paragraphs = [tool.summary, *tool.description.split("\n\n")]
-    parts = [f"<p>{_escaped(text)}</p>" for text in paragraphs if text]
+    parts = [f"<p>{worded(text)}</p>" for text in paragraphs if text]
     rows = [
-        f"<p><b>{_escaped(p.kind.label)}</b>: {_escaped(p.kind.help)}</p>" for p in tool.parameters
+        f"<p><b>{_escaped(p.kind.label)}</b>: {worded(p.kind.help)}</p>" for p in tool.parameters
     ]
     return "\n".join([*parts, "<h3>Parameters</h3>", *rows])
 

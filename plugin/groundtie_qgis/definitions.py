@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import singledispatch
 from pathlib import Path
 from typing import Any
@@ -11,12 +12,14 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProcessingParameterBand,
     QgsProcessingParameterBoolean,
+    QgsProcessingParameterCrs,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterEnum,
     QgsProcessingParameterFile,
     QgsProcessingParameterFileDestination,
     QgsProcessingParameterFolderDestination,
     QgsProcessingParameterMapLayer,
+    QgsProcessingParameterMultipleLayers,
     QgsProcessingParameterNumber,
     QgsProcessingParameterRasterDestination,
     QgsProcessingParameterRasterLayer,
@@ -27,6 +30,7 @@ from qgis.core import (
 
 from . import compat
 from .library import kinds
+from .wording import choice_label
 
 
 def qgis_name(name: str) -> str:
@@ -37,7 +41,6 @@ def qgis_name(name: str) -> str:
 def definition(parameter: Any) -> QgsProcessingParameterDefinition:
     """Return the Processing definition of a declared parameter."""
     made = _make(parameter.kind, parameter, qgis_name(parameter.name))
-    made.setHelp(parameter.kind.help)
     if parameter.kind.advanced:
         made.setFlags(made.flags() | compat.ADVANCED)
     return made
@@ -61,6 +64,13 @@ def _make(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinit
 @_make.register(kinds.RasterIn)
 def _raster_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     return QgsProcessingParameterRasterLayer(name, kind.label, optional=not parameter.required)
+
+
+@_make.register(kinds.RastersIn)
+def _rasters_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterMultipleLayers(
+        name, kind.label, layerType=compat.RASTER, optional=not parameter.required
+    )
 
 
 @_make.register(kinds.VectorIn)
@@ -158,15 +168,47 @@ def _number(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefin
     )
 
 
+class WordOrNumber(QgsProcessingParameterEnum):
+    """A choice shown by labels, given by its number, its label or the command line's word."""
+
+    def __init__(self, name: str, label: str, words: Sequence[str], **more: Any) -> None:
+        super().__init__(name, label, options=[*map(choice_label, words)], **more)
+        self._words = tuple(words)
+
+    def word(self, value: Any) -> str | None:
+        """Return the word of a value; None if it has none."""
+        given = str(value)
+        if given in self._words:
+            return given
+        labels = self.options()
+        number = labels.index(given) if given in labels else _whole_number(given)
+        return self._words[number] if 0 <= number < len(self._words) else None
+
+    def checkValueIsAcceptable(
+        self, value: Any, context: QgsProcessingContext | None = None
+    ) -> bool:
+        is_word = isinstance(value, (str, int)) and self.word(value) is not None
+        return is_word or super().checkValueIsAcceptable(value, context)
+
+    def clone(self) -> WordOrNumber:
+        copy = WordOrNumber(self.name(), self.description(), self._words)
+        copy.fromVariantMap(self.toVariantMap())
+        return copy
+
+
+def _whole_number(text: str) -> int:
+    return int(text) if text.isascii() and text.isdigit() else -1
+
+
 @_make.register(kinds.Choice)
 def _choice(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterEnum(
+    default = parameter.default
+    return WordOrNumber(
         name,
         kind.label,
-        options=list(kind.choices),
-        defaultValue=parameter.default,
+        kind.choices,
+        defaultValue=None if default is None else kind.choices.index(default),
         optional=_optional(parameter),
-        usesStaticStrings=True,
     )
 
 
@@ -178,6 +220,13 @@ def _flag(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinit
 @_make.register(kinds.Text)
 def _text(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     return QgsProcessingParameterString(
+        name, kind.label, defaultValue=parameter.default, optional=_optional(parameter)
+    )
+
+
+@_make.register(kinds.Crs)
+def _crs(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterCrs(
         name, kind.label, defaultValue=parameter.default, optional=_optional(parameter)
     )
 

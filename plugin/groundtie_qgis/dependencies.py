@@ -21,14 +21,17 @@ _LOCK = threading.RLock()
 
 
 # What only some of the tools need, or only some of their outputs: by the endings of files.
-_NEEDED_BY_TOOL = {"train_feature_classifier": ("scikit-learn",)}
+_NEEDED_BY_TOOL = {
+    "train_feature_classifier": ("scikit-learn",),
+    "coregister_series": ("shapely", "fiona"),
+}
 _NEEDED_BY_FILE = {
     ".html": ("jinja2", "matplotlib"),
     ".png": ("matplotlib",),
     ".gpkg": ("fiona",),
 }
 # rasterio needs click itself; the tools do not.
-_NOT_BY_ALL = {"click", "scikit-learn", "jinja2", "matplotlib", "fiona"}
+_NOT_BY_ALL = {"click", "scikit-learn", "jinja2", "matplotlib", "fiona", "shapely"}
 
 
 def missing_packages() -> list[str]:
@@ -36,7 +39,7 @@ def missing_packages() -> list[str]:
     path = FOLDER / "requirements.txt"  # made when the plugin is built
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
     names = [match.group() for line in lines if (match := re.match(r"[\w.-]+", line))]
-    return _not_found(name for name in names if name not in _NOT_BY_ALL)
+    return not_found(name for name in names if name not in _NOT_BY_ALL)
 
 
 def missing_for(tool: str, paths: Iterable[Path]) -> list[str]:
@@ -44,10 +47,11 @@ def missing_for(tool: str, paths: Iterable[Path]) -> list[str]:
     needed = [*_NEEDED_BY_TOOL.get(tool, ())]
     for path in paths:
         needed += _NEEDED_BY_FILE.get(path.suffix.lower(), ())
-    return _not_found(dict.fromkeys(needed))
+    return not_found(dict.fromkeys(needed))
 
 
-def _not_found(names: Iterable[str]) -> list[str]:
+def not_found(names: Iterable[str]) -> list[str]:
+    """Return those of some distributions whose module is not found."""
     return [name for name in names if importlib.util.find_spec(_module(name)) is None]
 
 
@@ -58,13 +62,14 @@ def complaint(missing: list[str]) -> str:
     noun = "package" if len(missing) == 1 else "packages"
     return (
         f"GroundTie needs the Python {noun} {', '.join(missing)}, which QGIS's Python does not "
-        f"have; install with: {install_command(missing)} (then restart QGIS)"
+        f"have: take Raster > GroundTie > Install what is missing, or run: "
+        f"{install_command(missing)} (then restart QGIS)"
     )
 
 
-def install_command(missing: list[str]) -> str:
-    """Return the command that installs `missing` on this machine."""
-    if Path("/etc/debian_version").exists():
+def install_command(missing: list[str], debian: bool | None = None) -> str:
+    """Return the command that installs `missing`: on Debian, or elsewhere; None: here."""
+    if Path("/etc/debian_version").exists() if debian is None else debian:
         return "sudo apt install " + " ".join(
             _NAMES.get(name, ("", f"python3-{name}"))[1] for name in missing
         )

@@ -8,6 +8,15 @@ from typing import Any
 from qgis.core import Qgis, QgsMessageLog
 
 
+def which_qgis(platform: str) -> str:
+    """Return which QGIS has a newer Python on a platform, as `sys.platform` has it."""
+    if platform == "darwin":  # github.com/qgis/QGIS/issues/59321
+        return "QGIS from conda-forge or MacPorts; the installer of QGIS 3.40 has Python 3.9, too"
+    if platform == "win32":  # github.com/qgis/QGIS-Mac-Packager/issues/179
+        return "QGIS 3.34.10 or newer, best the current long-term release"
+    return "a newer QGIS, best the current long-term release"
+
+
 class OldPython:
     """States which Python QGIS has and which one is needed; offers nothing."""
 
@@ -16,8 +25,7 @@ class OldPython:
         found = ".".join(map(str, sys.version_info[:3]))
         self.complaint = (
             f"GroundTie needs Python {oldest[0]}.{oldest[1]} or newer, and this QGIS "
-            f"({Qgis.QGIS_VERSION}) has Python {found}: install a newer QGIS, best the current "
-            "long-term release"
+            f"({Qgis.QGIS_VERSION}) has Python {found}: install {which_qgis(sys.platform)}"
         )
 
     def initProcessing(self) -> None:

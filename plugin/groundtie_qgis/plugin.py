@@ -1,17 +1,41 @@
-"""The plugin as QGIS sees it: it adds and removes the Processing provider."""
+"""The plugin as QGIS sees it: the Processing provider, and the menu *Raster > GroundTie*."""
 
 from __future__ import annotations
 
-from qgis.core import QgsApplication
+from pathlib import Path
+from typing import Any
 
+from qgis.core import QgsApplication
+from qgis.PyQt.QtCore import Qt, QUrl
+from qgis.PyQt.QtGui import QDesktopServices, QIcon
+from qgis.PyQt.QtWidgets import QAction
+
+from .compat import WARNING
+from .install_dialog import InstallDialog
+from .pages import help_url
 from .provider import GroundTieProvider
+from .styling import ICON
+
+MENU = "GroundTie"
 
 
 class GroundTiePlugin:
-    """Adds GroundTie's provider to Processing; works with and without a desktop."""
+    """Adds GroundTie's provider to Processing, and its menu to a desktop.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    iface
+        The desktop; None without one.
+    packages
+        Folder of the packages that the plugin may install.
+    """
+
+    def __init__(self, iface: Any, packages: Path) -> None:
         self.provider: GroundTieProvider | None = None
+        self._iface = iface
+        self._packages = packages
+        self.actions: list[QAction] = []
+        self.dock: Any = None
 
     def initProcessing(self) -> None:
         """Register the provider (qgis_process calls this and nothing else)."""
@@ -21,9 +45,62 @@ class GroundTiePlugin:
     def initGui(self) -> None:
         """Start in the desktop."""
         self.initProcessing()
+        self._add_action("Register and review…", self.toggle_dock)
+        self._iface.addToolBarIcon(self.actions[0])
+        self._add_action("Install what is missing…", self.install)
+        self._add_action("Help", self.show_help)
+        if self.provider is not None and self.provider.warningMessage():
+            message = "Python packages are missing: Raster > GroundTie > Install what is missing"
+            self._iface.messageBar().pushMessage("GroundTie", message, WARNING, 0)
 
     def unload(self) -> None:
-        """Take the provider away again."""
+        """Take the provider and the menu away again."""
+        for action in self.actions:
+            self._iface.removePluginRasterMenu(MENU, action)
+        if self.actions:
+            self._iface.removeToolBarIcon(self.actions[0])
+        if self.dock is not None:
+            self.dock.take_away()
+            self._iface.removeDockWidget(self.dock)
+            self.dock = None
+        self.actions = []
+        self._remove_provider()
+
+    def toggle_dock(self) -> None:
+        """Open the dock, or close it."""
+        if self.provider is not None and self.provider.warningMessage():
+            self.install()
+            return
+        if self.dock is None:
+            from .dock import GroundTieDock
+
+            self.dock = GroundTieDock(self._iface)
+            self._iface.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, self.dock)
+            self.dock.show()
+            return
+        self.dock.setVisible(not self.dock.isVisible())
+
+    def install(self) -> None:
+        """Offer to install what is missing."""
+        dialog = InstallDialog(self._packages, self._start_again, self._iface.mainWindow())
+        dialog.exec()
+
+    def show_help(self) -> None:
+        """Open the page on the plugin."""
+        QDesktopServices.openUrl(QUrl(help_url("qgis")))
+
+    def _start_again(self) -> None:
+        self._remove_provider()
+        self.initProcessing()
+
+    def _remove_provider(self) -> None:
         if self.provider is not None:
             QgsApplication.processingRegistry().removeProvider(self.provider)
             self.provider = None
+
+    def _add_action(self, text: str, does: Any) -> QAction:
+        action = QAction(QIcon(str(ICON)), text, self._iface.mainWindow())
+        action.triggered.connect(lambda *_: does())
+        self._iface.addPluginToRasterMenu(MENU, action)
+        self.actions.append(action)
+        return action

@@ -23,6 +23,15 @@ def show_report(name: str, path: Path) -> None:
     resultsList.addResult(QIcon(str(ICON)), name, time.localtime(), str(path))
 
 
+def load_on_completion(path: Path, context: QgsProcessingContext) -> None:
+    """Have a raster loaded that is no output of its own; where there is a desktop."""
+    from qgis.utils import iface
+
+    if iface is not None and context.project() is not None:
+        details = QgsProcessingContext.LayerDetails(path.stem, context.project(), path.stem)
+        context.addLayerToLoadOnCompletion(str(path), details)
+
+
 def forget_layers(context: QgsProcessingContext, paths: Iterable[str]) -> None:
     """Have layers not loaded that a run did not make: QGIS would complain of each."""
     left = context.layersToLoadOnCompletion()

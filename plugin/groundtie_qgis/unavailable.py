@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib.util
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from qgis.core import (
 from qgis.PyQt.QtGui import QIcon
 
 from .library import library_name
+from .pages import help_url
 from .styling import ICON
 
 
@@ -30,6 +32,7 @@ class NamedTool:
     summary: str
 
 
+@cache
 def named_tools() -> list[NamedTool]:
     """Read names, titles and groups of the tools from their source."""
     spec = importlib.util.find_spec(f"{library_name()}.tools")
@@ -98,6 +101,9 @@ class UnavailableAlgorithm(QgsProcessingAlgorithm):
 
     def shortHelpString(self) -> str:
         return self._reason
+
+    def helpUrl(self) -> str:
+        return help_url("qgis")
 
     def icon(self) -> QIcon:
         return QIcon(str(ICON))

@@ -62,10 +62,16 @@ class Reader:
             return None
         if isinstance(kind, kinds.RasterIn):
             return self._raster(kind, name, given)
+        if isinstance(kind, kinds.RastersIn):
+            return self._rasters(kind, name, given)
         if isinstance(kind, kinds.VectorIn):
             return self._vector(name, given)
         if isinstance(kind, kinds.MaskIn):
             return self._mask(kind, name, given)
+        if isinstance(kind, kinds.Choice):
+            return self._word(name)
+        if isinstance(kind, kinds.Crs):
+            return self._crs(name)
         read, context = self._method(kind)
         return read(self._parameters, name, context)
 
@@ -78,25 +84,32 @@ class Reader:
             return algorithm.parameterAsFileOutput, self._outputs
         if isinstance(kind, kinds.Flag):
             return algorithm.parameterAsBool, self._context
-        if isinstance(kind, kinds.Choice):
-            return algorithm.parameterAsEnumString, self._context
         if isinstance(kind, kinds.Band) or (isinstance(kind, kinds.Number) and kind.integer):
             return algorithm.parameterAsInt, self._context
         if isinstance(kind, kinds.Number):
             return algorithm.parameterAsDouble, self._context
         return algorithm.parameterAsString, self._context
 
+    def _word(self, name: str) -> str:
+        given = self._algorithm.parameterAsString(self._parameters, name, self._context)
+        return self._algorithm.parameterDefinition(name).word(given) or given
+
+    def _crs(self, name: str) -> str | None:
+        crs = self._algorithm.parameterAsCrs(self._parameters, name, self._context)
+        return (crs.authid() or crs.toWkt()) if crs.isValid() else None
+
     def _raster(self, kind: Any, name: str, given: Any) -> Any:
         layer = self._algorithm.parameterAsRasterLayer(self._parameters, name, self._context)
         if layer is None:
             return given  # the library reports better than QGIS what is wrong with it
-        provider = layer.providerType()
-        if provider != "gdal":
-            raise errors.ParameterError(
-                f"{kind.label} must be a raster file, not the layer {layer.name()} of the "
-                f"provider {provider}; export it to a file first"
-            )
-        return _without_options(layer.source())
+        return _file_of(layer, kind)
+
+    def _rasters(self, kind: Any, name: str, given: Any) -> Any:
+        layers = self._algorithm.parameterAsLayerList(self._parameters, name, self._context)
+        names = [given] if isinstance(given, str) else list(given)
+        if len(layers) < len(names):
+            return names  # folders, patterns and tables are no layers
+        return [_file_of(layer, kind) for layer in layers]
 
     def _mask(self, kind: Any, name: str, given: Any) -> Any:
         if isinstance(given, str) and Path(given).is_file():
@@ -158,6 +171,17 @@ def _snapshot(layer: QgsVectorLayer, label: str, context: QgsProcessingContext) 
     if failed:
         raise errors.ParameterError(f"{label}: the layer {layer.name()} cannot be read: {message}")
     return str(path)
+
+
+def _file_of(layer: Any, kind: Any) -> str:
+    """Return the file of a raster layer; raise `ParameterError` if it has none."""
+    provider = layer.providerType()
+    if provider != "gdal":
+        raise errors.ParameterError(
+            f"{kind.label} must be a raster file, not the layer {layer.name()} of the "
+            f"provider {provider}; export it to a file first"
+        )
+    return _without_options(layer.source())
 
 
 def _without_options(source: str) -> str:

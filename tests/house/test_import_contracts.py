@@ -15,7 +15,7 @@ pytest.importorskip("importlinter", reason="import-linter is not packaged by Deb
 ROOT = Path(__file__).resolve().parents[2]
 LINT = "from importlinter.cli import lint_imports_command; lint_imports_command()"
 PACKAGES = (
-    *("tools", "simulation", "registration", "report", "assessment", "studies"),
+    *("tools", "simulation", "series", "registration", "report", "assessment", "studies"),
     *("sensor", "features", "matching"),
     *("similarity", "masks", "geometry", "rasters", "speckle"),
 )
@@ -28,7 +28,7 @@ def package(tmp_path: Path) -> Path:
     for name in PACKAGES:
         (package / name).mkdir(parents=True)
         (package / name / "__init__.py").touch()
-    for name in ("register", "coregister", "match_sar_sar", "match_optical"):
+    for name in ("register", "coregister", "coregister_series", "match_sar_sar", "match_optical"):
         (package / "tools" / f"{name}.py").touch()
     for name in ("extract_gcps", "refine_rpc"):
         (package / "tools" / f"{name}.py").touch()

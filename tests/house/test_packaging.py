@@ -22,7 +22,7 @@ from groundtie.version import __version__  # noqa: E402
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 # Distributions whose modules have another name, and modules that come with a declared one.
-MODULES = {"opencv-python-headless": "cv2", "scikit-learn": "sklearn"}
+MODULES = {"opencv-python-headless": "cv2", "pyyaml": "yaml", "scikit-learn": "sklearn"}
 COMES_WITH = {"affine": "rasterio"}
 # Debian 12's versions (packages.debian.org/bookworm).
 DEBIAN_12 = {
@@ -64,7 +64,8 @@ def modules() -> set[str]:
 def extras() -> set[str]:
     """Return the modules of what only Python users may want."""
     groups = PROJECT["optional-dependencies"]
-    return {name.split(">=")[0] for group in groups if group != "dev" for name in groups[group]}
+    names = [name for group in groups if group != "dev" for name in groups[group]]
+    return {MODULES.get(name, name) for name in (name.split(">=")[0] for name in names)}
 
 
 @pytest.mark.slow

@@ -340,3 +340,18 @@ class TestCheck:
 
 def _text(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
+
+
+def test_a_batch_tells_its_failed_rows_and_goes_on(provider: Any, tmp_path: Path) -> None:
+    from qgis.core import QgsProcessingFeedback
+
+    write_raster(tmp_path / "a.tif")
+    (tmp_path / "t.csv").write_text("input,mask-high-percent\na.tif,10\nnone.tif,\n")
+    feedback = QgsProcessingFeedback()
+    values = {"TOOL": "mask_threshold", "TABLE": str(tmp_path / "t.csv")}
+    values["OUTPUT_FOLDER"] = str(tmp_path / "out")
+    results, finished = run(provider.algorithm("batch").create(), values, feedback)
+    assert finished
+    assert (results["DONE"], results["FAILED"]) == (1, 1)
+    assert results["TABLE_OF_RESULTS"] == str(tmp_path / "out/t.results.csv")
+    assert "row 2 (2) failed: cannot read" in feedback.textLog()

@@ -23,6 +23,7 @@ TYPES = {
     "REGIONS": "vector",
     "TRANSFORM": "file",
     "MASK": "layer",
+    "OTHERS": "multilayer",
     "SEED": "number",
 }
 
@@ -48,17 +49,18 @@ def test_optional_is_what_may_be_absent(definitions: dict[str, Any]) -> None:
         "REGIONS",
         "TRANSFORM",
         "MASK",
+        "OTHERS",
     }
 
 
 def test_advanced_parameters_are_folded_away(definitions: dict[str, Any]) -> None:
     advanced = {n for n, d in definitions.items() if d.flags() & d.FlagAdvanced}
-    assert advanced == {"REGIONS", "TRANSFORM", "MASK", "SEED"}
+    assert advanced == {"REGIONS", "TRANSFORM", "MASK", "OTHERS", "SEED"}
 
 
 def test_defaults(definitions: dict[str, Any]) -> None:
     defaults = {n: d.defaultValue() for n, d in definitions.items()}
-    given = {"MODE": "work", "BAND": 1, "CAREFUL": True, "SEED": 7}
+    given = {"MODE": 0, "BAND": 1, "CAREFUL": True, "SEED": 7}
     assert defaults == {**dict.fromkeys(TYPES), **given}
 
 
@@ -89,9 +91,8 @@ def test_numbers_keep_their_ranges(definitions: dict[str, Any]) -> None:
     assert seed.dataType() == seed.Integer
 
 
-def test_choices_are_words_not_numbers(definitions: dict[str, Any]) -> None:
-    assert definitions["MODE"].options() == ["work", "refuse", "crash", "wait"]
-    assert definitions["MODE"].usesStaticStrings()
+def test_choices_have_labels(definitions: dict[str, Any]) -> None:
+    assert definitions["MODE"].options() == ["Work", "Refuse", "Crash", "Wait"]
 
 
 def test_a_band_follows_its_raster(definitions: dict[str, Any]) -> None:

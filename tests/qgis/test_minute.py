@@ -106,3 +106,27 @@ def test_a_refusal_shows_its_report(desktop: Any, tmp_path: Path) -> None:
     assert report.filename in log
     assert "not correctly generated" not in log
     assert len(QgsProject.instance().mapLayers()) == 2
+
+
+def test_a_simulated_pair_is_loaded(desktop: Any, tmp_path: Path) -> None:
+    from qgis.core import QgsProject
+
+    values = {"FOLDER": str(tmp_path / "pair"), "SIZE": 100, "DENSITY": "rural"}
+    succeeded, log = click_run(desktop, "simulate", **values)
+    assert succeeded, log
+    root = QgsProject.instance().layerTreeRoot()
+    assert [layer.name() for layer in root.layerOrder()] == ["input", "reference"]
+    assert [group.name() for group in root.children()] == ["Simulate a SAR–optical pair"]
+    assert all(layer.isValid() for layer in root.layerOrder())
+    assert Path(root.layerOrder()[0].source()).is_relative_to(tmp_path / "pair")
+
+
+def test_residuals_of_rpcs_are_drawn_as_tie_points_are(provider: Any) -> None:
+    from groundtie_qgis.library import library_module
+
+    tools = library_module("tools")
+    styles = {
+        name: tools.load_tool(name).parameter(parameter).kind.style
+        for name, parameter in (("refine_rpc", "residuals"), ("coregister", "tie_points"))
+    }
+    assert set(styles.values()) == {"tie_points"}

@@ -12,7 +12,7 @@ import pytest
 HIDE = "import sys\nsys.modules['cv2'] = None\n"
 COMPLAINT = (
     "GroundTie needs the Python package opencv-python-headless, which QGIS's Python does not "
-    "have; install with: "
+    "have: take Raster > GroundTie > Install what is missing, or run: "
 )
 
 

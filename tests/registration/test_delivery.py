@@ -13,8 +13,8 @@ from contexts import context
 from textured_pairs import TexturedPair, listing
 
 from groundtie.context import Context
-from groundtie.errors import NothingFoundError, NotRegisteredError, OutputError, SameFileError
-from groundtie.geometry.transform import load_transform
+from groundtie.errors import NothingFoundError, NotRegisteredError, OutputError
+from groundtie.geometry.transform import FORMAT, load_transform
 from groundtie.registration import delivery
 from groundtie.registration.delivery import (
     Call,
@@ -102,10 +102,15 @@ def test_what_fails_later_leaves_no_report_either(
     assert listing(tmp_path) == {}
 
 
-def test_the_report_and_the_transform_cannot_share_a_name() -> None:
-    """A report's numbers are put beside it as JSON; nothing is computed before this is found."""
-    with pytest.raises(SameFileError, match=r"report's numbers: .*r\.json"):
-        RegistrationFiles(None, None, Path("r.json"), Path("r.html"))
+def test_the_reports_numbers_leave_the_transform_its_name(
+    registration: Registration, context: Context, tmp_path: Path
+) -> None:
+    """`--report r.html --transform r.json`: the numbers are put beside them under another name."""
+    files = RegistrationFiles(None, None, tmp_path / "r.json", tmp_path / "r.html")
+    files.write(registration, context)
+    assert set(listing(tmp_path)) == {"r.html", "r.json", "r.report.json"}
+    assert json.loads((tmp_path / "r.json").read_text())["format"] == FORMAT
+    assert "verdict" in json.loads((tmp_path / "r.report.json").read_text())
 
 
 def test_rasters_stay_open_as_long_as_a_delivered_registration(

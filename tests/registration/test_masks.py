@@ -19,12 +19,11 @@ from groundtie.rasters.pair import ImagePair
 from groundtie.registration import masks
 from groundtie.registration.masks import (
     Masked,
-    is_raster_mask,
     require_one_mask,
     with_ground_mask,
-    with_user_masks,
 )
 from groundtie.registration.scene import SceneInfo
+from groundtie.registration.user_masks import UserMask, named_masks, with_user_masks
 
 __all__ = ["context"]
 NO_RADAR = "there is no radar image beside a camera's"
@@ -115,7 +114,7 @@ def test_layers_and_classifiers_become_rasters(
         text = json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]})
         layer.write_text(text)
         classifier = bright_is_left_out(tmp_path / "bright.json", 120.0)
-        both, used = with_user_masks(pair, {REFERENCE: layer, INPUT: classifier}, stack, context)
+        both, used = with_user_masks(pair, named_masks((layer, classifier)), stack, context)
         assert used is not None
         assert (used.kind, used.image, used.reason) == (
             LAYER,
@@ -127,12 +126,12 @@ def test_layers_and_classifiers_become_rasters(
         assert valid[:, :199].all() and not valid[:, 201:].any()
         # Nothing of the fields is bright.
         assert both.input_patch(both.grid, both.nominal_px).valid.mean() > 0.9
-        alone, used = with_user_masks(pair, {REFERENCE: classifier}, stack, context)
+        alone, used = with_user_masks(pair, named_masks((classifier, None)), stack, context)
         assert used is None
         shown = alone.reference_patch(alone.grid)
         bright = pair.reference_patch(pair.grid).values
         assert bright[~shown.valid].mean() > 1.5 * bright[shown.valid].mean()
-        same, used = with_user_masks(pair, {REFERENCE: None, INPUT: None}, stack, context)
+        same, used = with_user_masks(pair, named_masks((None, None)), stack, context)
         assert same is pair and used is None
 
 
@@ -144,11 +143,10 @@ def test_layers_and_classifiers_become_rasters(
         ("a.json", False),
         ("a.gpkg", False),
         ("a.GeoJSON", False),
-        (None, False),
     ],
 )
-def test_rasters_are_recognised_by_their_ending(mask: str | None, expected: bool) -> None:
-    assert is_raster_mask(mask) == expected
+def test_rasters_are_recognised_by_their_ending(mask: str, expected: bool) -> None:
+    assert UserMask(mask).is_raster == expected
 
 
 def test_a_layer_and_a_kind_of_mask_are_one_too_many() -> None:

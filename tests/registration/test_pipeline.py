@@ -26,6 +26,7 @@ from groundtie.matching.guided_fit import GuidedFit
 from groundtie.matching.keypoint_fit import KeypointFit
 from groundtie.matching.pooled import PooledHistogramMatcher
 from groundtie.matching.surface_fit import SurfaceFit
+from groundtie.progress import Progress
 from groundtie.registration import masks, pipeline, verdict
 from groundtie.registration import scene as scene_module
 from groundtie.registration.evidence import AGREEMENT, ERROR, REFINEMENT, SCENE, SEARCH, SURVEY
@@ -302,3 +303,17 @@ def test_ground_control_is_judged_by_the_rules_of_every_stage(
 
     assert refused_by_house_rules(monkeypatch, stages, call) == list(expected)
     assert not output.exists()
+
+
+@pytest.mark.parametrize(("radius_m", "warned"), [(None, False), (20.0, False), (1e5, True)])
+def test_a_radius_beyond_the_images_is_warned_of_before_the_search(
+    textured: TexturedPair, context: Context, radius_m: float | None, warned: bool
+) -> None:
+    told: list[str] = []
+    noted = replace(context, progress=Progress(lambda fraction, message: told.append(message)))
+    spec = replace(COREGISTER, search_radius_m=radius_m)
+    with open_pair(textured.reference, textured.input, spec, noted):
+        pass
+    found = [note for note in told if "beyond the images" in note]
+    assert bool(found) == warned
+    assert not warned or found[0].startswith("warning: a search radius of 100000 m")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from evidences import (
     GRID,
+    RANGE,
     control,
     displaced,
     estimated,
@@ -51,6 +53,7 @@ from groundtie.registration.evidence import (
 from groundtie.registration.pose_verdict import PoseEvidence, PoseSurveyEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
+from groundtie.registration.series_evidence import DateEvidence
 from groundtie.registration.tie_point_evidence import TiePointEvidence
 from groundtie.registration.verdict import Evidence, first_refusal
 
@@ -65,6 +68,7 @@ RANK = (
     stages.SCENE,
     stages.SURVEY,
     stages.REFINEMENT,
+    stages.SERIES,
 )
 
 # Dense towns: of a radar with speckle, of a radar whose speckle a filter took, of who knows what.
@@ -168,10 +172,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     ),
     "another transform": (evidence(beside(15, 20)), evidence(beside(20, 16))),
     "error at held-out points": (
-        evidence(scatter(72, 0.3) + [1.2, 0.0], max_error_px=1.0),
-        evidence(scatter(72, 0.3) + [1.2, 0.0], max_error_px=1.5),
+        evidence(scatter(72, 0.9), max_error_px=1.0),
+        evidence(scatter(72, 0.9), max_error_px=1.5),
     ),
-    "loose model": (evidence(GOOD, loose(2.0)), evidence(GOOD, loose(1.0))),
+    "uncertain transform": (evidence(GOOD, loose(2.0)), evidence(GOOD, loose(1.0))),
     "too little ground": (
         evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.08, "as in a dense town")),
         evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.12, "as in a dense town")),
@@ -220,6 +224,19 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "bias not folded": (
         refinement(CONTROL, folding_px=0.02),
         refinement(CONTROL, folding_px=0.005),
+    ),
+    "date not readable": (DateEvidence("no such file"), DateEvidence(links=1)),
+    "date not linked": (
+        DateEvidence(refusals=["nothing in common was found"], is_reached=False),
+        DateEvidence(refusals=["nothing in common was found"], links=1),
+    ),
+    "loops do not close": (
+        DateEvidence(links=1, rejected=1, open_loops=1, loops=1),
+        DateEvidence(links=2, rejected=1, open_loops=1, loops=2, is_confirmed=True),
+    ),
+    "one way alone": (
+        DateEvidence(links=1, is_refused_by_hub=True),
+        DateEvidence(links=2, is_refused_by_hub=True, is_confirmed=True),
     ),
 }
 
@@ -273,6 +290,31 @@ def test_names_are_unique_and_stages_follow_one_another() -> None:
 def test_a_rule_states_its_limit_its_source_and_what_to_try(rule: Rule) -> None:
     for text in (rule.name, rule.refuses, rule.source, rule.advice):
         assert text and text == text.strip() and not text.endswith(".")
+
+
+def test_what_heights_may_displace_all_points_by_is_refused() -> None:
+    """Chips that scatter evenly along a line by ± n px may be n px off, all of them."""
+
+    def along(reach_px: float) -> RegistrationEvidence:
+        seen = survey()
+        return evidence(GOOD, survey=replace(seen, shifts_px=displaced(49, -reach_px, reach_px)))
+
+    assert refusing(along(2.0)) == []
+    assert refusing(along(3.5)) == ["uncertain transform"]
+
+
+@pytest.mark.parametrize(
+    ("more", "expected_px"),
+    [({}, 6.0), ({"mask": masked(REGIONS)}, 3.0), ({"layover_factor": 3.0}, 6.0 * math.sqrt(3))],
+)
+def test_heights_that_spread_evenly_displace_by_their_width(
+    more: dict[str, Any], expected_px: float
+) -> None:
+    """Chips that spread by ± 3 px along the range: the ground is the lowest, or the middle."""
+    seen = replace(survey(), shifts_px=displaced(49, -3.0, 3.0))
+    found = evidence(GOOD, survey=seen, **more).displacement_px
+    assert np.hypot(*found) == pytest.approx(expected_px, rel=0.15)
+    assert abs(found @ RANGE) == pytest.approx(np.hypot(*found), rel=0.01)
 
 
 @pytest.mark.parametrize("kind", [REGIONS, LAYER])

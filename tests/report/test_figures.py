@@ -176,10 +176,11 @@ def test_the_map_of_points_without_transform_shows_all() -> None:
     np.testing.assert_allclose(np.sort(drawn, axis=0), np.sort(AT_PX, axis=0), atol=1e-6)
 
 
-def test_the_circle_has_the_radius_of_ce90() -> None:
+def test_the_circle_holds_ninety_percent_of_the_residuals() -> None:
     axes = figures.error_scatter(measured(), VERDICT).axes[0]
     (circle,) = [patch for patch in axes.patches if isinstance(patch, Circle)]
-    assert circle.get_radius() == 1.52
+    # √ln 10 times the RMSE of 1 px, for circular normal errors.
+    assert circle.get_radius() == pytest.approx(1.5174, abs=1e-4)
     assert circle.center == (0, 0)
     assert axes.get_aspect() == 1
 
@@ -203,8 +204,8 @@ def test_the_histogram_counts_check_points() -> None:
     axes = figures.error_histogram(measured(), VERDICT, None).axes[0]
     assert sum(bar.get_height() for bar in axes.patches) == 3
     assert axes.get_xlim() == (0, 3)
-    (ce90,) = [line for line in axes.lines if line.get_label() == "CE90"]
-    assert list(ce90.get_xdata()) == [1.52, 1.52]
+    (radius,) = [line for line in axes.lines if line.get_label() == "90 % of the residuals"]
+    assert list(radius.get_xdata()) == pytest.approx([1.5174, 1.5174], abs=1e-4)
 
 
 def test_the_histogram_has_metres_only_if_there_are_any() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from ..errors import GeoreferencingError, NoOverlapError
 from ..geometry.transform import Transform
 from ..rasters.grid import FloatArray, reproject
 from ..rasters.pair import Image, ImagePair
+from ..rasters.patch import Patch
 from ..rasters.reading import RasterSource
 from ..rasters.target_grids import covering_grid
 from ..report import pictures
@@ -22,15 +24,15 @@ class Comparison:
     ----------
     reference, nominal, registered
         The reference, the input where its georeferencing puts it, and the input where a transform
-        puts it (None: there is no transform). What is masked is tinted.
+        puts it (None: there is no transform).
+    masks
+        By the names of these pictures, tints of what is masked, transparent elsewhere.
     backdrop
         The reference, small and faint.
     reference_name, input_name
         Names of the files.
     width, height
         Size in pixels.
-    is_masked
-        Whether a mask may tint the pictures.
     """
 
     reference: str
@@ -41,39 +43,50 @@ class Comparison:
     input_name: str
     width: int
     height: int
-    is_masked: bool = False
+    masks: Mapping[str, str]
 
     @classmethod
     def of(cls, pair: ImagePair, to_input_px: pictures.ToPixel | None) -> Comparison:
         """Draw the images of a pair; `to_input_px` takes map positions to the input's pixels."""
         grid = pictures.overview_grid(pair.grid)
-        bare = replace(
-            pair,
-            reference=replace(pair.reference, mask=None),
-            input=replace(pair.input, mask=None),
-        )
-        plain = bare.reference_patch(grid)
-        masked = pair.reference_patch(grid) if pair.reference.mask is not None else plain
-
-        def input_uri(to_px: pictures.ToPixel) -> str:
-            patch = bare.input_patch(grid, to_px)
-            shown = pair.input_patch(grid, to_px) if pair.input.mask is not None else patch
-            return pictures.jpeg_uri(pictures.tinted_picture(patch, shown.valid))
-
-        registered = None
+        bare = without_masks(pair)
+        reference = bare.reference_patch(grid)
+        shown = {"reference": pictures.jpeg_uri(pictures.grey_picture(reference))}
+        masks = {}
+        if pair.reference.mask is not None:
+            masks["reference"] = _tint(reference, pair.reference_patch(grid))
+        ways: dict[str, pictures.ToPixel] = {"nominal": pair.nominal_px}
         if to_input_px is not None:
-            registered = input_uri(pictures.overview_positions(to_input_px, grid))
+            ways["registered"] = pictures.overview_positions(to_input_px, grid)
+        for name, to_px in ways.items():
+            patch = bare.input_patch(grid, to_px)
+            shown[name] = pictures.jpeg_uri(pictures.grey_picture(patch))
+            if pair.input.mask is not None:
+                masks[name] = _tint(patch, pair.input_patch(grid, to_px))
         return cls(
-            pictures.jpeg_uri(pictures.tinted_picture(plain, masked.valid)),
-            input_uri(pair.nominal_px),
-            registered,
-            pictures.jpeg_uri(pictures.backdrop(pictures.grey_picture(plain))),
+            shown["reference"],
+            shown["nominal"],
+            shown.get("registered"),
+            pictures.jpeg_uri(pictures.backdrop(pictures.grey_picture(reference))),
             Path(pair.reference.source.path).name,
             Path(pair.input.source.path).name,
             grid.width,
             grid.height,
-            pair.is_masked,
+            masks,
         )
+
+
+def without_masks(pair: ImagePair) -> ImagePair:
+    """Return a pair whose images are shown whole."""
+    return replace(
+        pair,
+        reference=replace(pair.reference, mask=None),
+        input=replace(pair.input, mask=None),
+    )
+
+
+def _tint(patch: Patch, masked: Patch) -> str:
+    return pictures.tint_uri(patch.valid & ~masked.valid)
 
 
 def compare(reference: RasterSource, input: RasterSource, transform: Transform) -> Comparison:

@@ -29,7 +29,8 @@ USUAL_MAX_ERROR_PX = 3.0
 # 90 % of a circular normal distribution lies within this many standard deviations of an axis.
 CE90_FACTOR = math.sqrt(-2 * math.log(0.1))
 
-_SMALLEST_SIGMA_PX = 0.1
+# Below a hundredth of a pixel nothing is measured.
+_SMALLEST_SIGMA_PX = 0.01
 _SIGMA_BEYOND = 1.5
 
 

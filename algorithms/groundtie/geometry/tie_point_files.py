@@ -110,7 +110,7 @@ def read_tie_points(
     TiePoints
         With the CRS of their map; numbers that the file lacks are NaN. The column `edited` of
         `more` is 1 where a line of a layer was moved or drawn by a person: its ends count then,
-        and not the columns.
+        and not the columns. It stays 1 for points that are marked so in the file.
 
     Raises
     ------
@@ -132,6 +132,7 @@ def read_tie_points(
         if edited.any():
             _LOG.info("%s: %d of %d lines were moved or drawn", path, edited.sum(), len(rows))
         points = _from_rows(rows, input_grid, crs, more)
+        edited |= _numbers(rows, EDITED) > 0
         return replace(points, more={**points.more, EDITED: edited.astype(float)})
     except (OSError, ValueError, KeyError, TypeError, OverflowError, CRSError, csv.Error) as error:
         reason = f"column {error} is missing" if isinstance(error, KeyError) else error

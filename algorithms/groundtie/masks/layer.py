@@ -30,15 +30,18 @@ class LayerMask:
         GeoJSON geometries on the scene's map.
     reach_px
         Half of the width of the lines.
+    is_outside
+        Whether what it does not cover takes part instead.
     """
 
     scene: Scene
     areas: tuple[Any, ...]
     lines: tuple[Any, ...]
     reach_px: int
+    is_outside: bool = False
 
     def select(self, window: Window) -> Selection:
-        """Return which pixels of a window take part: those whose centres are covered."""
+        """Return which pixels of a window take part: those whose centres it covers."""
         reach = self.reach_px
         around = Window(
             window.col - reach,
@@ -50,7 +53,7 @@ class LayerMask:
         inside = np.s_[reach : reach + window.height, reach : reach + window.width]
         covered = self._drawn(self.areas, window) | along[inside]
         valid = self.scene.read(window).valid
-        return Selection(valid & covered, valid)
+        return Selection(valid & (covered != self.is_outside), valid)
 
     def _drawn(self, geometries: tuple[Any, ...], window: Window) -> Mask:
         from rasterio.features import rasterize

@@ -18,6 +18,7 @@ from ..similarity.peak import find_peak
 from ..similarity.surface import SimilaritySettings, describe, similarity_surface
 from .alignment import Positions
 from .belief_propagation import Surfaces, normalise_each, propagate
+from .chip_windows import ChipWindows
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 
@@ -133,40 +134,25 @@ class ChipMatcher:
         self, model: Model, places: Places, radius_px: int, context: Context, *, both_ways: bool
     ) -> tuple[NDArray[np.int_], Surfaces]:
         """Return the centres that could be matched and surfaces (n, ways, 2 r + 1, 2 r + 1)."""
-        kept: list[NDArray[np.int_]] = []
-        found: list[Surfaces] = []
+        reach = radius_px + BORDER_PX
+        windows = ChipWindows(self.pair, model, places, reach, self.held_out)
 
-        def one(centre: NDArray[np.int_]) -> Surfaces | None:
-            return self._surfaces(model, places, centre, radius_px, both_ways)
+        def one(chip: int, reference: Patch, input: Patch) -> Surfaces | None:
+            both = {"reference": reference.inner(reach), "input": input.inner(reach)}
+            if not all(self._can_be_matched(*one, places.centres[chip]) for one in both.items()):
+                return None
+            return self._surfaces(reference, input, places.chip_px, radius_px, both_ways)
 
-        matched = context.map(one, list(places.centres))
-        for centre, surfaces in zip(places.centres, matched, strict=True):
-            if surfaces is not None:
-                kept.append(centre)
-                found.append(surfaces)
+        matched = windows.map(one, context)
+        kept = [chip for chip, surfaces in enumerate(matched) if surfaces is not None]
+        found = [surfaces for surfaces in matched if surfaces is not None]
         span = 2 * radius_px + 1
         none = np.zeros((0, 1 + both_ways, span, span), np.float32)
-        return np.array(kept, int).reshape(-1, 2), np.stack(found) if found else none
+        return places.centres[kept], np.stack(found) if found else none
 
     def _surfaces(
-        self,
-        model: Model,
-        places: Places,
-        centre: NDArray[np.int_],
-        radius_px: int,
-        both_ways: bool,
-    ) -> Surfaces | None:
-        chip_px, reach = places.chip_px, radius_px + BORDER_PX
-        side = chip_px + 2 * reach
-        corner = centre - chip_px // 2 - reach
-        piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
-        hidden = None if self.held_out is None else self.held_out(piece)
-        reference = self.pair.reference_patch(piece, hidden)
-        if not self._can_be_matched(reference.inner(radius_px), "reference", centre):
-            return None
-        input = self.pair.input_patch(piece, lambda xy: self.pair.nominal_px(model(xy)))
-        if not self._can_be_matched(input.inner(radius_px), "input", centre):
-            return None
+        self, reference: Patch, input: Patch, chip_px: int, radius_px: int, both_ways: bool
+    ) -> Surfaces:
         reference_chip = describe(reference, chip_px**2, self.settings)
         input_chip = describe(input, chip_px**2, self.settings)
         forward = similarity_surface(
@@ -179,8 +165,7 @@ class ChipMatcher:
         )
         return np.stack([forward, backward[::-1, ::-1]])
 
-    def _can_be_matched(self, chip: Patch, image: str, centre: NDArray[np.int_]) -> bool:
-        core = chip.inner(BORDER_PX)
+    def _can_be_matched(self, image: str, core: Patch, centre: NDArray[np.int_]) -> bool:
         least = self.least_valid
         if least is None:
             least = LEAST_VALID_MASKED if self.pair.is_masked else _LEAST_VALID

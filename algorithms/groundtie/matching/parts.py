@@ -35,6 +35,8 @@ class Part:
         How many of those agree with the model.
     log10_false_alarms
         log10 of the expected number of such parts if all chips but these agreed by chance.
+    members
+        Which chips of the survey they are, by number.
     """
 
     where: str
@@ -43,6 +45,7 @@ class Part:
     surrounded: int
     confirming: int
     log10_false_alarms: float
+    members: tuple[int, ...] = ()
 
     @property
     def distance_px(self) -> float:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..context import Context
 from ..errors import TooFewPointsError
@@ -22,6 +21,7 @@ from ..similarity.pooled import PooledHistogram, smooth
 from ..similarity.surface import SimilaritySettings, Surface
 from .alignment import Positions
 from .belief_propagation import normalise_each
+from .chip_windows import ChipWindows
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 
@@ -82,19 +82,18 @@ class PooledHistogramMatcher:
         histogram = self._histogram(model, Places.tiles(places.grid, self.pooled_chip_px), context)
         order = 1 if self._is_reference_masked else -1
 
-        def one(centre: NDArray[np.int_]) -> Surface | None:
-            template, search = self._windows(model, places, centre, radius_px, self.blind)
+        windows = self._windows(model, places, radius_px, self.blind)
+
+        def one(_: int, reference: Patch, input: Patch) -> Surface | None:
+            template, search = self._template_first(reference, input)
             chip = template.inner(radius_px)
             if chip.valid_share < _LEAST_VALID:
                 return None
             return histogram.surface(chip, search)[::order, ::order]
 
-        kept, found = [], []
-        matched = context.map(one, list(places.centres))
-        for centre, surface in zip(places.centres, matched, strict=True):
-            if surface is not None:
-                kept.append(centre)
-                found.append(surface)
+        matched = windows.map(one, context)
+        kept = [chip for chip, surface in enumerate(matched) if surface is not None]
+        found = [surface for surface in matched if surface is not None]
         span = 2 * radius_px + 1
         nats = np.stack(found) if found else np.zeros((0, span, span), np.float32)
         normalised = normalise_each(nats)
@@ -102,7 +101,7 @@ class PooledHistogramMatcher:
         spread = np.ptp(nats, axis=(1, 2)) / np.maximum(np.ptp(normalised, axis=(1, 2)), 1e-9)
         heights = normalised.max(axis=(1, 2), initial=0.0) * spread
         weight = spread / max(float(heights.mean()), 1e-9) if found else spread
-        return ChipSurfaces(np.array(kept, int).reshape(-1, 2), normalised, normalised, weight)
+        return ChipSurfaces(places.centres[kept], normalised, normalised, weight)
 
     def fit_places(self, layout: ChipLayout) -> Places:
         """Return the chips that a fit is made of: all over the grid, as there is little in each."""
@@ -131,12 +130,12 @@ class PooledHistogramMatcher:
         """Return the evidence of pairs of grey levels in chips of the fit, as they lie now."""
         every = max(len(places.centres) * places.chip_px**2 // _MOST_PIXELS, 1)
 
-        def pixels(centre: NDArray[np.int_]) -> FloatImage:
-            template, search = self._windows(model, places, centre, 0, blind=True)
+        def pixels(_: int, reference: Patch, input: Patch) -> FloatImage:
+            template, search = self._template_first(reference, input)
             both = template.valid & search.valid
             return np.stack([smooth(template).values[both], search.values[both]])[:, ::every]
 
-        sampled = list(context.quiet().map(pixels, list(places.centres)))
+        sampled = self._windows(model, places, 0, blind=True).map(pixels, context.quiet())
         sample = np.concatenate(sampled, axis=1) if sampled else np.zeros((2, 0), np.float32)
         count = sample.shape[1] * every
         if count < _LEAST_PIXELS:
@@ -147,13 +146,10 @@ class PooledHistogramMatcher:
     def _is_reference_masked(self) -> bool:
         return self.pair.reference.mask is not None
 
-    def _windows(
-        self, model: Model, places: Places, centre: NDArray[np.int_], radius_px: int, blind: bool
-    ) -> tuple[Patch, Patch]:
-        """Return the masked image's and the other's window around a chip, as wide as searched."""
-        side = places.chip_px + 2 * radius_px
-        corner = centre - places.chip_px // 2 - radius_px
-        piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
-        reference = self.pair.reference_patch(piece, self.held_out(piece) if blind else None)
-        input = self.pair.input_patch(piece, lambda xy: self.pair.nominal_px(model(xy)))
+    def _windows(self, model: Model, places: Places, radius_px: int, blind: bool) -> ChipWindows:
+        hidden = self.held_out if blind else None
+        return ChipWindows(self.pair, model, places, radius_px, hidden)
+
+    def _template_first(self, reference: Patch, input: Patch) -> tuple[Patch, Patch]:
+        """Return the masked image's window, then the other's."""
         return (reference, input) if self._is_reference_masked else (input, reference)

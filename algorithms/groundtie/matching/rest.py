@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..context import Context
 from ..geometry.transform import Transform
+from ..similarity.surface import SimilaritySettings
 from .chips import ChipMatcher
 from .locked import find_locked_content
 from .matcher import Places
@@ -61,5 +62,7 @@ def survey_rest(
     locked = find_locked_content(pair, transform, survey_places(pair.grid), context.quiet())
     if locked is None or not locked.sameness.is_evident:
         return None
-    survey = survey_model(matcher, transform.model, context, locked, places, claimed_px)
+    # What a mask leaves is little: one measure alone would miss most of it.
+    fused = replace(matcher, settings=SimilaritySettings())
+    survey = survey_model(fused, transform.model, context, locked, places, claimed_px)
     return Rest(survey, locked.sameness.is_explained)

@@ -80,9 +80,14 @@ class Survey:
     ghost_height: float = 0.0
 
     @property
+    def is_confirming_chip(self) -> NDArray[np.bool_]:
+        """Which chips match where the model has them, shape (n,)."""
+        return np.asarray(np.hypot(*self.shifts_px.T) <= _SAME_PX)
+
+    @property
     def confirming(self) -> int:
         """How many chips match where the model has them."""
-        return int((np.hypot(*self.shifts_px.T) <= _SAME_PX).sum())
+        return int(self.is_confirming_chip.sum())
 
     @property
     def is_confirming(self) -> bool:
@@ -162,6 +167,7 @@ class Survey:
             surrounded,
             confirming,
             float(alarms),
+            tuple(int(chip) for chip in group),
         )
 
 

@@ -46,11 +46,17 @@ class Image:
     mask
         A raster on the same map whose pixels state which of the image's take part: those with 0
         or without data do not. None: all that are valid.
+    mask_note
+        What a user should know of the mask.
+    mask_hides
+        Whether it hides clouds and the like, and states nothing of the ground.
     """
 
     source: RasterSource
     band: int | None = None
     mask: RasterSource | None = None
+    mask_note: str = ""
+    mask_hides: bool = False
 
     def read_onto(self, grid: Grid, to_px: ToPixel, hidden: Mask | None = None) -> Patch:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
@@ -122,13 +128,21 @@ class ImagePair:
         """Whether a mask limits what of an image takes part."""
         return self.reference.mask is not None or self.input.mask is not None
 
+    @property
+    def is_ground_masked(self) -> bool:
+        """Whether a mask may state what of an image is ground."""
+        images = (self.reference, self.input)
+        return any(image.mask is not None and not image.mask_hides for image in images)
+
     def notes(self) -> list[str]:
         """Return what a user should know of how the images are read."""
-        return [
+        images = (self.reference, self.input)
+        complex_valued = [
             f"{image.source.path} is complex-valued: its amplitude is matched"
-            for image in (self.reference, self.input)
+            for image in images
             if image.source.is_complex
         ]
+        return [*complex_valued, *(image.mask_note for image in images if image.mask_note)]
 
     def nominal_px(self, xy: FloatArray) -> FloatArray:
         """Return the input pixels at reference map positions of its nominal place, shape (n, 2)."""

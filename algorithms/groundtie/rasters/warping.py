@@ -83,7 +83,12 @@ def coordinates(grid: Grid, to_input_px: ToInputPx) -> FloatArray:
     """
     if isinstance(to_input_px, DenseMap):
         return to_input_px.coordinates(grid)
-    nodes = lattice(grid, to_input_px)
+    return _between_nodes(lattice(grid, to_input_px))
+
+
+def _between_nodes(nodes: Lattice) -> FloatArray:
+    """Return a lattice's values at every pixel of its grid, shape (2, height, width)."""
+    grid = nodes.grid
     px = np.empty((2, grid.height, grid.width))
     for rows in row_strips(grid.height, grid.width):
         px[:, rows] = nodes.lines(rows)
@@ -227,7 +232,14 @@ def sample(
     values, valid
         Shape (height, width) of the grid; float32, 0 where invalid, and bool.
     """
-    px = coordinates(grid, to_input_px)
+    if isinstance(to_input_px, DenseMap):
+        px = to_input_px.coordinates(grid)
+    else:
+        nodes = lattice(grid, to_input_px)
+        window = _window_of(nodes)
+        if window is not None:  # every kernel gives the pixels themselves
+            return source.read(window, band)
+        px = _between_nodes(nodes)
     size = (source.grid.width, source.grid.height)
     factor = (1, 1) if method == "nearest" else reduction(grid, to_input_px, size)
     window = source_window(px, size, method, factor)
@@ -236,6 +248,17 @@ def sample(
         return np.zeros(shape, np.float32), np.zeros(shape, bool)
     image, valid = source.read(window, band, reduced_shape(window, factor))
     return resample(image, valid, inside_window(px, window, factor), method)
+
+
+def _window_of(nodes: Lattice) -> Window | None:
+    """Return the window of input pixels that a lattice's grid lies on, one by one; None: none."""
+    rows, cols = (np.arange(n) * nodes.step for n in nodes.values.shape[1:])
+    corner = nodes.values - np.stack(np.meshgrid(cols, rows))
+    # The first node lies half a cell before the first pixel's corner.
+    first = np.rint(corner[:, 0, 0] + (nodes.step + 1) / 2)
+    if not np.abs(corner + (nodes.step + 1) / 2 - first[:, None, None]).max() < _ON_PIXELS:
+        return None
+    return Window(int(first[0]), int(first[1]), nodes.grid.width, nodes.grid.height)
 
 
 def reduced_shape(window: Window, factor: tuple[int, int]) -> tuple[int, int] | None:

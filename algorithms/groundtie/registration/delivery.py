@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..context import Context, threads
-from ..errors import NotRegisteredError, SameFileError
+from ..errors import NotRegisteredError
 from ..geometry.tie_point_files import write_tie_points
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
@@ -20,28 +20,17 @@ from .pipeline import OpenPair, open_pair, pair_images, run
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import Registration
 from .specification import Specification
+from .user_masks import UserMask
 
 
 @dataclass(frozen=True)
 class RegistrationFiles:
-    """The files of a registration; None: not asked for.
-
-    Raises
-    ------
-    SameFileError
-        The transform would be written where the report's numbers go.
-    """
+    """The files of a registration; None: not asked for."""
 
     output: RegisteredOutput | None = None
     tie_points: Path | None = None
     transform: Path | None = None
     report: Path | None = None
-
-    def __post_init__(self) -> None:
-        if self.report is not None and self.report.with_suffix(".json") == self.transform:
-            raise SameFileError(
-                f"the transform would be written over the report's numbers: {self.transform}"
-            )
 
     def named(self, registration: Registration) -> dict[str, Path]:
         """Return what `write` writes of a registration, by name."""
@@ -61,7 +50,7 @@ class RegistrationFiles:
                 self._write_results(registration, outputs, context)
             # Last: who finds it finds all that it is about.
             if self.report is not None:
-                registration.page().write(outputs, self.report)
+                registration.page().write(outputs, self.report, self.transform)
 
     def _write_results(
         self, registration: Registration, outputs: Outputs, context: Context
@@ -119,7 +108,7 @@ class Call:
             given["input"],
             RegistrationFiles(output, given["tie_points"], given["transform"], given["report"]),
             (given["reference_band"], given["input_band"]),
-            (given["reference_mask"], given["input_mask"]),
+            asked_masks(given, "input"),
             parameters,
             given["workers"],
             progress,
@@ -181,7 +170,12 @@ class Call:
 
 
 # What tools may leave out that do not ask for it.
-_USUAL: Mapping[str, Any] = {"output_grid": "reference", "resampling": "cubic"}
+_USUAL: Mapping[str, Any] = {
+    "output_grid": "reference",
+    "resampling": "cubic",
+    "reference_mask_values": None,
+    "input_mask_values": None,
+}
 
 
 def register_as(
@@ -204,6 +198,15 @@ def register_as(
         The registration was refused.
     """
     return Call.of(parameters, progress).register(specified(preset, parameters))
+
+
+def asked_masks(given: Mapping[str, Any], image: str) -> tuple[UserMask | None, UserMask | None]:
+    """Return the masks of the reference and of `image`, by the values of a tool's parameters."""
+    reference, other = (
+        UserMask.of(given[name], given[f"{name}_mask"], given[f"{name}_mask_values"])
+        for name in ("reference", image)
+    )
+    return reference, other
 
 
 def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specification:

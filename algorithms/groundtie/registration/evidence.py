@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import GroundTieError
+from ..geometry.accuracy import UNKNOWN, Accuracy, CheckResiduals, predict_accuracy
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.estimation import Estimate
 from ..geometry.judging import (
@@ -19,16 +20,17 @@ from ..geometry.judging import (
     TOLERANCE_PX,
     sigma_range_px,
 )
-from ..geometry.robust import fit_mixture
+from ..geometry.robust import Mixture, fit_mixture
 from ..geometry.tie_points import TiePoints
-from ..masks.choice import NONE, MaskUsed
+from ..masks.choice import LAYER, NONE, REGIONS, MaskUsed
 from ..matching.rest import Rest
-from ..matching.survey import Survey
+from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..rasters.grid import FloatArray, Grid
+from .layover import EVEN_MEAN_OVER_SCATTER, scatter_along_line
 from .scene import SceneInfo
 
 # Stages of a registration, in the order in which their rules are asked.
-TIE_POINTS, SEARCH, ASSESSMENT, POSE, AGREEMENT, ERROR, SCENE, SURVEY, REFINEMENT = (
+TIE_POINTS, SEARCH, ASSESSMENT, POSE, AGREEMENT, ERROR, SCENE, SURVEY, REFINEMENT, SERIES = (
     "tie points",
     "search",
     "assessment",
@@ -38,9 +40,13 @@ TIE_POINTS, SEARCH, ASSESSMENT, POSE, AGREEMENT, ERROR, SCENE, SURVEY, REFINEMEN
     "scene",
     "survey",
     "refinement",
+    "series",
 )
 
 _LATTICE = 9
+
+# Scatter along a line is that of heights unless chance explains it with more than 5 %, as usual.
+_LOG10_SIGNIFICANCE = math.log10(0.05)
 
 
 @dataclass(frozen=True)
@@ -80,6 +86,8 @@ class HeldOut:
         Standard deviation of the model's predictions (root mean square).
     area
         What the predictions are for, such as "the overlap".
+    accuracy
+        The error of the transform at a random place of the area.
     """
 
     name: str
@@ -91,11 +99,12 @@ class HeldOut:
     max_error_px: float
     spread_px: float
     area: str
+    accuracy: Accuracy = UNKNOWN
 
     @property
-    def ce90_px(self) -> float:
-        """Radius within which 90 % of the errors lie."""
-        return self.rmse_px / math.sqrt(2) * CE90_FACTOR
+    def largest_ce90_px(self) -> float:
+        """Largest radius of 90 % that is accepted: that of errors as large as the largest."""
+        return self.max_error_px / math.sqrt(2) * CE90_FACTOR
 
 
 @dataclass(frozen=True)
@@ -165,8 +174,7 @@ class RegistrationEvidence:
         """How the check points agree; those without a peak count as disagreeing."""
         agreeing = int((np.hypot(*self.residuals_px.T) <= TOLERANCE_PX).sum())
         probability = agreement_probability(TOLERANCE_PX, self.radius_px)
-        area = (2 * self.radius_px + 1) ** 2
-        mixture = fit_mixture(self.residuals_px, area, sigma_range_px(self.max_error_px))
+        mixture = self._mixture(self.residuals_px, self.radius_px)
         return HeldOut(
             "check points",
             agreeing,
@@ -177,7 +185,36 @@ class RegistrationEvidence:
             self.max_error_px,
             float(np.sqrt(np.mean(self.estimate.spread_px(_lattice(self.grid)) ** 2))),
             "the overlap",
+            predict_accuracy(
+                self.estimate.fold_models,
+                _lattice(self.grid),
+                CheckResiduals(
+                    self.grid.map_to_pixel(self.counted.reference_xy),
+                    self.residuals_px,
+                    mixture.probability,
+                ),
+                self.displacement_px,
+            ),
         )
+
+    @property
+    def displacement_px(self) -> FloatArray:
+        """The most that heights may displace all matches by, to either side, shape (2,).
+
+        By what they scatter the survey's chips by: twice their mean where the ground may be the
+        lowest of what matched, their mean where a mask left more ground than heights.
+        """
+        if self.survey is None or len(self.survey.shifts_px) == 0:
+            return np.zeros(2)
+        shifts = self.survey.shifts_px
+        weights = self._mixture(shifts, SURVEY_RADIUS_PX).probability
+        scatter = scatter_along_line(shifts, weights, _LOG10_SIGNIFICANCE)
+        mean = (self.layover_factor or EVEN_MEAN_OVER_SCATTER) * scatter
+        return mean if self.mask.kind in (REGIONS, LAYER) else 2 * mean
+
+    def _mixture(self, residuals_px: FloatArray, radius_px: int) -> Mixture:
+        area = (2 * radius_px + 1) ** 2
+        return fit_mixture(residuals_px, area, sigma_range_px(self.max_error_px))
 
     @property
     def extrapolated_share(self) -> float:

@@ -25,6 +25,9 @@ _LINE_PX = 1.0
 KEYPOINTS_MEAN_OVER_SCATTER = 3.0
 CHIPS_MEAN_OVER_SCATTER = 6.0
 
+# The same of heights that spread evenly from the ground up: mean over standard deviation.
+EVEN_MEAN_OVER_SCATTER = math.sqrt(3)
+
 
 def count_on_line(residuals_px: FloatArray, radius_px: int) -> int:
     """Return how many residuals beyond the tolerance lie on one line through zero.
@@ -54,20 +57,40 @@ def count_on_line(residuals_px: FloatArray, radius_px: int) -> int:
 
 
 def scatter_along_line_px(residuals_px: FloatArray) -> float:
-    """Return what residuals scatter by along a line beyond what they do across it, in pixels.
+    """Return the length of `scatter_along_line`, in pixels."""
+    return float(np.hypot(*scatter_along_line(residuals_px)))
 
-    0 if residuals without a direction may do so, too: n pairs of normal variates are as far from
-    spherical as w, or further, with probability w^((n − 2) / 2). Source: [Mauchly1940].
+
+def scatter_along_line(
+    residuals_px: FloatArray,
+    weights: FloatArray | None = None,
+    largest_log10_chance: float = LARGEST_LOG10_CHANCE,
+) -> FloatArray:
+    """Return what residuals scatter by along a line beyond what they do across it.
+
+    n pairs of normal variates are as far from spherical as w, or further, with probability
+    w^((n − 2) / 2). Source: [Mauchly1940].
 
     Parameters
     ----------
     residuals_px
         Shape (n, 2).
+    weights
+        Their probabilities to be inliers, shape (n,); None: they are.
+    largest_log10_chance
+        log10 of the largest probability that residuals without a direction would scatter so.
+
+    Returns
+    -------
+    float64 array (2,)
+        Along the line, as long as the standard deviation; 0 if chance may do so, too.
     """
-    if len(residuals_px) < 3:
-        return 0.0
-    across, along = np.linalg.eigvalsh(np.cov(residuals_px.T))
+    each = np.ones(len(residuals_px)) if weights is None else weights
+    count = float(each.sum())
+    if count < 3:
+        return np.zeros(2)
+    (across, along), axes = np.linalg.eigh(np.cov(residuals_px.T, aweights=each))
     sphericity = across * along / max(((across + along) / 2) ** 2, 1e-12)
-    if (len(residuals_px) - 2) / 2 * math.log10(max(sphericity, 1e-12)) > LARGEST_LOG10_CHANCE:
-        return 0.0
-    return float(np.sqrt(along - across))
+    if (count - 2) / 2 * math.log10(max(sphericity, 1e-12)) > largest_log10_chance:
+        return np.zeros(2)
+    return np.asarray(math.sqrt(along - across) * axes[:, 1])

@@ -1,7 +1,7 @@
-"""What takes part in a registration: masks that the user gave, and masks of a dense town's ground.
+"""What takes part in a registration: masks of a radar image, and of a dense town's ground.
 
-Whatever a mask comes from, a raster, a vector layer, a classifier, thresholds or regions of the
-radar image, it becomes the same thing: a raster that masks one image of the pair.
+Whatever a mask comes from, the user or the radar image, it becomes the same thing: a raster that
+masks one image of the pair (see `user_masks`).
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 from ..context import Context
 from ..errors import ParameterError
@@ -19,29 +17,23 @@ from ..masks import threshold
 from ..masks.cast_shadow import shadow_azimuth_deg
 from ..masks.choice import (
     AUTO,
-    LAYER,
     NONE,
     REGIONS,
     MaskUsed,
     choose,
     is_reliable,
 )
-from ..masks.layer import read_layer
 from ..masks.regions import HIGH_PERCENT, WIDTH_M, GroundRegions, find_ground
-from ..masks.scene import Scene, Selection, write_mask
+from ..masks.scene import Scene, Selection
 from ..masks.threshold import Threshold
-from ..rasters.atomic import scratch_folder
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
-from ..rasters.reading import Window, open_raster
-from .classifying import read_scene_classifier
-from .scene import SceneInfo, scene_of
+from ..rasters.reading import Window
+from .scene import SceneInfo
+from .user_masks import with_mask
 
 # In which part of an image the direction of cast shadows is looked for.
 _MIDDLE_PX = 2048
-
-_CLASSIFIER_SUFFIX = ".json"
-_VECTOR_SUFFIXES = (".gpkg", ".geojson", ".shp", ".fgb", ".kml", ".gml")
 
 
 @dataclass(frozen=True)
@@ -71,50 +63,6 @@ class Masked:
             self.used,
             None if ground is None else replace(pair, reference=ground.reference),
         )
-
-
-def is_raster_mask(mask: Any) -> bool:
-    """Whether a mask that the user gave is a raster: in memory, or by the ending of its name."""
-    if not isinstance(mask, (str, Path)):
-        return mask is not None
-    return Path(mask).suffix.lower() not in (_CLASSIFIER_SUFFIX, *_VECTOR_SUFFIXES)
-
-
-def with_user_masks(
-    pair: ImagePair, masks: dict[str, Path | None], stack: ExitStack, context: Context
-) -> tuple[ImagePair, MaskUsed | None]:
-    """Return a pair with the vector layers and classifiers that the user gave as masks.
-
-    Parameters
-    ----------
-    pair
-        The images; rasters that the user gave mask them already.
-    masks
-        The masks of the "reference" and of the "input".
-    stack
-        Keeps the masks' rasters until it is closed.
-    context
-        Threads and progress.
-
-    Returns
-    -------
-    pair, used
-        The pair, and the mask that a vector layer made, which is one of the ground; None: none.
-    """
-    used = None
-    for name, mask in masks.items():
-        if mask is None or is_raster_mask(mask):
-            continue
-        scene = scene_of(pair, name)
-        if Path(mask).suffix.lower() == _CLASSIFIER_SUFFIX:
-            select = read_scene_classifier(pair, name, scene, Path(mask)).select
-        else:
-            select = read_layer(mask, scene, WIDTH_M).select
-        pair, share = _masked(pair, name, scene, select, stack, context)
-        if Path(mask).suffix.lower() in _VECTOR_SUFFIXES:
-            used = MaskUsed(LAYER, name, share, f"what {Path(mask).name} covers")
-        context.update(1.0, f"{Path(mask).name} keeps {share:.0%} of the {name}")
-    return pair, used
 
 
 def with_ground_mask(
@@ -171,7 +119,7 @@ class _Town:
     def masked(self, select: Callable[[Window], Selection]) -> tuple[ImagePair, float]:
         """Return the pair with a mask on the radar image, and the share that takes part."""
         name = self._info.radar_name
-        return _masked(self._pair, name, self.scene, select, self._stack, self._context)
+        return with_mask(self._pair, name, self.scene, select, self._stack, self._context)
 
     def ground(self) -> ImagePair:
         """Return the pair with a mask of the ground on the radar image."""
@@ -193,21 +141,3 @@ def require_one_mask(kind: str, used: MaskUsed | None) -> None:
 def _middle(grid: Grid) -> Window:
     width, height = min(grid.width, _MIDDLE_PX), min(grid.height, _MIDDLE_PX)
     return Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
-
-
-def _masked(
-    pair: ImagePair,
-    name: str,
-    scene: Scene,
-    select: Callable[[Window], Selection],
-    stack: ExitStack,
-    context: Context,
-) -> tuple[ImagePair, float]:
-    """Return a pair with a mask on one image, and the share of it that takes part.
-
-    The mask is a file until the stack is closed.
-    """
-    folder = stack.enter_context(scratch_folder())
-    share = write_mask(scene, folder / "mask.tif", select, context.quiet().progress)
-    mask = stack.enter_context(open_raster(folder / "mask.tif"))
-    return replace(pair, **{name: replace(getattr(pair, name), mask=mask)}), share

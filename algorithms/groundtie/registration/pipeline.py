@@ -18,7 +18,7 @@ from ..features.presets import optical_keypoints, sar_keypoints
 from ..geometry.estimation import Estimate
 from ..geometry.judging import LARGEST_LOG10_CHANCE, LOG10_CHANCE_ON_GROUND
 from ..geometry.models import Model
-from ..masks.choice import INPUT, REFERENCE, MaskUsed
+from ..masks.choice import MaskUsed
 from ..matching.alignment import LINEAR_CANDIDATES
 from ..matching.check import CHECK_RADIUS_PX, Check, check_model
 from ..matching.chips import ChipMatcher
@@ -36,10 +36,11 @@ from ..rasters.reading import bounded_cache, open_raster
 from ..similarity.surface import SimilaritySettings
 from .evidence import RegistrationEvidence, SearchEvidence
 from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
-from .masks import Masked, is_raster_mask, require_one_mask, with_ground_mask, with_user_masks
+from .masks import Masked, require_one_mask, with_ground_mask
 from .registration import Registration
 from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
+from .user_masks import named_masks, with_user_masks
 from .verdict import judge, judge_search
 
 
@@ -97,8 +98,8 @@ def open_pair(
     bands
         Numbers of the bands that are matched, from 1; None: the mean of all.
     masks
-        For each image a raster whose zeros take no part, a vector layer of what takes part, or a
-        classifier; None: all takes part.
+        For each image a `UserMask`, or a raster whose zeros take no part, a vector layer of what
+        takes part, or a classifier; None: all takes part.
     """
     started = time.perf_counter()
     with ExitStack() as stack:
@@ -107,6 +108,17 @@ def open_pair(
             for raster, band in zip((reference, input), bands, strict=True)
         ]
         yield pair_images(opened[0], opened[1], spec, context, masks, stack, started)
+
+
+def _reach_notes(images: ImagePair, asked_m: float | None) -> list[str]:
+    """Return a warning where a search was asked for that goes beyond the images."""
+    reach_m = images.limits.radius
+    if asked_m is None or asked_m <= reach_m:
+        return []
+    return [
+        f"warning: a search radius of {asked_m:.6g} m reaches beyond the images: all shifts up to "
+        f"{reach_m:.4g} m are searched, which may take minutes; a smaller one is faster and safer"
+    ]
 
 
 def pair_images(
@@ -134,19 +146,9 @@ def pair_images(
         0.0 if rotation_deg is None else rotation_deg,
         1.0 if scale is None else scale,
     )
-    for note in images.notes():
+    for note in (*_reach_notes(images, radius_m), *images.notes()):
         context.update(0.0, note)
-    named = dict(zip((REFERENCE, INPUT), masks, strict=True))
-    rasters = {
-        name: stack.enter_context(open_raster(mask))
-        for name, mask in named.items()
-        if is_raster_mask(mask)
-    }
-    pair = replace(
-        images,
-        **{name: replace(getattr(images, name), mask=mask) for name, mask in rasters.items()},
-    )
-    pair, used = with_user_masks(pair, named, stack, context.part(0.0, 0.02))
+    pair, used = with_user_masks(images, named_masks(masks), stack, context.part(0.0, 0.02))
     require_one_mask(spec.mask, used)
     return OpenPair(images, pair, used, stack, started)
 
@@ -198,7 +200,9 @@ def register(
     except (NothingFoundError, TooFewPointsError) as error:
         return replace(result, verdict=judge_search(SearchEvidence(error)))
     evidence = stages.evidence(estimate, check, surveys, scene)
-    return replace(result, verdict=judge(evidence), estimate=estimate, check=check)
+    return replace(
+        result, verdict=judge(evidence), estimate=estimate, check=check, survey=surveys[0]
+    )
 
 
 @dataclass(frozen=True)
@@ -315,7 +319,7 @@ def _fit(
     """Return what fits the model, by the name of the specification's matcher."""
     layout = held_out.layout
     if spec.matcher == CHIPS:
-        return SurfaceFit(matcher, layout)
+        return SurfaceFit(matcher, layout, spec.candidates)
     presets = {KEYPOINTS: sar_keypoints, GUIDED_CHIPS: optical_keypoints}
     detector, descriptor = presets[spec.matcher]()
     masked = None if pair is images else pair

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..geometry.accuracy import CheckResiduals, predict_accuracy
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.judging import (
     FEWEST_CHECK_POINTS,
@@ -102,14 +103,16 @@ class RefinementEvidence:
             By how much RPCs with the bias folded in miss it.
         """
         if check is None or len(check) < FEWEST_CHECK_POINTS:
-            name, before = LEFT_OUT, control.residuals_px(None)
+            name, points = LEFT_OUT, control
             after = adjustment.left_out_px
         else:
-            name, before = CHECK_POINTS, check.residuals_px(None)
+            name, points = CHECK_POINTS, check
             after = check.residuals_px(adjustment.bias)
+        before = points.residuals_px(None)
         length = np.hypot(*after.T)
         reach = max(int(np.ceil(length.max(initial=0.0))), _LEAST_REACH_PX)
         mixture = fit_mixture(after, (2 * reach + 1) ** 2, sigma_range_px(max_error_px))
+        residuals = CheckResiduals(points.expected_px, after, mixture.probability)
         tolerance = max(TOLERANCE_PX, max_error_px)
         agreeing = int((length <= tolerance).sum())
         held_out = HeldOut(
@@ -122,6 +125,7 @@ class RefinementEvidence:
             max_error_px,
             _spread_px(adjustment, control.size),
             "the image",
+            predict_accuracy(adjustment.fold_biases, _nodes(control.size), residuals, np.zeros(2)),
         )
         used_px = control.found_px[adjustment.used]
         return cls(
@@ -145,10 +149,13 @@ def _rms(residuals_px: FloatArray) -> float:
 
 def _spread_px(adjustment: Adjustment, size: tuple[int, int]) -> float:
     """Return how far the correction varies with its points over the image, root mean square."""
-    nodes: FloatArray = np.stack(
-        np.meshgrid(*(np.linspace(0, side - 1, _NODES) for side in size)), -1
-    )
-    px = nodes.reshape(-1, 2)
+    px = _nodes(size)
     by_points = adjustment.spread_px(px)
     by_noise = adjustment.bias.sigma_px(px)
     return float(np.sqrt(np.mean(np.maximum(by_points, by_noise) ** 2)))
+
+
+def _nodes(size: tuple[int, int]) -> FloatArray:
+    """Return positions all over an image of a size, (width, height)."""
+    sides = (np.linspace(0, side - 1, _NODES) for side in size)
+    return np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)

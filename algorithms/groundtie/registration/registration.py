@@ -18,11 +18,13 @@ from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..masks.choice import MaskUsed
 from ..matching.check import Check
+from ..matching.survey import Survey
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_to_array
 from ..rasters.pair import ImagePair
 from ..rasters.reading import open_raster
 from ..report.correction import Correction
+from ..report.parts import Parts
 from ..report.report import Report
 from ..similarity.surface import Surface
 from .registered_output import RegisteredOutput, resampled_onto
@@ -57,6 +59,8 @@ class Registration:
         The transform and the points of its fit; None if there is none.
     check
         The check points; None without a transform.
+    survey
+        Where chips all over the overlap match; None without a transform.
     parameters
         What the tool was called with.
     started
@@ -76,6 +80,7 @@ class Registration:
     verdict: Verdict = NOT_JUDGED
     estimate: Estimate | None = None
     check: Check | None = None
+    survey: Survey | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     started: float = 0.0
     files: Mapping[str, Path] = field(default_factory=dict)
@@ -167,6 +172,7 @@ class Registration:
             points=self.tie_points,
             transform=self.transform,
             surfaces=self.extreme_surfaces() if with_surfaces else (),
+            parts=None if self.survey is None else Parts.of(self.survey),
             parameters={k: v for k, v in self.parameters.items() if v is not None},
             seconds=time.perf_counter() - self.started,
         )
@@ -202,8 +208,8 @@ class Registration:
         if v.accepted and transform is not None:
             lines += [
                 f"model: {transform.model.kind}, {v.fit_points_used} of {v.fit_points} points",
-                f"error at check points: RMSE {v.check_rmse_px:.2f} px ({v.check_rmse_m:.2f} m), "
-                f"CE90 {v.check_ce90_px:.2f} px ({v.check_ce90_m:.2f} m)",
+                f"error at check points: RMSE {v.check_rmse_px:.2f} px ({v.check_rmse_m:.2f} m)",
+                v.accuracy_line(),
                 f"check points that agree: {v.check_points_agreeing} of {v.check_points}; by "
                 f"chance 1 in 10^{-v.log10_chance:.0f}",
             ]

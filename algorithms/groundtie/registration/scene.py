@@ -82,7 +82,7 @@ class SceneInfo:
     declared
         Which image is declared to be a radar's: see `Specification.radar`.
     has_user_mask
-        Whether the user gave a mask for one of the images.
+        Whether the user gave a mask for one of the images, not only of clouds.
     """
 
     reference: ImageFacts
@@ -96,7 +96,7 @@ class SceneInfo:
         reference, input = (
             ImageFacts(getattr(pair, name), scene_of(pair, name)) for name in (REFERENCE, INPUT)
         )
-        return cls(reference, input, declared, pair.is_masked)
+        return cls(reference, input, declared, pair.is_ground_masked)
 
     def of_name(self, name: str) -> ImageFacts:
         """Return what the "reference" or the "input" is."""

@@ -19,6 +19,7 @@ from ..sensor.adjustment import Adjustment
 from ..sensor.control_points import ControlPoints, read_control_points
 from ..sensor.height_check import HeightCheck
 from ..sensor.rpc_fit import RPCFit
+from .delivery import asked_masks
 from .ground_control import GroundControl, match_ground_control, require_crs
 from .refinement import Refinement
 from .refinement_output import Call, RefinementFiles
@@ -130,8 +131,8 @@ class RefinedRpc:
             f"shift in the middle of the image: {shift[0]:+.2f} ± {sigma[0]:.2f}, "
             f"{shift[1]:+.2f} ± {sigma[1]:.2f} px (column, row)",
             f"error at {self.judged.held_out}: {self.judged.before.rmse:.2f} px before, "
-            f"{self.judged.after.rmse:.2f} px after; CE90 {verdict.check_ce90_px:.2f} px "
-            f"({verdict.check_ce90_m:.2f} m)",
+            f"{self.judged.after.rmse:.2f} px after",
+            verdict.accuracy_line(),
             f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
             self.ground,
             *(() if self.mask is None else (self.mask.line(),)),
@@ -219,5 +220,5 @@ def _matched(
         matching_pixel_size_m=given["matching_pixel_size"],
     )
     bands = given["reference_band"], given["image_band"]
-    masks = given["reference_mask"], given["image_mask"]
+    masks = asked_masks(given, "image")
     return sensor, match_ground_control(sensor, reference, spec, bands, masks, stack, context)

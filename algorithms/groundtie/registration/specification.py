@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..masks.choice import AUTO
+from ..matching.alignment import CANDIDATES
 
 # What matches the tie points of the fit: chips alone; keypoints refined by chips around them; chips
 # all over around a model of keypoints.
@@ -50,6 +51,8 @@ class Specification:
         By what chips refine keypoints.
     model
         One of `models.KINDS`, or "auto" for the simplest polynomial that the points justify.
+    candidates
+        What "auto" chooses from, from simple to flexible.
     max_error_px
         Largest root mean square error at check points, in matching pixels.
     search_radius_m
@@ -75,6 +78,7 @@ class Specification:
     similarity: str = "fused"
     refinement: str = "fused"
     model: str = AUTO
+    candidates: tuple[str, ...] = CANDIDATES
     max_error_px: float = USUAL_MAX_ERROR_PX
     search_radius_m: float | None = None
     rotation_deg: float | None = None

@@ -29,7 +29,7 @@ class Verdict:
     check_rmse_px, check_rmse_m
         Root mean square error of inliers among the check points, in matching pixels and metres.
     check_ce90_px, check_ce90_m
-        Radius within which 90 % of these errors lie.
+        Radius within which the error of the transform at a random place lies with 90 %.
     log10_chance
         log10 of the probability that random matches would agree as well.
     spread_px
@@ -40,6 +40,10 @@ class Verdict:
         Name of the rule that refused it; empty if it is accepted.
     advice
         What can be tried next; empty if it is accepted.
+    ce50_px, ce95_px
+        As `check_ce90_px`, with 50 and 95 %.
+    ce90_range_px
+        Interval that holds the radius of 90 %, as it is known from few points only.
     """
 
     accepted: bool
@@ -57,6 +61,9 @@ class Verdict:
     extrapolated_share: float = math.nan
     rule: str = ""
     advice: str = ""
+    ce50_px: float = math.nan
+    ce95_px: float = math.nan
+    ce90_range_px: tuple[float, float] = (math.nan, math.nan)
 
     @property
     def points(self) -> int:
@@ -72,9 +79,20 @@ class Verdict:
         """Return the reason and, of a refusal, what to try."""
         return f"{self.reason}; {self.advice}" if self.advice else self.reason
 
+    def accuracy_line(self) -> str:
+        """Return the predicted error at a random place, with its interval, as a line of text."""
+        low, high = self.ce90_range_px
+        return (
+            f"accuracy at a random place: CE90 {self.check_ce90_px:.2f} px "
+            f"({self.check_ce90_m:.2f} m), known to {low:.2f}–{high:.2f} px"
+        )
+
     def summary(self) -> dict[str, Any]:
         """Return the verdict as values that JSON can carry; what is not finite is None."""
+        low, high = self.ce90_range_px
         values = asdict(self) | {"points": self.points, "chance": self.chance}
+        values |= {"ce90_low_px": low, "ce90_high_px": high}
+        del values["ce90_range_px"]
         unknown = {k for k, v in values.items() if isinstance(v, float) and not math.isfinite(v)}
         return {k: None if k in unknown else v for k, v in values.items()}
 
@@ -164,11 +182,14 @@ def _verdict(
         *counts,
         points.rmse_px,
         points.rmse_px * metres_per_px,
-        points.ce90_px,
-        points.ce90_px * metres_per_px,
+        points.accuracy.ce90_px,
+        points.accuracy.ce90_px * metres_per_px,
         points.log10_chance,
         points.spread_px,
         evidence.extrapolated_share,
         "" if refusal is None else refusal[0].name,
         "" if refusal is None else refusal[0].advice,
+        points.accuracy.ce50_px,
+        points.accuracy.ce95_px,
+        points.accuracy.ce90_range_px,
     )

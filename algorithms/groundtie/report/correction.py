@@ -55,7 +55,7 @@ class Correction:
             float(lengths[centre]),
             float(lengths.min()),
             float(lengths.max()),
-            _words(move, grid),
+            move_in_words(move, grid),
             *_turn(nominal, xy, grid),
             grid.pixel_size_m if grid.is_georeferenced else None,
         )
@@ -90,7 +90,7 @@ def _turn(nominal: NDArray[np.float64], xy: NDArray[np.float64], grid: Grid) -> 
     return float(np.rad2deg(np.arctan2(c - b, a + d))), float(np.sqrt(abs(a * d - b * c)))
 
 
-def _words(move: NDArray[np.float64], grid: Grid) -> str:
+def move_in_words(move: NDArray[np.float64], grid: Grid) -> str:
     """Return a move in map units along both axes, as "3.0 m east, 1.5 m north"."""
     # A map without georeferencing is the pixel lattice, y downwards.
     on_map = grid.is_georeferenced

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..assessment.point_errors import PointErrors
-from ..geometry.judging import FEWEST_CHECK_POINTS, TOLERANCE_PX
+from ..geometry.judging import CE90_FACTOR, FEWEST_CHECK_POINTS, TOLERANCE_PX
 from ..geometry.tie_points import TiePoints
 from ..rasters.grid import Grid
 from ..registration.verdict import Verdict
@@ -67,12 +67,18 @@ def residual_arrows(errors: PointErrors, grid: Grid) -> Arrows:
     if which.any():
         typical = max(float(np.median(errors.length_px[which])), _SMALLEST_PX)
         factor = max(round_length(0.04 * side / typical), 1.0)
-    return Arrows(
-        errors.position_px,
-        errors.error_px * factor,
-        factor,
-        round_length(0.12 * side / factor),
-    )
+    return _arrows(errors.position_px, errors.error_px, factor, side)
+
+
+def scaled_arrows(start_px: FloatArray, by_px: FloatArray, longest_px: float, grid: Grid) -> Arrows:
+    """Exaggerate by a round factor so that what is long is no more than a tenth of the grid."""
+    side = max(grid.width, grid.height)
+    factor = max(round_length(0.1 * side / max(longest_px, _SMALLEST_PX)), 1.0)
+    return _arrows(start_px, by_px, factor, side)
+
+
+def _arrows(start_px: FloatArray, by_px: FloatArray, factor: float, side: int) -> Arrows:
+    return Arrows(start_px, by_px * factor, factor, round_length(0.12 * side / factor))
 
 
 def error_reach_px(errors: PointErrors, verdict: Verdict) -> float:
@@ -80,9 +86,15 @@ def error_reach_px(errors: PointErrors, verdict: Verdict) -> float:
 
     As far as needed to see the errors of inliers; without such, to the largest error.
     """
-    if math.isfinite(verdict.check_ce90_px):
-        return max(1.6 * verdict.check_ce90_px, 1.5 * TOLERANCE_PX)
+    radius = ninety_percent_px(verdict)
+    if math.isfinite(radius):
+        return max(1.6 * radius, 1.5 * TOLERANCE_PX)
     return float(max(errors.length_px[errors.check].max(initial=0.0), TOLERANCE_PX) * 1.05)
+
+
+def ninety_percent_px(verdict: Verdict) -> float:
+    """Return the radius within which 90 % of the residuals of inliers lie, by their RMSE."""
+    return verdict.check_rmse_px / math.sqrt(2) * CE90_FACTOR
 
 
 def rayleigh_counts(at_px: FloatArray, width_px: float, verdict: Verdict) -> FloatArray:
@@ -107,7 +119,7 @@ def svg_uri(figure: Figure) -> str:
 def residual_map(errors: PointErrors, grid: Grid) -> Figure:
     """Draw the points and their exaggerated residuals; the figure's edges are the grid's."""
     arrows = residual_arrows(errors, grid)
-    axes = _map_axes(grid)
+    axes = map_axes(grid)
     disagreeing = errors.check & ~errors.agreeing
     axes.plot(*errors.position_px[~errors.used].T, ".", color=REJECTED_COLOUR, ms=3.5)
     axes.plot(*errors.position_px[errors.fit].T, ".", color=FIT_COLOUR, ms=4)
@@ -118,14 +130,14 @@ def residual_map(errors: PointErrors, grid: Grid) -> Figure:
         (disagreeing, CHECK_COLOUR, 0.35),
         (errors.agreeing, CHECK_COLOUR, 1.0),
     ):
-        _draw_arrows(axes, arrows.start_px[which], arrows.vector_px[which], colour, strength)
-    _draw_scale(axes, arrows, grid)
+        draw_arrows(axes, arrows.start_px[which], arrows.vector_px[which], colour, strength)
+    draw_scale(axes, arrows, grid)
     return axes.figure
 
 
 def point_map(points: TiePoints, grid: Grid) -> Figure:
     """Draw where points lie when there is no transform to disagree with."""
-    axes = _map_axes(grid)
+    axes = map_axes(grid)
     px = grid.map_to_pixel(points.reference_xy)
     axes.plot(*px[~points.used].T, ".", color=REJECTED_COLOUR, ms=3.5)
     axes.plot(*px[points.used & ~points.is_check].T, ".", color=FIT_COLOUR, ms=4)
@@ -147,7 +159,8 @@ def error_histogram(errors: PointErrors, verdict: Verdict, metres_per_px: float 
         at = np.linspace(0, reach, 100)
         expected = rayleigh_counts(at, float(edges[1]), verdict)
         axes.plot(at, expected, color="black", lw=1.5, label="Rayleigh curve of the RMSE")
-        axes.axvline(verdict.check_ce90_px, color=FIT_COLOUR, ls="--", lw=1.5, label="CE90")
+        radius = ninety_percent_px(verdict)
+        axes.axvline(radius, color=FIT_COLOUR, ls="--", lw=1.5, label="90 % of the residuals")
         axes.set_ylim(top=1.35 * axes.get_ylim()[1])
         axes.legend(edgecolor="white", framealpha=1, fontsize=8, loc="upper right")
     axes.set(xlim=(0, reach), xlabel="error (px)", ylabel="check points")
@@ -170,8 +183,9 @@ def error_scatter(errors: PointErrors, verdict: Verdict) -> Figure:
     axes.axhline(0, color="#bbbbbb", lw=0.8, zorder=0)
     axes.axvline(0, color="#bbbbbb", lw=0.8, zorder=0)
     axes.plot(*errors.error_px[shown].T, "o", color=CHECK_COLOUR, alpha=0.75, ms=5, mew=0)
-    if math.isfinite(verdict.check_ce90_px):
-        circle = Circle((0, 0), verdict.check_ce90_px, fill=False, ec=FIT_COLOUR, ls="--", lw=1.5)
+    radius = ninety_percent_px(verdict)
+    if math.isfinite(radius):
+        circle = Circle((0, 0), radius, fill=False, ec=FIT_COLOUR, ls="--", lw=1.5)
         axes.add_patch(circle)
     # Rows run downwards, as on the map.
     axes.set(xlim=(-reach, reach), ylim=(reach, -reach), aspect="equal")
@@ -189,7 +203,8 @@ def _plot_axes(width_in: float) -> Any:
     return figure.add_subplot()
 
 
-def _map_axes(grid: Grid) -> Any:
+def map_axes(grid: Grid) -> Any:
+    """Return axes whose edges are the grid's, rows downwards."""
     from matplotlib.figure import Figure
 
     inches = 8 / max(grid.width, grid.height)
@@ -199,9 +214,10 @@ def _map_axes(grid: Grid) -> Any:
     return axes
 
 
-def _draw_arrows(
+def draw_arrows(
     axes: Any, start_px: FloatArray, vector_px: FloatArray, colour: str, strength: float = 1.0
 ) -> None:
+    """Draw arrows from positions of the grid, shape (n, 2), along vectors, shape (n, 2)."""
     axes.quiver(
         *start_px.T,
         *vector_px.T,
@@ -219,7 +235,8 @@ def _draw_arrows(
     )
 
 
-def _draw_scale(axes: Any, arrows: Arrows, grid: Grid) -> None:
+def draw_scale(axes: Any, arrows: Arrows, grid: Grid) -> None:
+    """Draw the arrow that a round residual has, at the lower left."""
     from matplotlib.patches import Rectangle
 
     unit = max(grid.width, grid.height) / 100
@@ -228,7 +245,7 @@ def _draw_scale(axes: Any, arrows: Arrows, grid: Grid) -> None:
     box = Rectangle((left, low), length + 3 * unit, -6 * unit, fc="white", ec="#999999", lw=0.8)
     axes.add_patch(box)
     start = np.array([[left + 1.5 * unit, low - 1.5 * unit]])
-    _draw_arrows(axes, start, np.array([[length, 0.0]]), "black")
+    draw_arrows(axes, start, np.array([[length, 0.0]]), "black")
     text = f"{arrows.scale_px:g} px"
     axes.text(left + 1.5 * unit + length / 2, low - 3 * unit, text, ha="center", fontsize=10)
 

@@ -44,8 +44,10 @@ class Page:
         made = {"parameters": self.parameters, "versions": versions(), "seconds": self.seconds}
         return {name: plain(value) for name, value in (self.numbers() | made).items()}
 
-    def write(self, outputs: Outputs, path: Path) -> None:
+    def write(self, outputs: Outputs, path: Path, taken: Path | None = None) -> None:
         """Write the page, an HTML file, and before it its numbers, the JSON file beside it.
+
+        Where another output is to be `taken` for that file, they are NAME.report.json.
 
         Raises
         ------
@@ -56,7 +58,10 @@ class Page:
         shared = {name: summary[name] for name in ("parameters", "versions", "seconds")}
         run = run_tags().get(RUN)
         page = _rendered(self.template, title=self.title, run=run, **shared, **self.values())
-        write_json(outputs.stage(path.with_suffix(".json")), summary)
+        beside = path.with_suffix(".json")
+        is_free = taken is None or taken.resolve() != beside.resolve()
+        numbers = beside if is_free else path.with_suffix(".report.json")
+        write_json(outputs.stage(numbers), summary)
         staged = outputs.stage(path)
         with writing(staged):
             staged.write_text(page, encoding="utf-8")

@@ -29,8 +29,7 @@ _NO_DATA_GREY = 226
 _BACKDROP_STRENGTH = 0.4
 
 # What is masked: reddish purple [Okabe2008].
-_TINT_BGR = np.array([167.0, 121.0, 204.0])
-_TINT_STRENGTH = 0.3
+_TINT_BGRA = (167, 121, 204, 77)
 
 # A side of the lattice on which an overview follows a transform.
 _NODES = 33
@@ -75,15 +74,11 @@ def grey_picture(patch: Patch) -> Picture:
     return picture
 
 
-def tinted_picture(patch: Patch, taking_part: NDArray[np.bool_]) -> Picture:
-    """Return a grey picture, in which what is valid but takes no part is tinted (BGR then)."""
-    grey = grey_picture(patch)
-    masked = patch.valid & ~taking_part
-    if not masked.any():
-        return grey
-    picture = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
-    picture[masked] = (1 - _TINT_STRENGTH) * picture[masked] + _TINT_STRENGTH * _TINT_BGR
-    return np.asarray(picture)
+def tint_uri(masked: NDArray[np.bool_]) -> str:
+    """Return a tint of what is masked, elsewhere transparent, as the data URI of a PNG."""
+    picture = np.zeros((*masked.shape, 4), np.uint8)
+    picture[masked] = _TINT_BGRA
+    return png_uri(picture)
 
 
 def backdrop(picture: Picture) -> Picture:
@@ -108,7 +103,12 @@ def surface_uri(surface: Surface) -> str:
     low, high = float(surface.min()), float(surface.max())
     levels = ((surface - low) / max(high - low, 1e-9) * 255).astype(np.uint8)
     colours = cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS)
-    return data_uri("image/png", cv2.imencode(".png", colours)[1].tobytes())
+    return png_uri(np.asarray(colours, np.uint8))
+
+
+def png_uri(picture: Picture) -> str:
+    """Return a picture, grey, BGR or BGRA, as the data URI of a PNG."""
+    return data_uri("image/png", cv2.imencode(".png", picture)[1].tobytes())
 
 
 def data_uri(kind: str, data: bytes) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ..assessment.comparison import Comparison
+from ..assessment.comparison import Comparison, without_masks
 from ..assessment.point_errors import PointErrors
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
@@ -16,9 +16,10 @@ from ..rasters.pair import ImagePair
 from ..registration.verdict import Verdict
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
-from . import figures, pictures
+from . import details, figures, pictures
 from .correction import Correction
 from .page import Page
+from .parts import Parts
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ class Report(Page):
         Which mask was used; None: no question of one.
     scene
         Facts about the images by their names; None: none were found.
+    parts
+        Where neighbouring chips agree on another place than the transform has; None: not looked at.
     """
 
     title: str
@@ -59,6 +62,7 @@ class Report(Page):
     seconds: float
     mask: MaskUsed | None = None
     scene: Mapping[str, Any] | None = None
+    parts: Parts | None = None
     template: ClassVar[str] = "report.html.j2"
 
     def numbers(self) -> dict[str, Any]:
@@ -70,6 +74,7 @@ class Report(Page):
             "transform": None if self.transform is None else self.transform.to_json(),
             "mask": None if self.mask is None else self.mask.summary(),
             **({} if self.scene is None else {"scene": dict(self.scene)}),
+            **({} if self.parts is None else {"parts": self.parts.summary()}),
         }
 
     def correction(self) -> Correction | None:
@@ -90,7 +95,16 @@ class Report(Page):
             "residuals": None if self.points is None else self._residual_figures(self.points),
             "surfaces": [_shown_surface(label, surface) for label, surface in self.surfaces],
             "scene": self.scene or {},
+            "details": self._details(),
+            "parts": None if self.parts is None else self.parts.shown(),
         }
+
+    def _details(self) -> list[dict[str, Any]]:
+        """Return chips at full resolution; none without a transform."""
+        if self.transform is None or self.points is None:
+            return []
+        errors = PointErrors.on_grid(self.points, self.transform, self.pair.grid)
+        return details.shown(without_masks(self.pair), self.transform, errors)
 
     def _residual_figures(self, points: TiePoints) -> dict[str, Any]:
         """Return the figures that the points allow."""

@@ -27,13 +27,37 @@ def correlate(template: NDArray[Any], search: NDArray[Any]) -> NDArray[np.float3
     -------
     Array of shape (…, ny, nx), float32.
     """
-    shape = [scipy.fft.next_fast_len(n) for n in search.shape[-2:]]
-    ny, nx = (s - t + 1 for s, t in zip(search.shape[-2:], template.shape[-2:], strict=True))
+    size, spans = search.shape[-2:], _spans(template.shape[-2:], search.shape[-2:])
     if np.iscomplexobj(template):
+        shape = _fast_shape(size)
         spectrum = scipy.fft.fft2(template, shape).conj() * scipy.fft.fft2(search, shape)
-        return scipy.fft.ifft2(spectrum)[..., :ny, :nx].real.astype(np.float32)
-    spectrum = scipy.fft.rfft2(template, shape).conj() * scipy.fft.rfft2(search, shape)
-    return scipy.fft.irfft2(spectrum, shape)[..., :ny, :nx].astype(np.float32)
+        return scipy.fft.ifft2(spectrum)[..., : spans[0], : spans[1]].real.astype(np.float32)
+    of_template, of_search = _spectra(template, search, size)
+    return _inverse(of_template.conj() * of_search, size, spans)
+
+
+def _fast_shape(size: tuple[int, ...]) -> list[int]:
+    return [scipy.fft.next_fast_len(n) for n in size]
+
+
+def _spans(template: tuple[int, ...], search: tuple[int, ...]) -> tuple[int, int]:
+    """Return at how many shifts of rows and columns a template lies inside a search window."""
+    rows, cols = (s - t + 1 for s, t in zip(search, template, strict=True))
+    return rows, cols
+
+
+def _spectra(
+    template: NDArray[Any], search: NDArray[Any], size: tuple[int, ...]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    shape = _fast_shape(size)
+    return scipy.fft.rfft2(template, shape), scipy.fft.rfft2(search, shape)
+
+
+def _inverse(
+    spectrum: NDArray[Any], size: tuple[int, ...], spans: tuple[int, int]
+) -> NDArray[np.float32]:
+    found = scipy.fft.irfft2(spectrum, _fast_shape(size))
+    return np.asarray(found[..., : spans[0], : spans[1]], np.float32)
 
 
 def box_sums(image: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
@@ -102,11 +126,15 @@ def correlate_grey(template: Patch, search: Patch) -> NDArray[np.float32]:
     tm, sm = (window.valid.astype(np.float32) for window in (template, search))
     own_mean = np.float32(template.values[template.valid].mean()) if template.valid.any() else mean
     t, s = (template.values - own_mean) * tm, (search.values - mean) * sm
-    count = np.maximum(correlate(tm, sm), 1)
-    sum_t, sum_s = correlate(t, sm), correlate(tm, s)
-    covariance = correlate(t, s) - sum_t * sum_s / count
-    variance_t = correlate(t * t, sm) - sum_t**2 / count
-    variance_s = correlate(tm, s * s) - sum_s**2 / count
+    # Each of a window's three spectra serves several sums.
+    of_t, of_s = _spectra(np.stack([tm, t, t * t]), np.stack([sm, s, s * s]), search.valid.shape)
+    pairs = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (0, 2))
+    products = np.stack([of_t[i].conj() * of_s[j] for i, j in pairs])
+    spans = _spans(template.valid.shape, search.valid.shape)
+    count, sum_t, sum_s, sum_ts, sum_tt, sum_ss = _inverse(products, search.valid.shape, spans)
+    count = np.maximum(count, 1)
+    covariance = sum_ts - sum_t * sum_s / count
+    variance_t, variance_s = sum_tt - sum_t**2 / count, sum_ss - sum_s**2 / count
     product = variance_t * variance_s
     floor = 1e-6 * max(float(product.max(initial=0)), 1e-12)
     return np.where(product > floor, covariance / np.sqrt(np.maximum(product, floor)), 0)

@@ -34,9 +34,9 @@ ORDER = 4
 # Templates of so many pixels or fewer are counted a row of shifts at a time.
 _CODED_PIXELS = 20_000
 
-# Seconds, measured: to count a pixel, to call OpenCV, and for each element and halving of an FFT.
-_PIXEL_COST, _CALL_COST, _SPECTRAL_COST = 0.5e-9, 6e-6, 0.8e-9
-_WORKERS = 2
+# Seconds to count a pixel, one shift a call and a row of shifts a call; to call OpenCV; for each
+# element and halving of an FFT: `benchmarks/run.py --only kernels`.
+_PIXEL_COST, _CODED_PIXEL_COST, _CALL_COST, _SPECTRAL_COST = 0.5e-9, 0.95e-9, 6e-6, 0.4e-9
 
 
 def support(order: int) -> int:
@@ -145,10 +145,12 @@ def count_joint_histograms(
     sizes = (bins[0] + masked, bins[1] + masked)
     template = np.minimum(template, bins[0]).astype(np.uint8)
     search = np.minimum(search, bins[1]).astype(np.uint8)
-    if _spectral_cost(search.size, bins) < _direct_cost(template.size, span):
-        counts = _count_spectrally(template, search, bins)
+    coded = template.size <= _CODED_PIXELS and sizes[0] * sizes[1] <= 256 and span <= 256
+    if _spectral_cost(search.size, bins) < _direct_cost(template.size, span, coded):
+        counts = _count_spectrally(
+            template, search, bins, 1 if context is None else context.workers
+        )
     else:
-        coded = template.size <= _CODED_PIXELS and sizes[0] * sizes[1] <= 256 and span <= 256
         count_row = _row_counter(template, search, sizes, coded)
         counts = np.empty((span, span, *bins), np.float32)
 
@@ -194,7 +196,9 @@ def _row_counter(
     return all_at_once
 
 
-def _direct_cost(pixels: int, span: int) -> float:
+def _direct_cost(pixels: int, span: int, coded: bool) -> float:
+    if coded:
+        return span * (span * pixels * _CODED_PIXEL_COST + _CALL_COST)
     return span * span * (pixels * _PIXEL_COST + _CALL_COST)
 
 
@@ -203,17 +207,17 @@ def _spectral_cost(pixels: int, bins: tuple[int, int]) -> float:
 
 
 def _count_spectrally(
-    template: NDArray[np.uint8], search: NDArray[np.uint8], bins: tuple[int, int]
+    template: NDArray[np.uint8], search: NDArray[np.uint8], bins: tuple[int, int], workers: int
 ) -> FloatArray:
     """Count all shifts at once by correlating the planes of all bins with each other."""
     shape = [scipy.fft.next_fast_len(n, real=True) for n in search.shape]
     ny, nx = (s - t + 1 for s, t in zip(search.shape, template.shape, strict=True))
     counts = np.empty((ny, nx, *bins), np.float32)
     planes = np.stack([search == k for k in range(bins[1])]).astype(np.float32)
-    spectra = scipy.fft.rfft2(planes, shape, workers=_WORKERS)
+    spectra = scipy.fft.rfft2(planes, shape, workers=workers)
     for k in range(bins[0]):
         spectrum = scipy.fft.rfft2((template == k).astype(np.float32), shape)
-        found = scipy.fft.irfft2(spectra * spectrum.conj(), shape, workers=_WORKERS)
+        found = scipy.fft.irfft2(spectra * spectrum.conj(), shape, workers=workers)
         counts[:, :, k] = found[:, :ny, :nx].transpose(1, 2, 0)
     # Counts are whole numbers; what is left over is rounding, and so is the sign of zero.
     np.rint(counts, out=counts)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
+import importlib.util
+import inspect
 
 from ..declaration import Tool, tool_of
 
@@ -12,6 +15,7 @@ NAMES = (
     "coregister",
     "match_sar_sar",
     "match_optical",
+    "coregister_series",
     "train_feature_classifier",
     "estimate_rotation",
     "warp",
@@ -20,6 +24,7 @@ NAMES = (
     "orthorectify",
     "assess",
     "assess_sensor",
+    "batch",
     "similarity_surface",
     "detector_repeatability",
     "filter_speckle",
@@ -33,6 +38,20 @@ NAMES = (
 def load_tool(name: str) -> Tool:
     """Return the declaration of a tool; of all the tools' modules, its own alone is imported."""
     return tool_of(getattr(importlib.import_module(f".{name}", __name__), name))
+
+
+def summary_of(name: str) -> str:
+    """Return the first line of a tool's docstring; nothing is imported for it if there is source.
+
+    A list of all tools would otherwise import all that any of them needs.
+    """
+    spec = importlib.util.find_spec(f".{name}", __name__)
+    source = spec.loader.get_source(spec.name) if spec and spec.loader else None  # type: ignore[attr-defined]
+    if source is None:
+        return load_tool(name).summary
+    body = ast.parse(source).body
+    function = next(f for f in body if isinstance(f, ast.FunctionDef) and f.name == name)
+    return inspect.cleandoc(ast.get_docstring(function) or "").partition("\n")[0]
 
 
 def load_tools() -> tuple[Tool, ...]:

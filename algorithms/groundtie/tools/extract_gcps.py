@@ -15,7 +15,13 @@ from ..progress import SILENT, Progress
 from ..registration.sensor_jobs import GcpResult, extract_control
 from ..sensor.control_points import SUFFIXES
 from .common import MatchingPixelSize, Reference, ReferenceBand, Workers
-from .registration_parameters import Mask, MaxError, ReferenceMask
+from .registration_parameters import (
+    ImageMaskValues,
+    Mask,
+    MaxError,
+    ReferenceMask,
+    ReferenceMaskValues,
+)
 from .sensor_parameters import (
     Dem,
     DemDatum,
@@ -59,8 +65,10 @@ def extract_gcps(
     rpc: RpcFile = None,
     image_band: ImageBand = None,
     image_mask: ImageMask = None,
+    image_mask_values: ImageMaskValues = None,
     reference_band: ReferenceBand = None,
     reference_mask: ReferenceMask = None,
+    reference_mask_values: ReferenceMaskValues = None,
     mask: Mask = AUTO,
     matching_pixel_size: MatchingPixelSize = None,
     workers: Workers = None,
@@ -69,7 +77,7 @@ def extract_gcps(
 ) -> GcpResult:
     """Extract ground control for an image with RPCs from a reference image and a terrain model.
 
-    The image is projected onto the reference's map by its RPCs and matched there as coregister
+    The image is projected onto the reference's map by its RPCs and matched there as `coregister`
     does; what is found is carried back into the image. A coarse error of the RPCs within the search
     radius is found first. Held-out points decide whether the points can be trusted; if not,
     nothing is written.

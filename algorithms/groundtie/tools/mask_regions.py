@@ -71,8 +71,8 @@ def mask_regions(
 
     Speckle is filtered, regions grow from homogeneous seeds, and those stay that are long or large
     and neither bright nor radar shadow. Long ones are thinned to their skeleton and broadened by a
-    window; strong scatterers inside are masked. The mask is for `coregister` (reference_mask,
-    input_mask), which makes the same one itself with mask=regions.
+    window; strong scatterers inside are masked. The mask is for the registration of this
+    image; `coregister` makes the same one itself if asked for regions.
     """
     high = HIGH_PERCENT if mask_high_percent is None else mask_high_percent
     files = {"mask": output, "regions": regions, "skeleton": skeleton}

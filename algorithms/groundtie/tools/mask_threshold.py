@@ -57,8 +57,8 @@ def mask_threshold(
     """Mask the strong scatterers of a radar image, as buildings are.
 
     The thresholds are percentiles of the means over blocks of 4 × 4 pixels; whole blocks take
-    part or do not. The mask is for `coregister` (reference_mask, input_mask), which makes the
-    same one itself with mask=threshold.
+    part or do not. The mask is for the registration of this image; `coregister` makes the
+    same one itself if asked for threshold.
     """
     with bounded_cache(), open_raster(input) as source:
         scene = Scene.of(source, band)

@@ -13,7 +13,7 @@ from rasterio.errors import CRSError
 from ..context import threads
 from ..declaration import tool
 from ..errors import GeoreferencingError, ParameterError
-from ..kinds import Flag, RasterOut, Text
+from ..kinds import Crs, Flag, RasterOut
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.grid import require_map
@@ -63,7 +63,7 @@ def orthorectify(
     ] = None,
     crs: Annotated[
         str | None,
-        Text(
+        Crs(
             label="CRS",
             help="CRS of the result, as EPSG:32632; by default the UTM zone of the image.",
         ),

@@ -18,7 +18,13 @@ from ..sensor.adjustment import AUTO
 from ..sensor.bias import KINDS
 from ..sensor.control_points import SUFFIXES
 from .common import MatchingPixelSize, ReferenceBand, Workers
-from .registration_parameters import Mask, MaxError, ReferenceMask
+from .registration_parameters import (
+    ImageMaskValues,
+    Mask,
+    MaxError,
+    ReferenceMask,
+    ReferenceMaskValues,
+)
 from .sensor_parameters import (
     Dem,
     DemDatum,
@@ -108,8 +114,10 @@ def refine_rpc(
     rpc: RpcFile = None,
     image_band: ImageBand = None,
     image_mask: ImageMask = None,
+    image_mask_values: ImageMaskValues = None,
     reference_band: ReferenceBand = None,
     reference_mask: ReferenceMask = None,
+    reference_mask_values: ReferenceMaskValues = None,
     mask: Mask = AUTO_MASK,
     matching_pixel_size: MatchingPixelSize = None,
     workers: Workers = None,

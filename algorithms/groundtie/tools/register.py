@@ -22,8 +22,10 @@ from .common import (
 from .registration_parameters import (
     OUTPUTS,
     InputMask,
+    InputMaskValues,
     MaxError,
     ReferenceMask,
+    ReferenceMaskValues,
     ReportOut,
     TiePointsOut,
 )
@@ -44,7 +46,9 @@ def register(
     reference_band: ReferenceBand = None,
     input_band: InputBand = None,
     reference_mask: ReferenceMask = None,
+    reference_mask_values: ReferenceMaskValues = None,
     input_mask: InputMask = None,
+    input_mask_values: InputMaskValues = None,
     workers: Workers = None,
     progress: Progress = SILENT,
     parameters: Mapping[str, Any] = MappingProxyType({}),
@@ -52,7 +56,7 @@ def register(
     """Register an image to another one of the same place; the images decide how.
 
     Radar images, a camera's images and pairs of both are matched as match_sar_sar, match_optical
-    and coregister do; if that is refused, another way that makes sense is tried, and rotation and
+    and `coregister` do; if that is refused, another way that makes sense is tried, and rotation and
     scale are searched for. An image with RPCs has them refined, and is orthorectified, by a
     terrain model if one is given. The result names what was tried, and why; the probability of
     agreement by chance counts all of it. A refused registration writes no image.

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from ..declaration import Output
 from ..geometry.models import KINDS
-from ..kinds import Choice, Distance, FileOut, MaskIn, Number, VectorOut
+from ..kinds import Choice, Distance, FileOut, MaskIn, Number, Text, VectorOut
 from ..masks.choice import MASKS
 from ..matching.surface_fit import AUTO
 from ..registration.registered_output import OUTPUT_GRIDS
@@ -92,6 +92,22 @@ ReferenceMask = Annotated[
     Path | None, MaskIn(label="Mask of the reference", help=MASK_HELP, advanced=True)
 ]
 InputMask = Annotated[Path | None, MaskIn(label="Mask of the input", help=MASK_HELP, advanced=True)]
+_MASK_VALUES = (
+    "What of the mask takes no part: values as 3,8-10; scl, qa-pixel, fmask, hls-fmask or udm2 for "
+    "clouds and their shadows in these missions' masks; inside for a vector layer of what takes no "
+    "part. By default 0, and what lies outside of a layer. Without a mask one is taken that lies "
+    "beside the image by the mission's names; none takes none."
+)
+ReferenceMaskValues = Annotated[
+    str | None,
+    Text(label="Values of the reference's mask", help=_MASK_VALUES, advanced=True),
+]
+InputMaskValues = Annotated[
+    str | None, Text(label="Values of the input's mask", help=_MASK_VALUES, advanced=True)
+]
+ImageMaskValues = Annotated[
+    str | None, Text(label="Values of the image's mask", help=_MASK_VALUES, advanced=True)
+]
 Mask = Annotated[
     str,
     Choice(

@@ -37,6 +37,7 @@ def simulate(
             label="Folder",
             help="Gets reference.tif (SAR), input.tif (optical), dem.tif, truth.json, "
             "check_points.csv and roof_points.csv.",
+            shows=("input.tif", "reference.tif"),
         ),
     ],
     size: Size = 1000,
@@ -118,7 +119,7 @@ def simulate(
 
     The scene has terrain, fields, roads, water and buildings. The SAR image has layover, shadow,
     double bounce and speckle; the optical one relief displacement, cast shadows and noise. The
-    same seed gives the same pair. The file truth.json is a transform like those of coregister.
+    same seed gives the same pair. The file truth.json is a transform like those of `coregister`.
     """
     options = PairOptions(
         scene=SceneOptions((size, size), pixel_size, density, relief, seed, changed / 100),

@@ -37,6 +37,7 @@ def simulate_sensor(
             label="Folder",
             help="Gets sensor.tif (optical, with RPCs), reference.tif (SAR), dem.tif, "
             "exact_rpc.txt, truth.json, check_points.csv and roof_points.csv.",
+            shows=("reference.tif",),
         ),
     ],
     size: Size = 1000,

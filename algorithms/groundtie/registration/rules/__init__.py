@@ -19,6 +19,7 @@ from .refinement import REFINEMENT_RULES
 from .rule import Rule
 from .scene import SCENE_RULES
 from .search import SEARCH_RULES
+from .series import SERIES_RULES
 from .survey import SURVEY_RULES
 from .tie_points import TIE_POINT_RULES
 
@@ -34,4 +35,5 @@ RULES: tuple[Rule, ...] = (
     *SCENE_RULES,
     *SURVEY_RULES,
     *REFINEMENT_RULES,
+    *SERIES_RULES,
 )

@@ -14,12 +14,17 @@ def _large_error(evidence: RegistrationEvidence | RefinementEvidence) -> str | N
     return f"error at {points.name} is {points.rmse_px:.2f} px, above {points.max_error_px:g} px"
 
 
-def _loose_model(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+def _uncertain(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
     points = evidence.held_out
-    if points.spread_px <= points.max_error_px:
+    if points.spread_px > points.max_error_px:
+        spread = f"{points.spread_px:.2f} px over {points.area}"
+        return f"the points do not hold the model: it varies by {spread}"
+    if not points.accuracy.ce90_px > points.largest_ce90_px:
         return None
-    spread = f"{points.spread_px:.2f} px over {points.area}"
-    return f"the points do not hold the model: it varies by {spread}"
+    return (
+        f"90 % of errors over {points.area} are expected within {points.accuracy.ce90_px:.2f} px "
+        f"only, with what heights displace; {points.largest_ce90_px:.2f} px are allowed"
+    )
 
 
 ERROR_RULES: tuple[Rule, ...] = (
@@ -32,11 +37,13 @@ ERROR_RULES: tuple[Rule, ...] = (
         _large_error,
     ),
     Rule(
-        "loose model",
+        "uncertain transform",
         ERROR,
-        "the model varies by more than the largest error if blocks of points are left out in turn",
-        "jackknife; [Efron1993]",
-        "give a simpler model, or a larger part of the scene",
-        _loose_model,
+        "the model varies by more than the largest error if blocks of points are left out in turn, "
+        "or its CE90, what heights may displace all points by included, is above that of errors "
+        "as large",
+        "jackknife, [Efron1993]; [Mauchly1940]; the user's largest error",
+        "give a simpler model, or a larger part of the scene; in a town, give a mask of the ground",
+        _uncertain,
     ),
 )

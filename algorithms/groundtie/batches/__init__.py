@@ -1,0 +1,1 @@
+"""One tool run over the rows of a table."""

@@ -1,0 +1,153 @@
+"""A batch: the rows of a table, run, resumed, logged and summed up."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..declaration import Tool
+from ..errors import CancelledError
+from ..executors import open_executor
+from ..progress import Progress
+from ..rasters.atomic import writing
+from ..version import __version__
+from .calls import Call, make_calls
+from .log import EventLog, open_log, read_finished, still_there
+from .result import BatchResult, BatchRow
+from .running import Reporter, run_calls
+from .table import read_rows
+from .work import FAILED, Outcome
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What to run, and where.
+
+    Parameters
+    ----------
+    load
+        Returns a tool by its name; a function of a module that workers can import.
+    tool
+        Name of the tool.
+    table
+        Path of the table. Its inputs' relative paths begin at its folder.
+    folder
+        Where outputs with relative paths go, and the summary.
+    log
+        Path of the log.
+    workers
+        Rows at the same time on this machine; by default one per processor.
+    scheduler
+        Address of a Dask scheduler whose workers run the rows instead.
+    """
+
+    load: Callable[[str], Tool]
+    tool: str
+    table: Path
+    folder: Path
+    log: Path
+    workers: int | None = None
+    scheduler: str | None = None
+
+    def run(
+        self, resume: bool, progress: Progress, executor: Executor | None = None
+    ) -> BatchResult:
+        """Run the rows.
+
+        Parameters
+        ----------
+        resume
+            Take over what the log has of rows that ran already, if their files are unchanged.
+        progress
+            Of the whole batch.
+        executor
+            Runs the rows in the place of `workers` and `scheduler`; it stays open.
+
+        Raises
+        ------
+        ParameterError
+            The table cannot be read or understood.
+        SameFileError, OutputError
+            A row writes what another one reads or writes; a file cannot be written.
+        SchedulerError
+            The scheduler does not answer.
+        """
+        started = time.monotonic()
+        rows = read_rows(self.table)
+        tool = self.load(self.tool)
+        with writing(self.folder):
+            self.folder.mkdir(parents=True, exist_ok=True)
+        local = executor is None and self.scheduler is None
+        processors = os.cpu_count() or 1
+        workers = min(self.workers or processors, len(rows))
+        threads = max(1, processors // workers) if local else 1
+        base, folder = Path(os.path.abspath(self.table)).parent, Path(os.path.abspath(self.folder))
+        calls = make_calls(tool, rows, base, folder, threads)
+        ended = self._known(calls, resume)
+        resumed = {number for number, outcome in ended.items() if outcome.status != FAILED}
+        # Connected to before the log begins: a scheduler that is not there costs no old log.
+        with self._executor(executor, workers) as pool, open_log(self.log, resume) as log:
+            log.write("batch", tool=tool.name, version=__version__, rows=len(calls))
+            self._run(calls, ended, pool, log, progress)
+            result = BatchResult(
+                tool,
+                [BatchRow(call, ended[call.row], call.row in resumed) for call in calls],
+                time.monotonic() - started,
+                folder / f"{self.table.stem}.results.csv",
+                folder / f"{self.table.stem}.results.json",
+                Path(os.path.abspath(self.log)),
+            )
+            counts = {status: result.count(status) for status in ("done", "refused", "failed")}
+            log.write("end", **counts, seconds=result.seconds)
+        result.write()
+        return result
+
+    def _known(self, calls: list[Call], resume: bool) -> dict[int, Outcome]:
+        """Return what is known without running anything, by the rows' numbers."""
+        finished = read_finished(self.log) if resume else {}
+        known = {}
+        for call in calls:
+            earlier = finished.get(call.key)
+            if call.problem:
+                known[call.row] = Outcome(FAILED, call.problem)
+            elif earlier is not None and still_there(earlier):
+                known[call.row] = earlier
+        return known
+
+    @contextlib.contextmanager
+    def _executor(self, executor: Executor | None, workers: int) -> Iterator[Executor]:
+        if executor is not None:
+            yield executor
+            return
+        with open_executor(workers, self.scheduler) as opened:
+            yield opened
+
+    def _run(
+        self,
+        calls: list[Call],
+        ended: dict[int, Outcome],
+        pool: Executor,
+        log: EventLog,
+        progress: Progress,
+    ) -> None:
+        """Run the calls whose end is not known, and add it."""
+        for call in calls:
+            if call.problem:
+                log.row(call, ended[call.row])
+        waiting = [call for call in calls if call.row not in ended]
+        reporter = Reporter(progress, len(calls), len(ended))
+        progress.update(len(ended) / len(calls), f"{len(waiting)} of {len(calls)} rows to run")
+        try:
+            for call, outcome in run_calls(waiting, self.load, self.tool, pool, progress.check):
+                ended[call.row] = outcome
+                log.row(call, outcome)
+                reporter.ended(outcome)
+        except CancelledError as error:
+            log.write("cancelled")
+            said = f"cancelled after {len(ended)} of {len(calls)} rows; resume runs the others"
+            raise CancelledError(said) from error

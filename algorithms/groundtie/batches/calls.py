@@ -1,0 +1,156 @@
+"""The calls that a table asks for: values checked as for a single call, and against each other."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..declaration import Parameter, Tool
+from ..errors import GroundTieError, OutputError, ParameterError, SameFileError
+from ..kinds import Flag, FolderOut, InputKind, OutputKind, Text
+from ..rasters.atomic import writing
+
+# The column that is no parameter.
+NAME = "name"
+
+_YES, _NO = ("true", "yes", "1"), ("false", "no", "0")
+
+
+@dataclass(frozen=True)
+class Call:
+    """A row of a table as a call of the tool.
+
+    Parameters
+    ----------
+    row
+        Its number, from 1.
+    name
+        What it is called: in results, and in the names of outputs that the row does not name.
+    values
+        Checked values of all parameters; empty where there is a problem.
+    outputs
+        Paths of the outputs that are asked for, by the parameters' names.
+    key
+        Stands for tool, version, parameters, outputs, and the input files with their sizes and
+        times: calls with the same key have the same results (see `runs`).
+    problem
+        Why the row cannot be run at all; empty if it can.
+    """
+
+    row: int
+    name: str
+    values: Mapping[str, Any] = field(default_factory=dict)
+    outputs: Mapping[str, Path] = field(default_factory=dict)
+    key: str = ""
+    problem: str = ""
+
+
+def make_calls(
+    tool: Tool, rows: Sequence[Mapping[str, Any]], inputs: Path, outputs: Path, threads: int
+) -> list[Call]:
+    """Return the calls of a table's rows.
+
+    Parameters
+    ----------
+    tool
+        The tool to call.
+    rows
+        Values by parameters' names (see `read_rows`), and perhaps a `name`.
+    inputs, outputs
+        Folders in which relative paths of inputs and of outputs lie.
+    threads
+        How many a call uses, where the row does not say and the tool asks.
+
+    Raises
+    ------
+    ParameterError
+        The table has a column that the tool does not know.
+    SameFileError
+        A row writes what another one reads or writes.
+    """
+    known = {parameter.name for parameter in tool.parameters}
+    for name in {name: None for row in rows for name in row}:
+        if name not in known and name != NAME:
+            raise ParameterError(f"the table has a column {name}, which {tool.name} does not know")
+    width = len(str(len(rows)))
+    calls = []
+    for number, row in enumerate(rows, 1):
+        name = str(row.get(NAME, f"{number:0{width}}"))
+        given = {"workers": threads, **row} if "workers" in known else row
+        try:
+            calls.append(_call(tool, number, name, given, inputs, outputs))
+        except GroundTieError as error:
+            calls.append(Call(number, name, problem=error.one_line()))
+    _check_apart(tool, calls)
+    return calls
+
+
+def _call(
+    tool: Tool, number: int, name: str, row: Mapping[str, Any], inputs: Path, outputs: Path
+) -> Call:
+    values = {p.name: _value(p, row.get(p.name), name, inputs, outputs) for p in tool.parameters}
+    for parameter in tool.parameters:
+        path = values[parameter.name]
+        if path is not None and isinstance(parameter.kind, OutputKind):
+            with writing(path):
+                Path(path).parent.mkdir(parents=True, exist_ok=True)
+    checked = tool.check(values)
+    written = {p.name: checked[p.name] for p in tool.parameters if _is_output(p)}
+    written = {key: path for key, path in written.items() if path is not None}
+    places = sorted((key, str(path)) for key, path in written.items())
+    key = hashlib.sha256(repr((tool.run_of_call(checked), places)).encode()).hexdigest()[:16]
+    return Call(number, name, checked, written, key)
+
+
+def _value(parameter: Parameter, value: Any, name: str, inputs: Path, outputs: Path) -> Any:
+    kind = parameter.kind
+    if _is_output(parameter):
+        return _output(parameter, value, name, outputs)
+    if value is None:
+        return None
+    if isinstance(kind, InputKind):
+        checked = kind.check(parameter.name, value)
+        # GDAL's own names stay text.
+        return inputs / checked if isinstance(checked, Path) else checked
+    if isinstance(kind, Flag) and str(value).lower() in (*_YES, *_NO):
+        return str(value).lower() in _YES
+    if isinstance(kind, Text) and isinstance(value, (int, float)):
+        return str(value)  # YAML and JSON have numbers where a text was meant
+    return value
+
+
+def _is_output(parameter: Parameter) -> bool:
+    return isinstance(parameter.kind, (OutputKind, FolderOut))
+
+
+def _output(parameter: Parameter, value: Any, name: str, folder: Path) -> Path | None:
+    """Return where an output goes; one that is required has a name by default."""
+    kind = parameter.kind
+    if value is None:
+        if not parameter.required:
+            return None
+        stem = "{name}" if parameter.name in ("output", "folder") else f"{{name}}_{parameter.name}"
+        value = stem + (kind.suffixes[0] if isinstance(kind, OutputKind) else "")
+    if not isinstance(value, str):
+        raise ParameterError(f"{parameter.name} must be a path, not {value!r}")
+    return folder / value.replace("{name}", name)
+
+
+def _check_apart(tool: Tool, calls: Sequence[Call]) -> None:
+    """Raise if what a row writes is read or written by another: rows run in any order."""
+    writers: dict[Path, Call] = {}
+    for call in calls:
+        for path in call.outputs.values():
+            other = writers.setdefault(path.resolve(), call)
+            if other is not call:
+                raise SameFileError(f"rows {other.row} and {call.row} both write {path}")
+    inputs = [p.name for p in tool.parameters if isinstance(p.kind, InputKind)]
+    for call in calls:
+        for value in (call.values.get(name) for name in inputs):
+            if isinstance(value, Path) and (writer := writers.get(value.resolve())) is not None:
+                raise OutputError(
+                    f"row {writer.row} would write what row {call.row} reads: {value}"
+                )

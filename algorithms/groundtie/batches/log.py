@@ -1,0 +1,101 @@
+"""The log of a batch: JSON lines, one an event, from which an interrupted batch is resumed."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Iterator
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import IO, Any
+
+from ..rasters.atomic import writing
+from .calls import Call
+from .work import DONE, REFUSED, Outcome, files_of
+
+ROW = "row"
+
+
+class EventLog:
+    """Writes events to a file, each at once: a batch that is killed has told all until then."""
+
+    def __init__(self, path: Path, file: IO[str]) -> None:
+        self._path = path
+        self._file = file
+
+    def write(self, event: str, **facts: Any) -> None:
+        """Write an event, with the time of now (RFC 3339, UTC).
+
+        Raises
+        ------
+        OutputError
+            The disk is full, or the file cannot be written to.
+        """
+        now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
+        line = json.dumps({"time": now.replace("+00:00", "Z"), "event": event, **facts})
+        with writing(self._path):
+            self._file.write(line + "\n")
+            self._file.flush()
+
+    def row(self, call: Call, outcome: Outcome) -> None:
+        """Write how a row ended."""
+        self.write(ROW, row=call.row, name=call.name, key=call.key, **outcome.summary())
+
+
+@contextlib.contextmanager
+def open_log(path: Path, append: bool) -> Iterator[EventLog]:
+    """Open a log; without `append` an older one is replaced.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written to.
+    """
+    with writing(path):
+        file = path.open("a" if append else "w", encoding="utf-8")
+    with file:
+        if append and _torn(path):
+            file.write("\n")
+        yield EventLog(path, file)
+
+
+def read_finished(path: Path) -> dict[str, Outcome]:
+    """Return the outcomes of rows that need not run again, by their calls' keys.
+
+    Of lines that are no event, as the last one of a batch that was killed, nothing is taken.
+    """
+    finished = {}
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return {}
+    for line in lines:
+        with contextlib.suppress(ValueError, TypeError, KeyError, AttributeError):
+            event = json.loads(line)
+            if event["event"] == ROW and event["status"] in (DONE, REFUSED):
+                finished[event["key"]] = _outcome(event)
+    return finished
+
+
+def _outcome(event: dict[str, Any]) -> Outcome:
+    return Outcome(
+        event["status"],
+        str(event["message"]),
+        float(event["seconds"]),
+        dict(event["result"]),
+        {path: (int(size), int(time)) for path, (size, time) in event["files"].items()},
+    )
+
+
+def still_there(outcome: Outcome) -> bool:
+    """Whether the files of an earlier run are as it left them."""
+    return files_of(tuple(map(Path, outcome.files))) == dict(outcome.files)
+
+
+def _torn(path: Path) -> bool:
+    with path.open("rb") as file:
+        if not file.seek(0, os.SEEK_END):
+            return False
+        file.seek(-1, os.SEEK_END)
+        return file.read() != b"\n"

@@ -1,0 +1,157 @@
+"""What came of a batch: a table for people and spreadsheets, JSON for programs."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..declaration import Tool
+from ..rasters.atomic import Outputs, write_json, writing
+from ..runs import run_tags
+from ..version import __version__
+from .calls import Call
+from .work import DONE, FAILED, REFUSED, Outcome
+
+_FORMAT = "groundtie-batch/1"
+
+# So many rows that did not end well are lines of text; all of them are in the files.
+_LINES = 20
+
+
+@dataclass(frozen=True)
+class BatchRow:
+    """A row and how it ended; `resumed` if that was in an earlier run."""
+
+    call: Call
+    outcome: Outcome
+    resumed: bool
+
+    def summary(self) -> dict[str, Any]:
+        """Return the row as values that JSON can carry."""
+        return {
+            "row": self.call.row,
+            "name": self.call.name,
+            "status": self.outcome.status,
+            "exit_code": self.outcome.exit_code,
+            "message": self.outcome.message,
+            "seconds": self.outcome.seconds,
+            "resumed": self.resumed,
+            "outputs": self.outputs(),
+            "result": dict(self.outcome.result),
+        }
+
+    def outputs(self) -> dict[str, str]:
+        """Return the paths of the outputs that were written, by parameters' names."""
+        paths = {name: str(path) for name, path in self.call.outputs.items()}
+        return {name: path for name, path in paths.items() if path in self.outcome.files}
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """What came of all rows, in the table's order, and the files that hold it.
+
+    Parameters
+    ----------
+    tool
+        The tool that was run.
+    rows
+        The rows.
+    seconds
+        How long the batch took.
+    table, details, log
+        The summary as CSV and as JSON, and the log.
+    """
+
+    tool: Tool
+    rows: Sequence[BatchRow]
+    seconds: float
+    table: Path
+    details: Path
+    log: Path
+
+    def count(self, status: str) -> int:
+        """Return how many rows ended so: `done`, `refused` or `failed`."""
+        return sum(row.outcome.status == status for row in self.rows)
+
+    @property
+    def exit_code(self) -> int:
+        """Of the worst row: 2 if any failed, else 3 if any was refused, else 0."""
+        worst = next((s for s in (FAILED, REFUSED) if self.count(s)), DONE)
+        return Outcome(worst).exit_code
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {
+            "format": _FORMAT,
+            "tool": self.tool.name,
+            "version": __version__,
+            "seconds": self.seconds,
+            **{status: self.count(status) for status in (DONE, REFUSED, FAILED)},
+            "resumed": sum(row.resumed for row in self.rows),
+            "table": str(self.table),
+            "log": str(self.log),
+            "rows": [row.summary() for row in self.rows],
+        }
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        counts = [f"{self.count(status)} {status}" for status in (DONE, REFUSED, FAILED)]
+        resumed = sum(row.resumed for row in self.rows)
+        counts += [f"{resumed} of them in an earlier run"] if resumed else []
+        bad = [row for row in self.rows if row.outcome.status != DONE]
+        lines = [f"{len(self.rows)} rows: {', '.join(counts)}"]
+        lines += [
+            f"row {row.call.row} ({row.call.name}) {row.outcome.status}: {row.outcome.message}"
+            for row in bad[:_LINES]
+        ]
+        lines += [f"… and {len(bad) - _LINES} more"] if len(bad) > _LINES else []
+        return [*lines, f"wrote {self.table}, {self.details}"]
+
+    def write(self) -> None:
+        """Write the table and the JSON.
+
+        Raises
+        ------
+        OutputError
+            They cannot be written.
+        """
+        with Outputs() as outputs:
+            table = outputs.stage(self.table)
+            with writing(table):
+                table.write_text(self._csv(), encoding="utf-8", newline="")
+            write_json(outputs.stage(self.details), self.summary())
+
+    def _csv(self) -> str:
+        numbers = [output.name.lower() for output in self.tool.outputs]
+        paths = list(dict.fromkeys(name for row in self.rows for name in row.outputs()))
+        text = io.StringIO()
+        head = ["row", "name", "status", "message", "seconds", "resumed"]
+        writer = csv.DictWriter(text, [*head, *numbers, *paths, *run_tags()])
+        writer.writeheader()
+        for row in self.rows:
+            summary = row.summary()
+            writer.writerow(
+                {
+                    **{name: summary[name] for name in head},
+                    "resumed": "yes" if row.resumed else "no",
+                    "seconds": f"{row.outcome.seconds:.2f}",
+                    **self._numbers(row.outcome),
+                    **row.outputs(),
+                    **run_tags(),
+                }
+            )
+        return text.getvalue()
+
+    def _numbers(self, outcome: Outcome) -> dict[str, Any]:
+        found = {}
+        for output in self.tool.outputs:
+            # A refused registration has no more than its verdict.
+            try:
+                found[output.name.lower()] = output.value(outcome.result)
+            except (KeyError, TypeError):
+                continue
+        return found

@@ -1,0 +1,130 @@
+"""What a worker does: one call, whose end, whatever it is, becomes numbers and words."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+import traceback
+from collections.abc import Callable, Mapping
+from contextvars import Context
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..declaration import Tool
+from ..errors import CancelledError, GroundTieError, NotRegisteredError
+from ..executors import stop_requested
+from ..progress import Progress
+from ..version import __version__
+
+DONE, REFUSED, FAILED = "done", "refused", "failed"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a call ended.
+
+    Parameters
+    ----------
+    status
+        `done`, `refused` or `failed`.
+    message
+        Why it was refused or failed, in one line.
+    seconds
+        How long it took.
+    result
+        The tool's summary; of a refused registration its verdict.
+    files
+        Size in bytes and time in nanoseconds of the output files, by their paths.
+    traceback
+        Of a failure that is a bug.
+    """
+
+    status: str
+    message: str = ""
+    seconds: float = 0.0
+    result: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    traceback: str = ""
+
+    @property
+    def exit_code(self) -> int:
+        """What the command line of this one call would have ended with."""
+        return {DONE: 0, REFUSED: NotRegisteredError.exit_code}.get(
+            self.status, GroundTieError.exit_code
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as values that JSON can carry."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Task:
+    """One call as it travels to a worker: names, paths and parameters, no pixels.
+
+    Parameters
+    ----------
+    load
+        Returns a tool by its name; a function of a module that workers can import.
+    tool, values
+        The call.
+    outputs
+        Paths that it writes.
+    version
+        Of the package here: a worker's must be the same.
+    """
+
+    load: Callable[[str], Tool]
+    tool: str
+    values: Mapping[str, Any]
+    outputs: tuple[Path, ...]
+    version: str = __version__
+
+    def run(self) -> Outcome:
+        """Run the call; whatever is wrong with it is an outcome, too."""
+        started = time.perf_counter()
+        result: Mapping[str, Any] = {}
+        status, message, trace = FAILED, "", ""
+        try:
+            if self.version != __version__:
+                raise GroundTieError(f"the worker has GroundTie {__version__}, not {self.version}")
+            result = self._call()
+            status = DONE
+        except CancelledError:
+            raise
+        except NotRegisteredError as error:
+            status, message = REFUSED, error.one_line()
+            result = {} if error.verdict is None else {"verdict": error.verdict.summary()}
+        except GroundTieError as error:
+            message = error.one_line()
+        except Exception as error:
+            message = bug(error)
+            trace = traceback.format_exc()
+        seconds = time.perf_counter() - started
+        return Outcome(status, message, seconds, result, files_of(self.outputs), trace)
+
+    def _call(self) -> dict[str, Any]:
+        progress = Progress(is_cancelled=stop_requested)
+        run = self.load(self.tool).run
+        # A context of its own: files carry the id of this call (see `runs`), on any executor.
+        return Context().run(lambda: run(**self.values, progress=progress).summary())
+
+
+def bug(error: Exception) -> str:
+    """Return the line on an exception that nobody expects."""
+    return " ".join(f"this is a bug in GroundTie: {type(error).__name__}: {error}".split())
+
+
+def files_of(paths: tuple[Path, ...]) -> dict[str, tuple[int, int]]:
+    """Return size in bytes and time in nanoseconds of what there is of these files.
+
+    Folders, whose times change with any file in them, have zeros.
+    """
+    found = {}
+    for path in paths:
+        with contextlib.suppress(OSError):
+            status = path.stat()
+            facts = (0, 0) if path.is_dir() else (status.st_size, status.st_mtime_ns)
+            found[str(path)] = facts
+    return found

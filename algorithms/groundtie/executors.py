@@ -1,0 +1,180 @@
+"""Where many calls run: processes or threads of this machine, or a cluster's workers.
+
+All are `concurrent.futures.Executor`s, so that what runs on one runs on any.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, ParamSpec, TypeVar
+
+from .errors import ParameterError, SchedulerError, WorkerLostError
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+# A scheduler answers within a network's round trip; a user waits no longer without a word.
+_CONNECT_SECONDS = 5.0
+
+# A worker that is killed may be a coincidence, twice with the same task is not.
+_ATTEMPTS = 2
+
+_here = threading.local()
+
+
+def stop_requested() -> bool:
+    """Whether the pool that runs the calling task is to end before its tasks are done."""
+    stopped: Callable[[], bool] = getattr(_here, "stopped", lambda: False)
+    return stopped()
+
+
+class Threads(ThreadPoolExecutor):
+    """Threads of this process; tasks that ask `stop_requested` end soon."""
+
+    def __init__(self, workers: int) -> None:
+        self._stop = threading.Event()
+        super().__init__(workers, initializer=_heed, initargs=(self._stop.is_set,))
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the threads; with `cancel_futures` ask running tasks to stop."""
+        if cancel_futures:
+            self._stop.set()
+        super().shutdown(wait, cancel_futures=cancel_futures)
+
+
+class Processes(Executor):
+    """Processes of this machine, of which one that dies costs no other's task.
+
+    Each thread of a pool has a process of its own, which is known to have run the task by which
+    it died: that task runs again in a new one. Nothing is forked, as threads of OpenCV and GDAL do
+    not survive it: modules that use this at import need `if __name__ == "__main__"`.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self._context = multiprocessing.get_context("spawn")
+        self._stop = self._context.Event()
+        self._threads = ThreadPoolExecutor(workers)
+        self._own = threading.local()
+        self._pools: list[ProcessPoolExecutor] = []
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Have a task run by the next process that is free.
+
+        Its future raises `WorkerLostError` if its process dies again and again.
+        """
+        return self._threads.submit(self._run, fn, *args, **kwargs)
+
+    def _run(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
+        for _ in range(_ATTEMPTS):
+            try:
+                return self._pool().submit(fn, *args, **kwargs).result()
+            except BrokenProcessPool:
+                self._own.pool = None
+        raise WorkerLostError(
+            f"its process was ended {_ATTEMPTS} times, by the system (out of memory?) or somebody"
+        )
+
+    def _pool(self) -> ProcessPoolExecutor:
+        pool: ProcessPoolExecutor | None = getattr(self._own, "pool", None)
+        if pool is None:
+            pool = ProcessPoolExecutor(1, self._context, _start_worker, (self._stop,))
+            self._own.pool = pool
+            self._pools.append(pool)
+        return pool
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes; with `cancel_futures` ask running tasks to stop."""
+        if cancel_futures:
+            self._stop.set()
+        self._threads.shutdown(wait, cancel_futures=cancel_futures)
+        for pool in self._pools:
+            pool.shutdown(wait, cancel_futures=cancel_futures)
+
+
+@contextlib.contextmanager
+def open_executor(workers: int, scheduler: str | None = None) -> Iterator[Executor]:
+    """Open what runs many calls, and end it afterwards.
+
+    Parameters
+    ----------
+    workers
+        How many calls run at the same time on this machine: in processes, but in threads inside
+        QGIS, whose Python is no interpreter that another process could be started from.
+    scheduler
+        Address of a Dask scheduler, as `tcp://host:8786`: its workers run the calls, all at once.
+
+    Raises
+    ------
+    SchedulerError
+        The scheduler does not answer, or Dask is missing.
+    """
+    if scheduler is not None:
+        with _scheduler_executor(scheduler) as executor:
+            yield executor
+        return
+    pool = (Threads if "qgis.core" in sys.modules else Processes)(workers)
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+@contextlib.contextmanager
+def _scheduler_executor(address: str) -> Iterator[Executor]:
+    try:
+        import distributed
+    except ImportError as error:
+        raise SchedulerError(
+            "a scheduler needs the Python package distributed: pip install 'groundtie[cluster]'"
+        ) from error
+    if (__package__ or "").partition(".")[0] != "groundtie":
+        raise SchedulerError(
+            "a scheduler's workers know the package groundtie alone, not the copy in the QGIS "
+            "plugin: install groundtie in QGIS's Python, too"
+        )
+    if "://" not in address:
+        raise ParameterError(f"scheduler must be an address as tcp://host:8786, not {address!r}")
+    try:
+        client = distributed.Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
+    except (OSError, ValueError, ImportError) as error:  # also of a protocol it does not know
+        raise SchedulerError(f"no Dask scheduler answers at {address}") from error
+    with client:
+        # Tasks are no pure functions: they write files.
+        yield client.get_executor(pure=False)
+
+
+def _heed(stopped: Callable[[], bool]) -> None:
+    _here.stopped = stopped
+
+
+def _start_worker(stop: Any) -> None:
+    """Prepare a process: one thread for libraries, and an end as soon as its parent's.
+
+    A terminal's Ctrl-C reaches all processes: the parent alone decides what comes of it.
+    """
+    # The processes are the parallel part. Before numpy is imported: it reads these once.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _heed(stop.is_set)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    import cv2
+
+    cv2.setNumThreads(1)
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

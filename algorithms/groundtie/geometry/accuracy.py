@@ -1,0 +1,169 @@
+"""How accurate a transform is at a random place: a prediction from what its points show.
+
+Residuals of check points are no errors of the transform: each holds its own matching error, too.
+What the transform errs by is what it would change by with other points (jackknife), what
+neighbouring check points have in common, and what displaces all points alike: heights.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaincinv
+
+FloatArray = NDArray[np.float64]
+
+# Points at a side or a corner of each other are neighbours: √2 spacings are the farthest.
+_NEIGHBOUR_SPACINGS = 1.5
+
+# A quantile of so many draws at each place is good to 1 or 2 %.
+_DRAWS = 1000
+
+_LEAST_WEIGHT = 1e-9
+
+# The interval holds the true figure with this probability.
+_CONFIDENCE = 0.9
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Radii within which the error of a transform at a random place lies, in pixels.
+
+    Parameters
+    ----------
+    ce50_px, ce90_px, ce95_px
+        With probabilities of 50, 90 and 95 %.
+    ce90_range_px
+        Interval that holds `ce90_px` with 90 %: it is known from few points only.
+    """
+
+    ce50_px: float
+    ce90_px: float
+    ce95_px: float
+    ce90_range_px: tuple[float, float]
+
+
+UNKNOWN = Accuracy(math.nan, math.nan, math.nan, (math.nan, math.nan))
+
+
+@dataclass(frozen=True)
+class CheckResiduals:
+    """Residuals of points that took no part in the fit.
+
+    Parameters
+    ----------
+    px
+        Where the points lie, shape (n, 2).
+    residuals_px
+        By how much the transform misses them, shape (n, 2).
+    weights
+        Their probabilities to be inliers, shape (n,).
+    """
+
+    px: FloatArray
+    residuals_px: FloatArray
+    weights: FloatArray
+
+    @property
+    def variance_px2(self) -> float:
+        """Variance along an axis of a residual."""
+        squared = (self.residuals_px**2).sum(axis=1) / 2
+        return float((self.weights * squared).sum() / max(self.weights.sum(), _LEAST_WEIGHT))
+
+    @cached_property
+    def neighbours(self) -> FloatArray:
+        """The product of weights of points that are neighbours, 0 of others, shape (n, n)."""
+        if len(self.px) < 2:
+            return np.zeros((len(self.px),) * 2)
+        apart = np.hypot(*(self.px[:, None] - self.px).transpose(2, 0, 1))
+        np.fill_diagonal(apart, np.inf)
+        reach = _NEIGHBOUR_SPACINGS * np.median(apart.min(axis=1))
+        return np.asarray(np.outer(self.weights, self.weights) * (apart <= reach))
+
+    @property
+    def shared_variance_px2(self) -> float:
+        """Variance along an axis of what neighbours have in common; 0 without neighbours.
+
+        The matching errors of two points are independent, so that the mean product of their
+        residuals is the variance of what they share: the error of the transform.
+        """
+        products = self.residuals_px @ self.residuals_px.T / 2
+        weights = self.neighbours
+        return max(float((weights * products).sum() / max(weights.sum(), _LEAST_WEIGHT)), 0.0)
+
+
+def predict_accuracy(
+    fold_models: Sequence[Callable[[FloatArray], FloatArray]],
+    places_px: FloatArray,
+    check: CheckResiduals,
+    displacement_px: FloatArray,
+) -> Accuracy:
+    """Predict the error of a transform at a random one of some places.
+
+    Its random part is that of the models without one block of points after the other
+    ([Efron1993]), with the mean of two variances at the check points: theirs, and what the check
+    points share. It has Student's distribution, with one degree of freedom less than there are
+    blocks. Its common part is what heights displace all points by: evenly up to the largest.
+
+    Parameters
+    ----------
+    fold_models
+        The models without one block of points after the other, between pixel positions.
+    places_px
+        Places all over the overlap, shape (m, 2).
+    check
+        Points that took no part.
+    displacement_px
+        The most that heights may displace all points by, to either side, shape (2,).
+    """
+    count = len(fold_models)
+    if count < 2 or len(check.px) == 0:
+        return UNKNOWN
+    blocks = float((_deviations(fold_models, check.px) ** 2).sum(axis=0).mean())
+    factor = math.sqrt((blocks + check.shared_variance_px2) / (2 * blocks)) if blocks > 0 else 1.0
+    random = np.random.default_rng(0)
+    parts = random.standard_normal((_DRAWS, count)) * factor
+    moved = np.einsum("dk,kmx->dmx", parts, _deviations(fold_models, places_px))
+    common = random.uniform(-1, 1, (_DRAWS, 1, 1)) * displacement_px
+
+    def radii(scale: FloatArray | float, shares: Sequence[float]) -> list[float]:
+        error = moved * scale + common
+        return [float(r) for r in np.quantile(np.hypot(error[..., 0], error[..., 1]), shares)]
+
+    # So few blocks know their variance badly: Student's distribution.
+    known = random.chisquare(count - 1, (_DRAWS, 1, 1)) / (count - 1)
+    ce50, ce90, ce95 = radii(1 / np.sqrt(known), (0.5, 0.9, 0.95))
+    freedom = _degrees_of_freedom(blocks, count, check)
+    low, high = (
+        radii(math.sqrt(freedom / (2 * float(gammaincinv(freedom / 2, share)))), (0.9,))[0]
+        for share in ((1 + _CONFIDENCE) / 2, (1 - _CONFIDENCE) / 2)
+    )
+    return Accuracy(ce50, ce90, ce95, (min(low, ce90), max(high, ce90)))
+
+
+def _degrees_of_freedom(blocks_px2: float, count: int, check: CheckResiduals) -> float:
+    """Return those of the mean of the two variances, by their own variances ([Satterthwaite1946]).
+
+    What all check points share was drawn once, along two axes, and is found among the noise of the
+    products of neighbours. No fewer than Student's distribution has, as noise is no variance.
+    """
+    shared, pairs = check.shared_variance_px2, float(check.neighbours.sum()) / 2
+    by_blocks = blocks_px2**2 / (count - 1)
+    by_check = shared**2 + check.variance_px2**2 / max(2 * pairs, _LEAST_WEIGHT)
+    total = by_blocks + by_check
+    found = 2 * (blocks_px2 + shared) ** 2 / total if total > 0 else 0.0
+    return max(found, count - 1.0)
+
+
+def _deviations(
+    fold_models: Sequence[Callable[[FloatArray], FloatArray]], px: FloatArray
+) -> FloatArray:
+    """Return deviations, shape (k, n, 2), whose squares sum up to the jackknife's variance."""
+    models = np.array([model(px) for model in fold_models])
+    count = len(models)
+    return np.asarray((models - models.mean(axis=0)) * math.sqrt((count - 1) / count))

@@ -1,0 +1,91 @@
+"""Which values of a mask take no part: numbers, or the meaning that missions give them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ParameterError
+from ..rasters.reading import Mask
+
+# What a vector layer is if it shows what takes no part.
+INSIDE = "inside"
+
+_RANGE = re.compile(r"\s*(\d{1,9})\s*(?:-\s*(\d{1,9})\s*)?")
+
+
+@dataclass(frozen=True)
+class MaskValues:
+    """Values of a mask's first band that take no part.
+
+    Parameters
+    ----------
+    ranges
+        First and last value of each range.
+    bits
+        Values in which any of these bits is set.
+    """
+
+    ranges: tuple[tuple[int, int], ...] = ()
+    bits: int = 0
+
+    def excluded(self, values: NDArray[Any]) -> Mask:
+        """Return which of these values, of any shape, take no part; those that are no numbers."""
+        whole = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0).astype(np.int64)
+        found = ~np.isfinite(values) | ((whole & self.bits) != 0)
+        for first, last in self.ranges:
+            found |= (values >= first) & (values <= last)
+        return np.asarray(found)
+
+
+def _bits(*numbers: int) -> int:
+    return sum(1 << number for number in numbers)
+
+
+# No data, defects, clouds and their shadows; water and snow take part.
+SCHEMES: Mapping[str, MaskValues] = MappingProxyType(
+    {
+        # Sentinel-2's scene classification: no data, saturated, shadow, clouds [MainKnorn2017].
+        "scl": MaskValues(((0, 1), (3, 3), (8, 10))),
+        # Landsat Collection 2: fill, dilated cloud, cirrus, cloud, shadow [USGS2022].
+        "qa-pixel": MaskValues(bits=_bits(0, 1, 2, 3, 4)),
+        # Fmask: shadow, cloud, no observation [Zhu2012].
+        "fmask": MaskValues(((2, 2), (4, 4), (255, 255))),
+        # Harmonized Landsat Sentinel-2: cirrus, cloud, beside them, shadow [Claverie2018]; fill is
+        # all bits.
+        "hls-fmask": MaskValues(bits=_bits(0, 1, 2, 3)),
+        # Planet's usable data mask: its first band is 0 where the ground is hidden [Planet2022].
+        "udm2": MaskValues(((0, 0),)),
+    }
+)
+
+
+def mask_values(text: str) -> MaskValues:
+    """Return the values that a text means: a scheme's name, or numbers as in 3,8-10.
+
+    Raises
+    ------
+    ParameterError
+        It is neither.
+    """
+    scheme = SCHEMES.get(text.strip().lower().replace("_", "-"))
+    if scheme is not None:
+        return scheme
+    ranges = []
+    for part in text.split(","):
+        match = _RANGE.fullmatch(part)
+        first, last = (0, -1) if match is None else (int(match[1]), int(match[2] or match[1]))
+        if last < first:
+            names = ", ".join(SCHEMES)
+            raise ParameterError(
+                f"values of a mask must be numbers and ranges, as 3,8-10, or one of {names}; of a "
+                f"vector layer {INSIDE}; not {text!r}"
+            )
+        ranges.append((first, last))
+    return MaskValues(tuple(ranges))

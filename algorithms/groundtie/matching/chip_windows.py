@@ -1,0 +1,107 @@
+"""The windows of chips in both images, resampled for a block of neighbouring chips at a time.
+
+Windows of neighbours overlap: resampled chip by chip, most pixels would be made several times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..context import Context
+from ..geometry.models import Model
+from ..rasters.pair import ImagePair
+from ..rasters.patch import Patch
+from .matcher import MaskOf, Places
+
+R = TypeVar("R")
+_Numbers = NDArray[np.intp]
+
+# Longest side of a block, in pixels: enough of them for all threads, and each in the processor's
+# cache.
+_BLOCK_PX = 384
+
+
+@dataclass(frozen=True)
+class ChipWindows:
+    """Windows of chips, and of so many pixels around them, of both images of a pair.
+
+    Parameters
+    ----------
+    pair
+        The images.
+    model
+        The misregistration on the map, by which the input is resampled.
+    places
+        The chips.
+    reach_px
+        Pixels around a chip on each side.
+    hidden
+        Returns for a piece of a grid which pixels of the reference must not be seen; None: all
+        may be.
+    """
+
+    pair: ImagePair
+    model: Model
+    places: Places
+    reach_px: int
+    hidden: MaskOf | None
+
+    def map(self, function: Callable[[int, Patch, Patch], R], context: Context) -> list[R]:
+        """Return `function` of the number, reference and input window of each chip, in order."""
+
+        def of_block(block: _Numbers) -> list[R]:
+            return [function(number, *windows) for number, *windows in self._read(block)]
+
+        blocks = list(self._blocks(np.arange(len(self.places.centres))))
+        done = [one for results in context.map(of_block, blocks) for one in results]
+        numbers = np.concatenate(blocks) if blocks else np.zeros(0, int)
+        return [done[at] for at in np.argsort(numbers)]
+
+    @property
+    def _side_px(self) -> int:
+        return self.places.chip_px + 2 * self.reach_px
+
+    @property
+    def _corners(self) -> NDArray[np.int_]:
+        return self.places.centres - self.places.chip_px // 2 - self.reach_px
+
+    def _blocks(self, chips: _Numbers) -> Iterator[_Numbers]:
+        """Yield chips, by number, in blocks that are read as one, as that reads fewer pixels."""
+        if len(chips) == 0:
+            return
+        corners = self._corners[chips]
+        size = np.ptp(corners, axis=0) + self._side_px
+        is_dense = np.prod(size) <= len(chips) * self._side_px**2
+        if len(chips) == 1 or (is_dense and size.max() <= max(_BLOCK_PX, 2 * self._side_px)):
+            yield chips
+            return
+        along = corners[:, int(np.argmax(size))]
+        first = along < (along.min() + along.max() + 1) / 2
+        # Chips at one place cannot be parted.
+        if first.all():
+            yield from (chips[k : k + 1] for k in range(len(chips)))
+            return
+        yield from self._blocks(chips[first])
+        yield from self._blocks(chips[~first])
+
+    def _read(self, block: _Numbers) -> Iterator[tuple[int, Patch, Patch]]:
+        """Yield the number, reference and input window of each chip of a block."""
+        side, corners = self._side_px, self._corners[block]
+        corner = corners.min(axis=0)
+        width, height = (int(n) for n in np.ptp(corners, axis=0) + side)
+        piece = self.places.grid.window(int(corner[0]), int(corner[1]), width, height)
+        pair, model = self.pair, self.model
+        reference = pair.reference_patch(piece, None if self.hidden is None else self.hidden(piece))
+        input = pair.input_patch(piece, lambda xy: pair.nominal_px(model(xy)))
+        for number, (col, row) in zip(block, corners - corner, strict=True):
+            inside = slice(row, row + side), slice(col, col + side)
+            yield int(number), _part(reference, inside), _part(input, inside)
+
+
+def _part(patch: Patch, inside: tuple[slice, slice]) -> Patch:
+    return Patch(patch.values[inside].copy(), patch.valid[inside].copy())

@@ -1,0 +1,198 @@
+"""Masks that the user gave, or that a mission delivers with an image.
+
+Whatever they are, rasters, vector layers or classifiers, they become the same thing: a raster that
+masks one image of the pair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..context import Context
+from ..errors import ParameterError
+from ..masks.beside import mask_beside
+from ..masks.choice import INPUT, LAYER, NONE, REFERENCE, MaskUsed
+from ..masks.layer import read_layer
+from ..masks.raster import RasterMask
+from ..masks.regions import WIDTH_M
+from ..masks.scene import Scene, Selection, write_mask
+from ..masks.values import INSIDE, mask_values
+from ..rasters.atomic import scratch_folder
+from ..rasters.pair import ImagePair
+from ..rasters.reading import Window, open_raster
+from .classifying import read_scene_classifier
+from .scene import scene_of
+
+_CLASSIFIER_SUFFIX = ".json"
+_VECTOR_SUFFIXES = (".gpkg", ".geojson", ".shp", ".fgb", ".kml", ".gml")
+
+
+@dataclass(frozen=True)
+class UserMask:
+    """A mask that the user gave, or that lies beside an image.
+
+    Parameters
+    ----------
+    mask
+        A raster, a vector layer or a classifier.
+    values
+        What of it takes no part, see `masks.values`; None: zeros of a raster, what lies outside of
+        a vector layer.
+    origin
+        Words on where it was found; empty: the user gave it.
+    """
+
+    mask: Any
+    values: str | None = None
+    origin: str = ""
+
+    @classmethod
+    def of(cls, image: Any, mask: Any, values: str | None) -> UserMask | None:
+        """Return the mask of an image as it was asked for, or the one that lies beside it.
+
+        Parameters
+        ----------
+        image
+            The image, as `open_raster` takes it.
+        mask, values
+            What was asked for; values "none" without a mask: none is looked for.
+
+        Raises
+        ------
+        ParameterError
+            The values are none, or there is no mask that has them.
+        """
+        if mask is None and values not in (None, NONE):
+            raise ParameterError(f"there is no mask that the values {values} belong to")
+        if mask is None:
+            is_file = values is None and isinstance(image, (str, Path))
+            found = mask_beside(Path(image)) if is_file else None
+            if found is None:
+                return None
+            return cls(found.path, found.scheme, f", found beside {Path(image).name},")
+        if values is not None:
+            _check_values(mask, values)
+        return cls(mask, values)
+
+    @property
+    def is_zeros(self) -> bool:
+        """Whether it is a raster whose zeros take no part."""
+        return self.is_raster and self.values is None
+
+    @property
+    def is_raster(self) -> bool:
+        """Whether it is a raster: in memory, or by the ending of its name."""
+        if not isinstance(self.mask, (str, Path)):
+            return True
+        return self._suffix not in (_CLASSIFIER_SUFFIX, *_VECTOR_SUFFIXES)
+
+    @property
+    def is_layer(self) -> bool:
+        """Whether it is a vector layer."""
+        return not self.is_raster and self._suffix in _VECTOR_SUFFIXES
+
+    @property
+    def _suffix(self) -> str:
+        return Path(self.mask).suffix.lower()
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        named = isinstance(self.mask, (str, Path))
+        return Path(self.mask).name if named else str(getattr(self.mask, "name", "the mask"))
+
+
+def _check_values(mask: Any, values: str) -> None:
+    given = UserMask(mask)
+    if given.is_layer and values != INSIDE:
+        raise ParameterError(f"the only value of a vector layer is {INSIDE}, not {values!r}")
+    if given.is_raster:
+        mask_values(values)
+    elif not given.is_layer:
+        raise ParameterError(f"a classifier has no values: {values!r}")
+
+
+def named_masks(masks: tuple[Any, Any]) -> dict[str, UserMask]:
+    """Return the masks of reference and input by "reference" and "input"; None is left out."""
+    named = zip((REFERENCE, INPUT), masks, strict=True)
+    return {
+        name: mask if isinstance(mask, UserMask) else UserMask(mask)
+        for name, mask in named
+        if mask is not None
+    }
+
+
+def with_user_masks(
+    pair: ImagePair, masks: dict[str, UserMask], stack: ExitStack, context: Context
+) -> tuple[ImagePair, MaskUsed | None]:
+    """Return a pair with the masks that the user gave.
+
+    Parameters
+    ----------
+    pair
+        The images.
+    masks
+        The masks of the "reference" and of the "input".
+    stack
+        Keeps the masks' rasters until it is closed.
+    context
+        Threads and progress.
+
+    Returns
+    -------
+    pair, used
+        The pair, and the mask that a vector layer made, which is one of the ground; None: none.
+    """
+    used = None
+    for name, mask in masks.items():
+        if mask.is_zeros:
+            image = replace(getattr(pair, name), mask=stack.enter_context(open_raster(mask.mask)))
+            pair = replace(pair, **{name: image})
+            continue
+        select = _selection(pair, name, mask, stack)
+        pair, share = with_mask(pair, name, scene_of(pair, name), select, stack, context)
+        if mask.is_layer and mask.values is None:
+            used = MaskUsed(LAYER, name, share, f"what {mask.name} covers")
+        note = f"{mask.name}{mask.origin} keeps {share:.0%} of the {name}"
+        hides = mask.values is not None
+        image = replace(getattr(pair, name), mask_note=note, mask_hides=hides)
+        pair = replace(pair, **{name: image})
+        context.update(1.0, note)
+    return pair, used
+
+
+def _selection(
+    pair: ImagePair, name: str, mask: UserMask, stack: ExitStack
+) -> Callable[[Window], Selection]:
+    """Return what tells which pixels of a window of an image a mask keeps."""
+    scene = scene_of(pair, name)
+    if mask.is_raster:
+        assert mask.values is not None
+        source = stack.enter_context(open_raster(mask.mask))
+        return RasterMask(scene, source, mask_values(mask.values)).select
+    if not mask.is_layer:
+        return read_scene_classifier(pair, name, scene, Path(mask.mask)).select
+    layer = read_layer(mask.mask, scene, WIDTH_M)
+    return layer.select if mask.values is None else replace(layer, is_outside=True).select
+
+
+def with_mask(
+    pair: ImagePair,
+    name: str,
+    scene: Scene,
+    select: Callable[[Window], Selection],
+    stack: ExitStack,
+    context: Context,
+) -> tuple[ImagePair, float]:
+    """Return a pair with a mask on one image, and the share of it that takes part.
+
+    The mask is a file until the stack is closed.
+    """
+    folder = stack.enter_context(scratch_folder())
+    share = write_mask(scene, folder / "mask.tif", select, context.quiet().progress)
+    mask = stack.enter_context(open_raster(folder / "mask.tif"))
+    return replace(pair, **{name: replace(getattr(pair, name), mask=mask)}), share

@@ -1,0 +1,58 @@
+"""Chips of both images at full resolution, before and after, where they tell most."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..assessment.point_errors import PointErrors
+from ..geometry.transform import Transform
+from ..rasters.grid import FloatArray, Grid
+from ..rasters.pair import ImagePair
+from . import pictures
+
+# Side of a chip, in matching pixels: some twenty of them stay well below a megabyte.
+SIDE_PX = 128
+
+# So many of the best and of the worst check points.
+_EXTREMES = 2
+
+_CORNERS = ("upper left", "upper right", "lower left", "lower right")
+
+
+def places(errors: PointErrors, grid: Grid) -> list[tuple[str, FloatArray]]:
+    """Return labels and positions (col, row): best and worst check points, and the corners."""
+    check = np.flatnonzero(errors.check)
+    order = check[errors.length_px[check].argsort()]
+    best, worst = order[:_EXTREMES], order[_EXTREMES:][-_EXTREMES:]
+    found = [
+        (f"{name} check point", errors.position_px[k])
+        for name, some in (("best", best), ("worst", worst))
+        for k in some
+    ]
+    half = min(SIDE_PX, grid.width, grid.height) / 2
+    cols, rows = np.meshgrid((half, grid.width - half), (half, grid.height - half))
+    corners = np.column_stack([cols.ravel(), rows.ravel()])
+    return found + list(zip((f"{name} corner" for name in _CORNERS), corners, strict=True))
+
+
+def shown(pair: ImagePair, transform: Transform, errors: PointErrors) -> list[dict[str, Any]]:
+    """Return what a page shows at these places of a pair, which has no masks."""
+    grid = pair.grid
+    side = min(SIDE_PX, grid.width, grid.height)
+    made = []
+    for label, at in places(errors, grid):
+        col, row = (round(float(k) - side / 2) for k in at)
+        piece = grid.window(col, row, side, side)
+        patches = {
+            "reference": pair.reference_patch(piece),
+            "input before": pair.input_patch(piece, pair.nominal_px),
+            "input after": pair.input_patch(piece, pictures.overview_positions(transform, piece)),
+        }
+        chips = [
+            (name, pictures.jpeg_uri(pictures.grey_picture(patch)))
+            for name, patch in patches.items()
+        ]
+        made.append({"label": label, "at": at, "side": side, "chips": chips})
+    return made

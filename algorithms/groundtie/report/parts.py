@@ -1,0 +1,107 @@
+"""The parts of a scene that lie elsewhere than its transform has them, in words and as a map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..matching.survey import Part, Survey
+from ..rasters.grid import Grid
+from . import figures
+from .correction import move_in_words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Colours that people with any colour vision tell apart, but for those of points [Okabe2008].
+COLOURS = ("#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What chips all over an overlap show of parts that lie elsewhere.
+
+    Parameters
+    ----------
+    survey
+        Where the chips match.
+    parts
+        Those parts that chance does not explain by itself, the largest first.
+    """
+
+    survey: Survey
+    parts: Sequence[Part]
+
+    @classmethod
+    def of(cls, survey: Survey) -> Parts:
+        """Take the parts of which less than one is expected by chance."""
+        return cls(survey, [part for part in survey.parts if part.log10_false_alarms < 0])
+
+    def summary(self) -> list[dict[str, Any]]:
+        """Return the parts as values that JSON can carry."""
+        return [
+            {
+                "where": part.where,
+                "distance_px": part.distance_px,
+                "shift_px": part.shift_px,
+                "chips": part.chips,
+                "surrounded": part.surrounded,
+                "confirming": part.confirming,
+                "log10_false_alarms": part.log10_false_alarms,
+                "is_evident": part.is_evident,
+            }
+            for part in self.parts
+        ]
+
+    def lines(self) -> list[str]:
+        """Return each part in words: where it lies, and how far off."""
+        return [_in_words(part, self.survey.grid) for part in self.parts]
+
+    def shown(self) -> dict[str, Any] | None:
+        """Return what a page shows of the parts; None: there are none."""
+        if not self.parts:
+            return None
+        colours = [COLOURS[k % len(COLOURS)] for k in range(len(self.parts))]
+        return {
+            "map": figures.svg_uri(parts_map(self)),
+            "rows": list(zip(colours, self.lines(), self.parts, strict=True)),
+            "chips": len(self.survey.centres),
+            "confirming": self.survey.confirming,
+            "is_evident": any(part.is_evident for part in self.parts),
+        }
+
+
+def parts_map(parts: Parts) -> Figure:
+    """Draw where the chips match: each part in its colour, the figure's edges are the grid's."""
+    survey, grid = parts.survey, parts.survey.grid
+    axes = figures.map_axes(grid)
+    confirming = survey.is_confirming_chip
+    other = ~confirming
+    for part in parts.parts:
+        other[list(part.members)] = False
+    px = survey.centres.astype(float)
+    arrows = figures.scaled_arrows(
+        px, survey.shifts_px, max(part.distance_px for part in parts.parts), grid
+    )
+    axes.plot(*px[confirming].T, "o", color=figures.FIT_COLOUR, ms=6)
+    axes.plot(*px[other].T, "x", color=figures.REJECTED_COLOUR, ms=6)
+    for k, part in enumerate(parts.parts):
+        members, colour = np.array(part.members, int), COLOURS[k % len(COLOURS)]
+        axes.plot(*px[members].T, "o", color=colour, ms=8)
+        figures.draw_arrows(axes, px[members], arrows.vector_px[members], colour)
+    figures.draw_scale(axes, arrows, grid)
+    return axes.figure
+
+
+def _in_words(part: Part, grid: Grid) -> str:
+    """Return a part as "upper left: 9 neighbouring chips lie 10.3 px off (10.0 m east, …)"."""
+    origin, end = grid.pixel_to_map(np.array([(0.0, 0.0), part.shift_px]))
+    direction = move_in_words(end - origin, grid)
+    return (
+        f"{part.where}: {part.chips} neighbouring chips lie {part.distance_px:.1f} px off"
+        f"{f' ({direction})' if direction else ''}; of the {part.surrounded} chips there, "
+        f"{part.confirming} confirm the transform"
+    )

@@ -1,0 +1,280 @@
+"""Tie points under a person's hands: switched off, moved, added, and fitted again at once.
+
+What a person moved or added is marked as edited in files and results. Check points stay check
+points: no fit sees them, whatever is done to them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from affine import Affine
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import NothingFoundError, TooFewPointsError
+from .geometry.georeferencer import unmeasured
+from .geometry.model_choice import left_out_blocks
+from .geometry.models import KINDS, PARAMETERS
+from .geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
+from .geometry.tie_points import USED, TiePoints
+from .geometry.transform import Transform
+from .rasters.atomic import Outputs
+from .rasters.grid import Grid, compose
+from .rasters.pair import Image
+from .rasters.reading import open_raster
+from .registration.tie_point_evidence import TiePointEvidence
+from .registration.verdict import first_refusal
+from .similarity.description import BORDER_PX
+from .similarity.peak import Peak, find_peak
+from .steps import similarity_surface
+
+FloatArray = NDArray[np.float64]
+
+SWITCHED_OFF = "rejected: by a person"
+
+# A spline's system grows with the cube of its points: with more, it is fitted only when asked for
+# (tests/test_review.py holds all other models of 2000 points to the time of a refit).
+MOST_SPLINE_POINTS = 300
+
+# Side of the chip that is compared around a click, and how far the click may be off, in pixels of
+# the coarser image: a click is no better than a few pixels of the screen.
+_CHIP_PX, _CLICK_PX = 48, 8
+
+
+@dataclass(frozen=True)
+class ModelFit:
+    """A model fitted to the points that take part.
+
+    Parameters
+    ----------
+    kind
+        One of `geometry.models.KINDS`.
+    transform
+        What was fitted.
+    residuals_px
+        Residuals of all points, shape (n,), in input pixels.
+    rmse_px
+        Root mean square residual of the points of the fit: no measure of accuracy.
+    left_out_px
+        Root mean square error of points at models that have not seen their block; None: too few.
+    check_px
+        Root mean square error of the check points; None: there are none.
+    """
+
+    kind: str
+    transform: Transform
+    residuals_px: FloatArray
+    rmse_px: float
+    left_out_px: float | None
+    check_px: float | None
+
+
+@dataclass(frozen=True)
+class Review:
+    """Tie points of an input raster, as they are now; every change makes another one.
+
+    Parameters
+    ----------
+    points
+        The points, with the column `edited` of 1 where a person moved or added one.
+    input_grid
+        The input's own grid.
+    """
+
+    points: TiePoints
+    input_grid: Grid
+
+    @classmethod
+    def open(cls, path: str | Path, input: Any) -> Review:
+        """Read tie points of an input raster.
+
+        Raises
+        ------
+        TransformFileError
+            The file cannot be read or understood.
+        """
+        with open_raster(input) as source:
+            return cls(read_tie_points(path, source.grid), source.grid)
+
+    @property
+    def edited(self) -> NDArray[np.bool_]:
+        """Which points a person moved or added, shape (n,)."""
+        return np.asarray(self.points.more.get(EDITED, np.zeros(len(self.points))) > 0)
+
+    @property
+    def nominal(self) -> Transform:
+        """The transform by the input's own georeferencing."""
+        return Transform.nominal(self.points.crs, self.input_grid)
+
+    @cached_property
+    def nominal_xy(self) -> FloatArray:
+        """Nominal positions on the reference map, shape (n, 2)."""
+        return self.nominal.nominal_xy(self.points.input_px)
+
+    def input_px(self, nominal_xy: ArrayLike) -> FloatArray:
+        """Return the input pixel (col, row) at a nominal position on the reference map."""
+        return self.nominal(np.asarray(nominal_xy, float).reshape(1, 2)).ravel()
+
+    def switch(self, which: Sequence[int], on: bool) -> Review:
+        """Return the review with points taking part, or not."""
+        state = self.points.state.astype(object)
+        state[list(which)] = USED if on else SWITCHED_OFF
+        return replace(self, points=replace(self.points, state=state.astype(str)))
+
+    def move(
+        self, index: int, reference_xy: ArrayLike | None = None, input_px: ArrayLike | None = None
+    ) -> Review:
+        """Return the review with a point moved in the reference, in the input, or in both."""
+        columns = {"reference_xy": reference_xy, "input_px": input_px}
+        moved = {name: getattr(self.points, name).copy() for name in columns}
+        for name, place in columns.items():
+            if place is not None:
+                moved[name][index] = place
+        edited = self.edited.astype(float)
+        edited[index] = 1.0
+        more = {**self.points.more, EDITED: edited}
+        return replace(self, points=replace(self.points, **moved, more=more))
+
+    def add(self, reference_xy: ArrayLike, input_px: ArrayLike, score: float = np.nan) -> Review:
+        """Return the review with one more point, the last."""
+        xy, px = (np.asarray(place, float).reshape(1, 2) for place in (reference_xy, input_px))
+        point = unmeasured(xy, px, [USED], self.points.crs)
+        more = {name: np.full(1, np.nan) for name in self.points.more} | {EDITED: np.ones(1)}
+        point = replace(point, score=np.array([score]), more=more)
+        mine = replace(self.points, more={**self.points.more, EDITED: self.edited.astype(float)})
+        return replace(self, points=TiePoints.concatenate([mine, point]))
+
+    def fit(self, kind: str) -> ModelFit:
+        """Fit a model to the points that take part, as `warp` does.
+
+        Raises
+        ------
+        TooFewPointsError
+            They are fewer than the model needs.
+        """
+        evidence = TiePointEvidence.of(self.points, kind, self.input_grid)
+        residuals = evidence.residuals_px(evidence.transform)
+        check = self.points.used & self.points.is_check
+        return ModelFit(
+            kind,
+            evidence.transform,
+            residuals,
+            _root_mean_square(residuals[evidence.taken]),
+            self._left_out_px(kind),
+            _root_mean_square(residuals[check]) if check.any() else None,
+        )
+
+    def objection(self, kind: str) -> str:
+        """Return why `warp` refuses a model of these points; empty if it does not.
+
+        Raises
+        ------
+        TooFewPointsError
+            They are fewer than the model needs.
+        """
+        refusal = first_refusal(TiePointEvidence.of(self.points, kind, self.input_grid))
+        return "" if refusal is None else refusal[1]
+
+    def fits(self, kinds: Sequence[str] = KINDS) -> dict[str, ModelFit]:
+        """Return the models that can be fitted at once, by their kinds."""
+        found = {}
+        for kind in kinds:
+            if kind == "tps" and self._taken.sum() > MOST_SPLINE_POINTS:
+                continue
+            try:
+                found[kind] = self.fit(kind)
+            except TooFewPointsError:
+                continue
+        return found
+
+    def worst(self, residuals_px: FloatArray) -> NDArray[np.int_]:
+        """Return the indices of used points by falling residual."""
+        used = np.flatnonzero(self.points.used)
+        return used[np.argsort(-residuals_px[used], kind="stable")]
+
+    def write(self, path: Path, transform: Transform) -> None:
+        """Write the points, for `warp` or to go on with later."""
+        more = {**self.points.more, EDITED: self.edited.astype(float)}
+        with Outputs() as outputs:
+            write_tie_points(outputs.stage(path), replace(self.points, more=more), transform)
+
+    @property
+    def _taken(self) -> NDArray[np.bool_]:
+        return self.points.used & ~self.points.is_check
+
+    def _left_out_px(self, kind: str) -> float | None:
+        """Return the error at points that a model has not seen, block by block of neighbours."""
+        taken = np.flatnonzero(self._taken)
+        if kind == "tps" and len(taken) > MOST_SPLINE_POINTS:
+            return None
+        needed = -(-PARAMETERS[kind] // 2)
+        errors = np.full(len(taken), np.nan)
+        for block in left_out_blocks(self.points.reference_xy[taken]):
+            if (~block).sum() < max(needed, 3) or (
+                kind == "tps" and len(taken) > MOST_SPLINE_POINTS
+            ):
+                return None
+            seen = TiePointEvidence(self.points.take(taken[~block]), kind, self.input_grid)
+            left = self.points.take(taken[block])
+            errors[block] = np.hypot(*left.residual_px(seen.transform).T)
+        return _root_mean_square(errors) if np.isfinite(errors).all() else None
+
+
+def _root_mean_square(residuals: FloatArray) -> float:
+    return float(np.sqrt(np.mean(residuals**2)))
+
+
+def without_points(reference: Any, input: Any) -> Review:
+    """Return the review of two images between which there are no points yet."""
+    with open_raster(reference) as one, open_raster(input) as other:
+        return Review(replace(TiePoints.none(), crs=one.grid.crs), other.grid)
+
+
+def refine_click(
+    reference: Any, input: Any, reference_xy: ArrayLike, input_px: ArrayLike, transform: Transform
+) -> tuple[FloatArray, Peak]:
+    """Return where in the input the surroundings of a clicked pair match best, and the peak.
+
+    Parameters
+    ----------
+    reference, input
+        The images, as `rasters.reading.open_raster` takes them.
+    reference_xy, input_px
+        What a person clicked: position on the reference map, pixel (col, row) of the input.
+    transform
+        How the images lie to each other around there: rotation and scale are taken from it.
+
+    Raises
+    ------
+    NothingFoundError
+        There is no peak within the distance that a click may be off.
+    """
+    xy, px = np.asarray(reference_xy, float), np.asarray(input_px, float)
+    offset = px - transform(xy)
+    with open_raster(reference) as one, open_raster(input) as other:
+        factor = max(1.0, other.grid.pixel_size_m / one.grid.pixel_size_m)
+        grid = one.grid if factor < 1.01 else one.grid.scaled(factor)
+        side = _CHIP_PX + 2 * (_CLICK_PX + BORDER_PX) + 1
+        here = grid.map_to_pixel(xy).ravel()
+        # A lattice of the reference's pixels whose middle is the clicked place.
+        corner = Affine.translation(*(here + 0.5 - side / 2))
+        around = Grid(compose(grid.transform, corner), grid.crs, side, side)
+        middle = (side - 1) / 2
+        windows = [
+            Image(source, None).read_onto(around, to_px)
+            for source, to_px in (
+                (one, one.grid.map_to_pixel),
+                (other, lambda places: transform(places) + offset),
+            )
+        ]
+    masked = [np.ma.masked_array(window.values, ~window.valid) for window in windows]
+    peak = find_peak(similarity_surface(masked[0], masked[1], _CLICK_PX))
+    if peak.at_border or not np.isfinite(peak.height):
+        raise NothingFoundError("the surroundings of the two clicks do not match: click again")
+    found = around.pixel_to_map(np.array([middle, middle]) + peak.shift_px)
+    return (transform(found) + offset).ravel(), peak

@@ -1,0 +1,1 @@
+"""Many dates of one place: a network of registrations, adjusted as one."""

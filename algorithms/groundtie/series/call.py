@@ -1,0 +1,220 @@
+"""From the call of a tool to a registered series."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..context import Context, threads
+from ..errors import ParameterError, SameFileError
+from ..geometry.transform import Transform
+from ..progress import Progress
+from ..rasters.reading import bounded_cache
+from ..registration.registered_output import model_for_grid
+from ..registration.series_evidence import DateEvidence
+from ..registration.verdict import first_refusal
+from .dates import Date, Footprints, OpenDates, open_dates
+from .delivery import SERIES_JSON, SeriesFiles
+from .frame import SeriesFrame
+from .inputs import Listed, list_dates
+from .pairs import Settings
+from .registering import Matching
+from .series import Series, SeriesDate
+from .settling import DateVerdict, refused_date, settle
+from .stored import StoredSeries, read_series
+
+
+@dataclass(frozen=True)
+class SeriesCall:
+    """How a series is registered, and what it leaves.
+
+    Parameters
+    ----------
+    listed
+        All dates, the reference among them.
+    reference
+        The reference's name; None: there is none.
+    band
+        Number of the band that is matched, from 1; None: the mean of all.
+    settings
+        How each pair is registered.
+    files
+        What is written, and where.
+    workers
+        Number of threads; None: one per processor.
+    parameters
+        All parameters of the tool, for the report.
+    """
+
+    listed: tuple[Listed, ...]
+    reference: str | None
+    band: int | None
+    settings: Settings
+    files: SeriesFiles
+    workers: int | None
+    parameters: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> SeriesCall:
+        """Return a call by the values of the tool's parameters.
+
+        Raises
+        ------
+        ParameterError, SameFileError
+            They do not go together, or name what is not there.
+        """
+        listed, reference = _listed(given)
+        files = SeriesFiles(
+            given["output_folder"], given["output_grid"], given["resampling"], given["report"]
+        )
+        _require_apart(listed, files)
+        settings = Settings(
+            model_for_grid(given["model"], given["output_grid"]),
+            given["max_error"],
+            given["search_radius"],
+            given["matching_pixel_size"],
+        )
+        return cls(listed, reference, given["band"], settings, files, given["workers"], given)
+
+    def run(self, progress: Progress) -> Series:
+        """Register the series, and write its files.
+
+        Raises
+        ------
+        NotRegisteredError
+            No date was registered; the report is written.
+        """
+        started = time.perf_counter()
+        stored = read_series(self.files.folder / SERIES_JSON)
+        with threads(self.workers, progress) as context, ExitStack() as stack:
+            stack.enter_context(bounded_cache())
+            opened = open_dates(self.listed, self.band, stack, context.part(0.0, 0.05))
+            series = self._registered(opened, stored, context.part(0.05, 0.8))
+            series = replace(series, seconds=time.perf_counter() - started)
+            return self.files.write(series, stored, context.part(0.8, 1.0))
+
+    def _registered(self, opened: OpenDates, stored: StoredSeries, context: Context) -> Series:
+        dates, failures = _on_one_map(opened, self.reference)
+        hub = next((k for k, date in enumerate(dates) if date.name == self.reference), None)
+        home = dates[hub or 0]
+        key = None if hub is None else home.key
+        frame = SeriesFrame.around(home.source.grid, [date.source.grid for date in dates])
+        if stored.frame is not None and stored.reference == key:
+            frame = stored.frame  # that of the registrations which need not be done again
+        footprints = Footprints.of(dates, frame.grid.crs)
+        matching = Matching(dates, footprints, frame, self.settings, stored.pairs, context)
+        if hub is None:
+            hub, datum = matching.freely(), "so that their mean displacement is zero"
+        else:
+            matching.from_hub(hub)
+            datum = f"to {home.name}"
+        is_free = self.reference is None
+        settled = settle(frame, matching.results, len(dates), hub, is_free=is_free)
+        found = {
+            date.name: _judged(date, verdict, frame, date.name == self.reference)
+            for date, verdict in zip(dates, settled.verdicts, strict=True)
+        }
+        for one in self.listed:
+            if one.name in failures:
+                found[one.name] = SeriesDate(one, _unreadable(failures[one.name]))
+        return Series(
+            tuple(found[one.name] for one in self.listed),
+            frame,
+            dates[hub].source.grid,
+            datum,
+            tuple(matching.results.values()),
+            settled,
+            tuple(date.name for date in dates),
+            key,
+            matching.done,
+            matching.reused,
+            self.parameters,
+        )
+
+
+def _listed(given: Mapping[str, Any]) -> tuple[tuple[Listed, ...], str | None]:
+    """Return all dates in the order of their times, and the name of the reference."""
+    dates, name = list_dates(given["inputs"], given["asset"]), None
+    if given["reference"] is not None:
+        (reference,) = list_dates([given["reference"]], given["asset"])
+        others = [date for date in dates if not _is_same(date, reference)]
+        if any(date.name == reference.name for date in others):
+            reference = replace(reference, name=f"{reference.name} (reference)")
+        reference = replace(reference, mask=given["reference_mask"])
+        # In its place, if it is a date of the series.
+        same = next((k for k, date in enumerate(dates) if _is_same(date, reference)), 0)
+        dates, name = (*others[:same], reference, *others[same:]), reference.name
+    elif given["reference_mask"] is not None:
+        raise ParameterError("a mask of the reference needs a reference")
+    if len(dates) < 2:
+        raise ParameterError("a series needs two dates at least, or one and a reference")
+    return dates, name
+
+
+def _is_same(date: Listed, other: Listed) -> bool:
+    rasters = [
+        raster.resolve() if isinstance(raster, Path) else raster
+        for raster in (date.raster, other.raster)
+    ]
+    return rasters[0] == rasters[1]
+
+
+def _require_apart(listed: tuple[Listed, ...], files: SeriesFiles) -> None:
+    """Raise an error where outputs would be written over, or among, the inputs."""
+    folder = files.folder.resolve()
+    for date in listed:
+        if isinstance(date.raster, Path) and date.raster.resolve().parent == folder:
+            raise SameFileError(f"the output folder holds an input: {date.raster}")
+    if files.report is None:
+        return
+    beside = files.report.resolve().with_suffix(".json")
+    if beside == folder / SERIES_JSON:
+        raise SameFileError(f"the report's numbers would be written over {beside}")
+
+
+def _on_one_map(
+    opened: OpenDates, reference: str | None
+) -> tuple[tuple[Date, ...], dict[str, str]]:
+    """Return the dates that have a place on the reference's map, and why others have none.
+
+    Raises
+    ------
+    ParameterError
+        The reference cannot be opened, or fewer than two dates are left.
+    """
+    failures = dict(opened.failures)
+    if reference in failures:
+        raise ParameterError(failures[reference])
+    with_crs = [date.source.grid.crs is not None for date in opened.dates]
+    wanted = 2 * sum(with_crs) >= len(with_crs)
+    for date, has_crs in zip(opened.dates, with_crs, strict=True):
+        if date.name == reference:
+            wanted = has_crs
+    dates = []
+    for date, has_crs in zip(opened.dates, with_crs, strict=True):
+        if has_crs == wanted:
+            dates.append(date)
+        else:
+            failures[date.name] = f"{date.source.path} has {'a' if has_crs else 'no'} CRS"
+    if len(dates) < 2:
+        raise ParameterError("; ".join(failures.values()))
+    return tuple(dates), failures
+
+
+def _judged(date: Date, verdict: DateVerdict, frame: SeriesFrame, is_reference: bool) -> SeriesDate:
+    transform = None
+    if verdict.displacement is not None:
+        model = frame.model(verdict.displacement)
+        transform = Transform(model, frame.grid.crs, date.source.grid)
+    return SeriesDate(date.listed, verdict, date, transform, is_reference)
+
+
+def _unreadable(failure: str) -> DateVerdict:
+    evidence = DateEvidence(failure)
+    refusal = first_refusal(evidence)
+    assert refusal is not None
+    return refused_date(evidence, refusal)

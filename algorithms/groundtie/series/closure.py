@@ -1,0 +1,85 @@
+"""Triplets of dates: whether the way around three registrations leads back to its start."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from .frame import PARAMETERS, FloatArray, SeriesFrame, rms_px, sigma_px
+from .network import Link, largest_statistic
+
+
+@dataclass(frozen=True)
+class Closure:
+    """The way around three dates.
+
+    Parameters
+    ----------
+    dates
+        The dates, by number.
+    error_px
+        By how much it misses its start, root mean square over the frame.
+    expected_px
+        What the covariances of the links expect.
+    statistic
+        The same as a squared normalised length.
+    is_closed
+        Whether chance explains the error.
+    """
+
+    dates: tuple[int, int, int]
+    error_px: float
+    expected_px: float
+    statistic: float
+    is_closed: bool
+
+
+def triplet_closures(
+    frame: SeriesFrame, links: Sequence[Link], scatter_px: float
+) -> tuple[Closure, ...]:
+    """Return the closures of all triplets of dates that links connect, worst first.
+
+    Parameters
+    ----------
+    frame
+        The series' frame.
+    links
+        The registrations, whether the adjustment used them or not.
+    scatter_px
+        What each scatters by beside its own covariance.
+    """
+    by_ends = {frozenset((link.first, link.second)): link for link in links}
+    partners: dict[int, set[int]] = {}
+    for link in links:
+        partners.setdefault(link.first, set()).add(link.second)
+        partners.setdefault(link.second, set()).add(link.first)
+    largest = largest_statistic(links)
+    found = []
+    for a in sorted(partners):
+        later = sorted(date for date in partners[a] if date > a)
+        for b, c in combinations(later, 2):
+            if c in partners[b]:
+                found.append(_closure(frame, by_ends, (a, b, c), scatter_px, largest))
+    return tuple(sorted(found, key=lambda one: -one.statistic))
+
+
+def _closure(
+    frame: SeriesFrame,
+    by_ends: dict[frozenset[int], Link],
+    dates: tuple[int, int, int],
+    scatter_px: float,
+    largest: float,
+) -> Closure:
+    around = np.eye(3)
+    covariance = 3 * scatter_px**2 * np.eye(PARAMETERS)
+    for start, end in zip(dates, (*dates[1:], dates[0]), strict=True):
+        link = by_ends[frozenset((start, end))]
+        matrix = frame.matrix(link.displacement)
+        around = (matrix if link.first == start else np.linalg.inv(matrix)) @ around
+        covariance = covariance + link.covariance
+    miss: FloatArray = frame.of_matrix(around)
+    statistic = float(miss @ np.linalg.solve(covariance, miss))
+    return Closure(dates, rms_px(miss), sigma_px(covariance), statistic, statistic <= largest)

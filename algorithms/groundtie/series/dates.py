@@ -1,0 +1,194 @@
+"""The dates of a series, open: their pixels, what sensor they are of, and their footprints."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import warnings
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rasterio.crs import CRS
+from rasterio.features import shapes
+from shapely.geometry import Polygon, shape
+from shapely.ops import unary_union
+from shapely.strtree import STRtree
+
+from ..context import Context
+from ..errors import CancelledError, GroundTieError
+from ..masks.radar import LEAST_VARIATION2, variation2_of
+from ..rasters.grid import reproject
+from ..rasters.held import held_grey
+from ..rasters.pair import Image
+from ..rasters.radar_tags import is_known_radar
+from ..rasters.reading import RasterSource, open_raster
+from .inputs import Listed
+
+# Dates are held in memory as long as all of them have no more pixels: 400 MB as float32.
+_MOST_HELD_PX = 100_000_000
+
+# Footprints are drawn on images reduced to this, on their longer side.
+_FOOTPRINT_PX = 256
+
+
+@dataclass(frozen=True)
+class Date:
+    """One date of a series.
+
+    Parameters
+    ----------
+    listed
+        As it was named.
+    source
+        The raster, as its file is.
+    matched
+        What is matched: the same, or its grey image in memory.
+    band
+        Which of its bands is matched; None: the mean of all.
+    """
+
+    listed: Listed
+    source: RasterSource
+    matched: RasterSource
+    band: int | None
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return self.listed.name
+
+    @cached_property
+    def is_radar(self) -> bool:
+        """Whether its metadata or its speckle are those of a radar image."""
+        if is_known_radar(self.source):
+            return True
+        return variation2_of(Image(self.matched, self.band)) >= LEAST_VARIATION2
+
+    @cached_property
+    def key(self) -> str:
+        """Stands for the file by name, size and time of its last change, and for the mask's."""
+        facts = [file_facts(self.listed.raster), file_facts(self.listed.mask)]
+        return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
+
+    def footprint(self, crs: CRS | None) -> Any:
+        """Return the outline of its valid pixels as a shapely polygon on a map."""
+        grid = self.matched.grid
+        factor = max(grid.width, grid.height) / _FOOTPRINT_PX
+        small = grid.scaled(factor) if factor > 1 else grid
+        _, valid = self.matched.read(self.matched.window, self.band, (small.height, small.width))
+        found = [
+            shape(geometry)
+            for geometry, value in shapes(valid.astype(np.uint8), transform=small.transform)
+            if value
+        ]
+        rings = [polygon.exterior.coords for polygon in found]
+        moved = [Polygon(reproject(np.array(ring), grid.crs, crs)) for ring in rings]
+        sound = [polygon.buffer(0) for polygon in moved if np.isfinite(polygon.bounds).all()]
+        return unary_union(sound)
+
+
+@dataclass(frozen=True)
+class OpenDates:
+    """All dates that could be opened, and why the others could not.
+
+    Parameters
+    ----------
+    dates
+        The dates.
+    failures
+        What is wrong with the others, by name.
+    """
+
+    dates: tuple[Date, ...]
+    failures: dict[str, str] = field(default_factory=dict)
+
+
+def open_dates(
+    listed: Sequence[Listed], band: int | None, stack: ExitStack, context: Context
+) -> OpenDates:
+    """Open the rasters of a series; one that cannot be read is left out.
+
+    Parameters
+    ----------
+    listed
+        The dates, the reference among them.
+    band
+        Number of the band that is matched, from 1; None: the mean of all.
+    stack
+        Keeps the rasters open.
+    context
+        Progress.
+    """
+    dates: list[Date] = []
+    failures: dict[str, str] = {}
+    held = 0
+    for number, one in enumerate(listed):
+        context.update(number / len(listed), f"opening {one.name}")
+        try:
+            source = stack.enter_context(open_raster(one.raster))
+            held += source.grid.width * source.grid.height
+            date = Date(one, source, source, band)
+            if held <= _MOST_HELD_PX:
+                date = replace(date, matched=held_grey(source, band), band=None)
+            dates.append(date)
+        except CancelledError:
+            raise
+        except GroundTieError as error:
+            failures[one.name] = error.one_line()
+    return OpenDates(tuple(dates), failures)
+
+
+@dataclass(frozen=True)
+class Footprints:
+    """Where the valid pixels of dates lie on one map.
+
+    Parameters
+    ----------
+    polygons
+        A polygon for each date.
+    """
+
+    polygons: tuple[Any, ...]
+
+    @classmethod
+    def of(cls, dates: Sequence[Date], crs: CRS | None) -> Footprints:
+        """Draw the footprints of dates on a map."""
+        return cls(tuple(date.footprint(crs) for date in dates))
+
+    @cached_property
+    def shares(self) -> dict[frozenset[int], float]:
+        """Share of the smaller footprint that two dates have in common; 0 is left out."""
+        with warnings.catch_warnings():
+            # That its query changed in shapely 2: see below.
+            warnings.filterwarnings("ignore", message="STRtree will be changed")
+            tree = STRtree(self.polygons)
+        number = {id(polygon): index for index, polygon in enumerate(self.polygons)}
+        found = {}
+        for first, polygon in enumerate(self.polygons):
+            for hit in tree.query(polygon):
+                # Polygons before shapely 2, their numbers since.
+                second = number[id(hit)] if id(hit) in number else int(hit)
+                if second > first:
+                    common = polygon.intersection(self.polygons[second]).area
+                    smaller = min(polygon.area, self.polygons[second].area)
+                    if common > 0:
+                        found[frozenset((first, second))] = float(common / smaller)
+        return found
+
+    def share(self, first: int, second: int) -> float:
+        """Return which share of the smaller footprint two dates have in common."""
+        return self.shares.get(frozenset((first, second)), 0.0)
+
+
+def file_facts(path: Path | str | None) -> tuple[Any, ...]:
+    """Return name, size and time of the last change of a file; of another, its name."""
+    try:
+        found = os.stat(path) if path is not None else None
+    except OSError:
+        found = None
+    return (str(path),) if found is None else (str(path), found.st_size, found.st_mtime_ns)

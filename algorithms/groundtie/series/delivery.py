@@ -1,0 +1,175 @@
+"""What a registered series leaves in its folder, or a refused one: its report."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from shapely.geometry import LineString, mapping
+
+from ..context import Context
+from ..errors import NotRegisteredError
+from ..rasters.atomic import Outputs, write_json, writing
+from ..registration.registered_output import RegisteredOutput
+from ..registration.verdict import Verdict
+from ..runs import RUN, run_tags
+from ..version import __version__
+from .dates import file_facts
+from .frame import FloatArray
+from .series import TABLE_COLUMNS, Series, SeriesDate
+from .stored import StoredSeries
+
+SERIES_JSON, TABLE_CSV, TABLE_GPKG = "series.json", "series.csv", "series.gpkg"
+
+# A raster is not made again if a further date moves it by less than this, in its own pixels: what
+# untouched pixels may be wrong by, too.
+_SAME_PX = 0.05
+
+
+@dataclass(frozen=True)
+class SeriesFiles:
+    """What is written.
+
+    Parameters
+    ----------
+    folder
+        Where registered rasters, tables and `series.json` go.
+    output_grid, resampling
+        See `RegisteredOutput`.
+    report
+        The HTML page; None: none.
+    """
+
+    folder: Path
+    output_grid: str
+    resampling: str
+    report: Path | None
+
+    def write(self, series: Series, stored: StoredSeries, context: Context) -> Series:
+        """Write all files, or those of a series without registered dates: the report.
+
+        Raises
+        ------
+        NotRegisteredError
+            No date was registered.
+        """
+        if not series.registered:
+            self._write_refusal(series)
+            raise _refusal(series)
+        _make_folder(self.folder)
+        with Outputs() as outputs:
+            series = self._with_rasters(series, stored, outputs, context)
+            _write_csv(outputs.stage(self.folder / TABLE_CSV), series)
+            _write_layer(outputs.stage(self.folder / TABLE_GPKG), series)
+            write_json(outputs.stage(self.folder / SERIES_JSON), series.to_json())
+            # Last: who finds it finds all that it is about.
+            self._write_report(series, outputs)
+        self._remove_stale(series, stored)
+        return series
+
+    def raster_key(self, date: SeriesDate, series: Series) -> str:
+        """Return what stands for all that a date's raster is made of but its transform."""
+        facts = file_facts(date.listed.raster), series.map_grid, self.output_grid, self.resampling
+        return hashlib.sha256(repr((facts, __version__)).encode()).hexdigest()[:16]
+
+    def _with_rasters(
+        self, series: Series, stored: StoredSeries, outputs: Outputs, context: Context
+    ) -> Series:
+        """Write the rasters that are not there yet, and return what the series has then."""
+        dates, written = [], {}
+        for number, one in enumerate(series.dates):
+            part = context.part(number / len(series.dates), (number + 1) / len(series.dates))
+            if one.is_registered:
+                one, written[one.name] = self._with_raster(one, series, stored, outputs, part)
+            dates.append(one)
+        files = {"output_folder": self.folder}
+        if self.report is not None:
+            files["report"] = self.report
+        return replace(series, dates=tuple(dates), written=written, files=files)
+
+    def _with_raster(
+        self,
+        one: SeriesDate,
+        series: Series,
+        stored: StoredSeries,
+        outputs: Outputs,
+        context: Context,
+    ) -> tuple[SeriesDate, dict[str, Any]]:
+        assert one.date is not None and one.transform is not None
+        key, before = self.raster_key(one, series), stored.dates.get(one.name)
+        if before is not None and before.key == key and before.is_there(self.folder):
+            corners = one.transform.input_grid.outline(2)
+            moved = one.transform(before.transform.inverse(corners)) - corners
+            if np.hypot(*moved.T).max() < _SAME_PX:
+                known = {"file": before.file, "key": key, "run": before.run}
+                return replace(one, transform=before.transform), known
+        context.update(0.0, f"writing {one.name}")
+        path = self.folder / f"{one.name}_registered.tif"
+        output = RegisteredOutput(path, self.output_grid, self.resampling)
+        output.write(one.date.source, series.map_grid, one.transform, outputs, context)
+        return one, {"file": path.name, "key": key, "run": run_tags().get(RUN)}
+
+    def _write_refusal(self, series: Series) -> None:
+        if self.report is not None:
+            _make_folder(self.report.parent)
+            with Outputs() as outputs:
+                self._write_report(series, outputs)
+
+    def _write_report(self, series: Series, outputs: Outputs) -> None:
+        if self.report is not None:
+            from .report import SeriesReport  # matplotlib and jinja2 are heavy
+
+            SeriesReport.of(series).write(outputs, self.report)
+
+    def _remove_stale(self, series: Series, stored: StoredSeries) -> None:
+        """Remove rasters of dates that are left out now: they must not seem to be registered."""
+        current = {one["file"] for one in series.written.values()}
+        for one in stored.dates.values():
+            if one.file not in current and one.is_there(self.folder):
+                (self.folder / one.file).unlink()
+
+
+def _make_folder(folder: Path) -> None:
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+
+
+def _write_csv(path: Path, series: Series) -> None:
+    with writing(path), path.open("w", newline="", encoding="utf-8") as stream:
+        table = csv.DictWriter(stream, TABLE_COLUMNS)
+        table.writeheader()
+        table.writerows(series.rows())
+
+
+def _write_layer(path: Path, series: Series) -> None:
+    """Write the table with a line around each date, where it lies as registered."""
+    from ..geometry.geopackage import write_layer  # fiona is heavy
+
+    records = [
+        {"geometry": _outline(one), "properties": dict(row)}
+        for one, row in zip(series.dates, series.rows(), strict=True)
+    ]
+    with writing(path):
+        write_layer(path, "series", records, TABLE_COLUMNS, series.frame.grid.crs)
+
+
+def _outline(one: SeriesDate) -> Mapping[str, Any] | None:
+    if one.transform is None:
+        return None
+    around: FloatArray = one.transform.inverse(one.transform.input_grid.outline(1))
+    found: Mapping[str, Any] = mapping(LineString([*around, around[0]]))
+    return found
+
+
+def _refusal(series: Series) -> NotRegisteredError:
+    reasons = dict.fromkeys(one.verdict.reason for one in series.left_out)
+    count = len(series.left_out)
+    message = f"none of {count} dates was registered: {'; '.join(reasons)}"
+    return NotRegisteredError(
+        message, Verdict(False, message, rule=series.left_out[0].verdict.rule)
+    )

@@ -1,0 +1,127 @@
+"""The frame of a series: where displacements of its dates are measured, and how they compose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+
+from ..geometry.models import Frame, PolynomialModel, monomials
+from ..rasters.grid import Grid, compose, reproject
+
+FloatArray = NDArray[np.float64]
+Move = Callable[[FloatArray], FloatArray]
+
+# Parameters of a displacement: shift, and rise along both axes, (x, y) each.
+PARAMETERS = 6
+
+_LATTICE = 5
+
+# A displacement with less of a linear part, at the frame's border, is a shift.
+SHIFT_PX = 1e-6
+
+
+@dataclass(frozen=True)
+class SeriesFrame:
+    """A grid on the map, and a square on it in which positions are within ±1.
+
+    A displacement is a vector of six numbers, in pixels of the grid: a shift at the centre, by how
+    much more it is at the right border, and at the lower one; x before y.
+
+    Parameters
+    ----------
+    grid
+        The grid.
+    centre_px
+        Centre of the square, pixel position.
+    half_px
+        Half its side.
+    """
+
+    grid: Grid
+    centre_px: tuple[float, float]
+    half_px: float
+
+    @classmethod
+    def around(cls, hub: Grid, dates: Sequence[Grid]) -> SeriesFrame:
+        """Return the frame of a series by the grids of its hub and of its dates.
+
+        Its pixels are the hub's, or as large as those of the dates where these are coarser. One
+        date elsewhere does not move it.
+        """
+        factor = float(np.median([grid.pixel_size_m for grid in dates])) / hub.pixel_size_m
+        grid = hub.scaled(factor) if factor > 1 else hub
+        boxes = [_box(grid, date) for date in dates]
+        low, high = np.median([box for box in boxes if np.isfinite(box).all()], axis=0)
+        centre = (low + high) / 2
+        half = float((high - low).max() / 2)
+        return cls(grid, (float(centre[0]), float(centre[1])), half)
+
+    def enter(self, xy: FloatArray) -> FloatArray:
+        """Return map positions, shape (n, 2), in units of the square."""
+        return np.asarray((self.grid.map_to_pixel(xy) - self.centre_px) / self.half_px)
+
+    def leave(self, uv: FloatArray) -> FloatArray:
+        """Return positions in units of the square, shape (n, 2), on the map."""
+        return self.grid.pixel_to_map(uv * self.half_px + self.centre_px)
+
+    def displacement_of(self, move: Move) -> FloatArray:
+        """Return the displacement, (6,), that is nearest to a move of map positions."""
+        side = np.linspace(-1, 1, _LATTICE)
+        uv = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+        moved = (self.enter(move(self.leave(uv))) - uv) * self.half_px
+        return np.asarray(np.linalg.lstsq(monomials(uv, 1), moved, rcond=None)[0]).ravel()
+
+    def matrix(self, displacement: FloatArray) -> FloatArray:
+        """Return a displacement as a matrix of homogeneous positions of the square, (3, 3)."""
+        shift, along_u, along_v = displacement.reshape(3, 2) / self.half_px
+        matrix = np.eye(3)
+        matrix[:2] += np.column_stack([along_u, along_v, shift])
+        return matrix
+
+    def of_matrix(self, matrix: FloatArray) -> FloatArray:
+        """Return the displacement, (6,), of a matrix."""
+        rise = matrix - np.eye(3)
+        return np.asarray(rise[:2][:, [2, 0, 1]].T.ravel() * self.half_px)
+
+    def model(self, displacement: FloatArray) -> PolynomialModel:
+        """Return a displacement as a model of map positions."""
+        square = compose(
+            self.grid.centre_transform,
+            Affine.translation(*self.centre_px),
+            Affine.scale(self.half_px),
+        )
+        coefficients = displacement.reshape(3, 2) / self.half_px
+        if np.abs(displacement[2:]).max() < SHIFT_PX:
+            return PolynomialModel("translation", Frame(square), coefficients[:1])
+        return PolynomialModel("affine", Frame(square), coefficients)
+
+    def moved_grid(self, grid: Grid, displacement: FloatArray) -> Grid:
+        """Return a date's grid as moved, at the centre, to where a displacement has its ground."""
+        ground = self.leave(np.zeros((1, 2)))
+        nominal = self.leave(displacement[None, :2] / self.half_px)
+        there, here = (reproject(xy, self.grid.crs, grid.crs) for xy in (ground, nominal))
+        return grid.shifted(*map(float, (there - here)[0]))
+
+
+def rms_px(displacement: FloatArray) -> float:
+    """Return the root mean square length of a displacement, (6,), over the frame."""
+    squared = (displacement.reshape(3, 2) ** 2).sum(axis=1)
+    # u and v are spread evenly over ±1, with a variance of 1/3.
+    return float(np.sqrt(squared @ [1, 1 / 3, 1 / 3]))
+
+
+def sigma_px(covariance: FloatArray) -> float:
+    """Return the standard deviation over the frame, both axes together, by a covariance (6, 6)."""
+    variances = np.diag(covariance).reshape(3, 2).sum(axis=1)
+    return float(np.sqrt(max(variances @ [1, 1 / 3, 1 / 3], 0.0)))
+
+
+def _box(grid: Grid, date: Grid) -> FloatArray:
+    """Return the corners of a date's bounding box in pixels of a grid, shape (2, 2)."""
+    xy = reproject(date.pixel_to_map(date.outline()), date.crs, grid.crs)
+    px = grid.map_to_pixel(xy)
+    return np.array([px.min(axis=0), px.max(axis=0)])

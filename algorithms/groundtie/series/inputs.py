@@ -1,0 +1,199 @@
+"""What users name as a series: files, folders, patterns, tables and STAC items."""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import ParameterError
+from ..strict_json import read_json
+
+# Of rasters that a folder holds.
+_SUFFIXES = (".tif", ".tiff", ".jp2", ".vrt", ".img")
+_TABLE, _STAC = (".csv",), (".json", ".geojson")
+
+_DAY = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
+_YEAR = re.compile(r"(?<!\d)((?:19|20)\d\d)(?!\d)")
+
+_COLUMNS = ("file", "name", "time", "mask")
+
+
+@dataclass(frozen=True)
+class Listed:
+    """One date of a series, as it was named.
+
+    Parameters
+    ----------
+    name
+        What it is called: the file's stem, the STAC item's id, or the table's name.
+    raster
+        The file, or GDAL's name of it.
+    time
+        When it was taken; None: unknown.
+    mask
+        A raster or vector layer that states what of it takes part; None: all.
+    """
+
+    name: str
+    raster: Path | str
+    time: datetime.datetime | None
+    mask: Path | None = None
+
+
+def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed, ...]:
+    """Return the dates of a series, in the order of their times, else in that of their naming.
+
+    Parameters
+    ----------
+    inputs
+        Files, folders of rasters, patterns, CSV tables with a column `file` (and `name`, `time`,
+        `mask`), and STAC items or item collections as JSON.
+    asset
+        Which asset of STAC items is meant; None: the only one that is a raster.
+
+    Raises
+    ------
+    ParameterError
+        There is nothing under a name, a table or an item cannot be understood, or two dates have
+        one name.
+    """
+    found: dict[object, Listed] = {}
+    for given in inputs:
+        for date in _listed(given, asset):
+            raster = date.raster
+            found.setdefault(raster.resolve() if isinstance(raster, Path) else raster, date)
+    names: dict[str, Listed] = {}
+    for date in found.values():
+        other = names.setdefault(date.name, date)
+        if other is not date:
+            raise ParameterError(
+                f"two dates are called {date.name}: {other.raster} and {date.raster}; name them in "
+                "a CSV table with the columns file and name"
+            )
+    dates = tuple(found.values())
+    if any(date.time is None for date in dates):
+        return dates
+    return tuple(sorted(dates, key=lambda date: (date.time or datetime.datetime.min, date.name)))
+
+
+def time_of(text: str) -> datetime.datetime | None:
+    """Return the time that a text states: an ISO 8601 time, else a day or a year in a name."""
+    try:
+        stated = datetime.datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
+    except ValueError:
+        stated = None
+    if stated is not None and not text.strip().isdigit():
+        if stated.tzinfo is not None:
+            stated = stated.astimezone(datetime.timezone.utc).replace(tzinfo=None)
+        return stated
+    if day := _DAY.search(text):
+        try:
+            return datetime.datetime(*map(int, day.groups()))  # type: ignore[arg-type]
+        except ValueError:  # 30 February
+            return None
+    year = _YEAR.search(text)
+    return None if year is None else datetime.datetime(int(year.group(1)), 1, 1)
+
+
+def _listed(given: Path | str, asset: str | None) -> Iterable[Listed]:
+    if isinstance(given, str):
+        return [_file(given)]
+    if given.is_dir():
+        files = sorted(path for path in given.iterdir() if path.suffix.lower() in _SUFFIXES)
+        if not files:
+            raise ParameterError(f"the folder {given} holds no raster ({', '.join(_SUFFIXES)})")
+        return map(_file, files)
+    if given.is_file():
+        suffix = given.suffix.lower()
+        if suffix in _TABLE:
+            return _of_table(given)
+        return _of_stac(given, asset) if suffix in _STAC else [_file(given)]
+    if any(sign in given.name for sign in "*?["):
+        files = sorted(given.parent.glob(given.name))
+        if files:
+            return map(_file, files)
+        raise ParameterError(f"no file matches {given}")
+    raise ParameterError(f"there is no file {given}")
+
+
+def _file(raster: Path | str) -> Listed:
+    stem = Path(raster).stem
+    return Listed(stem, raster, time_of(stem))
+
+
+def _of_table(path: Path) -> list[Listed]:
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            reader = csv.DictReader(stream)
+            columns = reader.fieldnames or ()
+            rows = list(reader)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ParameterError(f"cannot read the table {path}: {error}") from error
+    if "file" not in columns:
+        raise ParameterError(f"the table {path} has no column file ({', '.join(_COLUMNS)})")
+    return [_of_row(path, number, row) for number, row in enumerate(rows, start=2)]
+
+
+def _of_row(path: Path, number: int, row: Mapping[str, str | None]) -> Listed:
+    values = {name: (row.get(name) or "").strip() for name in _COLUMNS}
+    if not values["file"]:
+        raise ParameterError(f"{path}, line {number}: the column file is empty")
+    date = _file(_located(values["file"], path.parent))
+    time = date.time if not values["time"] else time_of(values["time"])
+    if values["time"] and time is None:
+        raise ParameterError(f"{path}, line {number}: {values['time']!r} is no time (ISO 8601)")
+    mask = path.parent / values["mask"] if values["mask"] else None
+    return Listed(values["name"] or date.name, date.raster, time, mask)
+
+
+def _of_stac(path: Path, asset: str | None) -> list[Listed]:
+    try:
+        content = read_json(path)
+    except (OSError, ValueError) as error:
+        raise ParameterError(f"cannot read the STAC file {path}: {error}") from error
+    stated = content if isinstance(content, dict) else {}
+    items = [stated] if stated.get("type") == "Feature" else stated.get("features")
+    if not isinstance(items, list):
+        raise ParameterError(f"{path} is no STAC item or item collection")
+    try:
+        return [_of_item(path, item, asset) for item in items]
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ParameterError(f"{path} is no STAC item: {error!r}") from error
+
+
+def _of_item(path: Path, item: Mapping[str, Any], asset: str | None) -> Listed:
+    assets: Mapping[str, Any] = item["assets"]
+    rasters = [name for name, one in assets.items() if _is_raster(one)]
+    if asset is None and len(rasters) != 1:
+        raise ParameterError(
+            f"{path}: the item {item['id']} has {len(rasters)} rasters; name one of its assets: "
+            f"{', '.join(sorted(assets))}"
+        )
+    name = rasters[0] if asset is None else asset
+    if name not in assets:
+        raise ParameterError(f"{path}: the item {item['id']} has no asset {name}")
+    stated = (item.get("properties") or {}).get("datetime")
+    raster = _located(str(assets[name]["href"]), path.parent)
+    return Listed(str(item["id"]), raster, None if stated is None else time_of(str(stated)))
+
+
+def _is_raster(asset: Mapping[str, Any]) -> bool:
+    kind, href = str(asset.get("type") or ""), str(asset.get("href") or "")
+    is_image = kind.startswith("image/") and kind not in ("image/png", "image/jpeg")
+    return is_image or (not kind and Path(href).suffix.lower() in _SUFFIXES)
+
+
+def _located(name: str, folder: Path) -> Path | str:
+    """Return a file beside a table, or GDAL's name of a raster as it is."""
+    if name.startswith("file://"):
+        name = name.removeprefix("file://")
+    if name.startswith(("http://", "https://", "s3://")):
+        scheme, _, rest = name.partition("://")
+        return f"/vsis3/{rest}" if scheme == "s3" else f"/vsicurl/{name}"
+    return name if name.startswith("/vsi") else Path(os.path.normpath(folder / name))

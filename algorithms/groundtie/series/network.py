@@ -1,0 +1,306 @@
+"""The adjustment of a network of registrations: one displacement a date, by least squares.
+
+Sources: [Koch1999] sections 3.2 and 4.2 (adjustment, tests of outliers); [Baarda1968] (data
+snooping); docs/method-series.md has the formulas.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+from scipy.stats import chi2
+
+from ..geometry.judging import LARGEST_LOG10_CHANCE
+from .frame import PARAMETERS, SHIFT_PX, FloatArray, SeriesFrame
+
+Mask = NDArray[np.bool_]
+
+# What links scatter by beside their own covariance, per parameter, in pixels: seasons, shadows and
+# tides displace all points alike. It is found from the misclosures, between what the best links
+# leave (suite series) and the goal for dates that are good; a network that needs more is wrong.
+SCATTER_RANGE_PX = (0.03, 0.3)
+
+# A link that the others control by less than this is not tested.
+_LEAST_REDUNDANCY = 0.01
+
+_BISECTIONS = 12
+_STEPS = 10
+_PRECISION_PX = 1e-9
+
+
+@dataclass(frozen=True)
+class Link:
+    """A registration of one date to another one.
+
+    Parameters
+    ----------
+    first, second
+        The dates, by number: reference and input of the registration.
+    displacement
+        From nominal positions of the first date to those of the second, shape (6,).
+    covariance
+        Of it, shape (6, 6), px².
+    """
+
+    first: int
+    second: int
+    displacement: FloatArray
+    covariance: FloatArray
+
+
+def degrees_of_freedom(links: Sequence[Link]) -> int:
+    """Return how many of a displacement's six numbers links can differ in: two, of shifts alone."""
+    is_shift = all(np.abs(link.displacement[2:]).max() < SHIFT_PX for link in links)
+    return 2 if is_shift else PARAMETERS
+
+
+def largest_statistic(links: Sequence[Link]) -> float:
+    """Return the squared normalised length that links exceed by chance once in a thousand times."""
+    return float(chi2.isf(10**LARGEST_LOG10_CHANCE, degrees_of_freedom(links)))
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """Displacements of all dates that the network reaches.
+
+    Parameters
+    ----------
+    displacements, covariances
+        Of each date against the frame, shapes (n, 6) and (n, 6, 6); NaN for those not reached.
+    kept
+        Which links were used, shape (m,): no outliers, and connected with the hub.
+    statistics
+        Squared normalised residual of each link, shape (m,): that with which it was rejected, or
+        has at last; NaN where no other link controls it.
+    scatter_px
+        What links scatter by beside their own covariance.
+    confirmed
+        Which dates a second way confirms: no single link connects them with the hub, shape (n,).
+    """
+
+    displacements: FloatArray
+    covariances: FloatArray
+    kept: Mask
+    statistics: FloatArray
+    scatter_px: float
+    confirmed: Mask
+
+    @property
+    def reached(self) -> Mask:
+        """Which dates the network reaches, shape (n,)."""
+        return np.asarray(np.isfinite(self.displacements).all(axis=1))
+
+
+def adjust(
+    frame: SeriesFrame, links: Sequence[Link], count: int, hub: int, *, is_free: bool
+) -> Adjustment:
+    """Adjust a network; links that contradict the others are taken out, the worst first.
+
+    Parameters
+    ----------
+    frame
+        The series' frame.
+    links
+        All registrations that were accepted.
+    count
+        Number of dates.
+    hub
+        The date whose displacement is zero.
+    is_free
+        Let the mean displacement of all dates be zero instead.
+    """
+    kept = np.array([True] * len(links), bool)
+    statistics = np.full(len(links), np.nan)
+    largest = largest_statistic(links)
+    while True:
+        kept &= _reached(links, kept, count, hub)
+        network = _Network(frame, links, kept, count, hub)
+        solution = network.settled()
+        found = network.statistics(solution)
+        statistics[kept] = found
+        if not np.any(found > largest):
+            break
+        kept[np.flatnonzero(kept)[np.nanargmax(found)]] = False
+    displacements, covariances = solution.of_dates(frame, is_free)
+    confirmed = network.confirmed()
+    return Adjustment(displacements, covariances, kept, statistics, solution.scatter_px, confirmed)
+
+
+@dataclass(frozen=True)
+class _Solution:
+    """Displacements (n, 6) and their covariance (6 n, 6 n); NaN for dates that are not reached."""
+
+    displacements: FloatArray
+    covariance: FloatArray
+    scatter_px: float
+
+    def of_dates(self, frame: SeriesFrame, is_free: bool) -> tuple[FloatArray, FloatArray]:
+        """Return displacements (n, 6) and covariances (n, 6, 6)."""
+        count = len(self.displacements)
+        displacements: FloatArray = self.displacements
+        covariance: FloatArray = self.covariance
+        reached = np.isfinite(displacements).all(axis=1)
+        if is_free:
+            mean = np.linalg.inv(frame.matrix(displacements[reached].mean(axis=0)))
+            displacements = np.array(
+                [frame.of_matrix(frame.matrix(one) @ mean) for one in displacements]
+            )
+            # The S-transformation to the datum of the mean.
+            less_mean: FloatArray = np.eye(count)
+            less_mean[:, reached] -= 1 / reached.sum()
+            change = np.asarray(np.kron(less_mean, np.eye(PARAMETERS)), np.float64)
+            covariance = (change @ covariance @ change.T).astype(np.float64)
+        blocks = covariance.reshape(count, PARAMETERS, count, PARAMETERS)
+        own = np.array([blocks[i, :, i] for i in range(count)])
+        own[~reached] = np.nan
+        return displacements, own
+
+
+@dataclass(frozen=True)
+class _Network:
+    """The links that are used, and the dates that they reach from the hub."""
+
+    frame: SeriesFrame
+    all_links: Sequence[Link]
+    kept: Mask
+    count: int
+    hub: int
+
+    @property
+    def links(self) -> list[Link]:
+        return [link for link, is_kept in zip(self.all_links, self.kept, strict=True) if is_kept]
+
+    @property
+    def free(self) -> list[int]:
+        """The dates whose displacement is unknown."""
+        ends = {end for link in self.links for end in (link.first, link.second)}
+        return sorted(ends - {self.hub})
+
+    def settled(self) -> _Solution:
+        """Return the solution with the scatter that the median misclosure asks for."""
+        low, high = SCATTER_RANGE_PX
+        median = float(chi2.median(degrees_of_freedom(self.links)))
+
+        def is_enough(scatter_px: float) -> bool:
+            found = self.statistics(self.solve(scatter_px))
+            return not np.isfinite(found).any() or bool(np.nanmedian(found) <= median)
+
+        if is_enough(low):
+            return self.solve(low)
+        if not is_enough(high):
+            return self.solve(high)
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2
+            low, high = (low, middle) if is_enough(middle) else (middle, high)
+        return self.solve(high)
+
+    def solve(self, scatter_px: float) -> _Solution:
+        """Return the least-squares solution.
+
+        By Gauss and Newton: residuals are exact, by composed transforms; the design, differences
+        of displacements, neglects their products.
+        """
+        displacements = np.full((self.count, PARAMETERS), np.nan)
+        displacements[self.hub] = 0.0
+        covariance = np.zeros((self.count * PARAMETERS,) * 2)
+        free = self.free
+        if not free:
+            return _Solution(displacements, covariance, scatter_px)
+        displacements[free] = 0.0
+        weights: list[FloatArray] = [
+            np.asarray(np.linalg.inv(self._covariance(link, scatter_px)), float)
+            for link in self.links
+        ]
+        column = {date: k for k, date in enumerate(free)}
+        factors = splu(self._normal_matrix(weights, column))
+        for _ in range(_STEPS):
+            right = np.zeros((len(free), PARAMETERS))
+            for link, weight in zip(self.links, weights, strict=True):
+                pull = weight @ self._residual(link, displacements)
+                for end, sign in ((link.second, 1), (link.first, -1)):
+                    if end != self.hub:
+                        right[column[end]] += sign * pull
+            step = factors.solve(right.ravel()).reshape(-1, PARAMETERS)
+            displacements[free] += step
+            if np.abs(step).max() < _PRECISION_PX:
+                break
+        inverse = factors.solve(np.eye(len(free) * PARAMETERS))
+        rows = np.concatenate([np.arange(PARAMETERS) + PARAMETERS * date for date in free])
+        covariance[np.ix_(rows, rows)] = inverse
+        return _Solution(displacements, covariance, scatter_px)
+
+    def statistics(self, solution: _Solution) -> FloatArray:
+        """Return the squared normalised residual of each link that is used, shape (links,).
+
+        It has a χ² distribution of `degrees_of_freedom`; NaN where no other link controls it.
+        """
+        blocks = solution.covariance.reshape(self.count, PARAMETERS, self.count, PARAMETERS)
+        found = []
+        for link in self.links:
+            i, j = link.first, link.second
+            of_fit = blocks[i, :, i] + blocks[j, :, j] - blocks[i, :, j] - blocks[j, :, i]
+            own = self._covariance(link, solution.scatter_px)
+            left = own - of_fit
+            redundancy = np.trace(np.linalg.solve(own, left)) / PARAMETERS
+            residual = self._residual(link, solution.displacements)
+            is_controlled = redundancy >= _LEAST_REDUNDANCY
+            found.append(residual @ np.linalg.solve(left, residual) if is_controlled else np.nan)
+        return np.array(found)
+
+    def confirmed(self) -> Mask:
+        """Return which dates no single link alone connects with the hub, shape (n,)."""
+        edges = [(link.first, link.second) for link in self.links]
+        inner = [
+            edge
+            for k, edge in enumerate(edges)
+            if _parts(edges[:k] + edges[k + 1 :], self.count)[edge[0]]
+            == _parts(edges[:k] + edges[k + 1 :], self.count)[edge[1]]
+        ]
+        part = _parts(inner, self.count)
+        return np.asarray(part == part[self.hub])
+
+    def _covariance(self, link: Link, scatter_px: float) -> FloatArray:
+        return np.asarray(link.covariance + scatter_px**2 * np.eye(PARAMETERS))
+
+    def _residual(self, link: Link, displacements: FloatArray) -> FloatArray:
+        first, second, between = (
+            self.frame.matrix(one)
+            for one in (displacements[link.first], displacements[link.second], link.displacement)
+        )
+        return self.frame.of_matrix(between) - self.frame.of_matrix(second @ np.linalg.inv(first))
+
+    def _normal_matrix(self, weights: Sequence[FloatArray], column: dict[int, int]) -> object:
+        rows, cols, values = [], [], []
+        inside = np.indices((PARAMETERS, PARAMETERS)).reshape(2, -1)
+        for link, weight in zip(self.links, weights, strict=True):
+            for one, sign in ((link.first, 1), (link.second, -1)):
+                for other, other_sign in ((link.first, 1), (link.second, -1)):
+                    if self.hub not in (one, other):
+                        rows.append(inside[0] + PARAMETERS * column[one])
+                        cols.append(inside[1] + PARAMETERS * column[other])
+                        values.append(sign * other_sign * weight.ravel())
+        size = (len(column) * PARAMETERS,) * 2
+        where = np.concatenate(rows), np.concatenate(cols)
+        return coo_matrix((np.concatenate(values), where), shape=size).tocsc()
+
+
+def _reached(links: Sequence[Link], kept: Mask, count: int, hub: int) -> Mask:
+    """Return which links are connected with the hub by those that are kept, shape (m,)."""
+    edges = [
+        (link.first, link.second) for link, is_kept in zip(links, kept, strict=True) if is_kept
+    ]
+    part = _parts(edges, count)
+    return np.array([part[link.first] == part[hub] for link in links], bool)
+
+
+def _parts(edges: Sequence[tuple[int, int]], count: int) -> NDArray[np.int_]:
+    """Return which connected part of a graph each of its nodes lies in, shape (count,)."""
+    first, second = np.array(edges, int).reshape(-1, 2).T
+    graph = coo_matrix((np.ones(len(edges)), (first, second)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])

@@ -1,0 +1,239 @@
+"""One registration of the network: two dates, by the pipeline and its rules."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..context import Context
+from ..errors import CancelledError, GroundTieError
+from ..geometry.models import Model
+from ..masks.choice import AUTO
+from ..matching.alignment import LINEAR_CANDIDATES
+from ..rasters.grid import Grid, reproject
+from ..rasters.pair import Image
+from ..rasters.reading import bounded_cache
+from ..registration.pipeline import pair_images, run
+from ..registration.registration import Registration
+from ..registration.specification import COREGISTER, SAR_SAR, Specification
+from ..version import __version__
+from .dates import Date
+from .frame import PARAMETERS, FloatArray, SeriesFrame
+from .network import Link
+
+# Two images of one kind of camera show the same gradients: orientation alone finds as many matches
+# as all measures together, in half of the time (suite series).
+_CAMERAS = replace(COREGISTER, similarity="orientation")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How each pair is registered.
+
+    Parameters
+    ----------
+    model
+        "auto", "translation", "similarity" or "affine".
+    max_error_px, search_radius_m, matching_pixel_size_m
+        See `Specification`.
+    """
+
+    model: str
+    max_error_px: float
+    search_radius_m: float | None
+    matching_pixel_size_m: float | None
+
+    def specification(self, first: Date, second: Date) -> Specification:
+        """Return how a pair is registered: the preset of what the two images are."""
+        preset, model = COREGISTER, self.model
+        if first.is_radar == second.is_radar:
+            preset = SAR_SAR if first.is_radar else _CAMERAS
+        if preset is SAR_SAR and model == AUTO:
+            model = "affine"  # keypoints choose among bent models, too
+        return replace(
+            preset,
+            model=model,
+            candidates=LINEAR_CANDIDATES,
+            max_error_px=self.max_error_px,
+            search_radius_m=self.search_radius_m,
+            matching_pixel_size_m=self.matching_pixel_size_m,
+        )
+
+
+@dataclass(frozen=True)
+class PairResult:
+    """What became of the registration of one date to another.
+
+    Parameters
+    ----------
+    first, second
+        Names of the dates: reference and input.
+    key
+        Stands for the files, the settings and the version.
+    accepted, rule, reason
+        The verdict.
+    check_rmse_px
+        Error at check points, in matching pixels; None: none.
+    displacement, covariance
+        See `network.Link`; None if it was refused.
+    seconds
+        How long it took.
+    """
+
+    first: str
+    second: str
+    key: str
+    accepted: bool
+    rule: str
+    reason: str
+    check_rmse_px: float | None = None
+    displacement: tuple[float, ...] | None = None
+    covariance: tuple[tuple[float, ...], ...] | None = None
+    seconds: float = 0.0
+
+    def link(self, first: int, second: int) -> Link:
+        """Return an accepted registration as a link of two dates by their numbers."""
+        assert self.displacement is not None and self.covariance is not None
+        return Link(first, second, np.array(self.displacement), np.array(self.covariance))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> PairResult:
+        """Return the result that `to_json` described.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            The values describe none.
+        """
+        found = cls(**values)
+        if not found.accepted:
+            return found
+        displacement = np.array(found.displacement, float).reshape(PARAMETERS)
+        covariance = np.array(found.covariance, float).reshape(PARAMETERS, PARAMETERS)
+        return replace(
+            found,
+            displacement=tuple(displacement.tolist()),
+            covariance=tuple(map(tuple, covariance.tolist())),
+        )
+
+
+def pair_key(first: Date, second: Date, settings: Settings, frame: SeriesFrame) -> str:
+    """Return what stands for a registration: it need not be done again as long as this is same."""
+    grid = frame.grid
+    place = grid.transform, str(grid.crs), frame.centre_px, frame.half_px
+    facts = first.key, second.key, first.band, settings, place, __version__
+    return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
+
+
+def register_pair(
+    first: Date,
+    second: Date,
+    placed: tuple[FloatArray | None, FloatArray | None],
+    settings: Settings,
+    frame: SeriesFrame,
+    context: Context,
+) -> PairResult:
+    """Register one date to another.
+
+    Parameters
+    ----------
+    first, second
+        Reference and input.
+    placed
+        Displacements of both, (6,), as far as they are known: the search starts from there.
+    settings
+        How.
+    frame
+        The series' frame.
+    context
+        Threads, progress and seed.
+    """
+    started = time.perf_counter()
+    refused = PairResult(
+        first.name, second.name, pair_key(first, second, settings, frame), False, "", ""
+    )
+    spec = settings.specification(first, second)
+    grids = [
+        date.source.grid if one is None else frame.moved_grid(date.source.grid, one)
+        for date, one in zip((first, second), placed, strict=True)
+    ]
+    images = [
+        Image(replace(date.matched, grid=grid), date.band)
+        for date, grid in zip((first, second), grids, strict=True)
+    ]
+    try:
+        with ExitStack() as stack, bounded_cache():
+            masks = first.listed.mask, second.listed.mask
+            opened = pair_images(images[0], images[1], spec, context.quiet(), masks, stack, started)
+            found = run(opened, spec, context)
+    except CancelledError:
+        raise
+    except GroundTieError as error:
+        # Of this pair alone: the date is named with it, and the others stand.
+        return replace(refused, reason=error.one_line(), seconds=time.perf_counter() - started)
+    verdict = found.verdict
+    rmse = verdict.check_rmse_px
+    judged = replace(
+        refused,
+        rule=verdict.rule,
+        reason=verdict.reason,
+        check_rmse_px=rmse if np.isfinite(rmse) else None,
+        seconds=time.perf_counter() - started,
+    )
+    if not verdict.accepted:
+        return judged
+    displacement, covariance = _measured(found, first, second, grids, frame)
+    return replace(
+        judged,
+        accepted=True,
+        displacement=tuple(displacement.tolist()),
+        covariance=tuple(map(tuple, covariance.tolist())),
+    )
+
+
+def _measured(
+    found: Registration, first: Date, second: Date, grids: list[Grid], frame: SeriesFrame
+) -> tuple[FloatArray, FloatArray]:
+    """Return the displacement from one date's nominal positions to the other's, and its covariance.
+
+    The covariance is that of the jackknife over blocks of points ([Efron1993] chapter 11).
+    """
+    estimate = found.estimate
+    assert estimate is not None
+    grid = found.pair.grid
+
+    def displacement(model: Any) -> FloatArray:
+        return frame.displacement_of(lambda xy: _nominal(model, xy, first, second, grids, frame))
+
+    def fold(px_model: Any) -> Any:
+        return lambda xy: grid.pixel_to_map(px_model(grid.map_to_pixel(xy)))
+
+    model: Model = estimate.transform.model
+    folds = np.array([displacement(fold(one)) for one in estimate.fold_models])
+    if len(folds) < 2:
+        return displacement(model), np.zeros((PARAMETERS, PARAMETERS))
+    apart = folds - folds.mean(axis=0)
+    return displacement(model), (len(folds) - 1) / len(folds) * apart.T @ apart
+
+
+def _nominal(
+    model: Any, xy: FloatArray, first: Date, second: Date, grids: list[Grid], frame: SeriesFrame
+) -> FloatArray:
+    """Return where the second date has ground that the first has at positions of the series' map.
+
+    The registration was between grids that had been moved.
+    """
+    crs, own, other = frame.grid.crs, first.source.grid, second.source.grid
+    px = own.map_to_pixel(reproject(xy, crs, own.crs))
+    nominal = reproject(model(grids[0].pixel_to_map(px)), own.crs, other.crs)
+    px = grids[1].map_to_pixel(nominal)
+    return reproject(other.pixel_to_map(px), other.crs, crs)

@@ -1,0 +1,257 @@
+"""A registered series: its dates, where they lie, and what it leaves in its folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..geometry.transform import Transform
+from ..rasters.grid import Grid
+from ..report.page import plain, versions
+from .dates import Date
+from .frame import SeriesFrame, rms_px, sigma_px
+from .inputs import Listed
+from .pairs import PairResult
+from .settling import DateVerdict, Settled
+from .stored import FORMAT, frame_to_json
+
+TABLE_COLUMNS = {
+    "name": "str",
+    "time": "str",
+    "state": "str",
+    "rule": "str",
+    "reason": "str",
+    "file": "str",
+    "shift_x_px": "float",
+    "shift_y_px": "float",
+    "shift_x_m": "float",
+    "shift_y_m": "float",
+    "rms_px": "float",
+    "sigma_px": "float",
+    "links": "int",
+    "loops": "int",
+    "open_loops": "int",
+    "worst_loop_px": "float",
+    "confirmed": "bool",
+}
+
+
+@dataclass(frozen=True)
+class SeriesDate:
+    """One date of a registered series.
+
+    Parameters
+    ----------
+    listed
+        As it was named.
+    verdict
+        Whether it belongs to the series.
+    date
+        It, open; None: it could not be opened.
+    transform
+        From the series' map to its pixels; None: it is left out.
+    is_reference
+        Whether it is the reference, which stays as it is.
+    """
+
+    listed: Listed
+    verdict: DateVerdict
+    date: Date | None = None
+    transform: Transform | None = None
+    is_reference: bool = False
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return self.listed.name
+
+    @property
+    def is_registered(self) -> bool:
+        """Whether it was registered: it is neither left out, nor the reference, nor alone."""
+        return self.verdict.accepted and not self.is_reference and self.verdict.evidence.links > 0
+
+    def row(self, frame: SeriesFrame, file: str | None) -> dict[str, Any]:
+        """Return the date's row of the table; shifts are where its ground nominally lies."""
+        verdict, evidence = self.verdict, self.verdict.evidence
+        values: dict[str, Any] = dict.fromkeys(TABLE_COLUMNS)
+        state = "registered" if verdict.accepted else "left out"
+        values |= {
+            "name": self.name,
+            "time": None if self.listed.time is None else self.listed.time.isoformat(),
+            "state": "reference" if self.is_reference else state,
+            "rule": verdict.rule,
+            "reason": "all dates are registered to it" if self.is_reference else verdict.reason,
+            "file": file,
+            "links": evidence.links,
+            "loops": evidence.loops,
+            "open_loops": evidence.open_loops,
+            "worst_loop_px": verdict.worst_loop_px,
+            "confirmed": evidence.is_confirmed,
+        }
+        displacement, covariance = verdict.displacement, verdict.covariance
+        if displacement is None or covariance is None:
+            return values
+        centre = frame.leave(np.array([[0.0, 0.0], displacement[:2] / frame.half_px]))
+        shift_m = (centre[1] - centre[0]) * frame.grid.metres_per_unit
+        return values | {
+            "shift_x_px": float(displacement[0]),
+            "shift_y_px": float(displacement[1]),
+            "shift_x_m": float(shift_m[0]),
+            "shift_y_m": float(shift_m[1]),
+            "rms_px": rms_px(displacement),
+            "sigma_px": sigma_px(covariance),
+        }
+
+
+@dataclass(frozen=True)
+class Series:
+    """A series whose dates are registered to one frame.
+
+    Parameters
+    ----------
+    dates
+        All dates, also those that are left out, in the order of their times.
+    frame
+        Where displacements are measured.
+    map_grid
+        The grid that registered rasters get: the reference's, or that of the date in the middle.
+    datum
+        What the frame is, in words.
+    pairs
+        All registrations of two dates, those of earlier runs among them.
+    settled
+        The adjusted network and its loops.
+    names
+        Names of the dates that could be opened, by their numbers in the network.
+    reference_key
+        Stands for the reference's file; None: there is none.
+    registered_pairs, reused_pairs
+        How many registrations were done, and how many were taken over from an earlier run.
+    parameters
+        What the tool was called with.
+    seconds
+        How long it took.
+    written
+        What is known of each raster that was written, by the names of the dates.
+    files
+        What was written, by name.
+    """
+
+    dates: tuple[SeriesDate, ...]
+    frame: SeriesFrame
+    map_grid: Grid
+    datum: str
+    pairs: tuple[PairResult, ...]
+    settled: Settled
+    names: tuple[str, ...]
+    reference_key: str | None
+    registered_pairs: int
+    reused_pairs: int
+    parameters: Mapping[str, Any]
+    seconds: float = 0.0
+    written: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    files: Mapping[str, Path] = field(default_factory=dict)
+
+    @property
+    def registered(self) -> tuple[SeriesDate, ...]:
+        """The dates that were registered."""
+        return tuple(date for date in self.dates if date.is_registered)
+
+    @property
+    def left_out(self) -> tuple[SeriesDate, ...]:
+        """The dates that were not."""
+        return tuple(date for date in self.dates if not date.verdict.accepted)
+
+    def transforms(self) -> dict[str, Transform]:
+        """Return the transforms of all registered dates, by their names."""
+        return {date.name: date.transform for date in self.dates if date.transform is not None}
+
+    def file_of(self, date: SeriesDate) -> str | None:
+        """Return the name of a date's raster in the folder; None: there is none."""
+        written = self.written.get(date.name)
+        return None if written is None else str(written["file"])
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the table, one row a date (see `TABLE_COLUMNS`)."""
+        return [date.row(self.frame, self.file_of(date)) for date in self.dates]
+
+    def loops(self) -> dict[str, Any]:
+        """Return how well triplets of dates close."""
+        errors = [one.error_px for one in self.settled.closures]
+        return {
+            "closed": sum(one.is_closed for one in self.settled.closures),
+            "count": len(errors),
+            "median_px": float(np.median(errors)) if errors else None,
+            "largest_px": max(errors, default=None),
+            "scatter_px": self.settled.adjustment.scatter_px,
+            "triplets": [
+                {
+                    "dates": [self.names[k] for k in one.dates],
+                    "error_px": one.error_px,
+                    "expected_px": one.expected_px,
+                    "is_closed": one.is_closed,
+                }
+                for one in (*self.settled.open_closures, *self.settled.closures)
+            ],
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        rejected = [[self.names[k] for k in ends] for ends in self.settled.rejected]
+        values = {
+            "verdict": {
+                "accepted": bool(self.registered),
+                "registered": len(self.registered),
+                "left_out": len(self.left_out),
+            },
+            "datum": self.datum,
+            "dates": self.rows(),
+            "loops": self.loops(),
+            "rejected_pairs": rejected,
+            "registered_pairs": self.registered_pairs,
+            "reused_pairs": self.reused_pairs,
+            "parameters": {k: v for k, v in self.parameters.items() if v is not None},
+            "versions": versions(),
+            "seconds": self.seconds,
+            "files": {name: str(path) for name, path in self.files.items()},
+        }
+        found: dict[str, Any] = plain(values)
+        return found
+
+    def to_json(self) -> dict[str, Any]:
+        """Return `summary` with all that the next run in the folder needs."""
+        values = self.summary()
+        for row, date in zip(values["dates"], self.dates, strict=True):
+            transform = date.transform
+            row["transform"] = None if transform is None else transform.to_json()
+            row["written"] = self.written.get(date.name)
+            covariance = date.verdict.covariance
+            row["covariance_px2"] = None if covariance is None else covariance.tolist()
+        return {
+            "format": FORMAT,
+            "reference_key": self.reference_key,
+            "frame": frame_to_json(self.frame),
+            **values,
+            "pairs": [plain(pair.to_json()) for pair in self.pairs],
+        }
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        loops = self.loops()
+        count = len(self.registered) + len(self.left_out)
+        lines = [
+            f"registered: {len(self.registered)} of {count} dates, {self.datum}",
+            *(f"left out: {date.name}: {date.verdict.reason}" for date in self.left_out),
+        ]
+        if loops["count"]:
+            lines.append(
+                f"loops that close: {loops['closed']} of {loops['count']}; error "
+                f"{loops['median_px']:.2f} px (median), {loops['largest_px']:.2f} px (largest)"
+            )
+        reused = f", {self.reused_pairs} taken over" if self.reused_pairs else ""
+        lines.append(f"registrations of two dates: {self.registered_pairs} done{reused}")
+        return lines + [f"{name}: {path}" for name, path in self.files.items()]

@@ -1,0 +1,191 @@
+"""From registrations to dates: the adjusted network, its loops, and who is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from ..registration.rules import Rule
+from ..registration.series_evidence import DateEvidence
+from ..registration.verdict import first_refusal
+from .closure import Closure, triplet_closures
+from .frame import FloatArray, SeriesFrame
+from .network import Adjustment, Link, adjust
+from .pairs import PairResult
+
+Results = Mapping[tuple[int, int], PairResult]
+
+
+@dataclass(frozen=True)
+class DateVerdict:
+    """Whether a date belongs to the series, and where it lies.
+
+    Parameters
+    ----------
+    evidence
+        What it rests on.
+    accepted, reason, rule, advice
+        See `Verdict`.
+    displacement, covariance
+        From the series' frame to the date's nominal positions, shapes (6,) and (6, 6); None if the
+        date is left out.
+    worst_loop_px
+        Largest error of the ways around it; None: there is none.
+    """
+
+    evidence: DateEvidence
+    accepted: bool
+    reason: str
+    rule: str = ""
+    advice: str = ""
+    displacement: FloatArray | None = None
+    covariance: FloatArray | None = None
+    worst_loop_px: float | None = None
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A series whose dates are judged.
+
+    Parameters
+    ----------
+    verdicts
+        One for each date.
+    closures
+        The triplets of dates that stay, worst first.
+    open_closures
+        Those among all dates that do not lead back to their start.
+    adjustment
+        The network of the dates that stay.
+    rejected
+        Pairs of dates whose registration was accepted, but contradicts the network.
+    """
+
+    verdicts: tuple[DateVerdict, ...]
+    closures: tuple[Closure, ...]
+    open_closures: tuple[Closure, ...]
+    adjustment: Adjustment
+    rejected: tuple[tuple[int, int], ...]
+
+
+def settle(frame: SeriesFrame, results: Results, count: int, hub: int, *, is_free: bool) -> Settled:
+    """Adjust the network, leave out what the rules refuse, and adjust the rest again.
+
+    Parameters
+    ----------
+    frame
+        The series' frame.
+    results
+        All registrations, by the numbers of reference and input.
+    count
+        Number of dates.
+    hub
+        The date that stays where it is.
+    is_free
+        See `adjust`.
+    """
+    refused: dict[int, DateVerdict] = {}
+    open_closures: dict[tuple[int, ...], Closure] = {}
+    rejected: set[tuple[int, int]] = set()
+    while True:
+        links = [
+            result.link(*ends)
+            for ends, result in results.items()
+            if result.accepted and not refused.keys() & set(ends)
+        ]
+        found = adjust(frame, links, count, hub, is_free=is_free)
+        closures = triplet_closures(frame, links, found.scatter_px)
+        network = _Network(results, links, found, closures, hub)
+        open_closures.update({one.dates: one for one in closures if not one.is_closed})
+        rejected |= network.rejected
+        verdicts = [refused.get(date) or network.verdict(date) for date in range(count)]
+        new = {
+            date: verdict
+            for date, verdict in enumerate(verdicts)
+            if not verdict.accepted and date not in refused
+        }
+        if not new:
+            kept = [
+                one
+                for one in closures
+                if not rejected & {(a, b) for a in one.dates for b in one.dates}
+            ]
+            return Settled(
+                tuple(verdicts),
+                tuple(kept),
+                tuple(open_closures.values()),
+                found,
+                tuple(sorted(rejected)),
+            )
+        refused |= new
+
+
+@dataclass(frozen=True)
+class _Network:
+    results: Results
+    links: Sequence[Link]
+    found: Adjustment
+    closures: Sequence[Closure]
+    hub: int
+
+    @property
+    def rejected(self) -> set[tuple[int, int]]:
+        """Pairs whose registration contradicts the others."""
+        reached = self.found.reached
+        return {
+            (link.first, link.second)
+            for link, is_kept in zip(self.links, self.found.kept, strict=True)
+            if not is_kept and (reached[link.first] or reached[link.second])
+        }
+
+    def evidence(self, date: int) -> DateEvidence:
+        around = [one for one in self.closures if date in one.dates]
+        own = [
+            bool(is_kept)
+            for link, is_kept in zip(self.links, self.found.kept, strict=True)
+            if date in (link.first, link.second)
+        ]
+        tried = {ends: one for ends, one in self.results.items() if date in ends}
+        return DateEvidence(
+            "",
+            [one.reason for one in tried.values() if not one.accepted],
+            sum(own),
+            sum(date in ends for ends in self.rejected),
+            sum(not one.is_closed for one in around),
+            len(around),
+            bool(self.found.reached[date]),
+            bool(self.found.confirmed[date]),
+            any(self.hub in ends and not one.accepted for ends, one in tried.items()),
+        )
+
+    def verdict(self, date: int) -> DateVerdict:
+        around = [one.error_px for one in self.closures if date in one.dates and one.is_closed]
+        if date == self.hub:
+            evidence, refusal = self.evidence(date), None
+        else:
+            evidence = self.evidence(date)
+            refusal = first_refusal(evidence)
+        if refusal is not None:
+            return refused_date(evidence, refusal)
+        return DateVerdict(
+            evidence,
+            True,
+            _accepted(evidence),
+            displacement=self.found.displacements[date],
+            covariance=self.found.covariances[date],
+            worst_loop_px=max(around, default=None),
+        )
+
+
+def refused_date(evidence: DateEvidence, refusal: tuple[Rule, str]) -> DateVerdict:
+    """Return the verdict on a date that a rule refuses."""
+    rule, reason = refusal
+    return DateVerdict(evidence, False, reason, rule.name, rule.advice)
+
+
+def _accepted(evidence: DateEvidence) -> str:
+    noun = "registration" if evidence.links == 1 else "registrations"
+    if not evidence.is_confirmed:
+        return f"{evidence.links} {noun}, in no loop"
+    way = ", reached by other dates" if evidence.is_refused_by_hub else ""
+    return f"{evidence.links} {noun}, confirmed by loops{way}"

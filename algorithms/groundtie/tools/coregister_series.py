@@ -1,0 +1,109 @@
+"""Register the dates of a series to one reference, or to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any
+
+from ..declaration import Output, tool
+from ..kinds import Choice, FolderOut, MaskIn, Number, RasterIn, RastersIn, Text
+from ..matching.alignment import LINEAR_CANDIDATES
+from ..matching.surface_fit import AUTO
+from ..progress import SILENT, Progress
+from ..series.call import SeriesCall
+from ..series.series import Series
+from .common import MatchingPixelSize, Resampling, Workers
+from .registration_parameters import MASK_HELP, MaxError, OutputGrid, ReportOut, SearchRadius
+
+
+@tool(
+    title="Co-register a series",
+    group="Registration",
+    outputs=(
+        Output("REGISTERED", "Dates that were registered", "verdict.registered"),
+        Output("LEFT_OUT", "Dates that were left out", "verdict.left_out"),
+        Output("LOOP_ERROR_PX", "Median error of loops (px)", "loops.median_px"),
+    ),
+)
+def coregister_series(
+    output_folder: Annotated[
+        Path,
+        FolderOut(
+            label="Output folder",
+            help="Registered dates, series.csv, series.gpkg and series.json; what it holds of an "
+            "earlier run with the same files and parameters is not done again.",
+        ),
+    ],
+    inputs: Annotated[
+        tuple[Any, ...],
+        RastersIn(
+            label="Dates",
+            help="Images of one place: files, folders, patterns, CSV tables with a column file, "
+            "STAC items (.json).",
+        ),
+    ],
+    reference: Annotated[
+        Path | None,
+        RasterIn(
+            label="Reference image",
+            help="The image whose georeferencing is right; without one the mean displacement of "
+            "all dates is zero.",
+        ),
+    ] = None,
+    search_radius: SearchRadius = None,
+    model: Annotated[
+        str,
+        Choice(
+            label="Model",
+            help="Which misregistration is taken out of each date; auto takes for each pair the "
+            "simplest that the points justify.",
+            choices=(AUTO, *LINEAR_CANDIDATES),
+        ),
+    ] = AUTO,
+    max_error: MaxError = 3.0,
+    report: ReportOut = None,
+    band: Annotated[
+        int | None,
+        Number(
+            label="Band",
+            help="The band that is matched, from 1; by default the mean of all bands. Registered "
+            "images have all bands.",
+            integer=True,
+            minimum=1,
+            advanced=True,
+        ),
+    ] = None,
+    asset: Annotated[
+        str | None,
+        Text(
+            label="Asset",
+            help="Which asset of STAC items is meant; by default the only one that is a raster.",
+            advanced=True,
+        ),
+    ] = None,
+    reference_mask: Annotated[
+        Path | None, MaskIn(label="Mask of the reference", help=MASK_HELP, advanced=True)
+    ] = None,
+    matching_pixel_size: MatchingPixelSize = None,
+    output_grid: OutputGrid = "reference",
+    resampling: Resampling = "cubic",
+    workers: Workers = None,
+    progress: Progress = SILENT,
+    parameters: Mapping[str, Any] = MappingProxyType({}),
+) -> Series:
+    """Register the dates of a series to one reference, or to each other.
+
+    Every date is registered to the reference and to its neighbours in time; one adjustment of this
+    network by least squares gives each date's transform. A date that the reference refuses is
+    reached by others. Ways around three dates must lead back to their start. Dates of another
+    place, under clouds or too far off are named and left out; the others stand.
+
+    A date that is added later is registered alone. Without georeferencing, distances are in pixels.
+    """
+    return SeriesCall.of(parameters).run(progress)
+
+
+# As the project's other results are called in Python.
+register_series = coregister_series

@@ -1,0 +1,306 @@
+"""Whether errors are as large as verdicts say: CE50, CE90, CE95 against errors that are known."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+import groundtie
+from groundtie.errors import NotRegisteredError
+
+from .accuracy import CRASHED, REFUSED, FloatArray, Truth
+from .attempt import Pair, on_pixels
+from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
+from .optical_pairs import OpticalPair
+from .real import LARGEST_SHIFT_PX
+from .sar_pairs import SarPair
+from .simulations import Simulation
+from .suites import Goal, Settings, SuiteResult, Table, run_cases
+
+ACCEPTED = "accepted"
+SAID = {"ce50_px": 0.5, "ce90_px": 0.9, "ce95_px": 0.95}
+
+# Of every so many seeds one is a large scene, too: it takes five times as long.
+_SMALL_PX, _LARGE_PX, _LARGE_EVERY = 500, 1500, 5
+
+_RADIUS_PX = 20.0
+
+# What is wanted of the runs of each class, and of how many runs that can be told.
+_WANTED = 0.88, 0.93
+_ENOUGH = 20
+
+# Two-sided 95 % of a normal distribution.
+_Z = 1.96
+
+
+class Made(Protocol):
+    """A simulated pair, kept in a folder."""
+
+    @property
+    def name(self) -> str: ...
+
+    def pair(self, cache: Path) -> Pair: ...
+
+
+@dataclass(frozen=True)
+class CalibrationRun:
+    """What became of one registration.
+
+    Parameters
+    ----------
+    name, group
+        Which case, and its class.
+    verdict
+        Accepted, refused or crashed.
+    reason
+        What the tool said.
+    rms_px
+        Root mean square error over the reference, in its pixels.
+    sigma_px
+        How far the truth can be believed.
+    ce50_px, ce90_px, ce95_px
+        Radii that the verdict gives.
+    within
+        For each of them, the share of places of the reference whose error is not larger.
+    seconds
+        Wall-clock time.
+    """
+
+    name: str
+    group: str
+    verdict: str
+    reason: str
+    rms_px: float = math.nan
+    sigma_px: float = 0.0
+    ce50_px: float = math.nan
+    ce90_px: float = math.nan
+    ce95_px: float = math.nan
+    within: tuple[float, ...] = ()
+    seconds: float = 0.0
+
+    def record(self) -> dict[str, Any]:
+        """Return the run as values that JSON can carry."""
+        values = asdict(self)
+        unknown = {k for k, v in values.items() if isinstance(v, float) and not math.isfinite(v)}
+        return {k: None if k in unknown else v for k, v in values.items()}
+
+    def line(self) -> str:
+        """Return the run as a line of text."""
+        if self.verdict != ACCEPTED:
+            return f"{self.group}: {self.name}: {self.verdict}; {self.reason}"
+        return (
+            f"{self.group}: {self.name}: {self.rms_px:.2f} px (RMS), CE90 {self.ce90_px:.2f} px, "
+            f"which holds {self.within[1]:.0%}, in {self.seconds:.1f} s"
+        )
+
+
+@dataclass(frozen=True)
+class SimulatedCase:
+    """A simulated pair, registered by the tool that fits."""
+
+    made: Made
+    group: str
+    tool: str
+    cache: Path
+
+    def run(self, workers: int | None) -> CalibrationRun:
+        """Make the pair if need be, register it and compare."""
+        pair = self.made.pair(self.cache)
+        return compare(self.made.name, self.group, self.tool, pair, _RADIUS_PX, workers)
+
+
+@dataclass(frozen=True)
+class RealPairCase:
+    """A real pair with a wrong shift."""
+
+    case: RealCase
+    number: int
+
+    def run(self, workers: int | None) -> CalibrationRun:
+        """Write the pair, register it and compare."""
+        shift = draw_shift(self.case, LARGEST_SHIFT_PX, self.number)
+        with tempfile.TemporaryDirectory() as folder:
+            pair = write_case(self.case, shift, Path(folder))
+            radius = search_radius_m(LARGEST_SHIFT_PX)
+            group = f"real {self.case.kind}"
+            return compare(self.case.name, group, "coregister", pair, radius, workers)
+
+
+def compare(
+    name: str, group: str, tool: str, pair: Pair, radius_px: float, workers: int | None
+) -> CalibrationRun:
+    """Register a pair and compare its errors over the reference with the radii of the verdict."""
+    started = time.perf_counter()
+    try:
+        files = pair.reference, pair.input
+        found = getattr(groundtie, tool)(*files, search_radius=radius_px, workers=workers)
+    except NotRegisteredError as refusal:
+        reason = str(refusal) if refusal.verdict is None else refusal.verdict.reason
+        return CalibrationRun(name, group, REFUSED, reason)
+    except Exception as error:
+        # A finding like any other: it is counted, and `run.py` exits with 1.
+        traceback.print_exc()
+        return CalibrationRun(name, group, CRASHED, repr(error))
+    seconds = time.perf_counter() - started
+    assert pair.truth is not None
+    errors = errors_px(
+        pair.truth, on_pixels(found.transform, pair.reference)(pair.truth.reference_px)
+    )
+    verdict = found.verdict
+    radii = verdict.ce50_px, verdict.check_ce90_px, verdict.ce95_px
+    return CalibrationRun(
+        name,
+        group,
+        ACCEPTED,
+        verdict.reason,
+        float(np.sqrt(np.mean(errors**2))),
+        pair.sigma_px,
+        *radii,
+        tuple(
+            float(np.mean(errors <= with_truth_px(radius, said, pair.sigma_px)))
+            for radius, said in zip(radii, SAID.values(), strict=True)
+        ),
+        seconds,
+    )
+
+
+def errors_px(truth: Truth, found_px: FloatArray) -> FloatArray:
+    """Return the errors at the places of a truth, in reference pixels, shape (n,)."""
+    return np.hypot(*((found_px - truth.input_px) @ np.linalg.inv(truth.linear).T).T)
+
+
+def with_truth_px(radius_px: float, said: float, sigma_px: float) -> float:
+    """Return the radius of errors against a truth that errs itself, with a root mean square."""
+    return math.hypot(radius_px, sigma_px * math.sqrt(-math.log(1 - said)))
+
+
+def wilson(held: float, count: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share that was seen in so many runs ([Wilson1927])."""
+    if count == 0:
+        return 0.0, 1.0
+    middle = (held + _Z**2 / (2 * count)) / (1 + _Z**2 / count)
+    half = _Z * math.sqrt(held * (1 - held) / count + (_Z / (2 * count)) ** 2)
+    half /= 1 + _Z**2 / count
+    return max(middle - half, 0.0), min(middle + half, 1.0)
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite."""
+    runs: Sequence[CalibrationRun] = run_cases(cases(settings), settings.jobs)
+    groups = {
+        name: [r for r in runs if r.group == name] for name in dict.fromkeys(r.group for r in runs)
+    }
+    return SuiteResult(
+        "Calibration: said and true errors",
+        [goal(name, group) for name, group in groups.items()],
+        (coverage_table(groups),),
+        [one.record() for one in runs],
+        (
+            "CE90 is said to hold the error of the transform at a random place of the overlap with "
+            "90 %: given is the share of places, over all accepted runs of a class, with the 95 % "
+            "interval for as many runs (places of one run err together). Errors of real pairs are "
+            "against a truth that errs by σ itself, which the radii are widened by.",
+        ),
+    )
+
+
+def cases(settings: Settings) -> list[SimulatedCase | RealPairCase]:
+    """Return the cases, class by class for each seed, so that any part of a run is a sample."""
+    found: list[SimulatedCase | RealPairCase] = []
+    seeds = range(
+        settings.first_seed, settings.first_seed + (1 if settings.quick else settings.seeds)
+    )
+    for seed in seeds:
+        sizes = (_SMALL_PX, _LARGE_PX) if seed % _LARGE_EVERY == 0 else (_SMALL_PX,)
+        for size in sizes[: 1 if settings.quick else 2]:
+            found += [
+                SimulatedCase(made, group, tool, settings.cache)
+                for group, tool, made in _simulated(seed, size)
+            ]
+    if not settings.quick:
+        found += [RealPairCase(case, settings.first_seed) for case in read_cases(settings.data)]
+    return found
+
+
+def _simulated(seed: int, size: int) -> list[tuple[str, str, Made]]:
+    """Return class, tool and pair; looks and changes differ from seed to seed."""
+    further = (("looks", float(1 + seed % 3)), ("changed", 10.0 * (seed % 2)))
+    large = ", large" if size >= _LARGE_PX else ""
+    made: list[tuple[str, str, Made]] = [
+        (density + large, "coregister", Simulation(size, density, seed, 8.0, further))
+        for density in ("rural", "suburban", "urban", "city")
+    ]
+    for density in ("rural", "suburban"):
+        radar = SarPair(size, density, seed, 1 + seed % 4, bool(seed % 2))
+        made.append((f"SAR–SAR, {density}{large}", "match_sar_sar", radar))
+        camera = OpticalPair(size, density, seed)
+        made.append((f"optical, {density}{large}", "match_optical", camera))
+    return made
+
+
+def goal(name: str, runs: Sequence[CalibrationRun]) -> Goal:
+    """Return the goal of a class and what was found."""
+    share, count = coverage(runs, 1)
+    low, high = _WANTED
+    reached = None if count < _ENOUGH else low <= share <= high
+    said = f"{share:.0%} of places, {count} runs" if count else "no run was accepted"
+    return Goal(f"{name}: within CE90", f"{low:.0%} to {high:.0%}", said, reached)
+
+
+def coverage(runs: Sequence[CalibrationRun], which: int) -> tuple[float, int]:
+    """Return the share of places within a radius, over accepted runs, and how many these are."""
+    accepted = [one for one in runs if one.verdict == ACCEPTED]
+    share = float(np.mean([one.within[which] for one in accepted])) if accepted else math.nan
+    return share, len(accepted)
+
+
+def coverage_table(groups: dict[str, list[CalibrationRun]]) -> Table:
+    """Return a row for each class, and one for all."""
+    head = (
+        "class",
+        "runs",
+        "accepted",
+        "median RMS (px)",
+        "median CE90 (px)",
+        "within CE50",
+        "within CE90",
+        "95 % interval",
+        "within CE95",
+        "runs whose RMS is below CE90",
+    )
+    simulated = [
+        one for name, runs in groups.items() if not name.startswith("real") for one in runs
+    ]
+    rows = [_row(name, runs) for name, runs in (*groups.items(), ("all simulated", simulated))]
+    return Table("Coverage by class", head, rows)
+
+
+def _row(name: str, runs: Sequence[CalibrationRun]) -> list[str]:
+    accepted = [one for one in runs if one.verdict == ACCEPTED]
+    if not accepted:
+        return [name, str(len(runs)), "0", *["–"] * 7]
+    shares = [coverage(accepted, which)[0] for which in range(len(SAID))]
+    low, high = wilson(shares[1], len(accepted))
+    below = np.mean(
+        [one.rms_px <= with_truth_px(one.ce90_px, 0.9, one.sigma_px) for one in accepted]
+    )
+    return [
+        name,
+        str(len(runs)),
+        str(len(accepted)),
+        f"{np.median([one.rms_px for one in accepted]):.2f}",
+        f"{np.median([one.ce90_px for one in accepted]):.2f}",
+        f"{shares[0]:.0%}",
+        f"{shares[1]:.0%}",
+        f"{low:.0%} to {high:.0%}",
+        f"{shares[2]:.0%}",
+        f"{below:.0%}",
+    ]

@@ -1,0 +1,105 @@
+"""Simulated pairs of optical images: one place seen twice, in another light, from elsewhere."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+import math
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from groundtie.geometry.transform import Transform, load_transform
+from groundtie.simulation.misregistration import (
+    DistortionOptions,
+    SourcePositions,
+    draw_misregistration,
+    needed_margin,
+    resample,
+)
+from groundtie.simulation.optical import OpticalOptions, blur, quantise, render_radiance
+from groundtie.simulation.pair import map_grid, scene_grid
+from groundtie.simulation.scene import SceneOptions, generate_scenes
+
+from .accuracy import Truth
+from .attempt import Pair, on_pixels
+from .cases import write_image
+from .sar_pairs import CHANGED_BUILDINGS
+from .simulations import linear_of, simulator_version
+
+# Morning and afternoon, from the west and from the east.
+_EARLIER = OpticalOptions(sun_azimuth_deg=140.0, bands=("green",))
+_LATER = OpticalOptions(210.0, 35.0, view_azimuth_deg=100.0, off_nadir_deg=8.0, bands=("red",))
+
+_NAMES = ("reference.tif", "input.tif", "truth.json")
+
+# The second image's textures and noise are others.
+_OTHER_DATE = 100_000
+
+
+@dataclass(frozen=True)
+class OpticalPair:
+    """What a simulated pair of optical images is made from.
+
+    Parameters
+    ----------
+    size, density, seed
+        See `groundtie.simulate`; pixels are of 1 m.
+    """
+
+    size: int
+    density: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Name for people."""
+        return f"optical {self.density} {self.size}², seed {self.seed}"
+
+    def pair(self, cache: Path) -> Pair:
+        """Return the pair, which is made unless the folder `cache` has it."""
+        words = f"{self.size}-{self.density}-{self.seed}"
+        folder = cache / f"optical-{words}-{simulator_version()}-{_own_version()}"
+        reference, image, found = (folder / name for name in _NAMES)
+        # The truth is written last.
+        if not found.exists():
+            folder.mkdir(parents=True, exist_ok=True)
+            self._write(reference, image, found)
+        mapping = on_pixels(load_transform(found), reference)
+        size = (self.size, self.size)
+        lattice = Truth.on_lattice(mapping, size, linear_of(mapping, size))
+        return Pair(reference, image, lattice, lattice)
+
+    def _write(self, reference_path: Path, input_path: Path, truth_path: Path) -> None:
+        options = SceneOptions(
+            (self.size, self.size),
+            density=self.density,
+            seed=self.seed,
+            changed=CHANGED_BUILDINGS,
+        )
+        grid = map_grid(options)
+        model = draw_misregistration(DistortionOptions(), grid, self.seed)
+        truth = Transform(model, grid.crs, grid)
+        reach = max(one.lean + one.shadow for one in (_EARLIER, _LATER))
+        around = needed_margin(model, grid, grid) + math.ceil(reach * options.highest_object_m)
+        earlier, later = generate_scenes(options, around)
+        later = replace(later, seed=self.seed + _OTHER_DATE)
+        noise = np.random.default_rng((self.seed, 1)), np.random.default_rng((self.seed, 2))
+        light = render_radiance(earlier, _EARLIER)[0]
+        blur(light, _EARLIER.psf_sigma_px)
+        inner = slice(around, around + self.size)
+        image = quantise(light[inner, inner], _EARLIER, noise[0])
+        write_image(image[None], grid.transform, reference_path)
+        light = render_radiance(later, _LATER)[0]
+        blur(light, _LATER.psf_sigma_px)
+        seen = resample(light, SourcePositions.of(truth, scene_grid(grid, around)), self.size)
+        write_image(quantise(seen, _LATER, noise[1])[None], grid.transform, input_path)
+        truth_path.write_text(json.dumps(truth.to_json()), encoding="utf-8")
+
+
+def _own_version() -> str:
+    source = inspect.getsource(sys.modules[__name__])
+    return hashlib.sha256(source.encode()).hexdigest()[:8]

@@ -1,0 +1,140 @@
+"""What the dock draws on the map: images over it, up to a line, and tie points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from qgis.core import (
+    QgsContrastEnhancement,
+    QgsMapRendererParallelJob,
+    QgsMapSettings,
+    QgsPointXY,
+    QgsRasterLayer,
+    QgsRasterMinMaxOrigin,
+    QgsRectangle,
+)
+from qgis.gui import QgsMapCanvas, QgsMapCanvasItem
+from qgis.PyQt.QtCore import QPointF, QRectF, Qt
+from qgis.PyQt.QtGui import QColor, QImage, QPen
+
+# Residuals up to 1 px, up to 2 px and above, as in styles/tie_points.qml.
+_COLOURS = ((1.0, QColor("#1a9850")), (2.0, QColor("#f59b00")), (float("inf"), QColor("#d73027")))
+_OFF = QColor("#8c8c8c")
+
+
+def clearly(layer: Any) -> Any:
+    """Return a layer to look at: one band of grey without the brightest, which hide the rest.
+
+    A radar image between its least and its largest value is black.
+    """
+    if not isinstance(layer, QgsRasterLayer) or layer.renderer().type() != "singlebandgray":
+        return layer
+    copy = layer.clone()
+    copy.setContrastEnhancement(
+        QgsContrastEnhancement.StretchToMinimumMaximum, QgsRasterMinMaxOrigin.CumulativeCut
+    )
+    return copy
+
+
+class Overlay(QgsMapCanvasItem):
+    """Draws layers over the map, left of a line: a swipe; or all over it.
+
+    Parameters
+    ----------
+    canvas
+        The map.
+    """
+
+    def __init__(self, canvas: QgsMapCanvas) -> None:
+        super().__init__(canvas)
+        self._canvas = canvas
+        self._layers: list[Any] = []
+        self._image = QImage()
+        self._extent = QgsRectangle()
+        self._job: QgsMapRendererParallelJob | None = None
+        self.share = 1.0
+        self.setZValue(10)
+        canvas.mapCanvasRefreshed.connect(self.render)
+
+    def show_layers(self, layers: list[Any], share: float = 1.0) -> None:
+        """Draw layers over the left `share` of the map; none: nothing."""
+        self._layers, self.share = layers, share
+        self.render()
+
+    def take_away(self) -> None:
+        """Take this from the map for good."""
+        self.show_layers([])
+        self._canvas.mapCanvasRefreshed.disconnect(self.render)
+        self._canvas.scene().removeItem(self)
+
+    def set_share(self, share: float) -> None:
+        """Move the line to a share of the map's width."""
+        self.share = min(max(share, 0.0), 1.0)
+        self.update()
+
+    def render(self) -> None:
+        """Draw the layers anew, as the map is now."""
+        self.setVisible(bool(self._layers))
+        if not self._layers:
+            return
+        settings = QgsMapSettings(self._canvas.mapSettings())
+        settings.setLayers(self._layers)
+        self._job = QgsMapRendererParallelJob(settings)
+        self._job.finished.connect(self._drawn)
+        self._job.start()
+
+    def _drawn(self) -> None:
+        if self._job is None or not self._layers:
+            return
+        self._image = self._job.renderedImage()
+        self._extent = self._canvas.extent()
+        self.setRect(self._canvas.extent())
+        self.update()
+
+    def paint(self, painter: Any, option: Any = None, widget: Any = None) -> None:
+        if self._image.isNull() or not self._layers:
+            return
+        size = self._canvas.size()
+        width = size.width() * self.share
+        painter.save()
+        painter.setClipRect(QRectF(0, 0, width, size.height()))
+        painter.drawImage(QRectF(0, 0, size.width(), size.height()), self._image)
+        painter.restore()
+        if self.share < 1.0:
+            painter.setPen(QPen(QColor("white"), 3))
+            painter.drawLine(QPointF(width, 0), QPointF(width, size.height()))
+            painter.setPen(QPen(QColor("black"), 1))
+            painter.drawLine(QPointF(width, 0), QPointF(width, size.height()))
+
+
+class PointsItem(QgsMapCanvasItem):
+    """Draws tie points: lines from nominal to reference positions, marks at the latter."""
+
+    def __init__(self, canvas: QgsMapCanvas) -> None:
+        super().__init__(canvas)
+        self._canvas = canvas
+        self.rows: list[tuple[QgsPointXY, QgsPointXY, float, bool, bool]] = []
+        self.chosen = -1
+        self.setZValue(20)
+
+    def show_points(self, rows: list[tuple[QgsPointXY, QgsPointXY, float, bool, bool]]) -> None:
+        """Draw rows of nominal place, place on the reference, residual, whether used and check."""
+        self.rows = rows
+        self.updatePosition()
+
+    def updatePosition(self) -> None:
+        """Cover the map (called by QGIS when that moves)."""
+        self.setRect(self._canvas.extent())
+        self.update()
+
+    def paint(self, painter: Any, option: Any = None, widget: Any = None) -> None:
+        painter.setRenderHint(painter.RenderHint.Antialiasing)
+        for index, (nominal, place, residual, used, check) in enumerate(self.rows):
+            start, end = self.toCanvasCoordinates(nominal), self.toCanvasCoordinates(place)
+            colour = next(c for limit, c in _COLOURS if not residual > limit) if used else _OFF
+            painter.setPen(QPen(colour, 3 if index == self.chosen else 1.5))
+            painter.drawLine(start, end)
+            painter.setBrush(colour if used else Qt.BrushStyle.NoBrush)
+            reach = 6 if index == self.chosen else 4
+            mark = QRectF(end.x() - reach, end.y() - reach, 2 * reach, 2 * reach)
+            painter.drawRect(mark) if check else painter.drawEllipse(mark)

@@ -1,0 +1,106 @@
+"""The dock *Raster > GroundTie*: start, verdict, look, repair."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from qgis.core import QgsProject, QgsRasterLayer
+from qgis.PyQt.QtCore import Qt
+from qgis.PyQt.QtWidgets import QDockWidget, QTabWidget
+
+from .canvas_items import Overlay
+from .library import errors
+from .look_page import LookPage
+from .repair_page import RepairPage
+from .run import Outcome
+from .start_page import StartPage
+
+
+class GroundTieDock(QDockWidget):
+    """Drives the algorithms from two layers to a registered image that was looked at.
+
+    Parameters
+    ----------
+    iface
+        The desktop.
+    """
+
+    def __init__(self, iface: Any) -> None:
+        super().__init__("GroundTie", iface.mainWindow())
+        self.setObjectName("GroundTieDock")
+        canvas = iface.mapCanvas()
+        self.overlay = Overlay(canvas)
+        self.start = StartPage(canvas, self._registered)
+        self.look = LookPage(canvas, self.overlay)
+        self.repair = RepairPage(canvas, self.overlay, self.look.show_worst, self._written)
+        self.tabs = QTabWidget()
+        for page, title in ((self.start, "Register"), (self.look, "Look"), (self.repair, "Repair")):
+            self.tabs.addTab(page, title)
+        self.tabs.currentChanged.connect(self._turn_to)
+        self.setWidget(self.tabs)
+        self.setAllowedAreas(
+            Qt.DockWidgetArea.LeftDockWidgetArea | Qt.DockWidgetArea.RightDockWidgetArea
+        )
+        self._canvas = canvas
+        QgsProject.instance().layersWillBeRemoved.connect(self._forget)
+
+    def _turn_to(self, _: int) -> None:
+        """Show on the map what belongs to a page."""
+        page = self.tabs.currentWidget()
+        self.repair.points.setVisible(page is not self.look)
+        if page is not self.look:
+            self.look.stop()
+        if page is not self.repair:
+            self.repair.stop()
+
+    def _registered(self, outcome: Outcome, reference: Any, input: Any) -> None:
+        """Go on with what came of a registration."""
+        registered = _layer_of(outcome.files.get("OUTPUT"))
+        self.look.show_pair(reference, registered)
+        if outcome.succeeded or outcome.files.get("REPORT"):
+            try:
+                self.repair.open(reference, input, outcome.files.get("TIE_POINTS"))
+            except errors.GroundTieError as error:
+                self.repair.close_points()
+                self.repair.text.setText(error.one_line())
+
+    def _written(self, reference: Any, layer: Any) -> None:
+        self.look.show_pair(reference, layer)
+
+    def _forget(self, ids: list[str]) -> None:
+        """Show nothing of layers that are taken out of the project."""
+        self.look.stop()
+        self.overlay.show_layers([])
+        self.look.show_pair(None, None)
+        self.repair.close_points()
+
+    def closeEvent(self, event: Any) -> None:
+        """Leave the map as it is."""
+        self.look.stop()
+        self.repair.stop()
+        self.repair.points.hide()
+        super().closeEvent(event)
+
+    def showEvent(self, event: Any) -> None:
+        """Begin with what the project has."""
+        if self.start.outcome is None:
+            self.start.propose()
+        self.repair.points.setVisible(self.tabs.currentWidget() is not self.look)
+        super().showEvent(event)
+
+    def take_away(self) -> None:
+        """Remove what was drawn on the map, and the connections (for unloading)."""
+        QgsProject.instance().layersWillBeRemoved.disconnect(self._forget)
+        self.look.stop()
+        self.overlay.take_away()
+        self._canvas.scene().removeItem(self.repair.points)
+
+
+def _layer_of(path: Any) -> Any:
+    """Return the project's layer of a file; None if there is none."""
+    found = [
+        layer
+        for layer in QgsProject.instance().mapLayers().values()
+        if isinstance(layer, QgsRasterLayer) and path is not None and layer.source() == str(path)
+    ]
+    return found[0] if found else None

@@ -1,0 +1,174 @@
+"""The dock's second page: reference and registered image against each other, at full resolution."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from qgis.core import QgsPointXY, QgsRectangle
+from qgis.PyQt.QtCore import Qt, QTimer
+from qgis.PyQt.QtGui import QKeySequence
+from qgis.PyQt.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QShortcut,
+    QVBoxLayout,
+    QWidget,
+)
+
+from .canvas_items import Overlay, clearly
+from .map_tools import SwipeTool
+from .reference_export import between
+
+_FLICKER_MS = 600
+# Side of what is shown of a place, in pixels of the reference: about one of the screen each.
+_SHOWN_PX = 400
+_CORNERS = ("Top left", "Top right", "Bottom left", "Bottom right")
+
+
+class LookPage(QWidget):
+    """Swipes and flickers, and goes from place to place.
+
+    Parameters
+    ----------
+    canvas
+        The map.
+    overlay
+        What draws images over it.
+    """
+
+    def __init__(self, canvas: Any, overlay: Overlay) -> None:
+        super().__init__()
+        self._canvas, self._overlay = canvas, overlay
+        self._reference: Any = None
+        self._registered: Any = None
+        self._worst: list[QgsPointXY] = []
+        self._at = -1
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self._flick)
+        self._tool = SwipeTool(canvas, overlay)
+        self._build()
+
+    def _build(self) -> None:
+        self.hint = QLabel("Register two images first.")
+        self.hint.setWordWrap(True)
+        self.swipe, self.flicker = QPushButton("Swipe"), QPushButton("Flicker")
+        for button in (self.swipe, self.flicker):
+            button.setCheckable(True)
+        self.swipe.toggled.connect(self._swipe)
+        self.flicker.toggled.connect(self._flicker)
+        self.next, self.previous = QPushButton("Next worst point (N)"), QPushButton("Back (B)")
+        self.next.clicked.connect(lambda: self.go(1))
+        self.previous.clicked.connect(lambda: self.go(-1))
+        for key, step in (("N", 1), ("B", -1)):
+            shortcut = QShortcut(QKeySequence(key), self._canvas)
+            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            shortcut.activated.connect(lambda step=step: self.go(step))
+        self.corners = [QPushButton(name) for name in _CORNERS]
+        layout = QVBoxLayout(self)
+        layout.addWidget(self.hint)
+        for row in ((self.swipe, self.flicker), (self.previous, self.next)):
+            line = QHBoxLayout()
+            for button in row:
+                line.addWidget(button)
+            layout.addLayout(line)
+        grid = QGridLayout()
+        for index, button in enumerate(self.corners):
+            button.clicked.connect(lambda *_, index=index: self.go_to_corner(index))
+            grid.addWidget(button, index // 2, index % 2)
+        layout.addLayout(grid)
+        layout.addStretch()
+        self._enable()
+
+    def show_pair(self, reference: Any, registered: Any) -> None:
+        """Take two layers to look at; None: nothing."""
+        self.stop()
+        self._reference, self._registered = reference, registered
+        self._enable()
+
+    def show_worst(self, places: list[QgsPointXY]) -> None:
+        """Take the places to go to, on the map, the worst first."""
+        self._worst, self._at = places, -1
+        self._enable()
+
+    def _enable(self) -> None:
+        ready = self._reference is not None and self._registered is not None
+        for button in (self.swipe, self.flicker, *self.corners):
+            button.setEnabled(ready)
+        for button in (self.next, self.previous):
+            button.setEnabled(bool(self._worst))
+        if ready:
+            self.hint.setText(
+                "Left of the line: the reference. Swipe: move the mouse over the map. Roads and "
+                "shores must run on over the line."
+            )
+
+    def stop(self) -> None:
+        """Show the map as it is."""
+        self.swipe.setChecked(False)
+        self.flicker.setChecked(False)
+
+    def _swipe(self, on: bool) -> None:
+        if on:
+            self.flicker.setChecked(False)
+            self._show_registered()
+            self._overlay.show_layers([clearly(self._reference)], 0.5)
+            self._canvas.setMapTool(self._tool)
+        else:
+            self._overlay.show_layers([])
+            self._canvas.unsetMapTool(self._tool)
+
+    def _flicker(self, on: bool) -> None:
+        if on:
+            self.swipe.setChecked(False)
+            self._show_registered()
+            self._overlay.show_layers([clearly(self._reference)])
+            self._timer.start(_FLICKER_MS)
+        else:
+            self._timer.stop()
+            self._overlay.show_layers([])
+
+    def _flick(self) -> None:
+        self._overlay.set_share(0.0 if self._overlay.share else 1.0)
+
+    def _show_registered(self) -> None:
+        from qgis.core import QgsProject
+
+        node = QgsProject.instance().layerTreeRoot().findLayer(self._registered.id())
+        if node is not None:
+            node.setItemVisibilityCheckedParentRecursive(True)
+
+    def go(self, step: int) -> None:
+        """Go to the next, or the one before, of the worst points."""
+        if self._worst:
+            self._at = (self._at + step) % len(self._worst)
+            self.go_to(self._worst[self._at])
+
+    def go_to_corner(self, index: int) -> None:
+        """Go to a corner of the registered image: a tenth of its sides inside."""
+        box = self._registered.extent()
+        across, down = (0.1, 0.9)[index % 2], (0.9, 0.1)[index // 2]
+        place = QgsPointXY(
+            box.xMinimum() + across * box.width(), box.yMinimum() + down * box.height()
+        )
+        self.go_to(self._on_map(place))
+
+    def _on_map(self, place: QgsPointXY) -> QgsPointXY:
+        crs = self._canvas.mapSettings().destinationCrs()
+        return between(self._registered.crs(), crs).transform(place)
+
+    def go_to(self, place: QgsPointXY) -> None:
+        """Show a place of the map at full resolution."""
+        layer = self._reference
+        half = _SHOWN_PX / 2 * (layer.rasterUnitsPerPixelX() if layer is not None else 1.0)
+        if layer is not None:
+            crs = self._canvas.mapSettings().destinationCrs()
+            centre = between(crs, layer.crs()).transform(place)
+            box = QgsRectangle(
+                centre.x() - half, centre.y() - half, centre.x() + half, centre.y() + half
+            )
+            self._canvas.setExtent(between(layer.crs(), crs).transformBoundingBox(box))
+        else:
+            self._canvas.setCenter(place)
+        self._canvas.refresh()

@@ -1,0 +1,93 @@
+"""What the mouse does on the map while the dock looks at images or repairs points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from qgis.core import QgsPointXY
+from qgis.gui import QgsMapCanvas, QgsMapTool
+from qgis.PyQt.QtCore import Qt
+
+from .canvas_items import Overlay, PointsItem
+
+# A click within this many pixels of the screen takes hold of a point.
+_REACH_PX = 10
+
+
+class SwipeTool(QgsMapTool):
+    """The line between two images follows the mouse."""
+
+    def __init__(self, canvas: QgsMapCanvas, overlay: Overlay) -> None:
+        super().__init__(canvas)
+        self._overlay = overlay
+        self.setCursor(Qt.CursorShape.SplitHCursor)
+
+    def canvasMoveEvent(self, event: Any) -> None:
+        self._overlay.set_share(event.pos().x() / max(self.canvas().width(), 1))
+
+
+class DragTool(QgsMapTool):
+    """Takes hold of tie points and moves them.
+
+    Parameters
+    ----------
+    moved
+        Called with the index, the end (0: in the input, 1: on the reference) and its new place on
+        the map.
+    chosen
+        Called with the index of a point that was clicked.
+    """
+
+    def __init__(
+        self,
+        canvas: QgsMapCanvas,
+        points: PointsItem,
+        moved: Callable[[int, int, QgsPointXY], None],
+        chosen: Callable[[int], None],
+    ) -> None:
+        super().__init__(canvas)
+        self._points, self._moved, self._chosen = points, moved, chosen
+        self._held: tuple[int, int] | None = None
+        self._pressed: Any = None
+
+    def canvasPressEvent(self, event: Any) -> None:
+        self._held, self._pressed = self._nearest(event.pos()), event.pos()
+        if self._held is not None:
+            self._chosen(self._held[0])
+
+    def canvasMoveEvent(self, event: Any) -> None:
+        if self._held is None:
+            return
+        index, end = self._held
+        row = list(self._points.rows[index])
+        row[end] = self.toMapCoordinates(event.pos())
+        self._points.rows[index] = tuple(row)  # type: ignore[assignment, call-overload]
+        self._points.update()
+
+    def canvasReleaseEvent(self, event: Any) -> None:
+        if self._held is not None and event.pos() != self._pressed:
+            self._moved(*self._held, self.toMapCoordinates(event.pos()))
+        self._held = None
+
+    def _nearest(self, position: Any) -> tuple[int, int] | None:
+        ends = [
+            ((place.x() - position.x()) ** 2 + (place.y() - position.y()) ** 2, index, end)
+            for index, row in enumerate(self._points.rows)
+            for end in (1, 0)
+            for place in (self._points.toCanvasCoordinates(row[end]),)
+        ]
+        squared, index, end = min(ends, default=(float("inf"), -1, 0), key=lambda one: one[0])
+        return (index, end) if squared <= _REACH_PX**2 else None
+
+
+class ClickTool(QgsMapTool):
+    """Hands one click after the other over."""
+
+    def __init__(self, canvas: QgsMapCanvas, clicked: Callable[[QgsPointXY], None]) -> None:
+        super().__init__(canvas)
+        self._clicked = clicked
+        self.setCursor(Qt.CursorShape.CrossCursor)
+
+    def canvasReleaseEvent(self, event: Any) -> None:
+        self._clicked(self.toMapCoordinates(event.pos()))

@@ -1,0 +1,63 @@
+"""Which raster layers of the project are proposed as reference and as input: never one as both."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import qgis.utils
+from qgis.core import QgsProject, QgsRasterLayer, QgsUnitTypes
+from qgis.PyQt.QtCore import QCoreApplication, QThread
+
+from .definitions import qgis_name
+from .library import kinds
+
+# What a box shows that shall begin empty: QGIS would fill it with a layer.
+NOTHING = " "
+
+
+def preselect(algorithm: Any, tool: Any) -> None:
+    """Have the dialog of a tool that needs two rasters begin with two different ones.
+
+    QGIS by itself begins with the active layer in both boxes.
+    """
+    names = [p.name for p in tool.parameters if p.required and isinstance(p.kind, kinds.RasterIn)]
+    if len(names) != 2 or "reference" not in names or not _in_desktop():
+        return
+    reference, input = proposed_pair(raster_files(), qgis.utils.iface.activeLayer())
+    proposed = {name: reference if name == "reference" else input for name in names}
+    for name, layer in proposed.items():
+        definition = algorithm.parameterDefinition(qgis_name(name))
+        definition.setGuiDefaultValueOverride(NOTHING if layer is None else layer.id())
+
+
+def raster_files() -> list[Any]:
+    """Return the project's raster layers that are files, from the top of the map."""
+    order = QgsProject.instance().layerTreeRoot().layerOrder()
+    rasters = [layer for layer in order if isinstance(layer, QgsRasterLayer)]
+    return [layer for layer in rasters if layer.providerType() == "gdal" and layer.isValid()]
+
+
+def proposed_pair(rasters: list[Any], active: Any = None) -> tuple[Any, Any]:
+    """Return which of some layers to propose as reference and input; None where there is none.
+
+    Of two, the input is the one with smaller pixels, or with more bands: optical images are.
+    """
+    first = sorted(rasters, key=lambda layer: layer is not active)[:2]
+    if len(first) < 2:
+        return (first or [None])[0], None
+    reference, input = sorted(first, key=_as_input)
+    return reference, input
+
+
+def _as_input(layer: Any) -> tuple[float, int]:
+    to_metres = QgsUnitTypes.fromUnitToUnitFactor(
+        layer.crs().mapUnits(), QgsUnitTypes.DistanceMeters
+    )
+    pixel = layer.rasterUnitsPerPixelX() * (to_metres or 1.0)
+    return -float(f"{pixel:.2g}"), layer.bandCount()
+
+
+def _in_desktop() -> bool:
+    application = QCoreApplication.instance()
+    in_main = application is not None and QThread.currentThread() == application.thread()
+    return qgis.utils.iface is not None and in_main

@@ -1,0 +1,104 @@
+"""References that are no files: web maps, or the map as it is drawn, written to one."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from qgis.core import (
+    QgsCoordinateTransform,
+    QgsMapRendererParallelJob,
+    QgsMapSettings,
+    QgsProject,
+    QgsRasterLayer,
+)
+from qgis.PyQt.QtCore import QSize
+from qgis.PyQt.QtGui import QImage
+
+from .run import new_file
+
+MAP = "The map as it is drawn"
+# The side of the largest picture that is drawn; a larger input is compared with a coarser one.
+_MOST_PX = 8192
+# How much of the input's side is drawn around it, so that it may lie off.
+_MARGIN = 0.1
+
+
+def with_files(reference: Any, input: Any, canvas: Any) -> tuple[Any, dict[str, Any]]:
+    """Return the reference as a layer that is a file, and the algorithm's values for both.
+
+    Parameters
+    ----------
+    reference
+        A raster layer; None: the map as it is drawn, without the input.
+    input
+        The raster layer to be registered.
+    canvas
+        The map.
+    """
+    if reference is None:
+        layers = [layer for layer in canvas.layers() if layer != input]
+        reference = drawn(layers, input, "map")
+    elif reference.providerType() != "gdal":
+        reference = drawn([reference], input, reference.name())
+    return reference, {"REFERENCE": named(reference), "INPUT": named(input)}
+
+
+def named(layer: Any) -> str:
+    """Return what names a layer to an algorithm: its id in the project, else its file."""
+    known = QgsProject.instance().mapLayer(layer.id()) is not None
+    return str(layer.id() if known else layer.source())
+
+
+def drawn(layers: list[Any], input: Any, name: str) -> QgsRasterLayer:
+    """Return layers drawn over the extent of a raster, with its pixel size, as a file."""
+    path = new_file(f"{name}.tif")
+    extent = input.extent()
+    extent.grow(_MARGIN * max(extent.width(), extent.height()))
+    pixel = input.rasterUnitsPerPixelX()
+    pixel *= max(1.0, max(extent.width(), extent.height()) / pixel / _MOST_PX)
+    size = QSize(math.ceil(extent.width() / pixel), math.ceil(extent.height() / pixel))
+    settings = QgsMapSettings()
+    settings.setLayers(layers)
+    settings.setDestinationCrs(input.crs())
+    settings.setTransformContext(QgsProject.instance().transformContext())
+    settings.setOutputDpi(96)
+    settings.setOutputSize(size)
+    settings.setExtent(extent)
+    job = QgsMapRendererParallelJob(settings)
+    job.start()
+    job.waitForFinished()
+    _write(path, job.renderedImage(), settings.visibleExtent(), input.crs())
+    return QgsRasterLayer(str(path), name)
+
+
+def _write(path: Any, image: QImage, extent: Any, crs: Any) -> None:
+    import numpy as np
+    import rasterio
+    from rasterio.transform import from_bounds
+
+    from .dependencies import rasterio_env
+
+    image = image.convertToFormat(QImage.Format.Format_RGBA8888)
+    width, height = image.width(), image.height()
+    bits = image.constBits()
+    bits.setsize(image.bytesPerLine() * height)
+    pixels = np.frombuffer(bits, np.uint8).reshape(height, -1)[:, : 4 * width]
+    bands = pixels.reshape(height, width, 4).transpose(2, 0, 1)[:3]
+    edges = extent.xMinimum(), extent.yMinimum(), extent.xMaximum(), extent.yMaximum()
+    profile = {
+        "driver": "GTiff",
+        "dtype": "uint8",
+        "count": 3,
+        "width": width,
+        "height": height,
+        "crs": crs.toWkt(),
+        "transform": from_bounds(*edges, width, height),
+    }
+    with rasterio_env(), rasterio.open(path, "w", **profile) as raster:
+        raster.write(bands)
+
+
+def between(source: Any, target: Any) -> QgsCoordinateTransform:
+    """Return the transform between two CRSs."""
+    return QgsCoordinateTransform(source, target, QgsProject.instance())

@@ -1,0 +1,320 @@
+"""The dock's third page: tie points as a table and on the map, fitted again after every change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from qgis.core import QgsCoordinateReferenceSystem, QgsPointXY, QgsProject, QgsRasterLayer
+from qgis.PyQt.QtCore import QSortFilterProxyModel, Qt
+from qgis.PyQt.QtWidgets import (
+    QAbstractItemView,
+    QCheckBox,
+    QComboBox,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QTableView,
+    QVBoxLayout,
+    QWidget,
+)
+
+from .canvas_items import Overlay, PointsItem, clearly
+from .library import errors, library_module
+from .map_tools import ClickTool, DragTool
+from .point_table import SORT_ROLE, PointTable
+from .reference_export import between, named
+from .run import Outcome, Run, new_file
+from .start_page import points_name
+from .wording import choice_label
+
+# As the verdict counts them.
+TOLERANCE_PX = library_module("geometry.judging").TOLERANCE_PX
+
+# Words of models are long: the list shows what they begin with.
+_MODELS = {"translation": "Shift", "rigid": "Rigid", "similarity": "Similarity", "affine": "Affine"}
+
+
+class RepairPage(QWidget):
+    """Switches points off, moves and adds them, and writes the image that they give.
+
+    Parameters
+    ----------
+    canvas
+        The map.
+    overlay
+        What draws images over it.
+    changed
+        Called with the places of the points on the map, the worst first, after every fit.
+    written
+        Called with the reference and the layer that was written.
+    """
+
+    def __init__(
+        self,
+        canvas: Any,
+        overlay: Overlay,
+        changed: Callable[[list[QgsPointXY]], None],
+        written: Callable[[Any, Any], None],
+    ) -> None:
+        super().__init__()
+        self._canvas, self._overlay = canvas, overlay
+        self._changed, self._written = changed, written
+        self.review: Any = None
+        self.fits: dict[str, Any] = {}
+        self._reference: Any = None
+        self._input: Any = None
+        self._clicked: QgsPointXY | None = None
+        self._run: Run | None = None
+        self.points = PointsItem(canvas)
+        self._drag = DragTool(canvas, self.points, self._moved_on_map, self._choose)
+        self._click = ClickTool(canvas, self._clicked_on_map)
+        self._build()
+
+    def _build(self) -> None:
+        self.text = QLabel("Register two images first.")
+        self.text.setWordWrap(True)
+        self.model = QComboBox()
+        self.model.currentIndexChanged.connect(lambda *_: self._show_fit())
+        self.table = PointTable(self)
+        self.table.switched.connect(self._switch)
+        proxy = QSortFilterProxyModel(self)
+        proxy.setSourceModel(self.table)
+        proxy.setSortRole(SORT_ROLE)
+        self.view = QTableView()
+        self.view.setModel(proxy)
+        self.view.setSortingEnabled(True)
+        self.view.sortByColumn(2, Qt.SortOrder.DescendingOrder)
+        self.view.verticalHeader().hide()
+        self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.view.clicked.connect(lambda index: self._zoom(proxy.mapToSource(index).row()))
+        self.drag, self.add = QPushButton("Move points"), QPushButton("Add a point")
+        self.drag.setCheckable(True)
+        self.add.setCheckable(True)
+        self.drag.toggled.connect(self._set_dragging)
+        self.add.toggled.connect(self._set_adding)
+        self.match = QCheckBox("refine clicks by similarity")
+        self.match.setChecked(True)
+        self.write = QPushButton("Write image")
+        self.write.clicked.connect(self.start_writing)
+        layout = QVBoxLayout(self)
+        for row in ((self.model,), (self.drag, self.add)):
+            line = QHBoxLayout()
+            for widget in row:
+                line.addWidget(widget)
+            layout.addLayout(line)
+        layout.addWidget(self.match)
+        layout.addWidget(self.view)
+        layout.addWidget(self.text)
+        layout.addWidget(self.write)
+        self._enable()
+
+    def _enable(self) -> None:
+        for widget in (self.drag, self.add, self.match, self.model):
+            widget.setEnabled(self.review is not None)
+        self.write.setEnabled(bool(self.fits))
+
+    def open(self, reference: Any, input: Any, path: Any, kind: str = "affine") -> None:
+        """Take the tie points of a registration; None: begin with none."""
+        from .dependencies import rasterio_env
+
+        review = library_module("review")
+        self._reference, self._input = reference, input
+        with rasterio_env():
+            if path is not None:
+                opened = review.Review.open(path, input.source())
+            else:
+                opened = review.without_points(reference.source(), input.source())
+        self.change(opened, kind)
+        self.text.setText(self._summary() if path is not None else _FIRST_POINTS)
+
+    def close_points(self) -> None:
+        """Forget the points."""
+        self.review, self.fits = None, {}
+        self.points.show_points([])
+        self._enable()
+
+    def stop(self) -> None:
+        """Leave the map to others."""
+        self.drag.setChecked(False)
+        self.add.setChecked(False)
+
+    def kind(self) -> str:
+        """Return the model that is chosen."""
+        return str(self.model.currentData() or "")
+
+    def change(self, review: Any, kind: str | None = None) -> None:
+        """Show another state of the points, and fit them."""
+        wanted = kind or self.kind() or "affine"
+        self.review = review
+        self.fits = review.fits()
+        self.model.blockSignals(True)
+        self.model.clear()
+        for name, fit in self.fits.items():
+            self.model.addItem(_model_text(name, fit), name)
+        kinds = [*self.fits]
+        self.model.setCurrentIndex(kinds.index(wanted) if wanted in kinds else len(kinds) - 1)
+        self.model.blockSignals(False)
+        self._show_fit()
+        self._enable()
+
+    def _show_fit(self) -> None:
+        if self.review is None:
+            return
+        fit = self.fits.get(self.kind())
+        count = len(self.review.points)
+        residuals = np.full(count, np.nan) if fit is None else fit.residuals_px
+        self.table.show_review(self.review, residuals)
+        nominal = self._on_map(self.review.nominal_xy)
+        places = self._on_map(self.review.points.reference_xy)
+        used, check = self.review.points.used, self.review.points.is_check
+        self.view.resizeColumnsToContents()
+        self.points.show_points(
+            [*zip(nominal, places, residuals.tolist(), used.tolist(), check.tolist(), strict=True)]
+        )
+        self._changed([places[index] for index in self.review.worst(residuals)])
+        self.text.setText(self._summary())
+
+    def _summary(self) -> str:
+        points = self.review.points
+        edited = int(self.review.edited.sum())
+        parts = [f"{int(points.used.sum())} of {len(points)} points take part"]
+        parts += [f"{edited} set by hand"] if edited else []
+        fit = self.fits.get(self.kind())
+        check = points.is_check & points.used
+        if fit is not None and check.any():
+            agree = int((fit.residuals_px[check] <= TOLERANCE_PX).sum())
+            parts.append(f"{agree} of {check.sum()} check points agree within {TOLERANCE_PX:g} px")
+        return ", ".join(parts) + "."
+
+    def _switch(self, row: int, on: bool) -> None:
+        self.change(self.review.switch([row], on))
+
+    def _zoom(self, row: int) -> None:
+        self._choose(row)
+        self._canvas.setCenter(self.points.rows[row][1])
+        self._canvas.refresh()
+
+    def _choose(self, row: int) -> None:
+        self.points.chosen = row
+        self.points.update()
+        proxy = self.view.model()
+        shown = proxy.mapFromSource(self.table.index(row, 0))
+        self.view.selectRow(shown.row())
+        self.view.scrollTo(shown)
+
+    def _set_dragging(self, on: bool) -> None:
+        self._set_tool(self._drag, on)
+        if on:
+            self.add.setChecked(False)
+            self.text.setText("Pull a mark to its place on the reference, or a line's other end.")
+
+    def _set_adding(self, on: bool) -> None:
+        self._clicked = None
+        self._set_tool(self._click, on)
+        self._overlay.show_layers([clearly(self._reference)] if on else [])
+        if on:
+            self.drag.setChecked(False)
+            self.text.setText("Shown is the reference: click a place that both images have.")
+
+    def _set_tool(self, tool: Any, on: bool) -> None:
+        self._canvas.setMapTool(tool) if on else self._canvas.unsetMapTool(tool)
+
+    def _moved_on_map(self, index: int, end: int, place: QgsPointXY) -> None:
+        xy = self._on_reference(place)
+        if end == 1:
+            self.change(self.review.move(index, reference_xy=xy))
+        else:
+            self.change(self.review.move(index, input_px=self.review.input_px(xy)))
+        self._choose(index)
+
+    def _clicked_on_map(self, place: QgsPointXY) -> None:
+        if self._clicked is None:
+            self._clicked = place
+            self._overlay.show_layers([clearly(self._input)])
+            self.text.setText(
+                "Shown is the input where its own georeferencing has it: click there."
+            )
+            return
+        first, self._clicked = self._clicked, None
+        self._overlay.show_layers([clearly(self._reference)])
+        self.add_point(self._on_reference(first), self.review.input_px(self._on_reference(place)))
+
+    def add_point(self, reference_xy: Any, input_px: Any) -> None:
+        """Add a point, where similarity refines it if that is asked for."""
+        from .dependencies import rasterio_env
+
+        score, note = float("nan"), ""
+        if self.match.isChecked():
+            review = library_module("review")
+            fit = self.fits.get(self.kind())
+            transform = self.review.nominal if fit is None else fit.transform
+            images = self._reference.source(), self._input.source()
+            try:
+                with rasterio_env():
+                    input_px, peak = review.refine_click(*images, reference_xy, input_px, transform)
+                score = peak.height
+            except errors.GroundTieError as error:
+                note = f" It stays where you clicked: {error.one_line()}."
+        self.change(self.review.add(reference_xy, input_px, score))
+        self._choose(len(self.review.points) - 1)
+        self.text.setText(self._summary() + note)
+
+    def start_writing(self) -> None:
+        """Write the image by the points, as *Warp a raster* does."""
+        fit = self.fits[self.kind()]
+        try:
+            if objection := self.review.objection(fit.kind):
+                self.text.setText(f"Not written: {objection}.")
+                return
+            points = new_file(points_name())
+            self.review.write(points, fit.transform)
+        except errors.GroundTieError as error:
+            self.text.setText(f"Not written: {error.one_line()}.")
+            return
+        values = {
+            "INPUT": named(self._input),
+            "REFERENCE": named(self._reference),
+            "TRANSFORM": str(points),
+            "MODEL": fit.kind,
+        }
+        files = {"OUTPUT": new_file("registered_by_hand.tif")}
+        self.write.setEnabled(False)
+        self._run = Run("warp", values, files, ("OUTPUT",), self._end_writing, lambda _: None)
+        self._run.start()
+
+    def _end_writing(self, outcome: Outcome) -> None:
+        self._run = None
+        self.write.setEnabled(True)
+        if not outcome.succeeded:
+            self.text.setText(f"Not written: {outcome.reason}")
+            return
+        path = outcome.files["OUTPUT"]
+        loaded = [
+            layer
+            for layer in QgsProject.instance().mapLayers().values()
+            if isinstance(layer, QgsRasterLayer) and layer.source() == str(path)
+        ]
+        self.text.setText(f"Written: {path}. {self._summary()}")
+        self._written(self._reference, loaded[0] if loaded else QgsRasterLayer(str(path)))
+
+    def _crs(self) -> Any:
+        return self._reference.crs() if self._reference else QgsCoordinateReferenceSystem()
+
+    def _on_map(self, places: Any) -> list[QgsPointXY]:
+        transform = between(self._crs(), self._canvas.mapSettings().destinationCrs())
+        return [transform.transform(QgsPointXY(x, y)) for x, y in places.tolist()]
+
+    def _on_reference(self, place: QgsPointXY) -> tuple[float, float]:
+        transform = between(self._canvas.mapSettings().destinationCrs(), self._crs())
+        found = transform.transform(place)
+        return found.x(), found.y()
+
+
+_FIRST_POINTS = "There are no points yet. Add a point by a click in each image; three are needed."
+
+
+def _model_text(kind: str, fit: Any) -> str:
+    left_out = "–" if fit.left_out_px is None else f"{fit.left_out_px:.2f} px"
+    return f"{_MODELS.get(kind, choice_label(kind))}: left-out error {left_out}"

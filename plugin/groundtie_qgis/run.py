@@ -1,0 +1,134 @@
+"""Runs GroundTie's algorithms in the background for the dock, and returns what came of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from qgis.core import (
+    QgsApplication,
+    QgsProcessingAlgRunnerTask,
+    QgsProcessingContext,
+    QgsProcessingFeedback,
+    QgsProcessingOutputLayerDefinition,
+    QgsProcessingUtils,
+    QgsProject,
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a run.
+
+    Parameters
+    ----------
+    succeeded
+        Whether it did what it was asked for.
+    reason
+        Why not, in one line.
+    lines
+        What the tool stated, a line each.
+    files
+        What was written, by parameter.
+    """
+
+    succeeded: bool
+    reason: str = ""
+    lines: tuple[str, ...] = ()
+    files: dict[str, Path] = field(default_factory=dict)
+
+
+class Listener(QgsProcessingFeedback):
+    """Keeps what a run states."""
+
+    def __init__(self) -> None:
+        super().__init__(False)
+        self.lines: list[str] = []
+        self.errors: list[str] = []
+
+    def pushInfo(self, info: str) -> None:
+        self.lines.append(info)
+
+    def pushWarning(self, warning: str) -> None:
+        self.lines.append(warning)
+
+    def reportError(self, error: str, fatalError: bool = False) -> None:
+        self.errors.append(error)
+
+
+class Run:
+    """One run of an algorithm in the background.
+
+    Parameters
+    ----------
+    tool
+        Name of the tool.
+    values
+        Values of its parameters.
+    files
+        Files to be written, by parameter; those of `layers` are loaded.
+    layers
+        Parameters whose files are added to the map.
+    done
+        Called with the `Outcome`, in the main thread.
+    progress
+        Called with per cent.
+    """
+
+    def __init__(
+        self,
+        tool: str,
+        values: dict[str, Any],
+        files: dict[str, Path],
+        layers: tuple[str, ...],
+        done: Callable[[Outcome], None],
+        progress: Callable[[float], None],
+    ) -> None:
+        registry = QgsApplication.processingRegistry()
+        self._algorithm = registry.createAlgorithmById(f"groundtie:{tool}")
+        self._files, self._done = files, done
+        project = QgsProject.instance()
+        self._context = QgsProcessingContext()
+        self._context.setProject(project)
+        self._feedback = Listener()
+        self._feedback.progressChanged.connect(progress)
+        self._values = dict(values)
+        for name, path in files.items():
+            loaded = QgsProcessingOutputLayerDefinition(str(path), project)
+            self._values[name] = loaded if name in layers else str(path)
+
+    def start(self) -> None:
+        """Begin, if the values are right; else the outcome states what is wrong."""
+        able, why = self._algorithm.canExecute()
+        valid = False
+        if able:
+            valid, why = self._algorithm.checkParameterValues(self._values, self._context)
+        if not valid:
+            self._done(Outcome(False, why))
+            return
+        self._task = QgsProcessingAlgRunnerTask(
+            self._algorithm, self._values, self._context, self._feedback
+        )
+        self._task.executed.connect(self._end)
+        QgsApplication.taskManager().addTask(self._task)
+
+    def cancel(self) -> None:
+        """Stop at the next step."""
+        self._feedback.cancel()
+
+    def _end(self, succeeded: bool, results: dict[str, Any]) -> None:
+        if succeeded:
+            from processing.gui.Postprocessing import handleAlgorithmResults
+
+            handleAlgorithmResults(self._algorithm, self._context, self._feedback)
+        files = {name: path for name, path in self._files.items() if path.is_file()}
+        errors = self._feedback.errors
+        reason = "" if succeeded else (errors[0] if errors else "cancelled; nothing was written")
+        self._done(Outcome(succeeded, reason, tuple(self._feedback.lines), files))
+
+
+def new_file(name: str) -> Path:
+    """Return a path in QGIS's temporary folder at which nothing lies."""
+    return Path(QgsProcessingUtils.generateTempFilename(name))

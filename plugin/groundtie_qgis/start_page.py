@@ -1,0 +1,245 @@
+"""The dock's first page: which images, how to register them, and what came of it."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+from typing import Any
+
+from qgis.core import QgsMapLayerProxyModel
+from qgis.gui import QgsMapLayerComboBox
+from qgis.PyQt.QtCore import Qt, QTimer, QUrl
+from qgis.PyQt.QtGui import QDesktopServices
+from qgis.PyQt.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from .preselection import proposed_pair, raster_files
+from .reference_export import MAP, with_files
+from .run import Outcome, Run, new_file
+from .unavailable import named_tools
+from .wording import in_words
+
+# What a pair may be, and the tool for it.
+PAIRS = {
+    "Decided by the images": "register",
+    "SAR and optical": "coregister",
+    "SAR and SAR": "match_sar_sar",
+    "Optical and optical": "match_optical",
+}
+_FIRST_RADIUS_M = 200.0
+_ANY_ROTATION_DEG = 180.0
+_GREEN, _RED = "#1a7f37", "#b3261e"
+
+
+class StartPage(QWidget):
+    """Registers two layers of the project.
+
+    Parameters
+    ----------
+    canvas
+        The map.
+    finished
+        Called with the outcome of a registration and its two layers.
+    """
+
+    def __init__(self, canvas: Any, finished: Callable[[Outcome, Any, Any], None]) -> None:
+        super().__init__()
+        self._canvas, self._finished = canvas, finished
+        self._run: Run | None = None
+        self.outcome: Outcome | None = None
+        self._layers: tuple[Any, ...] = ()
+        self._build()
+        self.propose()
+
+    def _build(self) -> None:
+        self.reference, self.input = _raster_box(), _raster_box()
+        self.reference.setAdditionalItems([MAP])
+        self.pair = QComboBox()
+        self.pair.addItems([*PAIRS])
+        self.radius = QDoubleSpinBox()
+        self.radius.setRange(0, 1e6)
+        self.radius.setDecimals(0)
+        self.radius.setSuffix(" m")
+        self.radius.setSpecialValueText("usual")
+        self.rotated = QCheckBox("rotation unknown")
+        self.register = QPushButton("Register")
+        self.progress = QProgressBar()
+        self.progress.hide()
+        self.verdict = QLabel()
+        self.verdict.setWordWrap(True)
+        self.verdict.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.wider = QPushButton("Search farther")
+        self.turn = QPushButton("Allow any rotation")
+        self.report = QPushButton("Open report")
+        for button in (self.wider, self.turn, self.report):
+            button.hide()
+        self._lay_out()
+        self.register.clicked.connect(self.start_or_cancel)
+        self.wider.clicked.connect(self.search_farther)
+        self.turn.clicked.connect(self.allow_rotation)
+        self.report.clicked.connect(self.open_report)
+        self.pair.currentIndexChanged.connect(self._show_options)
+        # Later: while layers are taken out of the project, some of them are gone already.
+        self._apart = QTimer(self)
+        self._apart.setSingleShot(True)
+        self._apart.timeout.connect(self._keep_apart)
+        self._changed = self.reference
+        for box in (self.reference, self.input):
+            box.layerChanged.connect(lambda _, box=box: self._note_change(box))
+        self._show_options()
+
+    def _lay_out(self) -> None:
+        form = QFormLayout()
+        form.addRow("Reference", self.reference)
+        form.addRow("Input", self.input)
+        form.addRow("Images", self.pair)
+        options = QHBoxLayout()
+        options.addWidget(self.radius)
+        options.addWidget(self.rotated)
+        form.addRow("Search", options)
+        layout = QVBoxLayout(self)
+        layout.addLayout(form)
+        for widget in (self.register, self.progress, self.verdict):
+            layout.addWidget(widget)
+        tries = QHBoxLayout()
+        for button in (self.wider, self.turn, self.report):
+            tries.addWidget(button)
+        layout.addLayout(tries)
+        layout.addStretch()
+
+    def propose(self) -> None:
+        """Fill boxes that hold the same, or nothing, with two rasters of the project."""
+        if self.reference.currentLayer() not in (None, self.input.currentLayer()):
+            return
+        reference, input = proposed_pair(raster_files())
+        if reference is not None and input is not None:
+            self.reference.setLayer(reference)
+            self.input.setLayer(input)
+
+    def _note_change(self, box: Any) -> None:
+        self._changed = box
+        self._apart.start(0)
+
+    def _keep_apart(self) -> None:
+        """Give the other box another layer where both hold the same."""
+        changed = self._changed
+        other = self.input if changed is self.reference else self.reference
+        if changed.currentLayer() is None or changed.currentLayer() != other.currentLayer():
+            return
+        rest = [layer for layer in raster_files() if layer != changed.currentLayer()]
+        other.setLayer(rest[0] if rest else None)
+
+    def _show_options(self) -> None:
+        asked = PAIRS[self.pair.currentText()] != "register"
+        for widget in (self.radius, self.rotated):
+            widget.setEnabled(asked)
+            widget.setToolTip("" if asked else "Choose what the images are to set the search.")
+
+    def start_or_cancel(self) -> None:
+        """Begin to register, or stop that."""
+        if self._run is not None:
+            self._run.cancel()
+            return
+        input = self.input.currentLayer()
+        if input is None or (self.reference.currentLayer() is None and not self._from_map()):
+            self._layers = ()
+            self._state(False, "Choose two raster layers.")
+            return
+        reference, values = with_files(self.reference.currentLayer(), input, self._canvas)
+        self._layers = (reference, input)
+        names = {"OUTPUT": "registered.tif", "TIE_POINTS": points_name(), "REPORT": "report.html"}
+        files = {name: new_file(file) for name, file in names.items()}
+        tool = PAIRS[self.pair.currentText()]
+        if tool != "register":
+            values |= {"SEARCH_RADIUS": self.radius.value()} if self.radius.value() else {}
+            values |= {"SEARCH_ROTATION": _ANY_ROTATION_DEG} if self.rotated.isChecked() else {}
+        self.register.setText("Cancel")
+        self.progress.setValue(0)
+        self.progress.show()
+        self.verdict.setText("")
+        for button in (self.wider, self.turn, self.report):
+            button.hide()
+        self._run = Run(tool, values, files, ("OUTPUT",), self._end, self._show_progress)
+        self._run.start()
+
+    def _from_map(self) -> bool:
+        return bool(self.reference.currentText() == MAP)
+
+    def _show_progress(self, percent: float) -> None:
+        self.progress.setValue(round(percent))
+
+    def _end(self, outcome: Outcome) -> None:
+        self._run, self.outcome = None, outcome
+        self.register.setText("Register")
+        self.progress.hide()
+        report = outcome.files.get("REPORT")
+        self.report.setVisible(report is not None)
+        refused = not outcome.succeeded and report is not None
+        self.wider.setVisible(refused)
+        self.turn.setVisible(refused and not self.rotated.isChecked())
+        if outcome.succeeded:
+            self._state(True, "\n".join(first_lines(outcome.lines)))
+        else:
+            self._state(False, outcome.reason)
+        self._finished(outcome, *self._layers)
+
+    def _state(self, good: bool, text: str) -> None:
+        heading = "✔ Accepted" if good else "✘ Not registered"
+        for layer in self._layers:
+            text = text.replace(layer.source(), layer.name())
+        lines = html.escape(in_words(text, None, named_tools())).split("\n")
+        self.verdict.setText(
+            f'<p style="color: {_GREEN if good else _RED}"><b>{heading}</b></p>'
+            f"<p>{'<br>'.join(lines)}</p>"
+        )
+
+    def search_farther(self) -> None:
+        """Try again with a radius twice as large."""
+        self._ask_for_a_search()
+        self.radius.setValue(2 * self.radius.value() or _FIRST_RADIUS_M)
+        self.start_or_cancel()
+
+    def allow_rotation(self) -> None:
+        """Try again with any rotation."""
+        self._ask_for_a_search()
+        self.rotated.setChecked(True)
+        self.start_or_cancel()
+
+    def _ask_for_a_search(self) -> None:
+        if PAIRS[self.pair.currentText()] == "register":
+            self.pair.setCurrentIndex([*PAIRS.values()].index("coregister"))
+
+    def open_report(self) -> None:
+        """Open the report in the browser."""
+        path = None if self.outcome is None else self.outcome.files.get("REPORT")
+        if path is not None:
+            QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
+
+
+def first_lines(lines: tuple[str, ...], most: int = 6) -> list[str]:
+    """Return what a tool stated of its result: what comes after its steps."""
+    starts = [i for i, line in enumerate(lines) if line.startswith(("the input", "correction"))]
+    return list(lines[starts[0] if starts else -most :][:most])
+
+
+def points_name() -> str:
+    """Return the name of a file of tie points that can be written here."""
+    from .dependencies import not_found
+
+    return "tie_points.geojson" if not_found(["fiona"]) else "tie_points.gpkg"
+
+
+def _raster_box() -> QgsMapLayerComboBox:
+    box = QgsMapLayerComboBox()
+    box.setFilters(QgsMapLayerProxyModel.RasterLayer)
+    return box

@@ -1,0 +1,238 @@
+"""Batches of the toy tool: each row's end is its own, and nothing runs twice that need not."""
+
+from __future__ import annotations
+
+import csv
+import json
+import pickle
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+from toys import TOY, load_toy
+
+from groundtie.batches.batch import Batch
+from groundtie.batches.result import BatchResult
+from groundtie.batches.running import Reporter, duration
+from groundtie.batches.work import DONE, FAILED, REFUSED, Outcome, Task
+from groundtie.declaration import Tool
+from groundtie.errors import CancelledError, ParameterError
+from groundtie.progress import SILENT, Progress
+
+
+class Inline(Executor):
+    """Runs tasks as they are submitted, through pickle as if they went to another machine."""
+
+    def __init__(self) -> None:
+        self.bytes: list[int] = []
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        packed = pickle.dumps((fn, args, kwargs))
+        self.bytes.append(len(packed))
+        future: Future[Any] = Future()
+        try:
+            fn, args, kwargs = pickle.loads(packed)
+            future.set_result(pickle.loads(pickle.dumps(fn(*args, **kwargs))))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    for name in ("a.tif", "b.tif"):
+        (tmp_path / name).write_bytes(b"raster")
+    return tmp_path / "t.json"
+
+
+def run(
+    table: Path,
+    *rows: dict[str, Any],
+    resume: bool = False,
+    executor: Executor | None = None,
+    progress: Progress = SILENT,
+) -> BatchResult:
+    common = {"reference": "a.tif", "input": "b.tif", "size": 3}
+    table.write_text(json.dumps({"defaults": common, "rows": rows}))
+    folder = table.parent / "out"
+    batch = Batch(load_toy, "toy", table, folder, folder / "log.jsonl")
+    return batch.run(resume, progress, executor or Inline())
+
+
+def statuses(result: BatchResult) -> list[str]:
+    return [row.outcome.status for row in result.rows]
+
+
+def test_each_rows_end_is_its_own(table: Path) -> None:
+    modes = [{"mode": "refuse"}, {"mode": "crash"}, {"size": 99}, {"name": "good"}]
+    result = run(table, *modes)
+    assert statuses(result) == [REFUSED, FAILED, FAILED, DONE]
+    assert [row.outcome.message for row in result.rows] == [
+        "refused: too few points agree",
+        "this is a bug in GroundTie: ZeroDivisionError: a bug",
+        "size must be 1 to 9 px, not 99",
+        "",
+    ]
+    assert (table.parent / "out/good.tif").read_bytes() == b"done"
+    assert "ZeroDivisionError" in result.rows[1].outcome.traceback
+
+
+@pytest.mark.parametrize(
+    ("modes", "code"),
+    [(["work"], 0), (["work", "refuse"], 3), (["refuse", "crash", "work"], 2)],
+)
+def test_the_exit_code_is_that_of_the_worst_row(table: Path, modes: list[str], code: int) -> None:
+    assert run(table, *[{"mode": mode} for mode in modes]).exit_code == code
+
+
+def test_the_summary_is_a_table_and_json(table: Path) -> None:
+    result = run(table, {"name": "x"}, {"mode": "refuse"})
+    with result.table.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["status"] for row in rows] == ["done", "refused"]
+    assert rows[0]["check_rmse_px"] == "0.25" and rows[1]["check_rmse_px"] == ""
+    assert [row["reason"] for row in rows] == ["good", "too few"]
+    assert rows[0]["output"] == str(table.parent / "out/x.tif") and rows[1]["output"] == ""
+    details = json.loads(result.details.read_text())
+    assert details == json.loads(json.dumps(result.summary()))
+    assert (details["done"], details["refused"], details["failed"]) == (1, 1, 0)
+    assert details["rows"][1]["result"] == {"verdict": {"accepted": False, "reason": "too few"}}
+
+
+def test_lines_tell_what_did_not_end_well(table: Path) -> None:
+    lines = run(table, {}, *[{"mode": "refuse"}] * 22).lines()
+    assert lines[0] == "23 rows: 1 done, 22 refused, 0 failed"
+    assert lines[1] == "row 2 (02) refused: refused: too few points agree"
+    assert lines[-2] == "… and 2 more"
+
+
+class TestResume:
+    def test_what_is_done_or_refused_is_skipped(self, table: Path) -> None:
+        first = run(table, {}, {"mode": "refuse"}, {"mode": "crash"})
+        executor = Inline()
+        second = run(
+            table, {}, {"mode": "refuse"}, {"mode": "crash"}, resume=True, executor=executor
+        )
+        assert len(executor.bytes) == 1
+        assert [row.resumed for row in second.rows] == [True, True, False]
+        assert [r.outcome.result for r in second.rows] == [r.outcome.result for r in first.rows]
+        assert second.exit_code == 2
+
+    def test_without_it_all_rows_run(self, table: Path) -> None:
+        run(table, {}, {})
+        executor = Inline()
+        run(table, {}, {}, executor=executor)
+        assert len(executor.bytes) == 2
+
+    def test_rows_keep_their_results_where_they_move_in_the_table(self, table: Path) -> None:
+        run(table, {"name": "a"}, {"name": "b"})
+        executor = Inline()
+        run(table, {"name": "new"}, {"name": "b"}, {"name": "a"}, resume=True, executor=executor)
+        assert len(executor.bytes) == 1
+
+    @pytest.mark.parametrize("what", ["input", "output", "parameter", "version", "report"])
+    def test_what_changed_runs_again(
+        self, table: Path, what: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        run(table, {}, {"size": 4})
+        row: dict[str, Any] = {}
+        if what == "input":
+            (table.parent / "b.tif").write_bytes(b"another")
+        elif what == "output":
+            (table.parent / "out/1.tif").unlink()
+        elif what == "parameter":
+            row = {"seed": 3}
+        elif what == "report":
+            row = {"report": "{name}.html"}
+        else:
+            monkeypatch.setattr("groundtie.runs.__version__", "9")
+        executor = Inline()
+        run(table, row, {"size": 4}, resume=True, executor=executor)
+        assert len(executor.bytes) == (2 if what in ("input", "version") else 1)
+
+    def test_a_batch_that_was_cancelled_goes_on(self, table: Path) -> None:
+        rows = [{"seed": seed} for seed in range(5)]
+        asked: list[int] = []
+
+        def cancelled() -> bool:
+            asked.append(1)
+            return len(asked) > 6  # once before, and twice a row: three rows have ended
+
+        with pytest.raises(CancelledError, match=r"cancelled after 3 of 5 rows; resume"):
+            run(table, *rows, progress=Progress(is_cancelled=cancelled))
+        executor = Inline()
+        result = run(table, *rows, resume=True, executor=executor)
+        assert len(executor.bytes) == 2
+        assert statuses(result) == [DONE] * 5
+
+
+def test_a_cancelled_batch_waits_for_no_other_row(table: Path) -> None:
+    with ThreadPoolExecutor(1) as executor:
+        ended: list[float] = []
+        progress = Progress(
+            lambda fraction, message: ended.append(fraction), lambda: len(ended) > 1
+        )
+        with pytest.raises(CancelledError, match="after 1 of 9 rows"):
+            run(table, *[{"seed": seed} for seed in range(9)], executor=executor, progress=progress)
+
+
+def test_a_task_carries_no_pixels(table: Path) -> None:
+    (table.parent / "b.tif").write_bytes(bytes(10**6))
+    executor = Inline()
+    run(table, {}, executor=executor)
+    assert max(executor.bytes) < 2000
+
+
+def test_a_worker_of_another_version_is_told() -> None:
+    outcome = Task(load_toy, "toy", {}, (), version="0.0").run()
+    assert outcome.status == FAILED
+    assert outcome.message.endswith("not 0.0")
+
+
+def test_a_worker_without_the_package_is_told(table: Path) -> None:
+    class Bare(Inline):
+        def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+            future: Future[Any] = Future()
+            future.set_exception(ModuleNotFoundError("No module named 'groundtie'"))
+            return future
+
+    result = run(table, {}, executor=Bare())
+    assert "cannot import what it needs: No module named" in result.rows[0].outcome.message
+
+
+def test_an_unknown_table_costs_no_old_log(table: Path) -> None:
+    run(table, {})
+    log = table.parent / "out/log.jsonl"
+    before = log.read_text()
+    with pytest.raises(ParameterError, match="does not know"):
+        run(table, {"colour": 1})
+    assert log.read_text() == before
+
+
+def test_progress_tells_how_long_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr("groundtie.batches.running.time.monotonic", lambda: now[0])
+    said: list[tuple[float, str]] = []
+    reporter = Reporter(Progress(lambda *report: said.append(report)), rows=10, skipped=4)
+    now[0] += 30
+    reporter.ended(Outcome(DONE))
+    now[0] += 30
+    reporter.ended(Outcome(REFUSED))
+    # Four rows are left, of 30 s each: those that were skipped took no time.
+    assert said == [
+        (0.5, "5 of 10 rows, 2 min left"),
+        (0.6, "6 of 10 rows, 1 refused, 2 min left"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.2, "0 s"), (89, "89 s"), (120, "2 min"), (7200, "2.0 h")]
+)
+def test_durations_in_words(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
+
+
+def test_the_toys_are_tools() -> None:
+    assert isinstance(load_toy("toy"), Tool) and load_toy("toy") is TOY

@@ -1,0 +1,91 @@
+"""Tables of calls, in each of their formats."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from groundtie.batches.table import read_rows
+from groundtie.errors import ParameterError
+
+ROWS = [{"input": "a.tif", "search_radius": "3"}, {"input": "b.tif"}]
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_csv_of_any_spreadsheet(tmp_path: Path, delimiter: str) -> None:
+    path = tmp_path / "t.csv"
+    lines = ["input,search-radius", " a.tif ,3", "b.tif,", ""]
+    path.write_text("\n".join(lines).replace(",", delimiter), encoding="utf-8-sig")
+    assert read_rows(path) == ROWS
+
+
+def test_a_cell_may_hold_commas(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text('input,bands\n"a,b.tif","1,2"\n')
+    assert read_rows(path) == [{"input": "a,b.tif", "bands": "1,2"}]
+
+
+def test_json_is_a_list_of_rows_or_has_defaults(tmp_path: Path) -> None:
+    path = tmp_path / "t.json"
+    path.write_text(json.dumps([{"input": "a.tif", "search-radius": "3"}, {"input": "b.tif"}]))
+    assert read_rows(path) == ROWS
+    rows = [{"input": "a.tif"}, {"input": "b.tif", "seed": 9, "model": None}]
+    path.write_text(json.dumps({"defaults": {"seed": 4, "model": "affine"}, "rows": rows}))
+    assert read_rows(path) == [
+        {"input": "a.tif", "seed": 4, "model": "affine"},
+        {"input": "b.tif", "seed": 9, "model": "affine"},
+    ]
+
+
+def test_yaml_reads_as_json(tmp_path: Path) -> None:
+    pytest.importorskip("yaml")
+    path = tmp_path / "t.yaml"
+    path.write_text("defaults: {seed: 4}\nrows:\n  - input: a.tif\n  - {input: b.tif, seed: 9}\n")
+    assert read_rows(path) == [{"input": "a.tif", "seed": 4}, {"input": "b.tif", "seed": 9}]
+
+
+def test_yaml_without_its_package_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "yaml", None)
+    (tmp_path / "t.yml").write_text("- input: a.tif\n")
+    with pytest.raises(ParameterError, match="YAML needs the Python package PyYAML"):
+        read_rows(tmp_path / "t.yml")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("t.csv", "", "has no rows"),
+        ("t.csv", "input,output\n", "has no rows"),
+        ("t.csv", "input\na.tif,b.tif\n", "row 1 has more cells"),
+        ("t.csv", "input,input\na,b\n", "stands twice"),
+        ("t.csv", "max-error,max_error\n1,2\n", "stands twice"),
+        ("t.json", "[", "cannot read the table"),
+        ("t.json", "[]", "has no rows"),
+        ("t.json", "[1]", "a list of rows"),
+        ("t.json", '{"rows": 3}', "a list of rows"),
+        ("t.json", '{"row": []}', "rows and defaults only"),
+        ("t.json", '[{"seed": NaN}]', "no finite number"),
+        ("t.yaml", "a: [", "cannot read the table"),
+        ("t.yaml", "", "a list of rows"),
+        ("t.yaml", "- !!python/object/apply:os.getcwd []", "cannot read the table"),
+    ],
+)
+def test_what_is_no_table_is_one_line(
+    tmp_path: Path, name: str, content: str, message: str
+) -> None:
+    if name.endswith("yaml"):
+        pytest.importorskip("yaml")
+    (tmp_path / name).write_text(content)
+    with pytest.raises(ParameterError, match=message) as caught:
+        read_rows(tmp_path / name)
+    assert str(tmp_path / name) in caught.value.one_line()
+
+
+def test_a_missing_table_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"none\.csv: No such file"):
+        read_rows(tmp_path / "none.csv")

@@ -1,0 +1,115 @@
+"""The predicted accuracy of transforms holds for transforms whose error is known."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from groundtie.geometry.accuracy import UNKNOWN, Accuracy, CheckResiduals, predict_accuracy
+from groundtie.geometry.estimation import fit_without_blocks
+from groundtie.geometry.fitting import fit_model
+
+SIZE_PX = 500
+RUNS = 80
+NO_HEIGHTS = np.zeros(2)
+
+
+def lattice(count: int, margin: float) -> np.ndarray:
+    side = np.linspace(margin, SIZE_PX - margin, count)
+    return np.stack(np.meshgrid(side, side), -1).reshape(-1, 2)
+
+
+PLACES, FIT, CHECK = lattice(9, 0), lattice(8, 25), lattice(4, 80)
+
+
+def run(
+    seed: int, kind: str, sigma: float, check_sigma: float, bias: np.ndarray = NO_HEIGHTS
+) -> tuple[Accuracy, float]:
+    """Fit a model to points with noise; return its predicted accuracy and error at a place."""
+    random = np.random.default_rng(seed)
+    nominal = FIT + sigma * random.standard_normal(FIT.shape) + bias
+    model = fit_model(kind, FIT, nominal)
+    folds = fit_without_blocks(kind, FIT, nominal, np.ones(len(FIT)))
+    matched = CHECK + check_sigma * random.standard_normal(CHECK.shape)
+    check = CheckResiduals(CHECK, matched - model(CHECK), np.ones(len(CHECK)))
+    place = random.uniform(0, SIZE_PX, (1, 2))
+    found = predict_accuracy(folds, PLACES, check, NO_HEIGHTS)
+    return found, float(np.hypot(*(model(place) - place)[0]))
+
+
+@pytest.mark.parametrize("kind", ["translation", "affine", "polynomial2"])
+@pytest.mark.parametrize("check_sigma", [0.1, 1.5])
+def test_radii_hold_as_many_errors_as_they_say(kind: str, check_sigma: float) -> None:
+    """Whatever the check points' own errors, within what is probable of so many runs."""
+    runs = [run(seed, kind, 0.5, check_sigma) for seed in range(RUNS)]
+    for name, said in (("ce50_px", 0.5), ("ce90_px", 0.9), ("ce95_px", 0.95)):
+        held = sum(error <= getattr(accuracy, name) for accuracy, error in runs)
+        low, high = binom.ppf((0.0005, 0.9995), RUNS, said)
+        # Blocks that are left out at the border are extrapolated: the jackknife is no smaller.
+        assert low <= held <= max(high, RUNS * (said + 0.2))
+
+
+def test_an_error_that_no_block_shows_is_seen_by_check_points() -> None:
+    accuracy, error = run(0, "affine", 0.05, 0.3, np.array([2.0, 0.0]))
+    assert error == pytest.approx(2.0, abs=0.1)
+    assert accuracy.ce90_px > 2.0
+
+
+def test_heights_may_displace_all_points_evenly_up_to_the_largest() -> None:
+    folds = [partial(np.add, (0.01 * k, 0.0)) for k in range(5)]
+    check = CheckResiduals(CHECK, np.zeros_like(CHECK), np.ones(len(CHECK)))
+    accuracy = predict_accuracy(folds, PLACES, check, 4.0 * np.array([0.6, 0.8]))
+    assert accuracy.ce50_px == pytest.approx(2.0, rel=0.05)
+    assert accuracy.ce90_px == pytest.approx(3.6, rel=0.05)
+
+
+def test_the_interval_holds_the_true_radius_as_often_as_it_says() -> None:
+    """For a shift of σ = 0.5 / √64 px an axis, with the interval's 90 %, or a little more."""
+    true = 2.146 * 0.5 / math.sqrt(len(FIT))
+    ranges = [run(seed, "translation", 0.5, 0.1)[0].ce90_range_px for seed in range(RUNS)]
+    held = sum(low <= true <= high for low, high in ranges)
+    assert held >= binom.ppf(0.001, RUNS, 0.75)
+
+
+def test_matching_errors_of_neighbours_are_not_shared() -> None:
+    random = np.random.default_rng(5)
+    own = [
+        CheckResiduals(CHECK, random.standard_normal(CHECK.shape), np.ones(len(CHECK)))
+        for _ in range(200)
+    ]
+    assert np.mean([check.shared_variance_px2 for check in own]) < 0.1
+    common = CheckResiduals(CHECK, np.full(CHECK.shape, 0.7), np.ones(len(CHECK)))
+    assert common.shared_variance_px2 == pytest.approx(0.49)
+
+
+def test_outliers_count_by_their_probability() -> None:
+    residuals, weights = np.zeros_like(CHECK), np.ones(len(CHECK))
+    residuals[3], weights[3] = 12.0, 0.0
+    assert CheckResiduals(CHECK, residuals, weights).shared_variance_px2 == 0.0
+
+
+def test_one_block_or_no_check_point_predicts_nothing() -> None:
+    check = CheckResiduals(CHECK, np.zeros_like(CHECK), np.ones(len(CHECK)))
+    none = CheckResiduals(CHECK[:0], CHECK[:0], np.ones(0))
+    alike = partial(np.add, 0.0)
+    assert predict_accuracy([alike], PLACES, check, NO_HEIGHTS) is UNKNOWN
+    assert predict_accuracy([alike] * 5, PLACES, none, NO_HEIGHTS) is UNKNOWN
+    assert predict_accuracy([alike] * 5, PLACES, check, NO_HEIGHTS).ce90_px == 0.0
+
+
+def test_fewer_check_points_leave_a_wider_interval() -> None:
+    folds = [partial(np.add, (0.1 * k, 0.0)) for k in range(5)]
+
+    def width(side: int) -> float:
+        px = lattice(side, 80)
+        # The same error to the left and to the right in turns: nothing is shared.
+        own = np.where((np.arange(len(px)) + np.arange(len(px)) // side) % 2, 0.5, -0.5)
+        check = CheckResiduals(px, np.column_stack([own, 0 * own]), np.ones(len(px)))
+        low, high = predict_accuracy(folds, PLACES, check, NO_HEIGHTS).ce90_range_px
+        return high / low
+
+    assert width(2) > 1.2 * width(6)

@@ -1,0 +1,402 @@
+"""The dock's whole way: start, verdict, look, drag a point, write; and what goes wrong on it.
+
+Pictures of every step are left in the folder that GROUNDTIE_PICTURES names.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from unittest.mock import MagicMock
+
+import numpy as np
+import pytest
+from noise_pairs import ORIGIN, SHIFT, write_pair
+
+
+class Desktop:
+    """A window with a map and the dock beside it."""
+
+    def __init__(self, pictures: Path) -> None:
+        from groundtie_qgis.dock import GroundTieDock
+        from qgis.core import QgsCoordinateReferenceSystem
+        from qgis.gui import QgsMapCanvas
+        from qgis.PyQt.QtCore import Qt
+        from qgis.PyQt.QtWidgets import QMainWindow
+
+        self.window, self.iface = QMainWindow(), MagicMock()
+        self.canvas = QgsMapCanvas(self.window)
+        self.canvas.setDestinationCrs(QgsCoordinateReferenceSystem("EPSG:32633"))
+        self.window.setCentralWidget(self.canvas)
+        self.iface.mainWindow.return_value = self.window
+        self.iface.mapCanvas.return_value = self.canvas
+        self.window.resize(1200, 700)
+        self._pictures = pictures
+        self._dock = GroundTieDock
+        self._right = Qt.DockWidgetArea.RightDockWidgetArea
+        self.dock: Any = None
+
+    def open(self) -> Any:
+        self.dock = self._dock(self.iface)
+        self.window.addDockWidget(self._right, self.dock)
+        self.window.show()
+        self.refresh()
+        return self.dock
+
+    def load(self, folder: Path, *names: str) -> list[Any]:
+        from qgis.core import QgsProject, QgsRasterLayer
+
+        layers = [QgsRasterLayer(str(folder / f"{name}.tif"), name) for name in names]
+        for layer in layers:
+            QgsProject.instance().addMapLayer(layer)
+        self.canvas.setExtent(layers[0].extent())
+        return layers
+
+    def refresh(self) -> None:
+        from qgis.core import QgsProject
+
+        self.canvas.setLayers(QgsProject.instance().layerTreeRoot().checkedLayers())
+        self.canvas.refresh()
+        self.wait(lambda: not self.canvas.isDrawing(), 0.3)
+
+    def wait(self, until: Callable[[], bool], least: float = 0.0, most: float = 60.0) -> None:
+        import time
+
+        from qgis.core import QgsApplication
+
+        start = time.monotonic()
+        while time.monotonic() - start < most:
+            QgsApplication.processEvents()
+            if until() and time.monotonic() - start >= least:
+                return
+            time.sleep(0.01)
+        raise AssertionError("nothing came")
+
+    def picture(self, name: str) -> None:
+        self.refresh()
+        self._pictures.mkdir(parents=True, exist_ok=True)
+        assert self.window.grab().save(str(self._pictures / f"{name}.png"))
+
+    def register(self) -> Any:
+        start = self.dock.start
+        start.register.click()
+        self.wait(lambda: start._run is None)
+        return start.outcome
+
+
+@pytest.fixture
+def desktop(provider: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desktop]:
+    import qgis.utils
+    from qgis.core import QgsProject
+    from qgis.PyQt import sip
+
+    made = Desktop(Path(os.environ.get("GROUNDTIE_PICTURES") or tmp_path / "pictures"))
+    monkeypatch.setattr(qgis.utils, "iface", made.iface)
+    yield made
+    if made.dock is not None:
+        made.dock.take_away()
+    made.canvas.setLayers([])
+    QgsProject.instance().clear()
+    # What outlives QGIS crashes it.
+    sip.delete(made.window)
+    vars(made).clear()
+    gc.collect()
+
+
+@pytest.fixture(scope="module")
+def registered_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """What a registration of the pair leaves, made once."""
+    import groundtie
+
+    folder = tmp_path_factory.mktemp("registered")
+    write_pair(folder, 0)
+    files = {"OUTPUT": folder / "registered.tif", "TIE_POINTS": folder / "tie_points.gpkg"}
+    groundtie.coregister(
+        folder / "reference.tif",
+        folder / "input.tif",
+        files["OUTPUT"],
+        search_radius=12.0,
+        model="affine",
+        tie_points=files["TIE_POINTS"],
+    )
+    return files
+
+
+def pair(folder: Path, desktop: Desktop) -> list[Any]:
+    write_pair(folder, 0)
+    return desktop.load(folder, "reference", "input")
+
+
+def open_registered(folder: Path, desktop: Desktop, files: dict[str, Path]) -> Any:
+    """Open the dock as it is after a registration."""
+    from groundtie_qgis.run import Outcome
+    from qgis.core import QgsProject
+
+    reference, input = pair(folder, desktop)
+    dock = desktop.open()
+    desktop.load(files["OUTPUT"].parent, "registered")
+    dock._registered(Outcome(True, files=files), reference, input)
+    assert len(QgsProject.instance().mapLayers()) == 3
+    return dock
+
+
+def test_the_boxes_never_hold_one_layer(desktop: Desktop, tmp_path: Path) -> None:
+    reference, input = pair(tmp_path, desktop)
+    start = desktop.open().start
+    for box, layer in (
+        (start.reference, input),
+        (start.reference, reference),
+        (start.input, reference),
+        (start.input, input),
+    ):
+        box.setLayer(layer)
+        desktop.wait(lambda: not start._apart.isActive())
+        assert {start.reference.currentLayer(), start.input.currentLayer()} == {reference, input}
+
+
+def test_from_two_layers_to_a_reviewed_image(desktop: Desktop, tmp_path: Path) -> None:
+    """README's minute: the button that opens the dock, *Register*, *Look*, *Swipe*: four clicks."""
+    readme = (Path(__file__).resolve().parents[2] / "README.md").read_text(encoding="utf-8")
+    minute = readme.partition("## One minute in QGIS")[2].partition("##")[0]
+    clicks = ("Raster → GroundTie → Register and review", "Register", "Look", "Swipe")
+    assert [word for word in clicks if f"*{word}*" not in minute] == []
+    from qgis.core import QgsProject
+
+    pair(tmp_path, desktop)
+    dock = desktop.open()
+    desktop.picture("1_start")
+    outcome = desktop.register()
+    assert outcome.succeeded, outcome.reason
+    assert "Accepted" in dock.start.verdict.text()
+    assert "<p>correction: 5.0 px (5.0 m)" in dock.start.verdict.text()
+    assert dock.start.report.isVisible()
+    assert not dock.start.wider.isVisible()
+    desktop.picture("2_verdict")
+    names = [layer.name() for layer in QgsProject.instance().layerTreeRoot().layerOrder()]
+    assert names[0] == "Registered image"
+
+    dock.tabs.setCurrentWidget(dock.look)
+    dock.look.swipe.click()
+    desktop.wait(lambda: not dock.overlay._image.isNull(), 0.3)
+    assert dock.overlay.share == 0.5
+    desktop.picture("3_swipe")
+    dock.look.swipe.click()
+    assert not dock.overlay.isVisible()
+
+
+def test_looking_goes_from_place_to_place(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    dock = open_registered(tmp_path, desktop, registered_files)
+    worst = dock.repair.review.worst(dock.repair.fits[dock.repair.kind()].residuals_px)
+    for step in (0, 1):
+        dock.look.next.click()
+        centre = desktop.canvas.extent().center()
+        place = dock.repair.review.points.reference_xy[worst[step]]
+        np.testing.assert_allclose([centre.x(), centre.y()], place, atol=1)
+    dock.look.previous.click()
+    centre = desktop.canvas.extent().center()
+    place = dock.repair.review.points.reference_xy[worst[0]]
+    np.testing.assert_allclose([centre.x(), centre.y()], place, atol=1)
+    # Full resolution: a pixel of the reference is a pixel of the screen or larger.
+    pixel = dock.look._reference.rasterUnitsPerPixelX()
+    assert desktop.canvas.mapUnitsPerPixel() < 2 * pixel
+    dock.look.corners[0].click()
+    centre = desktop.canvas.extent().center()
+    assert centre.x() < ORIGIN[0] + 100
+    assert centre.y() > ORIGIN[1] - 100
+    dock.look.flicker.click()
+    shares = set()
+    desktop.wait(lambda: shares.add(dock.overlay.share) or shares >= {0.0, 1.0})  # type: ignore[func-returns-value]
+    dock.look.flicker.click()
+    assert not dock.overlay.isVisible()
+
+
+def drag(desktop: Desktop, tool: Any, start: Any, by: tuple[int, int]) -> None:
+    """Press on a place of the map, move the mouse, and let go."""
+    from qgis.PyQt.QtCore import QPoint
+
+    pressed = QPoint(round(start.x()), round(start.y()))
+    for name, place in (
+        ("canvasPressEvent", pressed),
+        ("canvasMoveEvent", pressed + QPoint(*by) / 2),
+        ("canvasMoveEvent", pressed + QPoint(*by)),
+        ("canvasReleaseEvent", pressed + QPoint(*by)),
+    ):
+        event = MagicMock()
+        event.pos.return_value = place
+        getattr(tool, name)(event)
+
+
+def test_repair_moves_switches_and_writes(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    import rasterio
+    from qgis.core import QgsProject
+    from qgis.PyQt.QtCore import Qt
+
+    dock = open_registered(tmp_path, desktop, registered_files)
+    repair = dock.repair
+    dock.tabs.setCurrentWidget(repair)
+    count = len(repair.review.points)
+    assert repair.table.rowCount() == count >= 10
+    assert "left-out error" in repair.model.currentText()
+    assert {"translation", "affine"} <= set(repair.fits)
+    desktop.picture("4_repair")
+
+    # A point that is dragged: its residual and the fit change, its row tells who did it.
+    index = int(np.flatnonzero(repair.review.points.used & ~repair.review.points.is_check)[0])
+    before = repair.fits["affine"]
+    repair.drag.click()
+    start = repair.points.toCanvasCoordinates(repair.points.rows[index][1])
+    drag(desktop, repair._drag, start, (30, 20))
+    after = repair.fits["affine"]
+    assert after.residuals_px[index] > before.residuals_px[index] + 5
+    assert after.left_out_px > before.left_out_px
+    assert repair.review.edited[index]
+    assert "1 set by hand" in repair.text.text()
+    assert "9 of 9 check points agree within 2 px" in repair.text.text()
+    desktop.picture("5_dragged")
+
+    # The worst stands first in the sorted table; switched off, it takes no part.
+    proxy = repair.view.model()
+    first = proxy.mapToSource(proxy.index(0, 0)).row()
+    assert first == index
+    assert proxy.setData(proxy.index(0, 0), Qt.CheckState.Unchecked, Qt.ItemDataRole.CheckStateRole)
+    assert not repair.review.points.used[index]
+    assert repair.fits["affine"].rmse_px < after.rmse_px
+
+    repair.model.setCurrentIndex(repair.model.findData("translation"))
+    repair.write.click()
+    desktop.wait(lambda: repair._run is None)
+    assert repair.text.text().startswith("Written: "), repair.text.text()
+    layer = dock.look._registered
+    assert layer.id() in QgsProject.instance().mapLayers()
+    with rasterio.open(layer.source()) as written, rasterio.open(tmp_path / "reference.tif") as ref:
+        assert written.transform == ref.transform
+        one, other = (r.read(1).astype(float)[50:-50, 50:-50] for r in (written, ref))
+    # The input is the reference's negative: where it lies right they are opposite.
+    assert np.corrcoef(one.ravel(), other.ravel())[0, 1] < -0.9
+    desktop.picture("6_written")
+
+
+def test_a_point_is_added_by_a_click_in_each_image(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    from qgis.core import QgsPointXY
+
+    dock = open_registered(tmp_path, desktop, registered_files)
+    repair = dock.repair
+    dock.tabs.setCurrentWidget(repair)
+    count = len(repair.review.points)
+    repair.add.click()
+    place = QgsPointXY(ORIGIN[0] + 200, ORIGIN[1] - 180)
+    repair._clicked_on_map(place)
+    assert [layer.source() for layer in dock.overlay._layers] == [repair._input.source()]
+    desktop.picture("7_second_click")
+    # Where the input's georeferencing has the place, and 3 px off.
+    repair._clicked_on_map(QgsPointXY(place.x() + SHIFT[0] + 3, place.y() + SHIFT[1] - 2))
+    assert len(repair.review.points) == count + 1
+    assert repair.review.edited[-1]
+    assert repair.review.points.score[-1] > 5
+    expected = repair.review.input_px((place.x() + SHIFT[0], place.y() + SHIFT[1]))
+    np.testing.assert_allclose(repair.review.points.input_px[-1], expected, atol=0.5)
+    repair.match.setChecked(False)
+    repair._clicked_on_map(place)
+    repair._clicked_on_map(QgsPointXY(place.x() + 9, place.y()))
+    clicked = repair.review.input_px((place.x() + 9, place.y()))
+    np.testing.assert_allclose(repair.review.points.input_px[-1], clicked, atol=1e-6)
+
+
+def test_a_refusal_says_why_and_what_to_try(desktop: Desktop, tmp_path: Path) -> None:
+    for seed, name in enumerate(("one", "other")):
+        (tmp_path / name).mkdir()
+        write_pair(tmp_path / name, seed)
+    (reference,) = desktop.load(tmp_path / "one", "reference")
+    (input,) = desktop.load(tmp_path / "other", "input")
+    dock = desktop.open()
+    start = dock.start
+    start.pair.setCurrentText("SAR and optical")
+    start.reference.setLayer(reference)
+    start.input.setLayer(input)
+    start.radius.setValue(12)
+    outcome = desktop.register()
+    assert not outcome.succeeded
+    assert "input was not registered to reference: " in start.verdict.text()
+    assert start.report.isVisible()
+    assert start.wider.isVisible()
+    assert start.turn.isVisible()
+    assert "refused" in outcome.files["REPORT"].read_text(encoding="utf-8")
+    desktop.picture("8_refused")
+    assert not dock.look.swipe.isEnabled()
+    # A person may begin with points of their own.
+    assert len(dock.repair.review.points) == 0
+    assert not dock.repair.write.isEnabled()
+    start.wider.click()
+    assert start.radius.value() == 24
+    start.register.click()  # it is Cancel now
+    desktop.wait(lambda: start._run is None)
+    assert not start.outcome.succeeded
+
+
+def test_wrong_values_are_told_at_once(desktop: Desktop) -> None:
+    start = desktop.open().start
+    start.register.click()
+    assert "Choose two raster layers" in start.verdict.text()
+
+
+def test_layers_that_go_leave_nothing_behind(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    from qgis.core import QgsProject
+
+    dock = open_registered(tmp_path, desktop, registered_files)
+    dock.look.swipe.click()
+    QgsProject.instance().clear()
+    assert not dock.overlay.isVisible()
+    assert dock.repair.review is None
+    assert not dock.look.swipe.isEnabled()
+
+
+def test_the_map_as_it_is_drawn_may_be_the_reference(desktop: Desktop, tmp_path: Path) -> None:
+    from groundtie_qgis.reference_export import with_files
+
+    reference, input = pair(tmp_path, desktop)
+    desktop.refresh()
+    made, values = with_files(None, input, desktop.canvas)
+    assert made.isValid()
+    assert made.crs() == input.crs()
+    assert values["INPUT"] == input.id()
+    assert made.rasterUnitsPerPixelX() == pytest.approx(1, rel=0.01)
+    assert made.extent().contains(input.extent())
+    # What is drawn there is what lies there.
+    import rasterio
+
+    with rasterio.open(made.source()) as drawn, rasterio.open(reference.source()) as ground:
+        place = [(ORIGIN[0] + x + 0.5, ORIGIN[1] - y - 0.5) for x, y in ((50, 60), (200, 300))]
+        there = np.array([values[0] for values in drawn.sample(place)], float)
+        truth = np.array([values[0] for values in ground.sample(place)], float)
+    # The stretch is linear: order and sign of differences stay.
+    assert np.sign(np.diff(there)) == np.sign(np.diff(truth))
+
+
+def test_plugin_menu_opens_and_closes_the_dock(desktop: Desktop, tmp_path: Path) -> None:
+    from groundtie_qgis.plugin import GroundTiePlugin
+
+    iface = desktop.iface
+    iface.addDockWidget.side_effect = desktop.window.addDockWidget
+    plugin = GroundTiePlugin(iface, tmp_path)
+    plugin.initProcessing = lambda: None
+    plugin.initGui()
+    iface.addToolBarIcon.assert_called_once_with(plugin.actions[0])
+    desktop.window.show()
+    plugin.actions[0].trigger()
+    assert plugin.dock.isVisible()
+    plugin.actions[0].trigger()
+    assert not plugin.dock.isVisible()
+    plugin.unload()
+    assert plugin.dock is None
+    iface.removeToolBarIcon.assert_called_once()

@@ -1,0 +1,105 @@
+"""Masks that users have: by values, inside out, and found beside an image."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+from contexts import context
+from facts_of_pairs import FIELDS, TOWN, opened
+from raster_files import write_raster
+
+from groundtie.context import Context
+from groundtie.errors import ParameterError
+from groundtie.rasters.grid import Grid
+from groundtie.registration.scene import SceneInfo
+from groundtie.registration.user_masks import UserMask, named_masks, with_user_masks
+
+__all__ = ["context"]
+
+
+@pytest.fixture
+def stack() -> Iterator[ExitStack]:
+    with ExitStack() as found:
+        yield found
+
+
+def half_cloudy(path: Path, grid: Grid) -> Path:
+    """Write a classification: a cloud over the right half."""
+    values = np.full((grid.height, grid.width), 4, np.uint8)
+    values[:, grid.width // 2 :] = 9
+    return write_raster(path, values, grid)
+
+
+def test_values_hide_clouds_and_say_nothing_of_the_ground(
+    tmp_path: Path, stack: ExitStack, context: Context
+) -> None:
+    with opened(tmp_path, TOWN, FIELDS) as pair:
+        grid = pair.input.source.grid
+        path = half_cloudy(tmp_path / "scl.tif", grid)
+        mask = UserMask.of("input.tif", path, "scl")
+        masked, used = with_user_masks(pair, named_masks((None, mask)), stack, context)
+        valid = masked.input_patch(masked.grid, masked.nominal_px).valid
+        middle = valid.shape[1] // 2
+        assert valid[5:-5, 5 : middle - 2].all() and not valid[:, middle + 2 :].any()
+        assert used is None and masked.is_masked
+        assert not SceneInfo.of(masked).has_user_mask
+        (note,) = masked.notes()
+        assert note.startswith("scl.tif keeps ") and note.endswith("% of the input")
+
+
+def test_a_layer_may_show_what_takes_no_part(
+    tmp_path: Path, stack: ExitStack, context: Context
+) -> None:
+    with opened(tmp_path, TOWN, FIELDS) as pair:
+        left, top = pair.grid.pixel_to_map([[-0.5, -0.5]])[0]
+        ring = [[left, top], [left + 200, top], [left + 200, top - 400], [left, top - 400]]
+        polygon = {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}
+        feature = {"type": "Feature", "properties": {}, "geometry": polygon}
+        crs = {"type": "name", "properties": {"name": pair.grid.crs.to_string()}}
+        layer = tmp_path / "clouds.geojson"
+        layer.write_text(
+            json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]})
+        )
+        found = []
+        for values in (None, "inside"):
+            mask = UserMask.of("input.tif", layer, values)
+            masked, used = with_user_masks(pair, named_masks((mask, None)), stack, context)
+            found.append(masked.reference_patch(masked.grid).valid)
+            assert (used is None) == (values == "inside")
+        everything = pair.reference_patch(pair.grid).valid
+        np.testing.assert_array_equal(found[0] ^ found[1], everything)
+        assert found[0][:, :199].all() and not found[1][:, :199].any()
+
+
+def test_a_mask_beside_the_image_is_taken_unless_it_is_not_wanted(tmp_path: Path) -> None:
+    image = tmp_path / "T32UQD_20200620T101031_B04_20m.jp2"
+    beside = tmp_path / "T32UQD_20200620T101031_SCL_20m.jp2"
+    beside.touch()
+    found = UserMask.of(image, None, None)
+    assert found is not None
+    assert (found.mask, found.values) == (beside, "scl")
+    assert found.origin == f", found beside {image.name},"
+    assert UserMask.of(image, None, "none") is None
+    own = UserMask.of(image, tmp_path / "own.tif", None)
+    assert own is not None and own.mask == tmp_path / "own.tif" and own.is_zeros
+    assert UserMask.of(np.zeros((3, 3)), None, None) is None
+
+
+@pytest.mark.parametrize(
+    ("mask", "values", "message"),
+    [
+        (None, "scl", "there is no mask that the values scl belong to"),
+        ("clouds.gpkg", "3", "the only value of a vector layer is inside"),
+        ("a.json", "3", "a classifier has no values"),
+        ("a.tif", "inside", "must be numbers and ranges"),
+        ("a.tif", "none", "must be numbers and ranges"),
+    ],
+)
+def test_values_belong_to_their_kind_of_mask(mask: str | None, values: str, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        UserMask.of("input.tif", mask, values)

@@ -1,0 +1,60 @@
+"""Parts that lie elsewhere are named by place, distance and direction, and drawn apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from evidences import survey
+from known_reports import Page, report_of, written
+from matplotlib.quiver import Quiver
+
+from groundtie.rasters.pair import ImagePair
+from groundtie.report.figures import FIT_COLOUR
+from groundtie.report.parts import COLOURS, Parts, parts_map
+
+# Chips of the two upper rows lie 9 px to the right and 5 px up, of 10 m each.
+TWO_ROWS = Parts.of(survey(35, part=14))
+
+
+def test_a_part_is_named_by_place_distance_and_direction() -> None:
+    (line,) = TWO_ROWS.lines()
+    assert line.startswith(
+        "upper: 14 neighbouring chips lie 10.3 px off (90.0 m east, 50.0 m north)"
+    )
+    assert line.endswith("of the 14 chips there, 0 confirm the transform")
+
+
+def test_numbers_of_a_part() -> None:
+    (part,) = TWO_ROWS.summary()
+    assert part["shift_px"] == (9.0, -5.0)
+    assert part["distance_px"] == pytest.approx(np.hypot(9, 5))
+    assert (part["chips"], part["surrounded"], part["confirming"]) == (14, 14, 0)
+    assert part["is_evident"]
+
+
+def test_chips_that_fell_anywhere_are_no_part() -> None:
+    parts = Parts.of(survey(30))
+    assert parts.shown() is None
+    assert parts.summary() == []
+
+
+def test_the_map_has_an_arrow_for_every_chip_of_a_part_in_its_colour() -> None:
+    axes = parts_map(TWO_ROWS).axes[0]
+    arrows, scale = (c for c in axes.collections if isinstance(c, Quiver))
+    assert (arrows.N, scale.N) == (14, 1)
+    drawn = np.column_stack([arrows.U, arrows.V])
+    # They point from where the transform has the chips, rows downwards.
+    np.testing.assert_allclose(drawn / drawn[:, :1], np.full((14, 2), [1, -5 / 9]))
+    confirming = [line for line in axes.lines if line.get_color() == FIT_COLOUR]
+    assert [len(line.get_xdata()) for line in confirming] == [35]
+    assert [len(line.get_xdata()) for line in axes.lines if line.get_color() == COLOURS[0]] == [14]
+
+
+def test_a_page_shows_parts_whatever_the_verdict(pair: ImagePair, tmp_path: Path) -> None:
+    page: Page = written(report_of(pair, parts=TWO_ROWS), tmp_path)
+    assert "Parts that lie elsewhere" in [e.text for e in page.all("h2")]
+    assert "Upper: 14 neighbouring chips lie 10.3 px off" in page.text
+    without = written(report_of(pair, parts=Parts.of(survey(49))), tmp_path)
+    assert "Parts that lie elsewhere" not in [e.text for e in without.all("h2")]

@@ -1,0 +1,60 @@
+"""Displacements as vectors, matrices and models."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from raster_files import utm_grid
+from series_dates import FRAME, GRID
+
+from groundtie.series.frame import SeriesFrame, rms_px, sigma_px
+
+DISPLACEMENT = np.array([3.0, -2.0, 0.4, 0.1, -0.2, 0.6])
+
+
+def test_a_displacement_survives_all_its_forms() -> None:
+    matrix = FRAME.matrix(DISPLACEMENT)
+    np.testing.assert_allclose(FRAME.of_matrix(matrix), DISPLACEMENT, atol=1e-12)
+    model = FRAME.model(DISPLACEMENT)
+    np.testing.assert_allclose(FRAME.displacement_of(model), DISPLACEMENT, atol=1e-9)
+
+
+def test_its_numbers_are_pixels_at_the_centre_and_at_the_border() -> None:
+    model = FRAME.model(DISPLACEMENT)
+    uv = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    moved = (FRAME.enter(model(FRAME.leave(uv))) - uv) * FRAME.half_px
+    expected = [[3.0, -2.0], [3.4, -1.9], [2.8, -1.4]]
+    np.testing.assert_allclose(moved, expected, atol=1e-9)
+
+
+def test_a_shift_is_a_translation() -> None:
+    assert FRAME.model(np.array([3.0, -2.0, 0, 0, 0, 0])).kind == "translation"
+    assert FRAME.model(DISPLACEMENT).kind == "affine"
+
+
+def test_the_root_mean_square_is_that_of_a_lattice() -> None:
+    side = np.linspace(-1, 1, 201)
+    uv = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    moved = DISPLACEMENT[:2] + uv @ DISPLACEMENT[2:].reshape(2, 2)
+    assert rms_px(DISPLACEMENT) == pytest.approx(np.sqrt((moved**2).sum(axis=1).mean()), rel=0.01)
+    assert sigma_px(np.outer(DISPLACEMENT, DISPLACEMENT)) == pytest.approx(rms_px(DISPLACEMENT))
+
+
+def test_pixels_are_no_finer_than_the_dates() -> None:
+    fine = utm_grid(4000, 3000, 1.0)
+    frame = SeriesFrame.around(fine, [fine, GRID, GRID])
+    assert frame.grid.pixel_size_m == pytest.approx(10.0)
+    assert SeriesFrame.around(GRID, [GRID, fine, fine]).grid == GRID
+
+
+def test_a_date_elsewhere_does_not_move_the_frame() -> None:
+    away = GRID.shifted(1e6, 0.0)
+    assert SeriesFrame.around(GRID, [GRID, GRID, away]).centre_px == FRAME.centre_px
+
+
+def test_a_date_is_moved_to_its_ground() -> None:
+    shift = np.array([3.0, -2.0, 0, 0, 0, 0])
+    moved = FRAME.moved_grid(GRID, shift)
+    # What nominally lies 3 px to the right, 2 px up, belongs 30 m to the west and 20 m south.
+    assert moved.transform.c - GRID.transform.c == pytest.approx(-30.0)
+    assert moved.transform.f - GRID.transform.f == pytest.approx(-20.0)

@@ -1,0 +1,133 @@
+"""What a series may be named by."""
+
+from __future__ import annotations
+
+import datetime
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from groundtie.errors import ParameterError
+from groundtie.series.inputs import list_dates, time_of
+
+DAY = datetime.datetime(2020, 3, 4)
+
+
+def touched(folder: Path, *names: str) -> list[Path]:
+    folder.mkdir(exist_ok=True)
+    paths = [folder / name for name in names]
+    for path in paths:
+        path.touch()
+    return paths
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("S2A_20200304T101", DAY),
+        ("a-2020-03-04-b", DAY),
+        ("2020_03_04", DAY),
+        ("2020-03-04T00:00:00Z", DAY),
+        ("2020-03-04T02:00:00+02:00", DAY),
+        ("1985", datetime.datetime(1985, 1, 1)),
+        ("m_4709963_se_14_1_20100629", datetime.datetime(2010, 6, 29)),
+        ("20200230", None),
+        ("4709963", None),
+        ("image", None),
+    ],
+)
+def test_times_in_names(text: str, expected: datetime.datetime | None) -> None:
+    assert time_of(text) == expected
+
+
+def test_files_folders_and_patterns_are_one_list_in_time(tmp_path: Path) -> None:
+    (late,) = touched(tmp_path, "b_20210101.tif")
+    touched(tmp_path / "more", "a_20200101.TIF", "c_20220101.jp2", "notes.txt")
+    found = list_dates([late, tmp_path / "more", tmp_path / "*.tif"], None)
+    assert [date.name for date in found] == ["a_20200101", "b_20210101", "c_20220101"]
+
+
+def test_without_all_times_the_order_is_that_of_the_inputs(tmp_path: Path) -> None:
+    paths = touched(tmp_path, "z_20220101.tif", "b.tif", "a_20200101.tif")
+    assert [date.raster for date in list_dates(paths, None)] == paths
+
+
+def test_a_table_names_its_files_from_where_it_lies(tmp_path: Path) -> None:
+    table = tmp_path / "dates.csv"
+    table.write_text("file,name,time,mask\nx/a.tif,first,2020-03-04,m.tif\n/b.tif,,,\n")
+    first, second = list_dates([table], None)
+    assert (first.name, first.raster, first.time) == ("first", tmp_path / "x/a.tif", DAY)
+    assert first.mask == tmp_path / "m.tif"
+    assert (second.name, second.raster, second.mask) == ("b", Path("/b.tif"), None)
+
+
+def item(number: int, **assets: Any) -> dict[str, Any]:
+    return {
+        "type": "Feature",
+        "stac_version": "1.0.0",
+        "id": f"item-{number}",
+        "properties": {"datetime": f"2020-0{number}-04T00:00:00Z"},
+        "assets": assets,
+    }
+
+
+TIFF = "image/tiff; application=geotiff; profile=cloud-optimized"
+
+
+def test_stac_items(tmp_path: Path) -> None:
+    items = [
+        item(4, red={"href": "4/red.tif", "type": TIFF}, quick={"href": "q.png"}),
+        item(3, red={"href": "https://host/red.tif"}, thumb={"href": "t.png", "type": "image/png"}),
+    ]
+    path = tmp_path / "items.json"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": items}))
+    for asset in (None, "red"):
+        first, second = list_dates([path], asset)
+        assert (first.name, first.raster) == ("item-3", "/vsicurl/https://host/red.tif")
+        assert first.time == DAY
+        assert (second.name, second.raster) == ("item-4", tmp_path / "4/red.tif")
+
+
+def test_an_asset_must_be_named_where_there_are_several(tmp_path: Path) -> None:
+    path = tmp_path / "item.json"
+    path.write_text(json.dumps(item(1, red={"href": "r.tif"}, blue={"href": "b.tif"})))
+    with pytest.raises(ParameterError, match="name one of its assets: blue, red"):
+        list_dates([path], None)
+    with pytest.raises(ParameterError, match="no asset green"):
+        list_dates([path], "green")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("none.tif", None, "there is no file"),
+        ("none*.tif", None, "no file matches"),
+        ("a.csv", "path\nx.tif\n", "has no column file"),
+        ("a.csv", "file,time\nx.tif,soon\n", "line 2: 'soon' is no time"),
+        ("a.csv", "file,time\n,2020-01-01\n", "line 2: the column file is empty"),
+        ("a.json", "[]", "is no STAC item"),
+        ("a.json", "{", "cannot read the STAC file"),
+        ("a.json", '{"type": "Feature"}', "is no STAC item"),
+        ("a.json", '{"type": "FeatureCollection", "features": [1]}', "is no STAC item"),
+    ],
+)
+def test_what_is_no_date_is_one_line(
+    tmp_path: Path, name: str, content: str | None, message: str
+) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(ParameterError, match=message) as caught:
+        list_dates([path], None)
+    assert "\n" not in caught.value.one_line()
+
+
+def test_an_empty_folder_and_two_dates_of_one_name(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="holds no raster"):
+        list_dates([tmp_path], None)
+    touched(tmp_path / "x", "a.tif")
+    touched(tmp_path / "y", "a.tif")
+    with pytest.raises(ParameterError, match="two dates are called a"):
+        list_dates([tmp_path / "x", tmp_path / "y"], None)

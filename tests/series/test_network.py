@@ -1,0 +1,128 @@
+"""The adjustment against theory: values, covariances, gross errors, datum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+from series_dates import FRAME, link, shifted, star_and_chain
+
+from groundtie.series.network import SCATTER_RANGE_PX, adjust
+
+RNG = np.random.default_rng(5)
+SIGMA = 0.1
+LEAST = SCATTER_RANGE_PX[0]
+
+
+def truth(count: int, linear_px: float = 0.0) -> np.ndarray:
+    found = np.column_stack(
+        [RNG.uniform(-15, 15, (count, 2)), RNG.uniform(-linear_px, linear_px, (count, 4))]
+    )
+    found[0] = 0.0
+    return found
+
+
+def test_links_without_error_give_the_truth_exactly() -> None:
+    """Rotated and scaled, too: transforms are composed, not added."""
+    true = truth(6, linear_px=3.0)
+    links = [link(a, b, true, SIGMA) for a, b in star_and_chain(6)]
+    found = adjust(FRAME, links, 6, 0, is_free=False)
+    np.testing.assert_allclose(found.displacements, true, atol=1e-9)
+    assert found.kept.all() and found.confirmed.all()
+
+
+def test_the_covariance_of_a_chain_adds_up() -> None:
+    true = truth(4)
+    links = [link(a, a + 1, true, SIGMA) for a in range(3)]
+    found = adjust(FRAME, links, 4, 0, is_free=False)
+    each = SIGMA**2 + LEAST**2
+    for date in range(4):
+        np.testing.assert_allclose(found.covariances[date], date * each * np.eye(6), atol=1e-12)
+    assert list(found.confirmed) == [True, False, False, False]
+    assert np.isnan(found.statistics).all()
+
+
+def test_two_ways_of_one_length_halve_the_variance() -> None:
+    true = truth(4)
+    links = [link(a, b, true, SIGMA) for a, b in ((0, 1), (1, 3), (0, 2), (2, 3))]
+    found = adjust(FRAME, links, 4, 0, is_free=False)
+    np.testing.assert_allclose(found.covariances[3], (SIGMA**2 + LEAST**2) * np.eye(6), atol=1e-12)
+
+
+def test_the_stated_covariance_is_that_of_many_trials() -> None:
+    """Links err by their covariance and the scatter; estimates do as their covariance has it."""
+    true, ends, spread = truth(4), star_and_chain(4), np.hypot(SIGMA, LEAST)
+    normalised = []
+    for _ in range(40):
+        links = [link(a, b, true, SIGMA, RNG.normal(0, spread, 6)) for a, b in ends]
+        found = adjust(FRAME, links, 4, 0, is_free=False)
+        if found.kept.all():
+            error = found.displacements[3] - true[3]
+            normalised.append(error @ np.linalg.solve(found.covariances[3], error))
+    # The mean of χ² with six degrees of freedom is 6, its variance 12.
+    assert np.mean(normalised) == pytest.approx(6.0, abs=4 * np.sqrt(12 / len(normalised)))
+
+
+def test_statistics_of_links_are_chi_squared() -> None:
+    true, ends, spread = truth(8), star_and_chain(8), np.hypot(SIGMA, LEAST)
+    found = []
+    for _ in range(15):
+        links = [link(a, b, true, SIGMA, RNG.normal(0, spread, 6)) for a, b in ends]
+        found.append(adjust(FRAME, links, 8, 0, is_free=False).statistics)
+    median = np.median(np.concatenate(found))
+    assert median == pytest.approx(chi2.median(6), rel=0.2)
+
+
+@pytest.mark.parametrize("wrong", [(0, 3), (3, 4), (0, 5)])
+def test_a_gross_error_is_found_and_does_no_harm(wrong: tuple[int, int]) -> None:
+    true = truth(7)
+    links = [
+        link(a, b, true, 0.05, shifted(1.5, -1.0) if (a, b) == wrong else RNG.normal(0, 0.03, 6))
+        for a, b in star_and_chain(7)
+    ]
+    found = adjust(FRAME, links, 7, 0, is_free=False)
+    ends = [(one.first, one.second) for one in links]
+    assert [end for end, kept in zip(ends, found.kept, strict=True) if not kept] == [wrong]
+    assert found.statistics[ends.index(wrong)] > 50
+    assert np.abs(found.displacements - true)[:, :2].max() < 0.15
+
+
+def test_the_scatter_is_found_from_the_misclosures() -> None:
+    true, scatter = truth(15), 0.15
+    links = [link(a, b, true, 0.01, RNG.normal(0, scatter, 6)) for a, b in star_and_chain(15)]
+    found = adjust(FRAME, links, 15, 0, is_free=False)
+    assert found.scatter_px == pytest.approx(scatter, rel=0.35)
+
+
+def test_shifts_alone_have_two_degrees_of_freedom() -> None:
+    true, scatter = truth(15), 0.15
+    links = [
+        link(a, b, true, 0.01, shifted(*RNG.normal(0, scatter, 2))) for a, b in star_and_chain(15)
+    ]
+    found = adjust(FRAME, links, 15, 0, is_free=False)
+    assert found.scatter_px == pytest.approx(scatter, rel=0.45)
+
+
+def test_without_a_reference_the_mean_is_zero() -> None:
+    true = truth(5)
+    links = [link(a, b, true, SIGMA) for a, b in star_and_chain(5)]
+    found = adjust(FRAME, links, 5, 0, is_free=True)
+    np.testing.assert_allclose(found.displacements.mean(axis=0), 0.0, atol=1e-9)
+    np.testing.assert_allclose(found.displacements - found.displacements[0], true, atol=1e-9)
+    # No date is without error now, and all together have less than from the hub.
+    fixed = adjust(FRAME, links, 5, 0, is_free=False)
+    assert found.covariances[0, 0, 0] > 0
+    assert found.covariances[:, 0, 0].sum() < fixed.covariances[:, 0, 0].sum()
+
+
+def test_what_is_not_connected_is_not_placed() -> None:
+    true = truth(5)
+    links = [link(a, b, true, SIGMA) for a, b in ((0, 1), (1, 2), (0, 2), (3, 4))]
+    found = adjust(FRAME, links, 5, 0, is_free=False)
+    assert list(found.reached) == [True, True, True, False, False]
+    assert list(found.kept) == [True, True, True, False]
+
+
+def test_no_link_at_all() -> None:
+    found = adjust(FRAME, [], 2, 0, is_free=False)
+    assert list(found.reached) == [True, False]

@@ -1,0 +1,134 @@
+"""Pools of processes and threads: what dies, what is stopped, and what stays."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from groundtie import executors
+from groundtie.errors import ParameterError, SchedulerError, WorkerLostError
+from groundtie.executors import Processes, Threads, open_executor, stop_requested
+
+# Of Debian 12's tornado, by Dask's own client.
+pytestmark = pytest.mark.filterwarnings("ignore:make_current is deprecated:DeprecationWarning")
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def process_number() -> int:
+    return os.getpid()
+
+
+def die(marker: Path, times: int) -> int:
+    """Kill the process that runs this, so many times."""
+    lives = len(list(marker.parent.glob(f"{marker.name}*")))
+    if lives < times:
+        (marker.parent / f"{marker.name}{lives}").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return lives
+
+
+def wait_for_stop(seconds: float) -> bool:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if stop_requested():
+            return True
+        time.sleep(0.01)
+    return False
+
+
+@pytest.mark.slow
+def test_a_killed_process_costs_no_task(tmp_path: Path) -> None:
+    with Processes(1) as pool:
+        before = pool.submit(process_number).result()
+        assert pool.submit(die, tmp_path / "once", 1).result() == 1
+        assert pool.submit(process_number).result() not in (before, os.getpid())
+        with pytest.raises(WorkerLostError, match="ended 2 times"):
+            pool.submit(die, tmp_path / "ever", 9).result()
+        assert pool.submit(process_number).result() != os.getpid()
+
+
+@pytest.mark.slow
+def test_tasks_are_asked_to_stop_in_threads_and_processes() -> None:
+    for kind in (Threads, Processes):
+        pool = kind(1)
+        pool.submit(process_number).result()
+        running, waiting = pool.submit(wait_for_stop, 20.0), pool.submit(process_number)
+        while not running.running():
+            time.sleep(0.01)
+        pool.shutdown(cancel_futures=True)
+        assert running.result() is True
+        assert waiting.cancelled()
+
+
+def test_nothing_is_asked_to_stop_elsewhere() -> None:
+    assert stop_requested() is False
+
+
+@pytest.mark.slow
+def test_processes_end_with_their_parent(tmp_path: Path) -> None:
+    script = tmp_path / "parent.py"
+    script.write_text(
+        "import os, sys, time\n"
+        "from groundtie.executors import Processes\n"
+        "def main():\n"
+        "    pool = Processes(1)\n"
+        "    print(pool.submit(os.getpid).result(), flush=True)\n"
+        "    time.sleep(60)\n"
+        "if __name__ == '__main__':\n"
+        "    main()\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "algorithms")}
+    with subprocess.Popen(
+        [sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env=environment
+    ) as parent:
+        assert parent.stdout is not None
+        child = int(parent.stdout.readline())
+        parent.kill()
+    end = time.monotonic() + 10
+    while Path(f"/proc/{child}").exists() and time.monotonic() < end:
+        if Path(f"/proc/{child}/stat").read_text().split()[2] == "Z":
+            break  # ended; nobody collects it here
+        time.sleep(0.02)
+    else:
+        assert not Path(f"/proc/{child}").exists()
+
+
+def test_threads_alone_run_inside_qgis(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "qgis.core", sys)
+    with open_executor(2) as pool:
+        assert pool.submit(process_number).result() == os.getpid()
+
+
+class TestScheduler:
+    def test_one_that_is_not_there_is_one_line(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        pytest.importorskip("distributed", reason="the extra cluster is not installed")
+        assert executors._CONNECT_SECONDS <= 5
+        monkeypatch.setattr(executors, "_CONNECT_SECONDS", 0.5)
+        started = time.monotonic()
+        with (
+            pytest.raises(SchedulerError, match=r"no Dask scheduler answers at tcp://127.0.0.1:9$"),
+            open_executor(2, "tcp://127.0.0.1:9"),
+        ):
+            pass
+        assert time.monotonic() - started < 5
+
+    def test_an_address_is_one(self) -> None:
+        pytest.importorskip("distributed", reason="the extra cluster is not installed")
+        for address, error in (("host:8786", ParameterError), ("fly://host:1", SchedulerError)):
+            with pytest.raises(error, match="host"), open_executor(2, address):
+                pass
+
+    def test_a_missing_package_is_named(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "distributed", None)
+        with (
+            pytest.raises(SchedulerError, match=r"pip install 'groundtie\[cluster\]'"),
+            open_executor(2, "tcp://127.0.0.1:9"),
+        ):
+            pass

@@ -1,0 +1,266 @@
+"""Whole series against truth: what is registered, what is left out, and what lies in the folder."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fiona
+import numpy as np
+import pytest
+import rasterio
+from raster_files import utm_grid, write_raster
+from series_dates import Dates, write_dates
+from textured_pairs import listing, pixels
+
+import groundtie
+from groundtie.cli import main
+from groundtie.errors import NotRegisteredError
+from groundtie.geometry.transform import Transform
+from groundtie.progress import Progress
+from groundtie.series.series import Series
+from groundtie.tools.coregister_series import coregister_series
+
+ELSEWHERE, CLOUDY = 2, 3
+GOOD = (0, 1, 4, 5)
+SIZE = 160
+OPTIONS: dict[str, Any] = {"search_radius": 120.0, "workers": 2}
+
+
+@dataclass(frozen=True)
+class Run:
+    dates: Dates
+    folder: Path
+    report: Path
+    result: Series
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: Any) -> Run:
+    """A series of six dates, of which two do not belong, with all outputs."""
+    folder = tmp_path_factory.mktemp("series")
+    dates = write_dates(folder / "dates", 6, SIZE, elsewhere=[ELSEWHERE], cloudy=[CLOUDY])
+    out, report = folder / "out", folder / "report.html"
+    result = coregister_series(
+        out, [dates.folder], reference=dates.files[0], report=report, **OPTIONS
+    )
+    return Run(dates, out, report, result)
+
+
+def error_px(transform: Transform, dates: Dates, date: int, reference: int) -> float:
+    """Return by how much a transform misses the truth between two dates, in pixels."""
+    grid = transform.input_grid
+    px = np.array([[30.0, 30.0], [130.0, 50.0], [80.0, 120.0]])
+    true = px + dates.displacement_px[date] - dates.displacement_px[reference]
+    return float(np.hypot(*(transform(grid.pixel_to_map(px)) - true).T).max())
+
+
+@pytest.mark.slow
+def test_good_dates_are_registered_and_the_others_named(run: Run) -> None:
+    names = run.dates.names
+    assert [one.name for one in run.result.registered] == [names[date] for date in GOOD[1:]]
+    left = {one.name: one.verdict.rule for one in run.result.left_out}
+    assert left == dict.fromkeys((names[k] for k in (ELSEWHERE, CLOUDY)), "date not linked")
+    transforms = run.result.transforms()
+    for date in GOOD[1:]:
+        assert error_px(transforms[names[date]], run.dates, date, 0) < 0.3
+
+
+@pytest.mark.slow
+def test_loops_close(run: Run) -> None:
+    loops = run.result.loops()
+    assert loops["count"] >= 2 and loops["closed"] == loops["count"]
+    assert loops["largest_px"] < 0.3
+    assert all(one.verdict.evidence.is_confirmed for one in run.result.registered)
+
+
+@pytest.mark.slow
+def test_all_files_and_no_others(run: Run) -> None:
+    rasters = {f"{run.dates.names[date]}_registered.tif" for date in GOOD[1:]}
+    assert set(listing(run.folder)) == {*rasters, "series.csv", "series.gpkg", "series.json"}
+    assert run.report.is_file() and run.report.with_suffix(".json").is_file()
+
+
+@pytest.mark.slow
+def test_registered_dates_show_the_same_ground(run: Run) -> None:
+    reference = pixels(run.dates.files[0])[0].astype(float)
+    for date in GOOD[1:]:
+        path = run.folder / f"{run.dates.names[date]}_registered.tif"
+        registered = pixels(path)[0].astype(float)
+        both = (registered > 0)[20:-20, 20:-20]
+        before = pixels(run.dates.files[date])[0].astype(float)
+        after, nominal = (
+            np.corrcoef(image[20:-20, 20:-20][both], reference[20:-20, 20:-20][both])[0, 1]
+            for image in (registered, before)
+        )
+        assert after > 0.85 > nominal
+
+
+@pytest.mark.slow
+def test_the_tables_say_the_same(run: Run) -> None:
+    with (run.folder / "series.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    stored = json.loads((run.folder / "series.json").read_text())
+    with fiona.open(run.folder / "series.gpkg") as layer:
+        features = list(layer)
+    assert [row["name"] for row in rows] == run.dates.names
+    assert rows[0]["state"] == "reference"
+    for row, feature, values in zip(rows, features, stored["dates"], strict=True):
+        assert row["state"] == feature["properties"]["state"] == values["state"]
+        assert (feature["geometry"] is None) == (row["state"] == "left out")
+    true = run.dates.displacement_px - run.dates.displacement_px[0]
+    for date in GOOD[1:]:
+        found = [float(rows[date][f"shift_{axis}_px"]) for axis in "xy"]
+        np.testing.assert_allclose(found, true[date], atol=0.3)
+        # Rows run downwards, the map's y upwards; pixels are of 10 m.
+        metres = [float(rows[date][f"shift_{axis}_m"]) for axis in "xy"]
+        np.testing.assert_allclose(metres, np.multiply(found, [10, -10]), atol=1e-6)
+        transform = Transform.from_json(stored["dates"][date]["transform"])
+        assert error_px(transform, run.dates, date, 0) < 0.3
+    assert {one["first"] for one in stored["pairs"]} >= {run.dates.names[0]}
+
+
+@pytest.mark.slow
+def test_the_report_names_who_is_left_out_first(run: Run) -> None:
+    page = run.report.read_text(encoding="utf-8")
+    for date in (ELSEWHERE, CLOUDY):
+        assert f"<b>{run.dates.names[date]}</b> is left out" in page
+    table = page[page.index("Dates, the worst first") :]
+    assert table.index(run.dates.names[CLOUDY]) < table.index(run.dates.names[1])
+    numbers = json.loads(run.report.with_suffix(".json").read_text())
+    assert numbers["verdict"] == {"accepted": True, "registered": 3, "left_out": 2}
+
+
+@pytest.mark.slow
+def test_a_further_date_is_registered_alone(run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    shutil.copytree(run.folder, folder)
+    before = listing(folder)
+    more = write_dates(tmp_path / "more", 7, SIZE)
+    result = coregister_series(
+        folder, [run.dates.folder, more.files[6]], reference=run.dates.files[0], **OPTIONS
+    )
+    assert more.names[6] in {one.name for one in result.registered}
+    assert 0 < result.registered_pairs <= 2 and result.reused_pairs > 5
+    after = listing(folder)
+    kept = [name for name in before if name.endswith(".tif")]
+    assert {name: after[name] for name in kept} == {name: before[name] for name in kept}
+
+
+@pytest.mark.slow
+def test_the_same_call_does_nothing_again(run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    shutil.copytree(run.folder, folder)
+    result = coregister_series(folder, [run.dates.folder], reference=run.dates.files[0], **OPTIONS)
+    assert result.registered_pairs == 0
+    assert result.rows() == run.result.rows()
+
+
+@pytest.mark.slow
+def test_without_a_reference_and_with_untouched_pixels(tmp_path: Path) -> None:
+    dates = write_dates(tmp_path / "dates", 3, SIZE, seed=3)
+    result = groundtie.register_series(
+        tmp_path / "out", [dates.folder], output_grid="untouched", **OPTIONS
+    )
+    assert len(result.registered) == 3 and not result.left_out
+    found = np.array([one.verdict.displacement for one in result.dates])[:, :2]
+    np.testing.assert_allclose(found.mean(axis=0), 0.0, atol=1e-9)
+    true = dates.displacement_px - dates.displacement_px.mean(axis=0)
+    np.testing.assert_allclose(found, true, atol=0.3)
+    for path, shift in zip(dates.files, true, strict=True):
+        out = tmp_path / "out" / f"{path.stem}_registered.tif"
+        np.testing.assert_array_equal(pixels(out), pixels(path))
+        with rasterio.open(out) as moved, rasterio.open(path) as before:
+            assert moved.transform.c - before.transform.c == pytest.approx(-10 * shift[0], abs=3)
+            assert moved.transform.f - before.transform.f == pytest.approx(10 * shift[1], abs=3)
+
+
+@pytest.mark.slow
+def test_a_refused_series_leaves_its_report_and_exits_3(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dates = write_dates(tmp_path / "dates", 3, 130, elsewhere=[1, 2])
+    report = tmp_path / "report.html"
+    words = ["coregister-series", str(tmp_path / "out"), *map(str, dates.files[1:])]
+    words += ["--reference", str(dates.files[0]), "--report", str(report)]
+    assert main(words) == 3
+    error = capsys.readouterr().err
+    assert error.startswith("groundtie: error: none of 2 dates was registered")
+    assert len(error.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+    assert set(listing(tmp_path)) >= {"report.html", "report.json"}
+    assert "Refused" in report.read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_a_damaged_file_costs_its_date_alone_and_its_raster(run: Run, tmp_path: Path) -> None:
+    out, inputs = tmp_path / "out", tmp_path / "dates"
+    shutil.copytree(run.folder, out)
+    shutil.copytree(run.dates.folder, inputs)
+    names, damaged = run.dates.names, GOOD[-1]
+    assert (out / f"{names[damaged]}_registered.tif").is_file()
+    (inputs / run.dates.files[damaged].name).write_bytes(b"no raster")
+    result = coregister_series(
+        out,
+        [path for k, path in enumerate(run.dates.files) if k != damaged]
+        + [inputs / run.dates.files[damaged].name],
+        reference=run.dates.files[0],
+        **OPTIONS,
+    )
+    assert [one.name for one in result.registered] == [names[k] for k in GOOD[1:-1]]
+    left = {one.name: one.verdict.rule for one in result.left_out}
+    assert left[names[damaged]] == "date not readable"
+    # It must not lie there as if it was registered.
+    assert not (out / f"{names[damaged]}_registered.tif").exists()
+
+
+def test_cancelling_leaves_nothing(tmp_path: Path) -> None:
+    dates = write_dates(tmp_path / "dates", 2, 64)
+    with pytest.raises(groundtie.errors.CancelledError):
+        coregister_series(
+            tmp_path / "out", [dates.folder], progress=Progress(is_cancelled=lambda: True)
+        )
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["{out}", "{dates}/none.tif"], "there is no file"),
+        (["{out}", "{one}"], "a series needs two dates at least"),
+        (["{dates}", "{dates}"], "the output folder holds an input"),
+        (["{out}", "{dates}", "--reference", "{dates}/none.tif"], "there is no file"),
+        (["{out}", "{dates}", "--reference-mask", "{one}"], "needs a reference"),
+        (["{out}", "{dates}", "--model", "affine", "--output-grid", "untouched"], "translation"),
+        (["{out}", "{dates}", "--report", "{out}/series.html"], "would be written over"),
+        (["{out}", "{dates}", "--report", "{dates}/none/a.html"], "folder of"),
+        (["{other}", "{dates}"], "is no series that can be continued"),
+        (["{out}"], "Missing argument"),
+    ],
+)
+def test_bad_input_is_one_line(
+    tmp_path: Path, words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dates = write_dates(tmp_path / "dates", 2, 64)
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "series.json").write_text('{"format": "something"}')
+    names = {
+        "out": tmp_path / "out", "dates": dates.folder, "one": dates.files[0], "other": other
+    }  # fmt: skip
+    assert main(["coregister-series", *(word.format(**names) for word in words)]) == 2
+    error = capsys.readouterr().err
+    assert message in error and len(error.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_dates_with_nothing_to_match_are_refused(tmp_path: Path) -> None:
+    grid = utm_grid(100, 100)
+    flat = [write_raster(tmp_path / f"{k}.tif", np.full((100, 100), 7 + k, np.uint8), grid)
+            for k in range(2)]  # fmt: skip
+    with pytest.raises(NotRegisteredError, match="none of"):
+        coregister_series(tmp_path / "out", flat)
