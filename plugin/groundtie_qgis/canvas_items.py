@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from qgis.core import QgsMapRendererParallelJob, QgsMapSettings, QgsPointXY, QgsRectangle
+from qgis.core import (
+    QgsContrastEnhancement,
+    QgsMapRendererParallelJob,
+    QgsMapSettings,
+    QgsPointXY,
+    QgsRasterLayer,
+    QgsRasterMinMaxOrigin,
+    QgsRectangle,
+)
 from qgis.gui import QgsMapCanvas, QgsMapCanvasItem
 from qgis.PyQt.QtCore import QPointF, QRectF, Qt
 from qgis.PyQt.QtGui import QColor, QImage, QPen
@@ -12,6 +20,20 @@ from qgis.PyQt.QtGui import QColor, QImage, QPen
 # Residuals up to 1 px, up to 2 px and above, as in styles/tie_points.qml.
 _COLOURS = ((1.0, QColor("#1a9850")), (2.0, QColor("#f59b00")), (float("inf"), QColor("#d73027")))
 _OFF = QColor("#8c8c8c")
+
+
+def clearly(layer: Any) -> Any:
+    """Return a layer to look at: one band of grey without the brightest, which hide the rest.
+
+    A radar image between its least and its largest value is black.
+    """
+    if not isinstance(layer, QgsRasterLayer) or layer.renderer().type() != "singlebandgray":
+        return layer
+    copy = layer.clone()
+    copy.setContrastEnhancement(
+        QgsContrastEnhancement.StretchToMinimumMaximum, QgsRasterMinMaxOrigin.CumulativeCut
+    )
+    return copy
 
 
 class Overlay(QgsMapCanvasItem):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from qgis.core import QgsPointXY, QgsRectangle
-from qgis.PyQt.QtCore import QTimer
+from qgis.PyQt.QtCore import Qt, QTimer
 from qgis.PyQt.QtGui import QKeySequence
 from qgis.PyQt.QtWidgets import (
     QGridLayout,
@@ -17,7 +17,7 @@ from qgis.PyQt.QtWidgets import (
     QWidget,
 )
 
-from .canvas_items import Overlay
+from .canvas_items import Overlay, clearly
 from .map_tools import SwipeTool
 from .reference_export import between
 
@@ -63,6 +63,7 @@ class LookPage(QWidget):
         self.previous.clicked.connect(lambda: self.go(-1))
         for key, step in (("N", 1), ("B", -1)):
             shortcut = QShortcut(QKeySequence(key), self._canvas)
+            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             shortcut.activated.connect(lambda step=step: self.go(step))
         self.corners = [QPushButton(name) for name in _CORNERS]
         layout = QVBoxLayout(self)
@@ -112,7 +113,7 @@ class LookPage(QWidget):
         if on:
             self.flicker.setChecked(False)
             self._show_registered()
-            self._overlay.show_layers([self._reference], 0.5)
+            self._overlay.show_layers([clearly(self._reference)], 0.5)
             self._canvas.setMapTool(self._tool)
         else:
             self._overlay.show_layers([])
@@ -122,7 +123,7 @@ class LookPage(QWidget):
         if on:
             self.swipe.setChecked(False)
             self._show_registered()
-            self._overlay.show_layers([self._reference])
+            self._overlay.show_layers([clearly(self._reference)])
             self._timer.start(_FLICKER_MS)
         else:
             self._timer.stop()

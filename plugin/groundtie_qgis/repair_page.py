@@ -20,7 +20,7 @@ from qgis.PyQt.QtWidgets import (
     QWidget,
 )
 
-from .canvas_items import Overlay, PointsItem
+from .canvas_items import Overlay, PointsItem, clearly
 from .library import errors, library_module
 from .map_tools import ClickTool, DragTool
 from .point_table import SORT_ROLE, PointTable
@@ -28,6 +28,9 @@ from .reference_export import between, named
 from .run import Outcome, Run, new_file
 from .start_page import points_name
 from .wording import choice_label
+
+# As the verdict counts them.
+TOLERANCE_PX = library_module("geometry.judging").TOLERANCE_PX
 
 # Words of models are long: the list shows what they begin with.
 _MODELS = {"translation": "Shift", "rigid": "Rigid", "similarity": "Similarity", "affine": "Affine"}
@@ -179,8 +182,10 @@ class RepairPage(QWidget):
         parts = [f"{int(points.used.sum())} of {len(points)} points take part"]
         parts += [f"{edited} set by hand"] if edited else []
         fit = self.fits.get(self.kind())
-        if fit is not None and fit.check_px is not None:
-            parts.append(f"error at check points {fit.check_px:.2f} px")
+        check = points.is_check & points.used
+        if fit is not None and check.any():
+            agree = int((fit.residuals_px[check] <= TOLERANCE_PX).sum())
+            parts.append(f"{agree} of {check.sum()} check points agree within {TOLERANCE_PX:g} px")
         return ", ".join(parts) + "."
 
     def _switch(self, row: int, on: bool) -> None:
@@ -208,7 +213,7 @@ class RepairPage(QWidget):
     def _set_adding(self, on: bool) -> None:
         self._clicked = None
         self._set_tool(self._click, on)
-        self._overlay.show_layers([self._reference] if on else [])
+        self._overlay.show_layers([clearly(self._reference)] if on else [])
         if on:
             self.drag.setChecked(False)
             self.text.setText("Shown is the reference: click a place that both images have.")
@@ -227,13 +232,13 @@ class RepairPage(QWidget):
     def _clicked_on_map(self, place: QgsPointXY) -> None:
         if self._clicked is None:
             self._clicked = place
-            self._overlay.show_layers([self._input])
+            self._overlay.show_layers([clearly(self._input)])
             self.text.setText(
                 "Shown is the input where its own georeferencing has it: click there."
             )
             return
         first, self._clicked = self._clicked, None
-        self._overlay.show_layers([self._reference])
+        self._overlay.show_layers([clearly(self._reference)])
         self.add_point(self._on_reference(first), self.review.input_px(self._on_reference(place)))
 
     def add_point(self, reference_xy: Any, input_px: Any) -> None:

@@ -57,6 +57,7 @@ class StartPage(QWidget):
         self._canvas, self._finished = canvas, finished
         self._run: Run | None = None
         self.outcome: Outcome | None = None
+        self._layers: tuple[Any, ...] = ()
         self._build()
         self.propose()
 
@@ -117,7 +118,9 @@ class StartPage(QWidget):
         layout.addStretch()
 
     def propose(self) -> None:
-        """Fill the boxes with two different rasters of the project, if there are so many."""
+        """Fill boxes that hold the same, or nothing, with two rasters of the project."""
+        if self.reference.currentLayer() not in (None, self.input.currentLayer()):
+            return
         reference, input = proposed_pair(raster_files())
         if reference is not None and input is not None:
             self.reference.setLayer(reference)
@@ -149,6 +152,7 @@ class StartPage(QWidget):
             return
         input = self.input.currentLayer()
         if input is None or (self.reference.currentLayer() is None and not self._from_map()):
+            self._layers = ()
             self._state(False, "Choose two raster layers.")
             return
         reference, values = with_files(self.reference.currentLayer(), input, self._canvas)
@@ -191,10 +195,12 @@ class StartPage(QWidget):
 
     def _state(self, good: bool, text: str) -> None:
         heading = "✔ Accepted" if good else "✘ Not registered"
+        for layer in self._layers:
+            text = text.replace(layer.source(), layer.name())
         lines = html.escape(in_words(text, None, named_tools())).split("\n")
         self.verdict.setText(
             f'<p style="color: {_GREEN if good else _RED}"><b>{heading}</b></p>'
-            + "".join(f"<p>{line}</p>" for line in lines)
+            f"<p>{'<br>'.join(lines)}</p>"
         )
 
     def search_farther(self) -> None:

@@ -65,7 +65,8 @@ def in_words(text: str, tool: Any, tools: Iterable[Any]) -> str:
     parameters = () if tool is None else tool.parameters
     named |= {parameter.name: parameter.kind.label for parameter in parameters}
     # Short names are English words, too: only what is said to be a tool is one.
-    long = "|".join(sorted((name for name in named if "_" in name), key=len, reverse=True))
+    words = (name for name in named if "_" in name or name == "coregister")
+    long = "|".join(sorted(words, key=len, reverse=True))
     short = "|".join(sorted(named, key=len, reverse=True))
     pattern = rf"`({short})`|the tool ({short})\b" + (rf"|\b({long})\b" if long else "")
     return re.sub(pattern, lambda found: f"“{named[next(filter(None, found.groups()))]}”", text)

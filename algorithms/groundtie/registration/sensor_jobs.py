@@ -131,8 +131,8 @@ class RefinedRpc:
             f"shift in the middle of the image: {shift[0]:+.2f} ± {sigma[0]:.2f}, "
             f"{shift[1]:+.2f} ± {sigma[1]:.2f} px (column, row)",
             f"error at {self.judged.held_out}: {self.judged.before.rmse:.2f} px before, "
-            f"{self.judged.after.rmse:.2f} px after; CE90 {verdict.check_ce90_px:.2f} px "
-            f"({verdict.check_ce90_m:.2f} m)",
+            f"{self.judged.after.rmse:.2f} px after",
+            verdict.accuracy_line(),
             f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
             self.ground,
             *(() if self.mask is None else (self.mask.line(),)),
