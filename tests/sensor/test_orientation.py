@@ -14,7 +14,7 @@ from rasterio.transform import RPCTransformer
 from rpc_models import REAL, camera_rpc, real_tags, to_rasterio, write_dem, write_positions
 
 from groundtie.errors import NoOverlapError
-from groundtie.rasters.grid import Grid, reproject
+from groundtie.rasters.grid import Grid, compose, reproject
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor import dense as dense_module
 from groundtie.sensor.dense import DenseOrientation
@@ -163,7 +163,7 @@ def test_a_terrain_model_elsewhere_is_an_error(tmp_path: Path) -> None:
     image = write_positions(tmp_path / "image.tif", RPC)
     path = write_dem(tmp_path / "dem.tif", size=40)
     with rasterio.open(path, "r+") as dem:
-        dem.transform = Affine.translation(3.0, 0.0) @ dem.transform
+        dem.transform = compose(Affine.translation(3.0, 0.0), dem.transform)
     with (
         open_raster(image, allow_sensor_geometry=True) as source,
         open_raster(path) as dem,
