@@ -143,7 +143,8 @@ def compare(
         files = pair.reference, pair.input
         found = getattr(groundtie, tool)(*files, search_radius=radius_px, workers=workers)
     except NotRegisteredError as refusal:
-        return CalibrationRun(name, group, REFUSED, str(refusal))
+        reason = str(refusal) if refusal.verdict is None else refusal.verdict.reason
+        return CalibrationRun(name, group, REFUSED, reason)
     except Exception as error:
         # A finding like any other: it is counted, and `run.py` exits with 1.
         traceback.print_exc()

@@ -35,6 +35,7 @@ SUITES = (
     "peaks",
     "fusion",
     "optical",
+    "series",
     "attacks",
     "calibration",
 )

@@ -14,6 +14,7 @@ if not __package__:
     # Run as a file, Python looks for modules beside it; the scripts are a package.
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
+from scripts.calibration_figures import calibration
 from scripts.drawing import Scenes, write
 from scripts.feature_figures import features, hog, masks
 from scripts.search_figures import propagation, rotation, search, similarity
@@ -24,6 +25,7 @@ FIGURES = Path(__file__).resolve().parents[1] / "docs" / "figures"
 
 DRAWN: Mapping[str, Callable[[Scenes], Figure]] = {
     "architecture": pipeline,
+    "calibration": calibration,
     "method-similarity": similarity,
     "method-search": search,
     "method-belief-propagation": propagation,

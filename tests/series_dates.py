@@ -70,19 +70,14 @@ def write_dates(
     *,
     elsewhere: Sequence[int] = (),
     cloudy: Sequence[int] = (),
-    beyond: Sequence[int] = (),
     seed: int = 0,
 ) -> Dates:
-    """Write dates of one texture with random shifts; some show another place, or clouds.
-
-    Those `beyond` are shifted by more than the usual search radius of 20 pixels.
-    """
+    """Write dates of one texture with random shifts; some show another place, or clouds."""
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(seed)
     grid = utm_grid(size, size)
     ground = texture(size + 2 * _MARGIN_PX, size + 2 * _MARGIN_PX, seed)
     shifts = rng.uniform(-4, 4, (count, 2))
-    shifts[list(beyond)] += 26
     rows, cols = np.mgrid[:size, :size] + float(_MARGIN_PX)
     files = []
     for date in range(count):

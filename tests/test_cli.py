@@ -79,6 +79,7 @@ def test_json_is_the_summary(capsys: pytest.CaptureFixture[str]) -> None:
         "regions": "r.gpkg",
         "transform": None,
         "mask": None,
+        "others": None,
         "seed": 9,
     }
 

@@ -25,6 +25,7 @@ from groundtie.kinds import (
     Number,
     RasterIn,
     RasterOut,
+    RastersIn,
     Text,
     VectorIn,
     VectorOut,
@@ -101,6 +102,9 @@ def toy(
     ] = None,
     mask: Annotated[
         Path | None, MaskIn(label="Mask", help="What takes part.", advanced=True)
+    ] = None,
+    others: Annotated[
+        tuple[Path, ...] | None, RastersIn(label="Others", help="More of them.", advanced=True)
     ] = None,
     seed: Annotated[
         int, Number(label="Seed", help="For chance.", integer=True, minimum=0, advanced=True)

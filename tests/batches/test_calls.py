@@ -11,6 +11,7 @@ from toys import TOY
 
 from groundtie.batches.calls import Call, make_calls
 from groundtie.errors import OutputError, ParameterError, SameFileError
+from groundtie.tools import load_tool
 
 ROW = {"reference": "a.tif", "input": "b.tif", "size": "3"}
 
@@ -109,3 +110,14 @@ def test_the_key_stands_for_files_parameters_and_outputs(folders: tuple[Path, Pa
     assert len({first, key(seed=8), key(output="d.tif"), key(report="r.html")}) == 4
     os.utime(folders[0] / "b.tif", (1e9, 1e9))
     assert key() != first
+
+
+def test_several_inputs_are_a_list_or_one_cell(folders: tuple[Path, Path]) -> None:
+    series = load_tool("coregister_series")
+    rows = [{"inputs": "a.tif;b.tif"}, {"inputs": ["a.tif", "b.tif"], "name": "again"}]
+    first, second = make_calls(series, rows, *folders, 1)
+    assert first.problem == second.problem == ""
+    expected = (folders[0] / "a.tif", folders[0] / "b.tif")
+    assert first.values["inputs"] == second.values["inputs"] == expected
+    assert first.outputs == {"output_folder": folders[1] / "1"}
+    assert second.outputs == {"output_folder": folders[1] / "again"}

@@ -22,10 +22,8 @@ TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
 def surveyed(folder: Path, pose: Pose, context: Context, **more: int) -> PoseSurvey:
     """Survey a pair whose true pose is `TRUTH` around a pose."""
     with ExitStack() as stack:
-        images = []
-        for name, window in zip(
-            "ri", turned_pair(TRUTH, (250, 250), (260, 260), **more), strict=True
-        ):
+        images, turned = [], turned_pair(TRUTH, (250, 250), (260, 260), **more)
+        for name, window in zip("ri", turned, strict=True):
             values = np.clip(window.values, 1, 65_535).astype(np.uint16)
             path = write_raster(folder / f"{name}.tif", values)
             images.append(Image(stack.enter_context(open_raster(path))))
@@ -42,7 +40,7 @@ def test_chips_confirm_a_pose(pose: Pose, tmp_path: Path, context: Context) -> N
     assert (found.errors_px <= POSE_TOLERANCE_PX).mean() > 0.9
     assert found.survey.confirming > 0.9 * len(found.errors_px)
     assert found.survey.parts == []
-    assert found.survey_of_rest is None
+    assert found.rest is None
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from groundtie.tools import load_tools
 INTEGER = 0  # of QgsProcessingParameterNumber.Type
 TYPES = {
     "RasterIn": "raster",
+    "RastersIn": "multilayer",
     "VectorIn": "vector",
     "MaskIn": "layer",
     "FileIn": "file",

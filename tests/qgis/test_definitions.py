@@ -23,6 +23,7 @@ TYPES = {
     "REGIONS": "vector",
     "TRANSFORM": "file",
     "MASK": "layer",
+    "OTHERS": "multilayer",
     "SEED": "number",
 }
 
@@ -48,12 +49,13 @@ def test_optional_is_what_may_be_absent(definitions: dict[str, Any]) -> None:
         "REGIONS",
         "TRANSFORM",
         "MASK",
+        "OTHERS",
     }
 
 
 def test_advanced_parameters_are_folded_away(definitions: dict[str, Any]) -> None:
     advanced = {n for n, d in definitions.items() if d.flags() & d.FlagAdvanced}
-    assert advanced == {"REGIONS", "TRANSFORM", "MASK", "SEED"}
+    assert advanced == {"REGIONS", "TRANSFORM", "MASK", "OTHERS", "SEED"}
 
 
 def test_defaults(definitions: dict[str, Any]) -> None:

@@ -72,7 +72,11 @@ def test_a_registration_is_lines_for_people_and_json_for_programs(
     assert lines[0].startswith("correction: ") and " m) at the centre: " in lines[0]
     assert lines[1] == "accepted: check points confirm the registration"
     assert f"{verdict.fit_points_used} of {verdict.fit_points} points" in lines[2]
-    assert f"{verdict.check_points_agreeing} of {verdict.check_points}" in lines[4]
+    assert f"RMSE {verdict.check_rmse_px:.2f} px" in lines[3]
+    low, high = verdict.ce90_range_px
+    assert f"CE90 {verdict.check_ce90_px:.2f} px" in lines[4]
+    assert lines[4].endswith(f"known to {low:.2f}–{high:.2f} px")
+    assert f"{verdict.check_points_agreeing} of {verdict.check_points}" in lines[5]
     assert lines[-1] == "output: out.tif"
     # 10 m pixels, in both units.
     assert f"RMSE {verdict.check_rmse_px:.2f} px ({10 * verdict.check_rmse_px:.2f} m)" in lines[3]

@@ -41,6 +41,7 @@ from groundtie.errors import (
 from groundtie.geometry.estimation import Estimate
 from groundtie.masks.choice import LAYER, REGIONS, THRESHOLD, MaskUsed
 from groundtie.matching.pose_survey import PoseSurvey
+from groundtie.matching.rest import Rest
 from groundtie.matching.survey import Survey
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
@@ -209,8 +210,8 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(height=2.1, rival=1.0)),
     ),
     "pixel-locked content": (
-        evidence(GOOD, survey=survey(), survey_of_rest=survey(5)),
-        evidence(GOOD, survey=survey(), survey_of_rest=survey(20)),
+        evidence(GOOD, survey=survey(), rest=Rest(survey(5))),
+        evidence(GOOD, survey=survey(), rest=Rest(survey(20))),
     ),
     "narrow control": (
         refinement(control((20, -9), corner=0.2), kind="shift"),
@@ -360,16 +361,46 @@ def test_little_ground_may_be_weakly_similar(kind: str) -> None:
 
 
 def test_a_part_of_which_half_confirms_is_layover_not_a_part() -> None:
-    found = survey(49, part=14)
+    found = survey(49, part=10)
     shifts = found.shifts_px.copy()
-    shifts[:14:2] = 0.0
+    shifts[[0, 2, 4, 6, 7, 8]] = 0.0
     assert refusing(evidence(GOOD, survey=replace(found, shifts_px=shifts))) == []
 
 
 def test_without_locked_content_another_place_must_not_match_better() -> None:
     rest = survey(20, height=4.0, rival=5.0)
-    found = evidence(GOOD, survey=survey(), survey_of_rest=rest)
+    found = evidence(GOOD, survey=survey(), rest=Rest(rest))
     assert refusing(found) == ["pixel-locked content"]
+
+
+@pytest.mark.parametrize(("off", "expected"), [(7, ["part elsewhere"]), (4, [])])
+def test_chips_far_from_each_other_that_agree(off: int, expected: list[str]) -> None:
+    """A strip at an angle has few neighbours; four of 49 agree by chance, once in a hundred."""
+    found = survey()
+    shifts = found.shifts_px.copy()
+    shifts[::8][:off] = [9.0, -5.0]
+    assert refusing(evidence(GOOD, survey=replace(found, shifts_px=shifts))) == expected
+
+
+def copied(off: int) -> Survey:
+    """Return a survey of what copies leave, of which some chips agree elsewhere."""
+    found = survey(3, height=1.5, rival=1.6)
+    shifts = found.shifts_px.copy()
+    shifts[: 2 * off : 2] = [9.0, -5.0]
+    return replace(found, shifts_px=shifts)
+
+
+@pytest.mark.parametrize(("height", "expected"), [(6.9, []), (7.1, ["second place nearby"])])
+def test_a_second_place_beneath_a_copy(height: float, expected: list[str]) -> None:
+    found = replace(survey(), ghost_height=height)
+    assert refusing(evidence(GOOD, survey=found)) == expected
+
+
+@pytest.mark.parametrize(("off", "expected"), [(7, ["pixel-locked content"]), (3, [])])
+def test_what_copies_leave_may_contradict(off: int, expected: list[str]) -> None:
+    """It need not confirm the transform, as a cloud deck looks like a copy, but not another."""
+    found = evidence(GOOD, survey=survey(), rest=Rest(copied(off), is_explained=True))
+    assert refusing(found) == expected
 
 
 @pytest.mark.parametrize(
@@ -403,11 +434,11 @@ def test_only_rules_of_the_evidence_are_asked() -> None:
         (7, survey(35, part=14), None, ["part elsewhere"]),
         (7, survey(height=4.0, rival=3.5), None, ["second place nearby"]),
         (7, survey(height=1.9, rival=0.5), None, ["weak similarity"]),
-        (7, survey(), survey(5), ["pixel-locked content"]),
+        (7, survey(), Rest(survey(5)), ["pixel-locked content"]),
     ],
 )
 def test_rules_of_registrations_judge_poses(
-    agreeing: int, found: Survey, rest: Survey | None, expected: list[str]
+    agreeing: int, found: Survey, rest: Rest | None, expected: list[str]
 ) -> None:
     """Of 21 chips, about as many agree as at the worst real pose that is right."""
     errors = np.where(np.arange(21) < agreeing, 4.9, 5.1)

@@ -1,19 +1,24 @@
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+import rasterio
+import rasterio.shutil
+from rasterio.control import GroundControlPoint
 from rasterio.crs import CRS
 from rpc_models import camera_rpc, write_dem, write_positions
 
 from groundtie.errors import OutputError, TransformFileError
 from groundtie.geometry.tie_points import TiePoints
-from groundtie.rasters.grid import Grid
+from groundtie.rasters.grid import Grid, reproject
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor.control_points import ControlPoints, read_control_points
 from groundtie.sensor.orientation import Orientation, orient
+from groundtie.sensor.surfaces import LON_LAT
 
 RPC = camera_rpc()
 UTM = CRS.from_epsg(32632)
@@ -140,3 +145,111 @@ def test_what_holds_no_points_is_said(
 def test_other_formats_are_not_written(tmp_path: Path, located: tuple[Orientation, Grid]) -> None:
     with pytest.raises(OutputError, match="written as"):
         some_points(located[0]).write(tmp_path / "a.xls", *located)
+
+
+class TestFormatsOfOthers:
+    """The same points, as other programs write them."""
+
+    PX = np.array([[100.25, 50.5], [400.0, 300.75], [-20.0, 610.0]])
+    LON_LAT = np.array([[9.001, 45.151], [9.002, 45.149], [8.999, 45.152]])
+    HEIGHT = np.array([210.0, 305.5, 280.0])
+
+    def orthority(self, names: list[str | None]) -> str:
+        features = [
+            {
+                "type": "Feature",
+                "properties": {"filename": name, "ji": list(px), "id": "a"},
+                "geometry": {"type": "Point", "coordinates": [*place, height]},
+            }
+            for name, px, place, height in zip(
+                names, self.PX.tolist(), self.LON_LAT.tolist(), self.HEIGHT.tolist(), strict=True
+            )
+        ]
+        return json.dumps({"type": "FeatureCollection", "features": features})
+
+    def expect(self, found: ControlPoints, which: list[int], heights: bool = True) -> None:
+        np.testing.assert_allclose(found.points.input_px, self.PX[which], atol=1e-9)
+        np.testing.assert_allclose(found.lon_lat, self.LON_LAT[which], atol=1e-9)
+        if heights:
+            np.testing.assert_allclose(found.height_m, self.HEIGHT[which])
+        assert found.points.used.all() and not found.points.is_check.any()
+        np.testing.assert_allclose(found.points.covariance_px2, [np.eye(2)] * len(which))
+
+    def test_orthority(self, tmp_path: Path, located: tuple[Orientation, Grid]) -> None:
+        path = tmp_path / "gcps.geojson"
+        path.write_text(self.orthority(["image.tif"] * 3))
+        self.expect(read_control_points(path, *located, "other.tif"), [0, 1, 2])
+        path.write_text(self.orthority(["image", "other.tif", "image.tif"]))
+        self.expect(read_control_points(path, *located, "/data/image.tif"), [0, 2])
+        with pytest.raises(TransformFileError, match=r"points of image, other, none of third\.tif"):
+            read_control_points(path, *located, "third.tif")
+
+    @pytest.mark.parametrize("suffix", ["tif", "vrt"])
+    def test_gcps_of_gdal(
+        self, tmp_path: Path, located: tuple[Orientation, Grid], suffix: str
+    ) -> None:
+        path = tmp_path / "gcps.tif"
+        for heights in (self.HEIGHT, np.zeros(3)):
+            points = [
+                GroundControlPoint(row + 0.5, col + 0.5, lon, lat, height)
+                for (col, row), (lon, lat), height in zip(
+                    self.PX, self.LON_LAT, heights, strict=True
+                )
+            ]
+            profile = {"driver": "GTiff", "width": 4, "height": 4, "count": 1, "dtype": "uint8"}
+            with rasterio.open(path, "w", **profile, gcps=points, crs="EPSG:4326") as raster:
+                raster.write(np.ones((1, 4, 4), np.uint8))
+            if suffix == "vrt":
+                rasterio.shutil.copy(path, tmp_path / "gcps.vrt", driver="VRT")
+            found = read_control_points(tmp_path / f"gcps.{suffix}", *located)
+            self.expect(found, [0, 1, 2], heights.any())
+            if not heights.any():  # GDAL's zeros are no heights
+                expected = located[0].heights.at(self.LON_LAT)
+                np.testing.assert_allclose(found.height_m, expected)
+
+    @pytest.mark.parametrize(
+        ("info", "crs"),
+        [("UTM, 32, North, WGS-84, units=Meters", 32632), ("Geographic Lat/Lon, WGS-84", 4326)],
+    )
+    def test_envi(
+        self, tmp_path: Path, located: tuple[Orientation, Grid], info: str, crs: int
+    ) -> None:
+        """ENVI calls the corner of the first pixel 1."""
+        xy = reproject(self.LON_LAT, LON_LAT, CRS.from_epsg(crs))
+        rows = [
+            f"  {x:.9f}  {y:.9f}  {col + 1.5}  {row + 1.5}"
+            for (x, y), (col, row) in zip(xy, self.PX, strict=True)
+        ]
+        head = ["; ENVI Image to Map GCP File", f"; projection info = {{{info}}}"]
+        path = tmp_path / "a.pts"
+        path.write_text("\n".join([*head, "; Map (x,y), Image (x,y)", ";", *rows]))
+        self.expect(read_control_points(path, *located), [0, 1, 2], heights=False)
+
+    @pytest.mark.parametrize(
+        ("name", "text", "message"),
+        [
+            ("a.pts", "; projection info = {State Plane, NAD-27}\n1 2 3 4\n", "is none of UTM"),
+            ("a.pts", "1 2 3 4\n", "is none of UTM"),
+            ("a.pts", "; only comments\n", "lines of map x, y"),
+            ("a.pts", "1 2 three 4\n", "could not convert"),
+            ("a.geojson", '{"features": [{"properties": {"ji": [1]}}]}', "cannot read the ground"),
+            ("a.tif", "no raster", "cannot read the ground control"),
+        ],
+    )
+    def test_what_cannot_be_understood(
+        self,
+        tmp_path: Path,
+        located: tuple[Orientation, Grid],
+        name: str,
+        text: str,
+        message: str,
+    ) -> None:
+        (tmp_path / name).write_text(text)
+        with pytest.raises(TransformFileError, match=message):
+            read_control_points(tmp_path / name, *located)
+
+    def test_a_raster_without_gcps_is_told(
+        self, tmp_path: Path, located: tuple[Orientation, Grid]
+    ) -> None:
+        with pytest.raises(TransformFileError, match="the raster has no GCPs"):
+            read_control_points(tmp_path / "dem.tif", *located)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rasterio
 from affine import Affine
 from raster_files import write_raster
 from rasterio.crs import CRS
@@ -136,9 +137,39 @@ def test_lines_of_sight_that_miss_the_terrain_are_nan(tmp_path: Path) -> None:
     assert np.isnan(xy[1:]).all()
 
 
-def test_a_terrain_model_must_cover_the_image(tmp_path: Path) -> None:
-    with pytest.raises(NoOverlapError, match="covers only"), oriented(tmp_path, size=20):
-        pass
+def test_a_terrain_model_may_cover_a_part_of_the_image(tmp_path: Path) -> None:
+    """Beyond it there is no height, and no pixel; nominal places are there all the same."""
+    with oriented(tmp_path) as whole:
+        assert whole.known_share == 1
+        xy = whole.to_map(CENTRE_AND_CORNER)
+    with oriented(tmp_path, size=16) as part:
+        # 400 m to the north, at 45° of latitude 283 m to the east, of 600 × 500 m; relief and
+        # obliqueness move the outline.
+        assert part.known_share == pytest.approx(400 * 283 / (600 * 500), abs=0.05)
+        np.testing.assert_allclose(part.to_map(CENTRE_AND_CORNER)[0], xy[0], atol=1e-3)
+        assert np.isnan(part.to_map(CENTRE_AND_CORNER)[1]).all()
+        assert np.isnan(part.to_px(xy)[1]).all()
+        nominal = part.to_nominal_map(CENTRE_AND_CORNER)
+        np.testing.assert_allclose(nominal[0], xy[0], atol=1e-3)
+        # Its typical height is wrong by what the relief is.
+        assert np.hypot(*(nominal - xy)[1]) < 200
+        assert np.isfinite(sensor_grid_of(tmp_path, part).pixel_to_map(CENTRE_AND_CORNER)).all()
+
+
+CENTRE_AND_CORNER = [[300.0, 250.0], [5.0, 5.0]]
+
+
+def test_a_terrain_model_elsewhere_is_an_error(tmp_path: Path) -> None:
+    image = write_positions(tmp_path / "image.tif", RPC)
+    path = write_dem(tmp_path / "dem.tif", size=40)
+    with rasterio.open(path, "r+") as dem:
+        dem.transform = Affine.translation(3.0, 0.0) @ dem.transform
+    with (
+        open_raster(image, allow_sensor_geometry=True) as source,
+        open_raster(path) as dem,
+        pytest.raises(NoOverlapError, match="does not cover"),
+    ):
+        orient(source, RPC, UTM, dem)
 
 
 @pytest.mark.parametrize("name", REAL)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from rpc_models import DIMAP, REAL, camera_rpc, rasterio_project, real_tags, to_
 
 from groundtie.errors import GeoreferencingError, OutputError
 from groundtie.rasters.reading import open_raster
+from groundtie.sensor.polynomials import EXPONENTS
 from groundtie.sensor.rpc import RPC
 from groundtie.sensor.rpc_files import read_rpc, rpc_of, write_rpc
 from groundtie.sensor.rpc_tags import rpc_from_tags, rpc_to_tags
@@ -90,12 +92,77 @@ def test_dimap_agrees_with_the_physical_model(real_data: Path) -> None:
         assert np.abs(rpc.project(lon_lat, heights[k]) - px).max() < 2e-3
 
 
+# Terms of RPC00A as powers of longitude, latitude and height, in its order [NGA2000].
+RPC00A = (
+    *("", "L", "P", "H", "LP", "LH", "PH", "LPH", "LL", "PP", "HH"),
+    *("LLL", "LLP", "LLH", "LPP", "PPP", "PPH", "LHH", "PHH", "HHH"),
+)
+
+
+def test_rpc00a_has_the_same_polynomials_in_another_order(tmp_path: Path) -> None:
+    write_rpc(tmp_path / "b.rpb", CAMERA)
+    # The value of each term at L, P, H: three primes tell the terms apart.
+    at = {"L": 2.0, "P": 3.0, "H": 5.0}
+    values = {term: np.prod([at[letter] for letter in term]) for term in RPC00A}
+    number = monomials_at(2.0, 3.0, 5.0)
+    places = [int(np.flatnonzero(np.isclose(number, values[term]))[0]) for term in RPC00A]
+    assert sorted(places) == list(range(20))
+    text = (tmp_path / "b.rpb").read_text().replace("RPC00B", "RPC00A")
+
+    def reordered(match: re.Match[str]) -> str:
+        words = [word.strip() for word in match[2].split(",")]
+        return match[1] + "(" + ", ".join(words[place] for place in places) + ")"
+
+    text = re.sub(r"(\w+Coef = )\(([^)]*)\)", reordered, text)
+    (tmp_path / "a.rpb").write_text(text)
+    assert read_rpc(tmp_path / "a.rpb") == CAMERA
+
+
+def monomials_at(lon: float, lat: float, height: float) -> np.ndarray:
+    """Return the twenty terms in the order of RPC00B at a normalized place."""
+    return np.prod(np.array([lon, lat, height]) ** np.array(EXPONENTS), axis=1)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_dimap_3_states_what_it_counts_from(tmp_path: Path, first: int) -> None:
+    (tmp_path / "RPC.XML").write_text(dimap_3(CAMERA.shifted((first, first)), first, first))
+    assert_same(read_rpc(tmp_path / "RPC.XML"), CAMERA)
+
+
+def test_dimap_3_that_counts_from_anywhere_is_refused(tmp_path: Path) -> None:
+    for firsts in ((0, 1), (-27, -791)):
+        (tmp_path / "RPC.XML").write_text(dimap_3(CAMERA, *firsts))
+        with pytest.raises(GeoreferencingError, match="counted from 0 or from 1"):
+            read_rpc(tmp_path / "RPC.XML")
+
+
+def dimap_3(rpc: RPC, first_row: int, first_col: int) -> str:
+    """Return RPCs as Pléiades Neo has them, with what is read of it."""
+    tags = rpc_to_tags(rpc)
+    values = "".join(
+        f"<{key}_{i}>{word}</{key}_{i}>"
+        for key, value in tags.items()
+        if key.endswith("COEFF")
+        for i, word in enumerate(value.split(), start=1)
+    )
+    validity = "".join(
+        f"<{key}>{value}</{key}>" for key, value in tags.items() if not key.endswith("COEFF")
+    )
+    domain = f"<FIRST_ROW>{first_row}</FIRST_ROW><FIRST_COL>{first_col}</FIRST_COL>"
+    return (
+        "<Dimap_Document><Rational_Function_Model><Resource><X/></Resource>"
+        f"<GroundtoImage_Values>{values}</GroundtoImage_Values><RFM_Validity>"
+        f"<ImagetoGround_Validity_Domain>{domain}</ImagetoGround_Validity_Domain>{validity}"
+        "</RFM_Validity></Rational_Function_Model></Dimap_Document>"
+    )
+
+
 @pytest.mark.parametrize(
     ("name", "text", "reason"),
     [
         ("a.txt", "LINE_OFF: 5 pixels\n", "lack"),
         ("a.txt", "", "lack"),
-        ("a.rpb", 'SpecId = "RPC00A";', "RPC00A"),
+        ("a.rpb", 'SpecId = "RPC00C";', "RPC00C are not supported"),
         ("a.xml", "<a></a>", "holds no RPCs"),
         ("a.xml", "no XML", "cannot read"),
         ("a.csv", "", "are read from"),

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rasterio
 from affine import Affine
+from cv2 import erode
 from raster_files import full_disk, write_raster
 from rasterio.crs import CRS
 from rasterio.warp import Resampling
@@ -13,7 +15,7 @@ from rasterio.warp import reproject as gdal_reproject
 from rpc_models import camera_rpc, to_rasterio, write_dem, write_positions
 
 import groundtie
-from groundtie.errors import GroundTieError, OutputError, ParameterError
+from groundtie.errors import GroundTieError, NoOverlapError, OutputError, ParameterError
 from groundtie.rasters.grid import Grid, apply_affine
 from groundtie.sensor.rpc_files import write_rpc
 
@@ -63,6 +65,29 @@ def test_positions_are_those_of_gdal(files: dict[str, Path], resampling: str) ->
     assert np.abs(own - expected)[:, both].max() < 0.05
     # Outlines agree but for a pixel's width.
     assert (np.isfinite(own[0]) != np.isfinite(expected[0])).mean() < 0.01
+
+
+def test_where_no_height_is_known_there_is_no_data(files: dict[str, Path], tmp_path: Path) -> None:
+    whole = groundtie.orthorectify(**files, dem_datum="ellipsoidal")
+    assert "covers" not in whole.heights
+    part = {**files, "dem": write_dem(tmp_path / "part.tif", size=16), "output": tmp_path / "p.tif"}
+    call = {**part, "dem_datum": "ellipsoidal", "reference": files["output"]}
+    result = groundtie.orthorectify(**call)
+    share = int(re.search(r"which covers (\d+) % of the image", result.heights)[1])
+    with rasterio.open(files["output"]) as all_of_it, rasterio.open(part["output"]) as some:
+        expected, found = all_of_it.read(1), some.read(1)
+    known = np.isfinite(found)
+    # Within half a pixel of its rim, 13 m, a terrain model does not know how it goes on.
+    inside = erode(known.astype(np.uint8), np.ones((31, 31), np.uint8), borderValue=0) > 0
+    np.testing.assert_allclose(found[inside], expected[inside], atol=0.02)
+    # The share is counted at one height; relief of ± 100 m, seen aslant, moves the rim by 30 m.
+    assert known.sum() / np.isfinite(expected).sum() == pytest.approx(share / 100, abs=0.05)
+    assert 30 < share < 70
+    with pytest.raises(NoOverlapError, match=f"covers only {share} % of the area of .*than 90 %"):
+        groundtie.orthorectify(**call, dem_cover=90)
+    # Without a grid of its own it gets one of the whole image.
+    own = groundtie.orthorectify(**part, dem_datum="ellipsoidal")
+    assert abs(own.grid.width - whole.grid.width) < 60
 
 
 def test_the_grid_of_a_reference_is_taken(files: dict[str, Path], tmp_path: Path) -> None:

@@ -63,6 +63,27 @@ def test_a_reference_and_a_terrain_model_make_the_rpcs_right(scene: Scene, tmp_p
     assert np.median(used) < 1.5
 
 
+@pytest.mark.slow
+def test_a_terrain_model_of_a_part_serves_for_matching_that_part(
+    scene: Scene, tmp_path: Path
+) -> None:
+    with rasterio.open(scene.dem) as dem:
+        profile, heights = dem.profile, dem.read(1)
+    profile["width"] = int(dem.width * 0.52)
+    with rasterio.open(tmp_path / "part.tif", "w", **profile) as part:
+        part.write(heights[:, : profile["width"]], 1)
+    result = groundtie.refine_rpc(
+        scene.image,
+        tmp_path / "refined_RPC.TXT",
+        scene.reference,
+        dem=tmp_path / "part.tif",
+        dem_datum="ellipsoidal",
+        model="shift_drift",
+    )
+    assert "part.tif above ellipsoidal, which covers" in result.ground
+    assert scene.error_px(read_rpc(tmp_path / "refined_RPC.TXT")) < 1.0
+
+
 def test_a_refused_matching_leaves_its_report(scene: Scene, tmp_path: Path) -> None:
     """The reference shows other ground."""
     with rasterio.open(scene.reference) as source:
@@ -249,6 +270,25 @@ def test_points_that_tell_too_little_are_refused(
     with pytest.raises(NotRegisteredError, match=reason):
         groundtie.refine_rpc(output=tmp_path / "refined.RPB", dem_datum="ellipsoidal", **files)
     assert not (tmp_path / "refined.RPB").exists()
+
+
+def test_a_shift_by_surveyed_points_needs_no_spread(tmp_path: Path) -> None:
+    """Five of them, within a sixth of a side."""
+    files = write_points(tmp_path, bias_of("shift"), 5, corner=0.16)
+    refined, call = tmp_path / "refined.RPB", {"dem_datum": "ellipsoidal", **files}
+    with pytest.raises(NotRegisteredError, match="spread over"):
+        groundtie.refine_rpc(output=refined, **call)
+    result = groundtie.refine_rpc(output=refined, model="shift", **call)
+    assert result.judged.verdict.fit_points_used == 5
+    assert error_px(read_rpc(refined)) < 0.35
+
+
+def test_points_outside_of_the_image_count(tmp_path: Path) -> None:
+    """A surveyor's points of the whole strip serve for a part of it."""
+    files = write_points(tmp_path, bias_of("shift"), corner=3.0)
+    result = groundtie.refine_rpc(output=tmp_path / "refined.RPB", dem_datum="ellipsoidal", **files)
+    assert result.judged.verdict.fit_points_used == 40
+    assert error_px(read_rpc(tmp_path / "refined.RPB")) < 0.35
 
 
 def test_heights_that_contradict_the_terrain_model_are_told(tmp_path: Path) -> None:

@@ -10,11 +10,14 @@ from typing import Any
 
 from ..declaration import Parameter, Tool
 from ..errors import GroundTieError, OutputError, ParameterError, SameFileError
-from ..kinds import Flag, FolderOut, InputKind, OutputKind, Text
+from ..kinds import Flag, FolderOut, InputKind, OutputKind, RastersIn, Text
 from ..rasters.atomic import writing
 
 # The column that is no parameter.
 NAME = "name"
+
+# Outputs that are what a tool is run for: named as their row alone.
+_MAIN = ("output", "folder", "output_folder")
 
 _YES, _NO = ("true", "yes", "1"), ("false", "no", "0")
 
@@ -115,6 +118,10 @@ def _value(parameter: Parameter, value: Any, name: str, inputs: Path, outputs: P
         checked = kind.check(parameter.name, value)
         # GDAL's own names stay text.
         return inputs / checked if isinstance(checked, Path) else checked
+    if isinstance(kind, RastersIn):
+        several = value.split(";") if isinstance(value, str) else value
+        rasters = kind.check(parameter.name, several)
+        return tuple(inputs / each if isinstance(each, Path) else each for each in rasters)
     if isinstance(kind, Flag) and str(value).lower() in (*_YES, *_NO):
         return str(value).lower() in _YES
     if isinstance(kind, Text) and isinstance(value, (int, float)):
@@ -132,7 +139,7 @@ def _output(parameter: Parameter, value: Any, name: str, folder: Path) -> Path |
     if value is None:
         if not parameter.required:
             return None
-        stem = "{name}" if parameter.name in ("output", "folder") else f"{{name}}_{parameter.name}"
+        stem = "{name}" if parameter.name in _MAIN else f"{{name}}_{parameter.name}"
         value = stem + (kind.suffixes[0] if isinstance(kind, OutputKind) else "")
     if not isinstance(value, str):
         raise ParameterError(f"{parameter.name} must be a path, not {value!r}")

@@ -150,13 +150,14 @@ def _degrees_of_freedom(blocks_px2: float, count: int, check: CheckResiduals) ->
     """Return those of the mean of the two variances, by their own variances ([Satterthwaite1946]).
 
     What all check points share was drawn once, along two axes, and is found among the noise of the
-    products of neighbours.
+    products of neighbours. No fewer than Student's distribution has, as noise is no variance.
     """
     shared, pairs = check.shared_variance_px2, float(check.neighbours.sum()) / 2
     by_blocks = blocks_px2**2 / (count - 1)
     by_check = shared**2 + check.variance_px2**2 / max(2 * pairs, _LEAST_WEIGHT)
     total = by_blocks + by_check
-    return max(2 * (blocks_px2 + shared) ** 2 / total, 1.0) if total > 0 else 1.0
+    found = 2 * (blocks_px2 + shared) ** 2 / total if total > 0 else 0.0
+    return max(found, count - 1.0)
 
 
 def _deviations(

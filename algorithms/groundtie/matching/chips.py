@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 
 # Chips with less valid area than this in either image are not matched. A mask leaves what was
 # chosen to be matched: a little of it may be enough.
-_LEAST_VALID, _LEAST_VALID_MASKED = 0.4, 0.1
+_LEAST_VALID, LEAST_VALID_MASKED = 0.4, 0.1
 
 # The background alone reaches about this many robust standard deviations.
 _LEAST_HEIGHT = 3.0
@@ -55,11 +55,15 @@ class ChipMatcher:
     held_out
         Returns for a piece of a grid which pixels of the reference must not be seen; None: all
         may be.
+    least_valid
+        Chips with less valid area than this share in either image are not matched; None: as images
+        with or without a mask.
     """
 
     pair: ImagePair
     settings: SimilaritySettings
     held_out: MaskOf | None = None
+    least_valid: float | None = None
 
     rematches = 1
 
@@ -162,7 +166,9 @@ class ChipMatcher:
         return np.stack([forward, backward[::-1, ::-1]])
 
     def _can_be_matched(self, image: str, core: Patch, centre: NDArray[np.int_]) -> bool:
-        least = _LEAST_VALID_MASKED if self.pair.is_masked else _LEAST_VALID
+        least = self.least_valid
+        if least is None:
+            least = LEAST_VALID_MASKED if self.pair.is_masked else _LEAST_VALID
         if core.valid_share < least:
             _log.debug(
                 "chip at %s: only %.0f %% of the %s valid", centre, 100 * core.valid_share, image

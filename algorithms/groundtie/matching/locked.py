@@ -72,10 +72,17 @@ class Sameness:
     @property
     def is_evident(self) -> bool:
         """Whether more is the same than two views show of one ground."""
-        if self.gradients < max(_LEAST_RATIO * self.chance, _LEAST_SHARE):
-            return False
+        return self.gradients >= max(_LEAST_RATIO * self.chance, _LEAST_SHARE)
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether one image is a copy of the other, or both are one sensor's views of one ground.
+
+        What is left of them need not confirm the transform, as copies leave nothing, and what one
+        sensor shows alike is most of what it shows.
+        """
         is_copy = min(self.area, self.reduced_area) >= _COPY_SHARE
-        return not is_copy and self.ground < _GROUND_SHARE
+        return is_copy or self.ground >= _GROUND_SHARE
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,9 @@ from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .coarse_shift import level_factor
 from .frames import compose
-from .locked import find_locked_content
 from .matcher import FloatArray, Places
-from .survey import SURVEY_RADIUS_PX, Survey, survey_model, survey_places
+from .rest import Rest, survey_rest
+from .survey import SURVEY_RADIUS_PX, Survey, survey_model
 
 # Chips along the shorter side. Of the 29 shared rotated pairs, at their poses: four are too few to
 # show parts, six so small that radar hardly matches.
@@ -51,13 +51,13 @@ class PoseSurvey:
         shape (n,).
     survey
         Where they match around the pose that was moved by all of them.
-    survey_of_rest
+    rest
         The same without content that is the same in both arrays; None: there is none.
     """
 
     errors_px: FloatArray
     survey: Survey
-    survey_of_rest: Survey | None
+    rest: Rest | None
 
 
 def survey_pose(
@@ -88,11 +88,7 @@ def survey_pose(
     claimed_px = max(claimed_share * max(level.width, level.height), POSE_TOLERANCE_PX)
     survey = survey_model(matcher, model, quiet, None, places, claimed_px)
     moved = Transform(model, transform.crs, transform.input_grid)
-    locked = find_locked_content(pair, moved, survey_places(pair.grid), quiet)
-    rest = None
-    if locked is not None and locked.sameness.is_evident:
-        rest = survey_model(matcher, model, quiet, locked, places, claimed_px)
-    return PoseSurvey(errors, survey, rest)
+    return PoseSurvey(errors, survey, survey_rest(matcher, moved, places, claimed_px, quiet))
 
 
 def _covered(grid: Grid, transform: Transform) -> Grid:

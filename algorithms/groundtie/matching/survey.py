@@ -22,8 +22,11 @@ from ..geometry.models import Model
 from ..rasters.grid import Grid
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
-from .chips import ChipMatcher
+from .chips import LEAST_VALID_MASKED, ChipMatcher
+from .coarse_shift import shift_model
+from .ghost import ghost_height
 from .matcher import FloatArray, MaskOf, Places
+from .parts import Elsewhere, Part
 
 # Chips lie side by side: so many along the shorter side of the grid if their sides allow it, and no
 # more than so many along any.
@@ -35,58 +38,13 @@ SURVEY_RADIUS_PX = 24
 # Chips agree with each other, or with the model, within this distance.
 _SAME_PX = 2.0
 
-_ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
+# Farther from where the model has them, they lie elsewhere.
+CLAIMED_PX = 2 * _SAME_PX
 
-# Expected false alarms (log10) below which chance does not explain a part, and how many chips of it
-# must disagree for each that confirms the model. Measured by the suites real and attacks: parts of
-# true transforms have -1.1 at least; where towns' layover has less, every third chip confirms.
-LOG10_FALSE_ALARMS = -2.0
-LEAST_PROPORTION = 2
+_ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
 
 # Chips nearer to each other than so many spacings are neighbours: those at a side.
 _NEIGHBOUR_SPACINGS = 1.2
-
-
-@dataclass(frozen=True)
-class Part:
-    """Neighbouring chips that agree with each other on another place than the model has.
-
-    Parameters
-    ----------
-    where
-        In which part of the grid they lie, such as "upper left".
-    shift_px
-        By how much they lie elsewhere, (x, y) in pixels of the grid.
-    chips
-        How many they are.
-    surrounded
-        How many chips lie in their convex hull, they included.
-    confirming
-        How many of those agree with the model.
-    log10_false_alarms
-        log10 of the expected number of such parts if all chips but these agreed by chance.
-    members
-        Which chips of the survey they are, by number.
-    """
-
-    where: str
-    shift_px: tuple[float, float]
-    chips: int
-    surrounded: int
-    confirming: int
-    log10_false_alarms: float
-    members: tuple[int, ...] = ()
-
-    @property
-    def distance_px(self) -> float:
-        """How far off they lie."""
-        return float(np.hypot(*self.shift_px))
-
-    @property
-    def is_evident(self) -> bool:
-        """Whether chance does not explain it, and the model hardly holds among its chips."""
-        evident = self.log10_false_alarms <= LOG10_FALSE_ALARMS
-        return evident and self.chips >= LEAST_PROPORTION * self.confirming
 
 
 @dataclass(frozen=True)
@@ -108,6 +66,9 @@ class Survey:
         (2 r + 1, 2 r + 1).
     claimed_px
         Chips nearer to where the model has them lie where it claims.
+    ghost_height
+        How high the mean is elsewhere when what the reference repeats of itself is taken out, in
+        robust standard deviations of what is left.
     """
 
     grid: Grid
@@ -115,7 +76,8 @@ class Survey:
     shifts_px: FloatArray
     spacing_px: FloatArray
     mean: Surface
-    claimed_px: float = 2 * _SAME_PX
+    claimed_px: float = CLAIMED_PX
+    ghost_height: float = 0.0
 
     @property
     def is_confirming_chip(self) -> NDArray[np.bool_]:
@@ -165,6 +127,21 @@ class Survey:
             found.append(self._part(largest))
             free[largest] = False
         return found
+
+    @property
+    def elsewhere(self) -> Elsewhere:
+        """The most chips, wherever they lie, that agree with each other and not with the model."""
+        shifts = self.shifts_px[np.hypot(*self.shifts_px.T) > self.claimed_px]
+        if len(shifts) == 0:
+            return Elsewhere((0.0, 0.0), 0, np.inf)
+        alike = np.hypot(*(shifts[:, None] - shifts).transpose(2, 0, 1)) <= _SAME_PX
+        most = alike[int(alike.sum(axis=1).argmax())]
+        count, every = int(most.sum()), len(self.centres)
+        # One of the chips gives the place.
+        chance = agreement_probability(_SAME_PX, SURVEY_RADIUS_PX)
+        alarms = np.log10(every) + log10_chance(count - 1, every - 1, chance)
+        right, down = np.median(shifts[most], axis=0)
+        return Elsewhere((float(right), float(down)), count, float(alarms))
 
     def _group(self, seed: int, free: NDArray[np.bool_]) -> NDArray[np.int_]:
         """Return the chips, by number, that are connected to one and lie where it does."""
@@ -227,7 +204,7 @@ def survey_model(
     context: Context,
     without: MaskOf | None = None,
     places: Places | None = None,
-    claimed_px: float = 2 * _SAME_PX,
+    claimed_px: float = CLAIMED_PX,
 ) -> Survey:
     """Match chips all over a pair around what a model on the map predicts.
 
@@ -247,12 +224,18 @@ def survey_model(
         See `Survey`.
     """
     places = places or survey_places(matcher.pair.grid)
-    blind = replace(matcher, held_out=without)
+    least_valid = None if without is None else LEAST_VALID_MASKED
+    blind = replace(matcher, held_out=without, least_valid=least_valid)
     kept, surfaces = blind.match_forward(model, places, SURVEY_RADIUS_PX, context)
     shifts = np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
     spacing = [float(np.diff(np.unique(places.centres[:, axis])).max(initial=1)) for axis in (0, 1)]
     mean = surfaces.sum(axis=0) / max(len(kept), 1)
-    return Survey(places.grid, kept, shifts, np.array(spacing), mean, claimed_px)
+    ghost = 0.0
+    if without is None and len(kept) > 0:
+        itself = replace(blind, pair=replace(matcher.pair, input=matcher.pair.reference))
+        _, own = itself.match_forward(shift_model(0.0, 0.0), places, SURVEY_RADIUS_PX, context)
+        ghost = ghost_height(mean, own.mean(axis=0))
+    return Survey(places.grid, kept, shifts, np.array(spacing), mean, claimed_px, ghost)
 
 
 def _along(size: int, chip_px: int) -> NDArray[np.int_]:

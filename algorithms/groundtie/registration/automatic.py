@@ -210,6 +210,7 @@ def _orthorectify(
 _RPC_DEFAULTS: Mapping[str, Any] = {
     "gcps": None,
     "geoid": None,
+    "dem_cover": 0.0,
     "height": None,
     "rpc": None,
     "model": AUTO,

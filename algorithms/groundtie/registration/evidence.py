@@ -23,6 +23,7 @@ from ..geometry.judging import (
 from ..geometry.robust import Mixture, fit_mixture
 from ..geometry.tie_points import TiePoints
 from ..masks.choice import LAYER, NONE, REGIONS, MaskUsed
+from ..matching.rest import Rest
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..rasters.grid import FloatArray, Grid
 from .layover import EVEN_MEAN_OVER_SCATTER, scatter_along_line
@@ -137,7 +138,7 @@ class RegistrationEvidence:
         The mask that was used.
     survey
         Where chips all over the overlap match; None: not looked at, as in tests of other rules.
-    survey_of_rest
+    rest
         The same without content that is the same in both arrays; None: there is none.
     """
 
@@ -154,7 +155,7 @@ class RegistrationEvidence:
     scene: SceneInfo | None = None
     mask: MaskUsed = field(default_factory=lambda: MaskUsed(NONE, None, 1.0, ""))
     survey: Survey | None = None
-    survey_of_rest: Survey | None = None
+    rest: Rest | None = None
 
     stages: ClassVar = (AGREEMENT, ERROR, SCENE, SURVEY)
 

@@ -47,8 +47,8 @@ class Orthorectification:
         """
         image, by = self.source.grid, self.orientation
         if self.grid is None:
-            return registered_grid(image, by.to_map, by.crs, self.pixel_size)
-        covering_grid(self.grid, by.to_map(image.outline()), within=True)
+            return registered_grid(image, by.to_nominal_map, by.crs, self.pixel_size)
+        covering_grid(self.grid, by.to_nominal_map(image.outline()), within=True)
         return self.grid
 
     def write(

@@ -26,11 +26,11 @@ from ..matching.guided_fit import GuidedFit
 from ..matching.held_out import HeldOut
 from ..matching.keypoint_fit import KeypointFit
 from ..matching.keypoints import KeypointMatcher
-from ..matching.locked import find_locked_content
 from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
+from ..matching.rest import Rest, survey_rest
 from ..matching.surface_fit import SurfaceFit
-from ..matching.survey import Survey, survey_model, survey_places
+from ..matching.survey import CLAIMED_PX, Survey, survey_model, survey_places
 from ..rasters.pair import Image, ImagePair, make_pair
 from ..rasters.reading import bounded_cache, open_raster
 from ..similarity.surface import SimilaritySettings
@@ -263,7 +263,7 @@ class Stages:
         model = estimate.transform.model
         return check_model(self.checker, self.held_out.layout, model, context)
 
-    def survey(self, estimate: Estimate, context: Context) -> tuple[Survey, Survey | None]:
+    def survey(self, estimate: Estimate, context: Context) -> tuple[Survey, Rest | None]:
         """Match chips all over the pair, with what its masks leave, around what was estimated.
 
         Returns what they show, and what they show without content that is the same in both arrays;
@@ -271,18 +271,15 @@ class Stages:
         """
         pair, transform = self.masked.pair, estimate.transform
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
-        survey = survey_model(chips, transform.model, context.part(0.0, 0.5))
         places = survey_places(pair.grid)
-        locked = find_locked_content(pair, transform, places, context.quiet())
-        if locked is None or not locked.sameness.is_evident:
-            return survey, None
-        return survey, survey_model(chips, transform.model, context.part(0.5, 1.0), locked)
+        survey = survey_model(chips, transform.model, context.part(0.0, 0.5))
+        return survey, survey_rest(chips, transform, places, CLAIMED_PX, context.part(0.5, 1.0))
 
     def evidence(
         self,
         estimate: Estimate,
         check: Check,
-        surveys: tuple[Survey, Survey | None],
+        surveys: tuple[Survey, Rest | None],
         scene: SceneInfo,
     ) -> RegistrationEvidence:
         """Return what the rules look at."""

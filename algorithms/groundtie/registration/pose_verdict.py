@@ -15,6 +15,7 @@ from ..geometry.judging import LARGEST_LOG10_CHANCE
 from ..geometry.limits import SearchLimits
 from ..masks.choice import NONE, MaskUsed
 from ..matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey, survey_pose
+from ..matching.rest import Rest
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..pose.pose import Pose, PoseFound
 from ..pose.rotation_windows import PoseWindows
@@ -156,9 +157,9 @@ class PoseSurveyEvidence:
         return self.found.survey
 
     @property
-    def survey_of_rest(self) -> Survey | None:
+    def rest(self) -> Rest | None:
         """The same without content that is the same in both arrays."""
-        return self.found.survey_of_rest
+        return self.found.rest
 
     @property
     def held_out(self) -> HeldOut:

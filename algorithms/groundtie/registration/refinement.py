@@ -10,7 +10,7 @@ from ..assessment.point_errors import PointErrors
 from ..errors import NotRegisteredError, TooFewPointsError
 from ..rasters.grid import PIXEL_COORDINATES, Grid
 from ..sensor.adjustment import Adjustment, Control, adjust
-from ..sensor.bias import fold
+from ..sensor.bias import SHIFT, fold
 from ..sensor.control_points import ControlPoints
 from ..sensor.height_check import HeightCheck, check_heights
 from ..sensor.orientation import sensor_grid
@@ -53,7 +53,12 @@ class Refinement:
 
     @classmethod
     def of(
-        cls, points: ControlPoints, image: OrientedImage, model: str, max_error_px: float
+        cls,
+        points: ControlPoints,
+        image: OrientedImage,
+        model: str,
+        max_error_px: float,
+        is_measured: bool = False,
     ) -> Refinement:
         """Estimate the bias by the points of the fit that are used, and judge it.
 
@@ -67,6 +72,8 @@ class Refinement:
             As `adjust` takes it.
         max_error_px
             Largest root mean square error at held-out points.
+        is_measured
+            Whether somebody measured the points, who were not matched.
 
         Raises
         ------
@@ -85,10 +92,11 @@ class Refinement:
             raise _refused(image, verdict) from error
         blunders = np.zeros(len(table), bool)
         blunders[np.flatnonzero(fitted)[~adjustment.used]] = True
+        needs_spread = not (is_measured and model == SHIFT)
         pixel_m = sensor_grid(image.source, image.orientation).pixel_size_m
         fit = fold(image.rpc, adjustment.bias)
         evidence = RefinementEvidence.of(
-            control, adjustment, check, pixel_m, max_error_px, fit.largest_residual_px
+            control, adjustment, check, pixel_m, max_error_px, fit.largest_residual_px, needs_spread
         )
         kept = points.with_points(table.reject(blunders, "blunder"))
         judged = RefinementVerdict.of(evidence)

@@ -50,6 +50,9 @@ class RefinementEvidence:
         Side of an image pixel on the ground.
     folding_px
         By how much RPCs with the bias folded in miss it.
+    needs_spread
+        Whether control at one place does not tell the bias elsewhere; who measured points and asks
+        for a shift states that it does.
     """
 
     held_out: HeldOut
@@ -61,6 +64,7 @@ class RefinementEvidence:
     control_points_used: int
     pixel_m: float
     folding_px: float
+    needs_spread: bool = True
 
     stages: ClassVar = (AGREEMENT, ERROR, REFINEMENT)
 
@@ -83,6 +87,7 @@ class RefinementEvidence:
         pixel_m: float,
         max_error_px: float,
         folding_px: float = 0.0,
+        needs_spread: bool = True,
     ) -> RefinementEvidence:
         """Measure a bias that was estimated.
 
@@ -101,6 +106,8 @@ class RefinementEvidence:
             Largest root mean square error at held-out points.
         folding_px
             By how much RPCs with the bias folded in miss it.
+        needs_spread
+            Whether control at one place does not tell the bias elsewhere.
         """
         if check is None or len(check) < FEWEST_CHECK_POINTS:
             name, points = LEFT_OUT, control
@@ -138,6 +145,7 @@ class RefinementEvidence:
             int(adjustment.used.sum()),
             pixel_m,
             folding_px,
+            needs_spread,
         )
 
 

@@ -208,8 +208,8 @@ class Registration:
         if v.accepted and transform is not None:
             lines += [
                 f"model: {transform.model.kind}, {v.fit_points_used} of {v.fit_points} points",
-                f"error at check points: RMSE {v.check_rmse_px:.2f} px ({v.check_rmse_m:.2f} m), "
-                f"CE90 {v.check_ce90_px:.2f} px ({v.check_ce90_m:.2f} m)",
+                f"error at check points: RMSE {v.check_rmse_px:.2f} px ({v.check_rmse_m:.2f} m)",
+                v.accuracy_line(),
                 f"check points that agree: {v.check_points_agreeing} of {v.check_points}; by "
                 f"chance 1 in 10^{-v.log10_chance:.0f}",
             ]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from rasterio.crs import CRS
 
-from ..errors import ParameterError
+from ..errors import NoOverlapError, ParameterError
 from ..progress import Progress
 from ..rasters.reading import RasterSource, open_raster
 from ..sensor.heights import DATUMS, declared_datum, find_geoid
@@ -28,6 +28,8 @@ class Ground:
         A terrain model, and what it counts from: a datum's name or a geoid's grid.
     height_m
         The height without a terrain model; None: the RPCs' own.
+    least_cover
+        Share of an image that the terrain model must cover.
 
     Raises
     ------
@@ -39,6 +41,7 @@ class Ground:
     datum: str | None
     geoid: Path | None
     height_m: float | None
+    least_cover: float = 0.0
 
     def __post_init__(self) -> None:
         if self.dem is None and (self.datum is not None or self.geoid is not None):
@@ -51,10 +54,13 @@ class Ground:
                 f"({', '.join(DATUMS)}) or a geoid grid"
             )
 
-    def note(self, rpc: RPC) -> str:
-        """Return in words which heights are used."""
+    def note(self, rpc: RPC, known_share: float = 1.0) -> str:
+        """Return in words which heights are used, and of which share of the image they are."""
         if self.dem is not None:
-            return f"heights of {self.dem} above {self.datum or self.geoid}"
+            partly = (
+                "" if known_share == 1 else f", which covers {_percent(known_share)} of the image"
+            )
+            return f"heights of {self.dem} above {self.datum or self.geoid}{partly}"
         height = rpc.offset[2] if self.height_m is None else self.height_m
         return f"no terrain model: the height is {height:g} m above the ellipsoid everywhere"
 
@@ -83,14 +89,19 @@ class Ground:
             raise ParameterError(
                 f"{self.dem} states that its heights count from {declared}, not {self.datum}"
             )
-        return orient(
-            source,
-            rpc,
-            crs,
-            dem,
-            None if geoid is None else opened(geoid),
-            self.height_m,
-        )
+        grid = None if geoid is None else opened(geoid)
+        found = orient(source, rpc, crs, dem, grid, self.height_m)
+        if found.known_share < self.least_cover:
+            raise NoOverlapError(
+                f"{self.dem} covers only {_percent(found.known_share)} of the area of "
+                f"{source.path}, less than {_percent(self.least_cover)}"
+            )
+        return found
+
+
+def _percent(share: float) -> str:
+    # What is not all must not read as all, nor as nothing.
+    return f"{min(max(round(100 * share), 1), 99) if share < 1 else 100} %"
 
 
 def open_sensor_image(
@@ -141,9 +152,9 @@ def open_oriented_image(
     `progress` receives which heights are used.
     """
     source, rpc = open_sensor_image(image, rpc_file, stack)
-    heights = ground.note(rpc)
-    progress.update(0.0, heights)
     orientation = ground.orientation(source, rpc, crs or utm_of(source, rpc), stack)
+    heights = ground.note(rpc, orientation.known_share)
+    progress.update(0.0, heights)
     return OrientedImage(source, rpc, orientation, heights)
 
 

@@ -131,8 +131,8 @@ class RefinedRpc:
             f"shift in the middle of the image: {shift[0]:+.2f} ± {sigma[0]:.2f}, "
             f"{shift[1]:+.2f} ± {sigma[1]:.2f} px (column, row)",
             f"error at {self.judged.held_out}: {self.judged.before.rmse:.2f} px before, "
-            f"{self.judged.after.rmse:.2f} px after; CE90 {verdict.check_ce90_px:.2f} px "
-            f"({verdict.check_ce90_m:.2f} m)",
+            f"{self.judged.after.rmse:.2f} px after",
+            verdict.accuracy_line(),
             f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
             self.ground,
             *(() if self.mask is None else (self.mask.line(),)),
@@ -180,11 +180,15 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
         stack.enter_context(bounded_cache())
         sensor, found = _matched(parameters, stack, context.part(0.0, 0.9))
         if found is None:
-            points = read_control_points(gcps, sensor.orientation, sensor.source.grid)
+            points = read_control_points(
+                gcps, sensor.orientation, sensor.source.grid, sensor.source.path
+            )
         else:
             points = files.points_or_report(found, call)
         context.update(0.9, "estimating the bias")
-        refinement = Refinement.of(points, sensor, parameters["model"], parameters["max_error"])
+        refinement = Refinement.of(
+            points, sensor, parameters["model"], parameters["max_error"], gcps is not None
+        )
         heights = refinement.heights(own_heights=gcps is not None and dem is not None)
         for warning in heights.warnings():
             context.update(0.9, warning)
@@ -205,7 +209,8 @@ def _matched(
 ) -> tuple[OrientedImage, GroundControl | None]:
     """Return the oriented image, and ground control matched in the reference if there is one."""
     given = parameters
-    ground = Ground(given["dem"], given["dem_datum"], given["geoid"], given["height"])
+    cover = given["dem_cover"] / 100
+    ground = Ground(given["dem"], given["dem_datum"], given["geoid"], given["height"], cover)
     reference = None
     if given["reference"] is not None:
         reference = stack.enter_context(open_raster(given["reference"]))

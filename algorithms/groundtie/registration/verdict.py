@@ -79,6 +79,14 @@ class Verdict:
         """Return the reason and, of a refusal, what to try."""
         return f"{self.reason}; {self.advice}" if self.advice else self.reason
 
+    def accuracy_line(self) -> str:
+        """Return the predicted error at a random place, with its interval, as a line of text."""
+        low, high = self.ce90_range_px
+        return (
+            f"accuracy at a random place: CE90 {self.check_ce90_px:.2f} px "
+            f"({self.check_ce90_m:.2f} m), known to {low:.2f}–{high:.2f} px"
+        )
+
     def summary(self) -> dict[str, Any]:
         """Return the verdict as values that JSON can carry; what is not finite is None."""
         low, high = self.ce90_range_px

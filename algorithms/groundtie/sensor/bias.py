@@ -19,7 +19,8 @@ from .rpc_fit import RPCFit, fit_rpc, ground_lattice
 FloatArray = NDArray[np.float64]
 
 # Terms of each model, an axis, from the simplest to the most flexible.
-TERMS = {"shift": 1, "shift_drift": 2, "affine": 3}
+SHIFT = "shift"
+TERMS = {SHIFT: 1, "shift_drift": 2, "affine": 3}
 KINDS = tuple(TERMS)
 
 # Heights between which RPCs are fitted again: their own range, so that they hold there as before.

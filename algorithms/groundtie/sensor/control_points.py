@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from rasterio.crs import CRS
 
 from ..errors import TransformFileError
+from ..geometry.georeferencer import unmeasured
 from ..geometry.tie_point_files import read_tie_points, write_tie_points
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..rasters.atomic import writing
 from ..rasters.grid import PIXEL_COORDINATES, Grid, reproject
 from .adjustment import Control
+from .control_formats import SUFFIXES as OTHER_SUFFIXES
+from .control_formats import Places, read_places
 from .orientation import Orientation, SensorGrid
 from .rpc import RPC
 from .surfaces import LON_LAT
@@ -34,6 +37,7 @@ _USUAL_SIGMA_PX = 1.0
 # What GDAL takes as `gdal_translate --optfile`.
 GDAL_SUFFIX = ".txt"
 SUFFIXES = (".gpkg", ".geojson", ".csv", ".points", GDAL_SUFFIX)
+READ_SUFFIXES = (*SUFFIXES[:-1], *OTHER_SUFFIXES)
 
 
 @dataclass(frozen=True)
@@ -115,27 +119,35 @@ class ControlPoints:
         return "\n".join(lines) + "\n"
 
 
-def read_control_points(path: Path, orientation: Orientation, grid: Grid) -> ControlPoints:
+def read_control_points(
+    path: Path, orientation: Orientation, grid: Grid, image: str = ""
+) -> ControlPoints:
     """Read ground control points, or tie points that a person set in QGIS.
 
     Parameters
     ----------
     path
-        A `.gpkg`, `.geojson`, `.csv` or `.points` file (see `geometry.tie_point_files`). Points
-        without a height get that of the ground, those without a sigma one of 1 px.
+        A `.gpkg`, `.geojson`, `.csv` or `.points` file (see `geometry.tie_point_files`), or one of
+        another program (see `control_formats`). Points without a height get that of the ground,
+        those without a sigma one of 1 px.
     orientation
         Gives heights, and the CRS of the map if the file does not state it.
     grid
         The image's own grid.
+    image
+        Its name: a file of another program may hold points of several images.
 
     Raises
     ------
     TransformFileError
         The file cannot be read or understood, or holds no points.
     """
-    pixels = replace(grid, crs=None)
     names = (HEIGHT, CORRELATION, *_SIGMAS)
-    stored = read_tie_points(path, _own_pixels(pixels), names)
+    places = read_places(path, image)
+    if places is None:
+        stored = read_tie_points(path, _own_pixels(replace(grid, crs=None)), names)
+    else:
+        stored = _points_of(places, names)
     if len(stored.reference_xy) == 0:
         raise TransformFileError(f"{path} holds no points")
     crs = stored.crs or orientation.crs
@@ -155,6 +167,12 @@ def read_control_points(path: Path, orientation: Orientation, grid: Grid) -> Con
         state=state.astype(str),
     )
     return ControlPoints(points, np.where(np.isfinite(height), height, 0.0), crs)
+
+
+def _points_of(places: Places, names: Sequence[str]) -> TiePoints:
+    unknown = np.full(len(places.xy), np.nan)
+    points = unmeasured(places.xy, places.px, [USED] * len(unknown), places.crs)
+    return replace(points, more={**dict.fromkeys(names, unknown), HEIGHT: places.height_m})
 
 
 def _own_pixels(grid: Grid) -> Grid:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import ClassVar, Protocol
@@ -19,7 +19,7 @@ from ..rasters.grid import Grid
 from ..rasters.lattice import Lattice
 from ..rasters.reading import FloatImage, RasterSource
 from .smooth_map import Positions
-from .surfaces import RasterSurface, SurfacePiece, surface_over
+from .surfaces import WHOLE_PX, RasterSurface, SurfacePiece, surface_over
 
 FloatArray = NDArray[np.float64]
 
@@ -231,7 +231,7 @@ def terrain_heights(
     if geoid is None:
         return TerrainHeights(terrain)
     try:
-        return TerrainHeights(terrain, surface_over(geoid, lon_lat))
+        return TerrainHeights(terrain, replace(surface_over(geoid, lon_lat), margin_px=WHOLE_PX))
     except (GeoreferencingError, NoOverlapError, RasterContentError) as error:
         raise type(error)(f"the geoid cannot be used: {error}") from error
 
@@ -262,7 +262,7 @@ def find_geoid(datum: str) -> Path | None:
                 return folder / name
     raise GeoreferencingError(
         f"heights above {datum} need PROJ's grid {names[0]}, which is not installed: get it with "
-        f"projsync --file {names[0]}, or give a geoid grid"
+        f"projsync --file {names[0]}, or give such a grid as geoid (--geoid)"
     )
 
 

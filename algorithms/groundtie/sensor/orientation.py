@@ -31,6 +31,9 @@ _AROUND = 0.5
 
 _NODES = 9
 
+# The share of an image whose heights are known is counted at so many places a side: to 1 %.
+_SHARE_NODES = 64
+
 
 @dataclass(frozen=True)
 class Orientation:
@@ -46,12 +49,15 @@ class Orientation:
         CRS of the map.
     to_lon_lat
         From map positions to longitude and latitude, shapes (n, 2).
+    known_share
+        Share of the image whose heights are known.
     """
 
     rpc: RPC
     heights: Heights
     crs: CRS
     to_lon_lat: Positions
+    known_share: float = 1.0
 
     def to_px(self, xy: ArrayLike) -> FloatArray:
         """Return the image positions (col, row), shape (n, 2), of map positions.
@@ -75,6 +81,16 @@ class Orientation:
         where it does not meet it.
         """
         xy = reproject(self.to_ground(px)[0], LON_LAT, self.crs)
+        return np.where(np.isfinite(xy), xy, np.nan)
+
+    def to_nominal_map(self, px: ArrayLike) -> FloatArray:
+        """Return as `to_map`, at a typical height where lines of sight meet no known ground."""
+        px = np.asarray(px, float)
+        xy = self.to_map(px)
+        lost = ~np.isfinite(xy).all(axis=1)
+        if lost.any():
+            level = self.rpc.localise(px[lost], self.heights.typical_m)
+            xy[lost] = reproject(level, LON_LAT, self.crs)
         return np.where(np.isfinite(xy), xy, np.nan)
 
     def to_ground(self, px: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -111,8 +127,9 @@ class Orientation:
 class SensorGrid(Grid):
     """The pixels of an image that is located by its orientation.
 
-    To all that asks where pixels lie on the map it is a grid as any other; its geotransform is an
-    approximation, good for pixel sizes.
+    To all that asks where pixels lie on the map it is a grid as any other, also where heights are
+    not known; what asks for pixels finds none there. Its geotransform is an approximation, good for
+    pixel sizes.
 
     Parameters
     ----------
@@ -123,7 +140,7 @@ class SensorGrid(Grid):
     orientation: Orientation
 
     def pixel_to_map(self, px: ArrayLike) -> FloatArray:
-        return self.orientation.to_map(np.asarray(px, float).reshape(-1, 2))
+        return self.orientation.to_nominal_map(np.asarray(px, float).reshape(-1, 2))
 
     def map_to_pixel(self, xy: ArrayLike) -> FloatArray:
         return self.orientation.to_px(np.asarray(xy, float).reshape(-1, 2))
@@ -157,7 +174,7 @@ def orient(
     Raises
     ------
     NoOverlapError
-        The terrain model does not cover the image.
+        The terrain model covers nothing of the image.
     GeoreferencingError, RasterContentError
         See `terrain_heights`.
     """
@@ -170,10 +187,10 @@ def orient(
     else:
         heights = terrain_heights(dem, geoid, extremes)
     seen = seen_at(rpc, size, heights.typical_m)
-    known = np.isfinite(heights.at(seen))
-    if dem is not None and not known.all():
-        share = "nothing" if not known.any() else f"only {100 * known.mean():.0f} %"
-        raise NoOverlapError(f"{dem.path} covers {share} of the area of {source.path}")
+    places = seen_at(rpc, size, heights.typical_m, _SHARE_NODES)
+    known = float(np.isfinite(heights.at(places)).mean())
+    if dem is not None and known == 0:
+        raise NoOverlapError(f"{dem.path} covers nothing of the area of {source.path}")
     xy = reproject(np.vstack([extremes, seen]), LON_LAT, crs)
     if not np.isfinite(xy).all():
         raise NoOverlapError(f"{source.path} lies outside of the domain of {crs.to_string()}")
@@ -183,7 +200,7 @@ def orient(
         return reproject(places, crs, LON_LAT)
 
     to_lon_lat = smooth_map(exact, xy.min(axis=0) - around, xy.max(axis=0) + around, _TOLERANCE_DEG)
-    return Orientation(rpc, heights, crs, to_lon_lat)
+    return Orientation(rpc, heights, crs, to_lon_lat, known)
 
 
 def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODES) -> FloatArray:

@@ -1,6 +1,7 @@
-"""RPCs in files: GeoTIFF tags, `_RPC.TXT`, `.RPB`, and the RPC XML of DIMAP 2 (Pléiades, SPOT).
+"""RPCs in files: GeoTIFF tags, `_RPC.TXT`, `.RPB`, and the RPC XML of DIMAP 2 and 3.
 
-All are taken to the names of GDAL's metadata domain first (see `rpc_tags`).
+DIMAP 2 is of Pléiades and SPOT, 3 of Pléiades Neo. All are taken to the names of GDAL's metadata
+domain first (see `rpc_tags`).
 """
 
 from __future__ import annotations
@@ -18,6 +19,10 @@ from .rpc import RPC
 from .rpc_tags import rpc_from_tags, rpc_to_tags
 
 Tags = dict[str, str]
+
+# Places in RPC00B of the terms of RPC00A [NGA2000]: there, the product of all three comes first
+# among the squares, and cubic terms by the power of longitude, latitude and height.
+_RPC00A = (0, 1, 2, 3, 4, 5, 6, 10, 7, 8, 9, 11, 14, 17, 12, 15, 18, 13, 16, 19)
 
 # Names in .RPB files, and those in GDAL's domain.
 _RPB_NAMES = {
@@ -46,9 +51,6 @@ _UNITS = {
     "LONG": "degrees",
     "HEIGHT": "meters",
 }
-
-# DIMAP counts lines and samples from 1.
-_DIMAP_FIRST = 1
 
 
 def rpc_of(source: RasterSource, path: str | os.PathLike[str] | None = None) -> RPC:
@@ -135,12 +137,24 @@ def _write_text(tags: Tags) -> str:
 
 def _read_rpb(text: str) -> Tags:
     """Read `.RPB`: statements with an equals sign, lists in brackets, in a group IMAGE."""
-    kind = re.search(r'SpecId\s*=\s*"?(\w+)', text, re.IGNORECASE)
-    if kind and kind[1].upper() != "RPC00B":
-        raise ValueError(f"coefficients of kind {kind[1]} are not supported, only RPC00B")
+    found = re.search(r'SpecId\s*=\s*"?(\w+)', text, re.IGNORECASE)
+    kind = found[1].upper() if found else "RPC00B"
+    if kind not in ("RPC00A", "RPC00B"):
+        raise ValueError(f"coefficients of kind {kind} are not supported, only RPC00A and RPC00B")
     # From the start of a word only: a text of one long word is none of quadratic work.
-    found = re.findall(r"\b(\w+)\s*=\s*(\([^)]*\)|[^;\n]*)", text)
-    return {_RPB_NAMES[key]: value.strip("() \r;") for key, value in found if key in _RPB_NAMES}
+    pairs = re.findall(r"\b(\w+)\s*=\s*(\([^)]*\)|[^;\n]*)", text)
+    tags = {_RPB_NAMES[key]: value.strip("() \r;") for key, value in pairs if key in _RPB_NAMES}
+    return _from_rpc00a(tags) if kind == "RPC00A" else tags
+
+
+def _from_rpc00a(tags: Tags) -> Tags:
+    """Return coefficients of RPC00A in the order of RPC00B."""
+    ordered = dict(tags)
+    for key, value in tags.items():
+        words = re.split(r"[\s,]+", value.strip())
+        if key.endswith("COEFF") and len(words) == len(_RPC00A):
+            ordered[key] = " ".join(words[_RPC00A.index(place)] for place in range(len(words)))
+    return ordered
 
 
 def _write_rpb(tags: Tags) -> str:
@@ -154,16 +168,30 @@ def _write_rpb(tags: Tags) -> str:
 
 
 def _read_dimap(text: str) -> Tags:
-    """Read DIMAP 2: there, the inverse model leads from the ground to the image."""
+    """Read DIMAP 2 or 3: there, the inverse model leads from the ground to the image."""
     root = ElementTree.fromstring(text)
-    model, validity = root.find(".//Global_RFM/Inverse_Model"), root.find(".//RFM_Validity")
+    model, first = root.find(".//Global_RFM/Inverse_Model"), 1
+    if model is None:
+        model = root.find(".//Rational_Function_Model//GroundtoImage_Values")
+        first = 1 if model is None else _dimap3_first(root)
+    validity = root.find(".//RFM_Validity")
     if model is None or validity is None:
-        raise ValueError("it holds no RPCs of DIMAP 2 (Global_RFM)")
+        raise ValueError("it holds no RPCs of DIMAP 2 (Global_RFM) or 3 (Rational_Function_Model)")
     tags = _joined({e.tag: (e.text or "").strip() for part in (model, validity) for e in part})
     for key in ("LINE_OFF", "SAMP_OFF"):
         if key in tags:
-            tags[key] = f"{float(tags[key]) - _DIMAP_FIRST:.17g}"
+            tags[key] = f"{float(tags[key]) - first:.17g}"
     return tags
+
+
+def _dimap3_first(root: ElementTree.Element) -> int:
+    """Return what DIMAP 3 (Pléiades Neo) calls the first line and sample, which it may choose."""
+    domain = ".//ImagetoGround_Validity_Domain/FIRST_"
+    firsts = {root.findtext(domain + name, "").strip() for name in ("ROW", "COL")}
+    numbers = {float(text) for text in firsts if text}
+    if numbers not in ({0.0}, {1.0}):
+        raise ValueError("it does not state whether its pixels are counted from 0 or from 1")
+    return int(numbers.pop())
 
 
 def _joined(tags: Tags) -> Tags:

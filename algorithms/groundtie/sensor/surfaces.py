@@ -32,8 +32,11 @@ _LOWEST_M, _HIGHEST_M = -600.0, 9_200.0
 # Positions in pixels of the raster may be wrong by this much.
 _TOLERANCE_PX = 1e-3
 
-# Positions beyond the outer pixels' centres by less, in pixels, have the values of these.
-_MARGIN_PX = 1.0
+# The outer pixels' values hold as far as these pixels reach.
+_HALF_PX = 0.5 + _TOLERANCE_PX
+
+# Grids of the whole Earth leave this much open where they meet themselves.
+WHOLE_PX = 1.0
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,8 @@ class RasterSurface:
         The region, reduced, without voids, for those of the raster.
     void_share
         Share of the region that holds no value.
+    margin_px
+        How far beyond the outer pixels' centres their values hold.
     """
 
     source: RasterSource
@@ -59,6 +64,7 @@ class RasterSurface:
     region: Window
     filled: FloatImage
     void_share: float
+    margin_px: float = _HALF_PX
 
     def at(self, lon_lat: FloatArray) -> FloatArray:
         """Return the values, shape (n,), at longitudes and latitudes; NaN beyond the raster."""
@@ -79,7 +85,7 @@ class RasterSurface:
         if not valid.all():
             void_rows, void_cols = np.nonzero(~valid)
             image[void_rows, void_cols] = self._fill_at(void_cols + left, void_rows + top)
-        return SurfacePiece(image, np.array([left, top], float))
+        return SurfacePiece(image, np.array([left, top], float), self.margin_px)
 
     def _fill_at(self, cols: NDArray[np.int_], rows: NDArray[np.int_]) -> FloatImage:
         height, width = self.filled.shape
@@ -99,10 +105,13 @@ class SurfacePiece:
         Its values, without voids.
     corner
         Column and row of the raster where it begins, shape (2,).
+    margin_px
+        As `RasterSurface` has it.
     """
 
     image: FloatImage
     corner: FloatArray
+    margin_px: float = _HALF_PX
 
     def at(self, cols: NDArray[Any], rows: NDArray[Any]) -> FloatImage:
         """Return the values at columns and rows of the piece, any shape; NaN beyond it."""
@@ -117,8 +126,9 @@ class SurfacePiece:
         if inside:
             return interpolate(self.image, px, "bilinear").reshape(cols.shape)
         # So that NaN is outside, too.
-        on_it = (px[0] >= -_MARGIN_PX) & (px[0] <= width - 1 + _MARGIN_PX)
-        on_it &= (px[1] >= -_MARGIN_PX) & (px[1] <= height - 1 + _MARGIN_PX)
+        margin = self.margin_px
+        on_it = (px[0] >= -margin) & (px[0] <= width - 1 + margin)
+        on_it &= (px[1] >= -margin) & (px[1] <= height - 1 + margin)
         last = np.array([width, height])[:, None, None] - 1
         values = interpolate(self.image, np.where(on_it, np.clip(px, 0, last), 0), "bilinear")
         values[~on_it] = np.nan

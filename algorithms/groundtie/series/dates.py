@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import warnings
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -19,7 +20,7 @@ from shapely.ops import unary_union
 from shapely.strtree import STRtree
 
 from ..context import Context
-from ..errors import CancelledError, GroundTieError, NoOverlapError
+from ..errors import CancelledError, GroundTieError
 from ..masks.radar import LEAST_VARIATION2, variation2_of
 from ..rasters.grid import reproject
 from ..rasters.held import held_grey
@@ -162,7 +163,10 @@ class Footprints:
     @cached_property
     def shares(self) -> dict[frozenset[int], float]:
         """Share of the smaller footprint that two dates have in common; 0 is left out."""
-        tree = STRtree(self.polygons)
+        with warnings.catch_warnings():
+            # That its query changed in shapely 2: see below.
+            warnings.filterwarnings("ignore", message="STRtree will be changed")
+            tree = STRtree(self.polygons)
         number = {id(polygon): index for index, polygon in enumerate(self.polygons)}
         found = {}
         for first, polygon in enumerate(self.polygons):
@@ -188,10 +192,3 @@ def file_facts(path: Path | str | None) -> tuple[Any, ...]:
     except OSError:
         found = None
     return (str(path),) if found is None else (str(path), found.st_size, found.st_mtime_ns)
-
-
-def require_separate(dates: Sequence[Date], map_crs: CRS | None) -> None:
-    """Raise `NoOverlapError` if dates and map do not all have a CRS, or none of them has one."""
-    for date in dates:
-        if (date.source.grid.crs is None) != (map_crs is None):
-            raise NoOverlapError(f"only one of {date.name} and the series' map has a CRS")

@@ -155,7 +155,8 @@ def closure_figure(series: Series) -> Figure:
         if closures:
             places = [one.expected_px for one in closures], [one.error_px for one in closures]
             axes.plot(*places, mark, color=colour, ms=5, label=label)
-    reach = max(*axes.get_xlim(), 1e-6)
+    # The axes begin at 0, so that the largest value must lie inside by more than the mark is wide.
+    reach = 1.1 * max(*axes.get_xlim(), 1e-6)
     axes.plot([0, reach], [0, reach], color="#bbbbbb", lw=0.8, zorder=0)
     axes.set(xlim=(0, reach), ylim=(0, None), xlabel="expected (px)", ylabel="error of loop (px)")
     axes.legend(fontsize=8, edgecolor="white")

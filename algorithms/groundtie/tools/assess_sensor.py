@@ -16,7 +16,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache
 from ..registration.sensor_input import Ground, open_oriented_image, open_sensor_image
-from ..sensor.control_points import SUFFIXES, read_control_points
+from ..sensor.control_points import READ_SUFFIXES, read_control_points
 from ..sensor.rpc import RPC
 from ..sensor.rpc_files import read_rpc
 from .sensor_parameters import Dem, DemDatum, Geoid, Height, RpcFile, SensorImage
@@ -72,7 +72,7 @@ def assess_sensor(
             label="Check points",
             help="Points that are independent of the refinement. If some have the role check, "
             "these alone count.",
-            suffixes=SUFFIXES[:-1],
+            suffixes=READ_SUFFIXES,
         ),
     ],
     refined: Annotated[
@@ -107,7 +107,9 @@ def assess_sensor(
     with ExitStack() as stack:
         stack.enter_context(bounded_cache())
         sensor = open_oriented_image(image, rpc, ground, None, stack, progress)
-        points = read_control_points(check_points, sensor.orientation, sensor.source.grid)
+        points = read_control_points(
+            check_points, sensor.orientation, sensor.source.grid, sensor.source.path
+        )
         which = points.points.used
         if (which & points.points.is_check).any():
             which = which & points.points.is_check

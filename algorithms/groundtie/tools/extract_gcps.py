@@ -24,6 +24,7 @@ from .registration_parameters import (
 )
 from .sensor_parameters import (
     Dem,
+    DemCover,
     DemDatum,
     Geoid,
     Height,
@@ -62,6 +63,7 @@ def extract_gcps(
     max_error: MaxError = 3.0,
     height: Height = None,
     geoid: Geoid = None,
+    dem_cover: DemCover = 0.0,
     rpc: RpcFile = None,
     image_band: ImageBand = None,
     image_mask: ImageMask = None,

@@ -21,7 +21,7 @@ from ..rasters.reading import bounded_cache, open_raster
 from ..registration.orthorectification import Orthorectification
 from ..registration.sensor_input import Ground, open_sensor_image, utm_of
 from .common import Resampling, Workers
-from .sensor_parameters import Dem, DemDatum, Geoid, Height, RpcFile, SensorImage
+from .sensor_parameters import Dem, DemCover, DemDatum, Geoid, Height, RpcFile, SensorImage
 from .written_raster import SIZE_OUTPUTS, WrittenRaster, like_reference, pixel_size_of_result
 
 
@@ -70,6 +70,7 @@ def orthorectify(
     ] = None,
     height: Height = None,
     geoid: Geoid = None,
+    dem_cover: DemCover = 0.0,
     rpc: RpcFile = None,
     resampling: Resampling = "cubic",
     cog: Annotated[
@@ -92,11 +93,10 @@ def orthorectify(
     """
     if reference is not None and (pixel_size is not None or crs is not None):
         raise ParameterError("give either a reference, which has CRS and pixel size, or these")
-    ground = Ground(dem, dem_datum, geoid, height)
+    ground = Ground(dem, dem_datum, geoid, height, dem_cover / 100)
     with threads(workers, progress) as context, ExitStack() as stack:
         stack.enter_context(bounded_cache())
         source, model = open_sensor_image(image, rpc, stack)
-        context.update(0.0, ground.note(model))
         grid = None
         if reference is not None:
             grid = stack.enter_context(open_raster(reference)).grid
@@ -104,10 +104,12 @@ def orthorectify(
                 raise GeoreferencingError(f"{reference} has no CRS")
         map_crs = grid.crs if grid is not None else _crs(crs) or utm_of(source, model)
         orientation = ground.orientation(source, model, map_crs, stack)
+        heights = ground.note(model, orientation.known_share)
+        context.update(0.0, heights)
         ortho = Orthorectification(source, orientation, grid, pixel_size)
         outputs = stack.enter_context(Outputs())
         target = ortho.write(output, outputs, context, resampling, cog)
-    return OrthoResult(output, target, ground.note(model))
+    return OrthoResult(output, target, heights)
 
 
 def _crs(text: str | None) -> CRS | None:

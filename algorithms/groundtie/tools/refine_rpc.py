@@ -16,7 +16,7 @@ from ..registration.refinement_output import IMAGES
 from ..registration.sensor_jobs import RefinedRpc, refine
 from ..sensor.adjustment import AUTO
 from ..sensor.bias import KINDS
-from ..sensor.control_points import SUFFIXES
+from ..sensor.control_points import READ_SUFFIXES, SUFFIXES
 from .common import MatchingPixelSize, ReferenceBand, Workers
 from .registration_parameters import (
     ImageMaskValues,
@@ -27,6 +27,7 @@ from .registration_parameters import (
 )
 from .sensor_parameters import (
     Dem,
+    DemCover,
     DemDatum,
     Geoid,
     Height,
@@ -70,8 +71,9 @@ def refine_rpc(
         Path | None,
         FileIn(
             label="Ground control points",
-            help="Points of extract_gcps or of a person, in place of a reference.",
-            suffixes=SUFFIXES[:-1],
+            help="Points of extract_gcps or of a person, in place of a reference; also orthority's "
+            "GeoJSON, a raster or VRT with GCPs of GDAL, and ENVI's .pts.",
+            suffixes=READ_SUFFIXES,
         ),
     ] = None,
     dem: Dem = None,
@@ -111,6 +113,7 @@ def refine_rpc(
     ] = None,
     height: Height = None,
     geoid: Geoid = None,
+    dem_cover: DemCover = 0.0,
     rpc: RpcFile = None,
     image_band: ImageBand = None,
     image_mask: ImageMask = None,

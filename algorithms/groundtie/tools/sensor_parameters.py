@@ -43,6 +43,18 @@ Geoid = Annotated[
         advanced=True,
     ),
 ]
+DemCover = Annotated[
+    float,
+    Number(
+        label="Least cover of the terrain model",
+        help="Share of the image whose heights the terrain model must know; where it does not know "
+        "them, there is no data.",
+        unit="%",
+        minimum=0,
+        maximum=100,
+        advanced=True,
+    ),
+]
 Height = Annotated[
     float | None,
     Number(
@@ -59,7 +71,8 @@ RpcFile = Annotated[
     Path | None,
     FileIn(
         label="RPC file",
-        help="RPCs to use in place of the image's own: _RPC.TXT, .RPB or the RPC XML of DIMAP 2.",
+        help="RPCs to use in place of the image's own: _RPC.TXT, .RPB or the RPC XML of DIMAP 2 "
+        "and 3.",
         suffixes=(".txt", ".rpb", ".xml"),
         advanced=True,
     ),

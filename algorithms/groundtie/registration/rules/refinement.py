@@ -14,7 +14,7 @@ _LARGEST_FOLDING_PX = 0.01
 
 
 def _narrow_control(evidence: RefinementEvidence) -> str | None:
-    if evidence.extent >= _SMALLEST_EXTENT:
+    if not evidence.needs_spread or evidence.extent >= _SMALLEST_EXTENT:
         return None
     share = f"{100 * evidence.extent:.0f} %"
     return f"the control points spread over {share} of a side of the image only"
@@ -38,9 +38,10 @@ REFINEMENT_RULES: tuple[Rule, ...] = (
     Rule(
         "narrow control",
         REFINEMENT,
-        f"control points spread over less than {_SMALLEST_EXTENT:.0%} of a side of the image",
+        f"control points spread over less than {_SMALLEST_EXTENT:.0%} of a side of the image, "
+        "unless somebody gives them and asks for a shift",
         "suite rpc",
-        "give control all over the image",
+        "give control all over the image, or points of your own with --model shift",
         _narrow_control,
     ),
     Rule(

@@ -1,0 +1,68 @@
+"""What chips show without content that is the same in both arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from ..context import Context
+from ..geometry.transform import Transform
+from ..similarity.surface import SimilaritySettings
+from .chips import ChipMatcher
+from .locked import find_locked_content
+from .matcher import Places
+from .parts import LEAST_PROPORTION
+from .survey import Survey, survey_model, survey_places
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Where chips match without content that is the same in both arrays.
+
+    Parameters
+    ----------
+    survey
+        What they show.
+    is_explained
+        Whether such content needs no confirmation (see `Sameness.is_explained`).
+    """
+
+    survey: Survey
+    is_explained: bool = False
+
+    @property
+    def is_confirming(self) -> bool:
+        """Whether the rest confirms the model, or does not contradict it where that is enough."""
+        survey = self.survey
+        if self.is_explained:
+            elsewhere = survey.elsewhere
+            is_more = elsewhere.chips >= LEAST_PROPORTION * survey.confirming
+            return not (elsewhere.is_evident and is_more)
+        return survey.is_confirming and survey.height > survey.rival_height
+
+
+def survey_rest(
+    matcher: ChipMatcher, transform: Transform, places: Places, claimed_px: float, context: Context
+) -> Rest | None:
+    """Return what chips show without content that is the same in both arrays; None: there is none.
+
+    Parameters
+    ----------
+    matcher
+        What the chips are matched by.
+    transform
+        What was found.
+    places
+        The chips.
+    claimed_px
+        See `Survey`.
+    context
+        Threads and progress.
+    """
+    pair = matcher.pair
+    locked = find_locked_content(pair, transform, survey_places(pair.grid), context.quiet())
+    if locked is None or not locked.sameness.is_evident:
+        return None
+    # What a mask leaves is little: one measure alone would miss most of it.
+    fused = replace(matcher, settings=SimilaritySettings())
+    survey = survey_model(fused, transform.model, context, locked, places, claimed_px)
+    return Rest(survey, locked.sameness.is_explained)

@@ -1,0 +1,145 @@
+"""Ground control in the formats of other programs: orthority, GDAL, ENVI."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from rasterio.crs import CRS
+
+from ..errors import GroundTieError, TransformFileError
+from ..geometry.georeferencer import require_places
+from ..rasters.handles import FileHandles
+from ..strict_json import read_json
+from .surfaces import LON_LAT
+
+FloatArray = NDArray[np.float64]
+
+# Of GDAL, in a raster's tags.
+RASTERS = (".tif", ".tiff", ".vrt")
+ENVI = ".pts"
+SUFFIXES = (*RASTERS, ENVI)
+
+# GDAL counts pixels from the first one's corner; ENVI, too, and that corner is 1.
+_GDAL_FIRST, _ENVI_FIRST = 0.5, 1.5
+
+
+class Places(NamedTuple):
+    """Control as others know it: no sigmas, no states.
+
+    `xy` on the map, (n, 2); `px` in the image, (n, 2), pixel centres at integers; `height_m` above
+    the ellipsoid, (n,), NaN if unknown.
+    """
+
+    xy: FloatArray
+    px: FloatArray
+    height_m: FloatArray
+    crs: CRS
+
+
+def read_places(path: Path, image: str) -> Places | None:
+    """Read ground control of another program; None if the file has one of our own formats.
+
+    Parameters
+    ----------
+    path
+        GeoJSON of orthority, a raster with GCPs in its tags (also a VRT), or ENVI's `.pts`.
+    image
+        Name of the image: orthority's files may hold points of several.
+
+    Raises
+    ------
+    TransformFileError
+        The file cannot be read or understood.
+    """
+    read = _reader(path)
+    if read is None:
+        return None
+    try:
+        places = read(path, image)
+        if places is not None:
+            require_places(places.xy)
+            require_places(places.px)
+        return places
+    except (GroundTieError, OSError, ValueError, KeyError, TypeError, OverflowError) as error:
+        raise TransformFileError(f"cannot read the ground control {path}: {error}") from error
+
+
+def _reader(path: Path) -> Callable[[Path, str], Places | None] | None:
+    suffix = path.suffix.lower()
+    if suffix in (".geojson", ".json"):
+        return _read_orthority
+    if suffix == ENVI:
+        return _read_envi
+    return _read_gdal if suffix in RASTERS else None
+
+
+def _read_orthority(path: Path, image: str) -> Places | None:
+    """Read points in WGS 84 with their pixel in the property `ji` (column and row)."""
+    collection = read_json(path)
+    features = collection.get("features", []) if isinstance(collection, dict) else []
+    points = [feature for feature in features if "ji" in (feature.get("properties") or {})]
+    if not points:
+        return None
+    names = {_stem(point) for point in points}
+    if len(names) > 1:
+        points = [point for point in points if _stem(point) == Path(image).stem]
+        if not points:
+            raise ValueError(f"it has points of {', '.join(sorted(names))}, none of {image}")
+    coordinates = [point["geometry"]["coordinates"] for point in points]
+    height = [place[2] if len(place) > 2 else np.nan for place in coordinates]
+    return Places(
+        np.array([place[:2] for place in coordinates], float).reshape(-1, 2),
+        np.array([point["properties"]["ji"] for point in points], float).reshape(-1, 2),
+        np.array(height, float),
+        LON_LAT,
+    )
+
+
+def _stem(feature: dict[str, Any]) -> str:
+    return Path(str(feature["properties"].get("filename") or "")).stem
+
+
+def _read_gdal(path: Path, image: str) -> Places:
+    """Read the GCPs of a raster; heights of 0 everywhere are none."""
+    with FileHandles(str(path)).borrow() as dataset:
+        points, crs = dataset.gcps
+    if not points:
+        raise ValueError("the raster has no GCPs")
+    if crs is None:
+        raise ValueError("its GCPs have no CRS")
+    height = np.array([point.z or 0.0 for point in points], float)
+    return Places(
+        np.array([[point.x, point.y] for point in points], float),
+        np.array([[point.col, point.row] for point in points], float) - _GDAL_FIRST,
+        height if height.any() else np.full(len(points), np.nan),
+        crs,
+    )
+
+
+def _read_envi(path: Path, image: str) -> Places:
+    """Read map and image positions, in four columns; comments begin with a semicolon."""
+    lines = path.read_text(encoding="utf-8-sig").splitlines()
+    comments = [line for line in lines if line.lstrip().startswith(";")]
+    rows = [line.split() for line in lines if line.strip() and not line.lstrip().startswith(";")]
+    if not rows or any(len(row) < 4 for row in rows):
+        raise ValueError("it must hold lines of map x, y and image x, y")
+    numbers = np.array([row[:4] for row in rows], float)
+    crs = _envi_crs(" ".join(comments))
+    return Places(numbers[:, :2], numbers[:, 2:] - _ENVI_FIRST, np.full(len(rows), np.nan), crs)
+
+
+def _envi_crs(comments: str) -> CRS:
+    """Return the CRS of a projection info on WGS 84: a UTM zone, or longitude and latitude."""
+    found = re.search(r"projection info\s*=\s*\{([^}]*)\}", comments, re.IGNORECASE)
+    words = [] if found is None else [word.strip().lower() for word in found[1].split(",")]
+    if "wgs-84" in words and words[0] == "utm" and words[1].isdigit():
+        base = 32700 if "south" in words else 32600
+        return CRS.from_epsg(base + int(words[1]))
+    if "wgs-84" in words and words[0].startswith("geographic"):
+        return LON_LAT
+    raise ValueError("its projection info is none of UTM or Geographic Lat/Lon on WGS-84")
