@@ -120,6 +120,7 @@ class TestRun:
         }
         seen = called_with(algorithm, {**values, **given}, monkeypatch)
         seen.pop("progress")
+        assert seen.pop("others") is None
         assert {name.upper(): _text(value) for name, value in seen.items()} == {**values, **given}
 
     def test_what_is_not_given_takes_the_default(
