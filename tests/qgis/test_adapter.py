@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -119,6 +120,7 @@ class TestRun:
         }
         seen = called_with(algorithm, {**values, **given}, monkeypatch)
         seen.pop("progress")
+        assert seen.pop("others") is None
         assert {name.upper(): _text(value) for name, value in seen.items()} == {**values, **given}
 
     def test_what_is_not_given_takes_the_default(
@@ -230,7 +232,7 @@ class TestFailure:
         from processing.core.ProcessingResults import resultsList
         from qgis.core import QgsProcessingFeedback
 
-        monkeypatch.setattr(qgis.utils, "iface", object())
+        monkeypatch.setattr(qgis.utils, "iface", MagicMock())
         monkeypatch.setattr(resultsList, "results", [])
         feedback, report = QgsProcessingFeedback(), str(tmp_path / "r.html")
         self.failure(algorithm, {**values, "MODE": "refuse", "REPORT": report}, feedback)
