@@ -390,7 +390,7 @@ def copied(off: int) -> Survey:
     return replace(found, shifts_px=shifts)
 
 
-@pytest.mark.parametrize(("height", "expected"), [(6.9, []), (7.1, ["second place nearby"])])
+@pytest.mark.parametrize(("height", "expected"), [(8.9, []), (9.1, ["second place nearby"])])
 def test_a_second_place_beneath_a_copy(height: float, expected: list[str]) -> None:
     found = replace(survey(), ghost_height=height)
     assert refusing(evidence(GOOD, survey=found)) == expected
