@@ -32,7 +32,7 @@ def surveyed(folder: Path, pose: Pose, context: Context, **more: int) -> PoseSur
         return survey_pose(pair, windows.transform(pose), 0.02, context)
 
 
-# What a pose claims, and what it may be wrong by.
+# How accurate a pose is to be, and what it may be wrong by.
 @pytest.mark.parametrize("pose", [TRUTH, replace(TRUTH, rotation_deg=51.5)])
 def test_chips_confirm_a_pose(pose: Pose, tmp_path: Path, context: Context) -> None:
     found = surveyed(tmp_path, pose, context)

@@ -61,7 +61,7 @@ class PoseSurvey:
 
 
 def survey_pose(
-    pair: ImagePair, transform: Transform, claimed_share: float, context: Context
+    pair: ImagePair, transform: Transform, accuracy_share: float, context: Context
 ) -> PoseSurvey:
     """Match chips all over a pair around a pose.
 
@@ -71,8 +71,8 @@ def survey_pose(
         The images.
     transform
         The pose, as a transform between them.
-    claimed_share
-        How good it claims to be, as a share of the reference's longer side.
+    accuracy_share
+        Its accuracy, as a share of the reference's longer side.
     context
         Threads and progress.
     """
@@ -85,10 +85,10 @@ def survey_pose(
     model = transform.model
     if len(kept) >= _FEWEST:
         model = compose(model, _moved(kept, surfaces), level)
-    claimed_px = max(claimed_share * max(level.width, level.height), POSE_TOLERANCE_PX)
-    survey = survey_model(matcher, model, quiet, None, places, claimed_px)
+    elsewhere_px = max(accuracy_share * max(level.width, level.height), POSE_TOLERANCE_PX)
+    survey = survey_model(matcher, model, quiet, None, places, elsewhere_px)
     moved = Transform(model, transform.crs, transform.input_grid)
-    return PoseSurvey(errors, survey, survey_rest(matcher, moved, places, claimed_px, quiet))
+    return PoseSurvey(errors, survey, survey_rest(matcher, moved, places, elsewhere_px, quiet))
 
 
 def _covered(grid: Grid, transform: Transform) -> Grid:

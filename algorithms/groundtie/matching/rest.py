@@ -41,7 +41,11 @@ class Rest:
 
 
 def survey_rest(
-    matcher: ChipMatcher, transform: Transform, places: Places, claimed_px: float, context: Context
+    matcher: ChipMatcher,
+    transform: Transform,
+    places: Places,
+    elsewhere_px: float,
+    context: Context,
 ) -> Rest | None:
     """Return what chips show without content that is the same in both arrays; None: there is none.
 
@@ -53,7 +57,7 @@ def survey_rest(
         What was found.
     places
         The chips.
-    claimed_px
+    elsewhere_px
         See `Survey`.
     context
         Threads and progress.
@@ -64,5 +68,5 @@ def survey_rest(
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())
-    survey = survey_model(fused, transform.model, context, locked, places, claimed_px)
+    survey = survey_model(fused, transform.model, context, locked, places, elsewhere_px)
     return Rest(survey, locked.sameness.is_explained)

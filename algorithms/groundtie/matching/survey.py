@@ -39,7 +39,7 @@ SURVEY_RADIUS_PX = 24
 _SAME_PX = 2.0
 
 # Farther from where the model has them, they lie elsewhere.
-CLAIMED_PX = 2 * _SAME_PX
+ELSEWHERE_PX = 2 * _SAME_PX
 
 _ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
 
@@ -64,8 +64,8 @@ class Survey:
     mean
         The mean of their similarity surfaces, in robust standard deviations of one of them, shape
         (2 r + 1, 2 r + 1).
-    claimed_px
-        Chips nearer to where the model has them lie where it claims.
+    elsewhere_px
+        Chips farther than this from where the model has them lie elsewhere.
     ghost_height
         How high the mean is elsewhere when what the reference repeats of itself is taken out, in
         robust standard deviations of what is left.
@@ -76,7 +76,7 @@ class Survey:
     shifts_px: FloatArray
     spacing_px: FloatArray
     mean: Surface
-    claimed_px: float = CLAIMED_PX
+    elsewhere_px: float = ELSEWHERE_PX
     ghost_height: float = 0.0
 
     @property
@@ -107,7 +107,7 @@ class Survey:
     @property
     def rival_height(self) -> float:
         """How high it is where all of them are moved elsewhere, at the best such place."""
-        return float(self.mean[self._distance_px > self.claimed_px].max())
+        return float(self.mean[self._distance_px > self.elsewhere_px].max())
 
     @property
     def _distance_px(self) -> FloatArray:
@@ -117,7 +117,7 @@ class Survey:
     @cached_property
     def parts(self) -> Sequence[Part]:
         """Groups of neighbours that agree with each other, not with the model, largest first."""
-        free = np.hypot(*self.shifts_px.T) > self.claimed_px
+        free = np.hypot(*self.shifts_px.T) > self.elsewhere_px
         found = []
         while free.any():
             groups = [self._group(int(seed), free) for seed in np.flatnonzero(free)]
@@ -131,7 +131,7 @@ class Survey:
     @property
     def elsewhere(self) -> Elsewhere:
         """The most chips, wherever they lie, that agree with each other and not with the model."""
-        shifts = self.shifts_px[np.hypot(*self.shifts_px.T) > self.claimed_px]
+        shifts = self.shifts_px[np.hypot(*self.shifts_px.T) > self.elsewhere_px]
         if len(shifts) == 0:
             return Elsewhere((0.0, 0.0), 0, np.inf)
         alike = np.hypot(*(shifts[:, None] - shifts).transpose(2, 0, 1)) <= _SAME_PX
@@ -204,7 +204,7 @@ def survey_model(
     context: Context,
     without: MaskOf | None = None,
     places: Places | None = None,
-    claimed_px: float = CLAIMED_PX,
+    elsewhere_px: float = ELSEWHERE_PX,
 ) -> Survey:
     """Match chips all over a pair around what a model on the map predicts.
 
@@ -220,7 +220,7 @@ def survey_model(
         Returns for a piece of the grid which pixels of the reference are left out; None: none.
     places
         The chips, on a regular layout; None: side by side on the matching grid.
-    claimed_px
+    elsewhere_px
         See `Survey`.
     """
     places = places or survey_places(matcher.pair.grid)
@@ -235,7 +235,7 @@ def survey_model(
         itself = replace(blind, pair=replace(matcher.pair, input=matcher.pair.reference))
         _, own = itself.match_forward(shift_model(0.0, 0.0), places, SURVEY_RADIUS_PX, context)
         ghost = ghost_height(mean, own.mean(axis=0))
-    return Survey(places.grid, kept, shifts, np.array(spacing), mean, claimed_px, ghost)
+    return Survey(places.grid, kept, shifts, np.array(spacing), mean, elsewhere_px, ghost)
 
 
 def _along(size: int, chip_px: int) -> NDArray[np.int_]:
