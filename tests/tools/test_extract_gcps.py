@@ -118,7 +118,7 @@ def no_rpcs(scene: Scene, folder: Path) -> dict[str, Path]:
         (elsewhere, NotRegisteredError, "was not matched with"),
         (far, GroundTieError, "do not overlap"),
         (placeless, GroundTieError, "has no CRS"),
-        (small_dem, GroundTieError, "covers"),
+        (small_dem, NotRegisteredError, "was not matched with"),
         (empty, GroundTieError, "no valid pixel"),
         (no_rpcs, GroundTieError, "has no RPCs"),
     ],
