@@ -77,9 +77,11 @@ def test_help_text_is_text_not_markup(provider: Any) -> None:
 
 
 def test_copies_of_an_algorithm_are_alike(provider: Any) -> None:
-    copy = provider.algorithm("toy").create()
+    algorithm = provider.algorithm("toy")
+    copy = algorithm.create()
     assert copy.id() == "groundtie:toy"
-    assert len(copy.parameterDefinitions()) == 16
+    one, other = ([d.name() for d in a.parameterDefinitions()] for a in (algorithm, copy))
+    assert one == other != []
 
 
 def test_the_plugin_takes_its_provider_away(plugin: Any) -> None:
@@ -89,7 +91,7 @@ def test_the_plugin_takes_its_provider_away(plugin: Any) -> None:
     plugin.unload()
     assert registry.providerById("groundtie") is None
     plugin.unload()  # twice does no harm
-    plugin.initGui()
+    plugin.initProcessing()  # as without a desktop
     assert registry.providerById("groundtie") is plugin.provider
 
 
