@@ -303,6 +303,15 @@ def test_what_heights_may_displace_all_points_by_is_refused() -> None:
     assert refusing(along(3.5)) == ["uncertain transform"]
 
 
+@pytest.mark.parametrize("folds", [0, 1, 5])
+def test_a_transform_whose_error_is_unknown_is_refused(folds: int) -> None:
+    """No model without a block, one alone, and models that have no values."""
+    unknown = replace(
+        estimated(fit_points()), fold_models=(lambda px: np.full(px.shape, np.nan),) * folds
+    )
+    assert "uncertain transform" in refusing(evidence(GOOD, unknown))
+
+
 @pytest.mark.parametrize(
     ("more", "expected_px"),
     [({}, 6.0), ({"mask": masked(REGIONS)}, 3.0), ({"layover_factor": 3.0}, 6.0 * math.sqrt(3))],

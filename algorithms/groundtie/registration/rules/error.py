@@ -16,9 +16,11 @@ def _large_error(evidence: RegistrationEvidence | RefinementEvidence) -> str | N
 
 def _uncertain(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
     points = evidence.held_out
-    if points.spread_px > points.max_error_px:
+    # What is not a number is not known to be small: it refuses.
+    if not points.spread_px <= points.max_error_px:
         spread = f"{points.spread_px:.2f} px over {points.area}"
         return f"the points do not hold the model: it varies by {spread}"
+    # Of assessed transforms, of which no fit is known, there is none.
     if not points.accuracy.ce90_px > points.largest_ce90_px:
         return None
     return (
