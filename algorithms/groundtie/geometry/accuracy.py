@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
+from .estimation import jackknife_deviations
+
 FloatArray = NDArray[np.float64]
 
 # Points at a side or a corner of each other are neighbours: √2 spacings are the farthest.
@@ -124,11 +126,15 @@ def predict_accuracy(
     count = len(fold_models)
     if count < 2 or len(check.px) == 0:
         return UNKNOWN
-    blocks = float((_deviations(fold_models, check.px) ** 2).sum(axis=0).mean())
+
+    def deviations(px: FloatArray) -> FloatArray:
+        return jackknife_deviations([model(px) for model in fold_models])
+
+    blocks = float((deviations(check.px) ** 2).sum(axis=0).mean())
     factor = math.sqrt((blocks + check.shared_variance_px2) / (2 * blocks)) if blocks > 0 else 1.0
     random = np.random.default_rng(0)
     parts = random.standard_normal((_DRAWS, count)) * factor
-    moved = np.einsum("dk,kmx->dmx", parts, _deviations(fold_models, places_px))
+    moved = np.einsum("dk,kmx->dmx", parts, deviations(places_px))
     common = random.uniform(-1, 1, (_DRAWS, 1, 1)) * displacement_px
 
     def radii(scale: FloatArray | float, shares: Sequence[float]) -> list[float]:
@@ -158,12 +164,3 @@ def _degrees_of_freedom(blocks_px2: float, count: int, check: CheckResiduals) ->
     total = by_blocks + by_check
     found = 2 * (blocks_px2 + shared) ** 2 / total if total > 0 else 0.0
     return max(found, count - 1.0)
-
-
-def _deviations(
-    fold_models: Sequence[Callable[[FloatArray], FloatArray]], px: FloatArray
-) -> FloatArray:
-    """Return deviations, shape (k, n, 2), whose squares sum up to the jackknife's variance."""
-    models = np.array([model(px) for model in fold_models])
-    count = len(models)
-    return np.asarray((models - models.mean(axis=0)) * math.sqrt((count - 1) / count))

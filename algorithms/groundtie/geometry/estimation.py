@@ -74,7 +74,17 @@ def jackknife_sigma(estimates: Sequence[FloatArray], size: int) -> FloatArray:
     count = len(estimates)
     if count < 2:
         return np.full(size, np.inf)
-    return np.asarray(np.sqrt(np.var(estimates, axis=0).sum(axis=1) * (count - 1)))
+    return np.asarray(np.sqrt((jackknife_deviations(estimates) ** 2).sum(axis=(0, 2))))
+
+
+def jackknife_deviations(estimates: Sequence[FloatArray]) -> FloatArray:
+    """Return deviations, shape (n, …), of n estimates without one block each, shape (…) each.
+
+    Their products sum up to variances and covariances. Source: [Efron1993], chapter 11.
+    """
+    values = np.asarray(estimates, float)
+    count = len(values)
+    return np.asarray((values - values.mean(axis=0)) * np.sqrt((count - 1) / count))
 
 
 def fit_without_blocks(

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..context import Context
 from ..errors import CancelledError, GroundTieError
+from ..geometry.estimation import jackknife_deviations
 from ..geometry.models import Model
 from ..masks.choice import AUTO
 from ..matching.alignment import LINEAR_CANDIDATES
@@ -218,11 +219,9 @@ def _measured(
         return lambda xy: grid.pixel_to_map(px_model(grid.map_to_pixel(xy)))
 
     model: Model = estimate.transform.model
-    folds = np.array([displacement(fold(one)) for one in estimate.fold_models])
-    if len(folds) < 2:
-        return displacement(model), np.zeros((PARAMETERS, PARAMETERS))
-    apart = folds - folds.mean(axis=0)
-    return displacement(model), (len(folds) - 1) / len(folds) * apart.T @ apart
+    # Two at least: what was accepted has a finite jackknife.
+    apart = jackknife_deviations([displacement(fold(one)) for one in estimate.fold_models])
+    return displacement(model), apart.T @ apart
 
 
 def _nominal(
