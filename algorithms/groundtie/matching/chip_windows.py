@@ -5,6 +5,7 @@ Windows of neighbours overlap: resampled chip by chip, most pixels would be made
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
@@ -51,16 +52,23 @@ class ChipWindows:
     reach_px: int
     hidden: MaskOf | None
 
-    def map(self, function: Callable[[int, Patch, Patch], R], context: Context) -> list[R]:
-        """Return `function` of the number, reference and input window of each chip, in order."""
+    def map(
+        self, function: Callable[[int, Patch, Patch], R | None], context: Context
+    ) -> tuple[list[int], list[R]]:
+        """Return what `function` makes of chips' windows, and the numbers of these chips, in order.
 
-        def of_block(block: _Numbers) -> list[R]:
-            return [function(number, *windows) for number, *windows in self._read(block)]
+        It takes a chip's number, its reference and its input window, and returns None for a chip
+        that is left out.
+        """
+
+        def of_block(block: _Numbers) -> list[tuple[int, R | None]]:
+            return [(number, function(number, *both)) for number, *both in self._read(block)]
 
         blocks = list(self._blocks(np.arange(len(self.places.centres))))
         done = [one for results in context.map(of_block, blocks) for one in results]
-        numbers = np.concatenate(blocks) if blocks else np.zeros(0, int)
-        return [done[at] for at in np.argsort(numbers)]
+        done.sort(key=operator.itemgetter(0))
+        found = [(number, result) for number, result in done if result is not None]
+        return [number for number, _ in found], [result for _, result in found]
 
     @property
     def _side_px(self) -> int:

@@ -138,14 +138,12 @@ class ChipMatcher:
         windows = ChipWindows(self.pair, model, places, reach, self.held_out)
 
         def one(chip: int, reference: Patch, input: Patch) -> Surfaces | None:
-            both = {"reference": reference.inner(reach), "input": input.inner(reach)}
-            if not all(self._can_be_matched(*one, places.centres[chip]) for one in both.items()):
+            cores = {"reference": reference.inner(reach), "input": input.inner(reach)}
+            if not all(self._can_be_matched(*core, places.centres[chip]) for core in cores.items()):
                 return None
             return self._surfaces(reference, input, places.chip_px, radius_px, both_ways)
 
-        matched = windows.map(one, context)
-        kept = [chip for chip, surfaces in enumerate(matched) if surfaces is not None]
-        found = [surfaces for surfaces in matched if surfaces is not None]
+        kept, found = windows.map(one, context)
         span = 2 * radius_px + 1
         none = np.zeros((0, 1 + both_ways, span, span), np.float32)
         return places.centres[kept], np.stack(found) if found else none

@@ -81,7 +81,6 @@ class PooledHistogramMatcher:
         """
         histogram = self._histogram(model, Places.tiles(places.grid, self.pooled_chip_px), context)
         order = 1 if self._is_reference_masked else -1
-
         windows = self._windows(model, places, radius_px, self.blind)
 
         def one(_: int, reference: Patch, input: Patch) -> Surface | None:
@@ -91,9 +90,7 @@ class PooledHistogramMatcher:
                 return None
             return histogram.surface(chip, search)[::order, ::order]
 
-        matched = windows.map(one, context)
-        kept = [chip for chip, surface in enumerate(matched) if surface is not None]
-        found = [surface for surface in matched if surface is not None]
+        kept, found = windows.map(one, context)
         span = 2 * radius_px + 1
         nats = np.stack(found) if found else np.zeros((0, span, span), np.float32)
         normalised = normalise_each(nats)
@@ -135,7 +132,7 @@ class PooledHistogramMatcher:
             both = template.valid & search.valid
             return np.stack([smooth(template).values[both], search.values[both]])[:, ::every]
 
-        sampled = self._windows(model, places, 0, blind=True).map(pixels, context.quiet())
+        _, sampled = self._windows(model, places, 0, blind=True).map(pixels, context.quiet())
         sample = np.concatenate(sampled, axis=1) if sampled else np.zeros((2, 0), np.float32)
         count = sample.shape[1] * every
         if count < _LEAST_PIXELS:
