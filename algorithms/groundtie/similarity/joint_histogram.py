@@ -12,7 +12,9 @@ from the volume without touching a pixel again.
 
 from __future__ import annotations
 
+import functools
 import math
+import operator
 from dataclasses import dataclass
 
 import cv2
@@ -109,11 +111,12 @@ class JointHistogramVolume:
 def _convolve(volume: FloatArray, weights: FloatArray, axis: int) -> FloatArray:
     """Correlate along axis 0 or 1 with a short kernel; the axis loses the kernel's ends."""
     count = volume.shape[axis] - len(weights) + 1
-    total = np.zeros((), np.float32)
-    for k, weight in enumerate(weights):
-        part = volume[k : k + count] if axis == 0 else volume[:, k : k + count]
-        total = total + part * weight
-    return total
+    parts = (
+        volume[k : k + count] if axis == 0 else volume[:, k : k + count]
+        for k in range(len(weights))
+    )
+    weighted = map(np.multiply, parts, weights)
+    return functools.reduce(operator.iadd, weighted)
 
 
 def count_joint_histograms(
@@ -193,8 +196,8 @@ def _count_spectrally(
     shape = [scipy.fft.next_fast_len(n, real=True) for n in search.shape]
     ny, nx = (s - t + 1 for s, t in zip(search.shape, template.shape, strict=True))
     digits = _Digits.of(template, search, bins)
-    own = np.eye(bins[0], bins[0] + 1, dtype=digits.dtype)[:, template]
-    other = digits.weights(bins[1])[:, search]
+    own = (template == np.arange(bins[0])[:, None, None]).astype(digits.dtype)
+    other = np.take(digits.weights(bins[1]), search, axis=1)
     # Rows that hold nothing, or are not asked for, are not transformed.
     along_rows = scipy.fft.rfft(own, shape[1], workers=workers)
     of_template = scipy.fft.fft(along_rows, shape[0], axis=-2, workers=workers).conj()
