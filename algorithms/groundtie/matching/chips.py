@@ -18,7 +18,7 @@ from ..similarity.peak import find_peak
 from ..similarity.surface import SimilaritySettings, describe, similarity_surface
 from .alignment import Positions
 from .belief_propagation import Surfaces, normalise_each, propagate
-from .chip_windows import ChipWindows
+from .chip_windows import ChipWindows, Resampled
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 
@@ -135,7 +135,8 @@ class ChipMatcher:
     ) -> tuple[NDArray[np.int_], Surfaces]:
         """Return the centres that could be matched and surfaces (n, ways, 2 r + 1, 2 r + 1)."""
         reach = radius_px + BORDER_PX
-        windows = ChipWindows(self.pair, model, places, reach, self.held_out)
+        images = Resampled.of(self.pair, model, places.grid, reach, context)
+        windows = ChipWindows(images, places, reach, self.held_out)
 
         def one(chip: int, reference: Patch, input: Patch) -> Surfaces | None:
             cores = {"reference": reference.inner(reach), "input": input.inner(reach)}

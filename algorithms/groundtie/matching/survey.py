@@ -18,12 +18,11 @@ from scipy.spatial import Delaunay, QhullError
 from ..context import Context
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.judging import LARGEST_LOG10_CHANCE, SMALLEST_INLIER_SHARE
-from ..geometry.models import Model
+from ..geometry.models import Model, shift_model
 from ..rasters.grid import Grid
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
 from .chips import LEAST_VALID_MASKED, ChipMatcher
-from .coarse_shift import shift_model
 from .ghost import ghost_height
 from .matcher import FloatArray, MaskOf, Places
 from .parts import Elsewhere, Part
