@@ -19,6 +19,8 @@ from .unavailable import UnavailableAlgorithm, broken, named_tools
 # tools would import them all.
 RASTERS = ("tif", "tiff")
 VECTORS = ("gpkg", "geojson", "csv", "points", "txt")
+# The tool that runs where packages are missing, and states which.
+DOCTOR = "doctor"
 
 
 def _tools_or_complaint() -> tuple[tuple[Any, ...], str]:
@@ -67,8 +69,11 @@ class GroundTieProvider(QgsProcessingProvider):
             self.addAlgorithm(ToolAlgorithm(tool))
         if self._missing:
             QgsMessageLog.logMessage(self._missing, "GroundTie", WARNING)
-            for unavailable in named_tools():
-                self.addAlgorithm(UnavailableAlgorithm(unavailable, self._missing))
+            for named in named_tools():
+                if named.name == DOCTOR:
+                    self.addAlgorithm(ToolAlgorithm(LazyTool(**vars(named))))
+                else:
+                    self.addAlgorithm(UnavailableAlgorithm(named, self._missing))
 
     def supportsNonFileBasedOutput(self) -> bool:
         return False

@@ -198,3 +198,8 @@ def test_qgis_process_tells_it_in_one_line(qgis_process: Any, tmp_path: Path) ->
     assert "Traceback" not in called.stderr
     listed = qgis_process("list", PYTHONPATH=str(tmp_path))
     assert "groundtie:coregister" in listed.stdout
+    stated = qgis_process("run", "groundtie:doctor", "--", PYTHONPATH=str(tmp_path))
+    assert "missing   opencv-python-headless: not installed; without it: every tool" in (
+        stated.stdout + stated.stderr
+    )
+    assert "Traceback" not in stated.stderr
