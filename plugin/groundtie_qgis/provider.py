@@ -1,4 +1,4 @@
-"""The Processing provider: one algorithm per declared tool."""
+"""The Processing provider: one algorithm per declared tool, and the models that chain them."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from .adapter import ToolAlgorithm
 from .compat import WARNING
 from .dependencies import complaint, missing_packages, rasterio_env
 from .library import LazyTool, all_tools, plugin_metadata
+from .shipped_models import load_models
 from .styling import ICON
 from .unavailable import UnavailableAlgorithm, broken, named_tools
 
@@ -67,6 +68,9 @@ class GroundTieProvider(QgsProcessingProvider):
     def loadAlgorithms(self) -> None:
         for tool in self._tools:
             self.addAlgorithm(ToolAlgorithm(tool))
+        if not self._missing:
+            for model in load_models():
+                self.addAlgorithm(model)
         if self._missing:
             QgsMessageLog.logMessage(self._missing, "GroundTie", WARNING)
             for named in named_tools():
