@@ -7,7 +7,7 @@ VENV := .venv
 PY := $(VENV)/bin/python
 PLUGIN := dist/groundtie_qgis.zip
 
-.PHONY: help install demo check test test-newest test-debian lint bench fuzz failures plugin clean
+.PHONY: help install demo check test test-newest test-debian lint bench fuzz failures plugin docs clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -56,6 +56,9 @@ fuzz: $(VENV)/.installed-dev ## read 20,000 damaged files; failures are kept in 
 
 plugin: ## build dist/groundtie_qgis.zip
 	$(or $(wildcard $(PY)),python3) scripts/build_plugin.py $(PLUGIN)
+
+docs: $(VENV)/.installed-dev ## make docs/ into a site, dist/site
+	$(PY) scripts/help_pages.py dist/site
 
 clean: ## remove everything that can be made again
 	rm -rf $(VENV) build demo dist algorithms/*.egg-info
