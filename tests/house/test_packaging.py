@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
 import shutil
 import subprocess
@@ -127,7 +128,10 @@ def environment(distributions: tuple[Path, Path], tmp_path_factory: pytest.TempP
     venv.create(folder, symlinks=True)
     commands = folder / "bin"
     pip = [sys.executable, "-m", "pip", "--python", str(commands / "python"), "install"]
-    subprocess.run([*pip, "-q", "--no-deps", "--no-index", str(distributions[1])], check=True)
+    # A tree on PYTHONPATH would pass for an installed package.
+    clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    wheel = str(distributions[1])
+    subprocess.run([*pip, "-q", "--no-deps", "--no-index", wheel], check=True, env=clean)
     (packages,) = folder.glob("lib/python*/site-packages")
     # Its own .pth files are not read there: an editable install of this tree is out of sight.
     (packages / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
