@@ -52,7 +52,7 @@ class MaskUsed:
         Why, in a sentence.
     is_reliable
         Whether enough roads and banks were found for regions to be the ground, or the image shows
-        what stands in the surface model.
+        the elevated objects of the surface model.
     """
 
     kind: str

@@ -1,7 +1,7 @@
 """What a sensor sees of the ground between buildings and trees, by rays cast over a surface model.
 
 A surface model is sampled along rays that run away from the sensor; one running maximum along each
-ray tells how high the line of sight is that grazes what stands nearer to the sensor.
+ray tells how high the line of sight is that grazes what is nearer to the sensor.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Masks by a surface model: the ground that both images show, by the geometry of their views.
 
-What stands is imaged elsewhere than its foot, hides ground, and casts shadows. With heights and
-views all of that is computed, and nothing is guessed from grey values.
+Elevated objects are imaged elsewhere than their feet, hide ground, and cast shadows. With heights
+and views all of that is computed, and nothing is guessed from grey values.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import re
 from dataclasses import dataclass
 from enum import IntFlag
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Protocol
 
 import cv2
@@ -21,10 +22,12 @@ from numpy.typing import NDArray
 from ..errors import NoOverlapError, VectorLayerError
 from ..geometry.vector_layers import read_vector_layer
 from ..geometry.views import RADAR, View, direction
+from ..progress import SILENT, Progress
 from ..rasters.grid import Grid, reproject
 from ..rasters.reading import FloatImage, Mask, RasterSource, Window
-from ..rasters.tiling import tiles
+from ..rasters.tiling import tile_count, tiles
 from ..rasters.warping import sample
+from ..rasters.writing import create_like, one_band
 from .ray_casting import Heights, LineOfSight, hidden_ground, radar_echoes
 from .scene import Scene, Selection
 from .threshold import grown
@@ -159,11 +162,11 @@ class SurfaceGround:
     scene
         The image whose pixels are in question; it lies right on the map.
     model
-        What stands on the map.
+        The elevated objects on the map.
     views
         From where the images were taken.
     offset_px
-        Columns and rows by which the scene shows what stands elsewhere than the model has it.
+        Columns and rows by which the scene shows elevated objects elsewhere than the model has it.
     """
 
     scene: Scene
@@ -240,6 +243,16 @@ class SurfaceGround:
 
     def _pixels(self, length_m: float) -> int:
         return math.ceil(length_m / self.scene.grid.pixel_size_m)
+
+
+def write_reasons(ground: SurfaceGround, path: Path, progress: Progress = SILENT) -> None:
+    """Write a raster of `Seen`: why pixels take no part; see `scene.write_mask`."""
+    grid = ground.scene.grid
+    like = one_band(ground.scene.like, "uint8")
+    with create_like(like, grid, path, nodata=None) as file:
+        for number, tile in enumerate(tiles(grid)):
+            file.write(ground.seen(tile), window=tile)
+            progress.update((number + 1) / tile_count(grid))
 
 
 def _longest(view: View) -> float:

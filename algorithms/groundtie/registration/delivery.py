@@ -214,7 +214,7 @@ def asked_masks(given: Mapping[str, Any], image: str) -> tuple[UserMask | None, 
 
 
 def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:
-    """Return what stands in the scene, by the values of a tool's parameters; None: unknown.
+    """Return what a tool is told of elevated objects, by its parameters; None: nothing.
 
     Raises
     ------

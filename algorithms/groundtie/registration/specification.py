@@ -41,18 +41,18 @@ class FreeSearch:
 
 @dataclass(frozen=True)
 class StatedSurface:
-    """What stands in a scene, and from where both images were taken.
+    """The elevated objects of a scene, and from where both images were taken.
 
     Parameters
     ----------
     model
         A raster of heights, or a vector layer of buildings with theirs.
     views
-        Those of the reference and of the input.
+        That of the reference, then that of the input if it is known.
     """
 
     model: Any
-    views: tuple[View, View]
+    views: tuple[View, ...]
 
     @property
     def name(self) -> str:
@@ -99,7 +99,7 @@ class Specification:
         Which image is a radar's, "reference", "input", "both" or "neither", for tools that are
         made for such pairs; "auto": inferred from metadata and speckle.
     surface
-        What stands in the scene; None: unknown.
+        Its elevated objects; None: unknown.
     matching_pixel_size_m, chip_px, spacing_px
         Pixel size of the matching grid, side of the chips and distance between them; None: by the
         images.
@@ -127,7 +127,7 @@ class Specification:
     tries: int = 1
 
     def with_surface(self, surface: StatedSurface) -> Specification:
-        """Return the same with what stands in the scene, and whose images show it."""
+        """Return the same with elevated objects, and whose images show them."""
         radar = surface.radar if self.radar == AUTO else self.radar
         return replace(self, surface=surface, radar=radar)
 

@@ -15,6 +15,7 @@ import scipy.fft
 from ..context import Context
 from ..errors import ParameterError
 from ..masks.choice import AUTO, NONE, REFERENCE, SURFACE, MaskUsed
+from ..masks.scene import Scene
 from ..masks.surface_model import (
     RasterModel,
     SurfaceGround,
@@ -67,19 +68,39 @@ def with_surface_mask(
     """
     if kind not in (AUTO, NONE):
         raise ParameterError(f"give either mask={kind} or a surface model")
-    ground = surface_ground(pair, stated, stack)
-    ground.require_cover()
-    fit = fit_of(ground)
-    if fit.is_clear:
-        ground = replace(ground, offset_px=fit.offset_px)
+    ground, fit = fitted_ground(scene_of(pair, REFERENCE), stated, stack)
     masked, share = with_mask(pair, REFERENCE, ground.scene, ground.select, stack, context)
     reason = f"ground that both images show by {stated.name}{fit.note}"
     return Masked(masked, MaskUsed(SURFACE, REFERENCE, share, reason, fit.is_clear))
 
 
-def surface_ground(pair: ImagePair, stated: StatedSurface, stack: ExitStack) -> SurfaceGround:
-    """Return the ground that both images of a pair show; rasters are opened within `stack`."""
-    scene = scene_of(pair, REFERENCE)
+def fitted_ground(
+    scene: Scene, stated: StatedSurface, stack: ExitStack
+) -> tuple[SurfaceGround, SurfaceFit]:
+    """Return the ground that all views show, by a model that is moved to where a scene shows it.
+
+    Parameters
+    ----------
+    scene
+        The reference, whose view is the first.
+    stated
+        The surface model and the views.
+    stack
+        Keeps rasters until it is closed.
+
+    Raises
+    ------
+    NoOverlapError
+        The surface model covers nothing of the reference.
+    """
+    ground = surface_ground(scene, stated, stack)
+    ground.require_cover()
+    fit = fit_of(ground)
+    return (replace(ground, offset_px=fit.offset_px) if fit.is_clear else ground), fit
+
+
+def surface_ground(scene: Scene, stated: StatedSurface, stack: ExitStack) -> SurfaceGround:
+    """Return the ground that all views show, by the model where it lies; see `fitted_ground`."""
     model: SurfaceModel
     if UserMask(stated.model).is_layer:
         model = read_footprints(stated.model, scene.grid)
@@ -105,7 +126,7 @@ class SurfaceFit:
 
     @property
     def is_clear(self) -> bool:
-        """Whether the reference shows what stands in the model."""
+        """Whether the reference shows the elevated objects of the model."""
         return self.correlation >= _CLEAR_CORRELATION
 
     @property

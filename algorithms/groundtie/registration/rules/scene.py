@@ -56,7 +56,7 @@ def _little_ground(evidence: RegistrationEvidence) -> str | None:
 def _surface_elsewhere(evidence: RegistrationEvidence) -> str | None:
     if evidence.mask.kind != SURFACE or evidence.mask.is_reliable:
         return None
-    return "the reference does not show what stands in the surface model"
+    return "the reference does not show the elevated objects of the surface model"
 
 
 def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
