@@ -33,6 +33,7 @@ NAMES = (
     "mask_regions",
     "simulate",
     "simulate_sensor",
+    "doctor",
 )
 
 
