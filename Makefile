@@ -7,7 +7,8 @@ VENV := .venv
 PY := $(VENV)/bin/python
 PLUGIN := dist/groundtie_qgis.zip
 
-.PHONY: help install demo check test test-newest test-debian test-qgis lint bench fuzz failures plugin clean
+.PHONY: help install demo check test test-newest test-debian test-qgis lint bench fuzz failures plugin
+.PHONY: docs clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -61,6 +62,9 @@ fuzz: $(VENV)/.installed-dev ## read 20,000 damaged files; failures are kept in 
 
 plugin: ## build dist/groundtie_qgis.zip
 	$(or $(wildcard $(PY)),python3) scripts/build_plugin.py $(PLUGIN)
+
+docs: $(VENV)/.installed-dev ## make docs/ into a site, dist/site
+	$(PY) scripts/help_pages.py dist/site
 
 clean: ## remove everything that can be made again
 	rm -rf $(VENV) build demo dist algorithms/*.egg-info

@@ -21,7 +21,7 @@ environment=(
     PATH=/usr/bin:/bin HOME="$runtime" XDG_RUNTIME_DIR="$runtime" LC_ALL=C.UTF-8
     QT_QPA_PLATFORM=offscreen PYTHONDONTWRITEBYTECODE=1 GROUNDTIE_REQUIRE_QGIS=1
 )
-for name in CI GROUNDTIE_DATA; do
+for name in CI GROUNDTIE_DATA GROUNDTIE_PICTURES; do
     [ -z "${!name:-}" ] || environment+=("$name=${!name}")
 done
 env -i "${environment[@]}" /usr/bin/python3 -m pytest "$@"
