@@ -30,7 +30,7 @@ from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
 from ..matching.rest import Rest, survey_rest
 from ..matching.surface_fit import SurfaceFit
-from ..matching.survey import Survey, survey_model, survey_places
+from ..matching.survey import ELSEWHERE_PX, Survey, survey_model, survey_places
 from ..rasters.pair import Image, ImagePair, make_pair
 from ..rasters.reading import bounded_cache, open_raster
 from ..similarity.surface import SimilaritySettings
@@ -276,7 +276,7 @@ class Stages:
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
         places = survey_places(pair.grid)
         survey = survey_model(chips, transform.model, context.part(0.0, 0.5))
-        return survey, survey_rest(chips, transform, survey, places, context.part(0.5, 1.0))
+        return survey, survey_rest(chips, transform, places, ELSEWHERE_PX, context.part(0.5, 1.0))
 
     def evidence(
         self,
