@@ -17,7 +17,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.reading import bounded_cache
 from .pipeline import OpenPair, open_pair, pair_images, run
-from .registered_output import RegisteredOutput, model_for_grid
+from .registered_output import RegisteredOutput, grid_of_output, model_for_grid
 from .registration import Registration
 from .specification import Specification
 from .user_masks import UserMask
@@ -102,7 +102,8 @@ class Call:
         given = {**_USUAL, **parameters}
         output = None
         if given["output"] is not None:
-            output = RegisteredOutput(given["output"], given["output_grid"], given["resampling"])
+            grid = grid_of_output(given["output"], given["output_grid"])
+            output = RegisteredOutput(given["output"], grid, given["resampling"])
         return cls(
             given["reference"],
             given["input"],
@@ -213,7 +214,9 @@ def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specifica
     """Return a preset with what a tool was called with."""
     return replace(
         preset,
-        model=model_for_grid(parameters["model"], parameters["output_grid"]),
+        model=model_for_grid(
+            parameters["model"], grid_of_output(parameters["output"], parameters["output_grid"])
+        ),
         max_error_px=parameters["max_error"],
         search_radius_m=parameters["search_radius"],
         rotation_deg=parameters["search_rotation"],
