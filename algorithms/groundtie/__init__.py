@@ -24,10 +24,12 @@ if TYPE_CHECKING:
     from .tools.coregister import coregister
     from .tools.coregister_series import coregister_series, register_series
     from .tools.detector_repeatability import detector_repeatability
+    from .tools.doctor import doctor
     from .tools.estimate_rotation import estimate_rotation
     from .tools.extract_gcps import extract_gcps
     from .tools.filter_speckle import filter_speckle
     from .tools.mask_regions import mask_regions
+    from .tools.mask_surface import mask_surface
     from .tools.mask_threshold import mask_threshold
     from .tools.match_optical import match_optical
     from .tools.match_sar_sar import match_sar_sar
@@ -49,11 +51,13 @@ __all__ = [
     "coregister",
     "coregister_series",
     "detector_repeatability",
+    "doctor",
     "estimate_rotation",
     "extract_gcps",
     "filter_speckle",
     "load_transform",
     "mask_regions",
+    "mask_surface",
     "mask_threshold",
     "match_optical",
     "match_sar_sar",

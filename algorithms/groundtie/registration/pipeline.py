@@ -30,7 +30,7 @@ from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
 from ..matching.rest import Rest, survey_rest
 from ..matching.surface_fit import SurfaceFit
-from ..matching.survey import ELSEWHERE_PX, Survey, survey_model, survey_places
+from ..matching.survey import Survey, survey_model, survey_places
 from ..rasters.pair import Image, ImagePair, make_pair
 from ..rasters.reading import bounded_cache, open_raster
 from ..similarity.surface import SimilaritySettings
@@ -40,6 +40,7 @@ from .masks import Masked, require_one_mask, with_ground_mask
 from .registration import Registration
 from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
+from .surface_masks import with_surface_mask
 from .user_masks import named_masks, with_user_masks
 from .verdict import judge, judge_search
 
@@ -178,6 +179,8 @@ def run(
 
 def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: Context) -> Masked:
     """Return the pair with all masks: the user's, and that of the radar image if one is needed."""
+    if spec.surface is not None:
+        return with_surface_mask(opened.pair, spec.surface, spec.mask, opened.stack, context)
     if opened.user_mask is not None:
         return Masked(opened.pair, opened.user_mask)
     return with_ground_mask(opened.pair, spec.mask, scene, opened.stack, context)
@@ -273,7 +276,7 @@ class Stages:
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
         places = survey_places(pair.grid)
         survey = survey_model(chips, transform.model, context.part(0.0, 0.5))
-        return survey, survey_rest(chips, transform, places, ELSEWHERE_PX, context.part(0.5, 1.0))
+        return survey, survey_rest(chips, transform, survey, places, context.part(0.5, 1.0))
 
     def evidence(
         self,

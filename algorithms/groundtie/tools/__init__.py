@@ -28,10 +28,12 @@ NAMES = (
     "similarity_surface",
     "detector_repeatability",
     "filter_speckle",
+    "mask_surface",
     "mask_threshold",
     "mask_regions",
     "simulate",
     "simulate_sensor",
+    "doctor",
 )
 
 
