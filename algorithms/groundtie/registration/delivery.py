@@ -17,6 +17,7 @@ from ..geometry.views import View
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.reading import bounded_cache
+from .displacement import write_displacement
 from .pipeline import OpenPair, open_pair, pair_images, run
 from .registered_output import RegisteredOutput, grid_of_output, model_for_grid
 from .registration import Registration
@@ -32,6 +33,7 @@ class RegistrationFiles:
     tie_points: Path | None = None
     transform: Path | None = None
     report: Path | None = None
+    displacement: Path | None = None
 
     def named(self, registration: Registration) -> dict[str, Path]:
         """Return what `write` writes of a registration, by name."""
@@ -40,6 +42,7 @@ class RegistrationFiles:
             # A pose has none.
             "tie_points": None if registration.tie_points is None else self.tie_points,
             "transform": self.transform,
+            "displacement": None if registration.evidence is None else self.displacement,
         }
         named = {**(results if registration.verdict.accepted else {}), "report": self.report}
         return {name: path for name, path in named.items() if path is not None}
@@ -61,11 +64,14 @@ class RegistrationFiles:
             write_tie_points(outputs.stage(self.tie_points), points, transform)
         if self.transform is not None:
             write_json(outputs.stage(self.transform), transform.to_json())
+        reference = registration.pair.reference.source
+        if self.displacement is not None and registration.evidence is not None:
+            staged = outputs.stage(self.displacement)
+            write_displacement(registration.evidence, reference, staged)
         if self.output is not None:
             context.update(0.0, "writing the registered image")
             source = registration.pair.input.source
-            reference = registration.pair.reference.source.grid
-            self.output.write(source, reference, transform, outputs, context)
+            self.output.write(source, reference.grid, transform, outputs, context)
 
 
 @dataclass(frozen=True)
@@ -108,7 +114,13 @@ class Call:
         return cls(
             given["reference"],
             given["input"],
-            RegistrationFiles(output, given["tie_points"], given["transform"], given["report"]),
+            RegistrationFiles(
+                output,
+                given["tie_points"],
+                given["transform"],
+                given["report"],
+                given["displacement"],
+            ),
             (given["reference_band"], given["input_band"]),
             asked_masks(given, "input"),
             parameters,
@@ -173,6 +185,7 @@ class Call:
 
 # What tools may leave out that do not ask for it.
 _USUAL: Mapping[str, Any] = {
+    "displacement": None,
     "output_grid": "reference",
     "resampling": "cubic",
     "reference_mask_values": None,
