@@ -16,7 +16,9 @@ from ..geometry.tie_point_files import write_tie_points
 from ..geometry.views import View
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
+from ..rasters.grid import Grid
 from ..rasters.reading import bounded_cache
+from ..report.stac import stac_item
 from .displacement import write_displacement
 from .pipeline import OpenPair, open_pair, pair_images, run
 from .registered_output import RegisteredOutput, grid_of_output, model_for_grid
@@ -50,15 +52,33 @@ class RegistrationFiles:
     def write(self, registration: Registration, context: Context) -> None:
         """Write all files, or those of a refused registration: the report."""
         with Outputs() as outputs:
+            grid = None
             if registration.verdict.accepted:
-                self._write_results(registration, outputs, context)
+                grid = self._write_results(registration, outputs, context)
             # Last: who finds it finds all that it is about.
             if self.report is not None:
-                registration.page().write(outputs, self.report, self.transform)
+                item = self._item(registration, grid, self.report)
+                registration.page().write(outputs, self.report, self.transform, item)
+
+    def _item(
+        self, registration: Registration, grid: Grid | None, report: Path
+    ) -> Mapping[str, Any]:
+        """Return the STAC item of a registered raster on a grid; empty without one."""
+        if self.output is None or grid is None:
+            return {}
+        return stac_item(
+            registration.pair.input.source,
+            self.output.path,
+            grid,
+            report.parent,
+            registration.verdict,
+            registration.accepted(),
+        )
 
     def _write_results(
         self, registration: Registration, outputs: Outputs, context: Context
-    ) -> None:
+    ) -> Grid | None:
+        """Write what an accepted registration leaves, and return the registered raster's grid."""
         transform, points = registration.accepted(), registration.tie_points
         if self.tie_points is not None and points is not None:
             write_tie_points(outputs.stage(self.tie_points), points, transform)
@@ -68,10 +88,11 @@ class RegistrationFiles:
         if self.displacement is not None and registration.evidence is not None:
             staged = outputs.stage(self.displacement)
             write_displacement(registration.evidence, reference, staged)
-        if self.output is not None:
-            context.update(0.0, "writing the registered image")
-            source = registration.pair.input.source
-            self.output.write(source, reference.grid, transform, outputs, context)
+        if self.output is None:
+            return None
+        context.update(0.0, "writing the registered image")
+        source = registration.pair.input.source
+        return self.output.write(source, reference.grid, transform, outputs, context)
 
 
 @dataclass(frozen=True)

@@ -52,8 +52,8 @@ class RegisteredOutput:
         transform: Transform,
         outputs: Outputs,
         context: Context,
-    ) -> None:
-        """Write a raster as registered; it is resampled once, or not at all.
+    ) -> Grid:
+        """Write a raster as registered, resampled once or not at all, and return its grid.
 
         Parameters
         ----------
@@ -69,18 +69,19 @@ class RegisteredOutput:
             Threads and progress.
         """
         staged, progress = outputs.stage(self.path), context.progress
-        if self.path.suffix.lower() == VRT:
-            write_vrt(source, moved_grid(transform), staged)
-            return
-        if self.grid == UNTOUCHED:
+        if self.grid == UNTOUCHED or self.path.suffix.lower() == VRT:
             moved = moved_grid(transform)
-            write_with_geotransform(source, moved, staged, progress=progress)
-            return
+            if self.path.suffix.lower() == VRT:
+                write_vrt(source, moved, staged)
+            else:
+                write_with_geotransform(source, moved, staged, progress=progress)
+            return moved
         to_px, target = resampled_onto(self.grid, source, reference, transform)
         workers = context.workers
         warp_raster(
             source, to_px, target, staged, self.resampling, workers=workers, progress=progress
         )
+        return target
 
 
 def resampled_onto(

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import csv
 import datetime
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import ParameterError
-from ..raster_names import file_name, identity, located
+from ..raster_names import file_name, identity, located, time_of
 from ..stac_items import RASTER_SUFFIXES, StacItem, is_item, raster_of_item, read_items
 
 _TABLE = (".csv",)
-
-_DAY = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
-_YEAR = re.compile(r"(?<!\d)((?:19|20)\d\d)(?!\d)")
 
 _COLUMNS = ("file", "name", "time", "mask")
 
@@ -77,25 +73,6 @@ def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed,
     if any(date.time is None for date in dates):
         return dates
     return tuple(sorted(dates, key=lambda date: (date.time or datetime.datetime.min, date.name)))
-
-
-def time_of(text: str) -> datetime.datetime | None:
-    """Return the time that a text states: an ISO 8601 time, else a day or a year in a name."""
-    try:
-        stated = datetime.datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
-    except ValueError:
-        stated = None
-    if stated is not None and not text.strip().isdigit():
-        if stated.tzinfo is not None:
-            stated = stated.astimezone(datetime.timezone.utc).replace(tzinfo=None)
-        return stated
-    if day := _DAY.search(text):
-        try:
-            return datetime.datetime(*map(int, day.groups()))  # type: ignore[arg-type]
-        except ValueError:  # 30 February
-            return None
-    year = _YEAR.search(text)
-    return None if year is None else datetime.datetime(int(year.group(1)), 1, 1)
 
 
 def _listed(given: Path | str, asset: str | None) -> Iterable[Listed]:
