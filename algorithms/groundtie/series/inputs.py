@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import datetime
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from pathlib import Path
 from ..errors import ParameterError
 from ..raster_names import file_name, identity, located, time_of
 from ..stac_items import RASTER_SUFFIXES, StacItem, is_item, raster_of_item, read_items
+from ..tables import read_rows
 
 _TABLE = (".csv",)
 
@@ -102,28 +102,18 @@ def _file(raster: Path | str) -> Listed:
 
 
 def _of_table(path: Path) -> list[Listed]:
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.DictReader(stream)
-            columns = reader.fieldnames or ()
-            rows = list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ParameterError(f"cannot read the table {path}: {error}") from error
-    if "file" not in columns:
-        raise ParameterError(f"the table {path} has no column file ({', '.join(_COLUMNS)})")
-    return [_of_row(path, number, row) for number, row in enumerate(rows, start=2)]
+    return [_of_row(path, number, row) for number, row in enumerate(read_rows(path), start=1)]
 
 
-def _of_row(path: Path, number: int, row: Mapping[str, str | None]) -> Listed:
-    values = {name: (row.get(name) or "").strip() for name in _COLUMNS}
-    if not values["file"]:
-        raise ParameterError(f"{path}, line {number}: the column file is empty")
-    date = _file(raster_of_item(located(values["file"], path)))
-    time = date.time if not values["time"] else time_of(values["time"])
-    if values["time"] and time is None:
-        raise ParameterError(f"{path}, line {number}: {values['time']!r} is no time (ISO 8601)")
-    mask = located(values["mask"], path) if values["mask"] else None
-    return Listed(values["name"] or date.name, date.raster, time, mask)
+def _of_row(path: Path, number: int, row: Mapping[str, str]) -> Listed:
+    if "file" not in row:
+        raise ParameterError(f"{path}, row {number}: no file ({', '.join(_COLUMNS)})")
+    date = _file(raster_of_item(located(row["file"], path)))
+    time = time_of(row["time"]) if "time" in row else date.time
+    if "time" in row and time is None:
+        raise ParameterError(f"{path}, row {number}: {row['time']!r} is no time (ISO 8601)")
+    mask = located(row["mask"], path) if "mask" in row else None
+    return Listed(row.get("name", date.name), date.raster, time, mask)
 
 
 def _of_stac(given: Path | str, asset: str | None) -> list[Listed]:
