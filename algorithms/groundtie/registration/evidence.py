@@ -34,6 +34,7 @@ from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..rasters.grid import FloatArray, Grid
 from .layover import EVEN_MEAN_OVER_SCATTER, scatter_along_line
 from .scene import SceneInfo
+from .surface_masks import ModelFit
 
 # Stages of a registration, in the order in which their rules are asked.
 TIE_POINTS, SEARCH, ASSESSMENT, POSE, AGREEMENT, ERROR, SCENE, SURVEY, REFINEMENT, SERIES = (
@@ -146,6 +147,8 @@ class RegistrationEvidence:
         Where chips all over the overlap match; None: not looked at, as in tests of other rules.
     rest
         The same without content that is the same in both arrays; None: there is none.
+    input_fit
+        How well a surface model fits the registered input; None: nothing is expected of it.
     """
 
     estimate: Estimate
@@ -162,6 +165,7 @@ class RegistrationEvidence:
     mask: MaskUsed = field(default_factory=lambda: MaskUsed(NONE, None, 1.0, ""))
     survey: Survey | None = None
     rest: Rest | None = None
+    input_fit: ModelFit | None = None
 
     stages: ClassVar = (AGREEMENT, ERROR, SCENE, SURVEY)
 
