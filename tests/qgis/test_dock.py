@@ -64,8 +64,15 @@ class Desktop:
         from qgis.core import QgsProject
 
         self.canvas.setLayers(QgsProject.instance().layerTreeRoot().checkedLayers())
+        drawn: list[bool] = []
+
+        def note() -> None:
+            drawn.append(True)
+
+        self.canvas.mapCanvasRefreshed.connect(note)
         self.canvas.refresh()
-        self.wait(lambda: not self.canvas.isDrawing(), 0.3)
+        self.wait(lambda: bool(drawn) and not self.canvas.isDrawing())
+        self.canvas.mapCanvasRefreshed.disconnect(note)
 
     def wait(self, until: Callable[[], bool], least: float = 0.0, most: float = 300.0) -> None:
         import time
@@ -463,7 +470,7 @@ def test_an_image_with_rpcs_from_start_to_points_set_by_hand(
     assert again.extent() == reference.extent()
     report = repair.writer.outcome.files["REPORT"]
     assert json.loads(report.with_suffix(".json").read_text())["points_by_hand"] == 1
-    assert "points set by hand: 1" in report.read_text(encoding="utf-8")
+    assert "Points set by hand: 1." in report.read_text(encoding="utf-8")
 
 
 def test_the_menu_makes_and_loads_an_example(desktop: Desktop, tmp_path: Path) -> None:
