@@ -272,10 +272,6 @@
       <translation>Schließen</translation>
     </message>
     <message>
-      <source>Cloud optimized</source>
-      <translation>Cloud-optimiert</translation>
-    </message>
-    <message>
       <source>Cluster reward</source>
       <translation>Cluster Reward</translation>
     </message>
@@ -338,6 +334,10 @@
     <message>
       <source>Discrete SPSA</source>
       <translation>Diskretes SPSA</translation>
+    </message>
+    <message>
+      <source>Displacement</source>
+      <translation>Versatz</translation>
     </message>
     <message>
       <source>Distortion</source>
@@ -524,6 +524,10 @@
       <translation>Gauß (RBF)</translation>
     </message>
     <message>
+      <source>GeoTIFF of three bands over the overlap: by how much the input is moved to the east and to the north, and the standard deviation of that; in metres, without georeferencing in pixels to the right and down.</source>
+      <translation>GeoTIFF mit drei Kanälen über der Überlappung: um wie viel die Eingabe nach Osten und nach Norden bewegt wird, und die Standardabweichung davon; in Metern, ohne Georeferenz in Pixeln nach rechts und unten.</translation>
+    </message>
+    <message>
       <source>GeoTIFF that is 1 on homogeneous regions whose shape is that of roads, waters, fields or squares.</source>
       <translation>GeoTIFF, das 1 ist auf homogenen Regionen mit der Form von Straßen, Gewässern, Feldern oder Plätzen.</translation>
     </message>
@@ -540,16 +544,20 @@
       <translation>GeoTIFF mit einem Pixel für jede Verschiebung; der erste Kanal hat die Werte des Maßes, der zweite robuste Standardabweichungen vom langsamen Verlauf.</translation>
     </message>
     <message>
-      <source>GeoTIFF with the image's bands, data type, nodata value, colours and metadata.</source>
-      <translation>GeoTIFF mit den Kanälen, dem Datentyp, dem Nodata-Wert, den Farben und Metadaten des Bildes.</translation>
+      <source>GeoTIFF with the image's bands, data type, nodata value, colours and metadata. A name that ends in .cog.tif makes it a Cloud Optimized GeoTIFF.</source>
+      <translation>GeoTIFF mit den Kanälen, dem Datentyp, dem Nodata-Wert, den Farben und Metadaten des Bildes. Ein Name, der auf .cog.tif endet, macht es zu einem Cloud Optimized GeoTIFF.</translation>
     </message>
     <message>
       <source>GeoTIFF with the input's bands, data type and nodata value; complex images become amplitudes.</source>
       <translation>GeoTIFF mit den Kanälen, dem Datentyp und dem Nodata-Wert der Eingabe; komplexe Bilder werden zu Amplituden.</translation>
     </message>
     <message>
-      <source>GeoTIFF with the input's bands, data type, nodata value, colours and metadata.</source>
-      <translation>GeoTIFF mit den Kanälen, dem Datentyp, dem Nodata-Wert, den Farben und Metadaten der Eingabe.</translation>
+      <source>GeoTIFF with the input's bands, data type, nodata value, colours and metadata. A name that ends in .cog.tif makes it a Cloud Optimized GeoTIFF.</source>
+      <translation>GeoTIFF mit den Kanälen, dem Datentyp, dem Nodata-Wert, den Farben und Metadaten der Eingabe. Ein Name, der auf .cog.tif endet, macht es zu einem Cloud Optimized GeoTIFF.</translation>
+    </message>
+    <message>
+      <source>GeoTIFF with the input's bands, data type, nodata value, colours and metadata. A name that ends in .cog.tif makes it a Cloud Optimized GeoTIFF. A .vrt, for a shift alone, puts the input's own file in its right place: no pixel is written.</source>
+      <translation>GeoTIFF mit den Kanälen, dem Datentyp, dem Nodata-Wert, den Farben und Metadaten der Eingabe. Ein Name, der auf .cog.tif endet, macht es zu einem Cloud Optimized GeoTIFF. Eine .vrt legt bei reiner Verschiebung die eigene Datei der Eingabe an ihren richtigen Ort: kein Pixel wird geschrieben.</translation>
     </message>
     <message>
       <source>GeoTIFF with why each pixel takes no part, as a sum: 1 raised, 2 layover, 4 radar shadow, 8 hidden from the camera, 16 cast shadow, 32 unknown.</source>
@@ -2114,10 +2122,6 @@
     <message>
       <source>Workers</source>
       <translation>Threads</translation>
-    </message>
-    <message>
-      <source>Write a Cloud Optimized GeoTIFF; it is copied once more.</source>
-      <translation>Ein Cloud Optimized GeoTIFF schreiben; es wird ein weiteres Mal kopiert.</translation>
     </message>
     <message>
       <source>Write image</source>
