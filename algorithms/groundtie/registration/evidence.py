@@ -11,7 +11,13 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import GroundTieError
-from ..geometry.accuracy import UNKNOWN, Accuracy, CheckResiduals, predict_accuracy
+from ..geometry.accuracy import (
+    UNKNOWN,
+    Accuracy,
+    CheckResiduals,
+    predict_accuracy,
+    standard_deviation_px,
+)
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.estimation import Estimate
 from ..geometry.judging import (
@@ -179,6 +185,7 @@ class RegistrationEvidence:
         agreeing = int((np.hypot(*self.residuals_px.T) <= TOLERANCE_PX).sum())
         probability = agreement_probability(TOLERANCE_PX, self.radius_px)
         mixture = self._mixture(self.residuals_px, self.radius_px)
+        lattice = _lattice(self.grid)
         return HeldOut(
             "check points",
             agreeing,
@@ -187,21 +194,26 @@ class RegistrationEvidence:
             self.largest_log10_chance,
             mixture.sigma * math.sqrt(2),
             self.max_error_px,
-            float(np.sqrt(np.mean(self.estimate.spread_px(_lattice(self.grid)) ** 2))),
+            float(np.sqrt(np.mean(self.estimate.spread_px(lattice) ** 2))),
             "the overlap",
             predict_accuracy(
-                self.estimate.fold_models,
-                _lattice(self.grid),
-                CheckResiduals(
-                    self.grid.map_to_pixel(self.counted.reference_xy),
-                    self.residuals_px,
-                    mixture.probability,
-                ),
-                self.displacement_px,
+                self.estimate.fold_models, lattice, self._check_residuals, self.displacement_px
             ),
         )
 
-    @property
+    def standard_deviation_px(self, px: FloatArray) -> FloatArray:
+        """Return that of the transform's error along an axis, shape (n,), at pixels (n, 2)."""
+        return standard_deviation_px(
+            self.estimate.fold_models, px, self._check_residuals, self.displacement_px
+        )
+
+    @cached_property
+    def _check_residuals(self) -> CheckResiduals:
+        places = self.grid.map_to_pixel(self.counted.reference_xy)
+        mixture = self._mixture(self.residuals_px, self.radius_px)
+        return CheckResiduals(places, self.residuals_px, mixture.probability)
+
+    @cached_property
     def displacement_px(self) -> FloatArray:
         """The most that heights may displace all matches by, to either side, shape (2,).
 

@@ -205,7 +205,12 @@ def register(
         return replace(result, verdict=judge_search(SearchEvidence(error)))
     evidence = stages.evidence(estimate, check, surveys, scene)
     return replace(
-        result, verdict=judge(evidence), estimate=estimate, check=check, survey=surveys[0]
+        result,
+        verdict=judge(evidence),
+        estimate=estimate,
+        check=check,
+        survey=surveys[0],
+        evidence=evidence,
     )
 
 
