@@ -17,9 +17,9 @@ from .survey import Survey, survey_model, survey_places
 
 # Nothing makes ground lie at whole pixels of both arrays. A transform, or many chips that confirm
 # it, within this distance of such an offset matches what is drawn, or ground that lies there by
-# chance. Suite attacks, seeds 40 to 47 and 64 to 66: transforms of ground from 0.2 px on, but for one in five;
-# what is drawn mostly below. Two sensors' chips up to 0.38; of drawn content that a mask misses, as
-# it has other colours, from 0.48 on.
+# chance. Suite attacks, seeds 40 to 47 and 64 to 66: transforms of ground from 0.2 px on, but for
+# one in five; what is drawn mostly below. Two sensors' chips up to 0.38; of drawn content that a
+# mask misses, as it has other colours, from 0.48 on.
 _WHOLE_PX, LARGEST_WHOLE_SHARE = 0.25, 0.4
 
 
