@@ -14,6 +14,7 @@ from .look_page import LookPage
 from .repair_page import RepairPage
 from .run import Outcome
 from .start_page import StartPage
+from .translation import tr
 
 
 class GroundTieDock(QDockWidget):
@@ -34,7 +35,11 @@ class GroundTieDock(QDockWidget):
         self.look = LookPage(canvas, self.overlay)
         self.repair = RepairPage(canvas, self.overlay, self.look.show_worst, self._written)
         self.tabs = QTabWidget()
-        for page, title in ((self.start, "Register"), (self.look, "Look"), (self.repair, "Repair")):
+        for page, title in (
+            (self.start, tr("Register")),
+            (self.look, tr("Look")),
+            (self.repair, tr("Repair")),
+        ):
             self.tabs.addTab(page, title)
         self.tabs.currentChanged.connect(self._turn_to)
         self.setWidget(self.tabs)

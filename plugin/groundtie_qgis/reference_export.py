@@ -16,8 +16,9 @@ from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QImage
 
 from .run import new_file
+from .translation import mark
 
-MAP = "The map as it is drawn"
+MAP = mark("The map as it is drawn")
 # The side of the largest picture that is drawn; a larger input is compared with a coarser one.
 _MOST_PX = 8192
 # How much of the input's side is drawn around it, so that it may lie off.

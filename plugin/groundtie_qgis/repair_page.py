@@ -27,13 +27,19 @@ from .point_table import SORT_ROLE, PointTable
 from .reference_export import between, named
 from .run import Outcome, Run, new_file
 from .start_page import points_name
+from .translation import mark, tr
 from .wording import choice_label
 
 # As the verdict counts them.
 TOLERANCE_PX = library_module("geometry.judging").TOLERANCE_PX
 
 # Words of models are long: the list shows what they begin with.
-_MODELS = {"translation": "Shift", "rigid": "Rigid", "similarity": "Similarity", "affine": "Affine"}
+_MODELS = {
+    "translation": mark("Shift"),
+    "rigid": mark("Rigid"),
+    "similarity": mark("Similarity"),
+    "affine": mark("Affine"),
+}
 
 
 class RepairPage(QWidget):
@@ -73,7 +79,7 @@ class RepairPage(QWidget):
         self._build()
 
     def _build(self) -> None:
-        self.text = QLabel("Register two images first.")
+        self.text = QLabel(tr("Register two images first."))
         self.text.setWordWrap(True)
         self.model = QComboBox()
         self.model.currentIndexChanged.connect(lambda *_: self._show_fit())
@@ -89,14 +95,14 @@ class RepairPage(QWidget):
         self.view.verticalHeader().hide()
         self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.view.clicked.connect(lambda index: self._zoom(proxy.mapToSource(index).row()))
-        self.drag, self.add = QPushButton("Move points"), QPushButton("Add a point")
+        self.drag, self.add = QPushButton(tr("Move points")), QPushButton(tr("Add a point"))
         self.drag.setCheckable(True)
         self.add.setCheckable(True)
         self.drag.toggled.connect(self._set_dragging)
         self.add.toggled.connect(self._set_adding)
-        self.match = QCheckBox("refine clicks by similarity")
+        self.match = QCheckBox(tr("refine clicks by similarity"))
         self.match.setChecked(True)
-        self.write = QPushButton("Write image")
+        self.write = QPushButton(tr("Write image"))
         self.write.clicked.connect(self.start_writing)
         layout = QVBoxLayout(self)
         for row in ((self.model,), (self.drag, self.add)):
@@ -127,7 +133,7 @@ class RepairPage(QWidget):
             else:
                 opened = review.without_points(reference.source(), input.source())
         self.change(opened, kind)
-        self.text.setText(self._summary() if path is not None else _FIRST_POINTS)
+        self.text.setText(self._summary() if path is not None else tr(_FIRST_POINTS))
 
     def close_points(self) -> None:
         """Forget the points."""
@@ -179,13 +185,16 @@ class RepairPage(QWidget):
     def _summary(self) -> str:
         points = self.review.points
         edited = int(self.review.edited.sum())
-        parts = [f"{int(points.used.sum())} of {len(points)} points take part"]
-        parts += [f"{edited} set by hand"] if edited else []
+        used = tr("{used} of {all} points take part")
+        parts = [used.format(used=int(points.used.sum()), all=len(points))]
+        parts += [tr("{} set by hand").format(edited)] if edited else []
         fit = self.fits.get(self.kind())
         check = points.is_check & points.used
         if fit is not None and check.any():
             agree = int((fit.residuals_px[check] <= TOLERANCE_PX).sum())
-            parts.append(f"{agree} of {check.sum()} check points agree within {TOLERANCE_PX:g} px")
+            agreeing = tr("{agree} of {all} check points agree within {limit} px")
+            limit = f"{TOLERANCE_PX:g}"
+            parts.append(agreeing.format(agree=agree, all=check.sum(), limit=limit))
         return ", ".join(parts) + "."
 
     def _switch(self, row: int, on: bool) -> None:
@@ -208,7 +217,9 @@ class RepairPage(QWidget):
         self._set_tool(self._drag, on)
         if on:
             self.add.setChecked(False)
-            self.text.setText("Pull a mark to its place on the reference, or a line's other end.")
+            self.text.setText(
+                tr("Pull a mark to its place on the reference, or a line's other end.")
+            )
 
     def _set_adding(self, on: bool) -> None:
         self._clicked = None
@@ -216,7 +227,7 @@ class RepairPage(QWidget):
         self._overlay.show_layers([clearly(self._reference)] if on else [])
         if on:
             self.drag.setChecked(False)
-            self.text.setText("Shown is the reference: click a place that both images have.")
+            self.text.setText(tr("Shown is the reference: click a place that both images have."))
 
     def _set_tool(self, tool: Any, on: bool) -> None:
         self._canvas.setMapTool(tool) if on else self._canvas.unsetMapTool(tool)
@@ -234,7 +245,7 @@ class RepairPage(QWidget):
             self._clicked = place
             self._overlay.show_layers([clearly(self._input)])
             self.text.setText(
-                "Shown is the input where its own georeferencing has it: click there."
+                tr("Shown is the input where its own georeferencing has it: click there.")
             )
             return
         first, self._clicked = self._clicked, None
@@ -256,7 +267,7 @@ class RepairPage(QWidget):
                     input_px, peak = review.refine_click(*images, reference_xy, input_px, transform)
                 score = peak.height
             except errors.GroundTieError as error:
-                note = f" It stays where you clicked: {error.one_line()}."
+                note = " " + tr("It stays where you clicked: {}.").format(error.one_line())
         self.change(self.review.add(reference_xy, input_px, score))
         self._choose(len(self.review.points) - 1)
         self.text.setText(self._summary() + note)
@@ -266,12 +277,12 @@ class RepairPage(QWidget):
         fit = self.fits[self.kind()]
         try:
             if objection := self.review.objection(fit.kind):
-                self.text.setText(f"Not written: {objection}.")
+                self.text.setText(tr("Not written: {}.").format(objection))
                 return
             points = new_file(points_name())
             self.review.write(points, fit.transform)
         except errors.GroundTieError as error:
-            self.text.setText(f"Not written: {error.one_line()}.")
+            self.text.setText(tr("Not written: {}.").format(error.one_line()))
             return
         values = {
             "INPUT": named(self._input),
@@ -288,7 +299,7 @@ class RepairPage(QWidget):
         self._run = None
         self.write.setEnabled(True)
         if not outcome.succeeded:
-            self.text.setText(f"Not written: {outcome.reason}")
+            self.text.setText(tr("Not written: {}.").format(outcome.reason.rstrip(".")))
             return
         path = outcome.files["OUTPUT"]
         loaded = [
@@ -296,7 +307,7 @@ class RepairPage(QWidget):
             for layer in QgsProject.instance().mapLayers().values()
             if isinstance(layer, QgsRasterLayer) and layer.source() == str(path)
         ]
-        self.text.setText(f"Written: {path}. {self._summary()}")
+        self.text.setText(tr("Written: {}.").format(path) + f" {self._summary()}")
         self._written(self._reference, loaded[0] if loaded else QgsRasterLayer(str(path)))
 
     def _crs(self) -> Any:
@@ -312,9 +323,12 @@ class RepairPage(QWidget):
         return found.x(), found.y()
 
 
-_FIRST_POINTS = "There are no points yet. Add a point by a click in each image; three are needed."
+_FIRST_POINTS = mark(
+    "There are no points yet. Add a point by a click in each image; three are needed."
+)
 
 
 def _model_text(kind: str, fit: Any) -> str:
     left_out = "–" if fit.left_out_px is None else f"{fit.left_out_px:.2f} px"
-    return f"{_MODELS.get(kind, choice_label(kind))}: left-out error {left_out}"
+    model = tr(_MODELS[kind]) if kind in _MODELS else choice_label(kind)
+    return tr("{model}: left-out error {error}").format(model=model, error=left_out)

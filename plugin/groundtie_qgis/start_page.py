@@ -28,15 +28,16 @@ from .dependencies import missing_for
 from .preselection import proposed_pair, raster_files
 from .reference_export import MAP, with_files
 from .run import Outcome, Run, new_file
+from .translation import mark, tr
 from .unavailable import named_tools
 from .wording import in_words
 
 # What a pair may be, and the tool for it.
 PAIRS = {
-    "Decided by the images": "register",
-    "SAR and optical": "coregister",
-    "SAR and SAR": "match_sar_sar",
-    "Optical and optical": "match_optical",
+    "register": mark("Decided by the images"),
+    "coregister": mark("SAR and optical"),
+    "match_sar_sar": mark("SAR and SAR"),
+    "match_optical": mark("Optical and optical"),
 }
 _FIRST_RADIUS_M = 200.0
 _ANY_ROTATION_DEG = 180.0
@@ -65,24 +66,25 @@ class StartPage(QWidget):
 
     def _build(self) -> None:
         self.reference, self.input = _raster_box(), _raster_box()
-        self.reference.setAdditionalItems([MAP])
+        self.reference.setAdditionalItems([tr(MAP)])
         self.pair = QComboBox()
-        self.pair.addItems([*PAIRS])
+        for tool, text in PAIRS.items():
+            self.pair.addItem(tr(text), tool)
         self.radius = QDoubleSpinBox()
         self.radius.setRange(0, 1e6)
         self.radius.setDecimals(0)
         self.radius.setSuffix(" m")
-        self.radius.setSpecialValueText("usual")
-        self.rotated = QCheckBox("rotation unknown")
-        self.register = QPushButton("Register")
+        self.radius.setSpecialValueText(tr("usual"))
+        self.rotated = QCheckBox(tr("rotation unknown"))
+        self.register = QPushButton(tr("Register"))
         self.progress = QProgressBar()
         self.progress.hide()
         self.verdict = QLabel()
         self.verdict.setWordWrap(True)
         self.verdict.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.wider = QPushButton("Search farther")
-        self.turn = QPushButton("Allow any rotation")
-        self.report = QPushButton("Open report")
+        self.wider = QPushButton(tr("Search farther"))
+        self.turn = QPushButton(tr("Allow any rotation"))
+        self.report = QPushButton(tr("Open report"))
         for button in (self.wider, self.turn, self.report):
             button.hide()
         self._lay_out()
@@ -102,13 +104,13 @@ class StartPage(QWidget):
 
     def _lay_out(self) -> None:
         form = QFormLayout()
-        form.addRow("Reference", self.reference)
-        form.addRow("Input", self.input)
-        form.addRow("Images", self.pair)
+        form.addRow(tr("Reference"), self.reference)
+        form.addRow(tr("Input"), self.input)
+        form.addRow(tr("Images"), self.pair)
         options = QHBoxLayout()
         options.addWidget(self.radius)
         options.addWidget(self.rotated)
-        form.addRow("Search", options)
+        form.addRow(tr("Search"), options)
         layout = QVBoxLayout(self)
         layout.addLayout(form)
         for widget in (self.register, self.progress, self.verdict):
@@ -142,10 +144,10 @@ class StartPage(QWidget):
         other.setLayer(rest[0] if rest else None)
 
     def _show_options(self) -> None:
-        asked = PAIRS[self.pair.currentText()] != "register"
+        asked = self.pair.currentData() != "register"
         for widget in (self.radius, self.rotated):
             widget.setEnabled(asked)
-            widget.setToolTip("" if asked else "Choose what the images are to set the search.")
+            widget.setToolTip("" if asked else tr("Choose what the images are to set the search."))
 
     def start_or_cancel(self) -> None:
         """Begin to register, or stop that."""
@@ -155,17 +157,17 @@ class StartPage(QWidget):
         input = self.input.currentLayer()
         if input is None or (self.reference.currentLayer() is None and not self._from_map()):
             self._layers = ()
-            self._state(False, "Choose two raster layers.")
+            self._state(False, tr("Choose two raster layers."))
             return
         reference, values = with_files(self.reference.currentLayer(), input, self._canvas)
         self._layers = (reference, input)
         names = {"OUTPUT": "registered.tif", "TIE_POINTS": points_name(), "REPORT": "report.html"}
         files = {name: new_file(file) for name, file in names.items()}
-        tool = PAIRS[self.pair.currentText()]
+        tool = self.pair.currentData()
         if tool != "register":
             values |= {"SEARCH_RADIUS": self.radius.value()} if self.radius.value() else {}
             values |= {"SEARCH_ROTATION": _ANY_ROTATION_DEG} if self.rotated.isChecked() else {}
-        self.register.setText("Cancel")
+        self.register.setText(tr("Cancel"))
         self.progress.setValue(0)
         self.progress.show()
         self.verdict.setText("")
@@ -175,14 +177,14 @@ class StartPage(QWidget):
         self._run.start()
 
     def _from_map(self) -> bool:
-        return bool(self.reference.currentText() == MAP)
+        return bool(self.reference.currentText() == tr(MAP))
 
     def _show_progress(self, percent: float) -> None:
         self.progress.setValue(round(percent))
 
     def _end(self, outcome: Outcome) -> None:
         self._run, self.outcome = None, outcome
-        self.register.setText("Register")
+        self.register.setText(tr("Register"))
         self.progress.hide()
         report = outcome.files.get("REPORT")
         self.report.setVisible(report is not None)
@@ -196,7 +198,7 @@ class StartPage(QWidget):
         self._finished(outcome, *self._layers)
 
     def _state(self, good: bool, text: str) -> None:
-        heading = "✔ Accepted" if good else "✘ Not registered"
+        heading = tr("✔ Accepted") if good else tr("✘ Not registered")
         for layer in self._layers:
             text = text.replace(layer.source(), layer.name())
         lines = html.escape(in_words(text, None, named_tools())).split("\n")
@@ -218,8 +220,8 @@ class StartPage(QWidget):
         self.start_or_cancel()
 
     def _ask_for_a_search(self) -> None:
-        if PAIRS[self.pair.currentText()] == "register":
-            self.pair.setCurrentIndex([*PAIRS.values()].index("coregister"))
+        if self.pair.currentData() == "register":
+            self.pair.setCurrentIndex(self.pair.findData("coregister"))
 
     def open_report(self) -> None:
         """Open the report in the browser."""

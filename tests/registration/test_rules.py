@@ -39,7 +39,7 @@ from groundtie.errors import (
     TooFewPointsError,
 )
 from groundtie.geometry.estimation import Estimate
-from groundtie.masks.choice import LAYER, REGIONS, THRESHOLD, MaskUsed
+from groundtie.masks.choice import LAYER, REGIONS, SURFACE, THRESHOLD, MaskUsed
 from groundtie.matching.pose_survey import PoseSurvey
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import Survey
@@ -179,6 +179,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "too little ground": (
         evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.08, "as in a dense town")),
         evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.12, "as in a dense town")),
+    ),
+    "surface model elsewhere": (
+        evidence(GOOD, mask=MaskUsed(SURFACE, "reference", 0.3, "shows nothing", False)),
+        evidence(GOOD, mask=MaskUsed(SURFACE, "reference", 0.3, "fits")),
     ),
     "ground elsewhere": (
         evidence(GOOD, ground_shift_px=1.1),
@@ -326,7 +330,7 @@ def test_heights_that_spread_evenly_displace_by_their_width(
     assert abs(found @ RANGE) == pytest.approx(np.hypot(*found), rel=0.01)
 
 
-@pytest.mark.parametrize("kind", [REGIONS, LAYER])
+@pytest.mark.parametrize("kind", [REGIONS, LAYER, SURFACE])
 def test_a_town_whose_ground_was_matched_is_not_suspected(kind: str) -> None:
     found = evidence(two_thirds(20), scene=PERHAPS, mask=masked(kind))
     assert "town matched whole" not in refusing(found)
@@ -361,7 +365,7 @@ def test_an_oblique_view_needs_more_check_points_on_the_ground(
     assert refusing(evidence(errors, mask=regions)) == []
 
 
-@pytest.mark.parametrize("kind", [REGIONS, LAYER])
+@pytest.mark.parametrize("kind", [REGIONS, LAYER, SURFACE])
 def test_little_ground_may_be_weakly_similar(kind: str) -> None:
     """A mask leaves little of each chip; other rules judge what it leaves."""
     weak = survey(height=1.9, rival=1.8)
@@ -429,7 +433,8 @@ def test_what_copies_leave_may_contradict(off: int, expected: list[str]) -> None
 
 
 @pytest.mark.parametrize(
-    ("kind", "expected"), [(LAYER, []), (REGIONS, ["despeckled town"]), (THRESHOLD, [])]
+    ("kind", "expected"),
+    [(LAYER, []), (SURFACE, []), (REGIONS, ["despeckled town"]), (THRESHOLD, [])],
 )
 def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list[str]) -> None:
     """Regions of a camera's image that pass for a radar's are no ground."""

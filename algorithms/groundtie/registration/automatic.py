@@ -217,4 +217,7 @@ _RPC_DEFAULTS: Mapping[str, Any] = {
     "search_radius": None,
     "mask": AUTO,
     "matching_pixel_size": None,
+    "surface_model": None,
+    "reference_view": None,
+    "image_view": None,
 }

@@ -11,15 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from ..context import Context, threads
-from ..errors import NotRegisteredError
+from ..errors import NotRegisteredError, ParameterError
 from ..geometry.tie_point_files import write_tie_points
+from ..geometry.views import View
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.reading import bounded_cache
 from .pipeline import OpenPair, open_pair, pair_images, run
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import Registration
-from .specification import Specification
+from .specification import Specification, StatedSurface
 from .user_masks import UserMask
 
 
@@ -175,6 +176,9 @@ _USUAL: Mapping[str, Any] = {
     "resampling": "cubic",
     "reference_mask_values": None,
     "input_mask_values": None,
+    "surface_model": None,
+    "reference_view": None,
+    "input_view": None,
 }
 
 
@@ -209,8 +213,36 @@ def asked_masks(given: Mapping[str, Any], image: str) -> tuple[UserMask | None, 
     return reference, other
 
 
+def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:
+    """Return what a tool is told of elevated objects, by its parameters; None: nothing.
+
+    Raises
+    ------
+    ParameterError
+        A view is missing or cannot be understood, or has no surface model to go with.
+    """
+    model = given["surface_model"]
+    names = ("reference", image)
+    if model is None:
+        if any(given[f"{name}_view"] is not None for name in names):
+            raise ParameterError("a view goes with a surface model (surface_model)")
+        return None
+    views = [View.of(given[name], given[f"{name}_view"]) for name in names]
+    for name, view in zip(names, views, strict=True):
+        if view is None:
+            raise ParameterError(
+                f"a surface model needs the view of the {name}: put its STAC item beside it, or "
+                f"give {name}_view"
+            )
+    reference, other = (view for view in views if view is not None)
+    return StatedSurface(model, (reference, other))
+
+
 def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specification:
     """Return a preset with what a tool was called with."""
+    surface = asked_surface({**_USUAL, **parameters}, "input")
+    if surface is not None:
+        preset = preset.with_surface(surface)
     return replace(
         preset,
         model=model_for_grid(parameters["model"], parameters["output_grid"]),

@@ -22,7 +22,7 @@ from ..geometry.judging import (
 )
 from ..geometry.robust import Mixture, fit_mixture
 from ..geometry.tie_points import TiePoints
-from ..masks.choice import LAYER, NONE, REGIONS, MaskUsed
+from ..masks.choice import NONE, MaskUsed
 from ..matching.rest import Rest
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..rasters.grid import FloatArray, Grid
@@ -210,7 +210,7 @@ class RegistrationEvidence:
         weights = self._mixture(shifts, SURVEY_RADIUS_PX).probability
         scatter = scatter_along_line(shifts, weights, _LOG10_SIGNIFICANCE)
         mean = (self.layover_factor or EVEN_MEAN_OVER_SCATTER) * scatter
-        return mean if self.mask.kind in (REGIONS, LAYER) else 2 * mean
+        return mean if self.mask.is_ground else 2 * mean
 
     def _mixture(self, residuals_px: FloatArray, radius_px: int) -> Mixture:
         area = (2 * radius_px + 1) ** 2

@@ -32,7 +32,7 @@ from ..rasters.reading import Window
 from .scene import SceneInfo
 from .user_masks import with_mask
 
-# In which part of an image the direction of cast shadows is looked for.
+# In which part of an image the direction of cast shadows, and the like, is looked for.
 _MIDDLE_PX = 2048
 
 
@@ -127,7 +127,7 @@ class _Town:
 
     def _find(self) -> GroundRegions:
         other = self._info.other.scene
-        middle = other.read(_middle(other.grid))
+        middle = other.read(middle_of(other.grid))
         shadow = shadow_azimuth_deg(middle) if middle.valid.any() else None
         return find_ground(self.scene, WIDTH_M, HIGH_PERCENT, self._context.progress, shadow)
 
@@ -138,6 +138,7 @@ def require_one_mask(kind: str, used: MaskUsed | None) -> None:
         raise ParameterError(f"give either mask={kind} or a vector layer as mask")
 
 
-def _middle(grid: Grid) -> Window:
+def middle_of(grid: Grid) -> Window:
+    """Return as much of the middle of an image as is enough to tell how it was taken."""
     width, height = min(grid.width, _MIDDLE_PX), min(grid.height, _MIDDLE_PX)
     return Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)

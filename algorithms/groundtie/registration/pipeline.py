@@ -40,6 +40,7 @@ from .masks import Masked, require_one_mask, with_ground_mask
 from .registration import Registration
 from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
+from .surface_masks import with_surface_mask
 from .user_masks import named_masks, with_user_masks
 from .verdict import judge, judge_search
 
@@ -178,6 +179,8 @@ def run(
 
 def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: Context) -> Masked:
     """Return the pair with all masks: the user's, and that of the radar image if one is needed."""
+    if spec.surface is not None:
+        return with_surface_mask(opened.pair, spec.surface, spec.mask, opened.stack, context)
     if opened.user_mask is not None:
         return Masked(opened.pair, opened.user_mask)
     return with_ground_mask(opened.pair, spec.mask, scene, opened.stack, context)

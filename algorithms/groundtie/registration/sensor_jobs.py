@@ -19,7 +19,7 @@ from ..sensor.adjustment import Adjustment
 from ..sensor.control_points import ControlPoints, read_control_points
 from ..sensor.height_check import HeightCheck
 from ..sensor.rpc_fit import RPCFit
-from .delivery import asked_masks
+from .delivery import asked_masks, asked_surface
 from .ground_control import GroundControl, match_ground_control, require_crs
 from .refinement import Refinement
 from .refinement_output import Call, RefinementFiles
@@ -224,6 +224,9 @@ def _matched(
         mask=given["mask"],
         matching_pixel_size_m=given["matching_pixel_size"],
     )
+    surface = asked_surface(given, "image")
+    if surface is not None:
+        spec = spec.with_surface(surface)
     bands = given["reference_band"], given["image_band"]
     masks = asked_masks(given, "image")
     return sensor, match_ground_control(sensor, reference, spec, bands, masks, stack, context)

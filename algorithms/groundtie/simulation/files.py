@@ -18,7 +18,8 @@ from ..rasters.grid import Grid
 from ..runs import RUN_TAG, run_tags
 from ..sensor.rpc import RPC
 from ..sensor.rpc_tags import rpc_to_tags
-from .pair import SimulatedPair
+from .metadata import optical_item, sar_item
+from .pair import SimulatedPair, scene_grid
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -26,6 +27,9 @@ NAMES = {
     "reference": "reference.tif",
     "input": "input.tif",
     "dem": "dem.tif",
+    "dsm": "dsm.tif",
+    "reference_metadata": "reference.json",
+    "input_metadata": "input.json",
     "truth": "truth.json",
     "check_points": "check_points.csv",
     "roof_points": "roof_points.csv",
@@ -47,8 +51,9 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
     Returns
     -------
     dict
-        Paths of reference, input, dem (bare ground in metres on the reference's pixels), truth
-        (JSON, which `load_transform` reads), check_points and roof_points (CSV).
+        Paths of reference, input, dem (bare ground in metres on the reference's pixels), dsm (the
+        same with buildings and trees, and beyond), reference_metadata and input_metadata (STAC
+        items), truth (JSON, which `load_transform` reads), check_points and roof_points (CSV).
 
     Raises
     ------
@@ -65,6 +70,17 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
         write_raster(staged["input"], pair.input, pair.truth.input_grid, bands)
         terrain = pair.scene.terrain_m[pair.scene.window]
         write_raster(staged["dem"], terrain[None], pair.reference_grid, ["Height of ground (m)"])
+        surface, grid = pair.scene.surface_m, pair.reference_grid
+        around = scene_grid(grid, pair.scene.margin_px)
+        write_raster(staged["dsm"], surface[None], around, ["Height of surface (m)"])
+        write_json(
+            staged["reference_metadata"],
+            sar_item(NAMES["reference"], grid, pair.options.sar),
+        )
+        write_json(
+            staged["input_metadata"],
+            optical_item(NAMES["input"], pair.truth.input_grid, pair.options.optical),
+        )
         write_json(staged["truth"], truth_json(pair))
         write_table(staged["check_points"], CHECK_POINT_COLUMNS, _check_points(pair))
         write_table(staged["roof_points"], ROOF_POINT_COLUMNS, _roof_points(pair))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...geometry.judging import TOLERANCE_PX
-from ...masks.choice import LAYER, REGIONS
+from ...masks.choice import LAYER, REGIONS, SURFACE
 from ..evidence import SCENE, RegistrationEvidence
 from ..layover import count_on_line, scatter_along_line_px
 from .rule import Rule
@@ -53,6 +53,12 @@ def _little_ground(evidence: RegistrationEvidence) -> str | None:
     return None
 
 
+def _surface_elsewhere(evidence: RegistrationEvidence) -> str | None:
+    if evidence.mask.kind != SURFACE or evidence.mask.is_reliable:
+        return None
+    return "the reference does not show the elevated objects of the surface model"
+
+
 def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
     if evidence.ground_shift_px <= _LARGEST_GROUND_SHIFT_PX:
         return None
@@ -88,7 +94,7 @@ def _layover_of_fit_points(evidence: RegistrationEvidence) -> str | None:
 
 def _despeckled_town(evidence: RegistrationEvidence) -> str | None:
     kind = evidence.mask.kind
-    if evidence.scene is None or kind == LAYER:
+    if evidence.scene is None or kind in (LAYER, SURFACE):
         return None
     if not evidence.scene.is_despeckled_town(masked_by_regions=kind == REGIONS):
         return None
@@ -97,7 +103,7 @@ def _despeckled_town(evidence: RegistrationEvidence) -> str | None:
 
 def _town_matched_whole(evidence: RegistrationEvidence) -> str | None:
     points = evidence.held_out
-    is_ground = evidence.mask.kind in (REGIONS, LAYER) or evidence.is_ground_checked
+    is_ground = evidence.mask.is_ground or evidence.is_ground_checked
     if evidence.scene is None or is_ground or points.agreeing >= _CLEAR_SHARE * points.total:
         return None
     if not evidence.scene.may_be_dense_town:
@@ -119,6 +125,15 @@ SCENE_RULES: tuple[Rule, ...] = (
         "suite rpc_city",
         _GROUND,
         _little_ground,
+    ),
+    Rule(
+        "surface model elsewhere",
+        SCENE,
+        "the reference does not correlate by 0.1 with what the surface model and its view let "
+        "expect",
+        "suite towns",
+        "give the surface model of this place, and the right view; or leave it out",
+        _surface_elsewhere,
     ),
     Rule(
         "ground elsewhere",
