@@ -145,6 +145,23 @@ def test_one_pattern_of_noise_over_different_ground_is_found(
     assert rest is not None and not rest.is_confirming
 
 
+@pytest.mark.parametrize(
+    ("area", "reduced", "ground", "expected"),
+    [
+        (1.0, 1.0, 0.0, True),
+        (0.95, 1.0, 0.1, True),
+        (0.95, 0.94, 0.1, False),
+        (0.8, 1.0, 0.1, False),
+        (0.1, 0.5, 0.4, True),
+    ],
+)
+def test_reduced_images_of_one_ground_are_more_alike(
+    area: float, reduced: float, ground: float, expected: bool
+) -> None:
+    """Under a strong pattern of noise that both have, they are less alike."""
+    assert Sameness(area, reduced, ground).is_explained is expected
+
+
 def test_fill_that_is_not_declared_leaves_no_border(tmp_path: Path, context: Context) -> None:
     """Holes of one value in both, of images with another contrast: their borders match, too."""
     holes = spots(length_px=8.0)
