@@ -103,3 +103,13 @@ def _write(path: Any, image: QImage, extent: Any, crs: Any) -> None:
 def between(source: Any, target: Any) -> QgsCoordinateTransform:
     """Return the transform between two CRSs."""
     return QgsCoordinateTransform(source, target, QgsProject.instance())
+
+
+def layer_of(path: Any) -> Any:
+    """Return the project's layer of a file; None if there is none."""
+    found = [
+        layer
+        for layer in QgsProject.instance().mapLayers().values()
+        if isinstance(layer, QgsRasterLayer) and path is not None and layer.source() == str(path)
+    ]
+    return found[0] if found else None

@@ -289,24 +289,6 @@ def test_a_case_runs_alone_and_keeps_its_images(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("made_scenes")
-@pytest.mark.parametrize(
-    "attack",
-    [
-        "irregular nodata/other place",
-        "snow of one shape/other place",
-        "fixed pattern noise/displaced",
-        "labels and roads/restyled",
-    ],
-)
-def test_what_is_drawn_is_not_registered(attack: str, tmp_path: Path) -> None:
-    """Of attacks that once deceived: masks missed borders, other colours and soft edges."""
-    result = suite.run(settings(tmp_path, case=f"{attack}/made-suburban/coregister/1"))
-    (record,) = result.records
-    assert record["verdict"] == REFUSED
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("made_scenes")
 def test_another_place_is_refused_by_a_rule(tmp_path: Path) -> None:
     result = suite.run(settings(tmp_path, case="another place/-/made-rural/match_optical/1"))
     (record,) = result.records

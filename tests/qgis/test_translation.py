@@ -104,7 +104,8 @@ def test_the_dock_and_the_menu_are_german(iface: Any, tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("german")
 def test_choices_are_still_taken_as_words(provider: Any) -> None:
-    definition = provider.algorithm("coregister").create().parameterDefinition("MODEL")
+    algorithm = provider.algorithm("coregister").create()
+    definition = algorithm.parameterDefinition("MODEL")
     assert "Polynom zweiten Grades" in definition.options()
     assert definition.word("polynomial2") == "polynomial2"
     assert definition.word("Polynom zweiten Grades") == "polynomial2"

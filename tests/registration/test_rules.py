@@ -54,6 +54,7 @@ from groundtie.registration.pose_verdict import PoseEvidence, PoseSurveyEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
 from groundtie.registration.series_evidence import DateEvidence
+from groundtie.registration.surface_masks import ModelFit
 from groundtie.registration.tie_point_evidence import TiePointEvidence
 from groundtie.registration.verdict import Evidence, first_refusal
 
@@ -344,6 +345,23 @@ def test_an_image_of_fields_is_not_suspected() -> None:
     assert refusing(evidence(two_thirds(20), scene=scene())) == []
 
 
+@pytest.mark.parametrize(
+    ("fit", "reason"),
+    [
+        (ModelFit(0.4, (2, -2)), None),
+        (ModelFit(0.4, (-3, 1)), "3.2 px off"),
+        (ModelFit(0.08, (0, 0)), "the registered input does not show"),
+    ],
+)
+def test_the_input_shows_elevated_objects_where_the_surface_model_has_them(
+    fit: ModelFit, reason: str | None
+) -> None:
+    found = evidence(GOOD, mask=masked(SURFACE), input_fit=fit, max_error_px=3.0)
+    decided = first_refusal(found)
+    assert (decided is None) == (reason is None)
+    assert decided is None or (reason is not None and reason in decided[1])
+
+
 def test_ground_must_be_reliable_and_span_the_overlap() -> None:
     regions = MaskUsed(REGIONS, "reference", 0.3, "as in a dense town")
     assert refusing(evidence(GOOD, mask=regions)) == []
@@ -384,15 +402,6 @@ def test_without_locked_content_another_place_must_not_match_better() -> None:
     rest = survey(20, height=4.0, rival=5.0)
     found = evidence(GOOD, survey=survey(), rest=Rest(rest))
     assert refusing(found) == ["pixel-locked content"]
-
-
-@pytest.mark.parametrize(("share", "expected"), [(0.41, ["pixel-locked content"]), (0.39, [])])
-@pytest.mark.parametrize("explained", [False, True])
-def test_what_is_left_must_not_lie_at_whole_pixels(
-    share: float, expected: list[str], explained: bool
-) -> None:
-    found = evidence(GOOD, survey=survey(), rest=Rest(survey(), explained, share))
-    assert refusing(found) == ([] if explained else expected)
 
 
 def test_without_locked_content_chips_must_not_agree_elsewhere() -> None:

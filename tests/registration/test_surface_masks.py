@@ -17,13 +17,19 @@ from groundtie.context import Context
 from groundtie.errors import NoOverlapError, ParameterError
 from groundtie.geometry.views import View
 from groundtie.masks.choice import REFERENCE, SURFACE
+from groundtie.masks.scene import Scene
 from groundtie.rasters.grid import compose
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.delivery import asked_surface
 from groundtie.registration.scene import scene_of
 from groundtie.registration.specification import BOTH, INPUT, NEITHER, StatedSurface
-from groundtie.registration.surface_masks import fit_of, surface_ground, with_surface_mask
+from groundtie.registration.surface_masks import (
+    ModelFit,
+    fit_of,
+    surface_ground,
+    with_surface_mask,
+)
 from groundtie.simulation.files import write_pair
 from groundtie.simulation.optical import OpticalOptions
 from groundtie.simulation.pair import PairOptions, simulate_pair
@@ -70,6 +76,14 @@ def pair_of(city: Path, stack: ExitStack, turned: bool = False) -> ImagePair:
     return make_pair(*(Image(stack.enter_context(open_raster(city / name))) for name in names))
 
 
+def fit_on(scene: Scene, stated: StatedSurface, stack: ExitStack) -> ModelFit:
+    """Return how a model fits a reference where it lies."""
+    ground = surface_ground(scene, stated, stack)
+    fit = fit_of(ground, stated.views[0], scene.read)
+    assert fit is not None
+    return fit
+
+
 def moved(model: Path, path: Path, east_m: float, north_m: float) -> Path:
     with rasterio.open(model) as raster:
         transform = compose(Affine.translation(east_m, north_m), raster.transform)
@@ -80,7 +94,7 @@ def moved(model: Path, path: Path, east_m: float, north_m: float) -> Path:
 
 
 def test_a_model_that_lies_right_is_found_there(city: Path, stack: ExitStack) -> None:
-    fit = fit_of(surface_ground(scene_of(pair_of(city, stack), REFERENCE), stated(city), stack))
+    fit = fit_on(scene_of(pair_of(city, stack), REFERENCE), stated(city), stack)
     assert fit.is_clear and max(np.abs(fit.offset_px)) <= 1
 
 
@@ -115,18 +129,27 @@ def test_a_view_from_the_other_side_is_not_the_references(city: Path, stack: Exi
     pair, right = pair_of(city, stack), stated(city)
     other_side = replace(right.views[0], azimuth_deg=right.views[0].azimuth_deg - 180)
     wrong = replace(right, views=(other_side, right.views[1]))
-    fits = [fit_of(surface_ground(scene_of(pair, REFERENCE), one, stack)) for one in (right, wrong)]
+    fits = [fit_on(scene_of(pair, REFERENCE), one, stack) for one in (right, wrong)]
     assert fits[0].correlation > 2 * fits[1].correlation
 
 
 def test_a_cameras_cast_shadows_show_where_the_model_lies(city: Path, stack: ExitStack) -> None:
     right = stated(city)
     turned = replace(right, views=right.views[::-1])
-    fit = fit_of(
-        surface_ground(scene_of(pair_of(city, stack, turned=True), REFERENCE), turned, stack)
-    )
+    fit = fit_on(scene_of(pair_of(city, stack, turned=True), REFERENCE), turned, stack)
     # The camera's image is misregistered, by 8 px and what is warped.
     assert fit.is_clear and 3 <= np.hypot(*fit.offset_px) <= 14
+
+
+def test_nothing_is_expected_of_a_camera_without_the_sun(
+    city: Path, stack: ExitStack, context: Context
+) -> None:
+    right, pair = stated(city), pair_of(city, stack, turned=True)
+    camera = replace(right.views[1], sun_azimuth_deg=None, sun_elevation_deg=None)
+    turned = replace(right, views=(camera, right.views[0]))
+    masked = with_surface_mask(pair, turned, "auto", stack, context)
+    assert masked.used.is_reliable and "moved" not in masked.used.reason
+    assert masked.surface is not None and masked.surface.offset_px == (0, 0)
 
 
 def test_another_mask_or_a_model_of_nowhere_is_refused(

@@ -4,7 +4,7 @@ import numpy as np
 from textured_pairs import texture
 
 from groundtie.rasters.patch import Patch
-from groundtie.similarity.sameness import all_of_windows, reduced, same_windows, without
+from groundtie.similarity.sameness import Gradients, count_same, reduced, same_windows, without
 
 
 def patch(values: np.ndarray, hidden: tuple[slice, slice] | None = None) -> Patch:
@@ -12,6 +12,31 @@ def patch(values: np.ndarray, hidden: tuple[slice, slice] | None = None) -> Patc
     if hidden is not None:
         valid[hidden] = False
     return Patch(values.astype(np.float32), valid)
+
+
+def test_all_gradients_of_an_array_and_its_offset_copy_are_the_same() -> None:
+    one = texture(60, 60)
+    gradients = [Gradients.of(patch(values)) for values in (one, one + 100.0)]
+    same, every = count_same(*gradients, (0.1, 0.1))
+    assert same == every > 1000
+
+
+def test_gradients_of_two_places_are_rarely_the_same() -> None:
+    """Two vectors of like lengths in any directions: within a quarter of the length, a few %."""
+    gradients = [Gradients.of(patch(texture(200, 200, seed))) for seed in (1, 2)]
+    limit = float(np.median(gradients[0].length))
+    same, every = count_same(*gradients, (limit, limit))
+    assert 0 < same < 0.03 * every
+
+
+def test_gradients_beside_invalid_pixels_do_not_count() -> None:
+    one = texture(60, 60)
+    hidden = np.s_[20:30, 20:30]
+    counts = [
+        count_same(Gradients.of(patch(one, where)), Gradients.of(patch(one)), (0.0, 0.0))[1]
+        for where in (None, hidden)
+    ]
+    assert counts[0] - counts[1] == 12 * 12
 
 
 def test_windows_are_the_same_where_one_thing_is_drawn_into_both() -> None:
@@ -42,14 +67,6 @@ def test_invalid_pixels_are_no_part_of_windows() -> None:
     same = same_windows(patch(one), patch(spoilt, hidden))
     assert not same[hidden].any()
     assert same[:20].all()
-
-
-def test_windows_are_nine_pixels_wide() -> None:
-    middles = np.zeros((20, 30), bool)
-    middles[10, 12] = True
-    rows, columns = np.nonzero(all_of_windows(middles))
-    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (6, 14, 8, 16)
-    assert len(rows) == 9 * 9
 
 
 def test_reduced_pixels_are_means_of_valid_ones() -> None:

@@ -218,6 +218,11 @@ def thin_plate_kernel(uv: FloatArray, knots: FloatArray) -> FloatArray:
     return np.asarray(0.5 * squared * np.log(np.maximum(squared, 1e-300)))
 
 
+def shift_model(dx: float, dy: float) -> Model:
+    """Return a translation in map units as a model."""
+    return PolynomialModel("translation", Frame(Affine.identity()), np.array([[dx, dy]]))
+
+
 def model_from_json(values: dict[str, Any]) -> Model:
     """Return the model that `to_json` described.
 

@@ -88,7 +88,7 @@ def survey_pose(
     elsewhere_px = max(accuracy_share * max(level.width, level.height), POSE_TOLERANCE_PX)
     survey = survey_model(matcher, model, quiet, None, places, elsewhere_px)
     moved = Transform(model, transform.crs, transform.input_grid)
-    return PoseSurvey(errors, survey, survey_rest(matcher, moved, survey, places, quiet))
+    return PoseSurvey(errors, survey, survey_rest(matcher, moved, places, elsewhere_px, quiet))
 
 
 def _covered(grid: Grid, transform: Transform) -> Grid:

@@ -16,9 +16,12 @@ from ..geometry.tie_point_files import write_tie_points
 from ..geometry.views import View
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
+from ..rasters.grid import Grid
 from ..rasters.reading import bounded_cache
+from ..report.stac import stac_item
+from .displacement import write_displacement
 from .pipeline import OpenPair, open_pair, pair_images, run
-from .registered_output import RegisteredOutput, model_for_grid
+from .registered_output import RegisteredOutput, grid_of_output, model_for_grid
 from .registration import Registration
 from .specification import Specification, StatedSurface
 from .user_masks import UserMask
@@ -32,6 +35,7 @@ class RegistrationFiles:
     tie_points: Path | None = None
     transform: Path | None = None
     report: Path | None = None
+    displacement: Path | None = None
 
     def named(self, registration: Registration) -> dict[str, Path]:
         """Return what `write` writes of a registration, by name."""
@@ -40,6 +44,7 @@ class RegistrationFiles:
             # A pose has none.
             "tie_points": None if registration.tie_points is None else self.tie_points,
             "transform": self.transform,
+            "displacement": None if registration.evidence is None else self.displacement,
         }
         named = {**(results if registration.verdict.accepted else {}), "report": self.report}
         return {name: path for name, path in named.items() if path is not None}
@@ -47,25 +52,47 @@ class RegistrationFiles:
     def write(self, registration: Registration, context: Context) -> None:
         """Write all files, or those of a refused registration: the report."""
         with Outputs() as outputs:
+            grid = None
             if registration.verdict.accepted:
-                self._write_results(registration, outputs, context)
+                grid = self._write_results(registration, outputs, context)
             # Last: who finds it finds all that it is about.
             if self.report is not None:
-                registration.page().write(outputs, self.report, self.transform)
+                item = self._item(registration, grid, self.report)
+                registration.page().write(outputs, self.report, self.transform, item)
+
+    def _item(
+        self, registration: Registration, grid: Grid | None, report: Path
+    ) -> Mapping[str, Any]:
+        """Return the STAC item of a registered raster on a grid; empty without one."""
+        if self.output is None or grid is None:
+            return {}
+        return stac_item(
+            registration.pair.input.source,
+            self.output.path,
+            grid,
+            report.parent,
+            registration.verdict,
+            registration.accepted(),
+        )
 
     def _write_results(
         self, registration: Registration, outputs: Outputs, context: Context
-    ) -> None:
+    ) -> Grid | None:
+        """Write what an accepted registration leaves, and return the registered raster's grid."""
         transform, points = registration.accepted(), registration.tie_points
         if self.tie_points is not None and points is not None:
             write_tie_points(outputs.stage(self.tie_points), points, transform)
         if self.transform is not None:
             write_json(outputs.stage(self.transform), transform.to_json())
-        if self.output is not None:
-            context.update(0.0, "writing the registered image")
-            source = registration.pair.input.source
-            reference = registration.pair.reference.source.grid
-            self.output.write(source, reference, transform, outputs, context)
+        reference = registration.pair.reference.source
+        if self.displacement is not None and registration.evidence is not None:
+            staged = outputs.stage(self.displacement)
+            write_displacement(registration.evidence, reference, staged)
+        if self.output is None:
+            return None
+        context.update(0.0, "writing the registered image")
+        source = registration.pair.input.source
+        return self.output.write(source, reference.grid, transform, outputs, context)
 
 
 @dataclass(frozen=True)
@@ -103,11 +130,18 @@ class Call:
         given = {**_USUAL, **parameters}
         output = None
         if given["output"] is not None:
-            output = RegisteredOutput(given["output"], given["output_grid"], given["resampling"])
+            grid = grid_of_output(given["output"], given["output_grid"])
+            output = RegisteredOutput(given["output"], grid, given["resampling"])
         return cls(
             given["reference"],
             given["input"],
-            RegistrationFiles(output, given["tie_points"], given["transform"], given["report"]),
+            RegistrationFiles(
+                output,
+                given["tie_points"],
+                given["transform"],
+                given["report"],
+                given["displacement"],
+            ),
             (given["reference_band"], given["input_band"]),
             asked_masks(given, "input"),
             parameters,
@@ -172,6 +206,7 @@ class Call:
 
 # What tools may leave out that do not ask for it.
 _USUAL: Mapping[str, Any] = {
+    "displacement": None,
     "output_grid": "reference",
     "resampling": "cubic",
     "reference_mask_values": None,
@@ -245,7 +280,9 @@ def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specifica
         preset = preset.with_surface(surface)
     return replace(
         preset,
-        model=model_for_grid(parameters["model"], parameters["output_grid"]),
+        model=model_for_grid(
+            parameters["model"], grid_of_output(parameters["output"], parameters["output_grid"])
+        ),
         max_error_px=parameters["max_error"],
         search_radius_m=parameters["search_radius"],
         rotation_deg=parameters["search_rotation"],

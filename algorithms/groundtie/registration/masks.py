@@ -25,6 +25,7 @@ from ..masks.choice import (
 )
 from ..masks.regions import HIGH_PERCENT, WIDTH_M, GroundRegions, find_ground
 from ..masks.scene import Scene, Selection
+from ..masks.surface_model import SurfaceGround
 from ..masks.threshold import Threshold
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
@@ -49,11 +50,14 @@ class Masked:
     ground
         The images with a mask of the ground alone, on which check points are matched where `pair`
         shows more of a dense town; None: no dense town, or nothing but ground takes part.
+    surface
+        What a surface model lets expect; None: there is none.
     """
 
     pair: ImagePair
     used: MaskUsed
     ground: ImagePair | None = None
+    surface: SurfaceGround | None = None
 
     def on(self, pair: ImagePair) -> Masked:
         """Return the masks of the reference on another pair with the same reference."""
@@ -62,6 +66,7 @@ class Masked:
             replace(pair, reference=self.pair.reference),
             self.used,
             None if ground is None else replace(pair, reference=ground.reference),
+            self.surface,
         )
 
 

@@ -30,9 +30,10 @@ from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
 from ..matching.rest import Rest, survey_rest
 from ..matching.surface_fit import SurfaceFit
-from ..matching.survey import Survey, survey_model, survey_places
+from ..matching.survey import ELSEWHERE_PX, Survey, survey_model, survey_places
 from ..rasters.pair import Image, ImagePair, make_pair
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.patch import Patch
+from ..rasters.reading import Window, bounded_cache, open_raster
 from ..similarity.surface import SimilaritySettings
 from .evidence import RegistrationEvidence, SearchEvidence
 from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
@@ -40,7 +41,7 @@ from .masks import Masked, require_one_mask, with_ground_mask
 from .registration import Registration
 from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
-from .surface_masks import with_surface_mask
+from .surface_masks import ModelFit, fit_of, with_surface_mask
 from .user_masks import named_masks, with_user_masks
 from .verdict import judge, judge_search
 
@@ -204,7 +205,12 @@ def register(
         return replace(result, verdict=judge_search(SearchEvidence(error)))
     evidence = stages.evidence(estimate, check, surveys, scene)
     return replace(
-        result, verdict=judge(evidence), estimate=estimate, check=check, survey=surveys[0]
+        result,
+        verdict=judge(evidence),
+        estimate=estimate,
+        check=check,
+        survey=surveys[0],
+        evidence=evidence,
     )
 
 
@@ -276,7 +282,7 @@ class Stages:
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
         places = survey_places(pair.grid)
         survey = survey_model(chips, transform.model, context.part(0.0, 0.5))
-        return survey, survey_rest(chips, transform, survey, places, context.part(0.5, 1.0))
+        return survey, survey_rest(chips, transform, places, ELSEWHERE_PX, context.part(0.5, 1.0))
 
     def evidence(
         self,
@@ -309,7 +315,20 @@ class Stages:
             scene,
             self.masked.used,
             *surveys,
+            self._input_fit(estimate),
         )
+
+    def _input_fit(self, estimate: Estimate) -> ModelFit | None:
+        """Return how well a surface model fits the registered input, which it was not fitted to."""
+        surface, pair, model = self.masked.surface, self.masked.pair, estimate.transform.model
+        if surface is None:
+            return None
+
+        def read(window: Window) -> Patch:
+            piece = surface.scene.grid.window(*window)
+            return pair.input_patch(piece, lambda xy: pair.nominal_px(model(xy)))
+
+        return fit_of(surface, surface.views[-1], read)
 
 
 def _fit(

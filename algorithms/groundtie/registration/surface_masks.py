@@ -6,6 +6,7 @@ that neither image lays over, hides or shades. Where the input lies is not known
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
@@ -14,6 +15,7 @@ import scipy.fft
 
 from ..context import Context
 from ..errors import ParameterError
+from ..geometry.views import View
 from ..masks.choice import AUTO, NONE, REFERENCE, SURFACE, MaskUsed
 from ..masks.scene import Scene
 from ..masks.surface_model import (
@@ -24,7 +26,7 @@ from ..masks.surface_model import (
 )
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
-from ..rasters.reading import FloatImage, open_raster
+from ..rasters.reading import FloatImage, Window, open_raster
 from .masks import Masked, middle_of
 from .scene import scene_of
 from .specification import StatedSurface
@@ -70,14 +72,17 @@ def with_surface_mask(
         raise ParameterError(f"give either mask={kind} or a surface model")
     ground, fit = fitted_ground(scene_of(pair, REFERENCE), stated, stack)
     masked, share = with_mask(pair, REFERENCE, ground.scene, ground.select, stack, context)
-    reason = f"ground that both images show by {stated.name}{fit.note}"
-    return Masked(masked, MaskUsed(SURFACE, REFERENCE, share, reason, fit.is_clear))
+    reason = f"ground that both images show by {stated.name}{fit.note if fit else ''}"
+    used = MaskUsed(SURFACE, REFERENCE, share, reason, fit is None or fit.is_clear)
+    return Masked(masked, used, surface=ground)
 
 
 def fitted_ground(
     scene: Scene, stated: StatedSurface, stack: ExitStack
-) -> tuple[SurfaceGround, SurfaceFit]:
+) -> tuple[SurfaceGround, ModelFit | None]:
     """Return the ground that all views show, by a model that is moved to where a scene shows it.
+
+    How it fits there is None where the view does not let expect anything.
 
     Parameters
     ----------
@@ -95,8 +100,9 @@ def fitted_ground(
     """
     ground = surface_ground(scene, stated, stack)
     ground.require_cover()
-    fit = fit_of(ground)
-    return (replace(ground, offset_px=fit.offset_px) if fit.is_clear else ground), fit
+    fit = fit_of(ground, ground.views[0], ground.scene.read)
+    is_clear = fit is not None and fit.is_clear
+    return (replace(ground, offset_px=fit.offset_px) if fit and is_clear else ground), fit
 
 
 def surface_ground(scene: Scene, stated: StatedSurface, stack: ExitStack) -> SurfaceGround:
@@ -110,15 +116,15 @@ def surface_ground(scene: Scene, stated: StatedSurface, stack: ExitStack) -> Sur
 
 
 @dataclass(frozen=True)
-class SurfaceFit:
+class ModelFit:
     """How well a surface model fits what the reference shows.
 
     Parameters
     ----------
     correlation
-        Of the reference's logarithm with what the model lets expect, at the best place.
+        Of an image's logarithm with what the model lets expect, at the best place.
     offset_px
-        That place: columns and rows by which the reference shows it elsewhere.
+        That place: columns and rows by which the image shows it elsewhere.
     """
 
     correlation: float
@@ -126,7 +132,7 @@ class SurfaceFit:
 
     @property
     def is_clear(self) -> bool:
-        """Whether the reference shows the elevated objects of the model."""
+        """Whether the image shows the elevated objects of the model."""
         return self.correlation >= _CLEAR_CORRELATION
 
     @property
@@ -138,18 +144,33 @@ class SurfaceFit:
         return f", moved by {right:+d} and {down:+d} px to fit it" if any(self.offset_px) else ""
 
 
-def fit_of(ground: SurfaceGround) -> SurfaceFit:
-    """Return how well a surface model fits the middle of the reference, whose view is the first."""
+def fit_of(ground: SurfaceGround, view: View, read: Callable[[Window], Patch]) -> ModelFit | None:
+    """Return how well a surface model fits an image in the middle of the reference.
+
+    Parameters
+    ----------
+    ground
+        What the model lets expect.
+    view
+        From where the image was taken.
+    read
+        Returns the image in a window of the reference.
+
+    Returns
+    -------
+    None where the view does not let expect anything: that of a camera without the sun's place.
+    """
     window = middle_of(ground.scene.grid)
-    patch = ground.scene.read(window)
+    patch, expected = read(window), ground.level(window, view)
+    if expected.min() == expected.max():
+        return None
     if not patch.valid.any():
-        return SurfaceFit(0.0, (0, 0))
+        return ModelFit(0.0, (0, 0))
     level = np.log(np.maximum(patch.values, patch.values[patch.valid].mean() * _DARKEST))
-    expected = ground.level(window, ground.views[0])
     surface = _correlation(_centred(expected, patch), _centred(level, patch))
     row, col = np.unravel_index(int(surface.argmax()), surface.shape)
     offset = int(col) - _REACH_PX, int(row) - _REACH_PX
-    return SurfaceFit(float(surface[row, col]), offset)
+    return ModelFit(float(surface[row, col]), offset)
 
 
 def _centred(values: FloatImage, patch: Patch) -> FloatImage:

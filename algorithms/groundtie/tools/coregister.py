@@ -25,6 +25,7 @@ from .common import (
 )
 from .registration_parameters import (
     OUTPUTS,
+    DisplacementOut,
     InputMask,
     InputMaskValues,
     InputView,
@@ -56,6 +57,7 @@ def coregister(
     tie_points: TiePointsOut = None,
     transform: TransformOut = None,
     report: ReportOut = None,
+    displacement: DisplacementOut = None,
     search_scale: SearchScale = None,
     reference_band: ReferenceBand = None,
     input_band: InputBand = None,

@@ -18,7 +18,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.specification import StatedSurface
-from ..registration.surface_masks import SurfaceFit, fitted_ground
+from ..registration.surface_masks import ModelFit, fitted_ground
 from .common import MaskOut, Reference
 from .registration_parameters import SURFACE_MODEL, InputView, ReferenceView
 
@@ -28,20 +28,25 @@ class SurfaceMaskResult:
     """The mask, the share of pixels that take part, and how the surface model fits the image."""
 
     share: float
-    fit: SurfaceFit
+    fit: ModelFit | None
     files: dict[str, Path]
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
         files = {name: str(path) for name, path in self.files.items()}
-        fit = {"correlation": self.fit.correlation, "offset_px": list(self.fit.offset_px)}
-        return {"share": self.share, **fit, "files": files}
+        values: dict[str, Any] = {"share": self.share, "correlation": None, "offset_px": None}
+        if self.fit is not None:
+            offset = list(self.fit.offset_px)
+            values |= {"correlation": self.fit.correlation, "offset_px": offset}
+        return {**values, "files": files}
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
         return [
             f"{self.share:.1%} of the pixels take part",
-            f"the image correlates by {self.fit.correlation:.2f} with the surface model"
+            "nothing is expected of the image"
+            if self.fit is None
+            else f"the image correlates by {self.fit.correlation:.2f} with the surface model"
             f"{self.fit.note}",
             *(f"{name}: {path}" for name, path in self.files.items()),
         ]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from ..declaration import Output
 from ..geometry.models import KINDS
-from ..kinds import Choice, Distance, FileOut, MaskIn, Number, Text, VectorOut
+from ..kinds import Choice, Distance, FileOut, MaskIn, Number, RasterOut, Text, VectorOut
 from ..masks.choice import MASKS
 from ..matching.surface_fit import AUTO
 from ..registration.registered_output import OUTPUT_GRIDS
@@ -40,6 +40,16 @@ TiePointsOut = Annotated[
         suffixes=(".gpkg", ".geojson", ".csv", ".points"),
         shown=True,
         style="tie_points",
+    ),
+]
+DisplacementOut = Annotated[
+    Path | None,
+    RasterOut(
+        label="Displacement",
+        help="GeoTIFF of three bands over the overlap: by how much the input is moved to the east "
+        "and to the north, and the standard deviation of that; in metres, without georeferencing "
+        "in pixels to the right and down.",
+        advanced=True,
     ),
 ]
 ReportOut = Annotated[

@@ -108,6 +108,10 @@
       <translation>Ein Bild in der Geometrie seines Sensors. Seine RPCs stehen in seinen Tags oder in einer Datei daneben, die GDAL findet (_RPC.TXT, .RPB, DIMAP).</translation>
     </message>
     <message>
+      <source>An image with RPCs needs a raster file as reference.</source>
+      <translation>Ein Bild mit RPCs braucht eine Rasterdatei als Referenz.</translation>
+    </message>
+    <message>
       <source>Angle between the radar's line of sight and the vertical.</source>
       <translation>Winkel zwischen der Blickrichtung des Radars und der Senkrechten.</translation>
     </message>
@@ -610,6 +614,10 @@
     <message>
       <source>Height over that of the best elsewhere</source>
       <translation>Höhe gegenüber dem besten anderen Ort</translation>
+    </message>
+    <message>
+      <source>Heights above</source>
+      <translation>Höhen über</translation>
     </message>
     <message>
       <source>Heights of another geoid above the ellipsoid, in place of a vertical datum by name.</source>

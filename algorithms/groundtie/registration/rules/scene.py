@@ -54,9 +54,19 @@ def _little_ground(evidence: RegistrationEvidence) -> str | None:
 
 
 def _surface_elsewhere(evidence: RegistrationEvidence) -> str | None:
-    if evidence.mask.kind != SURFACE or evidence.mask.is_reliable:
+    if evidence.mask.kind == SURFACE and not evidence.mask.is_reliable:
+        return "the reference does not show the elevated objects of the surface model"
+    fit = evidence.input_fit
+    if fit is None:
         return None
-    return "the reference does not show the elevated objects of the surface model"
+    if not fit.is_clear:
+        return "the registered input does not show the elevated objects of the surface model"
+    off_px = float(np.hypot(*fit.offset_px))
+    if off_px <= evidence.max_error_px:
+        return None
+    return (
+        f"the registered input shows the elevated objects of the surface model {off_px:.1f} px off"
+    )
 
 
 def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
@@ -129,10 +139,10 @@ SCENE_RULES: tuple[Rule, ...] = (
     Rule(
         "surface model elsewhere",
         SCENE,
-        "the reference does not correlate by 0.1 with what the surface model and its view let "
-        "expect",
+        "the reference or the registered input does not correlate by 0.1 with what the surface "
+        "model and the view let expect, or the input does elsewhere by more than the largest error",
         "suite towns",
-        "give the surface model of this place, and the right view; or leave it out",
+        "give the surface model of this place and the right views, or leave it out",
         _surface_elsewhere,
     ),
     Rule(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...matching.parts import LEAST_PROPORTION, LOG10_FALSE_ALARMS, LOG10_FALSE_ALARMS_ALL_OVER
-from ...matching.rest import LARGEST_WHOLE_SHARE
 from ...matching.survey import SURVEY_RADIUS_PX
 from ..evidence import SURVEY, RegistrationEvidence
 from .rule import WITHOUT, Rule
@@ -68,11 +67,6 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
     rest = evidence.rest
     if rest is None or rest.is_confirming:
         return None
-    if rest.is_whole and not rest.is_explained:
-        return (
-            f"{rest.whole_share:.0%} of the chips that match do so at whole pixels of both images, "
-            "as what is drawn into them does, and ground does not"
-        )
     return (
         "both images have the same content at the same columns and rows; without it, only "
         f"{rest.survey.confirming} of {len(rest.survey.centres)} chips match where the transform "
@@ -114,9 +108,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "pixel-locked content",
         SURVEY,
-        "chips match at whole pixels of both images, as content does that is drawn at the same "
-        "columns and rows, such as labels or clouds, and what else they show does not confirm the "
-        f"transform, or {LARGEST_WHOLE_SHARE:.0%} of it match so, too",
+        "both images have the same content at the same columns and rows, such as labels or clouds, "
+        "and what else they show does not confirm the transform",
         "suites real and attacks",
         WITHOUT,
         _locked,
