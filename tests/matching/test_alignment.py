@@ -7,17 +7,18 @@ from scipy.ndimage import gaussian_filter
 from scipy.optimize import check_grad
 
 from groundtie.geometry.fitting import fit_model
-from groundtie.geometry.models import DEGREE, Frame, Model
+from groundtie.geometry.models import DEGREE, Model, PolynomialModel
 from groundtie.matching.alignment import (
     CANDIDATES,
+    IDENTITY,
     LINEAR_CANDIDATES,
+    Prior,
     _cubic,
     _fields,
-    _model,
-    _starting,
     align,
     choose_alignment,
 )
+from groundtie.matching.families import Family
 from groundtie.rasters.grid import apply_affine
 
 RADIUS = 8
@@ -69,7 +70,7 @@ def surfaces_of(
 
 
 def identity() -> Model:
-    return _model("translation", Frame.around(np.array([[0.0, 0.0], SIZE])), np.zeros(2))
+    return PolynomialModel.identity()
 
 
 def error_px(model: Model, kind: str) -> float:
@@ -86,7 +87,9 @@ PRIORS = [Affine.identity(), Affine(1.003, 0.002, 1.0, -0.001, 0.998, -0.5)]
 @pytest.mark.parametrize("prior", PRIORS, ids=["plain", "resampled"])
 def test_the_model_behind_the_surfaces_is_found(kind: str, prior: Affine) -> None:
     px = centres()
-    found = align(kind, px, surfaces_of(kind, px, prior, seed=0), prior, identity())
+    found = align(
+        kind, px, surfaces_of(kind, px, prior, seed=0), Prior.of_affine(prior), identity()
+    )
     assert found.model.kind == kind
     assert error_px(found.model, kind) < 0.1
     assert set(found.left_out_score) == {kind}
@@ -100,7 +103,9 @@ def test_the_model_behind_the_surfaces_is_found(kind: str, prior: Affine) -> Non
 @pytest.mark.parametrize("seed", range(2))
 def test_the_simplest_model_that_fits_is_chosen(kind: str, seed: int) -> None:
     px = centres()
-    chosen = choose_alignment(px, surfaces_of(kind, px, PRIORS[1], seed), PRIORS[1], identity())
+    chosen = choose_alignment(
+        px, surfaces_of(kind, px, PRIORS[1], seed), Prior.of_affine(PRIORS[1]), identity()
+    )
     assert chosen.model.kind == kind
     assert error_px(chosen.model, kind) < 0.1
     assert set(chosen.left_out_score) == set(CANDIDATES)
@@ -109,7 +114,7 @@ def test_the_simplest_model_that_fits_is_chosen(kind: str, seed: int) -> None:
 def test_nothing_is_chosen_but_candidates() -> None:
     px, prior = centres(), PRIORS[0]
     bent = surfaces_of("polynomial2", px, prior, 0)
-    chosen = choose_alignment(px, bent, prior, identity(), LINEAR_CANDIDATES)
+    chosen = choose_alignment(px, bent, Prior.of_affine(prior), identity(), LINEAR_CANDIDATES)
     assert set(chosen.left_out_score) == {"translation", "similarity", "affine"}
     assert chosen.model.kind in chosen.left_out_score
 
@@ -120,7 +125,7 @@ def test_left_out_similarity_is_that_of_the_right_chips() -> None:
     scores = []
     for wrong in (0.0, 0.5):
         surfaces = surfaces_of("translation", px, PRIORS[0], 1, wrong)
-        found = align("translation", px, surfaces, PRIORS[0], identity())
+        found = align("translation", px, surfaces, Prior.of_affine(PRIORS[0]), identity())
         scores.append(found.left_out_score["translation"])
     assert scores[1] / scores[0] == pytest.approx(0.5, abs=0.1)
 
@@ -129,14 +134,14 @@ def test_few_chips_take_no_model_of_many_parameters() -> None:
     px = centres()[::25]
     assert len(px) == 8
     prior = Affine.identity()
-    chosen = choose_alignment(px, surfaces_of("translation", px, prior, 0, 0), prior, identity())
+    chosen = choose_alignment(px, surfaces_of("translation", px, prior, 0, 0), IDENTITY, identity())
     assert set(chosen.left_out_score) == {"translation", "similarity"}
 
 
 def test_surfaces_without_peaks_leave_a_finite_model() -> None:
     px = centres()
     flat = np.zeros((len(px), SPAN, SPAN), np.float32)
-    found = choose_alignment(px, flat, Affine.identity(), identity())
+    found = choose_alignment(px, flat, IDENTITY, identity())
     assert found.model.kind == "translation"
     np.testing.assert_allclose(found.model(px), px, atol=1e-9)
 
@@ -145,8 +150,7 @@ def test_surfaces_without_peaks_leave_a_finite_model() -> None:
 def test_the_slope_that_the_search_follows_is_that_of_the_similarity(kind: str) -> None:
     px = centres()[::3]
     prior = PRIORS[1]
-    field = _fields(px, surfaces_of(kind, px, prior, 2), prior)[-1]
-    frame = Frame.around(field.px)
+    field = _fields(px, surfaces_of(kind, px, prior, 2), Prior.of_affine(prior))[-1]
     rng = np.random.default_rng(0)
 
     def similarity(claimed: np.ndarray) -> float:
@@ -158,16 +162,17 @@ def test_the_slope_that_the_search_follows_is_that_of_the_similarity(kind: str) 
     start = apply_affine(prior, field.px + rng.uniform(-4, 4, field.px.shape)).ravel()
     size = np.linalg.norm(slope(start))
     assert check_grad(similarity, slope, start, epsilon=1e-6) < 1e-3 * size
-    parameters = _starting(kind, frame, field.px, identity())
-    np.testing.assert_allclose(_model(kind, frame, parameters)(px), px, atol=1e-6)
+    family = Family.of(kind, field.px, identity(), None)
+    found = family.model(family.starting(identity()))
+    np.testing.assert_allclose(found(px), px, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["rigid", "similarity", "affine", "polynomial2"])
 def test_parameters_of_a_model_are_found_again(kind: str) -> None:
     px = centres().astype(float)
-    frame = Frame.around(px)
     model = fit_model(kind, px, distortion(kind, px))
-    again = _model(kind, frame, _starting(kind, frame, px, model))
+    family = Family.of(kind, px, model, None)
+    again = family.model(family.starting(model))
     np.testing.assert_allclose(again(px), distortion(kind, px), atol=0.01)
 
 
@@ -175,7 +180,7 @@ def test_the_spline_looks_up_the_surface_itself() -> None:
     """At whole shifts it gives the surface's values, up to the chip's weight; beyond, nothing."""
     px = centres()[:4]
     surfaces = surfaces_of("translation", px, Affine.identity(), 0)
-    field = _fields(px, surfaces, Affine.identity())[-1]
+    field = _fields(px, surfaces, IDENTITY)[-1]
     weights = field.scores(field.px)[0] / surfaces[:, RADIUS, RADIUS]
     assert (weights > 0).all()
     for dx, dy in ((3, -5), (-6, 6), (1, 1)):

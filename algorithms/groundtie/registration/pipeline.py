@@ -18,8 +18,9 @@ from ..features.presets import optical_keypoints, sar_keypoints
 from ..geometry.estimation import Estimate
 from ..geometry.judging import LARGEST_LOG10_CHANCE, LOG10_CHANCE_ON_GROUND
 from ..geometry.models import Model
+from ..geometry.terrain import Terrain
 from ..masks.choice import MaskUsed
-from ..matching.alignment import LINEAR_CANDIDATES
+from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
 from ..matching.check import CHECK_RADIUS_PX, Check, check_model
 from ..matching.chips import ChipMatcher
 from ..matching.guided_fit import GuidedFit
@@ -318,6 +319,9 @@ def _fit(
 ) -> Fit:
     """Return what fits the model, by the name of the specification's matcher."""
     layout = held_out.layout
+    if spec.matcher == CHIPS and spec.dem is not None:
+        terrain = _terrain(pair, spec)
+        return SurfaceFit(matcher, layout, TERRAIN_CANDIDATES, terrain=terrain)
     if spec.matcher == CHIPS:
         return SurfaceFit(matcher, layout, spec.candidates)
     presets = {KEYPOINTS: sar_keypoints, GUIDED_CHIPS: optical_keypoints}
@@ -330,3 +334,20 @@ def _fit(
     # Polynomials bend along elevated objects: "auto" chooses among what keypoints choose from.
     fit = SurfaceFit(chips, layout, LINEAR_CANDIDATES)
     return GuidedFit(KeypointFit(keypoints, SurfaceFit(matcher, layout)), fit)
+
+
+def _terrain(pair: ImagePair, spec: Specification) -> Terrain:
+    """Return the heights of a specification where a pair may show something.
+
+    Raises
+    ------
+    GeoreferencingError, NoOverlapError, RasterContentError
+        They are not known where the images overlap.
+    """
+    corners = pair.surroundings.pixel_to_map(pair.surroundings.outline())
+    left, bottom = corners.min(axis=0).tolist()
+    right, top = corners.max(axis=0).tolist()
+    crs = pair.grid.crs
+    terrain = Terrain.open(spec.dem, spec.input_dem, crs, (left, bottom, right, top))
+    terrain.require_cover(pair.grid, pair.input.source.grid, crs)
+    return terrain

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..masks.choice import AUTO
@@ -72,6 +73,10 @@ class Specification:
     tries
         How many registrations of this pair were tried, this one included: the probability of
         agreement by chance is counted for all of them.
+    dem, input_dem
+        Terrain models, as `open_raster` takes them: heights of the ground, and those that the input
+        was orthorectified with (None: one height everywhere). With the first, "auto" may choose
+        `models.TERRAIN`; chips alone know it.
     """
 
     matcher: str = CHIPS
@@ -90,6 +95,8 @@ class Specification:
     chip_px: int | None = None
     spacing_px: float | None = None
     tries: int = 1
+    dem: Any = None
+    input_dem: Any = None
 
 
 # What the three tools are made for (see `tools`). Without georeferencing, SAR images may have any

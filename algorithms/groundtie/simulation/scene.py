@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,8 @@ class SceneOptions:
     changed : float
         Share of the buildings that stand in one of the images only: half of them are pulled down
         after the radar's image, half are new in the camera's.
+    slope_deg : float
+        The steepest slopes, about.
     """
 
     size_px: tuple[int, int] = (1000, 1000)
@@ -49,6 +52,7 @@ class SceneOptions:
     relief_m: float = 20.0
     seed: int = 0
     changed: float = 0.0
+    slope_deg: float = 20.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated."""
@@ -62,6 +66,8 @@ class SceneOptions:
             )
         if not self.pixel_size_m > 0 or self.relief_m < 0:
             raise ParameterError("pixel_size_m must be positive and relief_m not negative")
+        if not 1 <= self.slope_deg <= 60:
+            raise ParameterError(f"slope_deg must be 1 to 60, not {self.slope_deg}")
         if not 0 <= self.changed <= 1:
             raise ParameterError(f"changed must be 0 to 1, not {self.changed}")
 
@@ -167,7 +173,8 @@ def _terrain(options: SceneOptions, shape: tuple[int, int]) -> npt.NDArray[np.fl
     if options.relief_m == 0:
         return terrain
     # A lattice as wide as six times the relief keeps slopes below some 20 degrees.
-    hill_m = max(300.0, 6 * options.relief_m)
+    steepness = math.tan(math.radians(options.slope_deg)) / math.tan(math.radians(20.0))
+    hill_m = max(300.0, 6 / steepness * options.relief_m)
     for octave, (size, share) in enumerate(((1.0, 0.9), (0.35, 0.2), (0.12, 0.04))):
         cell_px = max(hill_m * size / options.pixel_size_m, 4.0)
         noise = SmoothNoise.draw(
