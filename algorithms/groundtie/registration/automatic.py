@@ -19,7 +19,7 @@ from ..progress import Progress
 from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster
 from ..sensor.rpc_files import rpc_of
-from .delivery import Call
+from .delivery import Call, asked_terrain
 from .evidence import SCENE, SURVEY
 from .orthorectification import Orthorectification
 from .pipeline import run
@@ -123,14 +123,18 @@ def register_anything(
         return _by_rpcs(parameters, progress)
     call = Call.of(parameters, progress)
     with bounded_cache(), threads(parameters["workers"], progress) as context:
-        found, stack = _first_accepted(call, parameters["max_error"], context.part(0.0, 0.7))
+        asked = asked_terrain(parameters) | {"max_error_px": parameters["max_error"]}
+        found, stack = _first_accepted(call, asked, context.part(0.0, 0.7))
         return call.deliver(found, context.part(0.7, 1.0), stack)
 
 
 def _first_accepted(
-    call: Call, max_error_px: float, context: Context
+    call: Call, asked: Mapping[str, Any], context: Context
 ) -> tuple[Registration, ExitStack]:
-    """Return the first registration that is accepted, or the first refusal if none is."""
+    """Return the first registration that is accepted, or the first refusal if none is.
+
+    `asked` is what every way's specification is given.
+    """
     tried: list[str] = []
     with ExitStack() as stack:
         opened = stack.enter_context(call.open(COREGISTER, context.part(0.0, 0.02)))
@@ -140,7 +144,7 @@ def _first_accepted(
         found = []
         for number, way in enumerate(ways, start=1):
             part = context.part((number - 1) / len(ways), number / len(ways))
-            spec = replace(way.spec, max_error_px=max_error_px, tries=number)
+            spec = replace(way.spec, **asked, tries=number)
             found.append(run(call.with_limits(opened, spec, part), spec, part, scene))
             tried.append(_line(way.name, way.because, found[-1].verdict))
             if found[-1].verdict.accepted or found[-1].verdict.rule in _FINAL:
@@ -172,6 +176,8 @@ def _needs_rpcs(raster: Any) -> bool:
 def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> OrthorectifiedRpc:
     """Refine the RPCs of the input on the reference, and orthorectify it."""
     given = {**_RPC_DEFAULTS, **parameters}
+    if given["input_dem"] is not None:
+        raise ParameterError("an image with RPCs was not orthorectified: input_dem is not for it")
     if given["transform"] is not None:
         raise ParameterError("an image with RPCs is orthorectified: there is no transform to write")
     if given["output"] is None:
@@ -209,6 +215,7 @@ def _orthorectify(
 # What `refine` takes and the tool `register` does not ask for.
 _RPC_DEFAULTS: Mapping[str, Any] = {
     "gcps": None,
+    "input_dem": None,
     "geoid": None,
     "dem_cover": 0.0,
     "height": None,

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from ..context import Context, threads
-from ..errors import NotRegisteredError
+from ..errors import NotRegisteredError, ParameterError
 from ..geometry.tie_point_files import write_tie_points
+from ..matching.surface_fit import AUTO
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.reading import bounded_cache
@@ -209,10 +210,30 @@ def asked_masks(given: Mapping[str, Any], image: str) -> tuple[UserMask | None, 
     return reference, other
 
 
+def asked_terrain(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the terrain models of a specification by the values of a tool's parameters.
+
+    Raises
+    ------
+    ParameterError
+        They do not go together.
+    """
+    dem, input_dem = given.get("dem"), given.get("input_dem")
+    if input_dem is not None and dem is None:
+        raise ParameterError("the input's terrain model (input_dem) goes with another one (dem)")
+    return {"dem": dem, "input_dem": input_dem}
+
+
 def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specification:
     """Return a preset with what a tool was called with."""
+    terrain = asked_terrain(parameters)
+    if terrain["dem"] is not None and parameters["model"] != AUTO:
+        raise ParameterError(
+            f"a terrain model (dem) goes with model {AUTO}, not {parameters['model']}"
+        )
     return replace(
         preset,
+        **terrain,
         model=model_for_grid(parameters["model"], parameters["output_grid"]),
         max_error_px=parameters["max_error"],
         search_radius_m=parameters["search_radius"],

@@ -16,6 +16,8 @@ from .cover import Cover, ParcelBook, ParcelTable
 from .layout import DENSITIES, Layout, highest_object_m
 from .noise import SmoothNoise, Stream, random_stream, strips
 
+USUAL_SLOPE_DEG = 12.0
+
 _CROWN_M = 2.2
 _COARSEST_FULL_SIZE_M = 2.5
 
@@ -43,7 +45,7 @@ class SceneOptions:
         Share of the buildings that stand in one of the images only: half of them are pulled down
         after the radar's image, half are new in the camera's.
     slope_deg : float
-        The steepest slopes, about.
+        Slope that one place in a thousand exceeds, where the relief is high enough for it.
     """
 
     size_px: tuple[int, int] = (1000, 1000)
@@ -52,7 +54,7 @@ class SceneOptions:
     relief_m: float = 20.0
     seed: int = 0
     changed: float = 0.0
-    slope_deg: float = 20.0
+    slope_deg: float = USUAL_SLOPE_DEG
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated."""
@@ -172,8 +174,9 @@ def _terrain(options: SceneOptions, shape: tuple[int, int]) -> npt.NDArray[np.fl
     terrain = np.zeros(shape, np.float32)
     if options.relief_m == 0:
         return terrain
-    # A lattice as wide as six times the relief keeps slopes below some 20 degrees.
-    steepness = math.tan(math.radians(options.slope_deg)) / math.tan(math.radians(20.0))
+    # By the splines' mean squared slopes, one place in a thousand is steeper than 12 degrees on a
+    # lattice as wide as six times the relief.
+    steepness = math.tan(math.radians(options.slope_deg)) / math.tan(math.radians(USUAL_SLOPE_DEG))
     hill_m = max(300.0, 6 / steepness * options.relief_m)
     for octave, (size, share) in enumerate(((1.0, 0.9), (0.35, 0.2), (0.12, 0.04))):
         cell_px = max(hill_m * size / options.pixel_size_m, 4.0)

@@ -25,6 +25,7 @@ from .common import (
 )
 from .registration_parameters import (
     OUTPUTS,
+    InputDem,
     InputMask,
     InputMaskValues,
     Mask,
@@ -37,6 +38,7 @@ from .registration_parameters import (
     SearchRadius,
     SearchRotation,
     SearchScale,
+    TerrainDem,
     TiePointsOut,
 )
 
@@ -61,6 +63,8 @@ def coregister(
     input_mask: InputMask = None,
     input_mask_values: InputMaskValues = None,
     mask: Mask = AUTO,
+    dem: TerrainDem = None,
+    input_dem: InputDem = None,
     matching_pixel_size: MatchingPixelSize = None,
     output_grid: OutputGrid = "reference",
     resampling: Resampling = "cubic",
@@ -73,6 +77,8 @@ def coregister(
     A coarse shift is searched for within the search radius, tie points are matched in chips, and a
     robust model is fitted to them. Parts of the reference are held out of all of this; points in
     them decide whether the registration is accepted. A refused registration writes no image.
+
+    With a terrain model, what wrong heights displace the input by is taken out, too.
 
     The input's pixels are resampled once, by the whole transform. Images without georeferencing
     are matched in pixel coordinates; distances are then in pixels.

@@ -21,6 +21,7 @@ from .common import (
 )
 from .registration_parameters import (
     OUTPUTS,
+    InputDem,
     InputMask,
     InputMaskValues,
     MaxError,
@@ -40,6 +41,7 @@ def register(
     max_error: MaxError = 3.0,
     dem: Dem = None,
     dem_datum: DemDatum = None,
+    input_dem: InputDem = None,
     tie_points: TiePointsOut = None,
     transform: TransformOut = None,
     report: ReportOut = None,
@@ -58,7 +60,8 @@ def register(
     Radar images, a camera's images and pairs of both are matched as match_sar_sar, match_optical
     and `coregister` do; if that is refused, another way that makes sense is tried, and rotation and
     scale are searched for. An image with RPCs has them refined, and is orthorectified, by a
-    terrain model if one is given. The result names what was tried, and why; the probability of
+    terrain model if one is given; what wrong heights displace another one by is taken out by it, if
+    the points justify that. The result names what was tried, and why; the probability of
     agreement by chance counts all of it. A refused registration writes no image.
     """
     return register_anything(parameters, progress)

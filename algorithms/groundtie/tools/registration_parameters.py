@@ -7,7 +7,7 @@ from typing import Annotated
 
 from ..declaration import Output
 from ..geometry.models import KINDS
-from ..kinds import Choice, Distance, FileOut, MaskIn, Number, Text, VectorOut
+from ..kinds import Choice, Distance, FileOut, MaskIn, Number, RasterIn, Text, VectorOut
 from ..masks.choice import MASKS
 from ..matching.surface_fit import AUTO
 from ..registration.registered_output import OUTPUT_GRIDS
@@ -107,6 +107,25 @@ InputMaskValues = Annotated[
 ]
 ImageMaskValues = Annotated[
     str | None, Text(label="Values of the image's mask", help=_MASK_VALUES, advanced=True)
+]
+TerrainDem = Annotated[
+    Path | None,
+    RasterIn(
+        label="Terrain model",
+        help="Heights of the ground, in any CRS. Where the input was orthorectified with others, "
+        "or with one height, it is displaced in proportion to the difference: model auto may "
+        "take this out, too, if the points justify it.",
+        advanced=True,
+    ),
+]
+InputDem = Annotated[
+    Path | None,
+    RasterIn(
+        label="Terrain model of the input",
+        help="The heights that the input was orthorectified with; by default, one height "
+        "everywhere. Goes with a terrain model.",
+        advanced=True,
+    ),
 ]
 Mask = Annotated[
     str,

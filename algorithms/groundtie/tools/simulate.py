@@ -13,7 +13,7 @@ from ..simulation.misregistration import DISTORTIONS, DistortionOptions
 from ..simulation.optical import OpticalOptions
 from ..simulation.pair import INPUTS, OPTICAL, PairOptions, simulate_pair
 from ..simulation.sar import SarOptions
-from ..simulation.scene import SceneOptions
+from ..simulation.scene import USUAL_SLOPE_DEG, SceneOptions
 from .common import Seed
 from .simulated import (
     Changed,
@@ -81,13 +81,13 @@ def simulate(
         float,
         Number(
             label="Steepest slopes",
-            help="Slope of the steepest terrain, about, where its relief is high enough for it.",
+            help="Slope that one place in a thousand exceeds, where the relief is high enough.",
             unit="°",
             minimum=1,
             maximum=60,
             advanced=True,
         ),
-    ] = 20.0,
+    ] = USUAL_SLOPE_DEG,
     terrain_error: Annotated[
         float,
         Distance(
