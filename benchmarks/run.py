@@ -38,6 +38,7 @@ SUITES = (
     "series",
     "attacks",
     "calibration",
+    "mountains",
 )
 
 
