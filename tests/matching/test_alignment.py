@@ -3,15 +3,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from affine import Affine
+from rasterio.crs import CRS
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import check_grad
 
+from groundtie.arrays import Raster
 from groundtie.geometry.fitting import fit_model
-from groundtie.geometry.models import DEGREE, Model, PolynomialModel
+from groundtie.geometry.models import DEGREE, TERRAIN, Frame, Model, PolynomialModel
+from groundtie.geometry.terrain import Terrain, TerrainModel
 from groundtie.matching.alignment import (
     CANDIDATES,
     IDENTITY,
     LINEAR_CANDIDATES,
+    TERRAIN_CANDIDATES,
     Prior,
     _cubic,
     _fields,
@@ -19,7 +23,7 @@ from groundtie.matching.alignment import (
     choose_alignment,
 )
 from groundtie.matching.families import Family
-from groundtie.rasters.grid import apply_affine
+from groundtie.rasters.grid import Grid, apply_affine
 
 RADIUS = 8
 SPAN = 2 * RADIUS + 1
@@ -55,8 +59,13 @@ def surfaces_of(
     kind: str, px: np.ndarray, prior: Affine, seed: int, wrong: float = 0.4
 ) -> np.ndarray:
     """Surfaces that peak where chips lie, over a correlated background; many peak elsewhere."""
+    return surfaces_at(apply_affine(~prior, distortion(kind, px)) - px, seed, wrong)
+
+
+def surfaces_at(shifts: np.ndarray, seed: int, wrong: float = 0.4) -> np.ndarray:
+    """Surfaces that peak at shifts, (n, 2), but for those that are wrong."""
+    px, shifts = shifts, shifts.copy()
     rng = np.random.default_rng(seed)
-    shifts = apply_affine(~prior, distortion(kind, px)) - px
     assert np.abs(shifts).max() < RADIUS - 1
     lost = rng.random(len(px)) < wrong
     shifts[lost] = rng.uniform(-RADIUS, RADIUS, (lost.sum(), 2))
@@ -200,3 +209,78 @@ def test_cubic_sum_to_one_and_their_slopes_to_nothing() -> None:
     np.testing.assert_allclose(weights @ [-1, 0, 1, 2], t, atol=1e-12)
     numeric = np.gradient(weights, t, axis=0, edge_order=2)
     np.testing.assert_allclose(slopes[1:-1], numeric[1:-1], atol=1e-3)
+
+
+class TestHeights:
+    """Chips on hills, of which the input was orthorectified with other heights."""
+
+    GRID = Grid(Affine(10, 0, 4e5, 0, -10, 5e6), CRS.from_epsg(32633), 600, 500)
+    SIGHT_PX = np.array([-0.045, 0.01])  # for a metre
+
+    def terrain(self, seed: int = 0) -> Terrain:
+        """Hills of 100 m, of which the input's have errors of about 30 m."""
+        rng = np.random.default_rng(seed)
+        rough = rng.normal(size=(2, 500, 600))
+        hills, errors = (
+            gaussian_filter(one, sigma) * sigma for one, sigma in zip(rough, (40, 30), strict=True)
+        )
+        low, high = self.GRID.pixel_to_map([[0, 499], [599, 0]])
+        rasters = [
+            Raster(values.astype(np.float32), self.GRID.transform, self.GRID.crs)
+            for values in (350 * hills, 350 * hills - 110 * errors)
+        ]
+        found = Terrain.open(rasters[0], rasters[1], self.GRID.crs, (*low, *high))
+        return found.seen_from(self.GRID.centre_transform)
+
+    def truth(self, terrain: Terrain) -> TerrainModel:
+        frame = Frame.around(np.array([[0.0, 0.0], SIZE]))
+        scale = frame.to_map.a
+        affine = np.array([[1.7, -1.2], [0.8, 0.4], [-0.5, 0.7]]) / scale
+        return TerrainModel(
+            TERRAIN, frame, np.vstack([affine, self.SIGHT_PX / scale]), terrain, 0.0
+        )
+
+    def chips(self, truth: Model, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        px = centres()
+        return px, surfaces_at(truth(px.astype(float)) - px, seed)
+
+    @pytest.mark.parametrize("seed", range(2))
+    def test_what_heights_displace_is_found_and_chosen(self, seed: int) -> None:
+        terrain = self.terrain(seed)
+        truth = self.truth(terrain)
+        px, surfaces = self.chips(truth, seed)
+        chosen = choose_alignment(
+            px, surfaces, IDENTITY, identity(), TERRAIN_CANDIDATES, terrain
+        ).model
+        assert isinstance(chosen, TerrainModel)
+        at = np.random.default_rng(1).uniform(40, 450, (200, 2))
+        assert np.hypot(*(truth(at) - truth.affine(at)).T).max() > 2
+        np.testing.assert_allclose(chosen(at), truth(at), atol=0.4)
+        scale = chosen.frame.to_map.a
+        np.testing.assert_allclose(chosen.coefficients[3] * scale, self.SIGHT_PX, atol=0.006)
+
+    @pytest.mark.parametrize("kind", ["affine", "polynomial2"])
+    @pytest.mark.parametrize("seed", range(2))
+    def test_heights_of_another_place_are_not_chosen(self, kind: str, seed: int) -> None:
+        px = centres()
+        surfaces = surfaces_of(kind, px, Affine.identity(), seed)
+        chosen = choose_alignment(
+            px, surfaces, IDENTITY, identity(), TERRAIN_CANDIDATES, self.terrain(seed + 7)
+        )
+        assert TERRAIN in chosen.left_out_score
+        assert chosen.model.kind == kind
+
+    def test_flat_land_says_nothing_on_heights(self) -> None:
+        flat = Raster(np.full((500, 600), 30, np.float32), self.GRID.transform, self.GRID.crs)
+        low, high = self.GRID.pixel_to_map([[0, 499], [599, 0]])
+        terrain = Terrain.open(flat, None, self.GRID.crs, (*low, *high))
+        px, surfaces = self.chips(identity(), 0)
+        chosen = choose_alignment(
+            px,
+            surfaces,
+            IDENTITY,
+            identity(),
+            TERRAIN_CANDIDATES,
+            terrain.seen_from(self.GRID.centre_transform),
+        )
+        assert TERRAIN not in chosen.left_out_score
