@@ -34,6 +34,7 @@ from ..matching.surface_fit import SurfaceFit
 from ..matching.survey import ELSEWHERE_PX, Survey, survey_model, survey_places
 from ..rasters.pair import Image, ImagePair, make_pair
 from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.rendered import rendered
 from ..similarity.surface import SimilaritySettings
 from .evidence import RegistrationEvidence, SearchEvidence
 from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
@@ -132,6 +133,9 @@ def pair_images(
     started: float,
 ) -> OpenPair:
     """Put two open images on a common matching grid, and the user's masks on them."""
+    if spec.light is not None:
+        lit = rendered(reference.source, spec.light, reference.band)
+        reference = Image(lit, 1)
     grid = input.source.grid
     radius_m, rotation_deg, scale = spec.search_radius_m, spec.rotation_deg, spec.scale
     if not grid.is_georeferenced:

@@ -8,6 +8,7 @@ from typing import Any
 from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..masks.choice import AUTO
 from ..matching.alignment import CANDIDATES
+from ..rasters.rendered import Light
 
 # What matches the tie points of the fit: chips alone; keypoints refined by chips around them; chips
 # all over around a model of keypoints.
@@ -77,6 +78,8 @@ class Specification:
         Terrain models, as `open_raster` takes them: heights of the ground, and those that the input
         was orthorectified with (None: one height everywhere). With the first, "auto" may choose
         `models.TERRAIN`; chips alone know it.
+    light
+        The reference is a terrain model: it is rendered in this light. None: it is an image.
     """
 
     matcher: str = CHIPS
@@ -97,6 +100,7 @@ class Specification:
     tries: int = 1
     dem: Any = None
     input_dem: Any = None
+    light: Light | None = None
 
 
 # What the three tools are made for (see `tools`). Without georeferencing, SAR images may have any

@@ -13,7 +13,7 @@ from ..simulation.misregistration import DISTORTIONS, DistortionOptions
 from ..simulation.optical import OpticalOptions
 from ..simulation.pair import INPUTS, OPTICAL, PairOptions, simulate_pair
 from ..simulation.sar import SarOptions
-from ..simulation.scene import USUAL_SLOPE_DEG, SceneOptions
+from ..simulation.scene import SceneOptions
 from .common import Seed
 from .simulated import (
     Changed,
@@ -78,16 +78,17 @@ def simulate(
         Distance(label="Relief", help="Range of the terrain's heights.", advanced=True),
     ] = 20.0,
     slope: Annotated[
-        float,
+        float | None,
         Number(
             label="Steepest slopes",
-            help="Slope that one place in a thousand exceeds, where the relief is high enough.",
+            help="Slope that one place in a thousand exceeds, of mountains that are rough at all "
+            "scales; by default, country is gentle.",
             unit="°",
             minimum=1,
             maximum=60,
             advanced=True,
         ),
-    ] = USUAL_SLOPE_DEG,
+    ] = None,
     terrain_error: Annotated[
         float,
         Distance(
