@@ -7,7 +7,8 @@ VENV := .venv
 PY := $(VENV)/bin/python
 PLUGIN := dist/groundtie_qgis.zip
 
-.PHONY: help install demo check test test-newest test-debian lint bench fuzz failures plugin clean
+.PHONY: help install demo check test test-newest test-debian test-qgis lint bench fuzz failures plugin
+.PHONY: docs clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -31,13 +32,18 @@ check: lint ## lint and the quick tests of every module, in a minute or so
 	env -u GROUNDTIE_REQUIRE_QGIS $(PY) -m pytest -n 2 --dist=loadfile -m "not slow" \
 		--ignore=tests/qgis --durations=0 --durations-min=2
 
-test: test-newest test-debian ## everything, with the newest packages and with Debian's (incl. QGIS)
+test: test-newest test-debian test-qgis ## everything; the product with Debian's packages, too
 
 test-newest: lint
 	env -u GROUNDTIE_REQUIRE_QGIS $(PY) -m pytest --ignore=tests/qgis
 
-test-debian: plugin
-	scripts/test_debian.sh
+# What looks at the repository or at the benchmarks is the same with any packages.
+test-debian:
+	scripts/test_debian.sh --ignore=tests/house --ignore=tests/benchmarks --ignore=tests/qgis
+
+# A process of its own: a crash of QGIS must not take the other results with it.
+test-qgis: plugin
+	scripts/test_debian.sh tests/qgis
 
 lint: $(VENV)/.installed-dev ## ruff, mypy, import contracts
 	$(VENV)/bin/ruff check .
@@ -56,6 +62,9 @@ fuzz: $(VENV)/.installed-dev ## read 20,000 damaged files; failures are kept in 
 
 plugin: ## build dist/groundtie_qgis.zip
 	$(or $(wildcard $(PY)),python3) scripts/build_plugin.py $(PLUGIN)
+
+docs: $(VENV)/.installed-dev ## make docs/ into a site, dist/site
+	$(PY) scripts/help_pages.py dist/site
 
 clean: ## remove everything that can be made again
 	rm -rf $(VENV) build demo dist algorithms/*.egg-info

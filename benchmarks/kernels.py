@@ -50,20 +50,15 @@ def _costs(chip_px: int, radius_px: int, bins: int) -> dict[str, float]:
     side, span = chip_px + 2 * radius_px, 2 * radius_px + 1
     template, search = (random.integers(0, bins, (n, n)).astype(np.uint8) for n in (chip_px, side))
     sizes = (bins, bins)
-
-    def rows(coded: bool) -> Callable[[], object]:
-        count = counting._row_counter(template, search, sizes, coded)
-        return lambda: [count(dy) for dy in range(span)]
-
     pixels, elements = span**2 * chip_px**2, bins**2 * side**2 * np.log2(side**2)
+    direct = _seconds(lambda: counting._count_directly(template, search, sizes, None))
     spectral = _seconds(lambda: counting._count_spectrally(template, search, sizes, 1))
     return {
         "chip, px": chip_px,
         "shifts a side": span,
         "bins": bins,
-        "a row a call": _seconds(rows(True)) / pixels * 1e9,
-        "a shift a call": _seconds(rows(False)) / pixels * 1e9,
-        "spectral": float(spectral / elements * 1e9),
+        "directly": float(direct / pixels * 1e9),
+        "spectrally": float(spectral / elements * 1e9),
     }
 
 

@@ -72,8 +72,9 @@ def collect(root: Path) -> dict[str, bytes]:
     for name in ("metadata.txt", "LICENSE"):
         add(contents, name, (root / name).read_bytes())
     add(contents, "requirements.txt", requirements(root / "pyproject.toml").encode())
-    if can_make_pages():
-        for name, data in help_pages(root / "docs").items():
+    docs = root / "docs"
+    if docs.is_dir() and can_make_pages():
+        for name, data in help_pages(docs).items():
             add(contents, f"help/{name}", data)
     return contents
 

@@ -3,6 +3,10 @@
 # Debian's Python and QGIS need. Exits 1 with one line where they are missing and we may not install.
 set -euo pipefail
 
+# Two targets may ask at once; dpkg takes one.
+exec 9<"${BASH_SOURCE[0]}"
+flock 9
+
 packages=("$@")
 if [ ${#packages[@]} -eq 0 ]; then
     packages=(

@@ -187,6 +187,49 @@ def test_help_of_a_tool_tells_everything_of_its_parameters(
     assert "--seed INTEGER For chance. [at least 0; default: 7]" in re.sub(r"\s+", " ", advanced)
 
 
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("groundtie t", ["plain,toy"]),
+        ("groundtie u", []),
+        ("groundtie --vers", ["plain,--version"]),
+        ("groundtie toy --mo", ["plain,--mode"]),
+        ("groundtie toy --mode r", ["plain,refuse"]),
+        ("groundtie toy a", ["file,a"]),
+        ("groundtie toy --folder a", ["dir,a"]),
+        ("groundtie toy --others a", ["file,a"]),
+        ("groundtie toy --size 1", []),
+        ("groundtie coregister-series out a b", ["file,b"]),
+    ],
+)
+def test_the_shell_completes_commands_options_words_and_files(
+    words: str,
+    expected: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("_GROUNDTIE_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
+    with pytest.raises(SystemExit) as ended:
+        main([], tools=[TOY, load_tool("coregister_series")])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out.split() == expected
+
+
+def test_completing_a_command_loads_no_tool() -> None:
+    code = (
+        "import sys; from groundtie.cli import main\n"
+        "try: main([])\n"
+        "except SystemExit: sys.exit(bool({'numpy', 'rasterio', 'cv2'} & set(sys.modules)))"
+    )
+    words = {"COMP_WORDS": "groundtie co", "COMP_CWORD": "1"}
+    environment = {**ENVIRONMENT, "_GROUNDTIE_COMPLETE": "bash_complete", **words}
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+    assert done.stdout.split() == ["plain,coregister", "plain,coregister-series"]
+
+
 def start(words: str, stderr: int = subprocess.PIPE) -> subprocess.Popen[str]:
     """Start the toy tool in a process of its own."""
     return subprocess.Popen(

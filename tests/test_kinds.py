@@ -59,7 +59,7 @@ HTML_OUT = FileOut(**TEXTS, suffixes=(".html", ".htm"))
         (RASTER, r"C:\images\b.tif", Path(r"C:\images\b.tif")),
         (RASTER, "/vsizip//a.zip/b.tif", "/vsizip//a.zip/b.tif"),
         (RASTER, 'HDF5:"a.h5"://b', 'HDF5:"a.h5"://b'),
-        (VectorIn(**TEXTS), "https://host/a.gpkg", "https://host/a.gpkg"),
+        (VectorIn(**TEXTS), "https://host/a.gpkg", "/vsicurl/https://host/a.gpkg"),
         (FileIn(**TEXTS, suffixes=(".json",)), "t.json", Path("t.json")),
         (RASTER_OUT, "x.TIF", Path("x.TIF")),
         (VectorOut(**TEXTS), "x.gpkg", Path("x.gpkg")),

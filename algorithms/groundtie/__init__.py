@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .tools.coregister import coregister
     from .tools.coregister_series import coregister_series, register_series
     from .tools.detector_repeatability import detector_repeatability
+    from .tools.doctor import doctor
     from .tools.estimate_rotation import estimate_rotation
     from .tools.extract_gcps import extract_gcps
     from .tools.filter_speckle import filter_speckle
@@ -49,6 +50,7 @@ __all__ = [
     "coregister",
     "coregister_series",
     "detector_repeatability",
+    "doctor",
     "estimate_rotation",
     "extract_gcps",
     "filter_speckle",

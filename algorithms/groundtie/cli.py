@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from typing import Any, TextIO
 
 import click
+from click.shell_completion import CompletionItem
 
 from .declaration import Parameter, Tool
 from .errors import CancelledError, GroundTieError, NotRegisteredError
@@ -149,6 +150,15 @@ class ToolGroup(click.Group):
         name = self._names.get(cmd_name)
         return None if name is None else ToolCommand(self._load(name))
 
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Return the commands that begin so; none of them is loaded for it."""
+        options = super().shell_complete(ctx, incomplete) if incomplete.startswith("-") else []
+        return options + [
+            CompletionItem(command, help=self._summarise(name))
+            for command, name in self._names.items()
+            if command.startswith(incomplete)
+        ]
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write a line for each tool; none of them is loaded for it."""
         rows = [(command, self._summarise(name)) for command, name in self._names.items()]
@@ -252,11 +262,26 @@ class KindType(click.ParamType):
         """Return `value` as the tools take it."""
         return self.parameter.kind.check(spelled(self.parameter), value)
 
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Return the words that a value may be, or have the shell offer files or folders."""
+        kind = self.parameter.kind
+        if isinstance(kind, Choice):
+            return [CompletionItem(word) for word in kind.choices if word.startswith(incomplete)]
+        if isinstance(kind, (PathKind, RastersIn)):
+            shown = "dir" if isinstance(kind, FolderOut) else "file"
+            return [CompletionItem(incomplete, type=shown)]
+        return []
+
 
 def _click_parameter(parameter: Parameter) -> click.Parameter:
     name, flag = parameter.name, spelled(parameter)
     if parameter.positional and isinstance(parameter.kind, RastersIn):
-        return click.Argument([name], type=str, nargs=-1, required=True, metavar=f"{flag}…")
+        files = KindType(parameter).shell_complete
+        return click.Argument(
+            *([name], True), type=str, nargs=-1, metavar=f"{flag}…", shell_complete=files
+        )
     if parameter.positional:
         return click.Argument([name], type=KindType(parameter), metavar=flag)
     need = {"required": True} if parameter.required else {"default": parameter.default}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import math
 import os
-import re
 import stat
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
@@ -13,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from .errors import GroundTieError, OutputError, ParameterError, SameFileError
-
-# GDAL's own names, such as /vsizip/a.zip/b.tif, HDF5:"a.h5"://b or https://…; C:\\… is a path.
-_GDAL_NAME = re.compile(r"/vsi|[A-Za-z][\w+.-]+:")
+from .raster_names import identity, raster_name
+from .stac_items import raster_of_item
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,8 +42,7 @@ class PathKind(Kind):
     """A path; the value is a `pathlib.Path`."""
 
     def check(self, name: str, value: Any) -> Path:
-        if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
-            raise ParameterError(f"{name} must be a path, not {value!r}")
+        _named(name, value)
         path = Path(value)
         _mode(name, path)  # so that whatever cannot be a name is found here
         return path
@@ -61,13 +58,16 @@ class InputKind(PathKind):
             raise ParameterError(f"{name} is neither a file nor a folder: {path}")
         return path
 
+    def check_named(self, name: str, value: Any) -> Any:
+        """Check what may lie elsewhere than on disk: a path, a URL or another of GDAL's names."""
+        found = _named(name, value)
+        return found if isinstance(found, str) else InputKind.check(self, name, found)
+
     def check_raster(self, name: str, value: Any) -> Any:
-        """Check what may be a raster: a path, one of GDAL's names, or a raster in memory."""
-        if _is_gdal_name(value):
-            return value
-        if isinstance(value, (str, os.PathLike)):
-            return InputKind.check(self, name, value)
-        return _in_memory(name, value)
+        """Check what may be a raster: `check_named`, an asset of a STAC item, one in memory."""
+        if not isinstance(value, (str, os.PathLike)):
+            return _in_memory(name, value)
+        return InputKind.check_named(self, name, raster_of_item(_named(name, value)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,9 +88,10 @@ class OutputKind(PathKind):
 
 
 class RasterIn(InputKind):
-    """A raster that is read; GDAL's own names (`/vsi…`, `DRIVER:…`) stay text.
+    """A raster that is read: a path, or text of GDAL's own names (`/vsi…`, `DRIVER:…`).
 
-    In Python it may be in memory, too (see `arrays.in_memory`).
+    URLs and assets of STAC items (`item.json#asset`) become these. In Python a raster may be in
+    memory, too (see `arrays.in_memory`).
     """
 
     def check(self, name: str, value: Any) -> Any:
@@ -111,23 +112,27 @@ class RastersIn(Kind):
         if not given:
             raise ParameterError(f"{name} is missing")
         kind = InputKind(label=self.label, help=self.help)
-        return tuple(one if _is_gdal_name(one) else kind.check(name, one) for one in given)
+        return tuple(kind.check_named(name, one) for one in given)
 
 
 class VectorIn(InputKind):
-    """A vector layer that is read; GDAL's own names stay text."""
+    """A vector layer that is read; GDAL's own names and URLs as for `RasterIn`."""
 
     def check(self, name: str, value: Any) -> Any:
-        return value if _is_gdal_name(value) else super().check(name, value)
+        return self.check_named(name, value)
 
 
 class MaskIn(InputKind):
     """A raster, a vector layer or a file that states what of an image takes part.
 
-    In Python a raster may be in memory, as for `RasterIn`.
+    In Python a raster may be in memory, as for `RasterIn`. A `.json` alone is a classifier; with
+    `#asset` it is a STAC item.
     """
 
     def check(self, name: str, value: Any) -> Any:
+        is_text = isinstance(value, (str, os.PathLike))
+        if is_text and "#" not in os.fspath(value):
+            return self.check_named(name, value)
         return self.check_raster(name, value)
 
 
@@ -260,10 +265,18 @@ class Band(Kind):
         return int(number.check(name, value))
 
 
-def _is_gdal_name(value: Any) -> bool:
-    if not isinstance(value, str) or not _GDAL_NAME.match(value):
-        return False
-    return _mode("a raster", value) is None
+def _named(name: str, value: Any) -> Path | str:
+    """Return a path or GDAL's own name; `ParameterError` for what is neither."""
+    if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
+        raise ParameterError(f"{name} must be a path, not {value!r}")
+    text = os.fspath(value)
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise ParameterError(f"{name} has a name that is not UTF-8: {text!a}") from error
+    if "\0" in text:
+        raise ParameterError(f"{name} has a name that no file has: {text!a}")
+    return raster_name(value)
 
 
 def _mode(name: str, path: str | Path) -> int | None:
@@ -272,15 +285,10 @@ def _mode(name: str, path: str | Path) -> int | None:
     Raises
     ------
     ParameterError
-        Nothing can have that name: it is too long, or GDAL and reports cannot write it.
+        Nothing can have that name: it is too long.
     """
     try:
-        os.fspath(path).encode("utf-8")
         return os.stat(path).st_mode
-    except UnicodeEncodeError as error:
-        raise ParameterError(f"{name} has a name that is not UTF-8: {str(path)!a}") from error
-    except ValueError as error:
-        raise ParameterError(f"{name} has a name that no file has: {str(path)!a}") from error
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:
             raise ParameterError(
@@ -309,10 +317,8 @@ def plainly(value: Any) -> Any:
 
 def _identity(raster: Any) -> Hashable:
     """Return what is the same for two rasters that are one."""
-    if isinstance(raster, Path):
-        return raster.resolve()
-    if isinstance(raster, str):
-        return raster
+    if isinstance(raster, (str, Path)):
+        return identity(raster)
     # An open dataset is where its file is.
     return getattr(raster, "identity", None) or Path(raster.name).resolve()
 

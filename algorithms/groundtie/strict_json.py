@@ -20,11 +20,22 @@ def read_json(path: Path) -> Any:
     OSError
         The file cannot be read.
     ValueError
+        As `parse_json`.
+    """
+    return parse_json(path.read_bytes())
+
+
+def parse_json(content: bytes) -> Any:
+    """Return what JSON in UTF-8 states; all of its numbers are finite.
+
+    Raises
+    ------
+    ValueError
         It is no JSON, holds numbers that are not finite, or is nested too deeply.
     """
     try:
         return json.loads(
-            path.read_text(encoding="utf-8-sig"),
+            content.decode("utf-8-sig"),
             parse_float=_finite,
             parse_int=_whole,
             parse_constant=_finite,

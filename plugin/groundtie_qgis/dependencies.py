@@ -4,55 +4,25 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import re
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .library import FOLDER
+from .library import library_module
 
-# Where a distribution's name is not the module's: module, and Debian's package.
-_NAMES = {
-    "opencv-python-headless": ("cv2", "python3-opencv"),
-    "scikit-learn": ("sklearn", "python3-sklearn"),
-}
+packages = library_module("packages")
 _LOCK = threading.RLock()
 
 
-# What only some of the tools need, or only some of their outputs: by the endings of files.
-_NEEDED_BY_TOOL = {
-    "train_feature_classifier": ("scikit-learn",),
-    "coregister_series": ("shapely", "fiona"),
-}
-_NEEDED_BY_FILE = {
-    ".html": ("jinja2", "matplotlib"),
-    ".png": ("matplotlib",),
-    ".gpkg": ("fiona",),
-}
-# rasterio needs click itself; the tools do not.
-_NOT_BY_ALL = {"click", "scikit-learn", "jinja2", "matplotlib", "fiona", "shapely"}
-
-
 def missing_packages() -> list[str]:
-    """Return the distributions of requirements.txt that all tools need and that are not found."""
-    path = FOLDER / "requirements.txt"  # made when the plugin is built
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    names = [match.group() for line in lines if (match := re.match(r"[\w.-]+", line))]
-    return not_found(name for name in names if name not in _NOT_BY_ALL)
+    """Return the distributions that all tools need and that are not found."""
+    return list(packages.missing(packages.needed_by_all()))
 
 
 def missing_for(tool: str, paths: Iterable[Path]) -> list[str]:
     """Return the distributions that are not found of those that a call of a tool needs beside."""
-    needed = [*_NEEDED_BY_TOOL.get(tool, ())]
-    for path in paths:
-        needed += _NEEDED_BY_FILE.get(path.suffix.lower(), ())
-    return not_found(dict.fromkeys(needed))
-
-
-def not_found(names: Iterable[str]) -> list[str]:
-    """Return those of some distributions whose module is not found."""
-    return [name for name in names if importlib.util.find_spec(_module(name)) is None]
+    return list(packages.missing(packages.needed_for(tool, paths)))
 
 
 def complaint(missing: list[str]) -> str:
@@ -70,14 +40,9 @@ def complaint(missing: list[str]) -> str:
 def install_command(missing: list[str], debian: bool | None = None) -> str:
     """Return the command that installs `missing`: on Debian, or elsewhere; None: here."""
     if Path("/etc/debian_version").exists() if debian is None else debian:
-        return "sudo apt install " + " ".join(
-            _NAMES.get(name, ("", f"python3-{name}"))[1] for name in missing
-        )
+        names = {package.name: package.debian for package in packages.PACKAGES}
+        return "sudo apt install " + " ".join(names[name] or f"python3-{name}" for name in missing)
     return "python3 -m pip install --user " + " ".join(missing)
-
-
-def _module(distribution: str) -> str:
-    return _NAMES.get(distribution, (distribution, ""))[0]
 
 
 @contextmanager
@@ -88,7 +53,10 @@ def rasterio_env() -> Iterator[None]:
     so the variables that lead there are out of its sight.
     """
     spec = importlib.util.find_spec("rasterio")
-    origin = spec.origin if spec is not None else None
+    if spec is None:  # nothing that needs it runs in here
+        yield
+        return
+    origin = spec.origin
     wheel = origin is not None and (Path(origin).parent / "proj_data").is_dir()
     hidden = ("PROJ_LIB", "PROJ_DATA", "GDAL_DATA") if wheel else ()
     with _LOCK:

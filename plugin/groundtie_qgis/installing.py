@@ -8,8 +8,7 @@ import shlex
 import sys
 from pathlib import Path
 
-from .dependencies import not_found
-from .library import FOLDER
+from .dependencies import packages
 
 # affine 3 needs newer attrs than a QGIS may have, and QGIS's own is found first.
 _BOUNDS = ("affine<3",)
@@ -28,11 +27,9 @@ def use_packages(folder: Path) -> None:
 
 
 def missing_requirements() -> list[str]:
-    """Return the lines of requirements.txt, of tools and of some outputs, that are not met."""
-    path = FOLDER / "requirements.txt"  # made when the plugin is built
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    names = {match.group(): line for line in lines if (match := re.match(r"[\w.-]+", line))}
-    return [names[name] for name in not_found(names)]
+    """Return the requirements, of tools and of some outputs, that are not met."""
+    wanted = [package for package in packages.PACKAGES if not package.extra]
+    return [package.requirement for package in wanted if not package.found()]
 
 
 def pip_command(requirements: list[str], folder: Path) -> list[str]:

@@ -36,6 +36,7 @@ class GroundTiePlugin:
         self._packages = packages
         self.actions: list[QAction] = []
         self.dock: Any = None
+        self._example: Any = None
 
     def initProcessing(self) -> None:
         """Register the provider (qgis_process calls this and nothing else)."""
@@ -47,6 +48,7 @@ class GroundTiePlugin:
         self.initProcessing()
         self._add_action("Register and review…", self.toggle_dock)
         self._iface.addToolBarIcon(self.actions[0])
+        self._add_action("Load an example", self.load_example)
         self._add_action("Install what is missing…", self.install)
         self._add_action("Help", self.show_help)
         if self.provider is not None and self.provider.warningMessage():
@@ -68,17 +70,38 @@ class GroundTiePlugin:
 
     def toggle_dock(self) -> None:
         """Open the dock, or close it."""
-        if self.provider is not None and self.provider.warningMessage():
-            self.install()
+        if self.dock is not None and self.dock.isVisible():
+            self.dock.hide()
+        else:
+            self.open_dock()
+
+    def open_dock(self) -> None:
+        """Show the dock; where packages are missing, offer them instead."""
+        if self._lacks_packages():
             return
         if self.dock is None:
             from .dock import GroundTieDock
 
             self.dock = GroundTieDock(self._iface)
             self._iface.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, self.dock)
-            self.dock.show()
+        self.dock.show()
+
+    def load_example(self) -> None:
+        """Simulate a pair of images, load it, and open the dock."""
+        if self._lacks_packages():
             return
-        self.dock.setVisible(not self.dock.isVisible())
+        if self._example is None:
+            from .example import Example
+
+            self._example = Example(self._iface, self.open_dock)
+        self._example.make()
+
+    def _lacks_packages(self) -> bool:
+        """Whether packages are missing; then they are offered."""
+        if self.provider is None or not self.provider.warningMessage():
+            return False
+        self.install()
+        return True
 
     def install(self) -> None:
         """Offer to install what is missing."""

@@ -1,4 +1,4 @@
-"""The Processing provider: one algorithm per declared tool."""
+"""The Processing provider: one algorithm per declared tool, and the models that chain them."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from .adapter import ToolAlgorithm
 from .compat import WARNING
 from .dependencies import complaint, missing_packages, rasterio_env
 from .library import LazyTool, all_tools, plugin_metadata
+from .shipped_models import load_models
 from .styling import ICON
 from .unavailable import UnavailableAlgorithm, broken, named_tools
 
@@ -19,6 +20,8 @@ from .unavailable import UnavailableAlgorithm, broken, named_tools
 # tools would import them all.
 RASTERS = ("tif", "tiff")
 VECTORS = ("gpkg", "geojson", "csv", "points", "txt")
+# The tool that runs where packages are missing, and states which.
+DOCTOR = "doctor"
 
 
 def _tools_or_complaint() -> tuple[tuple[Any, ...], str]:
@@ -65,10 +68,16 @@ class GroundTieProvider(QgsProcessingProvider):
     def loadAlgorithms(self) -> None:
         for tool in self._tools:
             self.addAlgorithm(ToolAlgorithm(tool))
+        if not self._missing:
+            for model in load_models():
+                self.addAlgorithm(model)
         if self._missing:
             QgsMessageLog.logMessage(self._missing, "GroundTie", WARNING)
-            for unavailable in named_tools():
-                self.addAlgorithm(UnavailableAlgorithm(unavailable, self._missing))
+            for named in named_tools():
+                if named.name == DOCTOR:
+                    self.addAlgorithm(ToolAlgorithm(LazyTool(**vars(named))))
+                else:
+                    self.addAlgorithm(UnavailableAlgorithm(named, self._missing))
 
     def supportsNonFileBasedOutput(self) -> bool:
         return False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from qgis.core import QgsMapLayerProxyModel
@@ -23,6 +24,7 @@ from qgis.PyQt.QtWidgets import (
     QWidget,
 )
 
+from .dependencies import missing_for
 from .preselection import proposed_pair, raster_files
 from .reference_export import MAP, with_files
 from .run import Outcome, Run, new_file
@@ -234,9 +236,8 @@ def first_lines(lines: tuple[str, ...], most: int = 6) -> list[str]:
 
 def points_name() -> str:
     """Return the name of a file of tie points that can be written here."""
-    from .dependencies import not_found
-
-    return "tie_points.geojson" if not_found(["fiona"]) else "tie_points.gpkg"
+    name = "tie_points.gpkg"
+    return "tie_points.geojson" if missing_for("", [Path(name)]) else name
 
 
 def _raster_box() -> QgsMapLayerComboBox:

@@ -145,7 +145,7 @@ def test_without_its_heights_it_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("origin_m", None), ("coefficients", [[0, 0]]), ("region", [1, 2]), ("rises_m", "x")],
+    [("origin_m", None), ("coefficients", [[0, 0]]), ("region", [1, 2]), ("heights_m", "x")],
 )
 def test_damaged_values_are_refused(tmp_path: Path, key: str, value: object) -> None:
     path, _ = stored(tmp_path)

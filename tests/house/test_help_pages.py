@@ -12,7 +12,7 @@ from groundtie.tools import NAMES
 pytest.importorskip("tomllib", reason="the build needs Python 3.11")
 pytest.importorskip("markdown_it")
 from scripts import build_plugin
-from scripts.help_pages import help_pages
+from scripts.help_pages import help_pages, main
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -52,16 +52,70 @@ def test_no_page_leads_to_a_placeholder_or_loads_from_the_network(pages: dict[st
     assert not re.search(r"<script|<link|src=\"https?:", text)
 
 
-def test_links_to_what_is_not_shipped_are_plain_text(tmp_path: Path) -> None:
-    (tmp_path / "a.md").write_text(
-        "# A & B\n\n[out](../x.md), [in](b.md#c), [web](https://doi.org/1)\n"
+@pytest.fixture
+def docs(tmp_path: Path) -> Path:
+    """A folder of two pages and an index, beside a file that is no page."""
+    folder = tmp_path / "docs"
+    folder.mkdir()
+    (tmp_path / "LICENSE").touch()
+    (tmp_path / "README.md").write_text("# Read me\n\n[a](docs/a.md)\n")
+    (folder / "index.md").write_text(
+        "# I\n\n## Start\n\n* [A page](a.md)\n* [B](b.md), [A](a.md)\n"
     )
-    (tmp_path / "b.md").write_text("# B\n\n## C\n")
-    page = help_pages(tmp_path)["a.html"].decode()
+    (folder / "a.md").write_text(
+        "# A & B\n\n[out](../LICENSE), [in](b.md#c), [web](https://doi.org/1), [up](../README.md)\n"
+    )
+    (folder / "b.md").write_text("# B\n\n## C\n")
+    return folder
+
+
+def test_links_to_what_is_not_shipped_are_plain_text(docs: Path) -> None:
+    pages = help_pages(docs)
+    page = pages["a.html"].decode()
     assert "out, " in page
+    assert '<a href="readme.html">up</a>' in page
+    assert '<a href="a.html">a</a>' in pages["readme.html"].decode()
     assert '<a href="b.html#c">in</a>' in page
     assert '<a href="https://doi.org/1">web</a>' in page
     assert "<title>A &amp; B</title>" in page
+
+
+def test_every_page_has_the_navigation_with_its_own_place(docs: Path) -> None:
+    page = help_pages(docs)["b.html"].decode()
+    assert '<details open><summary>Start</summary><ul><li><a href="a.html">A page</a></li>' in page
+    assert '<a href="b.html" aria-current=page>B</a>' in page
+    assert page.count("<li>") == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("[x](nowhere.md)", "no such page or heading: nowhere.md"),
+        ("[x](a.md#nowhere)", "no such page or heading: a.html#nowhere"),
+        ("[x](../nowhere/LICENSE)", "no such page or heading: ../nowhere/LICENSE"),
+        ("[x](#nowhere)", "no such page or heading: b.html#nowhere"),
+    ],
+)
+def test_a_broken_link_ends_the_build(docs: Path, text: str, fault: str) -> None:
+    (docs / "b.md").write_text(f"# B\n\n## C\n\n{text}\n")
+    with pytest.raises(ValueError, match=f"b.md: {re.escape(fault)}$"):
+        help_pages(docs)
+
+
+def test_a_page_that_nobody_finds_ends_the_build(docs: Path) -> None:
+    (docs / "c.md").write_text("# C\n")
+    with pytest.raises(ValueError, match=r"c\.md: not named by index\.md"):
+        help_pages(docs)
+
+
+def test_the_site_is_the_same_files(
+    pages: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.argv", ["help_pages.py", str(tmp_path / "site")])
+    assert main() == 0
+    written = {path for path in (tmp_path / "site").rglob("*") if path.is_file()}
+    names = {path.relative_to(tmp_path / "site").as_posix(): path for path in written}
+    assert {name: path.read_bytes() for name, path in names.items()} == pages
 
 
 def test_a_placeholder_is_not_released(tmp_path: Path) -> None:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tarfile
+import venv
 import zipfile
 from email.parser import Parser
 from importlib import metadata
 from pathlib import Path
 
 import pytest
+from noise_pairs import write_pair
 
 tomllib = pytest.importorskip("tomllib", reason="reading pyproject.toml needs Python 3.11")
 
@@ -111,6 +115,70 @@ def distributions(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]
     build(unpacked, "build_wheel", folder)
     (wheel,) = folder.glob("*.whl")
     return sdist, wheel
+
+
+@pytest.fixture(scope="module")
+def environment(distributions: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the commands of a new virtual environment with the wheel in it.
+
+    The dependencies are those of the Python that runs the tests: `make install` has pip resolve
+    them.
+    """
+    folder = tmp_path_factory.mktemp("clean") / "venv"
+    venv.create(folder, symlinks=True)
+    commands = folder / "bin"
+    pip = [sys.executable, "-m", "pip", "--python", str(commands / "python"), "install"]
+    # A tree on PYTHONPATH would pass for an installed package.
+    clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    wheel = str(distributions[1])
+    subprocess.run([*pip, "-q", "--no-deps", "--no-index", wheel], check=True, env=clean)
+    (packages,) = folder.glob("lib/python*/site-packages")
+    # Its own .pth files are not read there: an editable install of this tree is out of sight.
+    (packages / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    return commands
+
+
+@pytest.mark.slow
+def test_the_wheel_runs_in_a_clean_environment(environment: Path, tmp_path: Path) -> None:
+    def groundtie(*words: str) -> str:
+        done = subprocess.run(
+            [environment / "groundtie", *words],
+            cwd=tmp_path,
+            env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert groundtie("--version") == f"groundtie {__version__}\n"
+    write_pair(tmp_path, 0)
+    files = ("--tie-points", "points.gpkg", "--report", "report.html")
+    search = ("--model", "translation", "--search-radius", "12")
+    groundtie("coregister", "reference.tif", "input.tif", "registered.tif", *search, *files)
+    for name in ("registered.tif", "points.gpkg", "report.html"):
+        assert (tmp_path / name).is_file()
+
+
+BASH = """
+eval "$(_GROUNDTIE_COMPLETE=bash_source groundtie)"
+COMP_WORDS=(groundtie mask); COMP_CWORD=1
+_groundtie_completion groundtie
+echo "${COMPREPLY[@]}"
+"""
+
+
+@pytest.mark.slow
+def test_bash_completes_the_installed_command(environment: Path) -> None:
+    done = subprocess.run(
+        ["bash", "-c", BASH],
+        env={"PATH": f"{environment}:/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == ["mask-threshold", "mask-regions"], done.stderr
 
 
 def build(tree: Path, hook: str, target: Path) -> None:

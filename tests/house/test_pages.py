@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from groundtie.tools import NAMES
 from scripts.make_figures import DRAWN
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -66,6 +67,14 @@ def test_images_and_anchors_exist(path: Path) -> None:
     for page, anchor in ANCHOR.findall(text):
         target = path.parent / page if page else path
         assert anchor in anchors(target), f"{page}#{anchor}"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_tool_has_a_worked_example(name: str) -> None:
+    page = read(DOCS / f"{name.replace('_', '-')}.md")
+    example = re.search(r"^## Example\n(.*?)^(?:## |<!--)", page, re.MULTILINE | re.DOTALL)
+    assert example is not None
+    assert f"groundtie {name.replace('_', '-')} " in example[1].replace("\n", " ")
 
 
 def test_every_figure_is_drawn_shown_and_small() -> None:

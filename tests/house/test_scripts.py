@@ -28,7 +28,7 @@ class Machine:
         self.log.touch()
         shutil.copytree(ROOT / "scripts", self.tree / "scripts")
         shutil.copytree(ROOT / ".ci", self.tree / ".ci")
-        for name in ("bash", "dirname", "mktemp", "rm", "env"):
+        for name in ("bash", "dirname", "mktemp", "rm", "env", "flock"):
             (self.bin / name).symlink_to(shutil.which(name) or f"/usr/bin/{name}")
 
     def add(self, name: str, body: str) -> None:

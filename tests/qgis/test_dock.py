@@ -383,6 +383,26 @@ def test_the_map_as_it_is_drawn_may_be_the_reference(desktop: Desktop, tmp_path:
     assert np.sign(np.diff(there)) == np.sign(np.diff(truth))
 
 
+def test_the_menu_makes_and_loads_an_example(desktop: Desktop, tmp_path: Path) -> None:
+    from groundtie_qgis.plugin import GroundTiePlugin
+    from qgis.core import QgsProject
+
+    desktop.iface.addDockWidget.side_effect = desktop.window.addDockWidget
+    plugin = GroundTiePlugin(desktop.iface, tmp_path)
+    desktop.window.show()
+    plugin.load_example()
+    plugin.load_example()  # a second click does not make a second one
+    desktop.wait(lambda: plugin.dock is not None)
+    layers = QgsProject.instance().mapLayers().values()
+    assert sorted(layer.name() for layer in layers) == ["input", "reference"]
+    assert plugin.dock.start.reference.currentLayer().name() == "reference"
+    assert plugin.dock.start.input.currentLayer().name() == "input"
+    shown = desktop.canvas.extent()
+    assert all(shown.intersects(layer.extent()) for layer in layers)
+    desktop.picture("9_example")
+    plugin.unload()
+
+
 def test_plugin_menu_opens_and_closes_the_dock(desktop: Desktop, tmp_path: Path) -> None:
     from groundtie_qgis.plugin import GroundTiePlugin
 

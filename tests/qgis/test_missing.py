@@ -126,14 +126,17 @@ os._exit(0)
 
 
 def test_the_desktop_starts_without_importing_the_tools(plugin_folder: Path) -> None:
-    """A tool is imported when its dialog is opened."""
+    """A tool is imported when its dialog is opened, and no model asks for its tools before."""
     from groundtie.tools import NAMES
+
+    models = [*(plugin_folder / "groundtie_qgis" / "models").iterdir()]
+    assert models
 
     script = IN_THE_DESKTOP.format(plugins=str(plugin_folder))
     command = [sys.executable, "-c", script]
     called = subprocess.run(command, text=True, capture_output=True, check=True, timeout=300)
     expected = [
-        f"{len(NAMES)} []",
+        f"{len(NAMES) + len(models)} []",
         "True Apply a stored transform or tie points to a raster.",
         "False True",
     ]
@@ -198,3 +201,8 @@ def test_qgis_process_tells_it_in_one_line(qgis_process: Any, tmp_path: Path) ->
     assert "Traceback" not in called.stderr
     listed = qgis_process("list", PYTHONPATH=str(tmp_path))
     assert "groundtie:coregister" in listed.stdout
+    stated = qgis_process("run", "groundtie:doctor", "--", PYTHONPATH=str(tmp_path))
+    assert "missing   opencv-python-headless: not installed; without it: every tool" in (
+        stated.stdout + stated.stderr
+    )
+    assert "Traceback" not in stated.stderr

@@ -13,7 +13,8 @@ from scipy.interpolate import RegularGridInterpolator
 from groundtie.errors import GeoreferencingError, NoOverlapError, RasterContentError
 from groundtie.rasters.grid import Grid, reproject
 from groundtie.rasters.reading import open_raster
-from groundtie.sensor.heights import ConstantHeight, declared_datum, find_geoid, terrain_heights
+from groundtie.sensor.geoids import find_geoid
+from groundtie.sensor.heights import ConstantHeight, declared_datum, terrain_heights
 from groundtie.sensor.surfaces import LON_LAT, surface_over
 
 REGION = np.array([[8.998, 45.148], [9.002, 45.152]])
@@ -135,7 +136,7 @@ def test_projs_geoid_grids_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_a_geoid_grid_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("groundtie.sensor.heights._proj_folders", lambda: [])
+    monkeypatch.setattr("groundtie.sensor.geoids._proj_folders", lambda: [])
     with pytest.raises(GeoreferencingError, match=r"us_nga_egm96_15\.tif"):
         find_geoid("EGM96")
 

@@ -93,7 +93,7 @@ def test_stac_items(tmp_path: Path) -> None:
 def test_an_asset_must_be_named_where_there_are_several(tmp_path: Path) -> None:
     path = tmp_path / "item.json"
     path.write_text(json.dumps(item(1, red={"href": "r.tif"}, blue={"href": "b.tif"})))
-    with pytest.raises(ParameterError, match="name one of its assets: blue, red"):
+    with pytest.raises(ParameterError, match=r"as item.json#NAME: blue, red"):
         list_dates([path], None)
     with pytest.raises(ParameterError, match="no asset green"):
         list_dates([path], "green")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from ..errors import GeoreferencingError, NoOverlapError
 from ..geometry.transform import Transform
+from ..raster_names import file_name
 from ..rasters.grid import FloatArray, reproject
 from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch
@@ -68,8 +68,8 @@ class Comparison:
             shown["nominal"],
             shown.get("registered"),
             pictures.jpeg_uri(pictures.backdrop(pictures.grey_picture(reference))),
-            Path(pair.reference.source.path).name,
-            Path(pair.input.source.path).name,
+            file_name(pair.reference.source.path),
+            file_name(pair.input.source.path),
             grid.width,
             grid.height,
             masks,

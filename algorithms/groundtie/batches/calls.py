@@ -11,6 +11,7 @@ from typing import Any
 from ..declaration import Parameter, Tool
 from ..errors import GroundTieError, OutputError, ParameterError, SameFileError
 from ..kinds import Flag, FolderOut, InputKind, OutputKind, RastersIn, Text
+from ..raster_names import raster_name
 from ..rasters.atomic import writing
 
 # The column that is no parameter.
@@ -115,18 +116,23 @@ def _value(parameter: Parameter, value: Any, name: str, inputs: Path, outputs: P
     if value is None:
         return None
     if isinstance(kind, InputKind):
-        checked = kind.check(parameter.name, value)
-        # GDAL's own names stay text.
-        return inputs / checked if isinstance(checked, Path) else checked
+        return _located(value, inputs)
     if isinstance(kind, RastersIn):
         several = value.split(";") if isinstance(value, str) else value
-        rasters = kind.check(parameter.name, several)
-        return tuple(inputs / each if isinstance(each, Path) else each for each in rasters)
+        return [_located(one, inputs) for one in several] if isinstance(several, list) else several
     if isinstance(kind, Flag) and str(value).lower() in (*_YES, *_NO):
         return str(value).lower() in _YES
     if isinstance(kind, Text) and isinstance(value, (int, float)):
         return str(value)  # YAML and JSON have numbers where a text was meant
     return value
+
+
+def _located(value: Any, inputs: Path) -> Any:
+    """Return an input's place; what is no name is left to the parameter's check."""
+    if not isinstance(value, str) or not value or "\0" in value:
+        return value
+    found = raster_name(value)
+    return inputs / found if isinstance(found, Path) else found
 
 
 def _is_output(parameter: Parameter) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from affine import Affine
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from rasterio.crs import CRS
 
 from ..errors import (
@@ -201,14 +201,16 @@ class TerrainModel(Model):
 
     def to_json(self) -> dict[str, Any]:
         """Return the model as values that JSON can carry."""
-        rises = self.rise_m(_compared())
         return {
             "kind": self.kind,
             "frame": list(self.frame.to_map)[:6],
             "coefficients": self.coefficients.tolist(),
             "origin_m": self.origin_m,
             **self.terrain.to_json(),
-            "rises_m": [float(rise) if np.isfinite(rise) else None for rise in rises],
+            "heights_m": [
+                [float(height) if np.isfinite(height) else None for height in place]
+                for place in self._compared_m().tolist()
+            ],
         }
 
     @classmethod
@@ -247,13 +249,20 @@ class TerrainModel(Model):
         except GroundTieError as error:
             raise TransformFileError(str(error)) from error
         model = cls(TERRAIN, frame, coefficients, terrain, origin_m)
-        stored = np.array([np.nan if r is None else float(r) for r in values["rises_m"]])
-        if not np.allclose(model.rise_m(_compared()), stored, 0, _SAME_M, equal_nan=True):
+        stored = np.array(values["heights_m"], float).reshape(-1, 2)
+        if not np.allclose(model._compared_m(), stored, 0, _SAME_M, equal_nan=True):
             raise TransformFileError(
                 f"the heights of {' and '.join(str(p) for p in paths if p)} are not those that the "
                 "transform was made with"
             )
         return model
+
+    def _compared_m(self) -> FloatArray:
+        """Return both heights at places of the frame, shape (n, 2)."""
+        side = np.linspace(-0.5, 0.5, _COMPARED)
+        places = self.frame.leave(np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2))
+        terrain = self.terrain
+        return np.column_stack([terrain.ground_m(places), terrain.assumed_m(places)])
 
 
 _FILES = ("dem", "input_dem")
@@ -310,8 +319,3 @@ def _found(path: str, folder: Path | None) -> Path:
         if file.is_file():
             return file
     raise TransformFileError(f"{path}, whose heights the transform needs, is not there")
-
-
-def _compared() -> NDArray[np.float64]:
-    side = np.linspace(-0.5, 0.5, _COMPARED)
-    return np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)

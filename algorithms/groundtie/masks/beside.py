@@ -29,11 +29,14 @@ class MaskBeside:
     scheme: str
 
 
-def mask_beside(image: Path) -> MaskBeside | None:
+def mask_beside(image: Path | str) -> MaskBeside | None:
     """Return the mask that belongs to an image, if both have the names that the mission gives.
 
-    Sentinel-2 L2A has its classification in the folder of another pixel size.
+    Sentinel-2 L2A has its classification in the folder of another pixel size. Only files on disk
+    are looked for: what is asked of a server costs a request each.
     """
+    if isinstance(image, str):
+        return None
     for candidate in _candidates(image):
         if candidate.path.is_file():
             return candidate

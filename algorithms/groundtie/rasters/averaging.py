@@ -85,7 +85,7 @@ def area_average(
 
 
 def average_by_strips(
-    read_lines: Lines, shape: tuple[int, int], out_shape: tuple[int, int]
+    read_lines: Lines, row_edges: NDArray[np.float64], col_edges: NDArray[np.float64]
 ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
     """Average an image to a smaller size without ever holding all of it.
 
@@ -94,20 +94,18 @@ def average_by_strips(
     read_lines
         Returns values and validity, shapes (bands, lines, width), of some lines, given the first
         and their number.
-    shape, out_shape
-        Height and width of the image, and of the result.
+    row_edges, col_edges
+        Borders of the m × n larger pixels, rising, shapes (m + 1,) and (n + 1,).
 
     Returns
     -------
     means, valid
-        Shapes (bands, *out_shape), as `area_average`.
+        Shapes (bands, m, n), as `area_average`.
     """
-    height, width = shape
-    row_edges = np.linspace(0, height, out_shape[0] + 1)
-    col_edges = np.linspace(0, width, out_shape[1] + 1)
-    lines = max(int(_STRIP_PIXELS / width * out_shape[0] / height), 1)
+    count = len(row_edges) - 1
+    lines = max(int(_STRIP_PIXELS / col_edges[-1] * count / row_edges[-1]), 1)
     strips = []
-    for first in range(0, out_shape[0], lines):
+    for first in range(0, count, lines):
         edges = row_edges[first : first + lines + 1]
         top, bottom = int(np.floor(edges[0])), int(np.ceil(edges[-1]))
         values, valid = read_lines(top, bottom - top)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Hashable, Iterator, Sequence
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,6 +14,8 @@ from rasterio.env import env_ctx_if_needed
 
 from ..arrays import Raster
 from ..errors import RasterOpenError, raised_by
+from ..raster_names import identity, is_remote
+from .remote import environment, reason_of_server
 
 
 class Handles(Protocol):
@@ -32,25 +33,34 @@ class Handles(Protocol):
 
 
 class FileHandles:
-    """GDAL's handles of one file: each is used by one thread at a time, as GDAL demands."""
+    """GDAL's handles of one file: each is used by one thread at a time, as GDAL demands.
 
-    def __init__(self, path: str) -> None:
+    Parameters
+    ----------
+    path
+        The file or GDAL's name.
+    overview
+        Number of the overview that is read, from 0; None: the raster itself.
+    """
+
+    def __init__(self, path: str, overview: int | None = None) -> None:
         self._path = path
+        self._options = {} if overview is None else {"overview_level": overview}
         self._lock = threading.Lock()
         self._free: list[Any] = []
 
     @property
     def identity(self) -> Hashable:
-        """The file's place."""
-        return Path(self._path).resolve()
+        """The file's place, or GDAL's name."""
+        return identity(self._path)
 
     @contextlib.contextmanager
     def borrow(self) -> Iterator[Any]:
         """Lend a handle of its own to each thread."""
-        with _reading(self._path):
+        with _reading(self._path), environment(self._path):
             with self._lock:
                 dataset = self._free.pop() if self._free else None
-            dataset = dataset or rasterio.open(self._path, sharing=False)
+            dataset = dataset or rasterio.open(self._path, sharing=False, **self._options)
             with env_ctx_if_needed():  # GDAL's messages in this thread go to rasterio's logger
                 yield dataset
         with self._lock:
@@ -73,7 +83,7 @@ class OpenDataset:
     @property
     def identity(self) -> Hashable:
         """The file's place, also where another handle reads it."""
-        return Path(self._dataset.name).resolve()
+        return identity(self._dataset.name)
 
     @contextlib.contextmanager
     def borrow(self) -> Iterator[Any]:
@@ -136,5 +146,7 @@ def _reading(name: str) -> Iterator[None]:
     except Exception as error:
         if not raised_by(error, "rasterio"):
             raise
-        reason = error.__cause__ or error
+        reason = str(error.__cause__ or error)
+        if is_remote(name):
+            reason = reason_of_server(reason)
         raise RasterOpenError(f"cannot read {name}: {reason}") from error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any
@@ -18,11 +18,12 @@ from rasterio.errors import NotGeoreferencedWarning
 
 from ..arrays import Raster, in_memory
 from ..errors import BandError, RasterOpenError
-from .averaging import average_by_strips
+from ..raster_names import is_remote, raster_name
 from .bands import MOST_BANDS, BandInfo, colormap, stated, tags_of, working_dtype
 from .georeferencing import grid_of
 from .grid import PIXEL_COORDINATES, Grid
 from .handles import ArrayHandles, FileHandles, Handles, OpenDataset
+from .levels import Levels, average_of
 from .windows import Mask, Window, read_window
 
 # Images without georeferencing are a supported case, see `Grid.is_georeferenced`.
@@ -66,6 +67,7 @@ class RasterSource:
     colormap: dict[int, tuple[int, ...]] | None
     tags: dict[str, dict[str, str]]
     _handles: Handles = field(repr=False, compare=False)
+    _levels: Levels | None = field(repr=False, compare=False, default=None)
 
     def __enter__(self) -> RasterSource:
         return self
@@ -81,6 +83,8 @@ class RasterSource:
     def close(self) -> None:
         """Close the file; reading opens it again. What the caller has opened stays open."""
         self._handles.close()
+        if self._levels is not None:
+            self._levels.close()
 
     def is_same_as(self, other: RasterSource) -> bool:
         """Return whether both read one and the same raster."""
@@ -139,7 +143,8 @@ class RasterSource:
             offset of the bands are not applied.
         out_shape
             Height and width, smaller than the window's, of the result; each of its pixels is
-            the mean of the valid pixels in its area. None keeps the full resolution.
+            the mean of the valid pixels in its area. None keeps the full resolution. Of remote
+            rasters overviews are read, as far as they hold such means.
 
         Returns
         -------
@@ -159,8 +164,8 @@ class RasterSource:
         """
         bands = self.image_bands if band is None else (band,)
 
-        def grey(part: Window) -> tuple[NDArray[Any], Mask]:
-            values, valid = self.read_bands(part, bands)
+        def grey(source: RasterSource, part: Window) -> tuple[NDArray[Any], Mask]:
+            values, valid = source.read_bands(part, bands)
             if self.is_complex:
                 values = np.abs(values)
             if len(bands) == 1:
@@ -168,7 +173,14 @@ class RasterSource:
             everywhere: Mask = np.asarray(valid.all(axis=0, keepdims=True))
             return values.mean(axis=0, keepdims=True, dtype=np.float32), everywhere
 
-        values, valid = _averaged(grey, window, out_shape)
+        if out_shape is None:
+            values, valid = grey(self, window)
+        else:
+            level = self
+            if self._levels is not None:
+                reduction = min(window.height / out_shape[0], window.width / out_shape[1])
+                level = self._levels.coarsest(self, reduction)
+            values, valid = average_of(grey, self, level, window, out_shape)
         grey_values = np.where(valid[0], values[0], np.float32(0)).astype(np.float32)
         return grey_values, valid[0]
 
@@ -189,18 +201,18 @@ class RasterSource:
             if not 1 <= number <= self.count:
                 raise BandError(f"{self.path} has no band {number}; it has {self.count}")
 
-        def native(part: Window) -> tuple[NDArray[Any], Mask]:
-            with self._handles.borrow() as dataset:
-                return read_window(dataset, self, part, bands)
+        def native(source: RasterSource, part: Window) -> tuple[NDArray[Any], Mask]:
+            with source._handles.borrow() as dataset:
+                return read_window(dataset, source, part, bands)
 
         if out_shape is None:
-            return native(window)
+            return native(self, window)
 
-        def floating(part: Window) -> tuple[NDArray[Any], Mask]:
-            values, valid = native(part)
+        def floating(source: RasterSource, part: Window) -> tuple[NDArray[Any], Mask]:
+            values, valid = native(source, part)
             return values.astype(working_dtype(values.dtype), copy=False), valid
 
-        return _averaged(floating, window, out_shape)
+        return average_of(floating, self, self, window, out_shape)
 
     def read_untouched(self, window: Window) -> tuple[NDArray[Any], NDArray[np.uint8]]:
         """Read all bands, shape (bands, h, w), and the mask, (h, w), of a window inside as stored.
@@ -221,8 +233,8 @@ def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSou
     Parameters
     ----------
     value
-        A file, any name that GDAL understands (`/vsizip/…`, `NETCDF:…`), an open rasterio dataset,
-        which stays open, a `Raster`, a numpy array or an `xarray.DataArray` (see
+        A file, a URL, any name that GDAL understands (`/vsizip/…`, `NETCDF:…`), an open rasterio
+        dataset, which stays open, a `Raster`, a numpy array or an `xarray.DataArray` (see
         `arrays.in_memory`).
     allow_sensor_geometry
         Take images that are located by RPCs or GCPs only; their grid is in pixel coordinates.
@@ -237,7 +249,7 @@ def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSou
     held = in_memory(value)
     if isinstance(held, Raster):
         return _source_of_array(held)
-    name = os.fspath(value) if held is None else held.name
+    name = os.fspath(raster_name(value)) if held is None else held.name
     handles = FileHandles(name) if held is None else OpenDataset(held)
     with handles.borrow() as dataset:
         if dataset.count == 0:
@@ -260,6 +272,7 @@ def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSou
                 ns: tags_of(dataset, ns=ns or None) for ns in ("", *stated(dataset.tag_namespaces))
             },
             _handles=handles,
+            _levels=Levels(len(dataset.overviews(1))) if is_remote(name) and held is None else None,
         )
 
 
@@ -283,17 +296,3 @@ def _source_of_array(raster: Raster) -> RasterSource:
 def bounded_cache() -> Any:
     """Return the environment in which GDAL keeps a bounded amount of what it has read."""
     return rasterio.Env(GDAL_CACHEMAX=_READING_CACHE_BYTES)
-
-
-def _averaged(
-    read: Callable[[Window], tuple[NDArray[Any], Mask]],
-    window: Window,
-    out_shape: tuple[int, int] | None,
-) -> tuple[NDArray[Any], Mask]:
-    if out_shape is None:
-        return read(window)
-
-    def read_lines(first: int, lines: int) -> tuple[NDArray[Any], Mask]:
-        return read(Window(window.col, window.row + first, window.width, lines))
-
-    return average_by_strips(read_lines, (window.height, window.width), out_shape)

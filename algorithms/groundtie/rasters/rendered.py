@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ParameterError
 from .bands import BandInfo
 from .grid import Grid
 from .reading import FloatImage, RasterSource, Window
@@ -36,16 +35,13 @@ class Light:
     azimuth_deg
         Clockwise from north.
     elevation_deg
-        Above the horizon: of a radar 90° minus its incidence angle.
+        Above the horizon: of a radar 90° minus its incidence angle. It hardly counts: similarity
+        asks where brightness changes, not by how much.
     """
 
     kind: str
     azimuth_deg: float
-    elevation_deg: float
-
-    def __post_init__(self) -> None:
-        if self.kind not in LIGHTS or not 0 < self.elevation_deg <= 90:
-            raise ParameterError(f"no light: {self}")
+    elevation_deg: float = 45.0
 
     def shade(self, east: FloatImage, north: FloatImage) -> FloatImage:
         """Return how bright ground is that rises by so much per metre to the east and north.

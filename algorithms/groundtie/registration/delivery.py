@@ -17,6 +17,7 @@ from ..matching.surface_fit import AUTO
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.reading import bounded_cache
+from ..rasters.rendered import SUN, Light
 from .pipeline import OpenPair, open_pair, pair_images, run
 from .registered_output import RegisteredOutput, model_for_grid
 from .registration import Registration
@@ -170,6 +171,10 @@ class Call:
         return kept
 
 
+# Satellites fly nearly from pole to pole: a radar looks east or west, which differ in the sign of
+# contrast above all.
+RADAR_AZIMUTHS_DEG = (270.0, 90.0)
+
 # What tools may leave out that do not ask for it.
 _USUAL: Mapping[str, Any] = {
     "output_grid": "reference",
@@ -224,6 +229,26 @@ def asked_terrain(given: Mapping[str, Any]) -> dict[str, Any]:
     return {"dem": dem, "input_dem": input_dem}
 
 
+def asked_light(given: Mapping[str, Any]) -> Light | None:
+    """Return in which light a reference that is a terrain model is rendered; None: it is none.
+
+    Raises
+    ------
+    ParameterError
+        Nobody said where the light comes from.
+    """
+    kind, azimuth_deg = given.get("light"), given.get("light_azimuth")
+    if kind is None:
+        if azimuth_deg is not None:
+            raise ParameterError("light_azimuth goes with light: the reference is a terrain model")
+        return None
+    if azimuth_deg is None and kind == SUN:
+        raise ParameterError(
+            "light sun needs its azimuth (light_azimuth): the tool register tries some"
+        )
+    return Light(kind, RADAR_AZIMUTHS_DEG[0] if azimuth_deg is None else azimuth_deg)
+
+
 def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specification:
     """Return a preset with what a tool was called with."""
     terrain = asked_terrain(parameters)
@@ -234,6 +259,7 @@ def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specifica
     return replace(
         preset,
         **terrain,
+        light=asked_light(parameters),
         model=model_for_grid(parameters["model"], parameters["output_grid"]),
         max_error_px=parameters["max_error"],
         search_radius_m=parameters["search_radius"],

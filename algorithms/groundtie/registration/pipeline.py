@@ -17,7 +17,7 @@ from ..errors import NothingFoundError, TooFewPointsError
 from ..features.presets import optical_keypoints, sar_keypoints
 from ..geometry.estimation import Estimate
 from ..geometry.judging import LARGEST_LOG10_CHANCE, LOG10_CHANCE_ON_GROUND
-from ..geometry.models import Model
+from ..geometry.models import TERRAIN, Model
 from ..geometry.terrain import Terrain
 from ..masks.choice import MaskUsed
 from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
@@ -323,11 +323,13 @@ def _fit(
 ) -> Fit:
     """Return what fits the model, by the name of the specification's matcher."""
     layout = held_out.layout
-    if spec.matcher == CHIPS and spec.dem is not None:
-        terrain = _terrain(pair, spec)
-        return SurfaceFit(matcher, layout, TERRAIN_CANDIDATES, terrain=terrain)
     if spec.matcher == CHIPS:
-        return SurfaceFit(matcher, layout, spec.candidates)
+        terrain = None if spec.dem is None else _terrain(pair, spec)
+        candidates = spec.candidates if terrain is None else TERRAIN_CANDIDATES
+        if spec.light is not None:
+            # Polynomials bend along what no rendering shows: land cover and what is laid over.
+            candidates = tuple(kind for kind in candidates if kind in (*LINEAR_CANDIDATES, TERRAIN))
+        return SurfaceFit(matcher, layout, candidates, terrain=terrain)
     presets = {KEYPOINTS: sar_keypoints, GUIDED_CHIPS: optical_keypoints}
     detector, descriptor = presets[spec.matcher]()
     masked = None if pair is images else pair

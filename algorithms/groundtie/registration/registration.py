@@ -19,6 +19,7 @@ from ..geometry.transform import Transform
 from ..masks.choice import MaskUsed
 from ..matching.check import Check
 from ..matching.survey import Survey
+from ..raster_names import file_name
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_to_array
 from ..rasters.pair import ImagePair
@@ -162,7 +163,7 @@ class Registration:
 
     def page(self, with_surfaces: bool = True) -> Report:
         """Return the report; without surfaces, its numbers are the same."""
-        names = [Path(image.source.path).name for image in (self.pair.input, self.pair.reference)]
+        names = [file_name(image.source.path) for image in (self.pair.input, self.pair.reference)]
         return Report(
             title=f"{names[0]} registered to {names[1]}",
             verdict=self.verdict,

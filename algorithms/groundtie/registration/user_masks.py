@@ -21,6 +21,7 @@ from ..masks.raster import RasterMask
 from ..masks.regions import WIDTH_M
 from ..masks.scene import Scene, Selection, write_mask
 from ..masks.values import INSIDE, mask_values
+from ..raster_names import file_name, raster_name
 from ..rasters.atomic import scratch_folder
 from ..rasters.pair import ImagePair
 from ..rasters.reading import Window, open_raster
@@ -69,11 +70,11 @@ class UserMask:
         if mask is None and values not in (None, NONE):
             raise ParameterError(f"there is no mask that the values {values} belong to")
         if mask is None:
-            is_file = values is None and isinstance(image, (str, Path))
-            found = mask_beside(Path(image)) if is_file else None
+            is_named = values is None and isinstance(image, (str, Path))
+            found = mask_beside(raster_name(image)) if is_named else None
             if found is None:
                 return None
-            return cls(found.path, found.scheme, f", found beside {Path(image).name},")
+            return cls(found.path, found.scheme, f", found beside {file_name(image)},")
         if values is not None:
             _check_values(mask, values)
         return cls(mask, values)
@@ -97,13 +98,13 @@ class UserMask:
 
     @property
     def _suffix(self) -> str:
-        return Path(self.mask).suffix.lower()
+        return Path(file_name(self.mask)).suffix.lower()
 
     @property
     def name(self) -> str:
         """What people call it."""
         named = isinstance(self.mask, (str, Path))
-        return Path(self.mask).name if named else str(getattr(self.mask, "name", "the mask"))
+        return file_name(self.mask) if named else str(getattr(self.mask, "name", "the mask"))
 
 
 def _check_values(mask: Any, values: str) -> None:

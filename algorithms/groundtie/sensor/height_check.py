@@ -17,7 +17,8 @@ from ..errors import GroundTieError
 from ..rasters.reading import open_raster
 from .adjustment import SMALLEST_SIGMA_PX, Adjustment, Control
 from .bias import KINDS, design
-from .heights import ConstantHeight, find_geoid
+from .geoids import find_geoid
+from .heights import ConstantHeight
 from .orientation import FloatArray, Orientation, seen_at
 from .surfaces import surface_over
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import ClassVar, Protocol
 
 import numpy as np
-import rasterio
 from numpy.typing import NDArray
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
@@ -19,20 +15,11 @@ from ..rasters.grid import Grid
 from ..rasters.lattice import Lattice
 from ..rasters.reading import FloatImage, RasterSource
 from ..rasters.surfaces import RasterSurface, SurfacePiece
+from .geoids import GEOID_GRIDS
 from .smooth_map import Positions
 from .surfaces import WHOLE_PX, surface_over
 
 FloatArray = NDArray[np.float64]
-
-ELLIPSOIDAL = "ellipsoidal"
-
-# PROJ's grids of the geoids' heights above the ellipsoid, by the names that it had and has.
-GEOID_GRIDS = {
-    "EGM96": ("us_nga_egm96_15.tif", "egm96_15.gtx"),
-    "EGM2008": ("us_nga_egm08_25.tif", "egm08_25.gtx"),
-}
-DATUMS = (ELLIPSOIDAL, *GEOID_GRIDS)
-
 
 # Takes a smooth function of longitude and latitude, (n, 2) → (n, k), and its largest error; returns
 # its values for all pixels of a grid.
@@ -244,34 +231,3 @@ def declared_datum(dem: RasterSource) -> str | None:
     if "VERT_CS" not in text and "VERTCRS" not in text:
         return None
     return next((name for name in GEOID_GRIDS if name in text), None)
-
-
-def find_geoid(datum: str) -> Path | None:
-    """Return the grid of the geoid of a vertical datum; None for the ellipsoid.
-
-    Raises
-    ------
-    GeoreferencingError
-        PROJ's grid is not installed.
-    """
-    if datum == ELLIPSOIDAL:
-        return None
-    names = GEOID_GRIDS[datum]
-    for folder in _proj_folders():
-        for name in names:
-            if (folder / name).is_file():
-                return folder / name
-    raise GeoreferencingError(
-        f"heights above {datum} need PROJ's grid {names[0]}, which is not installed: get it with "
-        f"projsync --file {names[0]}, or give such a grid as geoid (--geoid)"
-    )
-
-
-def _proj_folders() -> list[Path]:
-    """Return where PROJ looks for grids."""
-    named = [os.environ.get(key, "") for key in ("PROJ_DATA", "PROJ_LIB")]
-    own = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "proj"
-    folders = [Path(part) for text in named for part in text.split(os.pathsep) if part]
-    shared = [Path(sys.prefix) / "share" / "proj", Path("/usr/local/share/proj")]
-    bundled = Path(rasterio.__file__).parent / "proj_data"
-    return [*folders, own, bundled, *shared, Path("/usr/share/proj")]

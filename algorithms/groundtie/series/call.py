@@ -13,6 +13,7 @@ from ..context import Context, threads
 from ..errors import ParameterError, SameFileError
 from ..geometry.transform import Transform
 from ..progress import Progress
+from ..raster_names import identity
 from ..rasters.reading import bounded_cache
 from ..registration.registered_output import model_for_grid
 from ..registration.series_evidence import DateEvidence
@@ -140,13 +141,15 @@ def _listed(given: Mapping[str, Any]) -> tuple[tuple[Listed, ...], str | None]:
     """Return all dates in the order of their times, and the name of the reference."""
     dates, name = list_dates(given["inputs"], given["asset"]), None
     if given["reference"] is not None:
-        (reference,) = list_dates([given["reference"]], given["asset"])
+        (reference,) = list_dates([given["reference"]], None)
+        # In its place and by its name, if it is a date of the series.
+        same = next((k for k, date in enumerate(dates) if _is_same(date, reference)), 0)
+        if _is_same(dates[same], reference):
+            reference = dates[same]
         others = [date for date in dates if not _is_same(date, reference)]
         if any(date.name == reference.name for date in others):
             reference = replace(reference, name=f"{reference.name} (reference)")
         reference = replace(reference, mask=given["reference_mask"])
-        # In its place, if it is a date of the series.
-        same = next((k for k, date in enumerate(dates) if _is_same(date, reference)), 0)
         dates, name = (*others[:same], reference, *others[same:]), reference.name
     elif given["reference_mask"] is not None:
         raise ParameterError("a mask of the reference needs a reference")
@@ -156,11 +159,7 @@ def _listed(given: Mapping[str, Any]) -> tuple[tuple[Listed, ...], str | None]:
 
 
 def _is_same(date: Listed, other: Listed) -> bool:
-    rasters = [
-        raster.resolve() if isinstance(raster, Path) else raster
-        for raster in (date.raster, other.raster)
-    ]
-    return rasters[0] == rasters[1]
+    return identity(date.raster) == identity(other.raster)
 
 
 def _require_apart(listed: tuple[Listed, ...], files: SeriesFiles) -> None:

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import csv
 import datetime
-import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from ..errors import ParameterError
-from ..strict_json import read_json
+from ..raster_names import file_name, identity, located
+from ..stac_items import RASTER_SUFFIXES, StacItem, is_item, raster_of_item, read_items
 
-# Of rasters that a folder holds.
-_SUFFIXES = (".tif", ".tiff", ".jp2", ".vrt", ".img")
-_TABLE, _STAC = (".csv",), (".json", ".geojson")
+_TABLE = (".csv",)
 
 _DAY = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
 _YEAR = re.compile(r"(?<!\d)((?:19|20)\d\d)(?!\d)")
@@ -43,7 +40,7 @@ class Listed:
     name: str
     raster: Path | str
     time: datetime.datetime | None
-    mask: Path | None = None
+    mask: Path | str | None = None
 
 
 def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed, ...]:
@@ -52,10 +49,11 @@ def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed,
     Parameters
     ----------
     inputs
-        Files, folders of rasters, patterns, CSV tables with a column `file` (and `name`, `time`,
-        `mask`), and STAC items or item collections as JSON.
+        Files, URLs, folders of rasters, patterns, CSV tables with a column `file` (and `name`,
+        `time`, `mask`), and STAC items or item collections as JSON.
     asset
-        Which asset of STAC items is meant; None: the only one that is a raster.
+        Which asset of STAC items is meant where a name states none (`item.json#asset`); None: the
+        only one that is a raster.
 
     Raises
     ------
@@ -66,8 +64,7 @@ def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed,
     found: dict[object, Listed] = {}
     for given in inputs:
         for date in _listed(given, asset):
-            raster = date.raster
-            found.setdefault(raster.resolve() if isinstance(raster, Path) else raster, date)
+            found.setdefault(identity(date.raster), date)
     names: dict[str, Listed] = {}
     for date in found.values():
         other = names.setdefault(date.name, date)
@@ -103,27 +100,27 @@ def time_of(text: str) -> datetime.datetime | None:
 
 def _listed(given: Path | str, asset: str | None) -> Iterable[Listed]:
     if isinstance(given, str):
-        return [_file(given)]
+        return _of_stac(given, asset) if is_item(given) else [_file(given)]
     if given.is_dir():
-        files = sorted(path for path in given.iterdir() if path.suffix.lower() in _SUFFIXES)
+        files = sorted(path for path in given.iterdir() if path.suffix.lower() in RASTER_SUFFIXES)
         if not files:
-            raise ParameterError(f"the folder {given} holds no raster ({', '.join(_SUFFIXES)})")
+            endings = ", ".join(RASTER_SUFFIXES)
+            raise ParameterError(f"the folder {given} holds no raster ({endings})")
         return map(_file, files)
-    if given.is_file():
-        suffix = given.suffix.lower()
-        if suffix in _TABLE:
-            return _of_table(given)
-        return _of_stac(given, asset) if suffix in _STAC else [_file(given)]
-    if any(sign in given.name for sign in "*?["):
+    if any(sign in given.name for sign in "*?[") and not given.exists():
         files = sorted(given.parent.glob(given.name))
         if files:
-            return map(_file, files)
+            return [date for file in files for date in _listed(file, asset)]
         raise ParameterError(f"no file matches {given}")
-    raise ParameterError(f"there is no file {given}")
+    if is_item(given):
+        return _of_stac(given, asset)
+    if not given.is_file():
+        raise ParameterError(f"there is no file {given}")
+    return _of_table(given) if given.suffix.lower() in _TABLE else [_file(given)]
 
 
 def _file(raster: Path | str) -> Listed:
-    stem = Path(raster).stem
+    stem = Path(file_name(raster)).stem
     return Listed(stem, raster, time_of(stem))
 
 
@@ -144,56 +141,19 @@ def _of_row(path: Path, number: int, row: Mapping[str, str | None]) -> Listed:
     values = {name: (row.get(name) or "").strip() for name in _COLUMNS}
     if not values["file"]:
         raise ParameterError(f"{path}, line {number}: the column file is empty")
-    date = _file(_located(values["file"], path.parent))
+    date = _file(raster_of_item(located(values["file"], path)))
     time = date.time if not values["time"] else time_of(values["time"])
     if values["time"] and time is None:
         raise ParameterError(f"{path}, line {number}: {values['time']!r} is no time (ISO 8601)")
-    mask = path.parent / values["mask"] if values["mask"] else None
+    mask = located(values["mask"], path) if values["mask"] else None
     return Listed(values["name"] or date.name, date.raster, time, mask)
 
 
-def _of_stac(path: Path, asset: str | None) -> list[Listed]:
-    try:
-        content = read_json(path)
-    except (OSError, ValueError) as error:
-        raise ParameterError(f"cannot read the STAC file {path}: {error}") from error
-    stated = content if isinstance(content, dict) else {}
-    items = [stated] if stated.get("type") == "Feature" else stated.get("features")
-    if not isinstance(items, list):
-        raise ParameterError(f"{path} is no STAC item or item collection")
-    try:
-        return [_of_item(path, item, asset) for item in items]
-    except (KeyError, TypeError, AttributeError) as error:
-        raise ParameterError(f"{path} is no STAC item: {error!r}") from error
+def _of_stac(given: Path | str, asset: str | None) -> list[Listed]:
+    items, named = read_items(given)
+    return [_of_item(item, named or asset) for item in items]
 
 
-def _of_item(path: Path, item: Mapping[str, Any], asset: str | None) -> Listed:
-    assets: Mapping[str, Any] = item["assets"]
-    rasters = [name for name, one in assets.items() if _is_raster(one)]
-    if asset is None and len(rasters) != 1:
-        raise ParameterError(
-            f"{path}: the item {item['id']} has {len(rasters)} rasters; name one of its assets: "
-            f"{', '.join(sorted(assets))}"
-        )
-    name = rasters[0] if asset is None else asset
-    if name not in assets:
-        raise ParameterError(f"{path}: the item {item['id']} has no asset {name}")
-    stated = (item.get("properties") or {}).get("datetime")
-    raster = _located(str(assets[name]["href"]), path.parent)
-    return Listed(str(item["id"]), raster, None if stated is None else time_of(str(stated)))
-
-
-def _is_raster(asset: Mapping[str, Any]) -> bool:
-    kind, href = str(asset.get("type") or ""), str(asset.get("href") or "")
-    is_image = kind.startswith("image/") and kind not in ("image/png", "image/jpeg")
-    return is_image or (not kind and Path(href).suffix.lower() in _SUFFIXES)
-
-
-def _located(name: str, folder: Path) -> Path | str:
-    """Return a file beside a table, or GDAL's name of a raster as it is."""
-    if name.startswith("file://"):
-        name = name.removeprefix("file://")
-    if name.startswith(("http://", "https://", "s3://")):
-        scheme, _, rest = name.partition("://")
-        return f"/vsis3/{rest}" if scheme == "s3" else f"/vsicurl/{name}"
-    return name if name.startswith("/vsi") else Path(os.path.normpath(folder / name))
+def _of_item(item: StacItem, asset: str | None) -> Listed:
+    time = None if item.time is None else time_of(item.time)
+    return Listed(item.id, item.raster(asset), time)

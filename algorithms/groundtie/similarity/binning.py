@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .order_statistics import quantiles
+
 MASKED = np.uint8(255)
 BINNINGS = ("equal-frequency", "linear")
+
+# Comparing pixels with so many edges, one after the other, is faster than to search among them.
+_FEW_BINS = 64
 
 # Quantiles are taken from at most this many pixels; their error is then far below a bin.
 _SAMPLE = 65_536
@@ -26,7 +31,7 @@ def bin_edges(
         return np.zeros(bins - 1, np.float32)
     inner = np.arange(1, bins) / bins
     if binning == "equal-frequency":
-        return np.quantile(sample, inner).astype(np.float32)
+        return quantiles(sample, inner).astype(np.float32)
     low, high = sample.min(), sample.max()
     return (low + inner * (high - low)).astype(np.float32)
 
@@ -49,7 +54,11 @@ def to_bins(
         One of `BINNINGS`.
     """
     edges = bin_edges(values, valid, bins, binning)
-    binned = np.searchsorted(edges, values.ravel(), side="right").astype(np.uint8)
-    binned = binned.reshape(values.shape)
+    if bins <= _FEW_BINS:
+        binned = np.zeros(values.shape, np.uint8)
+        for edge in edges:
+            binned += values >= edge
+    else:
+        binned = np.searchsorted(edges, values, side="right").astype(np.uint8)
     binned[~valid] = MASKED
     return binned

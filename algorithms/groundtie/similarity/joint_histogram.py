@@ -12,8 +12,9 @@ from the volume without touching a pixel again.
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Callable
+import operator
 from dataclasses import dataclass
 
 import cv2
@@ -23,7 +24,6 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..rasters.kernels import bspline_weights
-from .binning import MASKED
 
 FloatArray = NDArray[np.float32]
 ORDERS = (2, 3, 4, 5, 6, 7)
@@ -31,12 +31,13 @@ ORDERS = (2, 3, 4, 5, 6, 7)
 # The cubic B-spline is the first without interpolation artefacts.
 ORDER = 4
 
-# Templates of so many pixels or fewer are counted a row of shifts at a time.
-_CODED_PIXELS = 20_000
+# Seconds to count a pixel at a shift; to call OpenCV; for each element and halving of an FFT:
+# `benchmarks/run.py --only kernels`.
+_PIXEL_COST, _CALL_COST, _SPECTRAL_COST = 0.8e-9, 3.5e-6, 0.25e-9
 
-# Seconds to count a pixel, one shift a call and a row of shifts a call; to call OpenCV; for each
-# element and halving of an FFT: `benchmarks/run.py --only kernels`.
-_PIXEL_COST, _CODED_PIXEL_COST, _CALL_COST, _SPECTRAL_COST = 0.5e-9, 0.95e-9, 6e-6, 0.4e-9
+# Rounding of a correlation by FFT stays below four times the product of both arrays' norms and of
+# half a unit in the last place. Whole numbers are told apart up to a half.
+_LARGEST_ROUNDING = 0.5 / 4
 
 
 def support(order: int) -> int:
@@ -110,11 +111,12 @@ class JointHistogramVolume:
 def _convolve(volume: FloatArray, weights: FloatArray, axis: int) -> FloatArray:
     """Correlate along axis 0 or 1 with a short kernel; the axis loses the kernel's ends."""
     count = volume.shape[axis] - len(weights) + 1
-    total = np.zeros((), np.float32)
-    for k, weight in enumerate(weights):
-        part = volume[k : k + count] if axis == 0 else volume[:, k : k + count]
-        total = total + part * weight
-    return total
+    parts = (
+        volume[k : k + count] if axis == 0 else volume[:, k : k + count]
+        for k in range(len(weights))
+    )
+    weighted = map(np.multiply, parts, weights)
+    return functools.reduce(operator.iadd, weighted)
 
 
 def count_joint_histograms(
@@ -139,66 +141,19 @@ def count_joint_histograms(
     context
         Threads to count in; by default the calling one alone.
     """
-    span = search.shape[0] - template.shape[0] + 1
-    masked = bool((template == MASKED).any() or (search == MASKED).any())
     # Masked pixels go to one extra bin that is dropped; OpenCV's own mask is much slower.
-    sizes = (bins[0] + masked, bins[1] + masked)
     template = np.minimum(template, bins[0]).astype(np.uint8)
     search = np.minimum(search, bins[1]).astype(np.uint8)
-    coded = template.size <= _CODED_PIXELS and sizes[0] * sizes[1] <= 256 and span <= 256
-    if _spectral_cost(search.size, bins) < _direct_cost(template.size, span, coded):
-        counts = _count_spectrally(
-            template, search, bins, 1 if context is None else context.workers
-        )
+    span = search.shape[0] - template.shape[0] + 1
+    if _spectral_cost(search.size, bins) < _direct_cost(template.size, span):
+        workers = 1 if context is None else context.workers
+        counts = _count_spectrally(template, search, bins, workers)
     else:
-        count_row = _row_counter(template, search, sizes, coded)
-        counts = np.empty((span, span, *bins), np.float32)
-
-        def store(dy: int) -> None:
-            counts[dy] = count_row(dy)[:, : bins[0], : bins[1]]
-
-        rows = range(span)
-        for _ in map(store, rows) if context is None else context.quiet().map(store, rows):
-            pass
+        counts = _count_directly(template, search, bins, context)
     return JointHistogramVolume(counts, radius)
 
 
-def _row_counter(
-    template: NDArray[np.uint8], search: NDArray[np.uint8], sizes: tuple[int, int], coded: bool
-) -> Callable[[int], FloatArray]:
-    """Return the function that counts all shifts of one row, shape (shifts, *sizes)."""
-    height, width = template.shape
-    span = search.shape[1] - width + 1
-    ranges = [0, sizes[0], 0, sizes[1]]
-
-    def one_by_one(dy: int) -> FloatArray:
-        rows = np.empty((span, *sizes), np.float32)
-        for dx in range(span):
-            window = search[dy : dy + height, dx : dx + width]
-            rows[dx] = cv2.calcHist([template, window], [0, 1], None, list(sizes), ranges)
-        return rows
-
-    if not coded:
-        return one_by_one
-    # Small windows: a call would cost more than its counting. Template and search bin share a
-    # byte, and all shifts of a row are counted by one call against the number of the shift.
-    windows = np.lib.stride_tricks.sliding_window_view(search, (height, width))
-    shape = (span * height, width)
-    codes = np.broadcast_to(template * np.uint8(sizes[1]), (span, height, width)).reshape(shape)
-    shifts = np.repeat(np.arange(span, dtype=np.uint8), height * width).reshape(shape)
-    cells = sizes[0] * sizes[1]
-
-    def all_at_once(dy: int) -> FloatArray:
-        pairs = cv2.add(codes, windows[dy].reshape(shape))
-        counted = cv2.calcHist([shifts, pairs], [0, 1], None, [span, cells], [0, span, 0, cells])
-        return np.asarray(counted, np.float32).reshape(span, *sizes)
-
-    return all_at_once
-
-
-def _direct_cost(pixels: int, span: int, coded: bool) -> float:
-    if coded:
-        return span * (span * pixels * _CODED_PIXEL_COST + _CALL_COST)
+def _direct_cost(pixels: int, span: int) -> float:
     return span * span * (pixels * _PIXEL_COST + _CALL_COST)
 
 
@@ -206,20 +161,105 @@ def _spectral_cost(pixels: int, bins: tuple[int, int]) -> float:
     return bins[0] * bins[1] * pixels * np.log2(pixels) * _SPECTRAL_COST
 
 
+def _count_directly(
+    template: NDArray[np.uint8],
+    search: NDArray[np.uint8],
+    bins: tuple[int, int],
+    context: Context | None,
+) -> FloatArray:
+    """Count one shift after the other."""
+    height, width = template.shape
+    rows, cols = (s - t + 1 for s, t in zip(search.shape, template.shape, strict=True))
+    sizes = [n + 1 for n in bins]
+    ranges = [0, sizes[0], 0, sizes[1]]
+    counts = np.empty((rows, cols, *bins), np.float32)
+
+    def count_row(dy: int) -> None:
+        for dx in range(cols):
+            window = search[dy : dy + height, dx : dx + width]
+            counted = cv2.calcHist([template, window], [0, 1], None, sizes, ranges)
+            counts[dy, dx] = counted[: bins[0], : bins[1]]
+
+    for _ in (map if context is None else context.quiet().map)(count_row, range(rows)):
+        pass
+    return counts
+
+
 def _count_spectrally(
     template: NDArray[np.uint8], search: NDArray[np.uint8], bins: tuple[int, int], workers: int
 ) -> FloatArray:
-    """Count all shifts at once by correlating the planes of all bins with each other."""
+    """Count all shifts at once by correlating the planes of all bins with each other.
+
+    Counts are whole numbers: several bins of the search window, times powers of 2, share a plane,
+    and their counts are the digits of what is found.
+    """
     shape = [scipy.fft.next_fast_len(n, real=True) for n in search.shape]
     ny, nx = (s - t + 1 for s, t in zip(search.shape, template.shape, strict=True))
-    counts = np.empty((ny, nx, *bins), np.float32)
-    planes = np.stack([search == k for k in range(bins[1])]).astype(np.float32)
-    spectra = scipy.fft.rfft2(planes, shape, workers=workers)
-    for k in range(bins[0]):
-        spectrum = scipy.fft.rfft2((template == k).astype(np.float32), shape)
-        found = scipy.fft.irfft2(spectra * spectrum.conj(), shape, workers=workers)
-        counts[:, :, k] = found[:, :ny, :nx].transpose(1, 2, 0)
-    # Counts are whole numbers; what is left over is rounding, and so is the sign of zero.
-    np.rint(counts, out=counts)
-    np.abs(counts, out=counts)
-    return counts
+    digits = _Digits.of(template, search, bins)
+    own = (template == np.arange(bins[0])[:, None, None]).astype(digits.dtype)
+    other = np.take(digits.weights(bins[1]), search, axis=1)
+    # Rows that hold nothing, or are not asked for, are not transformed.
+    along_rows = scipy.fft.rfft(own, shape[1], workers=workers)
+    of_template = scipy.fft.fft(along_rows, shape[0], axis=-2, workers=workers).conj()
+    of_search = scipy.fft.rfft2(other, shape, workers=workers)
+    counts = np.empty((*bins, ny, nx), np.float32)
+    for spectrum, into in zip(of_template, counts, strict=True):
+        product = of_search * spectrum
+        lines = scipy.fft.ifft(product, axis=-2, overwrite_x=True, workers=workers)[:, :ny]
+        digits.read(scipy.fft.irfft(lines, shape[1], workers=workers)[:, :, :nx], into)
+    return np.moveaxis(counts, (0, 1), (2, 3))
+
+
+@dataclass(frozen=True)
+class _Digits:
+    """How counts of several bins are held by one floating-point number.
+
+    Parameters
+    ----------
+    dtype
+        Type of the number.
+    bits
+        Of each count.
+    count
+        How many counts a number holds.
+    """
+
+    dtype: type[np.floating]
+    bits: int
+    count: int
+
+    @classmethod
+    def of(
+        cls, template: NDArray[np.uint8], search: NDArray[np.uint8], bins: tuple[int, int]
+    ) -> _Digits:
+        """Return the digits that hold the counts of two binned windows exactly."""
+        own, other = (
+            max(int(np.bincount(window.ravel(), minlength=n)[:n].max()), 1)
+            for window, n in zip((template, search), bins, strict=True)
+        )
+        bits = min(own, other).bit_length()
+
+        def most(dtype: type[np.floating]) -> int:
+            rounding = float(np.finfo(dtype).eps) / 2 * math.sqrt(own * other)
+            spare = math.log2(_LARGEST_ROUNDING) - math.log2(rounding)
+            return min(1 + math.floor(spare / bits), bins[1])
+
+        single, double = most(np.float32), most(np.float64)
+        # Double precision takes twice the time, and more digits a little more.
+        if double <= 2.5 * single:
+            return cls(np.float32, bits, single)
+        return cls(np.float64, bits, max(double, 1))
+
+    def weights(self, bins: int) -> NDArray[np.floating]:
+        """Return what a pixel of each bin, and a masked one, adds to planes, (planes, bins + 1)."""
+        bin = np.arange(bins)
+        weights = np.zeros((-(-bins // self.count), bins + 1), self.dtype)
+        weights[bin // self.count, bin] = 2.0 ** (self.bits * (bin % self.count))
+        return weights
+
+    def read(self, planes: NDArray[np.floating], counts: FloatArray) -> None:
+        """Write what planes, shape (planes, …), hold as counts, shape (bins, …)."""
+        whole = np.rint(planes).astype(np.int32 if self.dtype is np.float32 else np.int64)
+        for digit in range(self.count):
+            part = counts[digit :: self.count]
+            part[:] = (whole[: len(part)] >> (digit * self.bits)) & ((1 << self.bits) - 1)

@@ -17,6 +17,7 @@ from ..rasters.patch import Patch
 from .correlation import MINIMUM_OVERLAP, overlap_share
 from .description import Description
 from .measures import MEASURES
+from .order_statistics import upper_median
 
 Surface = NDArray[np.float32]
 
@@ -63,17 +64,11 @@ class SimilaritySettings:
 
 def normalise(surface: Surface) -> Surface:
     """Return a surface in robust standard deviations from its median (median and MAD)."""
-    centred = surface - _median(surface)
-    spread = 1.4826 * _median(np.abs(centred))
+    centred = surface - upper_median(surface)
+    spread = 1.4826 * upper_median(np.abs(centred))
     if spread <= _FLAT:
         return np.zeros_like(surface)
     return (centred / np.float32(spread)).astype(np.float32)
-
-
-def _median(values: Surface) -> np.float32:
-    # Surfaces have an odd number of values; numpy's own median takes ten times as long for them.
-    middle = values.size // 2
-    return np.float32(np.partition(values, middle, axis=None)[middle])
 
 
 def detrend(surface: Surface, width_px: float = TREND_PX) -> Surface:

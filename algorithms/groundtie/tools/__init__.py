@@ -32,6 +32,7 @@ NAMES = (
     "mask_regions",
     "simulate",
     "simulate_sensor",
+    "doctor",
 )
 
 

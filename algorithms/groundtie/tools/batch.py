@@ -31,7 +31,7 @@ def batch(
         Choice(
             label="Tool",
             help="Name of the tool to run.",
-            choices=tuple(name for name in NAMES if name != "batch"),
+            choices=tuple(name for name in NAMES if name not in ("batch", "doctor")),
         ),
     ],
     table: Annotated[

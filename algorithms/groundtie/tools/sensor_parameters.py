@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from ..kinds import Band, Choice, Distance, FileIn, MaskIn, Number, RasterIn
-from ..sensor.heights import DATUMS
+from ..sensor.geoids import DATUMS
 from .registration_parameters import MASK_HELP
 
 SensorImage = Annotated[

@@ -1,0 +1,103 @@
+"""The Python packages that GroundTie uses: what for, and whether they are here.
+
+Nothing is imported from them, so that what is missing can be named.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import PurePath
+
+
+@dataclass(frozen=True)
+class Package:
+    """A distribution on the Python Package Index.
+
+    Parameters
+    ----------
+    name
+        Its name there.
+    oldest
+        The oldest version that will do.
+    module
+        What is imported of it, where that has another name.
+    debian
+        Debian's package, where that has another name than `python3-NAME`.
+    tools
+        The tools that need it; none, with no `files` either: all do.
+    files
+        Endings of the files that need it.
+    use
+        What else it is for, where GroundTie is whole without it.
+    extra
+        The extra of this package that brings it then.
+    """
+
+    name: str
+    oldest: str
+    module: str = ""
+    debian: str = ""
+    tools: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    use: str = ""
+    extra: str = ""
+
+    @property
+    def imported(self) -> str:
+        """The name of the module."""
+        return self.module or self.name
+
+    @property
+    def requirement(self) -> str:
+        """What pip is asked for."""
+        return f"{self.name}>={self.oldest}"
+
+    @property
+    def needed_by_all(self) -> bool:
+        """Whether no tool runs without it."""
+        return not (self.tools or self.files or self.use)
+
+    def found(self) -> bool:
+        """Whether its module is here; it may be broken."""
+        return importlib.util.find_spec(self.imported) is not None
+
+
+# A test compares them with pyproject.toml and with what is imported.
+PACKAGES = (
+    Package("numpy", "1.24"),
+    Package("scipy", "1.10"),
+    Package("rasterio", "1.3"),
+    Package("opencv-python-headless", "4.6", "cv2", "python3-opencv"),
+    Package("click", "8.1", use="the command line"),
+    Package("fiona", "1.9", tools=("coregister_series",), files=(".gpkg",)),
+    Package("jinja2", "3.1", files=(".html",)),
+    Package("matplotlib", "3.6", files=(".html", ".png")),
+    Package(
+        *("scikit-learn", "1.2", "sklearn", "python3-sklearn"), tools=("train_feature_classifier",)
+    ),
+    Package("shapely", "1.8", tools=("coregister_series",)),
+    Package("xarray", "2022.11", use="rasters as xarray's", extra="xarray"),
+    Package("rioxarray", "0.13", use="rasters as xarray's", extra="xarray"),
+    Package("geopandas", "0.12", use="tie points as a GeoDataFrame", extra="geopandas"),
+    Package("dask", "2022.12", use="batch on a Dask cluster", extra="cluster"),
+    Package("distributed", "2022.12", use="batch on a Dask cluster", extra="cluster"),
+    Package("pyyaml", "6.0", "yaml", use="tables of batch in YAML", extra="yaml"),
+)
+
+
+def missing(packages: Iterable[Package]) -> list[str]:
+    """Return the names of those of some packages that are not here."""
+    return [package.name for package in packages if not package.found()]
+
+
+def needed_by_all() -> list[Package]:
+    """Return what no tool runs without."""
+    return [package for package in PACKAGES if package.needed_by_all]
+
+
+def needed_for(tool: str, paths: Iterable[PurePath]) -> list[Package]:
+    """Return what a call of a tool needs besides: for itself, and for its files."""
+    endings = {path.suffix.lower() for path in paths}
+    return [p for p in PACKAGES if tool in p.tools or endings.intersection(p.files)]

@@ -1,0 +1,89 @@
+"""What rasters are called: files on disk, GDAL's own names, and what lies on other machines.
+
+The one place that tells them apart: whoever takes a raster asks here before it becomes a path.
+"""
+
+from __future__ import annotations
+
+import os
+import posixpath
+import re
+from collections.abc import Hashable
+from pathlib import Path, PurePosixPath
+from typing import Any
+from urllib.parse import urlsplit
+
+# GDAL's own names, such as /vsizip/a.zip/b.tif or HDF5:"a.h5"://b; C:\\… is a path.
+_GDAL_NAME = re.compile(r"/vsi|[A-Za-z][\w+.-]+:")
+
+# pathlib makes one slash of two.
+_URL = re.compile(r"(/vsicurl/)?(https?|ftp|s3|gs|az|abfss?|oss|file):/{1,2}(?=[^/]|/[^/])", re.I)
+
+# What reads a URL of each kind: GDAL's virtual file systems.
+_FILE_SYSTEMS = {
+    "http": "/vsicurl/http://",
+    "https": "/vsicurl/https://",
+    "ftp": "/vsicurl/ftp://",
+    "s3": "/vsis3/",
+    "gs": "/vsigs/",
+    "az": "/vsiaz/",
+    "abfs": "/vsiadls/",
+    "abfss": "/vsiadls/",
+    "oss": "/vsioss/",
+    "file": "",
+}
+
+# Those that read over a network, also inside of others, as /vsizip//vsicurl/….
+_REMOTE = re.compile(
+    r"/vsi(curl|s3|gs|az|adls|oss|swift|webhdfs|hdfs)(_streaming)?[/?]|\b(https?|ftp)://", re.I
+)
+
+
+def raster_name(value: str | os.PathLike[str]) -> Path | str:
+    """Return what a name means: a `Path` of a file, or GDAL's own name as text.
+
+    URLs become GDAL's names, also those that pathlib has shortened: `https://…` is read by
+    `/vsicurl/`, `s3://…` by `/vsis3/`, and so on. A file of that very name comes first.
+    """
+    text = os.fspath(value)
+    if os.path.lexists(text):
+        return Path(text)
+    if url := _URL.match(text):
+        kind, rest = url[2].lower(), text[url.end() :]
+        return f"{_FILE_SYSTEMS[kind]}{rest}" if kind != "file" else Path(f"/{rest.lstrip('/')}")
+    # A path is what it states; only GDAL's virtual file systems look like one.
+    is_text = isinstance(value, str) and _GDAL_NAME.match(text)
+    return text if is_text or text.startswith("/vsi") else Path(text)
+
+
+def located(name: str, beside: Path | str) -> Path | str:
+    """Return what a name means that stands in a file, relative to where that file lies."""
+    found = raster_name(name)
+    if isinstance(found, str):
+        return found
+    if isinstance(beside, Path):
+        return beside.parent / found
+    system, mark, path = beside.rpartition("://")
+    folder = path.partition("?")[0].rpartition("/")[0]
+    # From the server's root where it begins with a slash.
+    start = folder.partition("/")[0] if mark and name.startswith("/") else folder
+    return f"{system}{mark}{posixpath.normpath(f'{start}/{name}')}"
+
+
+def is_remote(name: Path | str) -> bool:
+    """Return whether a raster is read over a network."""
+    return isinstance(name, str) and _REMOTE.search(name) is not None
+
+
+def file_name(name: Any) -> str:
+    """Return the last part of a name, without the query of a URL."""
+    text = os.fspath(name)
+    if is_remote(text):
+        return PurePosixPath(urlsplit(text).path).name
+    return Path(text).name
+
+
+def identity(name: Path | str) -> Hashable:
+    """Return what is the same for two names of one raster."""
+    found = raster_name(name)
+    return found.resolve() if isinstance(found, Path) else found

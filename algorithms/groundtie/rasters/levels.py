@@ -1,0 +1,191 @@
+"""Overviews of remote rasters, read in place of pixels that would be averaged.
+
+Only those whose pixels are seen to be means of the level before: picked ones lie off by half a
+pixel, and show what averaging would have taken away.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+
+from .averaging import area_average, average_by_strips
+from .grid import compose
+from .handles import FileHandles
+from .windows import Mask, Window
+
+if TYPE_CHECKING:
+    from .reading import RasterSource
+
+FloatArray = NDArray[np.float64]
+Read = Callable[["RasterSource", Window], tuple[NDArray[Any], Mask]]
+
+# Pixels of a side that are looked at to see how an overview was made, in places of the image.
+_SAMPLE_PX = 64
+_PLACES = (0.75, 0.5, 0.25)
+
+
+@dataclass
+class Levels:
+    """The overviews of one raster file.
+
+    Parameters
+    ----------
+    count
+        How many there are.
+    """
+
+    count: int
+    _lock: threading.Lock = field(init=False, repr=False, default_factory=threading.Lock)
+    _known: list[RasterSource] = field(init=False, repr=False, default_factory=list)
+    _is_complete: bool = field(init=False, repr=False, default=False)
+
+    def coarsest(self, source: RasterSource, reduction: float) -> RasterSource:
+        """Return the smallest image of a raster that still has to be reduced, or just not.
+
+        Parameters
+        ----------
+        source
+            The raster itself.
+        reduction
+            By how much its pixels are to be made larger.
+        """
+        with self._lock:
+            if not self._known:
+                self._known.append(source)
+            while not self._is_complete and _factor(source, self._known[-1]) * 2 <= reduction:
+                self._add_next()
+            small = [one for one in self._known if _factor(source, one) <= reduction]
+        return small[-1]
+
+    def close(self) -> None:
+        """Close the files of all overviews."""
+        with self._lock:
+            for one in self._known[1:]:
+                one.close()
+
+    def _add_next(self) -> None:
+        before, number = self._known[-1], len(self._known) - 1
+        found = None if number == self.count else _overview(self._known[0], number)
+        if found is None or not _is_mean_of(found, before):
+            self._is_complete = True
+        else:
+            self._known.append(found)
+
+
+def average_of(
+    read: Read, source: RasterSource, level: RasterSource, window: Window, shape: tuple[int, int]
+) -> tuple[NDArray[Any], Mask]:
+    """Return a window of a raster as means over larger pixels.
+
+    Parameters
+    ----------
+    read
+        Returns values and validity of a window of the raster or of a level, (bands, h, w).
+    source, level
+        The raster, and the image of it that is read; both may be the same.
+    window
+        In pixels of the raster.
+    shape
+        Height and width of the result.
+    """
+    starts, edges = [], []
+    axes = (
+        (source.grid.height, level.grid.height, window.row, window.height, shape[0]),
+        (source.grid.width, level.grid.width, window.col, window.width, shape[1]),
+    )
+    for whole, reduced, first, side, count in axes:
+        start = int(np.floor(first * reduced / whole))
+        starts.append(start)
+        edges.append(np.linspace(0, side, count + 1))
+        if whole != reduced:
+            edges[-1] = (first + edges[-1]) * reduced / whole - start
+    width = int(np.ceil(edges[1][-1]))
+
+    def read_lines(first: int, lines: int) -> tuple[NDArray[Any], Mask]:
+        return read(level, Window(starts[1], starts[0] + first, width, lines))
+
+    return average_by_strips(read_lines, edges[0], edges[1])
+
+
+def _factor(source: RasterSource, level: RasterSource) -> float:
+    return max(
+        source.grid.width / level.grid.width,
+        source.grid.height / level.grid.height,
+    )
+
+
+def _overview(source: RasterSource, number: int) -> RasterSource | None:
+    """Return an overview as a raster; None if it is too small to be told how it was made."""
+    handles = FileHandles(source.path, number)
+    with handles.borrow() as dataset:
+        width, height = dataset.width, dataset.height
+    if min(width, height) < _SAMPLE_PX:
+        return None
+    larger = Affine.scale(source.grid.width / width, source.grid.height / height)
+    transform = compose(source.grid.transform, larger)
+    grid = replace(source.grid, transform=transform, width=width, height=height)
+    return replace(source, grid=grid, _handles=handles, _levels=None)
+
+
+def _is_mean_of(level: RasterSource, before: RasterSource) -> bool:
+    """Return whether an overview's pixels are nearest to means of those below.
+
+    Others would be picked ones, or means about another place, as those of wavelets are.
+    """
+    band = level.image_bands[0]
+    for place in _PLACES:
+        col, row = (
+            int((side - _SAMPLE_PX) * place) for side in (level.grid.width, level.grid.height)
+        )
+        values, valid = level.read_bands(Window(col, row, _SAMPLE_PX, _SAMPLE_PX), [band])
+        x, y = before.grid.width / level.grid.width, before.grid.height / level.grid.height
+        cols, rows = (np.arange(_SAMPLE_PX + 1, dtype=np.float64) + first for first in (col, row))
+        candidates = [
+            _mean(before, band, rows * y, cols * x),
+            _mean(before, band, rows * y - 0.5, cols * x - 0.5),
+            _picked(before, band, rows[:-1] * y, cols[:-1] * x),
+        ]
+        if (x, y) != (round(x), round(y)):
+            candidates.append(_mean(before, band, rows * round(y), cols * round(x)))
+        valid &= np.all([known for _, known in candidates], axis=0)
+        misses = [float(np.abs(image - values)[valid].sum()) for image, _ in candidates]
+        if misses[0] < min(misses[1:]):
+            return True
+        if misses[0] > 0:
+            return False
+    return False  # nothing but one value: no place states how it was made
+
+
+def _mean(
+    source: RasterSource, band: int, rows: FloatArray, cols: FloatArray
+) -> tuple[NDArray[Any], Mask]:
+    """Return means between edges, shape (1, n, n)."""
+    values, valid, top, left = _around(source, band, rows, cols)
+    means, known = area_average(values, valid, rows - top, cols - left)
+    return means[None], known[None]
+
+
+def _picked(
+    source: RasterSource, band: int, rows: FloatArray, cols: FloatArray
+) -> tuple[NDArray[Any], Mask]:
+    """Return the pixels that GDAL's `nearest` picks, shape (1, n, n): the first of each block."""
+    values, valid, top, left = _around(source, band, rows, cols)
+    at = np.ix_((rows + 0.5).astype(int) - top, (cols + 0.5).astype(int) - left)
+    return values[at][None], valid[at][None]
+
+
+def _around(
+    source: RasterSource, band: int, rows: FloatArray, cols: FloatArray
+) -> tuple[NDArray[Any], Mask, int, int]:
+    top, left = int(rows[0]) - 1, int(cols[0]) - 1
+    window = Window(left, top, int(cols[-1]) + 2 - left, int(rows[-1]) + 2 - top)
+    values, valid = source.read_bands(window, [band])
+    values = np.abs(values[0]) if source.is_complex else values[0].astype(np.float64)
+    return values, valid[0], top, left

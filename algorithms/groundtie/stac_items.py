@@ -1,0 +1,146 @@
+"""STAC items as inputs: local JSON or over HTTP, of which an asset is a raster.
+
+Plain JSON is read, of any version of STAC: what is needed has not changed since 1.0
+(https://github.com/radiantearth/stac-spec).
+"""
+
+from __future__ import annotations
+
+import http.client
+import urllib.error
+import urllib.request
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .errors import ParameterError
+from .raster_names import file_name, located
+from .strict_json import parse_json
+
+SUFFIXES = (".json", ".geojson")
+
+# Of files that are rasters, whatever an item states of their type.
+RASTER_SUFFIXES = (".tif", ".tiff", ".jp2", ".vrt", ".img")
+
+# A server that is silent for so long does not answer any more.
+SILENT_SECONDS = 30
+
+
+@dataclass(frozen=True)
+class StacItem:
+    """An item of a catalogue.
+
+    Parameters
+    ----------
+    id
+        What it is called.
+    time
+        When it was taken, as it states it; None: not stated.
+    assets
+        What it has, by name.
+    place
+        Where the JSON lies.
+    """
+
+    id: str
+    time: str | None
+    assets: Mapping[str, Any]
+    place: Path | str
+
+    def raster(self, asset: str | None) -> Path | str:
+        """Return an asset's file or GDAL's name of it; None takes the only one that is a raster.
+
+        Raises
+        ------
+        ParameterError
+            There is no such asset, or none or several are rasters.
+        """
+        rasters = [name for name, one in self.assets.items() if _is_raster(one)]
+        if asset is None and len(rasters) != 1:
+            raise ParameterError(
+                f"{self.place}: the item {self.id} has {len(rasters)} rasters; name one of its "
+                f"assets, as {file_name(self.place)}#NAME: {', '.join(sorted(self.assets))}"
+            )
+        name = rasters[0] if asset is None else asset
+        if name not in self.assets:
+            raise ParameterError(f"{self.place}: the item {self.id} has no asset {name}")
+        return located(str(self.assets[name]["href"]), self.place)
+
+
+def is_item(name: Path | str) -> bool:
+    """Return whether a name is one of JSON, with an asset of it or without."""
+    return Path(file_name(_split(name)[0])).suffix.lower() in SUFFIXES
+
+
+def raster_of_item(name: Path | str) -> Path | str:
+    """Return what `item.json#asset`, or `item.json` with one raster, stands for; others as is.
+
+    Raises
+    ------
+    ParameterError
+        The item cannot be read, is one of several, or has no such asset.
+    """
+    if not is_item(name) or (isinstance(name, Path) and "#" not in name.name and not name.exists()):
+        return name  # a file that is not there is none of a catalogue
+    items, asset = read_items(name)
+    if len(items) != 1:
+        raise ParameterError(f"{name} has {len(items)} items; one is needed")
+    return items[0].raster(asset)
+
+
+def read_items(name: Path | str) -> tuple[list[StacItem], str | None]:
+    """Return the items of a JSON file, and the asset that its name names after a #.
+
+    Raises
+    ------
+    ParameterError
+        It cannot be read, or is no STAC item or item collection.
+    """
+    place, asset = _split(name)
+    try:
+        content = parse_json(_read(place))
+    except (OSError, ValueError, http.client.HTTPException) as error:
+        raise ParameterError(f"cannot read the STAC file {place}: {error}") from error
+    stated = content if isinstance(content, dict) else {}
+    items = [stated] if stated.get("type") == "Feature" else stated.get("features")
+    if not isinstance(items, list):
+        raise ParameterError(f"{place} is no STAC item or item collection")
+    try:
+        return [_item(place, item) for item in items], asset
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ParameterError(f"{place} is no STAC item: {error!r}") from error
+
+
+def _item(place: Path | str, item: Mapping[str, Any]) -> StacItem:
+    time = (item.get("properties") or {}).get("datetime")
+    assets = {str(name): {"href": one["href"], **one} for name, one in item["assets"].items()}
+    return StacItem(str(item["id"]), None if time is None else str(time), assets, place)
+
+
+def _split(name: Path | str) -> tuple[Path | str, str | None]:
+    """Return a name without the asset behind its #, and that."""
+    text, mark, asset = str(name).rpartition("#")
+    if not mark or (isinstance(name, Path) and name.exists()):
+        return name, None
+    return (Path(text) if isinstance(name, Path) else text), asset
+
+
+def _read(place: Path | str) -> bytes:
+    if isinstance(place, Path):
+        return place.read_bytes()
+    url = place.removeprefix("/vsicurl/")
+    if not url.startswith(("http://", "https://")):
+        raise ValueError("STAC items are read from disk and by http only")
+    try:
+        with urllib.request.urlopen(url, timeout=SILENT_SECONDS) as answer:
+            return bytes(answer.read())
+    except urllib.error.HTTPError as error:
+        error.close()
+        raise
+
+
+def _is_raster(asset: Mapping[str, Any]) -> bool:
+    kind, href = str(asset.get("type") or ""), str(asset["href"])
+    is_image = kind.startswith("image/") and kind not in ("image/png", "image/jpeg")
+    return is_image or (not kind and Path(file_name(href)).suffix.lower() in RASTER_SUFFIXES)

@@ -1,0 +1,46 @@
+"""The models that the plugin ships: chains of tools, to run and to begin own models with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from qgis.core import QgsProcessingModelAlgorithm
+from qgis.PyQt.QtGui import QIcon
+
+from .library import FOLDER
+from .pages import help_url
+from .styling import ICON
+
+MODELS = FOLDER / "models"
+
+
+class ShippedModel(QgsProcessingModelAlgorithm):
+    """The model of a file; its tools are looked for when a copy is made to be run.
+
+    QGIS has one text for a model's name and its title; here the title is in its help.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._path = path
+        self.fromFile(str(path))
+
+    def createInstance(self) -> ShippedModel:
+        return ShippedModel(self._path)
+
+    def displayName(self) -> str:
+        return str(self.helpContent()["TITLE"])
+
+    def helpUrl(self) -> str:
+        return help_url("models")
+
+    def icon(self) -> QIcon:
+        return QIcon(str(ICON))
+
+    def svgIconPath(self) -> str:
+        return str(ICON)
+
+
+def load_models() -> list[ShippedModel]:
+    """Return all models that are shipped."""
+    return [ShippedModel(path) for path in sorted(MODELS.glob("*.model3"))]

@@ -1,0 +1,42 @@
+"""Against numpy's own, digit by digit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from groundtie.similarity.order_statistics import median, quantiles, upper_median
+
+SIZES = (1, 2, 3, 10, 4095, 4096)
+
+
+def sample(size: int, dtype: str = "float32") -> np.ndarray:
+    return np.random.default_rng(size).normal(1000, 300, size).astype(dtype)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_the_median_is_numpys(size: int, dtype: str) -> None:
+    values = sample(size, dtype)
+    assert median(values) == np.median(values)
+    assert np.asarray(median(values)).dtype == dtype
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_upper_median_is_a_value(size: int) -> None:
+    values = sample(size)
+    assert upper_median(values) == np.sort(values)[size // 2]
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("count", [1, 7, 12])
+def test_quantiles_are_numpys(size: int, count: int) -> None:
+    values, shares = sample(size), np.arange(1, count + 1) / (count + 1)
+    np.testing.assert_array_equal(quantiles(values, shares), np.quantile(values, shares))
+
+
+def test_images_are_taken_as_a_whole() -> None:
+    values = sample(4096).reshape(64, 64)
+    assert median(values) == np.median(values)
+    assert upper_median(values) == upper_median(values.ravel())
+    np.testing.assert_array_equal(quantiles(values, np.ones(1)), [values.max()])

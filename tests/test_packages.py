@@ -1,0 +1,48 @@
+"""The list of packages is that of pyproject.toml, and knows what each is needed for."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from groundtie.packages import PACKAGES, missing, needed_by_all, needed_for
+from groundtie.tools import NAMES
+
+PYPROJECT = Path(__file__).resolve().parents[1] / "pyproject.toml"
+
+
+def test_it_is_what_pyproject_declares() -> None:
+    tomllib = pytest.importorskip("tomllib", reason="reading pyproject.toml needs Python 3.11")
+    project = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))["project"]
+    declared = dict.fromkeys(project["dependencies"], "")
+    for extra, requirements in project["optional-dependencies"].items():
+        if extra != "dev":
+            declared |= dict.fromkeys(requirements, extra)
+    assert {package.requirement: package.extra for package in PACKAGES} == declared
+
+
+def test_what_needs_a_package_exists() -> None:
+    for package in PACKAGES:
+        assert set(package.tools) <= set(NAMES)
+        assert all(re.fullmatch(r"\.[a-z]+", ending) for ending in package.files)
+        assert not package.extra or package.use
+
+
+def test_calls_need_what_their_tool_and_their_files_need() -> None:
+    def names(tool: str, *files: str) -> list[str]:
+        return [package.name for package in needed_for(tool, map(Path, files))]
+
+    assert names("coregister", "o.tif") == []
+    assert names("coregister", "o.tif", "p.GPKG", "r.html") == ["fiona", "jinja2", "matplotlib"]
+    assert names("train_feature_classifier") == ["scikit-learn"]
+    assert {"numpy", "rasterio"} <= {package.name for package in needed_by_all()}
+    assert "click" not in {package.name for package in needed_by_all()}
+
+
+def test_what_is_not_here_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert missing(needed_by_all()) == []
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    assert missing(needed_by_all()) == ["opencv-python-headless"]
