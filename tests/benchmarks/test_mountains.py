@@ -11,7 +11,7 @@ from benchmark_outcomes import outcome
 from benchmarks import mountains
 from benchmarks.accuracy import CORRECT, REFUSED, SILENTLY_WRONG
 from benchmarks.attempt import Pair
-from benchmarks.mountains import NEEDLESS, WITH, WITHOUT
+from benchmarks.mountains import ELSEWHERE, LIT, NEEDLESS, WITH, WITHOUT
 
 
 def test_only_what_is_needless_was_made_with_right_heights() -> None:
@@ -19,7 +19,7 @@ def test_only_what_is_needless_was_made_with_right_heights() -> None:
         way: dict(mountains.mountain("hilly", "SAR", way, 1).further)["terrain_error"]
         for way in mountains.WAYS
     }
-    assert errors == {WITHOUT: 30.0, WITH: 30.0, NEEDLESS: 0.0}
+    assert errors == {WITHOUT: 30.0, WITH: 30.0, NEEDLESS: 0.0, LIT: 0.0, ELSEWHERE: 0.0}
     assert mountains.mountain("hilly", "SAR", WITH, 1) == mountains.mountain(
         "hilly", "SAR", WITHOUT, 1
     )
@@ -28,9 +28,11 @@ def test_only_what_is_needless_was_made_with_right_heights() -> None:
 def test_heights_that_are_given() -> None:
     pair = Pair(Path("a/reference.tif"), Path("a/input.tif"))
     dem, taken = Path("a/dem.tif"), Path("a/input_dem.tif")
-    assert mountains.heights(pair, WITHOUT) == {}
-    assert mountains.heights(pair, WITH) == {"dem": dem, "input_dem": taken}
-    assert mountains.heights(pair, NEEDLESS) == {"dem": dem, "input_dem": None}
+    assert mountains.further(pair, "SAR", WITHOUT) == {}
+    assert mountains.further(pair, "SAR", WITH) == {"dem": dem, "input_dem": taken}
+    assert mountains.further(pair, "SAR", NEEDLESS) == {"dem": dem, "input_dem": None}
+    assert mountains.further(pair, "SAR", LIT) == {"light": "radar"}
+    assert mountains.further(pair, "optical", ELSEWHERE) == {"light": "sun"}
 
 
 @pytest.mark.parametrize(
@@ -43,6 +45,11 @@ def test_heights_that_are_given() -> None:
         ("mountains", WITH, [math.nan], [False, True]),
         ("mountains", WITH, [5.0, 0.1], [False, False]),
         ("mountains", WITHOUT, [2.9], [None, True]),
+        ("hilly", LIT, [0.9], [True, True]),
+        ("hilly", LIT, [1.1], [False, True]),
+        ("flat", LIT, [0.1], [False]),
+        ("flat", LIT, [math.nan], [True]),
+        ("hilly", ELSEWHERE, [math.nan], [True]),
     ],
 )
 def test_goals(country: str, way: str, errors: list[float], expected: list[bool | None]) -> None:
