@@ -127,7 +127,7 @@ def run(settings: Settings) -> SuiteResult:
     outcomes = run_cases([MountainCase(*scene, settings.cache) for scene in scenes], settings.jobs)
     groups = {group(*kind): [o for o in outcomes if o.group == group(*kind)] for kind in kinds}
     return SuiteResult(
-        f"Terrain wrong by {ERROR_M:g} m, or the reference: {SIZE_PX}×{SIZE_PX} px of {PIXEL_M:g} m",
+        f"Terrain wrong by {ERROR_M:g} m, or the reference: {SIZE_PX}² px of {PIXEL_M:g} m",
         [goal for kind in kinds for goal in goals(*kind, groups[group(*kind)])],
         (models_table(groups), accuracy_table("By country", groups)),
         [outcome.record() for outcome in outcomes],

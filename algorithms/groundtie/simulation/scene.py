@@ -184,6 +184,9 @@ def _terrain(options: SceneOptions, shape: tuple[int, int]) -> npt.NDArray[np.fl
     terrain = np.zeros(shape, np.float32)
     if options.relief_m == 0:
         return terrain
+    if options.slope_deg is not None:
+        # Above the sea: whoever reads heights takes those below all land for voids.
+        terrain += options.relief_m
     for octave, (cell_m, sigma_m) in enumerate(_octaves(options)):
         cell_px = max(cell_m / options.pixel_size_m, _LEAST_CELL_PX)
         noise = SmoothNoise.draw(
