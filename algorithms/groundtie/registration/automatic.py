@@ -29,7 +29,7 @@ from .rules import RULES
 from .scene import SceneInfo
 from .sensor_input import Ground, open_sensor_image
 from .sensor_jobs import RefinedRpc, refine
-from .specification import COREGISTER, OPTICAL, SAR_SAR, FreeSearch, Specification
+from .specification import CHIPS, COREGISTER, OPTICAL, SAR_SAR, FreeSearch, Specification
 from .verdict import Verdict
 
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
@@ -168,6 +168,8 @@ def _first_accepted(
         scene = SceneInfo.of(opened.pair)
         is_georeferenced = opened.pair.input.source.grid.is_georeferenced
         ways = ways or plan(scene, is_georeferenced)
+        if asked["dem"] is not None:
+            ways = tuple(way for way in ways if way.spec.matcher == CHIPS)
         found = []
         for number, way in enumerate(ways, start=1):
             part = context.part((number - 1) / len(ways), number / len(ways))
