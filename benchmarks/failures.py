@@ -276,11 +276,10 @@ def jobs(scene: Path) -> Iterator[Job]:
     yield tool(groundtie.mask_threshold, "out.tif", reference)
     yield tool(
         groundtie.orthorectify,
-        "out.tif",
+        "out.cog.tif",
         sensor / "sensor.tif",
         dem=sensor / "dem.tif",
         dem_datum="ellipsoidal",
-        cog=True,
         workers=2,
     )
 

@@ -33,18 +33,32 @@ CORRECT_PX, WRONG_PX = 2.0, 3.0
 
 @dataclass(frozen=True)
 class Run:
-    """A tool, the file that it writes, and the parameters that differ from their defaults."""
+    """A tool, the file that it writes, and the parameters that differ from their defaults.
+
+    Those that are paths name a file of the scene.
+    """
 
     tool: str
     output: str
     parameters: Mapping[str, Any] = field(default_factory=dict)
 
+    def on(self, scene: Path) -> dict[str, Any]:
+        """Return the parameters for the scene in a folder."""
+        given = self.parameters.items()
+        return {name: scene / v if isinstance(v, Path) else v for name, v in given}
+
 
 _RPC = "refined_RPC.TXT"
-REFINED, MASKED, EXTRACTED = "refine_rpc", "refine_rpc, mask=regions", "extract_gcps"
+REFINED, MASKED, MODELLED, EXTRACTED = (
+    "refine_rpc",
+    "refine_rpc, mask=regions",
+    "refine_rpc, surface model",
+    "extract_gcps",
+)
 RUNS = {
     REFINED: Run("refine_rpc", _RPC),
     MASKED: Run("refine_rpc", _RPC, {"mask": "regions"}),
+    MODELLED: Run("refine_rpc", _RPC, {"surface_model": Path("dsm.tif")}),
     EXTRACTED: Run("extract_gcps", "points.csv"),
 }
 
@@ -138,7 +152,7 @@ class CityCase:
             dem=scene / "dem.tif",
             dem_datum="ellipsoidal",
             workers=workers,
-            **run.parameters,
+            **run.on(scene),
         )
 
 

@@ -19,6 +19,7 @@ SUITES = (
     "crossings",
     "simulated",
     "city",
+    "towns",
     "layover",
     "masks",
     "large_shift",
@@ -53,7 +54,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--seeds",
         type=_seeds,
         default=(1, 20),
-        help="simulated pairs of each kind; for attacks and calibration also a range, A-B",
+        help="simulated pairs of each kind; for attacks, calibration and towns also a range, A-B",
     )
     parser.add_argument(
         "--jobs",

@@ -32,8 +32,8 @@ class Settings:
     cache
         Folder of simulated pairs, which take long to make.
     first_seed, sample, classes, case, save
-        Of `attacks` alone: the first of the seeds; how many cases, of all classes; which classes;
-        one case by its name; a folder for the images of what is run.
+        The first of the seeds, of attacks, calibration and towns; of attacks alone: how many cases,
+        of all classes; which classes; one case by its name; a folder for the images of what is run.
     """
 
     quick: bool

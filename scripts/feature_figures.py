@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 import groundtie
+from groundtie.masks.surface_model import Seen
 from groundtie.rasters.patch import Patch
 from groundtie.studies.sift_variants import sift_detector
 from scripts.drawing import BLUE, GREY, ORANGE, FloatArray, Scenes, canvas, read_band, stretched
@@ -67,6 +68,46 @@ def masks(scenes: Scenes) -> Figure:
         colours[taken[window] == 0] = (0.84, 0.37, 0.0)
         each.imshow(colours)
         each.set_title(f"{name}: {np.mean(taken > 0):.0%} take part", fontsize=9)
+    return figure
+
+
+def surface_model(scenes: Scenes) -> Figure:
+    """What of a city's ground radar and camera do not show, by its surface model."""
+    folder, window = scenes.city(), np.s_[90:310:2, 90:310:2]
+    files = [scenes.folder / f"{name}.tif" for name in ("surface", "reasons", "aligned")]
+    radar, camera = folder / "reference.tif", folder / "input.tif"
+    groundtie.mask_surface(
+        radar,
+        folder / "dsm.tif",
+        files[0],
+        reasons=files[1],
+        input_view=str(folder / "input.json"),
+    )
+    groundtie.warp(camera, files[2], transform=folder / "truth.json", reference=radar)
+    taken, why, seen = (read_band(path)[window] for path in files)
+    power = cv2.blur(read_band(radar) ** 2, (3, 3))
+    greys = stretched(np.log(power + 1.0))[window], stretched(seen)
+    shown = greys[0], greys[0], greys[1], greys[1] * taken
+    tints = (
+        (),
+        ((Seen.RADAR_SHADOW, (0.0, 0.45, 0.7)), (Seen.LAYOVER, (0.84, 0.37, 0.0))),
+        ((Seen.CAST_SHADOW, (0.0, 0.45, 0.7)), (Seen.HIDDEN, (0.84, 0.37, 0.0))),
+        (),
+    )
+    titles = (
+        "radar image",
+        "layover, radar shadow",
+        "hidden, cast shadow",
+        f"{np.mean(taken > 0):.0%} take part",
+    )
+    figure, axes = canvas(8, 2.3, 4)
+    for each, grey, tint, title in zip(axes, shown, tints, titles, strict=True):
+        colours = np.repeat(grey[:, :, None], 3, axis=2)
+        for reason, colour in tint:
+            chosen = (why.astype(int) & reason) > 0
+            colours[chosen] = 0.4 * colours[chosen] + 0.6 * np.array(colour)
+        each.imshow(colours)
+        each.set_title(title, fontsize=9)
     return figure
 
 

@@ -16,7 +16,7 @@ if not __package__:
 
 from scripts.calibration_figures import calibration
 from scripts.drawing import Scenes, write
-from scripts.feature_figures import features, hog, masks
+from scripts.feature_figures import features, hog, masks, surface_model
 from scripts.search_figures import propagation, rotation, search, similarity
 from scripts.series_figures import series
 from scripts.verdict_figures import pipeline, rpc, survey, verdict
@@ -35,6 +35,7 @@ DRAWN: Mapping[str, Callable[[Scenes], Figure]] = {
     "method-rotation": rotation,
     "method-rpc": rpc,
     "method-series": series,
+    "method-surface-model": surface_model,
     "method-survey": survey,
     "method-verdict": verdict,
 }

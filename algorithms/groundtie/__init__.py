@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from .tools.extract_gcps import extract_gcps
     from .tools.filter_speckle import filter_speckle
     from .tools.mask_regions import mask_regions
+    from .tools.mask_surface import mask_surface
     from .tools.mask_threshold import mask_threshold
     from .tools.match_optical import match_optical
     from .tools.match_sar_sar import match_sar_sar
@@ -56,6 +57,7 @@ __all__ = [
     "filter_speckle",
     "load_transform",
     "mask_regions",
+    "mask_surface",
     "mask_threshold",
     "match_optical",
     "match_sar_sar",

@@ -7,6 +7,7 @@ points: no fit sees them, whatever is done to them.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -23,12 +24,16 @@ from .geometry.models import KINDS, PARAMETERS
 from .geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
 from .geometry.tie_points import USED, TiePoints
 from .geometry.transform import Transform
+from .progress import SILENT
 from .rasters.atomic import Outputs
 from .rasters.grid import Grid, compose
 from .rasters.pair import Image
 from .rasters.reading import open_raster
+from .registration.sensor_input import Ground, open_oriented_image
 from .registration.tie_point_evidence import TiePointEvidence
 from .registration.verdict import first_refusal
+from .sensor.control_points import HEIGHT
+from .sensor.orientation import sensor_grid
 from .similarity.description import BORDER_PX
 from .similarity.peak import Peak, find_peak
 from .steps import similarity_surface
@@ -135,9 +140,11 @@ class Review:
         for name, place in columns.items():
             if place is not None:
                 moved[name][index] = place
-        edited = self.edited.astype(float)
-        edited[index] = 1.0
-        more = {**self.points.more, EDITED: edited}
+        more = {**self.points.more, EDITED: self.edited.astype(float)}
+        more[EDITED][index] = 1.0
+        if HEIGHT in more and reference_xy is not None:  # the ground has another one there
+            more[HEIGHT] = more[HEIGHT].copy()
+            more[HEIGHT][index] = np.nan
         return replace(self, points=replace(self.points, **moved, more=more))
 
     def add(self, reference_xy: ArrayLike, input_px: ArrayLike, score: float = np.nan) -> Review:
@@ -235,6 +242,35 @@ def without_points(reference: Any, input: Any) -> Review:
         return Review(replace(TiePoints.none(), crs=one.grid.crs), other.grid)
 
 
+def of_sensor_image(
+    reference: Any, image: Any, rpc: Path, dem: Path | None, datum: str | None, path: Path | None
+) -> Review:
+    """Return the review of an image with RPCs, located by RPCs in a file and a terrain model.
+
+    Parameters
+    ----------
+    reference
+        The reference, whose map it is.
+    image, rpc, dem, datum
+        The image, its RPCs, a terrain model and what its heights count from.
+    path
+        Ground control; None: there is none yet.
+
+    Raises
+    ------
+    GroundTieError
+        Image, heights or points cannot be used.
+    """
+    with ExitStack() as stack:
+        crs = stack.enter_context(open_raster(reference)).grid.crs
+        ground = Ground(dem, datum, None, None)
+        oriented = open_oriented_image(image, rpc, ground, crs, stack, SILENT)
+        grid = sensor_grid(oriented.source, oriented.orientation)
+        if path is None:
+            return Review(replace(TiePoints.none(), crs=crs), grid)
+        return Review(read_tie_points(path, grid, (HEIGHT,)), grid)
+
+
 def refine_click(
     reference: Any, input: Any, reference_xy: ArrayLike, input_px: ArrayLike, transform: Transform
 ) -> tuple[FloatArray, Peak]:
@@ -256,8 +292,8 @@ def refine_click(
     """
     xy, px = np.asarray(reference_xy, float), np.asarray(input_px, float)
     offset = px - transform(xy)
-    with open_raster(reference) as one, open_raster(input) as other:
-        factor = max(1.0, other.grid.pixel_size_m / one.grid.pixel_size_m)
+    with open_raster(reference) as one, open_raster(input, allow_sensor_geometry=True) as other:
+        factor = max(1.0, transform.input_grid.pixel_size_m / one.grid.pixel_size_m)
         grid = one.grid if factor < 1.01 else one.grid.scaled(factor)
         side = _CHIP_PX + 2 * (_CLICK_PX + BORDER_PX) + 1
         here = grid.map_to_pixel(xy).ravel()

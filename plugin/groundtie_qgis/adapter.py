@@ -23,7 +23,8 @@ from .library import LazyTool, errors, kinds, plugin_metadata, progress
 from .pages import help_url
 from .preselection import NOTHING, preselect
 from .results import forget_layers, load_on_completion, show_report
-from .styling import ICON, LoadedLayers
+from .styling import LoadedLayers, icon_of
+from .translation import tr
 from .unavailable import UnavailableAlgorithm, broken, named_tools
 from .values import Reader, with_layers_as_files
 from .wording import in_words
@@ -50,19 +51,19 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         return str(self._tool.name)
 
     def displayName(self) -> str:
-        return str(self._tool.title)
+        return tr(self._tool.title)
 
     def group(self) -> str:
-        return str(self._tool.group)
+        return tr(self._tool.group)
 
     def groupId(self) -> str:
-        return self.group().lower().replace(" ", "_")
+        return str(self._tool.group).lower().replace(" ", "_")
 
     def tags(self) -> list[str]:
         return [tag.strip() for tag in plugin_metadata().get("tags", "").split(",") if tag]
 
     def shortDescription(self) -> str:
-        return str(self._tool.summary)
+        return tr(self._tool.summary)
 
     def shortHelpString(self) -> str:
         return help_html(self._tool)
@@ -71,29 +72,29 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         return help_url(self.name())
 
     def icon(self) -> QIcon:
-        return QIcon(str(ICON))
+        return QIcon(self.svgIconPath())
 
     def svgIconPath(self) -> str:
-        return str(ICON)
+        return str(icon_of(self.name()))
 
     def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:
         if isinstance(self._tool, LazyTool) and not self._tool.loaded():
             return  # the provider's own: what runs, or shows a dialog, is made from it
         for parameter in self._tool.parameters:
             made = definition(parameter)
-            made.setHelp(in_words(parameter.kind.help, self._tool, named_tools()))
+            made.setHelp(in_words(tr(parameter.kind.help), self._tool, named_tools()))
             self.addParameter(made)
         preselect(self, self._tool)
         for output in self._tool.outputs:
             made = QgsProcessingOutputString if output.text else QgsProcessingOutputNumber
-            self.addOutput(made(qgis_name(output.name), output.label))
+            self.addOutput(made(qgis_name(output.name), tr(output.label)))
 
     def checkParameterValues(
         self, parameters: dict[str, Any], context: QgsProcessingContext
     ) -> tuple[bool, str]:
         for parameter in self._tool.parameters:
             if parameters.get(qgis_name(parameter.name)) == NOTHING:
-                return False, f"{parameter.kind.label} is missing"
+                return False, tr("{} is missing").format(tr(parameter.kind.label))
         valid, message = super().checkParameterValues(parameters, context)
         if not valid:
             return valid, message
@@ -152,7 +153,7 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
 
     def _check(self, reader: Reader) -> dict[str, Any]:
         read = {parameter.name: reader.read(parameter) for parameter in self._tool.parameters}
-        values = dict(self._tool.check(read, spell=lambda parameter: parameter.kind.label))
+        values = dict(self._tool.check(read, spell=lambda parameter: tr(parameter.kind.label)))
         paths = [value for value in values.values() if isinstance(value, Path)]
         if missing := missing_for(self._tool.name, paths):
             raise errors.ParameterError(complaint(missing))
@@ -164,11 +165,11 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
             kind, path = parameter.kind, values[parameter.name]
             if isinstance(kind, kinds.FileOut) and ".html" in kind.suffixes and path is not None:
                 feedback.pushInfo(f"{parameter.name}: {path}")
-                show_report(f"{self._tool.title}: refused", path)
+                show_report(tr("{}: refused").format(self.displayName()), path)
 
     def _finish_layers(self, values: dict[str, Any], context: QgsProcessingContext) -> None:
         """Have the layers that are loaded styled and grouped."""
-        title = self._tool.title
+        title = self.displayName()
         layers = LoadedLayers(f"{title}: {self._about}" if self._about else title)
         for parameter in self._tool.parameters:
             path, kind = values[parameter.name], parameter.kind
@@ -209,14 +210,15 @@ def help_html(tool: Any) -> str:
     """Return the help of a tool and of its parameters as HTML."""
 
     def worded(text: str) -> str:
-        return _escaped(in_words(text, tool, named_tools()))
+        return _escaped(in_words(tr(" ".join(text.split())), tool, named_tools()))
 
     paragraphs = [tool.summary, *tool.description.split("\n\n")]
     parts = [f"<p>{worded(text)}</p>" for text in paragraphs if text]
     rows = [
-        f"<p><b>{_escaped(p.kind.label)}</b>: {worded(p.kind.help)}</p>" for p in tool.parameters
+        f"<p><b>{_escaped(tr(p.kind.label))}</b>: {worded(p.kind.help)}</p>"
+        for p in tool.parameters
     ]
-    return "\n".join([*parts, "<h3>Parameters</h3>", *rows])
+    return "\n".join([*parts, f"<h3>{tr('Parameters')}</h3>", *rows])
 
 
 def _escaped(text: str) -> str:

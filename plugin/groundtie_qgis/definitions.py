@@ -30,6 +30,7 @@ from qgis.core import (
 
 from . import compat
 from .library import kinds
+from .translation import tr
 from .wording import choice_label
 
 
@@ -48,7 +49,8 @@ def definition(parameter: Any) -> QgsProcessingParameterDefinition:
 
 def file_filter(suffixes: tuple[str, ...]) -> str:
     """Return the filter of a file dialog for files that end in `suffixes`."""
-    return ";;".join(f"{suffix[1:].upper()} files (*{suffix})" for suffix in suffixes)
+    files = tr("{} files")
+    return ";;".join(f"{files.format(suffix[1:].upper())} (*{suffix})" for suffix in suffixes)
 
 
 # In Processing, "optional" means that a value may be absent: with a default there always is one.
@@ -63,20 +65,20 @@ def _make(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinit
 
 @_make.register(kinds.RasterIn)
 def _raster_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterRasterLayer(name, kind.label, optional=not parameter.required)
+    return QgsProcessingParameterRasterLayer(name, tr(kind.label), optional=not parameter.required)
 
 
 @_make.register(kinds.RastersIn)
 def _rasters_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     return QgsProcessingParameterMultipleLayers(
-        name, kind.label, layerType=compat.RASTER, optional=not parameter.required
+        name, tr(kind.label), layerType=compat.RASTER, optional=not parameter.required
     )
 
 
 @_make.register(kinds.VectorIn)
 def _vector_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     return QgsProcessingParameterVectorLayer(
-        name, kind.label, types=[compat.ANY_VECTOR], optional=not parameter.required
+        name, tr(kind.label), types=[compat.ANY_VECTOR], optional=not parameter.required
     )
 
 
@@ -99,7 +101,7 @@ class LayerOrFile(QgsProcessingParameterMapLayer):
 def _mask_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     return LayerOrFile(
         name,
-        kind.label,
+        tr(kind.label),
         optional=not parameter.required,
         types=[compat.RASTER, compat.ANY_VECTOR],
     )
@@ -114,11 +116,11 @@ def takes_layers(kind: Any) -> bool:
 def _file_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     if takes_layers(kind):
         return LayerOrFile(
-            name, kind.label, optional=not parameter.required, types=[compat.ANY_VECTOR]
+            name, tr(kind.label), optional=not parameter.required, types=[compat.ANY_VECTOR]
         )
     return QgsProcessingParameterFile(
         name,
-        kind.label,
+        tr(kind.label),
         behavior=compat.FILE,
         optional=not parameter.required,
         fileFilter=file_filter(kind.suffixes),
@@ -127,27 +129,29 @@ def _file_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefi
 
 @_make.register(kinds.RasterOut)
 def _raster_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterRasterDestination(name, kind.label, None, *_wanted(parameter))
+    return QgsProcessingParameterRasterDestination(name, tr(kind.label), None, *_wanted(parameter))
 
 
 @_make.register(kinds.VectorOut)
 def _vector_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     return QgsProcessingParameterVectorDestination(
-        name, kind.label, compat.ANY_VECTOR, None, *_wanted(parameter)
+        name, tr(kind.label), compat.ANY_VECTOR, None, *_wanted(parameter)
     )
 
 
 @_make.register(kinds.FileOut)
 def _file_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     return QgsProcessingParameterFileDestination(
-        name, kind.label, file_filter(kind.suffixes), None, *_wanted(parameter)
+        name, tr(kind.label), file_filter(kind.suffixes), None, *_wanted(parameter)
     )
 
 
 @_make.register(kinds.FolderOut)
 def _folder_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     required = parameter.required
-    return QgsProcessingParameterFolderDestination(name, kind.label, None, not required, required)
+    return QgsProcessingParameterFolderDestination(
+        name, tr(kind.label), None, not required, required
+    )
 
 
 def _wanted(parameter: Any) -> tuple[bool, bool]:
@@ -160,7 +164,7 @@ def _number(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefin
     limits = {"minValue": kind.minimum, "maxValue": kind.maximum}
     return QgsProcessingParameterNumber(
         name,
-        f"{kind.label} ({kind.unit})" if kind.unit else kind.label,
+        f"{tr(kind.label)} ({kind.unit})" if kind.unit else tr(kind.label),
         type=compat.INTEGER if kind.integer else compat.DOUBLE,
         defaultValue=parameter.default,
         optional=_optional(parameter),
@@ -205,7 +209,7 @@ def _choice(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefin
     default = parameter.default
     return WordOrNumber(
         name,
-        kind.label,
+        tr(kind.label),
         kind.choices,
         defaultValue=None if default is None else kind.choices.index(default),
         optional=_optional(parameter),
@@ -214,20 +218,20 @@ def _choice(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefin
 
 @_make.register(kinds.Flag)
 def _flag(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterBoolean(name, kind.label, defaultValue=parameter.default)
+    return QgsProcessingParameterBoolean(name, tr(kind.label), defaultValue=parameter.default)
 
 
 @_make.register(kinds.Text)
 def _text(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     return QgsProcessingParameterString(
-        name, kind.label, defaultValue=parameter.default, optional=_optional(parameter)
+        name, tr(kind.label), defaultValue=parameter.default, optional=_optional(parameter)
     )
 
 
 @_make.register(kinds.Crs)
 def _crs(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     return QgsProcessingParameterCrs(
-        name, kind.label, defaultValue=parameter.default, optional=_optional(parameter)
+        name, tr(kind.label), defaultValue=parameter.default, optional=_optional(parameter)
     )
 
 
@@ -236,7 +240,7 @@ def _band(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinit
     # QGIS 3.22 takes a band with a default for mandatory: a band is always optional.
     return QgsProcessingParameterBand(
         name,
-        kind.label,
+        tr(kind.label),
         defaultValue=parameter.default,
         parentLayerParameterName=qgis_name(kind.of),
         optional=not parameter.required,

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from .library import library_module
+from .translation import tr
 
 packages = library_module("packages")
 _LOCK = threading.RLock()
@@ -29,12 +30,16 @@ def complaint(missing: list[str]) -> str:
     """Return one line that names what is missing and how to install it; empty if all is there."""
     if not missing:
         return ""
-    noun = "package" if len(missing) == 1 else "packages"
-    return (
-        f"GroundTie needs the Python {noun} {', '.join(missing)}, which QGIS's Python does not "
-        f"have: take Raster > GroundTie > Install what is missing, or run: "
-        f"{install_command(missing)} (then restart QGIS)"
+    one = tr(
+        "GroundTie needs the Python package {names}, which QGIS's Python does not have: take "
+        "Raster > GroundTie > Install what is missing, or run: {command} (then restart QGIS)"
     )
+    several = tr(
+        "GroundTie needs the Python packages {names}, which QGIS's Python does not have: take "
+        "Raster > GroundTie > Install what is missing, or run: {command} (then restart QGIS)"
+    )
+    text = one if len(missing) == 1 else several
+    return text.format(names=", ".join(missing), command=install_command(missing))
 
 
 def install_command(missing: list[str], debian: bool | None = None) -> str:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from qgis.core import QgsProject, QgsRasterLayer
+from qgis.core import QgsProject
 from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QDockWidget, QTabWidget
 
 from .canvas_items import Overlay
 from .library import errors
 from .look_page import LookPage
+from .reference_export import layer_of
 from .repair_page import RepairPage
 from .run import Outcome
 from .start_page import StartPage
+from .translation import tr
 
 
 class GroundTieDock(QDockWidget):
@@ -34,7 +36,11 @@ class GroundTieDock(QDockWidget):
         self.look = LookPage(canvas, self.overlay)
         self.repair = RepairPage(canvas, self.overlay, self.look.show_worst, self._written)
         self.tabs = QTabWidget()
-        for page, title in ((self.start, "Register"), (self.look, "Look"), (self.repair, "Repair")):
+        for page, title in (
+            (self.start, tr("Register")),
+            (self.look, tr("Look")),
+            (self.repair, tr("Repair")),
+        ):
             self.tabs.addTab(page, title)
         self.tabs.currentChanged.connect(self._turn_to)
         self.setWidget(self.tabs)
@@ -55,11 +61,15 @@ class GroundTieDock(QDockWidget):
 
     def _registered(self, outcome: Outcome, reference: Any, input: Any) -> None:
         """Go on with what came of a registration."""
-        registered = _layer_of(outcome.files.get("OUTPUT"))
+        registered = layer_of(outcome.files.get("OUTPUT"))
         self.look.show_pair(reference, registered)
         if outcome.succeeded or outcome.files.get("REPORT"):
             try:
-                self.repair.open(reference, input, outcome.files.get("TIE_POINTS"))
+                points = outcome.files.get("TIE_POINTS")
+                if self.start.sensor is None:
+                    self.repair.open(reference, input, points)
+                elif points is not None:
+                    self.repair.open_sensor(reference, registered, self.start.sensor, outcome)
             except errors.GroundTieError as error:
                 self.repair.close_points()
                 self.repair.text.setText(error.one_line())
@@ -94,13 +104,3 @@ class GroundTieDock(QDockWidget):
         self.look.stop()
         self.overlay.take_away()
         self._canvas.scene().removeItem(self.repair.points)
-
-
-def _layer_of(path: Any) -> Any:
-    """Return the project's layer of a file; None if there is none."""
-    found = [
-        layer
-        for layer in QgsProject.instance().mapLayers().values()
-        if isinstance(layer, QgsRasterLayer) and path is not None and layer.source() == str(path)
-    ]
-    return found[0] if found else None

@@ -10,6 +10,7 @@ from qgis.PyQt.QtWidgets import QDialog, QDialogButtonBox, QLabel, QPlainTextEdi
 
 from .dependencies import install_command
 from .installing import as_typed, missing_requirements, pip_command, use_packages
+from .translation import tr
 
 
 class InstallDialog(QDialog):
@@ -25,7 +26,7 @@ class InstallDialog(QDialog):
 
     def __init__(self, folder: Path, finished: Any, parent: Any = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle("GroundTie: install what is missing")
+        self.setWindowTitle(tr("GroundTie: install what is missing"))
         self.resize(680, 420)
         self._folder, self._finished = folder, finished
         self._command = pip_command(missing_requirements(), folder)
@@ -44,7 +45,7 @@ class InstallDialog(QDialog):
         self.log = QPlainTextEdit(as_typed(self._command) if missing_requirements() else "")
         self.log.setReadOnly(True)
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
-        self.install = self.buttons.addButton("Install", QDialogButtonBox.ButtonRole.ActionRole)
+        self.install = self.buttons.addButton(tr("Install"), QDialogButtonBox.ButtonRole.ActionRole)
         self.install.setEnabled(bool(missing_requirements()))
         self.install.clicked.connect(self._start)
         self.buttons.rejected.connect(self.reject)
@@ -54,15 +55,17 @@ class InstallDialog(QDialog):
     def _question(self) -> str:
         names = missing_requirements()
         if not names:
-            return "Nothing is missing: all Python packages that GroundTie needs are there."
-        return (
-            f"<p>GroundTie needs Python packages that this QGIS does not have: "
-            f"<b>{', '.join(names).replace('<', '&lt;')}</b>.</p>"
-            f"<p><i>Install</i> downloads them from the Python Package Index by the command below, "
-            f"into a folder of GroundTie's own: {self._folder}. QGIS's own packages stay as they "
-            f"are and are preferred. Delete the folder to take everything back.</p>"
-            f"<p>Or run the command yourself, or on Debian and Ubuntu: "
-            f"<code>{install_command([n.split('>')[0].split('<')[0] for n in names], True)}</code>"
+            return tr("Nothing is missing: all Python packages that GroundTie needs are there.")
+        return tr(
+            "<p>GroundTie needs Python packages that this QGIS does not have: <b>{names}</b>.</p>"
+            "<p><i>Install</i> downloads them from the Python Package Index by the command below, "
+            "into a folder of GroundTie's own: {folder}. QGIS's own packages stay as they are and "
+            "are preferred. Delete the folder to take everything back.</p><p>Or run the command "
+            "yourself, or on Debian and Ubuntu: <code>{command}</code>"
+        ).format(
+            names=", ".join(names).replace("<", "&lt;"),
+            folder=self._folder,
+            command=install_command([n.split(">")[0].split("<")[0] for n in names], True),
         )
 
     def _start(self) -> None:
@@ -76,16 +79,18 @@ class InstallDialog(QDialog):
 
     def _fail(self, error: Any) -> None:
         if error == QProcess.ProcessError.FailedToStart:
-            self.text.setText(f"Python was not found: {self._command[0]} cannot be started.")
+            self.text.setText(
+                tr("Python was not found: {} cannot be started.").format(self._command[0])
+            )
 
     def _end(self, code: int, *_: Any) -> None:
         use_packages(self._folder)
         if code or missing_requirements():
-            self.text.setText("The packages were not installed; pip's reason stands below.")
+            self.text.setText(tr("The packages were not installed; pip's reason stands below."))
             self.install.setEnabled(True)
             return
-        self.text.setText("All is installed. GroundTie's tools are ready.")
-        self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setText("Close")
+        self.text.setText(tr("All is installed. GroundTie's tools are ready."))
+        self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setText(tr("Close"))
         self._finished()
 
     def reject(self) -> None:

@@ -20,11 +20,12 @@ from qgis.PyQt.QtWidgets import (
 from .canvas_items import Overlay, clearly
 from .map_tools import SwipeTool
 from .reference_export import between
+from .translation import mark, tr
 
 _FLICKER_MS = 600
 # Side of what is shown of a place, in pixels of the reference: about one of the screen each.
 _SHOWN_PX = 400
-_CORNERS = ("Top left", "Top right", "Bottom left", "Bottom right")
+_CORNERS = (mark("Top left"), mark("Top right"), mark("Bottom left"), mark("Bottom right"))
 
 
 class LookPage(QWidget):
@@ -51,21 +52,23 @@ class LookPage(QWidget):
         self._build()
 
     def _build(self) -> None:
-        self.hint = QLabel("Register two images first.")
+        self.hint = QLabel(tr("Register two images first."))
         self.hint.setWordWrap(True)
-        self.swipe, self.flicker = QPushButton("Swipe"), QPushButton("Flicker")
+        self.swipe, self.flicker = QPushButton(tr("Swipe")), QPushButton(tr("Flicker"))
         for button in (self.swipe, self.flicker):
             button.setCheckable(True)
         self.swipe.toggled.connect(self._swipe)
         self.flicker.toggled.connect(self._flicker)
-        self.next, self.previous = QPushButton("Next worst point (N)"), QPushButton("Back (B)")
+        self.next, self.previous = (
+            QPushButton(tr(text)) for text in (mark("Next worst point (N)"), mark("Back (B)"))
+        )
         self.next.clicked.connect(lambda: self.go(1))
         self.previous.clicked.connect(lambda: self.go(-1))
         for key, step in (("N", 1), ("B", -1)):
             shortcut = QShortcut(QKeySequence(key), self._canvas)
             shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             shortcut.activated.connect(lambda step=step: self.go(step))
-        self.corners = [QPushButton(name) for name in _CORNERS]
+        self.corners = [QPushButton(tr(name)) for name in _CORNERS]
         layout = QVBoxLayout(self)
         layout.addWidget(self.hint)
         for row in ((self.swipe, self.flicker), (self.previous, self.next)):
@@ -100,8 +103,10 @@ class LookPage(QWidget):
             button.setEnabled(bool(self._worst))
         if ready:
             self.hint.setText(
-                "Left of the line: the reference. Swipe: move the mouse over the map. Roads and "
-                "shores must run on over the line."
+                tr(
+                    "Left of the line: the reference. Swipe: move the mouse over the map. Roads "
+                    "and shores must run on over the line."
+                )
             )
 
     def stop(self) -> None:

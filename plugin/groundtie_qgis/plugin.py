@@ -15,6 +15,7 @@ from .install_dialog import InstallDialog
 from .pages import help_url
 from .provider import GroundTieProvider
 from .styling import ICON
+from .translation import tr
 
 MENU = "GroundTie"
 
@@ -46,13 +47,15 @@ class GroundTiePlugin:
     def initGui(self) -> None:
         """Start in the desktop."""
         self.initProcessing()
-        self._add_action("Register and review…", self.toggle_dock)
+        self._add_action(tr("Register and review…"), self.toggle_dock)
         self._iface.addToolBarIcon(self.actions[0])
-        self._add_action("Load an example", self.load_example)
-        self._add_action("Install what is missing…", self.install)
-        self._add_action("Help", self.show_help)
+        self._add_action(tr("Load an example"), self.load_example)
+        self._add_action(tr("Install what is missing…"), self.install)
+        self._add_action(tr("Help"), self.show_help)
         if self.provider is not None and self.provider.warningMessage():
-            message = "Python packages are missing: Raster > GroundTie > Install what is missing"
+            message = tr(
+                "Python packages are missing: Raster > GroundTie > Install what is missing"
+            )
             self._iface.messageBar().pushMessage("GroundTie", message, WARNING, 0)
 
     def unload(self) -> None:

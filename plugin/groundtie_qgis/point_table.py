@@ -7,7 +7,16 @@ from typing import Any
 import numpy as np
 from qgis.PyQt.QtCore import QAbstractTableModel, QModelIndex, Qt, pyqtSignal
 
-HEADERS = ("Use", "Point", "Residual (px)", "Score", "Role", "By hand")
+from .translation import mark, tr
+
+HEADERS = (
+    mark("Use"),
+    mark("Point"),
+    mark("Residual (px)"),
+    mark("Score"),
+    mark("Role"),
+    mark("By hand"),
+)
 _USE, _POINT, _RESIDUAL, _SCORE, _ROLE, _EDITED = range(len(HEADERS))
 # What a column is sorted by, as opposed to what it shows.
 SORT_ROLE = Qt.ItemDataRole.UserRole
@@ -44,7 +53,7 @@ class PointTable(QAbstractTableModel):
     def headerData(self, section: int, orientation: Any, role: int = 0) -> Any:
         across = orientation == Qt.Orientation.Horizontal
         shown = across and role == Qt.ItemDataRole.DisplayRole
-        return HEADERS[section] if shown else None
+        return tr(HEADERS[section]) if shown else None
 
     def flags(self, index: QModelIndex) -> Any:
         checkable = index.column() == _USE
@@ -77,8 +86,8 @@ class PointTable(QAbstractTableModel):
             values = self._residuals if column == _RESIDUAL else points.score
             return float(values[row]) if row < len(values) else float("nan")
         if column == _ROLE:
-            return "check" if points.is_check[row] else "fit"
-        return "yes" if self._review.edited[row] else ""
+            return tr("check") if points.is_check[row] else tr("fit")
+        return tr("yes") if self._review.edited[row] else ""
 
     def setData(self, index: QModelIndex, value: Any, role: int = 0) -> bool:
         if role != Qt.ItemDataRole.CheckStateRole or index.column() != _USE:

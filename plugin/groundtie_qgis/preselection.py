@@ -10,6 +10,7 @@ from qgis.PyQt.QtCore import QCoreApplication, QThread
 
 from .definitions import qgis_name
 from .library import kinds
+from .start_files import has_rpcs
 
 # What a box shows that shall begin empty: QGIS would fill it with a layer.
 NOTHING = " "
@@ -40,7 +41,8 @@ def raster_files() -> list[Any]:
 def proposed_pair(rasters: list[Any], active: Any = None) -> tuple[Any, Any]:
     """Return which of some layers to propose as reference and input; None where there is none.
 
-    Of two, the input is the one with smaller pixels, or with more bands: optical images are.
+    Of two, the input is the one with RPCs, with smaller pixels, or with more bands: optical images
+    are.
     """
     first = sorted(rasters, key=lambda layer: layer is not active)[:2]
     if len(first) < 2:
@@ -49,12 +51,12 @@ def proposed_pair(rasters: list[Any], active: Any = None) -> tuple[Any, Any]:
     return reference, input
 
 
-def _as_input(layer: Any) -> tuple[float, int]:
+def _as_input(layer: Any) -> tuple[bool, float, int]:
     to_metres = QgsUnitTypes.fromUnitToUnitFactor(
         layer.crs().mapUnits(), QgsUnitTypes.DistanceMeters
     )
     pixel = layer.rasterUnitsPerPixelX() * (to_metres or 1.0)
-    return -float(f"{pixel:.2g}"), layer.bandCount()
+    return has_rpcs(layer), -float(f"{pixel:.2g}"), layer.bandCount()
 
 
 def _in_desktop() -> bool:

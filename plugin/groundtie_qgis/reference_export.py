@@ -16,8 +16,9 @@ from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QImage
 
 from .run import new_file
+from .translation import mark
 
-MAP = "The map as it is drawn"
+MAP = mark("The map as it is drawn")
 # The side of the largest picture that is drawn; a larger input is compared with a coarser one.
 _MOST_PX = 8192
 # How much of the input's side is drawn around it, so that it may lie off.
@@ -102,3 +103,13 @@ def _write(path: Any, image: QImage, extent: Any, crs: Any) -> None:
 def between(source: Any, target: Any) -> QgsCoordinateTransform:
     """Return the transform between two CRSs."""
     return QgsCoordinateTransform(source, target, QgsProject.instance())
+
+
+def layer_of(path: Any) -> Any:
+    """Return the project's layer of a file; None if there is none."""
+    found = [
+        layer
+        for layer in QgsProject.instance().mapLayers().values()
+        if isinstance(layer, QgsRasterLayer) and path is not None and layer.source() == str(path)
+    ]
+    return found[0] if found else None

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from qgis.core import QgsCoordinateReferenceSystem, QgsPointXY, QgsProject, QgsRasterLayer
+from qgis.core import QgsCoordinateReferenceSystem, QgsPointXY, QgsRasterLayer
 from qgis.PyQt.QtCore import QSortFilterProxyModel, Qt
 from qgis.PyQt.QtWidgets import (
     QAbstractItemView,
@@ -23,17 +24,16 @@ from qgis.PyQt.QtWidgets import (
 from .canvas_items import Overlay, PointsItem, clearly
 from .library import errors, library_module
 from .map_tools import ClickTool, DragTool
+from .model_list import BIASES, FIRST_POINTS, model_text
 from .point_table import SORT_ROLE, PointTable
-from .reference_export import between, named
-from .run import Outcome, Run, new_file
-from .start_page import points_name
-from .wording import choice_label
+from .reference_export import between, layer_of
+from .run import Outcome
+from .sensor_run import SensorImage
+from .translation import tr
+from .writer import Writer
 
 # As the verdict counts them.
 TOLERANCE_PX = library_module("geometry.judging").TOLERANCE_PX
-
-# Words of models are long: the list shows what they begin with.
-_MODELS = {"translation": "Shift", "rigid": "Rigid", "similarity": "Similarity", "affine": "Affine"}
 
 
 class RepairPage(QWidget):
@@ -66,14 +66,16 @@ class RepairPage(QWidget):
         self._reference: Any = None
         self._input: Any = None
         self._clicked: QgsPointXY | None = None
-        self._run: Run | None = None
+        self.writer = Writer(self._end_writing)
+        # What an image with RPCs is, which then is written in place of the input.
+        self._sensor: SensorImage | None = None
         self.points = PointsItem(canvas)
         self._drag = DragTool(canvas, self.points, self._moved_on_map, self._choose)
         self._click = ClickTool(canvas, self._clicked_on_map)
         self._build()
 
     def _build(self) -> None:
-        self.text = QLabel("Register two images first.")
+        self.text = QLabel(tr("Register two images first."))
         self.text.setWordWrap(True)
         self.model = QComboBox()
         self.model.currentIndexChanged.connect(lambda *_: self._show_fit())
@@ -89,14 +91,14 @@ class RepairPage(QWidget):
         self.view.verticalHeader().hide()
         self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.view.clicked.connect(lambda index: self._zoom(proxy.mapToSource(index).row()))
-        self.drag, self.add = QPushButton("Move points"), QPushButton("Add a point")
+        self.drag, self.add = QPushButton(tr("Move points")), QPushButton(tr("Add a point"))
         self.drag.setCheckable(True)
         self.add.setCheckable(True)
         self.drag.toggled.connect(self._set_dragging)
         self.add.toggled.connect(self._set_adding)
-        self.match = QCheckBox("refine clicks by similarity")
+        self.match = QCheckBox(tr("refine clicks by similarity"))
         self.match.setChecked(True)
-        self.write = QPushButton("Write image")
+        self.write = QPushButton(tr("Write image"))
         self.write.clicked.connect(self.start_writing)
         layout = QVBoxLayout(self)
         for row in ((self.model,), (self.drag, self.add)):
@@ -115,19 +117,37 @@ class RepairPage(QWidget):
             widget.setEnabled(self.review is not None)
         self.write.setEnabled(bool(self.fits))
 
+    def open_sensor(self, reference: Any, ortho: Any, image: SensorImage, outcome: Outcome) -> None:
+        """Take the ground control of an image with RPCs, which `ortho` shows on the map."""
+        from .dependencies import rasterio_env
+
+        review = library_module("review")
+        files, dem = outcome.files, image.dem
+        with rasterio_env():
+            opened = review.of_sensor_image(
+                reference.source(),
+                image.layer.source(),
+                files["RPC"],
+                None if dem is None else Path(dem.source()),
+                None if dem is None else image.datum,
+                files["TIE_POINTS"],
+            )
+        self._reference, self._input, self._sensor = reference, ortho, image
+        self.change(opened, "translation")
+
     def open(self, reference: Any, input: Any, path: Any, kind: str = "affine") -> None:
         """Take the tie points of a registration; None: begin with none."""
         from .dependencies import rasterio_env
 
         review = library_module("review")
-        self._reference, self._input = reference, input
+        self._reference, self._input, self._sensor = reference, input, None
         with rasterio_env():
             if path is not None:
                 opened = review.Review.open(path, input.source())
             else:
                 opened = review.without_points(reference.source(), input.source())
         self.change(opened, kind)
-        self.text.setText(self._summary() if path is not None else _FIRST_POINTS)
+        self.text.setText(self._summary() if path is not None else tr(FIRST_POINTS))
 
     def close_points(self) -> None:
         """Forget the points."""
@@ -148,11 +168,11 @@ class RepairPage(QWidget):
         """Show another state of the points, and fit them."""
         wanted = kind or self.kind() or "affine"
         self.review = review
-        self.fits = review.fits()
+        self.fits = review.fits() if self._sensor is None else review.fits([*BIASES])
         self.model.blockSignals(True)
         self.model.clear()
         for name, fit in self.fits.items():
-            self.model.addItem(_model_text(name, fit), name)
+            self.model.addItem(model_text(name, fit), name)
         kinds = [*self.fits]
         self.model.setCurrentIndex(kinds.index(wanted) if wanted in kinds else len(kinds) - 1)
         self.model.blockSignals(False)
@@ -179,13 +199,16 @@ class RepairPage(QWidget):
     def _summary(self) -> str:
         points = self.review.points
         edited = int(self.review.edited.sum())
-        parts = [f"{int(points.used.sum())} of {len(points)} points take part"]
-        parts += [f"{edited} set by hand"] if edited else []
+        used = tr("{used} of {all} points take part")
+        parts = [used.format(used=int(points.used.sum()), all=len(points))]
+        parts += [tr("{} set by hand").format(edited)] if edited else []
         fit = self.fits.get(self.kind())
         check = points.is_check & points.used
         if fit is not None and check.any():
             agree = int((fit.residuals_px[check] <= TOLERANCE_PX).sum())
-            parts.append(f"{agree} of {check.sum()} check points agree within {TOLERANCE_PX:g} px")
+            agreeing = tr("{agree} of {all} check points agree within {limit} px")
+            limit = f"{TOLERANCE_PX:g}"
+            parts.append(agreeing.format(agree=agree, all=check.sum(), limit=limit))
         return ", ".join(parts) + "."
 
     def _switch(self, row: int, on: bool) -> None:
@@ -208,7 +231,9 @@ class RepairPage(QWidget):
         self._set_tool(self._drag, on)
         if on:
             self.add.setChecked(False)
-            self.text.setText("Pull a mark to its place on the reference, or a line's other end.")
+            self.text.setText(
+                tr("Pull a mark to its place on the reference, or a line's other end.")
+            )
 
     def _set_adding(self, on: bool) -> None:
         self._clicked = None
@@ -216,7 +241,7 @@ class RepairPage(QWidget):
         self._overlay.show_layers([clearly(self._reference)] if on else [])
         if on:
             self.drag.setChecked(False)
-            self.text.setText("Shown is the reference: click a place that both images have.")
+            self.text.setText(tr("Shown is the reference: click a place that both images have."))
 
     def _set_tool(self, tool: Any, on: bool) -> None:
         self._canvas.setMapTool(tool) if on else self._canvas.unsetMapTool(tool)
@@ -234,7 +259,7 @@ class RepairPage(QWidget):
             self._clicked = place
             self._overlay.show_layers([clearly(self._input)])
             self.text.setText(
-                "Shown is the input where its own georeferencing has it: click there."
+                tr("Shown is the input where its own georeferencing has it: click there.")
             )
             return
         first, self._clicked = self._clicked, None
@@ -250,54 +275,35 @@ class RepairPage(QWidget):
             review = library_module("review")
             fit = self.fits.get(self.kind())
             transform = self.review.nominal if fit is None else fit.transform
-            images = self._reference.source(), self._input.source()
+            seen = self._input if self._sensor is None else self._sensor.layer
+            images = self._reference.source(), seen.source()
             try:
                 with rasterio_env():
                     input_px, peak = review.refine_click(*images, reference_xy, input_px, transform)
                 score = peak.height
             except errors.GroundTieError as error:
-                note = f" It stays where you clicked: {error.one_line()}."
+                note = " " + tr("It stays where you clicked: {}.").format(error.one_line())
         self.change(self.review.add(reference_xy, input_px, score))
         self._choose(len(self.review.points) - 1)
         self.text.setText(self._summary() + note)
 
     def start_writing(self) -> None:
-        """Write the image by the points, as *Warp a raster* does."""
+        """Write the image by the points."""
         fit = self.fits[self.kind()]
-        try:
-            if objection := self.review.objection(fit.kind):
-                self.text.setText(f"Not written: {objection}.")
-                return
-            points = new_file(points_name())
-            self.review.write(points, fit.transform)
-        except errors.GroundTieError as error:
-            self.text.setText(f"Not written: {error.one_line()}.")
+        layers = self._reference, self._input
+        if refusal := self.writer.start(self.review, fit, *layers, self._sensor):
+            self.text.setText(tr("Not written: {}.").format(refusal))
             return
-        values = {
-            "INPUT": named(self._input),
-            "REFERENCE": named(self._reference),
-            "TRANSFORM": str(points),
-            "MODEL": fit.kind,
-        }
-        files = {"OUTPUT": new_file("registered_by_hand.tif")}
         self.write.setEnabled(False)
-        self._run = Run("warp", values, files, ("OUTPUT",), self._end_writing, lambda _: None)
-        self._run.start()
 
     def _end_writing(self, outcome: Outcome) -> None:
-        self._run = None
         self.write.setEnabled(True)
         if not outcome.succeeded:
-            self.text.setText(f"Not written: {outcome.reason}")
+            self.text.setText(tr("Not written: {}.").format(outcome.reason.rstrip(".")))
             return
         path = outcome.files["OUTPUT"]
-        loaded = [
-            layer
-            for layer in QgsProject.instance().mapLayers().values()
-            if isinstance(layer, QgsRasterLayer) and layer.source() == str(path)
-        ]
-        self.text.setText(f"Written: {path}. {self._summary()}")
-        self._written(self._reference, loaded[0] if loaded else QgsRasterLayer(str(path)))
+        self.text.setText(tr("Written: {}.").format(path) + f" {self._summary()}")
+        self._written(self._reference, layer_of(path) or QgsRasterLayer(str(path)))
 
     def _crs(self) -> Any:
         return self._reference.crs() if self._reference else QgsCoordinateReferenceSystem()
@@ -310,11 +316,3 @@ class RepairPage(QWidget):
         transform = between(self._canvas.mapSettings().destinationCrs(), self._crs())
         found = transform.transform(place)
         return found.x(), found.y()
-
-
-_FIRST_POINTS = "There are no points yet. Add a point by a click in each image; three are needed."
-
-
-def _model_text(kind: str, fit: Any) -> str:
-    left_out = "–" if fit.left_out_px is None else f"{fit.left_out_px:.2f} px"
-    return f"{_MODELS.get(kind, choice_label(kind))}: left-out error {left_out}"

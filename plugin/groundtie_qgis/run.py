@@ -17,6 +17,8 @@ from qgis.core import (
     QgsProject,
 )
 
+from .translation import tr
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -125,7 +127,9 @@ class Run:
             handleAlgorithmResults(self._algorithm, self._context, self._feedback)
         files = {name: path for name, path in self._files.items() if path.is_file()}
         errors = self._feedback.errors
-        reason = "" if succeeded else (errors[0] if errors else "cancelled; nothing was written")
+        reason = (
+            "" if succeeded else (errors[0] if errors else tr("cancelled; nothing was written"))
+        )
         self._done(Outcome(succeeded, reason, tuple(self._feedback.lines), files))
 
 

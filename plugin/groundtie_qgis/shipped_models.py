@@ -9,7 +9,8 @@ from qgis.PyQt.QtGui import QIcon
 
 from .library import FOLDER
 from .pages import help_url
-from .styling import ICON
+from .styling import icon_of
+from .translation import tr
 
 MODELS = FOLDER / "models"
 
@@ -29,16 +30,22 @@ class ShippedModel(QgsProcessingModelAlgorithm):
         return ShippedModel(self._path)
 
     def displayName(self) -> str:
-        return str(self.helpContent()["TITLE"])
+        return tr(str(self.helpContent()["TITLE"]))
+
+    def group(self) -> str:
+        return tr(super().group())
+
+    def shortDescription(self) -> str:
+        return tr(super().shortDescription())
 
     def helpUrl(self) -> str:
         return help_url("models")
 
     def icon(self) -> QIcon:
-        return QIcon(str(ICON))
+        return QIcon(self.svgIconPath())
 
     def svgIconPath(self) -> str:
-        return str(ICON)
+        return str(icon_of("models"))
 
 
 def load_models() -> list[ShippedModel]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from qgis.core import QgsMapLayerProxyModel
@@ -24,19 +23,22 @@ from qgis.PyQt.QtWidgets import (
     QWidget,
 )
 
-from .dependencies import missing_for
+from .library import library_module
 from .preselection import proposed_pair, raster_files
 from .reference_export import MAP, with_files
 from .run import Outcome, Run, new_file
+from .sensor_run import SensorImage, SensorRun
+from .start_files import has_rpcs, points_name
+from .translation import mark, tr
 from .unavailable import named_tools
 from .wording import in_words
 
 # What a pair may be, and the tool for it.
 PAIRS = {
-    "Decided by the images": "register",
-    "SAR and optical": "coregister",
-    "SAR and SAR": "match_sar_sar",
-    "Optical and optical": "match_optical",
+    "register": mark("Decided by the images"),
+    "coregister": mark("SAR and optical"),
+    "match_sar_sar": mark("SAR and SAR"),
+    "match_optical": mark("Optical and optical"),
 }
 _FIRST_RADIUS_M = 200.0
 _ANY_ROTATION_DEG = 180.0
@@ -57,7 +59,8 @@ class StartPage(QWidget):
     def __init__(self, canvas: Any, finished: Callable[[Outcome, Any, Any], None]) -> None:
         super().__init__()
         self._canvas, self._finished = canvas, finished
-        self._run: Run | None = None
+        self._run: Run | SensorRun | None = None
+        self.sensor: SensorImage | None = None
         self.outcome: Outcome | None = None
         self._layers: tuple[Any, ...] = ()
         self._build()
@@ -65,24 +68,31 @@ class StartPage(QWidget):
 
     def _build(self) -> None:
         self.reference, self.input = _raster_box(), _raster_box()
-        self.reference.setAdditionalItems([MAP])
+        self.reference.setAdditionalItems([tr(MAP)])
         self.pair = QComboBox()
-        self.pair.addItems([*PAIRS])
+        for tool, text in PAIRS.items():
+            self.pair.addItem(tr(text), tool)
         self.radius = QDoubleSpinBox()
         self.radius.setRange(0, 1e6)
         self.radius.setDecimals(0)
         self.radius.setSuffix(" m")
-        self.radius.setSpecialValueText("usual")
-        self.rotated = QCheckBox("rotation unknown")
-        self.register = QPushButton("Register")
+        self.radius.setSpecialValueText(tr("usual"))
+        self.rotated = QCheckBox(tr("rotation unknown"))
+        self.dem = _raster_box()
+        self.dem.setAllowEmptyLayer(True)
+        self.dem.setLayer(None)
+        self.datum = QComboBox()
+        self.datum.addItems(library_module("sensor.geoids").DATUMS)
+        self.heights = QWidget()
+        self.register = QPushButton(tr("Register"))
         self.progress = QProgressBar()
         self.progress.hide()
         self.verdict = QLabel()
         self.verdict.setWordWrap(True)
         self.verdict.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.wider = QPushButton("Search farther")
-        self.turn = QPushButton("Allow any rotation")
-        self.report = QPushButton("Open report")
+        self.wider = QPushButton(tr("Search farther"))
+        self.turn = QPushButton(tr("Allow any rotation"))
+        self.report = QPushButton(tr("Open report"))
         for button in (self.wider, self.turn, self.report):
             button.hide()
         self._lay_out()
@@ -102,15 +112,20 @@ class StartPage(QWidget):
 
     def _lay_out(self) -> None:
         form = QFormLayout()
-        form.addRow("Reference", self.reference)
-        form.addRow("Input", self.input)
-        form.addRow("Images", self.pair)
+        form.addRow(tr("Reference"), self.reference)
+        form.addRow(tr("Input"), self.input)
+        form.addRow(tr("Images"), self.pair)
         options = QHBoxLayout()
         options.addWidget(self.radius)
         options.addWidget(self.rotated)
-        form.addRow("Search", options)
+        form.addRow(tr("Search"), options)
+        ground = QFormLayout(self.heights)
+        ground.setContentsMargins(0, 0, 0, 0)
+        ground.addRow(tr("Terrain model"), self.dem)
+        ground.addRow(tr("Heights above"), self.datum)
         layout = QVBoxLayout(self)
         layout.addLayout(form)
+        layout.addWidget(self.heights)
         for widget in (self.register, self.progress, self.verdict):
             layout.addWidget(widget)
         tries = QHBoxLayout()
@@ -134,6 +149,7 @@ class StartPage(QWidget):
 
     def _keep_apart(self) -> None:
         """Give the other box another layer where both hold the same."""
+        self._show_options()
         changed = self._changed
         other = self.input if changed is self.reference else self.reference
         if changed.currentLayer() is None or changed.currentLayer() != other.currentLayer():
@@ -142,10 +158,14 @@ class StartPage(QWidget):
         other.setLayer(rest[0] if rest else None)
 
     def _show_options(self) -> None:
-        asked = PAIRS[self.pair.currentText()] != "register"
+        sensor = has_rpcs(self.input.currentLayer())
+        self.heights.setVisible(sensor)
+        self.pair.setEnabled(not sensor)
+        asked = sensor or self.pair.currentData() != "register"
         for widget in (self.radius, self.rotated):
             widget.setEnabled(asked)
-            widget.setToolTip("" if asked else "Choose what the images are to set the search.")
+            widget.setToolTip("" if asked else tr("Choose what the images are to set the search."))
+        self.rotated.setEnabled(asked and not sensor)
 
     def start_or_cancel(self) -> None:
         """Begin to register, or stop that."""
@@ -155,40 +175,60 @@ class StartPage(QWidget):
         input = self.input.currentLayer()
         if input is None or (self.reference.currentLayer() is None and not self._from_map()):
             self._layers = ()
-            self._state(False, "Choose two raster layers.")
+            self._state(False, tr("Choose two raster layers."))
+            return
+        self._begin()
+        if has_rpcs(input):
+            self._start_sensor(input)
             return
         reference, values = with_files(self.reference.currentLayer(), input, self._canvas)
         self._layers = (reference, input)
         names = {"OUTPUT": "registered.tif", "TIE_POINTS": points_name(), "REPORT": "report.html"}
         files = {name: new_file(file) for name, file in names.items()}
-        tool = PAIRS[self.pair.currentText()]
+        tool = self.pair.currentData()
         if tool != "register":
             values |= {"SEARCH_RADIUS": self.radius.value()} if self.radius.value() else {}
             values |= {"SEARCH_ROTATION": _ANY_ROTATION_DEG} if self.rotated.isChecked() else {}
-        self.register.setText("Cancel")
+        self._run = Run(tool, values, files, ("OUTPUT",), self._end, self._show_progress)
+        self._run.start()
+
+    def _begin(self) -> None:
+        self.sensor = None
+        self.register.setText(tr("Cancel"))
         self.progress.setValue(0)
         self.progress.show()
         self.verdict.setText("")
         for button in (self.wider, self.turn, self.report):
             button.hide()
-        self._run = Run(tool, values, files, ("OUTPUT",), self._end, self._show_progress)
+
+    def _start_sensor(self, image: Any) -> None:
+        """Refine the RPCs of an image in the reference, and orthorectify it."""
+        reference = self.reference.currentLayer()
+        self._layers = (reference, image)
+        if reference is None or reference.providerType() != "gdal":
+            self._end(Outcome(False, tr("An image with RPCs needs a raster file as reference.")))
+            return
+        self.sensor = SensorImage(image, self.dem.currentLayer(), self.datum.currentText())
+        control: dict[str, Any] = {"REFERENCE": reference.id()}
+        control |= {"SEARCH_RADIUS": self.radius.value()} if self.radius.value() else {}
+        self._run = SensorRun(self.sensor, reference.id(), control, self._end, self._show_progress)
         self._run.start()
 
     def _from_map(self) -> bool:
-        return bool(self.reference.currentText() == MAP)
+        return bool(self.reference.currentText() == tr(MAP))
 
     def _show_progress(self, percent: float) -> None:
         self.progress.setValue(round(percent))
 
     def _end(self, outcome: Outcome) -> None:
         self._run, self.outcome = None, outcome
-        self.register.setText("Register")
+        self.register.setText(tr("Register"))
         self.progress.hide()
         report = outcome.files.get("REPORT")
         self.report.setVisible(report is not None)
         refused = not outcome.succeeded and report is not None
         self.wider.setVisible(refused)
-        self.turn.setVisible(refused and not self.rotated.isChecked())
+        self.turn.setVisible(refused and self.sensor is None and not self.rotated.isChecked())
         if outcome.succeeded:
             self._state(True, "\n".join(first_lines(outcome.lines)))
         else:
@@ -196,7 +236,7 @@ class StartPage(QWidget):
         self._finished(outcome, *self._layers)
 
     def _state(self, good: bool, text: str) -> None:
-        heading = "✔ Accepted" if good else "✘ Not registered"
+        heading = tr("✔ Accepted") if good else tr("✘ Not registered")
         for layer in self._layers:
             text = text.replace(layer.source(), layer.name())
         lines = html.escape(in_words(text, None, named_tools())).split("\n")
@@ -207,7 +247,8 @@ class StartPage(QWidget):
 
     def search_farther(self) -> None:
         """Try again with a radius twice as large."""
-        self._ask_for_a_search()
+        if self.sensor is None:
+            self._ask_for_a_search()
         self.radius.setValue(2 * self.radius.value() or _FIRST_RADIUS_M)
         self.start_or_cancel()
 
@@ -218,8 +259,8 @@ class StartPage(QWidget):
         self.start_or_cancel()
 
     def _ask_for_a_search(self) -> None:
-        if PAIRS[self.pair.currentText()] == "register":
-            self.pair.setCurrentIndex([*PAIRS.values()].index("coregister"))
+        if self.pair.currentData() == "register":
+            self.pair.setCurrentIndex(self.pair.findData("coregister"))
 
     def open_report(self) -> None:
         """Open the report in the browser."""
@@ -230,14 +271,12 @@ class StartPage(QWidget):
 
 def first_lines(lines: tuple[str, ...], most: int = 6) -> list[str]:
     """Return what a tool stated of its result: what comes after its steps."""
-    starts = [i for i, line in enumerate(lines) if line.startswith(("the input", "correction"))]
+    starts = [
+        i
+        for i, line in enumerate(lines)
+        if line.startswith(("the input", "correction", "accepted"))
+    ]
     return list(lines[starts[0] if starts else -most :][:most])
-
-
-def points_name() -> str:
-    """Return the name of a file of tie points that can be written here."""
-    name = "tie_points.gpkg"
-    return "tie_points.geojson" if missing_for("", [Path(name)]) else name
 
 
 def _raster_box() -> QgsMapLayerComboBox:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from qgis.core import (
@@ -20,6 +21,12 @@ from .compat import LINE
 from .library import FOLDER
 
 ICON = FOLDER / "icons" / "groundtie.svg"
+
+
+def icon_of(name: str) -> Path:
+    """Return the icon of a tool; GroundTie's own where it has none."""
+    path = ICON.with_name(f"{name}.svg")
+    return path if path.is_file() else ICON
 
 
 class LoadedLayers:

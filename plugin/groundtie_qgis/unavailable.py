@@ -19,7 +19,8 @@ from qgis.PyQt.QtGui import QIcon
 
 from .library import library_name
 from .pages import help_url
-from .styling import ICON
+from .styling import icon_of
+from .translation import tr
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ def named_tools() -> list[NamedTool]:
 
 def broken(error: ImportError) -> str:
     """Return one line that states which package cannot be used."""
-    return f"GroundTie cannot use a Python package: {' '.join(str(error).split())}"
+    return tr("GroundTie cannot use a Python package: {}").format(" ".join(str(error).split()))
 
 
 def _declared(source: str) -> list[NamedTool]:
@@ -91,10 +92,10 @@ class UnavailableAlgorithm(QgsProcessingAlgorithm):
         return self._tool.name
 
     def displayName(self) -> str:
-        return self._tool.title
+        return tr(self._tool.title)
 
     def group(self) -> str:
-        return self._tool.group
+        return tr(self._tool.group)
 
     def groupId(self) -> str:
         return self._tool.group.lower().replace(" ", "_")
@@ -106,7 +107,7 @@ class UnavailableAlgorithm(QgsProcessingAlgorithm):
         return help_url("qgis")
 
     def icon(self) -> QIcon:
-        return QIcon(str(ICON))
+        return QIcon(str(icon_of(self.name())))
 
     def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:
         """Declare nothing: the parameters are in what cannot be imported."""

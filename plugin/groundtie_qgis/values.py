@@ -19,6 +19,7 @@ from qgis.core import (
 
 from .definitions import qgis_name, takes_layers
 from .library import errors, kinds
+from .translation import tr
 
 
 class Reader:
@@ -150,7 +151,7 @@ def with_layers_as_files(
             continue
         layer = algorithm.parameterAsLayer(parameters, name, context)
         if isinstance(layer, QgsVectorLayer):
-            written[name] = _snapshot(layer, parameter.kind.label, context)
+            written[name] = _snapshot(layer, tr(parameter.kind.label), context)
     return written
 
 
@@ -178,7 +179,7 @@ def _file_of(layer: Any, kind: Any) -> str:
     provider = layer.providerType()
     if provider != "gdal":
         raise errors.ParameterError(
-            f"{kind.label} must be a raster file, not the layer {layer.name()} of the "
+            f"{tr(kind.label)} must be a raster file, not the layer {layer.name()} of the "
             f"provider {provider}; export it to a file first"
         )
     return _without_options(layer.source())

@@ -14,7 +14,7 @@ from benchmark_outcomes import outcome
 import groundtie
 from benchmarks import rpc_city
 from benchmarks.accuracy import CORRECT, CRASHED, INACCURATE, REFUSED, SILENTLY_WRONG
-from benchmarks.rpc_city import EXTRACTED, MASKED, REFINED, RUNS, City, CityCase
+from benchmarks.rpc_city import EXTRACTED, MASKED, MODELLED, REFINED, RUNS, City, CityCase
 from benchmarks.suites import Settings, SuiteResult
 from groundtie.errors import NotRegisteredError
 from groundtie.sensor.rpc_files import read_rpc, write_rpc
@@ -53,8 +53,14 @@ def test_at_least_forty_cities_by_default_and_few_of_them_quickly(tmp_path: Path
     assert len(rpc_city.cases(settings(tmp_path, quick=True))) == len(RUNS)
 
 
-def test_only_the_comparison_sets_a_mask() -> None:
-    assert [dict(run.parameters) for run in RUNS.values()] == [{}, {"mask": "regions"}, {}]
+def test_only_the_comparisons_set_a_mask_or_a_surface_model() -> None:
+    scene = Path("scene")
+    assert [run.on(scene) for run in RUNS.values()] == [
+        {},
+        {"mask": "regions"},
+        {"surface_model": scene / "dsm.tif"},
+        {},
+    ]
 
 
 def test_a_scene_is_made_once(city: City, scene: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,9 +164,10 @@ def suite(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, wrong: str) -> SuiteR
 @pytest.mark.parametrize(
     ("wrong", "reached"),
     [
-        (REFINED, [False, None, True, False]),
-        (MASKED, [True, None, True, True]),
-        (EXTRACTED, [True, None, False, True]),
+        (REFINED, [False, None, True, True, False]),
+        (MASKED, [True, None, True, True, True]),
+        (MODELLED, [True, None, False, True, True]),
+        (EXTRACTED, [True, None, True, False, True]),
     ],
 )
 def test_goals(

@@ -12,12 +12,12 @@ from textured_pairs import TexturedPair
 from groundtie.context import Context
 from groundtie.errors import RasterContentError
 from groundtie.geometry.limits import SearchLimits
+from groundtie.geometry.models import shift_model
 from groundtie.matching import coarse_shift
 from groundtie.matching.coarse_shift import (
     Candidate,
     coarse_candidates,
     level_factor,
-    shift_model,
 )
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.rasters.grid import Grid

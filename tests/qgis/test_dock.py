@@ -6,6 +6,7 @@ Pictures of every step are left in the folder that GROUNDTIE_PICTURES names.
 from __future__ import annotations
 
 import gc
+import json
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,6 +16,10 @@ from unittest.mock import MagicMock
 import numpy as np
 import pytest
 from noise_pairs import ORIGIN, SHIFT, write_pair
+from rpc_scenes import SIZE, make_scene
+
+from groundtie.sensor.bias import Bias
+from groundtie.sensor.rpc_files import read_rpc
 
 
 class Desktop:
@@ -271,7 +276,7 @@ def test_repair_moves_switches_and_writes(
 
     repair.model.setCurrentIndex(repair.model.findData("translation"))
     repair.write.click()
-    desktop.wait(lambda: repair._run is None)
+    desktop.wait(lambda: repair.writer.run is None)
     assert repair.text.text().startswith("Written: "), repair.text.text()
     layer = dock.look._registered
     assert layer.id() in QgsProject.instance().mapLayers()
@@ -381,6 +386,55 @@ def test_the_map_as_it_is_drawn_may_be_the_reference(desktop: Desktop, tmp_path:
         truth = np.array([values[0] for values in ground.sample(place)], float)
     # The stretch is linear: order and sign of differences stay.
     assert np.sign(np.diff(there)) == np.sign(np.diff(truth))
+
+
+def test_an_image_with_rpcs_from_start_to_points_set_by_hand(
+    desktop: Desktop, tmp_path: Path
+) -> None:
+    """Ground control on the reference, refined RPCs, an orthoimage to look at; a point is moved."""
+    from qgis.core import QgsProject
+
+    bias = Bias("shift", SIZE, np.array([[-6.0, 5.0]]), np.zeros((2, 2)))
+    scene = make_scene(tmp_path, bias)
+    reference, image, dem = desktop.load(tmp_path, "reference", "image", "dem")
+    dock = desktop.open()
+    start, repair = dock.start, dock.repair
+    start.reference.setLayer(reference)
+    start.input.setLayer(image)
+    desktop.wait(lambda: not start._apart.isActive())
+    assert start.heights.isVisible()
+    assert not start.pair.isEnabled()
+    start.dem.setLayer(dem)
+    start.radius.setValue(15)
+    outcome = desktop.register()
+    assert outcome.succeeded, outcome.reason
+    assert "error at check points" in start.verdict.text()
+    assert scene.error_px(read_rpc(outcome.files["RPC"])) < 0.6
+    ortho = dock.look._registered
+    assert QgsProject.instance().mapLayer(ortho.id()).extent() == reference.extent()
+    desktop.picture("10_rpcs")
+
+    dock.tabs.setCurrentWidget(repair)
+    assert list(repair.fits) == ["translation", "affine"]
+    desktop.picture("11_ground_control")
+    used = repair.review.points.used & ~repair.review.points.is_check
+    index = int(np.flatnonzero(used)[0])
+    xy = repair.review.points.reference_xy[index]
+    repair.drag.click()
+    place = repair.points.toCanvasCoordinates(repair.points.rows[index][1])
+    drag(desktop, repair._drag, place, (25, 0))
+    assert repair.review.edited[index]
+    assert repair.review.points.reference_xy[index][0] > xy[0] + 2
+    assert repair.fits["translation"].residuals_px[index] > 2
+    repair.write.click()
+    desktop.wait(lambda: repair.writer.run is None)
+    assert repair.text.text().startswith("Written: "), repair.text.text()
+    again = dock.look._registered
+    assert again.id() != ortho.id()
+    assert again.extent() == reference.extent()
+    report = repair.writer.outcome.files["REPORT"]
+    assert json.loads(report.with_suffix(".json").read_text())["points_by_hand"] == 1
+    assert "points set by hand: 1" in report.read_text(encoding="utf-8")
 
 
 def test_the_menu_makes_and_loads_an_example(desktop: Desktop, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from groundtie.errors import CancelledError, OutputError, RasterOpenError
 from groundtie.rasters import atomic
-from groundtie.rasters.atomic import Outputs, writing
+from groundtie.rasters.atomic import Outputs, scratch_file, writing
 
 
 class FakeLibraryError(Exception):
@@ -43,8 +43,9 @@ def test_nothing_remains_after_an_exception(tmp_path: Path, error: BaseException
         with Outputs() as outputs:
             staged = outputs.stage(tmp_path / "image.tif")
             staged.write_text("half")
-            outputs.scratch(tmp_path / "image.tif").write_text("half")
-            raise error
+            with scratch_file(staged) as scratch:
+                scratch.write_text("half")
+                raise error
 
     with pytest.raises(type(error)) as raised:
         fail()

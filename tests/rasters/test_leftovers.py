@@ -19,11 +19,13 @@ from groundtie.rasters.atomic import Outputs, scratch_folder
 RUN = """
 import sys, time
 from pathlib import Path
-from groundtie.rasters.atomic import Outputs
+from groundtie.rasters.atomic import Outputs, scratch_file
 with Outputs() as outputs:
     for name in ("image.tif", "points.csv"):
         outputs.stage(Path(sys.argv[1]) / name).write_text("half")
-    folder = outputs.scratch(Path(sys.argv[1]) / "image.tif")
+    staged = outputs.stage(Path(sys.argv[1]) / "folder.tif")
+    kept = scratch_file(staged)
+    folder = kept.__enter__()
     folder.mkdir()
     (folder / "inside").write_text("half")
     print("staged", flush=True)

@@ -39,7 +39,7 @@ from groundtie.errors import (
     TooFewPointsError,
 )
 from groundtie.geometry.estimation import Estimate
-from groundtie.masks.choice import LAYER, REGIONS, THRESHOLD, MaskUsed
+from groundtie.masks.choice import LAYER, REGIONS, SURFACE, THRESHOLD, MaskUsed
 from groundtie.matching.pose_survey import PoseSurvey
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import Survey
@@ -54,6 +54,7 @@ from groundtie.registration.pose_verdict import PoseEvidence, PoseSurveyEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
 from groundtie.registration.series_evidence import DateEvidence
+from groundtie.registration.surface_masks import ModelFit
 from groundtie.registration.tie_point_evidence import TiePointEvidence
 from groundtie.registration.verdict import Evidence, first_refusal
 
@@ -179,6 +180,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "too little ground": (
         evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.08, "as in a dense town")),
         evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.12, "as in a dense town")),
+    ),
+    "surface model elsewhere": (
+        evidence(GOOD, mask=MaskUsed(SURFACE, "reference", 0.3, "shows nothing", False)),
+        evidence(GOOD, mask=MaskUsed(SURFACE, "reference", 0.3, "fits")),
     ),
     "ground elsewhere": (
         evidence(GOOD, ground_shift_px=1.1),
@@ -326,7 +331,7 @@ def test_heights_that_spread_evenly_displace_by_their_width(
     assert abs(found @ RANGE) == pytest.approx(np.hypot(*found), rel=0.01)
 
 
-@pytest.mark.parametrize("kind", [REGIONS, LAYER])
+@pytest.mark.parametrize("kind", [REGIONS, LAYER, SURFACE])
 def test_a_town_whose_ground_was_matched_is_not_suspected(kind: str) -> None:
     found = evidence(two_thirds(20), scene=PERHAPS, mask=masked(kind))
     assert "town matched whole" not in refusing(found)
@@ -338,6 +343,23 @@ def test_a_town_whose_ground_confirms_is_not_suspected() -> None:
 
 def test_an_image_of_fields_is_not_suspected() -> None:
     assert refusing(evidence(two_thirds(20), scene=scene())) == []
+
+
+@pytest.mark.parametrize(
+    ("fit", "reason"),
+    [
+        (ModelFit(0.4, (2, -2)), None),
+        (ModelFit(0.4, (-3, 1)), "3.2 px off"),
+        (ModelFit(0.08, (0, 0)), "the registered input does not show"),
+    ],
+)
+def test_the_input_shows_elevated_objects_where_the_surface_model_has_them(
+    fit: ModelFit, reason: str | None
+) -> None:
+    found = evidence(GOOD, mask=masked(SURFACE), input_fit=fit, max_error_px=3.0)
+    decided = first_refusal(found)
+    assert (decided is None) == (reason is None)
+    assert decided is None or (reason is not None and reason in decided[1])
 
 
 def test_ground_must_be_reliable_and_span_the_overlap() -> None:
@@ -361,7 +383,7 @@ def test_an_oblique_view_needs_more_check_points_on_the_ground(
     assert refusing(evidence(errors, mask=regions)) == []
 
 
-@pytest.mark.parametrize("kind", [REGIONS, LAYER])
+@pytest.mark.parametrize("kind", [REGIONS, LAYER, SURFACE])
 def test_little_ground_may_be_weakly_similar(kind: str) -> None:
     """A mask leaves little of each chip; other rules judge what it leaves."""
     weak = survey(height=1.9, rival=1.8)
@@ -413,7 +435,8 @@ def test_what_copies_leave_may_contradict(off: int, expected: list[str]) -> None
 
 
 @pytest.mark.parametrize(
-    ("kind", "expected"), [(LAYER, []), (REGIONS, ["despeckled town"]), (THRESHOLD, [])]
+    ("kind", "expected"),
+    [(LAYER, []), (SURFACE, []), (REGIONS, ["despeckled town"]), (THRESHOLD, [])],
 )
 def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list[str]) -> None:
     """Regions of a camera's image that pass for a radar's are no ground."""

@@ -104,9 +104,9 @@ def test_an_asset_must_be_named_where_there_are_several(tmp_path: Path) -> None:
     [
         ("none.tif", None, "there is no file"),
         ("none*.tif", None, "no file matches"),
-        ("a.csv", "path\nx.tif\n", "has no column file"),
-        ("a.csv", "file,time\nx.tif,soon\n", "line 2: 'soon' is no time"),
-        ("a.csv", "file,time\n,2020-01-01\n", "line 2: the column file is empty"),
+        ("a.csv", "path\nx.tif\n", "row 1: no file"),
+        ("a.csv", "file,time\nx.tif,soon\n", "row 1: 'soon' is no time"),
+        ("a.csv", "file,time\n,2020-01-01\n", "row 1: no file"),
         ("a.json", "[]", "is no STAC item"),
         ("a.json", "{", "cannot read the STAC file"),
         ("a.json", '{"type": "Feature"}', "is no STAC item"),

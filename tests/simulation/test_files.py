@@ -10,6 +10,7 @@ import rasterio
 
 from groundtie.errors import OutputError
 from groundtie.geometry.transform import load_transform
+from groundtie.geometry.views import View
 from groundtie.simulation.files import CHECK_POINT_COLUMNS, ROOF_POINT_COLUMNS, write_pair
 from groundtie.simulation.misregistration import DISTORTIONS, DistortionOptions
 from groundtie.simulation.optical import OpticalOptions
@@ -52,6 +53,31 @@ class TestRasters:
             assert raster.transform == pair.reference_grid.transform
             assert raster.crs == pair.reference_grid.crs
             assert raster.descriptions == ("Amplitude",)
+
+    def test_surface(self, pair: SimulatedPair, paths: dict[str, Path]) -> None:
+        with rasterio.open(paths["dsm"]) as raster, rasterio.open(paths["dem"]) as ground:
+            surface, terrain, margin = raster.read(1), ground.read(1), pair.scene.margin_px
+            corner = pair.reference_grid.pixel_to_map([[-margin, -margin]])[0]
+            assert raster.xy(0, 0) == pytest.approx(tuple(corner))
+        rows, cols = pair.scene.window
+        above = surface[rows, cols] - terrain
+        stands = pair.scene.object_m[rows, cols] > 2
+        np.testing.assert_allclose(
+            above[stands], pair.scene.object_m[rows, cols][stands], atol=1e-3
+        )
+        assert stands.any() and (above >= 0).all()
+
+    def test_views(self, pair: SimulatedPair, paths: dict[str, Path]) -> None:
+        options = pair.options
+        radar, camera = (View.of(paths[name], None) for name in ("reference", "input"))
+        assert radar == View("radar", 270.0, options.sar.incidence_deg)
+        assert camera == View(
+            "camera",
+            options.optical.view_azimuth_deg,
+            options.optical.off_nadir_deg,
+            options.optical.sun_azimuth_deg,
+            options.optical.sun_elevation_deg,
+        )
 
     def test_input(self, pair: SimulatedPair, paths: dict[str, Path]) -> None:
         with rasterio.open(paths["input"]) as raster:

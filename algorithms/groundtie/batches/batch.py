@@ -15,12 +15,12 @@ from ..errors import CancelledError
 from ..executors import open_executor
 from ..progress import Progress
 from ..rasters.atomic import writing
+from ..tables import read_rows
 from ..version import __version__
 from .calls import Call, make_calls
 from .log import EventLog, open_log, read_finished, still_there
 from .result import BatchResult, BatchRow
 from .running import Reporter, run_calls
-from .table import read_rows
 from .work import FAILED, Outcome
 
 

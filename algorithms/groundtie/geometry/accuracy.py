@@ -127,14 +127,10 @@ def predict_accuracy(
     if count < 2 or len(check.px) == 0:
         return UNKNOWN
 
-    def deviations(px: FloatArray) -> FloatArray:
-        return jackknife_deviations([model(px) for model in fold_models])
-
-    blocks = float((deviations(check.px) ** 2).sum(axis=0).mean())
-    factor = math.sqrt((blocks + check.shared_variance_px2) / (2 * blocks)) if blocks > 0 else 1.0
+    blocks = _block_variance_px2(fold_models, check)
     random = np.random.default_rng(0)
-    parts = random.standard_normal((_DRAWS, count)) * factor
-    moved = np.einsum("dk,kmx->dmx", parts, deviations(places_px))
+    parts = random.standard_normal((_DRAWS, count)) * _factor(blocks, check)
+    moved = np.einsum("dk,kmx->dmx", parts, _deviations(fold_models, places_px))
     common = random.uniform(-1, 1, (_DRAWS, 1, 1)) * displacement_px
 
     def radii(scale: FloatArray | float, shares: Sequence[float]) -> list[float]:
@@ -150,6 +146,49 @@ def predict_accuracy(
         for share in ((1 + _CONFIDENCE) / 2, (1 - _CONFIDENCE) / 2)
     )
     return Accuracy(ce50, ce90, ce95, (min(low, ce90), max(high, ce90)))
+
+
+def standard_deviation_px(
+    fold_models: Sequence[Callable[[FloatArray], FloatArray]],
+    places_px: FloatArray,
+    check: CheckResiduals,
+    displacement_px: FloatArray,
+) -> FloatArray:
+    """Return the standard deviation along an axis of a transform's error at places, shape (m,).
+
+    What `predict_accuracy` draws from, without what so few blocks leave unknown of the variance;
+    infinite where that predicts nothing. Parameters are the same.
+    """
+    if len(fold_models) < 2 or len(check.px) == 0:
+        return np.full(len(places_px), np.inf)
+    factor = _factor(_block_variance_px2(fold_models, check), check)
+    variance = (_deviations(fold_models, places_px) ** 2).sum(axis=0).mean(axis=-1) * factor**2
+    # Of an even distribution between both limits.
+    common = float((np.asarray(displacement_px) ** 2).mean()) / 3
+    return np.asarray(np.sqrt(variance + common))
+
+
+def _deviations(
+    fold_models: Sequence[Callable[[FloatArray], FloatArray]], px: FloatArray
+) -> FloatArray:
+    return jackknife_deviations([model(px) for model in fold_models])
+
+
+def _block_variance_px2(
+    fold_models: Sequence[Callable[[FloatArray], FloatArray]], check: CheckResiduals
+) -> float:
+    """Return the mean variance along an axis that blocks of points leave at the check points."""
+    return float((_deviations(fold_models, check.px) ** 2).sum(axis=0).mean())
+
+
+def _factor(blocks_px2: float, check: CheckResiduals) -> float:
+    """Return by how much deviations are larger than those of blocks show: see `predict_accuracy`.
+
+    Their variance is the mean of what blocks show and of what check points share.
+    """
+    if blocks_px2 <= 0:
+        return 1.0
+    return math.sqrt((blocks_px2 + check.shared_variance_px2) / (2 * blocks_px2))
 
 
 def _degrees_of_freedom(blocks_px2: float, count: int, check: CheckResiduals) -> float:

@@ -219,3 +219,8 @@ def thin_plate_kernel(uv: FloatArray, knots: FloatArray) -> FloatArray:
     """Return r² log r for all distances between `uv` (m, 2) and `knots` (n, 2), shape (m, n)."""
     squared = ((uv[:, None, :] - knots[None, :, :]) ** 2).sum(axis=2)
     return np.asarray(0.5 * squared * np.log(np.maximum(squared, 1e-300)))
+
+
+def shift_model(dx: float, dy: float) -> Model:
+    """Return a translation in map units as a model."""
+    return PolynomialModel("translation", Frame(Affine.identity()), np.array([[dx, dy]]))

@@ -30,8 +30,8 @@ _LEAST_GROUND, _LEAST_SKELETON = 0.04, 2.0
 # Chips with less than this share of valid pixels have too few for a joint histogram of their own.
 _LITTLE = 0.4
 
-# What a mask by a vector layer is called.
-LAYER = "layer"
+# What masks by a vector layer and by a surface model are called.
+LAYER, SURFACE = "layer", "surface"
 
 REFERENCE, INPUT = "reference", "input"
 
@@ -43,7 +43,7 @@ class MaskUsed:
     Parameters
     ----------
     kind
-        One of `MASKS`, or `LAYER`.
+        One of `MASKS`, `LAYER` or `SURFACE`.
     image
         Which image was masked: "reference" or "input"; None without a mask.
     share
@@ -51,7 +51,8 @@ class MaskUsed:
     reason
         Why, in a sentence.
     is_reliable
-        Whether enough roads and banks were found for regions to be the ground.
+        Whether enough roads and banks were found for regions to be the ground, or the image shows
+        the elevated objects of the surface model.
     """
 
     kind: str
@@ -59,6 +60,11 @@ class MaskUsed:
     share: float
     reason: str
     is_reliable: bool = True
+
+    @property
+    def is_ground(self) -> bool:
+        """Whether nothing but ground takes part, as far as the mask is right."""
+        return self.kind in (REGIONS, LAYER, SURFACE)
 
     @property
     def leaves_little(self) -> bool:

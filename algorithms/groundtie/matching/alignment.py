@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
-from scipy.ndimage import spline_filter1d
 from scipy.optimize import minimize
 
 from ..errors import TooFewPointsError
@@ -225,11 +224,19 @@ def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Prior) -> list[_Fie
     to_shift = np.asarray(np.linalg.inv(prior.linear), np.float64)
     for blur in _BLURS_PX:
         blurred = (cv2.GaussianBlur(s, (0, 0), blur) if blur else s for s in surfaces)
-        coefficients = np.stack(list(blurred)).astype(np.float64)
-        for axis in (1, 2):
-            coefficients = spline_filter1d(coefficients, order=3, axis=axis)
+        coefficients = _spline_coefficients(np.stack(list(blurred)).astype(np.float64))
         fields.append(_Field(centres, predicted, coefficients, to_shift))
     return fields
+
+
+def _spline_coefficients(values: FloatArray) -> FloatArray:
+    """Return the coefficients of cubic B-splines through values, (n, s, s), mirrored beyond."""
+    middle, side = bspline_weights(4, 0.0)[1], bspline_weights(4, 0.0)[0]
+    size = values.shape[1]
+    splines = middle * np.eye(size) + side * (np.eye(size, k=1) + np.eye(size, k=-1))
+    splines[0, 1] = splines[-1, -2] = 2 * side
+    inverse = np.linalg.inv(splines)
+    return np.asarray(inverse @ values @ inverse.T)
 
 
 def _cubic(t: FloatArray) -> tuple[FloatArray, FloatArray]:

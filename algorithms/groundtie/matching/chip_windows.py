@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
-from ..geometry.models import Model
+from ..geometry.models import Model, shift_model
+from ..rasters.grid import Grid
+from ..rasters.held import held_onto
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from .matcher import MaskOf, Places
@@ -22,9 +24,71 @@ from .matcher import MaskOf, Places
 R = TypeVar("R")
 _Numbers = NDArray[np.intp]
 
-# Longest side of a block, in pixels: enough of them for all threads, and each in the processor's
-# cache.
+# Longest side of a block that is read from files, in pixels: enough of them for all threads, and
+# each in the processor's cache.
 _BLOCK_PX = 384
+
+# Images of so many pixels are resampled as a whole: 5 bytes each are held for either.
+_HELD_PIXELS = 4_000_000
+
+# Blocks of these for a thread: none waits long for the others.
+_HELD_BLOCKS = 2
+
+
+@dataclass(frozen=True)
+class Resampled:
+    """Two images, the input where a model has it: what windows of chips are cut out of.
+
+    Parameters
+    ----------
+    pair
+        The images.
+    model
+        The misregistration on the map that is left, by which the input is resampled.
+    is_held
+        Whether they lie in memory on the grid of the chips, so that nothing is left.
+    """
+
+    pair: ImagePair
+    model: Model
+    is_held: bool = False
+
+    @classmethod
+    def of(
+        cls, pair: ImagePair, model: Model, grid: Grid, reach_px: int, context: Context
+    ) -> Resampled:
+        """Resample images as a whole if they are small; of large ones chips show a part alone.
+
+        Parameters
+        ----------
+        pair
+            The images.
+        model
+            The misregistration on the map.
+        grid
+            The grid on which chips are matched.
+        reach_px
+            How far windows of chips reach beyond it.
+        context
+            Threads.
+        """
+        width, height = grid.width + 2 * reach_px, grid.height + 2 * reach_px
+        if width * height > _HELD_PIXELS:
+            return cls(pair, model)
+        around, quiet = grid.window(-reach_px, -reach_px, width, height), context.quiet()
+        to_reference = pair.reference.source.grid.map_to_pixel
+        held = replace(
+            pair,
+            reference=held_onto(pair.reference, around, to_reference, quiet),
+            input=held_onto(pair.input, around, lambda xy: pair.nominal_px(model(xy)), quiet),
+        )
+        return cls(held, shift_model(0.0, 0.0), is_held=True)
+
+    def read(self, piece: Grid, hidden: MaskOf | None) -> tuple[Patch, Patch]:
+        """Return both images on a piece of the grid, the reference without what is hidden."""
+        pair, model = self.pair, self.model
+        reference = pair.reference_patch(piece, None if hidden is None else hidden(piece))
+        return reference, pair.input_patch(piece, lambda xy: pair.nominal_px(model(xy)))
 
 
 @dataclass(frozen=True)
@@ -33,10 +97,8 @@ class ChipWindows:
 
     Parameters
     ----------
-    pair
+    images
         The images.
-    model
-        The misregistration on the map, by which the input is resampled.
     places
         The chips.
     reach_px
@@ -46,8 +108,7 @@ class ChipWindows:
         may be.
     """
 
-    pair: ImagePair
-    model: Model
+    images: Resampled
     places: Places
     reach_px: int
     hidden: MaskOf | None
@@ -64,7 +125,9 @@ class ChipWindows:
         def of_block(block: _Numbers) -> list[tuple[int, R | None]]:
             return [(number, function(number, *both)) for number, *both in self._read(block)]
 
-        blocks = list(self._blocks(np.arange(len(self.places.centres))))
+        count = len(self.places.centres)
+        most = -(-count // (_HELD_BLOCKS * context.workers)) if self.images.is_held else None
+        blocks = list(self._blocks(np.arange(count), most))
         done = [one for results in context.map(of_block, blocks) for one in results]
         done.sort(key=operator.itemgetter(0))
         found = [(number, result) for number, result in done if result is not None]
@@ -78,14 +141,21 @@ class ChipWindows:
     def _corners(self) -> NDArray[np.int_]:
         return self.places.centres - self.places.chip_px // 2 - self.reach_px
 
-    def _blocks(self, chips: _Numbers) -> Iterator[_Numbers]:
-        """Yield chips, by number, in blocks that are read as one, as that reads fewer pixels."""
+    def _blocks(self, chips: _Numbers, most: int | None) -> Iterator[_Numbers]:
+        """Yield chips, by number, in blocks that are read as one: of so many, or by their size.
+
+        In files, that reads fewer pixels.
+        """
         if len(chips) == 0:
             return
         corners = self._corners[chips]
         size = np.ptp(corners, axis=0) + self._side_px
-        is_dense = np.prod(size) <= len(chips) * self._side_px**2
-        if len(chips) == 1 or (is_dense and size.max() <= max(_BLOCK_PX, 2 * self._side_px)):
+        if most is None:
+            is_dense = np.prod(size) <= len(chips) * self._side_px**2
+            is_block = is_dense and size.max() <= max(_BLOCK_PX, 2 * self._side_px)
+        else:
+            is_block = len(chips) <= most
+        if len(chips) == 1 or is_block:
             yield chips
             return
         along = corners[:, int(np.argmax(size))]
@@ -94,8 +164,8 @@ class ChipWindows:
         if first.all():
             yield from (chips[k : k + 1] for k in range(len(chips)))
             return
-        yield from self._blocks(chips[first])
-        yield from self._blocks(chips[~first])
+        yield from self._blocks(chips[first], most)
+        yield from self._blocks(chips[~first], most)
 
     def _read(self, block: _Numbers) -> Iterator[tuple[int, Patch, Patch]]:
         """Yield the number, reference and input window of each chip of a block."""
@@ -103,9 +173,7 @@ class ChipWindows:
         corner = corners.min(axis=0)
         width, height = (int(n) for n in np.ptp(corners, axis=0) + side)
         piece = self.places.grid.window(int(corner[0]), int(corner[1]), width, height)
-        pair, model = self.pair, self.model
-        reference = pair.reference_patch(piece, None if self.hidden is None else self.hidden(piece))
-        input = pair.input_patch(piece, lambda xy: pair.nominal_px(model(xy)))
+        reference, input = self.images.read(piece, self.hidden)
         for number, (col, row) in zip(block, corners - corner, strict=True):
             inside = slice(row, row + side), slice(col, col + side)
             yield int(number), _part(reference, inside), _part(input, inside)

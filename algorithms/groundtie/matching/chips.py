@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,16 +14,19 @@ from ..geometry.models import DEGREE, Model
 from ..geometry.robust import find_consensus
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
-from ..similarity.description import BORDER_PX
+from ..similarity.description import BORDER_PX, Description
 from ..similarity.peak import find_peak
-from ..similarity.surface import SimilaritySettings, describe, similarity_surface
+from ..similarity.surface import SimilaritySettings, Surface, describe, similarity_surface
 from .alignment import Positions
 from .belief_propagation import Surfaces, normalise_each, propagate
-from .chip_windows import ChipWindows
+from .chip_windows import ChipWindows, Resampled
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 
 _log = logging.getLogger(__name__)
+
+# Makes a surface of the reference's and the input's window.
+_Way = Callable[[Description, Description, int, SimilaritySettings], Surface]
 
 # Chips with less valid area than this in either image are not matched. A mask leaves what was
 # chosen to be matched: a little of it may be enough.
@@ -85,7 +89,7 @@ class ChipMatcher:
         context
             Threads and progress.
         """
-        kept, found = self._run(model, places, radius_px, context, both_ways=True)
+        kept, found = self._run(model, places, radius_px, context, _forward, _backward)
         forward, backward = found[:, 0], found[:, 1]
         weight = _equal_weight(normalise_each(forward + backward))
         return ChipSurfaces(kept, forward, backward, weight)
@@ -97,8 +101,18 @@ class ChipMatcher:
 
         Parameters as `match`.
         """
-        kept, found = self._run(model, places, radius_px, context, both_ways=False)
+        kept, found = self._run(model, places, radius_px, context, _forward)
         return kept, found[:, 0]
+
+    def match_forward_and_own(
+        self, model: Model, places: Places, radius_px: int, context: Context
+    ) -> tuple[NDArray[np.int_], Surfaces, Surfaces]:
+        """Return what `match_forward` does, and the surfaces of its chips in the reference itself.
+
+        Parameters as `match`.
+        """
+        kept, found = self._run(model, places, radius_px, context, _forward, _own)
+        return kept, found[:, 0], found[:, 1]
 
     def fit_places(self, layout: ChipLayout) -> Places:
         """Return the chips that a fit is made of."""
@@ -131,37 +145,26 @@ class ChipMatcher:
         return surfaces
 
     def _run(
-        self, model: Model, places: Places, radius_px: int, context: Context, *, both_ways: bool
+        self, model: Model, places: Places, radius_px: int, context: Context, *ways: _Way
     ) -> tuple[NDArray[np.int_], Surfaces]:
         """Return the centres that could be matched and surfaces (n, ways, 2 r + 1, 2 r + 1)."""
         reach = radius_px + BORDER_PX
-        windows = ChipWindows(self.pair, model, places, reach, self.held_out)
+        images = Resampled.of(self.pair, model, places.grid, reach, context)
+        windows = ChipWindows(images, places, reach, self.held_out)
 
         def one(chip: int, reference: Patch, input: Patch) -> Surfaces | None:
             cores = {"reference": reference.inner(reach), "input": input.inner(reach)}
             if not all(self._can_be_matched(*core, places.centres[chip]) for core in cores.items()):
                 return None
-            return self._surfaces(reference, input, places.chip_px, radius_px, both_ways)
+            of_reference = describe(reference, places.chip_px**2, self.settings)
+            of_input = describe(input, places.chip_px**2, self.settings)
+            made = [way(of_reference, of_input, radius_px, self.settings) for way in ways]
+            return np.stack(made)
 
         kept, found = windows.map(one, context)
         span = 2 * radius_px + 1
-        none = np.zeros((0, 1 + both_ways, span, span), np.float32)
+        none = np.zeros((0, len(ways), span, span), np.float32)
         return places.centres[kept], np.stack(found) if found else none
-
-    def _surfaces(
-        self, reference: Patch, input: Patch, chip_px: int, radius_px: int, both_ways: bool
-    ) -> Surfaces:
-        reference_chip = describe(reference, chip_px**2, self.settings)
-        input_chip = describe(input, chip_px**2, self.settings)
-        forward = similarity_surface(
-            reference_chip.inner(radius_px), input_chip, radius_px, self.settings
-        )
-        if not both_ways:
-            return forward[None]
-        backward = similarity_surface(
-            input_chip.inner(radius_px), reference_chip, radius_px, self.settings
-        )
-        return np.stack([forward, backward[::-1, ::-1]])
 
     def _can_be_matched(self, image: str, core: Patch, centre: NDArray[np.int_]) -> bool:
         least = self.least_valid
@@ -176,6 +179,28 @@ class ChipMatcher:
             _log.debug("chip at %s: the %s is constant", centre, image)
             return False
         return True
+
+
+def _forward(
+    reference: Description, input: Description, radius_px: int, settings: SimilaritySettings
+) -> Surface:
+    """Return the surface of a chip of the reference in the input."""
+    return similarity_surface(reference.inner(radius_px), input, radius_px, settings)
+
+
+def _backward(
+    reference: Description, input: Description, radius_px: int, settings: SimilaritySettings
+) -> Surface:
+    """Return the surface of a chip of the input in the reference, as that of the way forward."""
+    backward = similarity_surface(input.inner(radius_px), reference, radius_px, settings)
+    return backward[::-1, ::-1]
+
+
+def _own(
+    reference: Description, input: Description, radius_px: int, settings: SimilaritySettings
+) -> Surface:
+    """Return the surface of a chip of the reference in the reference itself."""
+    return similarity_surface(reference.inner(radius_px), reference, radius_px, settings)
 
 
 def _equal_weight(surfaces: Surfaces) -> FloatArray:

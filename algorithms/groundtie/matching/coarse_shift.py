@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from affine import Affine
 
 from ..context import Context
 from ..errors import RasterContentError
 from ..geometry.fitting import fit_model
 from ..geometry.limits import SearchLimits
-from ..geometry.models import Frame, Model, PolynomialModel
+from ..geometry.models import Model, shift_model
 from ..geometry.transform import Transform
 from ..pose.rotation_windows import read_windows
 from ..pose.search import find_poses
@@ -45,11 +44,6 @@ class Candidate:
 
     model: Model
     height: float
-
-
-def shift_model(dx: float, dy: float) -> Model:
-    """Return a translation in map units as a model."""
-    return PolynomialModel("translation", Frame(Affine.identity()), np.array([[dx, dy]]))
 
 
 def level_factor(grid: Grid) -> float:

@@ -7,8 +7,8 @@ there that the reference has not.
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
-from scipy.ndimage import maximum_filter
 
 from ..similarity.surface import Surface
 
@@ -37,6 +37,6 @@ def ghost_height(mean: Surface, own: Surface) -> float:
     left = mean - (design @ share).reshape(mean.shape)
     # What is highest at the border may be higher beyond.
     inside = np.maximum(*np.meshgrid(abs(shift), abs(shift))) < radius
-    tops = left[far & inside & (left >= maximum_filter(left, _WINDOW_PX))]
+    tops = left[far & inside & (left >= cv2.dilate(left, np.ones((_WINDOW_PX,) * 2)))]
     spread = 1.4826 * float(np.median(np.abs(left[far] - np.median(left[far]))))
     return float(tops.max(initial=0.0)) / max(spread, 1e-9)

@@ -21,7 +21,7 @@ from ..similarity.pooled import PooledHistogram, smooth
 from ..similarity.surface import SimilaritySettings, Surface
 from .alignment import Positions
 from .belief_propagation import normalise_each
-from .chip_windows import ChipWindows
+from .chip_windows import ChipWindows, Resampled
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 
@@ -79,9 +79,11 @@ class PooledHistogramMatcher:
         TooFewPointsError
             The mask leaves too few pixels.
         """
-        histogram = self._histogram(model, Places.tiles(places.grid, self.pooled_chip_px), context)
+        images = Resampled.of(self.pair, model, places.grid, radius_px, context)
+        tiles = Places.tiles(places.grid, self.pooled_chip_px)
+        histogram = self._histogram(images, tiles, context)
         order = 1 if self._is_reference_masked else -1
-        windows = self._windows(model, places, radius_px, self.blind)
+        windows = self._windows(images, places, radius_px, self.blind)
 
         def one(_: int, reference: Patch, input: Patch) -> Surface | None:
             template, search = self._template_first(reference, input)
@@ -123,7 +125,7 @@ class PooledHistogramMatcher:
         """Return the surfaces that check points are taken from: sums over neighbouring blocks."""
         return surfaces.summed(layout.neighbourhoods(surfaces.centres))
 
-    def _histogram(self, model: Model, places: Places, context: Context) -> PooledHistogram:
+    def _histogram(self, images: Resampled, places: Places, context: Context) -> PooledHistogram:
         """Return the evidence of pairs of grey levels in chips of the fit, as they lie now."""
         every = max(len(places.centres) * places.chip_px**2 // _MOST_PIXELS, 1)
 
@@ -132,7 +134,7 @@ class PooledHistogramMatcher:
             both = template.valid & search.valid
             return np.stack([smooth(template).values[both], search.values[both]])[:, ::every]
 
-        _, sampled = self._windows(model, places, 0, blind=True).map(pixels, context.quiet())
+        _, sampled = self._windows(images, places, 0, blind=True).map(pixels, context.quiet())
         sample = np.concatenate(sampled, axis=1) if sampled else np.zeros((2, 0), np.float32)
         count = sample.shape[1] * every
         if count < _LEAST_PIXELS:
@@ -143,9 +145,10 @@ class PooledHistogramMatcher:
     def _is_reference_masked(self) -> bool:
         return self.pair.reference.mask is not None
 
-    def _windows(self, model: Model, places: Places, radius_px: int, blind: bool) -> ChipWindows:
-        hidden = self.held_out if blind else None
-        return ChipWindows(self.pair, model, places, radius_px, hidden)
+    def _windows(
+        self, images: Resampled, places: Places, radius_px: int, blind: bool
+    ) -> ChipWindows:
+        return ChipWindows(images, places, radius_px, self.held_out if blind else None)
 
     def _template_first(self, reference: Patch, input: Patch) -> tuple[Patch, Patch]:
         """Return the masked image's window, then the other's."""

@@ -23,7 +23,6 @@ from ..rasters.grid import Grid
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
 from .chips import LEAST_VALID_MASKED, ChipMatcher
-from .coarse_shift import shift_model
 from .ghost import ghost_height
 from .matcher import FloatArray, MaskOf, Places
 from .parts import Elsewhere, Part
@@ -224,16 +223,19 @@ def survey_model(
         See `Survey`.
     """
     places = places or survey_places(matcher.pair.grid)
-    least_valid = None if without is None else LEAST_VALID_MASKED
-    blind = replace(matcher, held_out=without, least_valid=least_valid)
-    kept, surfaces = blind.match_forward(model, places, SURVEY_RADIUS_PX, context)
+    asked = model, places, SURVEY_RADIUS_PX, context
+    own = None
+    if without is None:
+        whole = replace(matcher, held_out=None, least_valid=None)
+        kept, surfaces, own = whole.match_forward_and_own(*asked)
+    else:
+        rest = replace(matcher, held_out=without, least_valid=LEAST_VALID_MASKED)
+        kept, surfaces = rest.match_forward(*asked)
     shifts = np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
     spacing = [float(np.diff(np.unique(places.centres[:, axis])).max(initial=1)) for axis in (0, 1)]
     mean = surfaces.sum(axis=0) / max(len(kept), 1)
     ghost = 0.0
-    if without is None and len(kept) > 0:
-        itself = replace(blind, pair=replace(matcher.pair, input=matcher.pair.reference))
-        _, own = itself.match_forward(shift_model(0.0, 0.0), places, SURVEY_RADIUS_PX, context)
+    if own is not None and len(own) > 0:
         ghost = ghost_height(mean, own.mean(axis=0))
     return Survey(places.grid, kept, shifts, np.array(spacing), mean, elsewhere_px, ghost)
 

@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
 
 from ..context import Context
 from ..geometry.limits import SearchLimits
@@ -200,6 +199,9 @@ class _Search:
             return [
                 level.peaks(surface, pose, self.limits.radius, peaks) for surface, pose in pairs
             ]
+
+        # Every registration imports this module; few search poses.
+        from scipy.ndimage import maximum_filter
 
         rows = list(self.context.map(at_scale, scales.tolist()))
         heights = np.array([[found[0].height for found in row] for row in rows])

@@ -24,6 +24,7 @@ from .leftovers import Claim, hidden_name, new_token, remove
 SIDECARS = (".aux.xml", ".ovr", ".msk", "-wal", "-shm", "-journal")
 
 _HIDDEN = re.compile(r"\.([^/\\]*)\.groundtie-[0-9a-f]{16}-[a-z]+(\.[^/\\]*)?$")
+_ROLE = re.compile(r"-new(\.[^.]*)?$")
 
 # Of Linux and Windows, in bytes or characters; the rest of a hidden name takes up to 40.
 _LONGEST_NAME = 255 - 40
@@ -46,7 +47,6 @@ class Outputs:
         self._claims: dict[Path, Claim] = {}
         self._staged: dict[Path, Path] = {}
         self._aside: dict[Path, Path] = {}
-        self._scratch: list[Path] = []
         self._names = itertools.count()
 
     def __enter__(self) -> Outputs:
@@ -72,12 +72,6 @@ class Outputs:
         self._staged[final] = staged
         return staged
 
-    def scratch(self, path: str | os.PathLike[str]) -> Path:
-        """Return the name of a file beside the output `path` that is needed in this job alone."""
-        made = self._hidden(Path(os.path.abspath(path)), "tmp")
-        self._scratch.append(made)
-        return made
-
     def __exit__(
         self,
         kind: type[BaseException] | None,
@@ -89,7 +83,7 @@ class Outputs:
                 self._commit()
         finally:
             # After a commit there are but the old files.
-            for path in (*self._staged.values(), *self._scratch, *self._aside.values()):
+            for path in (*self._staged.values(), *self._aside.values()):
                 for present in (*_sidecars(path), path):
                     remove(present)
             for claim in self._claims.values():
@@ -192,6 +186,19 @@ def write_json(path: Path, values: Mapping[str, Any], indent: int | None = 1) ->
     text = json.dumps({**values, **run_tags()}, indent=indent, allow_nan=False, ensure_ascii=False)
     with writing(path):
         path.write_text(text, encoding="utf-8")
+
+
+@contextlib.contextmanager
+def scratch_file(path: Path) -> Iterator[Path]:
+    """Give the name of a file beside a staged output that its job alone needs, and remove it."""
+    # The same token: should the job be killed, this file is a leftover, too.
+    scratch = path.with_name(_ROLE.sub(r"-tmp\1", path.name))
+    if scratch == path:
+        scratch = path.with_name(hidden_name(new_token(), "tmp", path.stem, path.suffix))
+    try:
+        yield scratch
+    finally:
+        remove(scratch)
 
 
 @contextlib.contextmanager

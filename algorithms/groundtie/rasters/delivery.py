@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -114,7 +113,6 @@ def warp_raster(
     resampling: str = "cubic",
     *,
     nodata: float | None = None,
-    cog: Path | None = None,
     workers: int = 2,
     progress: Progress = SILENT,
 ) -> None:
@@ -135,14 +133,12 @@ def warp_raster(
     target
         The grid of the result.
     path
-        The GeoTIFF to write; see `atomic.Outputs.stage`.
+        The GeoTIFF to write; see `atomic.Outputs.stage` and `writing.create_like`.
     resampling
         One of `warping.METHODS`. Where the target's pixels are larger than 1.5 input pixels,
         the mean over the area is taken first (not with `nearest`).
     nodata
         Another nodata value for the result.
-    cog
-        See `writing.create_like`.
     workers
         Number of threads.
     progress
@@ -171,7 +167,6 @@ def warp_raster(
             nodata=warp.nodata,
             interleave=interleave,
             masked=masked,
-            cog=cog,
             workers=workers,
             progress=progress.part(1 - _OVERVIEWS, 1),
         ) as file,

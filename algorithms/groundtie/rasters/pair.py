@@ -67,12 +67,17 @@ class Image:
         if not self.source.says_what_is_valid:
             valid = valid & ~_empty_areas(values, valid)
         if self.mask is not None:
-            own, to_mask = self.source.grid, _nominal_pixels(self.source.grid, self.mask.grid)
-            shown, known = sample(
-                self.mask, grid, lambda xy: to_mask(own.pixel_to_map(to_px(xy))), "nearest", 1
-            )
-            valid = valid & known & (shown != 0)
+            valid = valid & self.shown_on(grid, to_px)
         return Patch(values, valid)
+
+    def shown_on(self, grid: Grid, to_px: ToPixel) -> Mask:
+        """Return what the mask, which there must be, lets take part; parameters as `read_onto`."""
+        assert self.mask is not None
+        own, to_mask = self.source.grid, _nominal_pixels(self.source.grid, self.mask.grid)
+        shown, known = sample(
+            self.mask, grid, lambda xy: to_mask(own.pixel_to_map(to_px(xy))), "nearest", 1
+        )
+        return known & (shown != 0)
 
     def bands_onto(self, grid: Grid, to_px: ToPixel) -> FloatImage:
         """Return all bands but alpha on a grid, shape (bands, h, w), 0 where one is invalid."""

@@ -91,6 +91,11 @@ class RasterSource:
         return self._handles.identity == other._handles.identity
 
     @property
+    def is_file(self) -> bool:
+        """Whether its name opens it again: it is neither in memory nor a dataset of the caller."""
+        return isinstance(self._handles, FileHandles)
+
+    @property
     def count(self) -> int:
         """Number of bands."""
         return len(self.bands)

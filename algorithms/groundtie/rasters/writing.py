@@ -18,7 +18,7 @@ from rasterio.io import MemoryFile
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
 from ..runs import RUN_TAG, run_tags
-from .atomic import scratch_folder, writing
+from .atomic import final_name, scratch_file, scratch_folder, writing
 from .bands import BandInfo, fits
 from .blocks import PixelType
 from .grid import PIXEL_COORDINATES, Grid
@@ -32,6 +32,9 @@ from .tiling import in_order
 _OWN_DOMAINS = ("IMAGE_STRUCTURE", "DERIVED_SUBDATASETS", "SUBDATASETS", "RPC", "GEOLOCATION")
 _OWN_TAGS = ("NODATA_VALUES", RUN_TAG)
 
+# Endings by which users ask for a Cloud Optimized GeoTIFF.
+COG_SUFFIXES = (".cog.tif", ".cog.tiff")
+
 
 @contextlib.contextmanager
 def create_like(
@@ -43,7 +46,6 @@ def create_like(
     interleave: str | None = None,
     masked: bool = False,
     rpc_tags: Mapping[str, str] | None = None,
-    cog: Path | None = None,
     workers: int = 2,
     progress: Progress = SILENT,
 ) -> Iterator[TiledFile]:
@@ -60,7 +62,8 @@ def create_like(
     grid
         Where the new pixels lie.
     path
-        The file to write; see `atomic.Outputs.stage`.
+        The file to write; see `atomic.Outputs.stage`. One whose final name ends in `.cog.tif`
+        becomes a Cloud Optimized GeoTIFF: its blocks are copied once more.
     nodata
         Value of pixels without data, or None.
     interleave
@@ -69,9 +72,6 @@ def create_like(
         Whether a mask is written, too.
     rpc_tags
         RPCs that locate it, as GDAL's metadata domain RPC.
-    cog
-        Where the blocks are written first (see `atomic.Outputs.scratch`), to be copied into a
-        Cloud Optimized GeoTIFF; None: it need not be one.
     workers
         Threads that compress.
     progress
@@ -91,8 +91,8 @@ def create_like(
     """
     if nodata is not None:
         require_fit(nodata, source.dtype)
-    first = Path(path if cog is None else cog)
-    require_space(first, grid.width * grid.height * source.count * source.dtype.itemsize)
+    path = Path(path)
+    require_space(path, grid.width * grid.height * source.count * source.dtype.itemsize)
     names = {band.dtype for band in source.bands}
     # GDAL's complex integers have no name in numpy.
     pixels = PixelType(names.pop() if len(names) == 1 else source.dtype.name, source.dtype)
@@ -102,15 +102,17 @@ def create_like(
     base = base_image(template, grid.width, grid.height)
     raster = Level(base, base.mask() if masked else None)
     levels = [raster, *(raster.overview(factor) for factor in _overviews(grid))]
+    is_cog = final_name(path).lower().endswith(COG_SUFFIXES)
     with (
+        scratch_file(path) if is_cog else contextlib.nullcontext(path) as first,
         ThreadPoolExecutor(workers) as pool,
         TiledFile(first, levels, pixels, source.count, pool, 2 * workers) as file,
     ):
         yield file
         _write_overviews(file, nearest=source.colormap is not None, progress=progress)
         file.finish(len(levels))
-        if cog is not None:
-            file.copy_as_cog(Path(path))
+        if is_cog:
+            file.copy_as_cog(path)
     if beside is not None:
         with writing(path):
             Path(f"{os.fspath(path)}.aux.xml").write_bytes(beside)

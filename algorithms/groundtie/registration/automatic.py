@@ -20,7 +20,7 @@ from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster
 from ..rasters.rendered import RADAR, Light
 from ..sensor.rpc_files import rpc_of
-from .delivery import RADAR_AZIMUTHS_DEG, Call, asked_terrain
+from .delivery import Call
 from .evidence import SCENE, SURVEY
 from .orthorectification import Orthorectification
 from .pipeline import run
@@ -30,6 +30,7 @@ from .scene import SceneInfo
 from .sensor_input import Ground, open_sensor_image
 from .sensor_jobs import RefinedRpc, refine
 from .specification import CHIPS, COREGISTER, OPTICAL, SAR_SAR, FreeSearch, Specification
+from .terrain import RADAR_AZIMUTHS_DEG, asked_terrain
 from .verdict import Verdict
 
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
@@ -255,4 +256,7 @@ _RPC_DEFAULTS: Mapping[str, Any] = {
     "search_radius": None,
     "mask": AUTO,
     "matching_pixel_size": None,
+    "surface_model": None,
+    "reference_view": None,
+    "image_view": None,
 }

@@ -13,15 +13,18 @@ from typing import Any
 from ..context import Context, threads
 from ..errors import NotRegisteredError, ParameterError
 from ..geometry.tie_point_files import write_tie_points
-from ..matching.surface_fit import AUTO
+from ..geometry.views import View
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
+from ..rasters.grid import Grid
 from ..rasters.reading import bounded_cache
-from ..rasters.rendered import SUN, Light
+from ..report.stac import stac_item
+from .displacement import write_displacement
 from .pipeline import OpenPair, open_pair, pair_images, run
-from .registered_output import RegisteredOutput, model_for_grid
+from .registered_output import RegisteredOutput, grid_of_output, model_for_grid
 from .registration import Registration
-from .specification import Specification
+from .specification import Specification, StatedSurface
+from .terrain import asked_light, asked_terrain
 from .user_masks import UserMask
 
 
@@ -33,6 +36,7 @@ class RegistrationFiles:
     tie_points: Path | None = None
     transform: Path | None = None
     report: Path | None = None
+    displacement: Path | None = None
 
     def named(self, registration: Registration) -> dict[str, Path]:
         """Return what `write` writes of a registration, by name."""
@@ -41,6 +45,7 @@ class RegistrationFiles:
             # A pose has none.
             "tie_points": None if registration.tie_points is None else self.tie_points,
             "transform": self.transform,
+            "displacement": None if registration.evidence is None else self.displacement,
         }
         named = {**(results if registration.verdict.accepted else {}), "report": self.report}
         return {name: path for name, path in named.items() if path is not None}
@@ -48,25 +53,47 @@ class RegistrationFiles:
     def write(self, registration: Registration, context: Context) -> None:
         """Write all files, or those of a refused registration: the report."""
         with Outputs() as outputs:
+            grid = None
             if registration.verdict.accepted:
-                self._write_results(registration, outputs, context)
+                grid = self._write_results(registration, outputs, context)
             # Last: who finds it finds all that it is about.
             if self.report is not None:
-                registration.page().write(outputs, self.report, self.transform)
+                item = self._item(registration, grid, self.report)
+                registration.page().write(outputs, self.report, self.transform, item)
+
+    def _item(
+        self, registration: Registration, grid: Grid | None, report: Path
+    ) -> Mapping[str, Any]:
+        """Return the STAC item of a registered raster on a grid; empty without one."""
+        if self.output is None or grid is None:
+            return {}
+        return stac_item(
+            registration.pair.input.source,
+            self.output.path,
+            grid,
+            report.parent,
+            registration.verdict,
+            registration.accepted(),
+        )
 
     def _write_results(
         self, registration: Registration, outputs: Outputs, context: Context
-    ) -> None:
+    ) -> Grid | None:
+        """Write what an accepted registration leaves, and return the registered raster's grid."""
         transform, points = registration.accepted(), registration.tie_points
         if self.tie_points is not None and points is not None:
             write_tie_points(outputs.stage(self.tie_points), points, transform)
         if self.transform is not None:
             write_json(outputs.stage(self.transform), transform.to_json())
-        if self.output is not None:
-            context.update(0.0, "writing the registered image")
-            source = registration.pair.input.source
-            reference = registration.pair.reference.source.grid
-            self.output.write(source, reference, transform, outputs, context)
+        reference = registration.pair.reference.source
+        if self.displacement is not None and registration.evidence is not None:
+            staged = outputs.stage(self.displacement)
+            write_displacement(registration.evidence, reference, staged)
+        if self.output is None:
+            return None
+        context.update(0.0, "writing the registered image")
+        source = registration.pair.input.source
+        return self.output.write(source, reference.grid, transform, outputs, context)
 
 
 @dataclass(frozen=True)
@@ -104,11 +131,18 @@ class Call:
         given = {**_USUAL, **parameters}
         output = None
         if given["output"] is not None:
-            output = RegisteredOutput(given["output"], given["output_grid"], given["resampling"])
+            grid = grid_of_output(given["output"], given["output_grid"])
+            output = RegisteredOutput(given["output"], grid, given["resampling"])
         return cls(
             given["reference"],
             given["input"],
-            RegistrationFiles(output, given["tie_points"], given["transform"], given["report"]),
+            RegistrationFiles(
+                output,
+                given["tie_points"],
+                given["transform"],
+                given["report"],
+                given["displacement"],
+            ),
             (given["reference_band"], given["input_band"]),
             asked_masks(given, "input"),
             parameters,
@@ -171,16 +205,16 @@ class Call:
         return kept
 
 
-# Satellites fly nearly from pole to pole: a radar looks east or west, which differ in the sign of
-# contrast above all.
-RADAR_AZIMUTHS_DEG = (270.0, 90.0)
-
 # What tools may leave out that do not ask for it.
 _USUAL: Mapping[str, Any] = {
+    "displacement": None,
     "output_grid": "reference",
     "resampling": "cubic",
     "reference_mask_values": None,
     "input_mask_values": None,
+    "surface_model": None,
+    "reference_view": None,
+    "input_view": None,
 }
 
 
@@ -215,52 +249,43 @@ def asked_masks(given: Mapping[str, Any], image: str) -> tuple[UserMask | None, 
     return reference, other
 
 
-def asked_terrain(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the terrain models of a specification by the values of a tool's parameters.
+def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:
+    """Return what a tool is told of elevated objects, by its parameters; None: nothing.
 
     Raises
     ------
     ParameterError
-        They do not go together.
+        A view is missing or cannot be understood, or has no surface model to go with.
     """
-    dem, input_dem = given.get("dem"), given.get("input_dem")
-    if input_dem is not None and dem is None:
-        raise ParameterError("the input's terrain model (input_dem) goes with another one (dem)")
-    return {"dem": dem, "input_dem": input_dem}
-
-
-def asked_light(given: Mapping[str, Any]) -> Light | None:
-    """Return in which light a reference that is a terrain model is rendered; None: it is none.
-
-    Raises
-    ------
-    ParameterError
-        Nobody said where the light comes from.
-    """
-    kind, azimuth_deg = given.get("light"), given.get("light_azimuth")
-    if kind is None:
-        if azimuth_deg is not None:
-            raise ParameterError("light_azimuth goes with light: the reference is a terrain model")
+    model = given["surface_model"]
+    names = ("reference", image)
+    if model is None:
+        if any(given[f"{name}_view"] is not None for name in names):
+            raise ParameterError("a view goes with a surface model (surface_model)")
         return None
-    if azimuth_deg is None and kind == SUN:
-        raise ParameterError(
-            "light sun needs its azimuth (light_azimuth): the tool register tries some"
-        )
-    return Light(kind, RADAR_AZIMUTHS_DEG[0] if azimuth_deg is None else azimuth_deg)
+    views = [View.of(given[name], given[f"{name}_view"]) for name in names]
+    for name, view in zip(names, views, strict=True):
+        if view is None:
+            raise ParameterError(
+                f"a surface model needs the view of the {name}: put its STAC item beside it, or "
+                f"give {name}_view"
+            )
+    reference, other = (view for view in views if view is not None)
+    return StatedSurface(model, (reference, other))
 
 
 def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specification:
     """Return a preset with what a tool was called with."""
-    terrain = asked_terrain(parameters)
-    if terrain["dem"] is not None and parameters["model"] != AUTO:
-        raise ParameterError(
-            f"a terrain model (dem) goes with model {AUTO}, not {parameters['model']}"
-        )
+    surface = asked_surface({**_USUAL, **parameters}, "input")
+    if surface is not None:
+        preset = preset.with_surface(surface)
     return replace(
         preset,
-        **terrain,
+        **asked_terrain(parameters),
         light=asked_light(parameters),
-        model=model_for_grid(parameters["model"], parameters["output_grid"]),
+        model=model_for_grid(
+            parameters["model"], grid_of_output(parameters["output"], parameters["output_grid"])
+        ),
         max_error_px=parameters["max_error"],
         search_radius_m=parameters["search_radius"],
         rotation_deg=parameters["search_rotation"],

@@ -11,7 +11,13 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import GroundTieError
-from ..geometry.accuracy import UNKNOWN, Accuracy, CheckResiduals, predict_accuracy
+from ..geometry.accuracy import (
+    UNKNOWN,
+    Accuracy,
+    CheckResiduals,
+    predict_accuracy,
+    standard_deviation_px,
+)
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.estimation import Estimate
 from ..geometry.judging import (
@@ -22,12 +28,13 @@ from ..geometry.judging import (
 )
 from ..geometry.robust import Mixture, fit_mixture
 from ..geometry.tie_points import TiePoints
-from ..masks.choice import LAYER, NONE, REGIONS, MaskUsed
+from ..masks.choice import NONE, MaskUsed
 from ..matching.rest import Rest
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..rasters.grid import FloatArray, Grid
 from .layover import EVEN_MEAN_OVER_SCATTER, scatter_along_line
 from .scene import SceneInfo
+from .surface_masks import ModelFit
 
 # Stages of a registration, in the order in which their rules are asked.
 TIE_POINTS, SEARCH, ASSESSMENT, POSE, AGREEMENT, ERROR, SCENE, SURVEY, REFINEMENT, SERIES = (
@@ -140,6 +147,8 @@ class RegistrationEvidence:
         Where chips all over the overlap match; None: not looked at, as in tests of other rules.
     rest
         The same without content that is the same in both arrays; None: there is none.
+    input_fit
+        How well a surface model fits the registered input; None: nothing is expected of it.
     """
 
     estimate: Estimate
@@ -156,6 +165,7 @@ class RegistrationEvidence:
     mask: MaskUsed = field(default_factory=lambda: MaskUsed(NONE, None, 1.0, ""))
     survey: Survey | None = None
     rest: Rest | None = None
+    input_fit: ModelFit | None = None
 
     stages: ClassVar = (AGREEMENT, ERROR, SCENE, SURVEY)
 
@@ -175,6 +185,7 @@ class RegistrationEvidence:
         agreeing = int((np.hypot(*self.residuals_px.T) <= TOLERANCE_PX).sum())
         probability = agreement_probability(TOLERANCE_PX, self.radius_px)
         mixture = self._mixture(self.residuals_px, self.radius_px)
+        lattice = _lattice(self.grid)
         return HeldOut(
             "check points",
             agreeing,
@@ -183,21 +194,26 @@ class RegistrationEvidence:
             self.largest_log10_chance,
             mixture.sigma * math.sqrt(2),
             self.max_error_px,
-            float(np.sqrt(np.mean(self.estimate.spread_px(_lattice(self.grid)) ** 2))),
+            float(np.sqrt(np.mean(self.estimate.spread_px(lattice) ** 2))),
             "the overlap",
             predict_accuracy(
-                self.estimate.fold_models,
-                _lattice(self.grid),
-                CheckResiduals(
-                    self.grid.map_to_pixel(self.counted.reference_xy),
-                    self.residuals_px,
-                    mixture.probability,
-                ),
-                self.displacement_px,
+                self.estimate.fold_models, lattice, self._check_residuals, self.displacement_px
             ),
         )
 
-    @property
+    def standard_deviation_px(self, px: FloatArray) -> FloatArray:
+        """Return that of the transform's error along an axis, shape (n,), at pixels (n, 2)."""
+        return standard_deviation_px(
+            self.estimate.fold_models, px, self._check_residuals, self.displacement_px
+        )
+
+    @cached_property
+    def _check_residuals(self) -> CheckResiduals:
+        places = self.grid.map_to_pixel(self.counted.reference_xy)
+        mixture = self._mixture(self.residuals_px, self.radius_px)
+        return CheckResiduals(places, self.residuals_px, mixture.probability)
+
+    @cached_property
     def displacement_px(self) -> FloatArray:
         """The most that heights may displace all matches by, to either side, shape (2,).
 
@@ -210,7 +226,7 @@ class RegistrationEvidence:
         weights = self._mixture(shifts, SURVEY_RADIUS_PX).probability
         scatter = scatter_along_line(shifts, weights, _LOG10_SIGNIFICANCE)
         mean = (self.layover_factor or EVEN_MEAN_OVER_SCATTER) * scatter
-        return mean if self.mask.kind in (REGIONS, LAYER) else 2 * mean
+        return mean if self.mask.is_ground else 2 * mean
 
     def _mixture(self, residuals_px: FloatArray, radius_px: int) -> Mixture:
         area = (2 * radius_px + 1) ** 2

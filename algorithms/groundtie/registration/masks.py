@@ -25,6 +25,7 @@ from ..masks.choice import (
 )
 from ..masks.regions import HIGH_PERCENT, WIDTH_M, GroundRegions, find_ground
 from ..masks.scene import Scene, Selection
+from ..masks.surface_model import SurfaceGround
 from ..masks.threshold import Threshold
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
@@ -32,7 +33,7 @@ from ..rasters.reading import Window
 from .scene import SceneInfo
 from .user_masks import with_mask
 
-# In which part of an image the direction of cast shadows is looked for.
+# In which part of an image the direction of cast shadows, and the like, is looked for.
 _MIDDLE_PX = 2048
 
 
@@ -49,11 +50,14 @@ class Masked:
     ground
         The images with a mask of the ground alone, on which check points are matched where `pair`
         shows more of a dense town; None: no dense town, or nothing but ground takes part.
+    surface
+        What a surface model lets expect; None: there is none.
     """
 
     pair: ImagePair
     used: MaskUsed
     ground: ImagePair | None = None
+    surface: SurfaceGround | None = None
 
     def on(self, pair: ImagePair) -> Masked:
         """Return the masks of the reference on another pair with the same reference."""
@@ -62,6 +66,7 @@ class Masked:
             replace(pair, reference=self.pair.reference),
             self.used,
             None if ground is None else replace(pair, reference=ground.reference),
+            self.surface,
         )
 
 
@@ -127,7 +132,7 @@ class _Town:
 
     def _find(self) -> GroundRegions:
         other = self._info.other.scene
-        middle = other.read(_middle(other.grid))
+        middle = other.read(middle_of(other.grid))
         shadow = shadow_azimuth_deg(middle) if middle.valid.any() else None
         return find_ground(self.scene, WIDTH_M, HIGH_PERCENT, self._context.progress, shadow)
 
@@ -138,6 +143,7 @@ def require_one_mask(kind: str, used: MaskUsed | None) -> None:
         raise ParameterError(f"give either mask={kind} or a vector layer as mask")
 
 
-def _middle(grid: Grid) -> Window:
+def middle_of(grid: Grid) -> Window:
+    """Return as much of the middle of an image as is enough to tell how it was taken."""
     width, height = min(grid.width, _MIDDLE_PX), min(grid.height, _MIDDLE_PX)
     return Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)

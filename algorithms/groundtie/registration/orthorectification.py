@@ -57,7 +57,6 @@ class Orthorectification:
         outputs: Outputs,
         context: Context,
         resampling: str = "cubic",
-        cog: bool = False,
     ) -> Grid:
         """Write the orthoimage, and return its grid.
 
@@ -71,8 +70,6 @@ class Orthorectification:
             Threads and progress.
         resampling
             One of `warping.METHODS`.
-        cog
-            Whether it is copied into a Cloud Optimized GeoTIFF.
         """
         target = self.target
         warp_raster(
@@ -81,7 +78,6 @@ class Orthorectification:
             target,
             outputs.stage(output),
             resampling,
-            cog=outputs.scratch(output) if cog else None,
             workers=context.workers,
             progress=context.progress,
         )

@@ -33,7 +33,8 @@ from ..matching.rest import Rest, survey_rest
 from ..matching.surface_fit import SurfaceFit
 from ..matching.survey import ELSEWHERE_PX, Survey, survey_model, survey_places
 from ..rasters.pair import Image, ImagePair, make_pair
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.patch import Patch
+from ..rasters.reading import Window, bounded_cache, open_raster
 from ..rasters.rendered import rendered
 from ..similarity.surface import SimilaritySettings
 from .evidence import RegistrationEvidence, SearchEvidence
@@ -42,6 +43,7 @@ from .masks import Masked, require_one_mask, with_ground_mask
 from .registration import Registration
 from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
+from .surface_masks import ModelFit, fit_of, with_surface_mask
 from .user_masks import named_masks, with_user_masks
 from .verdict import judge, judge_search
 
@@ -183,6 +185,8 @@ def run(
 
 def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: Context) -> Masked:
     """Return the pair with all masks: the user's, and that of the radar image if one is needed."""
+    if spec.surface is not None:
+        return with_surface_mask(opened.pair, spec.surface, spec.mask, opened.stack, context)
     if opened.user_mask is not None:
         return Masked(opened.pair, opened.user_mask)
     return with_ground_mask(opened.pair, spec.mask, scene, opened.stack, context)
@@ -206,7 +210,12 @@ def register(
         return replace(result, verdict=judge_search(SearchEvidence(error)))
     evidence = stages.evidence(estimate, check, surveys, scene)
     return replace(
-        result, verdict=judge(evidence), estimate=estimate, check=check, survey=surveys[0]
+        result,
+        verdict=judge(evidence),
+        estimate=estimate,
+        check=check,
+        survey=surveys[0],
+        evidence=evidence,
     )
 
 
@@ -311,7 +320,20 @@ class Stages:
             scene,
             self.masked.used,
             *surveys,
+            self._input_fit(estimate),
         )
+
+    def _input_fit(self, estimate: Estimate) -> ModelFit | None:
+        """Return how well a surface model fits the registered input, which it was not fitted to."""
+        surface, pair, model = self.masked.surface, self.masked.pair, estimate.transform.model
+        if surface is None:
+            return None
+
+        def read(window: Window) -> Patch:
+            piece = surface.scene.grid.window(*window)
+            return pair.input_patch(piece, lambda xy: pair.nominal_px(model(xy)))
+
+        return fit_of(surface, surface.views[-1], read)
 
 
 def _fit(

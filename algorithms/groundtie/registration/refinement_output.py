@@ -133,6 +133,7 @@ def _report(
         grid=refinement.grid,
         pixel_m=sensor_grid(image.source, image.orientation).pixel_size_m,
         heights=image.heights,
+        by_hand=refinement.points.by_hand,
         warnings=tuple(heights.warnings()),
         comparison=None if found is None else _compared(refinement, found),
         mask=None if found is None else found.registration.mask,

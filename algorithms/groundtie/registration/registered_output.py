@@ -17,6 +17,8 @@ from ..rasters.delivery import warp_raster, write_with_geotransform
 from ..rasters.grid import Grid, reproject
 from ..rasters.reading import RasterSource
 from ..rasters.target_grids import registered_grid
+from ..rasters.vrt import SUFFIX as VRT
+from ..rasters.vrt import write_vrt
 
 UNTOUCHED = "untouched"
 OUTPUT_GRIDS = ("reference", "input", UNTOUCHED)
@@ -32,7 +34,7 @@ class RegisteredOutput:
     Parameters
     ----------
     path
-        The GeoTIFF.
+        The GeoTIFF; for untouched pixels a `.vrt`, too.
     grid
         "reference", "input" or "untouched" (see `OUTPUT_GRIDS`).
     resampling
@@ -50,8 +52,8 @@ class RegisteredOutput:
         transform: Transform,
         outputs: Outputs,
         context: Context,
-    ) -> None:
-        """Write a raster as registered; it is resampled once, or not at all.
+    ) -> Grid:
+        """Write a raster as registered, resampled once or not at all, and return its grid.
 
         Parameters
         ----------
@@ -67,15 +69,19 @@ class RegisteredOutput:
             Threads and progress.
         """
         staged, progress = outputs.stage(self.path), context.progress
-        if self.grid == UNTOUCHED:
+        if self.grid == UNTOUCHED or self.path.suffix.lower() == VRT:
             moved = moved_grid(transform)
-            write_with_geotransform(source, moved, staged, progress=progress)
-            return
+            if self.path.suffix.lower() == VRT:
+                write_vrt(source, moved, staged)
+            else:
+                write_with_geotransform(source, moved, staged, progress=progress)
+            return moved
         to_px, target = resampled_onto(self.grid, source, reference, transform)
         workers = context.workers
         warp_raster(
             source, to_px, target, staged, self.resampling, workers=workers, progress=progress
         )
+        return target
 
 
 def resampled_onto(
@@ -103,6 +109,11 @@ def resampled_onto(
     return own_map_to_px, registered_grid(source.grid, px_to_own_map, crs)
 
 
+def grid_of_output(output: Path | None, asked: str) -> str:
+    """Return the grid of an output, one of `OUTPUT_GRIDS`: a `.vrt` holds untouched pixels."""
+    return UNTOUCHED if output is not None and output.suffix.lower() == VRT else asked
+
+
 def model_for_grid(model: str, output_grid: str) -> str:
     """Return the model that goes with an output grid; untouched pixels allow a shift only.
 
@@ -114,7 +125,7 @@ def model_for_grid(model: str, output_grid: str) -> str:
     if output_grid != UNTOUCHED:
         return model
     if model not in (AUTO, "translation"):
-        raise ParameterError(f"output_grid untouched goes with model translation, not {model}")
+        raise ParameterError(f"untouched pixels go with model translation, not {model}")
     return "translation"
 
 
@@ -133,6 +144,6 @@ def moved_grid(transform: Transform) -> Grid:
     dx, dy = shifts.mean(axis=0)
     if np.abs(shifts - [dx, dy]).max() > _UNTOUCHED_TOLERANCE_PX * min(grid.pixel_size):
         raise ParameterError(
-            "output_grid untouched is not possible: the CRS of reference and input differ too much"
+            "pixels cannot stay untouched: the correction is no shift in the input's own CRS"
         )
     return grid.shifted(float(dx), float(dy))

@@ -28,6 +28,7 @@ from ..report.correction import Correction
 from ..report.parts import Parts
 from ..report.report import Report
 from ..similarity.surface import Surface
+from .evidence import RegistrationEvidence
 from .registered_output import RegisteredOutput, resampled_onto
 from .scene import SceneInfo
 from .specification import Specification
@@ -62,6 +63,8 @@ class Registration:
         The check points; None without a transform.
     survey
         Where chips all over the overlap match; None without a transform.
+    evidence
+        What the verdict rests on; None without a transform, or of a pose.
     parameters
         What the tool was called with.
     started
@@ -82,6 +85,7 @@ class Registration:
     estimate: Estimate | None = None
     check: Check | None = None
     survey: Survey | None = None
+    evidence: RegistrationEvidence | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     started: float = 0.0
     files: Mapping[str, Path] = field(default_factory=dict)

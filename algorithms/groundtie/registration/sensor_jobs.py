@@ -19,7 +19,7 @@ from ..sensor.adjustment import Adjustment
 from ..sensor.control_points import ControlPoints, read_control_points
 from ..sensor.height_check import HeightCheck
 from ..sensor.rpc_fit import RPCFit
-from .delivery import asked_masks
+from .delivery import asked_masks, asked_surface
 from .ground_control import GroundControl, match_ground_control, require_crs
 from .refinement import Refinement
 from .refinement_output import Call, RefinementFiles
@@ -97,6 +97,8 @@ class RefinedRpc:
         Which heights were used, in words.
     mask
         Which mask points were matched with; None: they were given.
+    by_hand
+        How many of the points a person moved or added.
     files
         What was written, by name.
     """
@@ -107,12 +109,14 @@ class RefinedRpc:
     heights: HeightCheck
     ground: str
     mask: MaskUsed | None
+    by_hand: int
     files: dict[str, str]
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
         return {
             "verdict": self.judged.summary(),
+            "points_by_hand": self.by_hand,
             "bias": self.adjustment.bias.to_json(),
             "left_out_rmse_px": self.adjustment.left_out_rmse_px,
             "folding_residual_px": self.fit.largest_residual_px,
@@ -134,6 +138,7 @@ class RefinedRpc:
             f"{self.judged.after.rmse:.2f} px after",
             verdict.accuracy_line(),
             f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
+            *([f"set by hand: {self.by_hand} points"] if self.by_hand else []),
             self.ground,
             *(() if self.mask is None else (self.mask.line(),)),
             *(f"warning: {line}" for line in self.heights.warnings()),
@@ -200,6 +205,7 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
         heights,
         sensor.heights,
         None if found is None else found.registration.mask,
+        points.by_hand,
         files.written(),
     )
 
@@ -224,6 +230,9 @@ def _matched(
         mask=given["mask"],
         matching_pixel_size_m=given["matching_pixel_size"],
     )
+    surface = asked_surface(given, "image")
+    if surface is not None:
+        spec = spec.with_surface(surface)
     bands = given["reference_band"], given["image_band"]
     masks = asked_masks(given, "image")
     return sensor, match_ground_control(sensor, reference, spec, bands, masks, stack, context)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from ..geometry.judging import USUAL_MAX_ERROR_PX
-from ..masks.choice import AUTO
+from ..geometry.views import RADAR, View
+from ..masks.choice import AUTO, INPUT, REFERENCE
 from ..matching.alignment import CANDIDATES
 from ..rasters.rendered import Light
 
@@ -39,6 +41,35 @@ class FreeSearch:
 
 
 @dataclass(frozen=True)
+class StatedSurface:
+    """The elevated objects of a scene, and from where both images were taken.
+
+    Parameters
+    ----------
+    model
+        A raster of heights, or a vector layer of buildings with theirs.
+    views
+        That of the reference, then that of the input if it is known.
+    """
+
+    model: Any
+    views: tuple[View, ...]
+
+    @property
+    def name(self) -> str:
+        """What people call the model."""
+        return Path(self.model).name if isinstance(self.model, (str, Path)) else "the surface model"
+
+    @property
+    def radar(self) -> str:
+        """Which image is a radar's, as `Specification.radar` has it."""
+        is_radar = [view.sensor == RADAR for view in self.views]
+        if all(is_radar):
+            return BOTH
+        return (REFERENCE if is_radar[0] else INPUT) if any(is_radar) else NEITHER
+
+
+@dataclass(frozen=True)
 class Specification:
     """How a pair is registered; the registering tools are presets of it.
 
@@ -68,6 +99,8 @@ class Specification:
     radar
         Which image is a radar's, "reference", "input", "both" or "neither", for tools that are
         made for such pairs; "auto": inferred from metadata and speckle.
+    surface
+        Its elevated objects; None: unknown.
     matching_pixel_size_m, chip_px, spacing_px
         Pixel size of the matching grid, side of the chips and distance between them; None: by the
         images.
@@ -94,6 +127,7 @@ class Specification:
     free: FreeSearch = FreeSearch()
     mask: str = AUTO
     radar: str = AUTO
+    surface: StatedSurface | None = None
     matching_pixel_size_m: float | None = None
     chip_px: int | None = None
     spacing_px: float | None = None
@@ -101,6 +135,11 @@ class Specification:
     dem: Any = None
     input_dem: Any = None
     light: Light | None = None
+
+    def with_surface(self, surface: StatedSurface) -> Specification:
+        """Return the same with elevated objects, and whose images show them."""
+        radar = surface.radar if self.radar == AUTO else self.radar
+        return replace(self, surface=surface, radar=radar)
 
 
 # What the three tools are made for (see `tools`). Without georeferencing, SAR images may have any

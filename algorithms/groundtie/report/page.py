@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import platform
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import cv2
@@ -44,10 +46,17 @@ class Page:
         made = {"parameters": self.parameters, "versions": versions(), "seconds": self.seconds}
         return {name: plain(value) for name, value in (self.numbers() | made).items()}
 
-    def write(self, outputs: Outputs, path: Path, taken: Path | None = None) -> None:
+    def write(
+        self,
+        outputs: Outputs,
+        path: Path,
+        taken: Path | None = None,
+        item: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
         """Write the page, an HTML file, and before it its numbers, the JSON file beside it.
 
-        Where another output is to be `taken` for that file, they are NAME.report.json.
+        Where another output is to be `taken` for that file, they are NAME.report.json. With the
+        members of a STAC `item` that file is one (see `stac`).
 
         Raises
         ------
@@ -61,7 +70,7 @@ class Page:
         beside = path.with_suffix(".json")
         is_free = taken is None or taken.resolve() != beside.resolve()
         numbers = beside if is_free else path.with_suffix(".report.json")
-        write_json(outputs.stage(numbers), summary)
+        write_json(outputs.stage(numbers), {**plain(dict(item)), **summary})
         staged = outputs.stage(path)
         with writing(staged):
             staged.write_text(page, encoding="utf-8")

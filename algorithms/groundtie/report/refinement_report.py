@@ -35,6 +35,8 @@ class RefinementReport(Page):
         Side of one on the ground.
     heights
         Which heights were used, in words.
+    by_hand
+        How many of the points a person moved or added.
     warnings
         What makes the heights doubtful.
     comparison
@@ -54,6 +56,7 @@ class RefinementReport(Page):
     grid: Grid
     pixel_m: float
     heights: str
+    by_hand: int
     warnings: tuple[str, ...]
     comparison: Comparison | None
     mask: MaskUsed | None
@@ -66,6 +69,7 @@ class RefinementReport(Page):
         return {
             "verdict": self.judged.summary(),
             "bias": self.bias.to_json(),
+            "points_by_hand": self.by_hand,
             "heights": {"used": self.heights, "warnings": self.warnings},
             "mask": None if self.mask is None else self.mask.summary(),
         }
@@ -85,7 +89,7 @@ class RefinementReport(Page):
             },
             "bias": self.bias,
             "shift": list(zip(("column", "row"), *self.bias.shift_px(), strict=True)),
-            "facts": [self.heights, *([] if self.mask is None else [self.mask.line()])],
+            "facts": self._facts(),
             "warnings": self.warnings,
             "map": figures.svg_uri(figures.residual_map(residuals, grid)),
             "histogram": figures.svg_uri(histogram),
@@ -94,3 +98,7 @@ class RefinementReport(Page):
             "grid": grid,
             "pictures": self.comparison,
         }
+
+    def _facts(self) -> list[str]:
+        by_hand = [f"points set by hand: {self.by_hand}"] if self.by_hand else []
+        return [self.heights, *by_hand, *([] if self.mask is None else [self.mask.line()])]

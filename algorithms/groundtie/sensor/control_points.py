@@ -14,7 +14,7 @@ from rasterio.crs import CRS
 
 from ..errors import TransformFileError
 from ..geometry.georeferencer import unmeasured
-from ..geometry.tie_point_files import read_tie_points, write_tie_points
+from ..geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..rasters.atomic import writing
@@ -70,6 +70,11 @@ class ControlPoints:
         return replace(self, points=points)
 
     @property
+    def by_hand(self) -> int:
+        """How many of the points a person moved or added."""
+        return int(np.sum(self.points.more.get(EDITED, 0.0)))
+
+    @property
     def lon_lat(self) -> FloatArray:
         """Longitude and latitude, shape (n, 2)."""
         return reproject(self.points.reference_xy, self.crs, LON_LAT)
@@ -103,7 +108,7 @@ class ControlPoints:
             own = grid  # the Georeferencer counts an image's own pixels
         covariance = self.points.covariance_px2
         sigma = np.sqrt(covariance[:, 0, 0] * covariance[:, 1, 1])
-        more = {HEIGHT: self.height_m, CORRELATION: covariance[:, 0, 1] / sigma}
+        more = {HEIGHT: self.height_m, CORRELATION: covariance[:, 0, 1] / sigma, **self.points.more}
         transform = Transform.nominal(self.crs, own)
         write_tie_points(path, replace(self.points, more=more), transform)
 
@@ -165,6 +170,7 @@ def read_control_points(
         forward_backward_error_px=np.full(count, np.nan),
         is_check=stored.is_check,
         state=state.astype(str),
+        more={EDITED: stored.more[EDITED]} if EDITED in stored.more else {},
     )
     return ControlPoints(points, np.where(np.isfinite(height), height, 0.0), crs)
 

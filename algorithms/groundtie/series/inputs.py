@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import csv
 import datetime
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import ParameterError
-from ..raster_names import file_name, identity, located
+from ..raster_names import file_name, identity, located, time_of
 from ..stac_items import RASTER_SUFFIXES, StacItem, is_item, raster_of_item, read_items
+from ..tables import read_rows
 
 _TABLE = (".csv",)
-
-_DAY = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
-_YEAR = re.compile(r"(?<!\d)((?:19|20)\d\d)(?!\d)")
 
 _COLUMNS = ("file", "name", "time", "mask")
 
@@ -79,25 +75,6 @@ def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed,
     return tuple(sorted(dates, key=lambda date: (date.time or datetime.datetime.min, date.name)))
 
 
-def time_of(text: str) -> datetime.datetime | None:
-    """Return the time that a text states: an ISO 8601 time, else a day or a year in a name."""
-    try:
-        stated = datetime.datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
-    except ValueError:
-        stated = None
-    if stated is not None and not text.strip().isdigit():
-        if stated.tzinfo is not None:
-            stated = stated.astimezone(datetime.timezone.utc).replace(tzinfo=None)
-        return stated
-    if day := _DAY.search(text):
-        try:
-            return datetime.datetime(*map(int, day.groups()))  # type: ignore[arg-type]
-        except ValueError:  # 30 February
-            return None
-    year = _YEAR.search(text)
-    return None if year is None else datetime.datetime(int(year.group(1)), 1, 1)
-
-
 def _listed(given: Path | str, asset: str | None) -> Iterable[Listed]:
     if isinstance(given, str):
         return _of_stac(given, asset) if is_item(given) else [_file(given)]
@@ -125,28 +102,18 @@ def _file(raster: Path | str) -> Listed:
 
 
 def _of_table(path: Path) -> list[Listed]:
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.DictReader(stream)
-            columns = reader.fieldnames or ()
-            rows = list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ParameterError(f"cannot read the table {path}: {error}") from error
-    if "file" not in columns:
-        raise ParameterError(f"the table {path} has no column file ({', '.join(_COLUMNS)})")
-    return [_of_row(path, number, row) for number, row in enumerate(rows, start=2)]
+    return [_of_row(path, number, row) for number, row in enumerate(read_rows(path), start=1)]
 
 
-def _of_row(path: Path, number: int, row: Mapping[str, str | None]) -> Listed:
-    values = {name: (row.get(name) or "").strip() for name in _COLUMNS}
-    if not values["file"]:
-        raise ParameterError(f"{path}, line {number}: the column file is empty")
-    date = _file(raster_of_item(located(values["file"], path)))
-    time = date.time if not values["time"] else time_of(values["time"])
-    if values["time"] and time is None:
-        raise ParameterError(f"{path}, line {number}: {values['time']!r} is no time (ISO 8601)")
-    mask = located(values["mask"], path) if values["mask"] else None
-    return Listed(values["name"] or date.name, date.raster, time, mask)
+def _of_row(path: Path, number: int, row: Mapping[str, str]) -> Listed:
+    if "file" not in row:
+        raise ParameterError(f"{path}, row {number}: no file ({', '.join(_COLUMNS)})")
+    date = _file(raster_of_item(located(row["file"], path)))
+    time = time_of(row["time"]) if "time" in row else date.time
+    if "time" in row and time is None:
+        raise ParameterError(f"{path}, row {number}: {row['time']!r} is no time (ISO 8601)")
+    mask = located(row["mask"], path) if "mask" in row else None
+    return Listed(row.get("name", date.name), date.raster, time, mask)
 
 
 def _of_stac(given: Path | str, asset: str | None) -> list[Listed]:

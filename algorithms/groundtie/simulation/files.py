@@ -18,6 +18,7 @@ from ..rasters.grid import Grid
 from ..runs import RUN_TAG, run_tags
 from ..sensor.rpc import RPC
 from ..sensor.rpc_tags import rpc_to_tags
+from .metadata import optical_item, sar_item
 from .pair import SAR, SimulatedPair, scene_grid
 
 FloatArray = npt.NDArray[np.float64]
@@ -27,6 +28,9 @@ NAMES = {
     "input": "input.tif",
     "dem": "dem.tif",
     "input_dem": "input_dem.tif",
+    "dsm": "dsm.tif",
+    "reference_metadata": "reference.json",
+    "input_metadata": "input.json",
     "truth": "truth.json",
     "check_points": "check_points.csv",
     "roof_points": "roof_points.csv",
@@ -49,8 +53,9 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
     -------
     dict
         Paths of reference, input, dem (bare ground in metres on the reference's pixels), input_dem
-        (what the input was orthorectified with, on these and around, if it is wrong), truth (JSON,
-        which `load_transform` reads), check_points and roof_points (CSV).
+        (what the input was orthorectified with, on these and around, if it is wrong), dsm (the
+        ground with buildings and trees, and beyond), reference_metadata and input_metadata (STAC
+        items), truth (JSON, which `load_transform` reads), check_points and roof_points (CSV).
 
     Raises
     ------
@@ -70,9 +75,19 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
         write_raster(staged["input"], pair.input, pair.truth.input_grid, input)
         terrain = pair.scene.terrain_m[pair.scene.window]
         write_raster(staged["dem"], terrain[None], pair.reference_grid, ["Height of ground (m)"])
+        surface, grid = pair.scene.surface_m, pair.reference_grid
+        around = scene_grid(grid, pair.scene.margin_px)
+        write_raster(staged["dsm"], surface[None], around, ["Height of surface (m)"])
         if "input_dem" in staged:
-            around = scene_grid(pair.reference_grid, pair.scene.margin_px)
             write_raster(staged["input_dem"], pair.assumed_m[None], around, ["Height taken (m)"])
+        for name, lies in (("reference", grid), ("input", pair.truth.input_grid)):
+            is_radar = (name == "input") == (pair.options.input == SAR)
+            item = (
+                sar_item(NAMES[name], lies, pair.options.sar)
+                if is_radar
+                else optical_item(NAMES[name], lies, pair.options.optical)
+            )
+            write_json(staged[f"{name}_metadata"], item)
         write_json(staged["truth"], truth_json(pair))
         write_table(staged["check_points"], CHECK_POINT_COLUMNS, _check_points(pair))
         write_table(staged["roof_points"], ROOF_POINT_COLUMNS, _roof_points(pair))

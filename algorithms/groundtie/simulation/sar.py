@@ -83,6 +83,11 @@ class SarOptions:
         """Ground metres of layover for a metre of height."""
         return 1 / math.tan(math.radians(self.incidence_deg))
 
+    @property
+    def azimuth_deg(self) -> float:
+        """Where the radar stands, seen from the ground, clockwise from the top of the image."""
+        return 270.0 if self.orbit == "ascending" else 90.0
+
 
 def render_sar(scene: Scene, options: SarOptions) -> npt.NDArray[np.uint16]:
     """Return the amplitude image, uint16 (rows, columns), of the scene without its margin."""

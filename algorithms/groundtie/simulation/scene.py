@@ -126,6 +126,12 @@ class Scene:
         m = self.margin_px
         return slice(m, rows - m), slice(m, columns - m)
 
+    @property
+    def surface_m(self) -> npt.NDArray[np.float32]:
+        """What a surface model states: heights of ground, roofs and canopies, without vehicles."""
+        stands = self.cover() != Cover.CAR
+        return np.asarray(self.terrain_m + np.where(stands, self.object_m, np.float32(0)))
+
     def cover(self, rows: slice = slice(None)) -> npt.NDArray[np.uint8]:
         """Return the class (`Cover`) of the pixels of some rows."""
         return self.parcels.cover[self.parcel[rows]]

@@ -12,12 +12,16 @@ from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.grid import PIXEL_COORDINATES, Grid
 from ..sensor.rpc_files import write_rpc
 from .files import write_raster, write_table
+from .metadata import optical_item, sar_item
 from .sensor_image import FloatArray, SensorImage
 
 NAMES = {
     "reference": "reference.tif",
     "image": "sensor.tif",
     "dem": "dem.tif",
+    "dsm": "dsm.tif",
+    "reference_metadata": "reference.json",
+    "image_metadata": "sensor.json",
     "exact_rpc": "exact_rpc.txt",
     "truth": "truth.json",
     "check_points": "check_points.csv",
@@ -37,8 +41,9 @@ def write_sensor_image(made: SensorImage, folder: str | Path) -> dict[str, Path]
     -------
     dict
         Paths of reference (SAR orthoimage), image (with the delivered RPCs in its tags), dem (bare
-        ground, metres above the ellipsoid), exact_rpc, truth (JSON), check_points and roof_points
-        (CSV).
+        ground, metres above the ellipsoid), dsm (the same with buildings and trees),
+        reference_metadata and image_metadata (STAC items), exact_rpc, truth (JSON), check_points
+        and roof_points (CSV).
 
     Raises
     ------
@@ -56,6 +61,13 @@ def write_sensor_image(made: SensorImage, folder: str | Path) -> dict[str, Path]
         write_raster(staged["image"], made.image, own, bands, made.delivered.rpc)
         heights = ["Height of ground above the ellipsoid (m)"]
         write_raster(staged["dem"], made.terrain_m[None], made.terrain_grid, heights)
+        surface = ["Height of surface above the ellipsoid (m)"]
+        write_raster(staged["dsm"], made.surface_m[None], made.terrain_grid, surface)
+        sar, grid = made.options.sar, made.reference_grid
+        write_json(staged["reference_metadata"], sar_item(NAMES["reference"], grid, sar))
+        write_json(
+            staged["image_metadata"], optical_item(NAMES["image"], grid, made.options.optical)
+        )
         write_rpc(staged["exact_rpc"], made.exact.rpc)
         write_json(staged["truth"], truth_json(made))
         write_table(staged["check_points"], CHECK_POINT_COLUMNS, _check_points(made))

@@ -88,8 +88,10 @@ class SensorImage:
     terrain_m : float32 array (rows, columns)
         Height of the bare ground above the ellipsoid, beyond all that the image shows, in
         truth or nominally.
+    surface_m : float32 array (rows, columns)
+        The same with buildings and trees.
     terrain_grid : Grid
-        Where it lies.
+        Where both lie.
     check_points_px : float64 array (n, 2)
         Reference pixels (col, row) on open ground that the image shows.
     roof_points : RoofPoints
@@ -105,6 +107,7 @@ class SensorImage:
     exact: RPCFit
     delivered: RPCFit
     terrain_m: npt.NDArray[np.float32]
+    surface_m: npt.NDArray[np.float32]
     terrain_grid: Grid
     check_points_px: FloatArray
     roof_points: RoofPoints
@@ -204,6 +207,7 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
         exact=exact,
         delivered=delivered,
         terrain_m=terrain.height_m,
+        surface_m=scenes.radar.surface_m + np.float32(GROUND_M),
         terrain_grid=terrain.grid,
         check_points_px=ground_points(scenes, grid, optical),
         roof_points=roof_points(scenes, grid, optical, options.sar, view),

@@ -28,6 +28,7 @@ NAMES = (
     "similarity_surface",
     "detector_repeatability",
     "filter_speckle",
+    "mask_surface",
     "mask_threshold",
     "mask_regions",
     "simulate",

@@ -8,10 +8,10 @@ from typing import Annotated
 
 from ..batches.batch import Batch
 from ..batches.result import BatchResult
-from ..batches.table import SUFFIXES
 from ..declaration import Output, tool
 from ..kinds import Choice, FileIn, FileOut, Flag, FolderOut, Number, Text
 from ..progress import SILENT, Progress
+from ..tables import SUFFIXES
 from . import NAMES, load_tool
 
 

@@ -15,13 +15,22 @@ Reference = Annotated[
     Path, RasterIn(label="Reference image", help="The image whose georeferencing is right.")
 ]
 Input = Annotated[Path, RasterIn(label="Input image", help="The image to be registered.")]
-_OUTPUT = RasterOut(
+COG_HELP = "A name that ends in .cog.tif makes it a Cloud Optimized GeoTIFF."
+_GEOTIFF = RasterOut(
     label="Registered image",
-    help="GeoTIFF with the input's bands, data type, nodata value, colours and metadata.",
+    help="GeoTIFF with the input's bands, data type, nodata value, colours and metadata. "
+    + COG_HELP,
     like="input",
 )
-Output = Annotated[Path, _OUTPUT]
-OptionalOutput = Annotated[Path | None, replace(_OUTPUT, optional_in_python=True)]
+_OR_VRT = replace(
+    _GEOTIFF,
+    help=f"{_GEOTIFF.help} A .vrt, for a shift alone, puts the input's own file in its right "
+    "place: no pixel is written.",
+    suffixes=(*_GEOTIFF.suffixes, ".vrt"),
+)
+Output = Annotated[Path, _OR_VRT]
+OptionalOutput = Annotated[Path | None, replace(_OR_VRT, optional_in_python=True)]
+OptionalGeoTiff = Annotated[Path | None, replace(_GEOTIFF, optional_in_python=True)]
 Resampling = Annotated[
     str,
     Choice(

@@ -17,10 +17,13 @@ from ..sensor.control_points import SUFFIXES
 from .common import MatchingPixelSize, Reference, ReferenceBand, Workers
 from .registration_parameters import (
     ImageMaskValues,
+    ImageView,
     Mask,
     MaxError,
     ReferenceMask,
     ReferenceMaskValues,
+    ReferenceView,
+    SurfaceModel,
 )
 from .sensor_parameters import (
     Dem,
@@ -72,6 +75,9 @@ def extract_gcps(
     reference_mask: ReferenceMask = None,
     reference_mask_values: ReferenceMaskValues = None,
     mask: Mask = AUTO,
+    surface_model: SurfaceModel = None,
+    reference_view: ReferenceView = None,
+    image_view: ImageView = None,
     matching_pixel_size: MatchingPixelSize = None,
     workers: Workers = None,
     progress: Progress = SILENT,

@@ -25,6 +25,7 @@ from .common import (
 )
 from .registration_parameters import (
     OUTPUTS,
+    DisplacementOut,
     InputMask,
     InputMaskValues,
     Mask,
@@ -53,6 +54,7 @@ def match_optical(
     tie_points: TiePointsOut = None,
     transform: TransformOut = None,
     report: ReportOut = None,
+    displacement: DisplacementOut = None,
     search_scale: SearchScale = None,
     reference_band: ReferenceBand = None,
     input_band: InputBand = None,

@@ -13,14 +13,14 @@ from rasterio.errors import CRSError
 from ..context import threads
 from ..declaration import tool
 from ..errors import GeoreferencingError, ParameterError
-from ..kinds import Crs, Flag, RasterOut
+from ..kinds import Crs, RasterOut
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.grid import require_map
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.orthorectification import Orthorectification
 from ..registration.sensor_input import Ground, open_sensor_image, utm_of
-from .common import Resampling, Workers
+from .common import COG_HELP, Resampling, Workers
 from .sensor_parameters import Dem, DemCover, DemDatum, Geoid, Height, RpcFile, SensorImage
 from .written_raster import SIZE_OUTPUTS, WrittenRaster, like_reference, pixel_size_of_result
 
@@ -51,7 +51,8 @@ def orthorectify(
         Path,
         RasterOut(
             label="Orthoimage",
-            help="GeoTIFF with the image's bands, data type, nodata value, colours and metadata.",
+            help="GeoTIFF with the image's bands, data type, nodata value, colours and metadata. "
+            + COG_HELP,
             like="image",
         ),
     ],
@@ -73,14 +74,6 @@ def orthorectify(
     dem_cover: DemCover = 0.0,
     rpc: RpcFile = None,
     resampling: Resampling = "cubic",
-    cog: Annotated[
-        bool,
-        Flag(
-            label="Cloud optimized",
-            help="Write a Cloud Optimized GeoTIFF; it is copied once more.",
-            advanced=True,
-        ),
-    ] = False,
     workers: Workers = None,
     progress: Progress = SILENT,
 ) -> OrthoResult:
@@ -108,7 +101,7 @@ def orthorectify(
         context.update(0.0, heights)
         ortho = Orthorectification(source, orientation, grid, pixel_size)
         outputs = stack.enter_context(Outputs())
-        target = ortho.write(output, outputs, context, resampling, cog)
+        target = ortho.write(output, outputs, context, resampling)
     return OrthoResult(output, target, heights)
 
 

@@ -20,10 +20,13 @@ from ..sensor.control_points import READ_SUFFIXES, SUFFIXES
 from .common import MatchingPixelSize, ReferenceBand, Workers
 from .registration_parameters import (
     ImageMaskValues,
+    ImageView,
     Mask,
     MaxError,
     ReferenceMask,
     ReferenceMaskValues,
+    ReferenceView,
+    SurfaceModel,
 )
 from .sensor_parameters import (
     Dem,
@@ -122,6 +125,9 @@ def refine_rpc(
     reference_mask: ReferenceMask = None,
     reference_mask_values: ReferenceMaskValues = None,
     mask: Mask = AUTO_MASK,
+    surface_model: SurfaceModel = None,
+    reference_view: ReferenceView = None,
+    image_view: ImageView = None,
     matching_pixel_size: MatchingPixelSize = None,
     workers: Workers = None,
     progress: Progress = SILENT,

@@ -13,7 +13,7 @@ from ..registration.registration import Registration
 from .common import (
     Input,
     InputBand,
-    OptionalOutput,
+    OptionalGeoTiff,
     Reference,
     ReferenceBand,
     TransformOut,
@@ -39,7 +39,7 @@ from .sensor_parameters import Dem, DemDatum
 def register(
     reference: Reference,
     input: Input,
-    output: OptionalOutput = None,
+    output: OptionalGeoTiff = None,
     max_error: MaxError = 3.0,
     dem: Dem = None,
     dem_datum: DemDatum = None,

@@ -7,7 +7,17 @@ from typing import Annotated
 
 from ..declaration import Output
 from ..geometry.models import KINDS
-from ..kinds import Choice, Distance, FileOut, MaskIn, Number, RasterIn, Text, VectorOut
+from ..kinds import (
+    Choice,
+    Distance,
+    FileOut,
+    MaskIn,
+    Number,
+    RasterIn,
+    RasterOut,
+    Text,
+    VectorOut,
+)
 from ..masks.choice import MASKS
 from ..matching.surface_fit import AUTO
 from ..rasters.rendered import LIGHTS
@@ -41,6 +51,16 @@ TiePointsOut = Annotated[
         suffixes=(".gpkg", ".geojson", ".csv", ".points"),
         shown=True,
         style="tie_points",
+    ),
+]
+DisplacementOut = Annotated[
+    Path | None,
+    RasterOut(
+        label="Displacement",
+        help="GeoTIFF of three bands over the overlap: by how much the input is moved to the east "
+        "and to the north, and the standard deviation of that; in metres, without georeferencing "
+        "in pixels to the right and down.",
+        advanced=True,
     ),
 ]
 ReportOut = Annotated[
@@ -161,6 +181,25 @@ Mask = Annotated[
         advanced=True,
     ),
 ]
+SURFACE_MODEL = MaskIn(
+    label="Surface model",
+    help="Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with a "
+    "field height in metres. Only ground that both images show takes part: no layover, radar "
+    "shadow, relief displacement or cast shadow. Needs the views of both images.",
+    advanced=True,
+)
+SurfaceModel = Annotated[Path | None, SURFACE_MODEL]
+_VIEW = (
+    "From where the image was taken, for the surface model: a STAC item (.json), or words such as "
+    "'radar azimuth=280 incidence=35' and 'camera azimuth=250 incidence=12 sun-azimuth=155 "
+    "sun-elevation=48'; azimuths from the ground to the sensor or sun, clockwise from north, "
+    "incidence from the vertical. By default the STAC item of the image's own name beside it."
+)
+ReferenceView = Annotated[
+    str | None, Text(label="View of the reference", help=_VIEW, advanced=True)
+]
+InputView = Annotated[str | None, Text(label="View of the input", help=_VIEW, advanced=True)]
+ImageView = Annotated[str | None, Text(label="View of the image", help=_VIEW, advanced=True)]
 OutputGrid = Annotated[
     str,
     Choice(

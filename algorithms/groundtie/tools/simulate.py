@@ -35,8 +35,9 @@ def simulate(
         Path,
         FolderOut(
             label="Folder",
-            help="Gets reference.tif (SAR), input.tif (optical), dem.tif, truth.json, "
-            "check_points.csv and roof_points.csv; input_dem.tif where the terrain has an error.",
+            help="Gets reference.tif (SAR), input.tif (optical), dem.tif, dsm.tif, "
+            "reference.json and input.json (view angles), truth.json, check_points.csv and "
+            "roof_points.csv; input_dem.tif where the terrain has an error.",
             shows=("input.tif", "reference.tif"),
         ),
     ],

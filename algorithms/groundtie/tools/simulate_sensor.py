@@ -36,7 +36,8 @@ def simulate_sensor(
         FolderOut(
             label="Folder",
             help="Gets sensor.tif (optical, with RPCs), reference.tif (SAR), dem.tif, "
-            "exact_rpc.txt, truth.json, check_points.csv and roof_points.csv.",
+            "dsm.tif, reference.json and sensor.json (view angles), exact_rpc.txt, truth.json, "
+            "check_points.csv and roof_points.csv.",
             shows=("reference.tif",),
         ),
     ],

@@ -17,6 +17,9 @@ from ..rasters.delivery import warp_raster
 from ..rasters.grid import Grid, reproject
 from ..rasters.reading import open_raster
 from ..rasters.target_grids import covering_grid, registered_grid
+from ..rasters.vrt import SUFFIX as VRT
+from ..rasters.vrt import write_vrt
+from ..registration.registered_output import moved_grid
 from ..registration.stored_transform import TiePointFit, load_stored, transform_of
 from .common import Input, Output, Resampling, Workers, worker_count
 from .written_raster import SIZE_OUTPUTS, WrittenRaster, like_reference, pixel_size_of_result
@@ -85,13 +88,19 @@ def warp(
     resampled once, from the original pixels. Tie points are fitted as they are: those that are
     marked as rejected or as check points are left out.
     """
+    is_vrt = output.suffix.lower() == VRT
+    if is_vrt and (reference is not None or pixel_size is not None):
+        raise ParameterError("a .vrt has the input's own pixels: no reference and no pixel size")
     if reference is not None and pixel_size is not None:
         raise ParameterError("give either a reference, which has a pixel size, or a pixel size")
     with open_raster(input) as source:
         found, fit = load_stored(transform, model, source)
         found = transform_of(found, source, transform)
-        target = _target_grid(found, reference, pixel_size)
+        target = moved_grid(found) if is_vrt else _target_grid(found, reference, pixel_size)
         with Outputs() as outputs:
+            if is_vrt:
+                write_vrt(source, target, outputs.stage(output))
+                return WarpResult(output, target, found, fit)
             warp_raster(
                 source,
                 lambda xy: found(reproject(xy, target.crs, found.crs)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...geometry.judging import TOLERANCE_PX
-from ...masks.choice import LAYER, REGIONS
+from ...masks.choice import LAYER, REGIONS, SURFACE
 from ..evidence import SCENE, RegistrationEvidence
 from ..layover import count_on_line, scatter_along_line_px
 from .rule import Rule
@@ -53,6 +53,22 @@ def _little_ground(evidence: RegistrationEvidence) -> str | None:
     return None
 
 
+def _surface_elsewhere(evidence: RegistrationEvidence) -> str | None:
+    if evidence.mask.kind == SURFACE and not evidence.mask.is_reliable:
+        return "the reference does not show the elevated objects of the surface model"
+    fit = evidence.input_fit
+    if fit is None:
+        return None
+    if not fit.is_clear:
+        return "the registered input does not show the elevated objects of the surface model"
+    off_px = float(np.hypot(*fit.offset_px))
+    if off_px <= evidence.max_error_px:
+        return None
+    return (
+        f"the registered input shows the elevated objects of the surface model {off_px:.1f} px off"
+    )
+
+
 def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
     if evidence.ground_shift_px <= _LARGEST_GROUND_SHIFT_PX:
         return None
@@ -88,7 +104,7 @@ def _layover_of_fit_points(evidence: RegistrationEvidence) -> str | None:
 
 def _despeckled_town(evidence: RegistrationEvidence) -> str | None:
     kind = evidence.mask.kind
-    if evidence.scene is None or kind == LAYER:
+    if evidence.scene is None or kind in (LAYER, SURFACE):
         return None
     if not evidence.scene.is_despeckled_town(masked_by_regions=kind == REGIONS):
         return None
@@ -97,7 +113,7 @@ def _despeckled_town(evidence: RegistrationEvidence) -> str | None:
 
 def _town_matched_whole(evidence: RegistrationEvidence) -> str | None:
     points = evidence.held_out
-    is_ground = evidence.mask.kind in (REGIONS, LAYER) or evidence.is_ground_checked
+    is_ground = evidence.mask.is_ground or evidence.is_ground_checked
     if evidence.scene is None or is_ground or points.agreeing >= _CLEAR_SHARE * points.total:
         return None
     if not evidence.scene.may_be_dense_town:
@@ -119,6 +135,15 @@ SCENE_RULES: tuple[Rule, ...] = (
         "suite rpc_city",
         _GROUND,
         _little_ground,
+    ),
+    Rule(
+        "surface model elsewhere",
+        SCENE,
+        "the reference or the registered input does not correlate by 0.1 with what the surface "
+        "model and the view let expect, or the input does elsewhere by more than the largest error",
+        "suite towns",
+        "give the surface model of this place and the right views, or leave it out",
+        _surface_elsewhere,
     ),
     Rule(
         "ground elsewhere",

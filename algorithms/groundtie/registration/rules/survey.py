@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...masks.choice import LAYER, REGIONS
 from ...matching.parts import LEAST_PROPORTION, LOG10_FALSE_ALARMS, LOG10_FALSE_ALARMS_ALL_OVER
 from ...matching.survey import SURVEY_RADIUS_PX
 from ..evidence import SURVEY, RegistrationEvidence
@@ -43,7 +42,7 @@ def _chips_elsewhere(evidence: RegistrationEvidence) -> str | None:
 
 def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
     survey = evidence.survey
-    if survey is None or evidence.mask.kind in (REGIONS, LAYER):
+    if survey is None or evidence.mask.is_ground:
         return None
     if survey.rival_height >= _RIVAL_HEIGHT * survey.height:
         return "moved elsewhere as a whole, chips all over match about as well"
@@ -54,7 +53,7 @@ def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
 
 def _weak(evidence: RegistrationEvidence) -> str | None:
     survey = evidence.survey
-    if survey is None or evidence.mask.kind in (REGIONS, LAYER):
+    if survey is None or evidence.mask.is_ground:
         return None
     if survey.height >= _WEAK_HEIGHT:
         return None

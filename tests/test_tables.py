@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from groundtie.batches.table import read_rows
 from groundtie.errors import ParameterError
+from groundtie.tables import read_rows
 
 ROWS = [{"input": "a.tif", "search_radius": "3"}, {"input": "b.tif"}]
 

@@ -1,4 +1,4 @@
-"""Tables of calls: CSV, JSON or YAML, a row a call, a column a parameter."""
+"""Tables that people write: CSV, JSON or YAML, with named columns."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import csv
 from pathlib import Path
 from typing import Any
 
-from ..errors import ParameterError
-from ..strict_json import read_json
+from .errors import ParameterError
+from .strict_json import read_json
 
 SUFFIXES = (".csv", ".json", ".yaml", ".yml")
 

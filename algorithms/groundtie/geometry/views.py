@@ -1,0 +1,167 @@
+"""From where an image was taken: the sensor's azimuth and angle, and the sun's.
+
+Stated in words, or by the STAC item that providers put beside an image (view extension,
+[STAC2021]).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import ParameterError
+from ..strict_json import read_json
+
+RADAR, CAMERA = "radar", "camera"
+SENSORS = (RADAR, CAMERA)
+
+_USAGE = (
+    f"give a STAC item (.json), or words such as '{RADAR} azimuth=280 incidence=35' and "
+    f"'{CAMERA} azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'"
+)
+_WORD = re.compile(r"([a-z-]+)=(-?\d+(?:\.\d+)?)°?")
+
+# What of these a user states, and the range of each.
+_RANGES = {
+    "azimuth": (-360.0, 360.0),
+    "incidence": (0.0, 80.0),
+    "sun-azimuth": (-360.0, 360.0),
+    "sun-elevation": (1.0, 90.0),
+}
+# A radar that looks straight down has no range on the ground.
+_STEEPEST_RADAR_DEG = 5.0
+
+
+@dataclass(frozen=True)
+class View:
+    """From where an image was taken.
+
+    Parameters
+    ----------
+    sensor
+        One of `SENSORS`.
+    azimuth_deg
+        Where the sensor stands, seen from the ground, clockwise from the map's north.
+    incidence_deg
+        Angle between its line of sight and the vertical, on the ground.
+    sun_azimuth_deg, sun_elevation_deg
+        Where the sun stands, alike, and above the horizon; None: unknown, or of no matter.
+    """
+
+    sensor: str
+    azimuth_deg: float
+    incidence_deg: float
+    sun_azimuth_deg: float | None = None
+    sun_elevation_deg: float | None = None
+
+    @classmethod
+    def of(cls, image: Any, given: str | None) -> View | None:
+        """Return the view of an image as it was asked for, or of the STAC item beside it.
+
+        Parameters
+        ----------
+        image
+            The image, as `open_raster` takes it.
+        given
+            The name of a STAC item, or words; None: the item of the image's own name is taken.
+
+        Raises
+        ------
+        ParameterError
+            What was given states no view.
+        """
+        if given is not None:
+            is_file = given.strip().lower().endswith(".json")
+            return read_view(Path(given)) if is_file else parse_view(given)
+        if not isinstance(image, (str, Path)):
+            return None
+        beside = Path(image).with_suffix(".json")
+        return read_view(beside) if _is_item(beside) else None
+
+
+def parse_view(text: str) -> View:
+    """Return the view that words state: `radar azimuth=280 incidence=35`.
+
+    Raises
+    ------
+    ParameterError
+        They state none.
+    """
+    sensor, *words = text.replace(",", " ").lower().split() or [""]
+    found = [_WORD.fullmatch(word) for word in words]
+    if sensor not in SENSORS or None in found:
+        raise ParameterError(f"{text!r} states no view: {_USAGE}")
+    return _view(sensor, {match[1]: float(match[2]) for match in found if match}, repr(text))
+
+
+def read_view(path: Path) -> View:
+    """Return the view that a STAC item states.
+
+    Its `view:azimuth` is that of the line of sight from the sensor to the ground. An item with any
+    property of the SAR extension is a radar's.
+
+    Raises
+    ------
+    ParameterError
+        The file cannot be read, is no STAC item, or states no view.
+    """
+    try:
+        properties = read_json(path)["properties"]
+        values = {
+            "azimuth": properties["view:azimuth"] + 180.0,
+            "incidence": properties.get("view:incidence_angle", properties.get("view:off_nadir")),
+            "sun-azimuth": properties.get("view:sun_azimuth"),
+            "sun-elevation": properties.get("view:sun_elevation"),
+        }
+        sensor = RADAR if any(key.startswith("sar:") for key in properties) else CAMERA
+        given = {name: float(value) for name, value in values.items() if value is not None}
+    except (OSError, ValueError) as error:
+        raise ParameterError(f"cannot read the view in {path}: {error}") from error
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ParameterError(f"{path} is no STAC item with view:azimuth: {_USAGE}") from error
+    # The sun does not matter to a radar.
+    wanted = given if sensor == CAMERA else {k: given[k] for k in given if "sun" not in k}
+    return _view(sensor, {**wanted, "azimuth": wanted["azimuth"] % 360}, str(path))
+
+
+def _view(sensor: str, values: Mapping[str, float], origin: str) -> View:
+    for name, value in values.items():
+        if name not in _RANGES:
+            raise ParameterError(f"{origin}: there is no {name}; {_USAGE}")
+        low, high = _RANGES[name]
+        if name == "incidence" and sensor == RADAR:
+            low = _STEEPEST_RADAR_DEG
+        if not low <= value <= high:
+            raise ParameterError(f"{origin}: {name} must be {low:g} to {high:g} °, not {value:g}")
+    missing = [name for name in ("azimuth", "incidence") if name not in values]
+    if ("sun-azimuth" in values) != ("sun-elevation" in values):
+        missing += [name for name in ("sun-azimuth", "sun-elevation") if name not in values]
+    if missing:
+        raise ParameterError(f"{origin} does not state {' and '.join(missing)}: {_USAGE}")
+    return View(
+        sensor,
+        values["azimuth"],
+        values["incidence"],
+        values.get("sun-azimuth"),
+        values.get("sun-elevation"),
+    )
+
+
+def _is_item(path: Path) -> bool:
+    """Whether a file is a STAC item with a view: reports and transforms are JSON, too."""
+    try:
+        found = read_json(path)
+    except (OSError, ValueError):
+        return False
+    properties = found.get("properties") if isinstance(found, dict) else None
+    return isinstance(properties, dict) and "view:azimuth" in properties
+
+
+def direction(azimuth_deg: float) -> tuple[float, float]:
+    """Return the step (x, y) of length 1 on the map towards an azimuth."""
+    azimuth = math.radians(azimuth_deg)
+    return math.sin(azimuth), math.cos(azimuth)

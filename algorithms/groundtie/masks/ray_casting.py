@@ -1,0 +1,150 @@
+"""What a sensor sees of the ground between buildings and trees, by rays cast over a surface model.
+
+A surface model is sampled along rays that run away from the sensor; one running maximum along each
+ray tells how high the line of sight is that grazes what is nearer to the sensor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rasters.reading import FloatImage, Mask
+
+_Lines = NDArray[np.float32]
+_T = TypeVar("_T", bound=np.generic)
+
+# What lies lower by less than this is no lower: single precision has 0.001 m at 10 km.
+_LEVEL_M = 0.05
+
+
+@dataclass(frozen=True)
+class Heights:
+    """Heights of a piece of a map, all of them finite.
+
+    Parameters
+    ----------
+    surface_m
+        Height of what is seen from above: roofs, canopies, ground, shape (h, w).
+    ground_m
+        Height of the bare ground, nowhere above the surface, shape (h, w).
+    """
+
+    surface_m: FloatImage
+    ground_m: FloatImage
+
+
+@dataclass(frozen=True)
+class LineOfSight:
+    """The line of sight from the ground to a far sensor, or to the sun.
+
+    Parameters
+    ----------
+    towards_px
+        Columns and rows for a metre of ground towards the sensor.
+    tangent
+        Of the angle between the line of sight and the vertical, above 0.
+    """
+
+    towards_px: tuple[float, float]
+    tangent: float
+
+    @classmethod
+    def from_vertical(cls, towards_px: tuple[float, float], angle_deg: float) -> LineOfSight:
+        """Return the line of sight at an angle from the vertical, 0 to below 90."""
+        return cls(towards_px, math.tan(math.radians(angle_deg)))
+
+    @property
+    def pixel_m(self) -> float:
+        """Length on the ground of a pixel's width along the line."""
+        return 1 / math.hypot(*self.towards_px)
+
+
+def hidden_ground(heights: Heights, sight: LineOfSight) -> Mask:
+    """Return the ground that is hidden from a camera, a radar or the sun, shape (h, w).
+
+    An object of height h hides h · tan(angle from the vertical) of the level ground behind it.
+    """
+    if sight.tangent <= 0:
+        return np.zeros(heights.surface_m.shape, bool)
+    rise_m = sight.pixel_m / sight.tangent
+
+    def hidden(surface: _Lines, ground: _Lines) -> Mask:
+        return np.asarray(ground < _lowest_sight_m(surface, rise_m) - _LEVEL_M)
+
+    return _along_rays(heights, sight, hidden)
+
+
+def radar_echoes(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
+    """Return how many things that stand a radar shows together with each pixel's ground, (h, w).
+
+    They are imaged nearer to the radar than their feet, over the ground at the same range: nearer
+    by h / tan(incidence) on level ground. Each pixel of a roof is one, and each of a wall's foot,
+    as far up as the radar sees the wall; what it does not see is none.
+    """
+    # Pixels of level ground by which a metre of height is laid over.
+    lean_px = 1 / (sight.pixel_m * sight.tangent)
+
+    def echoes(surface: _Lines, ground: _Lines) -> NDArray[np.int32]:
+        foot = np.maximum(_lowest_sight_m(surface, sight.pixel_m / sight.tangent), ground)
+        row, col = np.nonzero(surface > foot + _LEVEL_M)
+        # Ranges, in pixels of level ground and rising away from the radar; a wall stands at the
+        # near side of its pixel.
+        own = np.arange(ground.shape[1], dtype=np.float32) - ground * lean_px
+        far, near = (col - 0.5 - height[row, col] * lean_px for height in (foot, surface))
+        first = math.floor(min(float(own.min()), float(near.min(initial=0)))) - 1
+        last = math.ceil(max(float(own.max()), float(far.max(initial=0)))) + 1
+        starts, stops = (np.rint(edge - first).astype(np.intp) for edge in (near, far + 1))
+        changes = np.zeros((len(ground), last - first + 2), np.int32)
+        np.add.at(changes, (row, starts), 1)
+        np.add.at(changes, (row, stops), -1)
+        place = np.rint(own - first).astype(np.intp)
+        return np.take_along_axis(np.cumsum(changes, axis=1, dtype=np.int32), place, axis=1)
+
+    return _along_rays(heights, sight, echoes)
+
+
+def _lowest_sight_m(surface: _Lines, rise_m: float) -> _Lines:
+    """Return how high the lowest free line of sight is over each pixel of rays; -inf: all are.
+
+    Rays run away from the sensor along the columns; towards it, a line of sight rises by `rise_m`
+    for each pixel.
+    """
+    rise = np.arange(surface.shape[1], dtype=np.float32) * np.float32(rise_m)
+    highest = np.maximum.accumulate(surface + rise, axis=1)
+    lowest = np.full_like(surface, -np.inf)
+    lowest[:, 1:] = highest[:, :-1] - rise[1:]
+    return lowest
+
+
+def _along_rays(
+    heights: Heights, sight: LineOfSight, function: Callable[[_Lines, _Lines], NDArray[_T]]
+) -> NDArray[_T]:
+    """Return what a function finds on rays, shape (rays, length), that run away from the sensor.
+
+    Rays lie a pixel apart, and so do their points: the pixels nearest to them are taken.
+    """
+    rows, cols = heights.surface_m.shape
+    away = -np.array(sight.towards_px) * sight.pixel_m
+    across = np.array([-away[1], away[0]])
+    middle = np.array([cols - 1, rows - 1]) / 2
+    # Half of what the image extends along the rays and across them.
+    reach = [float(np.abs(axis) @ middle) for axis in (away, across)]
+    along, aside = (np.arange(math.ceil(2 * half - 1e-6) + 1) - half for half in reach)
+    col, row = (
+        np.rint(middle[k] + np.add.outer(aside * across[k], along * away[k])).astype(np.intp)
+        for k in (0, 1)
+    )
+    at = np.clip(row, 0, rows - 1) * cols + np.clip(col, 0, cols - 1)
+    found = function(heights.surface_m.ravel()[at], heights.ground_m.ravel()[at])
+    x, y = np.arange(cols) - middle[0], np.arange(rows) - middle[1]
+    ray, place = (
+        np.rint(np.add.outer(y * axis[1], x * axis[0]) + half).astype(np.intp)
+        for axis, half in ((across, reach[1]), (away, reach[0]))
+    )
+    return found[ray, place]

@@ -1,0 +1,89 @@
+"""The displacement field of a registration as a raster, with its standard deviation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from affine import Affine
+
+from ..rasters.bands import BandInfo
+from ..rasters.grid import FloatArray, Grid, compose
+from ..rasters.reading import RasterSource
+from ..rasters.warping import lattice
+from ..rasters.writing import create_like, one_band
+from .evidence import RegistrationEvidence
+
+_ON_MAP = ("dx: move to the east", "dy: move to the north")
+_ON_PIXELS = ("dx: move to the right", "dy: move down")
+_SIGMA = "sigma: standard deviation of dx and of dy"
+
+
+def displacement_field(evidence: RegistrationEvidence) -> tuple[FloatArray, Grid]:
+    """Return by how much an input is moved to its right place, and how well that is known.
+
+    Parameters
+    ----------
+    evidence
+        Of an accepted registration.
+
+    Returns
+    -------
+    field
+        dx, dy and their standard deviation, shape (3, h, w), in metres east and north (in pixels
+        right and down without georeferencing); NaN where the input shows nothing.
+    grid
+        The matching grid in pixels that are as large as linear interpolation between them allows.
+    """
+    matching, transform = evidence.grid, evidence.estimate.transform
+
+    def field_px(xy: FloatArray) -> FloatArray:
+        px = matching.map_to_pixel(xy)
+        moved = px - matching.map_to_pixel(transform.model(xy))
+        return np.column_stack([moved, evidence.standard_deviation_px(px)])
+
+    nodes = lattice(matching, field_px)
+    values = np.array(nodes.values[:, 1:-1, 1:-1])
+    rows, cols = values.shape[1:]
+    place = compose(matching.transform, Affine.scale(nodes.step))
+    grid = Grid(place, matching.crs, cols, rows)
+    px = np.stack(np.meshgrid(np.arange(cols), np.arange(rows)), axis=-1).reshape(-1, 2)
+    xy = grid.pixel_to_map(px)
+    if matching.is_georeferenced:
+        t, per_unit = matching.transform, matching.metres_per_unit
+        x, y = values[:2].copy()
+        values[0] = (t.a * x + t.b * y) * per_unit[0]
+        values[1] = (t.d * x + t.e * y) * per_unit[1]
+        values[2] *= matching.pixel_size_m
+    shown = transform.input_grid.contains(transform(xy)).reshape(rows, cols)
+    return np.where(shown, values, np.nan), grid
+
+
+def write_displacement(evidence: RegistrationEvidence, like: RasterSource, path: Path) -> None:
+    """Write the displacement field as a GeoTIFF of three bands.
+
+    Parameters
+    ----------
+    evidence
+        Of an accepted registration.
+    like
+        The reference.
+    path
+        The file; see `atomic.Outputs.stage`.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    field, grid = displacement_field(evidence)
+    on_map = grid.is_georeferenced
+    plain = BandInfo.plain("float32", float("nan"))
+    bands = tuple(
+        replace(plain, description=name, unit="m" if on_map else "px")
+        for name in (*(_ON_MAP if on_map else _ON_PIXELS), _SIGMA)
+    )
+    kind = replace(one_band(like, "float32"), bands=bands)
+    with create_like(kind, grid, path, nodata=float("nan")) as file:
+        file.write(field.astype(np.float32))

@@ -1,0 +1,186 @@
+"""The mask that a surface model and the views of both images make, and whether the model fits.
+
+The mask lies on the reference, which lies right on the map as the model does: it holds the ground
+that neither image lays over, hides or shades. Where the input lies is not known before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.fft
+
+from ..context import Context
+from ..errors import ParameterError
+from ..geometry.views import View
+from ..masks.choice import AUTO, NONE, REFERENCE, SURFACE, MaskUsed
+from ..masks.scene import Scene
+from ..masks.surface_model import (
+    RasterModel,
+    SurfaceGround,
+    SurfaceModel,
+    read_footprints,
+)
+from ..rasters.pair import ImagePair
+from ..rasters.patch import Patch
+from ..rasters.reading import FloatImage, Window, open_raster
+from .masks import Masked, middle_of
+from .scene import scene_of
+from .specification import StatedSurface
+from .user_masks import UserMask, with_mask
+
+# How far off the surface model is looked for.
+_REACH_PX = 24
+
+# Images correlate with models of other places by up to 0.03, with their own by 0.27 and more (suite
+# towns).
+_CLEAR_CORRELATION = 0.1
+
+# Of the mean: what is darker counts as dark as that.
+_DARKEST = np.float32(0.01)
+
+
+def with_surface_mask(
+    pair: ImagePair, stated: StatedSurface, kind: str, stack: ExitStack, context: Context
+) -> Masked:
+    """Return a pair with a mask of the ground that both images show.
+
+    Parameters
+    ----------
+    pair
+        The images, with the masks that the user gave.
+    stated
+        The surface model and the views.
+    kind
+        The mask that was asked for besides: "auto" or "none".
+    stack
+        Keeps rasters until it is closed.
+    context
+        Threads and progress.
+
+    Raises
+    ------
+    ParameterError
+        Another mask is asked for, too.
+    NoOverlapError
+        The surface model covers nothing of the reference.
+    """
+    if kind not in (AUTO, NONE):
+        raise ParameterError(f"give either mask={kind} or a surface model")
+    ground, fit = fitted_ground(scene_of(pair, REFERENCE), stated, stack)
+    masked, share = with_mask(pair, REFERENCE, ground.scene, ground.select, stack, context)
+    reason = f"ground that both images show by {stated.name}{fit.note if fit else ''}"
+    used = MaskUsed(SURFACE, REFERENCE, share, reason, fit is None or fit.is_clear)
+    return Masked(masked, used, surface=ground)
+
+
+def fitted_ground(
+    scene: Scene, stated: StatedSurface, stack: ExitStack
+) -> tuple[SurfaceGround, ModelFit | None]:
+    """Return the ground that all views show, by a model that is moved to where a scene shows it.
+
+    How it fits there is None where the view does not let expect anything.
+
+    Parameters
+    ----------
+    scene
+        The reference, whose view is the first.
+    stated
+        The surface model and the views.
+    stack
+        Keeps rasters until it is closed.
+
+    Raises
+    ------
+    NoOverlapError
+        The surface model covers nothing of the reference.
+    """
+    ground = surface_ground(scene, stated, stack)
+    ground.require_cover()
+    fit = fit_of(ground, ground.views[0], ground.scene.read)
+    is_clear = fit is not None and fit.is_clear
+    return (replace(ground, offset_px=fit.offset_px) if fit and is_clear else ground), fit
+
+
+def surface_ground(scene: Scene, stated: StatedSurface, stack: ExitStack) -> SurfaceGround:
+    """Return the ground that all views show, by the model where it lies; see `fitted_ground`."""
+    model: SurfaceModel
+    if UserMask(stated.model).is_layer:
+        model = read_footprints(stated.model, scene.grid)
+    else:
+        model = RasterModel(stack.enter_context(open_raster(stated.model)))
+    return SurfaceGround(scene, model, stated.views)
+
+
+@dataclass(frozen=True)
+class ModelFit:
+    """How well a surface model fits what the reference shows.
+
+    Parameters
+    ----------
+    correlation
+        Of an image's logarithm with what the model lets expect, at the best place.
+    offset_px
+        That place: columns and rows by which the image shows it elsewhere.
+    """
+
+    correlation: float
+    offset_px: tuple[int, int]
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether the image shows the elevated objects of the model."""
+        return self.correlation >= _CLEAR_CORRELATION
+
+    @property
+    def note(self) -> str:
+        """What a user should know of it; empty: it lies right."""
+        if not self.is_clear:
+            return ", of which it shows nothing"
+        right, down = self.offset_px
+        return f", moved by {right:+d} and {down:+d} px to fit it" if any(self.offset_px) else ""
+
+
+def fit_of(ground: SurfaceGround, view: View, read: Callable[[Window], Patch]) -> ModelFit | None:
+    """Return how well a surface model fits an image in the middle of the reference.
+
+    Parameters
+    ----------
+    ground
+        What the model lets expect.
+    view
+        From where the image was taken.
+    read
+        Returns the image in a window of the reference.
+
+    Returns
+    -------
+    None where the view does not let expect anything: that of a camera without the sun's place.
+    """
+    window = middle_of(ground.scene.grid)
+    patch, expected = read(window), ground.level(window, view)
+    if expected.min() == expected.max():
+        return None
+    if not patch.valid.any():
+        return ModelFit(0.0, (0, 0))
+    level = np.log(np.maximum(patch.values, patch.values[patch.valid].mean() * _DARKEST))
+    surface = _correlation(_centred(expected, patch), _centred(level, patch))
+    row, col = np.unravel_index(int(surface.argmax()), surface.shape)
+    offset = int(col) - _REACH_PX, int(row) - _REACH_PX
+    return ModelFit(float(surface[row, col]), offset)
+
+
+def _centred(values: FloatImage, patch: Patch) -> FloatImage:
+    return np.where(patch.valid, values - values[patch.valid].mean(), np.float32(0))
+
+
+def _correlation(model: FloatImage, image: FloatImage) -> FloatImage:
+    """Return the correlation of an image with a model that is moved, (2 r + 1, 2 r + 1)."""
+    size = [scipy.fft.next_fast_len(n + _REACH_PX, real=True) for n in model.shape]
+    product = np.conj(scipy.fft.rfft2(model, size)) * scipy.fft.rfft2(image, size)
+    shifts = np.arange(-_REACH_PX, _REACH_PX + 1)
+    energy = max(float(np.linalg.norm(model) * np.linalg.norm(image)), 1e-12)
+    return np.asarray(scipy.fft.irfft2(product, size)[np.ix_(shifts, shifts)] / energy)

@@ -1,0 +1,108 @@
+"""A registered raster as a STAC item, whose fields stand beside the report's own in its JSON."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rasterio.crs import CRS
+from shapely.geometry import Polygon, mapping
+
+from ..geometry.transform import Transform
+from ..raster_names import file_name, time_of
+from ..rasters.grid import Grid, reproject
+from ..rasters.reading import RasterSource
+from ..rasters.writing import COG_SUFFIXES
+from ..registration.verdict import Verdict
+from ..stac_items import RASTER_SUFFIXES
+
+VERSION = "1.0.0"
+EXTENSIONS = (
+    "https://stac-extensions.github.io/projection/v1.0.0/schema.json",
+    "https://stac-extensions.github.io/accuracy/v1.0.0/schema.json",
+)
+
+_TIFF = "image/tiff; application=geotiff"
+
+# A footprint with more degrees of longitude crosses the antimeridian, where it has two parts.
+_MOST_DEGREES = 180
+
+
+def stac_item(
+    source: RasterSource,
+    output: Path,
+    grid: Grid,
+    folder: Path,
+    verdict: Verdict,
+    transform: Transform,
+) -> dict[str, Any]:
+    """Return the members of a STAC item of a registered raster.
+
+    Empty where there can be none: without a CRS, where nothing states when the image was taken,
+    and across the antimeridian.
+
+    Parameters
+    ----------
+    source
+        The input, whose metadata or name state its time.
+    output, grid
+        The registered raster.
+    folder
+        Where the JSON lies.
+    verdict, transform
+        Of the registration.
+    """
+    time = time_of(source.tags.get("IMAGERY", {}).get("ACQUISITIONDATETIME", ""))
+    time = time or time_of(file_name(source.path))
+    if time is None or grid.crs is None:
+        return {}
+    corners = grid.pixel_to_map(grid.outline(1))
+    places = reproject(corners, grid.crs, CRS.from_epsg(4326))
+    if not np.isfinite(places).all() or np.ptp(places[:, 0]) > _MOST_DEGREES:
+        return {}
+    return {
+        "type": "Feature",
+        "stac_version": VERSION,
+        "stac_extensions": list(EXTENSIONS),
+        "id": output.name.partition(".")[0],
+        "geometry": mapping(Polygon(places)),
+        "bbox": [*places.min(axis=0).tolist(), *places.max(axis=0).tolist()],
+        "properties": {
+            "datetime": f"{time.isoformat()}Z",
+            **_projection(grid),
+            "accuracy:geometric_rmse": verdict.check_rmse_m,
+            "groundtie:ce90_m": verdict.check_ce90_m,
+            "groundtie:points": verdict.points,
+            "groundtie:model": transform.model.kind,
+        },
+        "links": [],
+        "assets": {"data": _asset(output, folder)},
+    }
+
+
+def _projection(grid: Grid) -> dict[str, Any]:
+    assert grid.crs is not None
+    corners = grid.pixel_to_map(grid.outline(1))
+    code = grid.crs.to_epsg()
+    return {
+        "proj:epsg": code,
+        **({} if code is not None else {"proj:wkt2": grid.crs.to_wkt(version="WKT2_2019")}),
+        "proj:shape": [grid.height, grid.width],
+        "proj:transform": list(grid.transform[:6]),
+        "proj:bbox": [*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist()],
+    }
+
+
+def _asset(output: Path, folder: Path) -> dict[str, Any]:
+    try:
+        href = Path(os.path.relpath(output, folder)).as_posix()
+    except ValueError:  # another disk of Windows
+        href = output.resolve().as_posix()
+    asset: dict[str, Any] = {"href": href, "roles": ["data"]}
+    if output.name.lower().endswith(COG_SUFFIXES):
+        return asset | {"type": f"{_TIFF}; profile=cloud-optimized"}
+    # The media type of others is none that readers know.
+    is_tiff = output.suffix.lower() in RASTER_SUFFIXES[:2]
+    return asset | {"type": _TIFF} if is_tiff else asset

@@ -1,0 +1,105 @@
+"""Mask all of an image but the ground that a surface model and the views of images leave."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+from ..declaration import Output as ResultOutput
+from ..declaration import tool
+from ..errors import ParameterError
+from ..geometry.views import View
+from ..kinds import RasterOut
+from ..masks.scene import Scene, write_mask
+from ..masks.surface_model import write_reasons
+from ..progress import SILENT, Progress
+from ..rasters.atomic import Outputs
+from ..rasters.reading import bounded_cache, open_raster
+from ..registration.specification import StatedSurface
+from ..registration.surface_masks import ModelFit, fitted_ground
+from .common import MaskOut, Reference
+from .registration_parameters import SURFACE_MODEL, InputView, ReferenceView
+
+
+@dataclass(frozen=True)
+class SurfaceMaskResult:
+    """The mask, the share of pixels that take part, and how the surface model fits the image."""
+
+    share: float
+    fit: ModelFit | None
+    files: dict[str, Path]
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        files = {name: str(path) for name, path in self.files.items()}
+        values: dict[str, Any] = {"share": self.share, "correlation": None, "offset_px": None}
+        if self.fit is not None:
+            offset = list(self.fit.offset_px)
+            values |= {"correlation": self.fit.correlation, "offset_px": offset}
+        return {**values, "files": files}
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        return [
+            f"{self.share:.1%} of the pixels take part",
+            "nothing is expected of the image"
+            if self.fit is None
+            else f"the image correlates by {self.fit.correlation:.2f} with the surface model"
+            f"{self.fit.note}",
+            *(f"{name}: {path}" for name, path in self.files.items()),
+        ]
+
+
+@tool(
+    title="Mask by a surface model",
+    group="Radar",
+    outputs=(
+        ResultOutput("SHARE", "Share of the pixels that take part", "share"),
+        ResultOutput("CORRELATION", "Correlation with the surface model", "correlation"),
+    ),
+)
+def mask_surface(
+    reference: Reference,
+    surface_model: Annotated[Path, replace(SURFACE_MODEL, advanced=False)],
+    output: MaskOut,
+    reasons: Annotated[
+        Path | None,
+        RasterOut(
+            label="Reasons",
+            help="GeoTIFF with why each pixel takes no part, as a sum: 1 raised, 2 layover, 4 "
+            "radar shadow, 8 hidden from the camera, 16 cast shadow, 32 unknown.",
+        ),
+    ] = None,
+    reference_view: ReferenceView = None,
+    input_view: InputView = None,
+    progress: Progress = SILENT,
+) -> SurfaceMaskResult:
+    """Mask all of an image but the ground that a surface model and the views of images leave.
+
+    Elevated objects are laid over the ground, hide it and cast shadows: that follows from heights
+    and the angles of view, and is computed by casting rays. Without the view of the image that is
+    to be registered, only what the reference itself does not show is masked. `coregister`,
+    `extract_gcps` and `refine_rpc` make the same mask themselves if given a surface model.
+    """
+    views = [View.of(reference, reference_view)]
+    if input_view is not None:
+        views.append(View.of(None, input_view))
+    known = tuple(view for view in views if view is not None)
+    if len(known) < len(views):
+        raise ParameterError(
+            "the view of the reference is not known: put its STAC item beside it, or give "
+            "reference_view"
+        )
+    files = {"mask": output, "reasons": reasons}
+    with bounded_cache(), ExitStack() as stack:
+        scene = Scene.of(stack.enter_context(open_raster(reference)))
+        ground, fit = fitted_ground(scene, StatedSurface(surface_model, known), stack)
+        with Outputs() as outputs:
+            share = write_mask(scene, outputs.stage(output), ground.select, progress.part(0.1, 0.6))
+            if reasons is not None:
+                write_reasons(ground, outputs.stage(reasons), progress.part(0.6, 1.0))
+    return SurfaceMaskResult(
+        share, fit, {name: path for name, path in files.items() if path is not None}
+    )

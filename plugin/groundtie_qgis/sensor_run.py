@@ -1,0 +1,109 @@
+"""Runs what an image with RPCs takes: refined RPCs, and an orthoimage by them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from .run import Outcome, Run, new_file
+from .start_files import points_name
+
+# How much of the time goes into refining.
+_FIRST = 0.8
+
+
+@dataclass(frozen=True)
+class SensorImage:
+    """An image with RPCs, and what its ground is.
+
+    Parameters
+    ----------
+    layer
+        The image's layer.
+    dem
+        The terrain model's layer; None: one height holds everywhere.
+    datum
+        What the heights of the terrain model count from.
+    """
+
+    layer: Any
+    dem: Any
+    datum: str
+
+    def values(self) -> dict[str, Any]:
+        """Return the values that the tools for images with RPCs have in common."""
+        heights = {} if self.dem is None else {"DEM": self.dem.id(), "DEM_DATUM": self.datum}
+        return {"IMAGE": self.layer.id(), **heights}
+
+
+class SensorRun:
+    """Refines the RPCs of an image, and orthorectifies it on the reference's pixels.
+
+    The outcome's files are `RPC`, `TIE_POINTS` (the ground control), `REPORT` and `OUTPUT` (the
+    orthoimage, which is loaded).
+
+    Parameters
+    ----------
+    image
+        The image.
+    reference
+        What names the reference to an algorithm.
+    control
+        Values for `refine_rpc` that state where ground control comes from, and which model.
+    done, progress
+        As of `Run`.
+    """
+
+    def __init__(
+        self,
+        image: SensorImage,
+        reference: str,
+        control: dict[str, Any],
+        done: Callable[[Outcome], None],
+        progress: Callable[[float], None],
+    ) -> None:
+        self._image, self._reference = image, reference
+        self._done, self._progress = done, progress
+        files = {
+            "OUTPUT": new_file("refined_RPC.TXT"),
+            "RESIDUALS": new_file(points_name()),
+            "REPORT": new_file("refined.html"),
+        }
+        values = {**image.values(), **control}
+        self._run = Run("refine_rpc", values, files, (), self._refined, self._first)
+        self._lines: tuple[str, ...] = ()
+
+    def start(self) -> None:
+        """Begin, if the values are right; else the outcome states what is wrong."""
+        self._run.start()
+
+    def cancel(self) -> None:
+        """Stop at the next step."""
+        self._run.cancel()
+
+    def _first(self, percent: float) -> None:
+        self._progress(_FIRST * percent)
+
+    def _refined(self, outcome: Outcome) -> None:
+        if not outcome.succeeded:
+            report = {k: path for k, path in outcome.files.items() if k == "REPORT"}
+            self._done(replace(outcome, files=report))
+            return
+        files = outcome.files
+        self._lines = outcome.lines
+        self._files = {
+            "RPC": files["OUTPUT"],
+            "TIE_POINTS": files["RESIDUALS"],
+            "REPORT": files["REPORT"],
+        }
+        values = {**self._image.values(), "REFERENCE": self._reference, "RPC": str(files["OUTPUT"])}
+        ortho = {"OUTPUT": new_file("orthoimage.tif")}
+        self._run = Run(
+            *("orthorectify", values, ortho, ("OUTPUT",), self._projected),
+            lambda percent: self._progress(100 * _FIRST + (1 - _FIRST) * percent),
+        )
+        self._run.start()
+
+    def _projected(self, outcome: Outcome) -> None:
+        self._done(replace(outcome, lines=self._lines, files={**self._files, **outcome.files}))

@@ -1,0 +1,24 @@
+"""Names of the dock's files, and which images have RPCs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from .dependencies import missing_for
+
+
+def points_name() -> str:
+    """Return the name of a file of tie points that can be written here."""
+    name = "tie_points.gpkg"
+    return "tie_points.geojson" if missing_for("", [Path(name)]) else name
+
+
+def has_rpcs(layer: Any) -> bool:
+    """Whether a raster layer is located by RPCs alone."""
+    from osgeo import gdal
+
+    if layer is None or layer.providerType() != "gdal" or layer.crs().isValid():
+        return False
+    dataset = gdal.Open(layer.source())
+    return dataset is not None and bool(dataset.GetMetadata("RPC"))

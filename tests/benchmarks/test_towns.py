@@ -1,0 +1,50 @@
+"""The suite of cities with surface models: what it wants, and its rough model."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import rasterio
+from benchmark_outcomes import outcome
+from raster_files import utm_grid, write_raster
+
+from benchmarks import towns
+from benchmarks.accuracy import CORRECT, REFUSED, SILENTLY_WRONG
+
+
+def refused(setting: str) -> object:
+    return outcome(group=setting, verdict=REFUSED, error_px=math.nan)
+
+
+def test_goals() -> None:
+    good = [outcome(group=towns.MODEL, error_px=0.5, verdict=CORRECT)] * 9
+    assert [g.reached for g in towns.goals(towns.MODEL, [*good, refused(towns.MODEL)])] == [
+        True,
+        True,
+    ]
+    wrong = outcome(group=towns.MODEL, error_px=4.0, verdict=SILENTLY_WRONG)
+    assert [g.reached for g in towns.goals(towns.MODEL, [*good, wrong, wrong])] == [False, False]
+    assert [g.reached for g in towns.goals(towns.OTHER, good)] == [True, False]
+    assert [g.reached for g in towns.goals(towns.NONE, good)] == [True]
+
+
+def test_the_table_counts_refused_cities_as_not_within() -> None:
+    group = [outcome(group=towns.ROUGH, error_px=0.5, verdict=CORRECT), refused(towns.ROUGH)]
+    (row,) = towns.ground_table({towns.ROUGH: group}).rows
+    assert row == [towns.ROUGH, "1", "0.50", "50%", "0", "2"]
+
+
+def test_a_rough_model_lies_off_and_is_noisy(tmp_path: Path) -> None:
+    fine = write_raster(
+        tmp_path / "dsm.tif", np.full((80, 120), 50, np.float32), utm_grid(120, 80, 1.0)
+    )
+    path = towns.rough(fine)
+    with rasterio.open(fine) as right, rasterio.open(path) as raster:
+        assert raster.res == (2.0, 2.0) and raster.shape == (40, 60)
+        moved = np.subtract(raster.bounds, right.bounds)
+        np.testing.assert_allclose(moved, [3.0, -2.0, 3.0, -2.0])
+        heights = raster.read(1)
+    assert abs(heights.mean() - 50) < 0.1 and abs(heights.std() - 0.5) < 0.05
+    assert towns.rough(fine) == path

@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from groundtie.errors import ParameterError
+from groundtie.geometry.views import View, parse_view, read_view
+
+STAC = {
+    "view:azimuth": 100.0,
+    "view:off_nadir": 20.0,
+    "view:incidence_angle": 22.0,
+    "view:sun_azimuth": 155.0,
+    "view:sun_elevation": 48.0,
+}
+
+
+def item(path: Path, properties: dict[str, object]) -> Path:
+    path.write_text(json.dumps({"type": "Feature", "properties": properties}), encoding="utf-8")
+    return path
+
+
+def test_words() -> None:
+    assert parse_view("radar azimuth=280 incidence=35.5") == View("radar", 280.0, 35.5)
+    words = "Camera azimuth=250°, incidence=12, sun-azimuth=155, sun-elevation=48°"
+    assert parse_view(words) == View("camera", 250.0, 12.0, 155.0, 48.0)
+
+
+def test_an_items_azimuth_points_from_the_sensor_to_the_ground(tmp_path: Path) -> None:
+    assert read_view(item(tmp_path / "a.json", STAC)) == View("camera", 280.0, 22.0, 155.0, 48.0)
+
+
+def test_an_item_with_properties_of_a_sar_is_a_radars_and_has_no_sun(tmp_path: Path) -> None:
+    radar = {**STAC, "view:azimuth": 270.0, "sar:frequency_band": "X"}
+    assert read_view(item(tmp_path / "a.json", radar)) == View("radar", 90.0, 22.0)
+
+
+def test_without_an_incidence_angle_the_angle_at_the_sensor_is_taken(tmp_path: Path) -> None:
+    values = {key: STAC[key] for key in ("view:azimuth", "view:off_nadir")}
+    assert read_view(item(tmp_path / "a.json", values)) == View("camera", 280.0, 20.0)
+
+
+def test_the_item_beside_an_image_is_found(tmp_path: Path) -> None:
+    image = tmp_path / "scene.tif"
+    assert View.of(image, None) is None
+    item(tmp_path / "scene.json", {"verdict": {"accepted": True}})
+    assert View.of(image, None) is None, "a report is no item"
+    item(tmp_path / "scene.json", STAC)
+    assert View.of(image, None) == View("camera", 280.0, 22.0, 155.0, 48.0)
+    assert View.of(image, "radar azimuth=90 incidence=40") == View("radar", 90.0, 40.0)
+    assert View.of(object(), None) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "states no view"),
+        ("azimuth=3 incidence=4", "states no view"),
+        ("radar azimuth=a incidence=4", "states no view"),
+        ("radar azimuth=3", "does not state incidence"),
+        ("radar azimuth=3 incidence=2", "must be 5 to 80"),
+        ("camera azimuth=3 incidence=85", "must be 0 to 80"),
+        ("camera azimuth=3 incidence=5 tilt=3", "there is no tilt"),
+        ("camera azimuth=3 incidence=5 sun-azimuth=20", "does not state sun-elevation"),
+        ("camera azimuth=3 incidence=5 sun-azimuth=20 sun-elevation=-3", "must be 1 to 90"),
+    ],
+)
+def test_words_that_state_no_view(text: str, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        parse_view(text)
+
+
+@pytest.mark.parametrize(
+    "content", ["[]", "{", '{"properties": {}}', '{"properties": {"view:azimuth": "x"}}', "3"]
+)
+def test_files_that_state_no_view(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "a.json"
+    path.write_text(content, encoding="utf-8")
+    with pytest.raises(ParameterError):
+        View.of(tmp_path / "a.tif", str(path))
+
+
+def test_a_file_that_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="cannot read the view"):
+        read_view(tmp_path / "a.json")

@@ -1,0 +1,216 @@
+"""The ground that both images show, by a surface model: against the simulator, and by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import fiona
+import numpy as np
+import pytest
+from affine import Affine
+from raster_files import UTM, utm_grid, write_raster
+from rasterio.crs import CRS
+
+from groundtie.errors import NoOverlapError, VectorLayerError
+from groundtie.geometry.views import View
+from groundtie.masks.scene import Scene
+from groundtie.masks.surface_model import (
+    FootprintModel,
+    RasterModel,
+    Seen,
+    SurfaceGround,
+    read_footprints,
+)
+from groundtie.rasters.grid import Grid, compose
+from groundtie.rasters.reading import Window, open_raster
+from groundtie.simulation import optical
+from groundtie.simulation.cover import Cover
+from groundtie.simulation.optical import OpticalOptions
+from groundtie.simulation.sar import SarOptions, sar_power
+from groundtie.simulation.scene import Scene as Country
+from groundtie.simulation.scene import SceneOptions, generate_scene
+
+GRID = utm_grid(200, 180, 1.0)
+RADAR, CAMERA = View("radar", 270.0, 40.0), View("camera", 250.0, 18.0, 155.0, 48.0)
+HOUSE = np.s_[80:110, 90:120]
+
+
+def house(slope: float = 0.0, height_m: float = 12.0) -> np.ndarray:
+    heights = np.tile(np.arange(200) * slope, (180, 1)) + 100
+    heights[HOUSE] += height_m
+    return heights.astype(np.float32)
+
+
+def ground_of(
+    path: Path, heights: np.ndarray, grid: Grid = GRID, nodata: float | None = None
+) -> SurfaceGround:
+    """Return the ground of an image by a model on the same pixels."""
+    image = write_raster(path / "image.tif", np.ones(heights.shape, np.uint8), grid)
+    model = write_raster(path / "dsm.tif", heights, grid, nodata=nodata)
+    scene = Scene.of(open_raster(image))
+    return SurfaceGround(scene, RasterModel(open_raster(model)), (RADAR, CAMERA))
+
+
+def test_a_house_on_a_slope_is_found_and_the_slope_is_not(tmp_path: Path) -> None:
+    ground = ground_of(tmp_path, house(slope=0.1))
+    heights, known = ground.model.heights(GRID)
+    assert known.all()
+    # The lowest of a cell of 4 m counts; within half of the widest building of the model's end,
+    # a slope's upper side cannot be distinguished from one.
+    np.testing.assert_allclose(
+        heights.ground_m[:, :150], house(slope=0.1, height_m=0)[:, :150], atol=0.5
+    )
+    raised = (ground.seen(ground.scene.whole)[:, :150] & Seen.RAISED) > 0
+    assert raised[HOUSE].all() and raised.sum() == 32 * 32
+
+
+def test_each_reason_lies_where_geometry_puts_it(tmp_path: Path) -> None:
+    seen = ground_of(tmp_path, house()).seen(Window(0, 0, 200, 180))
+    layover_px = 12 / math.tan(math.radians(40))
+    shadow_px = 12 * math.tan(math.radians(40))
+    before, behind = seen[95, :89], seen[95, 121:]
+    # One pixel of the margin lies on the house's own.
+    assert np.sum((before & Seen.LAYOVER) > 0) == pytest.approx(layover_px, abs=1)
+    assert np.sum((behind & Seen.RADAR_SHADOW) > 0) == pytest.approx(shadow_px, abs=1)
+    assert not (before & Seen.RADAR_SHADOW).any() and not (behind & Seen.LAYOVER).any()
+    # The camera stands in the west-south-west, the sun in the south-south-east.
+    assert seen[94, 122] & Seen.HIDDEN and not seen[94, 87] & Seen.HIDDEN
+    assert seen[74, 98] & Seen.CAST_SHADOW and not seen[116, 98] & Seen.CAST_SHADOW
+    assert (seen[1:60, 1:-1] == 0).all()
+
+
+def test_windows_join_but_for_pixels_on_the_borders_of_oblique_shadows(tmp_path: Path) -> None:
+    ground = ground_of(tmp_path, house())
+    whole = ground.seen(Window(0, 0, 200, 180))
+    parts = np.hstack([ground.seen(Window(col, 0, 100, 180)) for col in (0, 100)])
+    straight = Seen.RAISED | Seen.LAYOVER | Seen.RADAR_SHADOW | Seen.UNKNOWN
+    np.testing.assert_array_equal(whole & straight, parts & straight)
+    inside, around = (cv2.erode(whole, np.ones((3, 3))), cv2.dilate(whole, np.ones((3, 3))))
+    assert np.all((inside <= parts) & (parts <= around))
+
+
+def test_what_is_not_known_takes_no_part_and_hides_nothing(tmp_path: Path) -> None:
+    heights = house(height_m=0)
+    heights[HOUSE] = -9999
+    ground = ground_of(tmp_path, heights, nodata=-9999)
+    part = ground.select(ground.scene.whole).part
+    expected = np.ones(part.shape, bool)
+    expected[79:111, 89:121] = False
+    # Nor is it known how the pixels beyond the border stand.
+    expected[[0, -1]] = expected[:, [0, -1]] = False
+    np.testing.assert_array_equal(part, expected)
+
+
+def test_a_model_of_another_place_is_refused(tmp_path: Path) -> None:
+    ground = ground_of(tmp_path, house())
+    ground.require_cover()
+    away = replace(GRID, transform=compose(Affine.translation(5000, 0), GRID.transform))
+    far = write_raster(tmp_path / "far.tif", house(), away)
+    with pytest.raises(NoOverlapError, match="does not cover"):
+        replace(ground, model=RasterModel(open_raster(far))).require_cover()
+
+
+def test_an_offset_moves_what_stands(tmp_path: Path) -> None:
+    ground = ground_of(tmp_path, house())
+    window = Window(50, 50, 100, 100)
+    moved = replace(ground, offset_px=(5, -3)).seen(window)
+    np.testing.assert_array_equal(moved, ground.seen(Window(45, 53, 100, 100)))
+
+
+def test_directions_follow_the_map_not_the_pixels(tmp_path: Path) -> None:
+    """On a grid of degrees, turned by 90°, shadows are as long and lie in the same direction."""
+    side = 1 / 111_195.0
+    grid = Grid(
+        compose(Affine.translation(11.0, 0.001), Affine.scale(side), Affine.rotation(90)),
+        CRS.from_epsg(4326),
+        200,
+        180,
+    )
+    seen = ground_of(tmp_path, house(), grid).seen(Window(0, 0, 200, 180))
+    rows, cols = np.nonzero((seen & Seen.RADAR_SHADOW) > 0)
+    lonlat = grid.pixel_to_map(np.column_stack([cols, rows]))
+    east = (lonlat[:, 0] - grid.pixel_to_map([[104.5, 94.5]])[0, 0]) / side
+    assert east.max() == pytest.approx(15 + 12 * math.tan(math.radians(40)), abs=2)
+
+
+@pytest.fixture(scope="module")
+def country() -> Country:
+    options = SceneOptions((220, 220), density="city", relief_m=10, seed=4)
+    return generate_scene(options, margin_px=128)
+
+
+@pytest.fixture(scope="module")
+def part(country: Country, tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
+    """Return what of a simulated city takes part."""
+    grid = utm_grid(*country.terrain_m.shape[::-1], 1.0)
+    ground = ground_of(tmp_path_factory.mktemp("city"), country.surface_m, grid)
+    rows, cols = country.window
+    return ground.select(Window(cols.start, rows.start, 220, 220)).part
+
+
+def test_the_simulators_radar_shows_nothing_else_with_it(
+    country: Country, part: np.ndarray
+) -> None:
+    """Without all that stands, the power of what takes part is the same."""
+    sar = SarOptions(incidence_deg=RADAR.incidence_deg)
+    stands = country.cover() != Cover.CAR
+    bare = replace(country, object_m=np.where(stands, 0, country.object_m).astype(np.float32))
+    change_db = 10 * np.abs(np.log10(sar_power(country, sar) / sar_power(bare, sar)))
+    assert 0.05 < part.mean() < 0.6
+    assert np.mean(change_db[part] > 1.0) < 0.01
+    assert np.mean(change_db[~part] > 1.0) > 0.6
+
+
+def test_the_simulators_camera_sees_it_in_the_sun(country: Country, part: np.ndarray) -> None:
+    stands = country.cover() != Cover.CAR
+    alone = replace(country, object_m=np.where(stands, country.object_m, 0).astype(np.float32))
+    options = OpticalOptions(
+        view_azimuth_deg=CAMERA.azimuth_deg, off_nadir_deg=CAMERA.incidence_deg
+    )
+    rows = slice(0, alone.object_m.shape[0])
+    seen, _ = optical._visible(alone, rows, options, rows)
+    own = np.arange(seen.size).reshape(seen.shape)
+    assert np.mean((seen == own)[country.window][part]) > 0.99
+    shaded = optical._in_shadow(alone.object_m, options)[country.window]
+    assert np.mean(shaded[part]) < 0.01
+
+
+def footprints(path: Path, heights: list[object], field: str = "height") -> Path:
+    schema = {"geometry": "Polygon", "properties": {field: "str"}}
+    with fiona.open(path, "w", driver="GPKG", crs_wkt=UTM.to_wkt(), schema=schema) as layer:
+        for number, height in enumerate(heights):
+            left = 20.5 + 40 * number
+            px = [(left, 50.5), (left + 20, 50.5), (left + 20, 80.5), (left, 80.5), (left, 50.5)]
+            ring = [tuple(map(float, xy)) for xy in GRID.pixel_to_map(px)]
+            layer.write(
+                {
+                    "type": "Feature",
+                    "geometry": {"type": "Polygon", "coordinates": [ring]},
+                    "properties": {field: height},
+                }
+            )
+    return path
+
+
+class TestFootprints:
+    def test_heights_stand_on_level_ground(self, tmp_path: Path) -> None:
+        model = read_footprints(footprints(tmp_path / "a.gpkg", ["12.5", "8 m", "high"]), GRID)
+        heights, known = model.heights(GRID)
+        assert known.all() and not heights.ground_m.any()
+        assert heights.surface_m[65, 30] == 12.5 and heights.surface_m[65, 70] == 8
+        assert heights.surface_m[65, 110] == 0 and heights.surface_m[20, 30] == 0
+
+    def test_the_higher_of_two_counts(self) -> None:
+        ring = [[x, y] for x, y in GRID.pixel_to_map([(9, 9), (30, 9), (30, 30), (9, 30), (9, 9)])]
+        area = {"type": "Polygon", "coordinates": [ring]}
+        heights, _ = FootprintModel(((area, 5.0), (area, 9.0))).heights(GRID)
+        assert heights.surface_m[20, 20] == 9
+
+    def test_no_field_or_no_height(self, tmp_path: Path) -> None:
+        with pytest.raises(VectorLayerError, match="no field height"):
+            read_footprints(footprints(tmp_path / "a.gpkg", ["3"], "levels"), GRID)
+        with pytest.raises(VectorLayerError, match="no polygons with a height"):
+            read_footprints(footprints(tmp_path / "b.gpkg", ["unknown"]), GRID)

@@ -1,0 +1,68 @@
+"""What is held in memory reads as what it was read from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from raster_files import utm_grid, write_raster
+
+from groundtie.context import threads
+from groundtie.rasters.held import held_grey, held_onto
+from groundtie.rasters.pair import Image
+from groundtie.rasters.reading import open_raster
+
+GRID = utm_grid(700, 640)
+SHIFT_M = np.array([3.4, -1.7]) * GRID.pixel_size_m
+
+
+def image(folder: Path, nodata: float | None) -> Image:
+    """An image with an area of zeros and a mask of its own."""
+    values = np.random.default_rng(0).uniform(1, 200, (GRID.height, GRID.width))
+    values[100:140, 200:260] = 0
+    mask = np.ones_like(values, np.uint8)
+    mask[300:350] = 0
+    source, shown = (folder / name for name in ("image.tif", "mask.tif"))
+    write_raster(source, values.astype(np.float32), GRID, nodata=nodata)
+    write_raster(shown, mask, GRID)
+    return Image(open_raster(str(source)), mask=open_raster(str(shown)))
+
+
+def to_px(xy: np.ndarray) -> np.ndarray:
+    return GRID.map_to_pixel(xy + SHIFT_M)
+
+
+@pytest.mark.parametrize("nodata", [0.0, None])
+def test_pieces_are_those_of_the_image(tmp_path: Path, nodata: float | None) -> None:
+    original = image(tmp_path, nodata)
+    with threads(2) as context:
+        held = held_onto(original, GRID.window(-20, -20, 600, 600), to_px, context)
+    hidden = np.zeros((150, 180), bool)
+    hidden[40:80, 60:100] = True
+    for col, row in ((-20, -20), (150, 60), (333, 280)):
+        piece = GRID.window(col, row, 180, 150)
+        expected = original.read_onto(piece, to_px, hidden)
+        found = held.read_onto(piece, held.source.grid.map_to_pixel, hidden)
+        np.testing.assert_array_equal(found.valid, expected.valid)
+        np.testing.assert_allclose(found.values, expected.values, atol=0.02)
+    assert not expected.valid.all()
+
+
+@pytest.mark.parametrize(("nodata", "states"), [(0.0, True), (None, False)])
+def test_whoever_states_nothing_of_what_is_valid_does_not_seem_to(
+    tmp_path: Path, nodata: float | None, states: bool
+) -> None:
+    original = image(tmp_path, nodata)
+    with threads(1) as context:
+        held = held_onto(original, GRID, to_px, context)
+    assert held.source.says_what_is_valid is states
+    assert held_grey(original.source).says_what_is_valid is states
+
+
+def test_a_raster_reads_the_same_from_memory(tmp_path: Path) -> None:
+    source = image(tmp_path, 0.0).source
+    held = held_grey(source)
+    for one, other in zip(held.read(held.window), source.read(source.window), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert held.grid == source.grid

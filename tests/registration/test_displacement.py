@@ -1,0 +1,103 @@
+"""The displacement field as a raster: what is known of a pair whose shift is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from affine import Affine
+from contexts import context
+from textured_pairs import listing
+
+from groundtie.context import Context
+from groundtie.geometry.models import Frame, PolynomialModel
+from groundtie.geometry.transform import Transform
+from groundtie.registration.delivery import RegistrationFiles
+from groundtie.registration.displacement import displacement_field
+from groundtie.registration.evidence import RegistrationEvidence
+from groundtie.registration.registration import Registration
+
+__all__ = ["context"]
+
+
+@pytest.fixture
+def evidence(registration: Registration) -> RegistrationEvidence:
+    assert registration.evidence is not None
+    return registration.evidence
+
+
+def test_the_file_holds_the_known_shift_and_how_well_it_is_known(
+    registration: Registration, tmp_path: Path, context: Context
+) -> None:
+    files = RegistrationFiles(displacement=tmp_path / "d.tif")
+    files.write(registration, context)
+    assert files.named(registration) == {"displacement": tmp_path / "d.tif"}
+    with rasterio.open(tmp_path / "d.tif") as raster:
+        dx, dy, sigma = raster.read()
+        assert raster.units == ("m", "m", "m")
+        assert [text.partition(":")[0] for text in raster.descriptions] == ["dx", "dy", "sigma"]
+        assert raster.crs == registration.pair.grid.crs
+        left, bottom, right, top = raster.bounds
+    # The input states a place 70 m too far east and 45 m too far south; pixels have 10 m.
+    known = np.isfinite(dx)
+    assert known.mean() > 0.5
+    error = np.array([dx[known] + 70, dy[known] - 45])
+    assert np.abs(error).max() < 1.0
+    assert sigma[known].min() > 0 and sigma[known].max() < 2.0
+    # The error is one of what sigma states: beyond four of them lies one in 16 000.
+    assert (np.abs(error) < 4 * sigma[known]).all()
+    # It covers the matching grid.
+    corners = registration.pair.grid.pixel_to_map(registration.pair.grid.outline(1))
+    assert left <= corners[:, 0].min() and right >= corners[:, 0].max()
+    assert bottom <= corners[:, 1].min() and top >= corners[:, 1].max()
+
+
+def test_nothing_is_known_where_the_input_shows_nothing(evidence: RegistrationEvidence) -> None:
+    field, grid = displacement_field(evidence)
+    rows, cols = np.nonzero(np.isfinite(field[0]))
+    px = evidence.estimate.transform(grid.pixel_to_map(np.column_stack([cols, rows])))
+    assert evidence.estimate.transform.input_grid.contains(px).all()
+
+
+def test_a_curved_model_gets_smaller_pixels(evidence: RegistrationEvidence) -> None:
+    frame = Frame.around(evidence.grid.pixel_to_map(evidence.grid.outline()))
+    terms = np.zeros((6, 2))
+    terms[3] = 0.02
+    curved = PolynomialModel("polynomial2", frame, terms)
+    moved = replace(
+        evidence,
+        estimate=replace(
+            evidence.estimate,
+            transform=Transform(curved, evidence.grid.crs, evidence.estimate.transform.input_grid),
+        ),
+    )
+    field, grid = displacement_field(moved)
+    assert grid.pixel_size[0] < displacement_field(evidence)[1].pixel_size[0]
+    xy = grid.pixel_to_map([[3, 5], [4, 5]])
+    expected = xy - curved(xy)
+    np.testing.assert_allclose(field[:2, 5, 3:5].T, expected, atol=0.05)
+
+
+def test_without_georeferencing_it_is_in_pixels(evidence: RegistrationEvidence) -> None:
+    lattice = replace(evidence.grid, transform=Affine.translation(-0.5, -0.5), crs=None)
+    shift = PolynomialModel("translation", Frame(Affine.identity()), np.array([[3.0, -2.0]]))
+    moved = replace(
+        evidence,
+        grid=lattice,
+        estimate=replace(evidence.estimate, transform=Transform(shift, None, lattice)),
+    )
+    field, _ = displacement_field(moved)
+    known = np.isfinite(field[0])
+    np.testing.assert_allclose(field[0][known], -3.0)
+    np.testing.assert_allclose(field[1][known], 2.0)
+
+
+def test_a_refused_registration_leaves_none(
+    registration: Registration, tmp_path: Path, context: Context
+) -> None:
+    refused = replace(registration, verdict=replace(registration.verdict, accepted=False))
+    RegistrationFiles(displacement=tmp_path / "d.tif").write(refused, context)
+    assert not listing(tmp_path)
