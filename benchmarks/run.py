@@ -40,6 +40,7 @@ SUITES = (
     "series",
     "attacks",
     "calibration",
+    "mountains",
 )
 
 
