@@ -21,6 +21,7 @@ SUITES = (
     "city",
     "towns",
     "layover",
+    "radar_likeness",
     "masks",
     "large_shift",
     "rotated_pairs",
@@ -39,6 +40,7 @@ SUITES = (
     "series",
     "attacks",
     "calibration",
+    "mountains",
 )
 
 

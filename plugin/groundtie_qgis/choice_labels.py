@@ -35,6 +35,7 @@ _LABELS = {
     "fused": "Mutual information and orientation",
     "kd-tree": "k-d tree (approximate)",
     "isef": "ISEF",
+    "sar": "SAR",
     "gamma-map": "Gamma MAP",
     "enhanced-frost": "Enhanced Frost",
     # Tools, by their titles (a test compares).

@@ -14,10 +14,10 @@ from groundtie.geometry.models import (
     Frame,
     Model,
     PolynomialModel,
-    model_from_json,
     monomials,
     thin_plate_kernel,
 )
+from groundtie.geometry.stored_models import model_from_json
 from groundtie.rasters.grid import apply_affine
 
 CORNER = np.array([500_000.0, 4_990_000.0])

@@ -3,22 +3,27 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from affine import Affine
+from rasterio.crs import CRS
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import check_grad
 
+from groundtie.arrays import Raster
 from groundtie.geometry.fitting import fit_model
-from groundtie.geometry.models import DEGREE, Frame, Model
+from groundtie.geometry.models import DEGREE, TERRAIN, Frame, Model, PolynomialModel
+from groundtie.geometry.terrain import Terrain, TerrainModel
 from groundtie.matching.alignment import (
     CANDIDATES,
+    IDENTITY,
     LINEAR_CANDIDATES,
+    TERRAIN_CANDIDATES,
+    Prior,
     _cubic,
     _fields,
-    _model,
-    _starting,
     align,
     choose_alignment,
 )
-from groundtie.rasters.grid import apply_affine
+from groundtie.matching.families import Family
+from groundtie.rasters.grid import Grid, apply_affine
 
 RADIUS = 8
 SPAN = 2 * RADIUS + 1
@@ -54,8 +59,13 @@ def surfaces_of(
     kind: str, px: np.ndarray, prior: Affine, seed: int, wrong: float = 0.4
 ) -> np.ndarray:
     """Surfaces that peak where chips lie, over a correlated background; many peak elsewhere."""
+    return surfaces_at(apply_affine(~prior, distortion(kind, px)) - px, seed, wrong)
+
+
+def surfaces_at(shifts: np.ndarray, seed: int, wrong: float = 0.4) -> np.ndarray:
+    """Surfaces that peak at shifts, (n, 2), but for those that are wrong."""
+    px, shifts = shifts, shifts.copy()
     rng = np.random.default_rng(seed)
-    shifts = apply_affine(~prior, distortion(kind, px)) - px
     assert np.abs(shifts).max() < RADIUS - 1
     lost = rng.random(len(px)) < wrong
     shifts[lost] = rng.uniform(-RADIUS, RADIUS, (lost.sum(), 2))
@@ -69,7 +79,7 @@ def surfaces_of(
 
 
 def identity() -> Model:
-    return _model("translation", Frame.around(np.array([[0.0, 0.0], SIZE])), np.zeros(2))
+    return PolynomialModel.identity()
 
 
 def error_px(model: Model, kind: str) -> float:
@@ -86,7 +96,9 @@ PRIORS = [Affine.identity(), Affine(1.003, 0.002, 1.0, -0.001, 0.998, -0.5)]
 @pytest.mark.parametrize("prior", PRIORS, ids=["plain", "resampled"])
 def test_the_model_behind_the_surfaces_is_found(kind: str, prior: Affine) -> None:
     px = centres()
-    found = align(kind, px, surfaces_of(kind, px, prior, seed=0), prior, identity())
+    found = align(
+        kind, px, surfaces_of(kind, px, prior, seed=0), Prior.of_affine(prior), identity()
+    )
     assert found.model.kind == kind
     assert error_px(found.model, kind) < 0.1
     assert set(found.left_out_score) == {kind}
@@ -100,7 +112,9 @@ def test_the_model_behind_the_surfaces_is_found(kind: str, prior: Affine) -> Non
 @pytest.mark.parametrize("seed", range(2))
 def test_the_simplest_model_that_fits_is_chosen(kind: str, seed: int) -> None:
     px = centres()
-    chosen = choose_alignment(px, surfaces_of(kind, px, PRIORS[1], seed), PRIORS[1], identity())
+    chosen = choose_alignment(
+        px, surfaces_of(kind, px, PRIORS[1], seed), Prior.of_affine(PRIORS[1]), identity()
+    )
     assert chosen.model.kind == kind
     assert error_px(chosen.model, kind) < 0.1
     assert set(chosen.left_out_score) == set(CANDIDATES)
@@ -109,7 +123,7 @@ def test_the_simplest_model_that_fits_is_chosen(kind: str, seed: int) -> None:
 def test_nothing_is_chosen_but_candidates() -> None:
     px, prior = centres(), PRIORS[0]
     bent = surfaces_of("polynomial2", px, prior, 0)
-    chosen = choose_alignment(px, bent, prior, identity(), LINEAR_CANDIDATES)
+    chosen = choose_alignment(px, bent, Prior.of_affine(prior), identity(), LINEAR_CANDIDATES)
     assert set(chosen.left_out_score) == {"translation", "similarity", "affine"}
     assert chosen.model.kind in chosen.left_out_score
 
@@ -120,7 +134,7 @@ def test_left_out_similarity_is_that_of_the_right_chips() -> None:
     scores = []
     for wrong in (0.0, 0.5):
         surfaces = surfaces_of("translation", px, PRIORS[0], 1, wrong)
-        found = align("translation", px, surfaces, PRIORS[0], identity())
+        found = align("translation", px, surfaces, Prior.of_affine(PRIORS[0]), identity())
         scores.append(found.left_out_score["translation"])
     assert scores[1] / scores[0] == pytest.approx(0.5, abs=0.1)
 
@@ -129,14 +143,14 @@ def test_few_chips_take_no_model_of_many_parameters() -> None:
     px = centres()[::25]
     assert len(px) == 8
     prior = Affine.identity()
-    chosen = choose_alignment(px, surfaces_of("translation", px, prior, 0, 0), prior, identity())
+    chosen = choose_alignment(px, surfaces_of("translation", px, prior, 0, 0), IDENTITY, identity())
     assert set(chosen.left_out_score) == {"translation", "similarity"}
 
 
 def test_surfaces_without_peaks_leave_a_finite_model() -> None:
     px = centres()
     flat = np.zeros((len(px), SPAN, SPAN), np.float32)
-    found = choose_alignment(px, flat, Affine.identity(), identity())
+    found = choose_alignment(px, flat, IDENTITY, identity())
     assert found.model.kind == "translation"
     np.testing.assert_allclose(found.model(px), px, atol=1e-9)
 
@@ -145,8 +159,7 @@ def test_surfaces_without_peaks_leave_a_finite_model() -> None:
 def test_the_slope_that_the_search_follows_is_that_of_the_similarity(kind: str) -> None:
     px = centres()[::3]
     prior = PRIORS[1]
-    field = _fields(px, surfaces_of(kind, px, prior, 2), prior)[-1]
-    frame = Frame.around(field.px)
+    field = _fields(px, surfaces_of(kind, px, prior, 2), Prior.of_affine(prior))[-1]
     rng = np.random.default_rng(0)
 
     def similarity(claimed: np.ndarray) -> float:
@@ -158,16 +171,17 @@ def test_the_slope_that_the_search_follows_is_that_of_the_similarity(kind: str) 
     start = apply_affine(prior, field.px + rng.uniform(-4, 4, field.px.shape)).ravel()
     size = np.linalg.norm(slope(start))
     assert check_grad(similarity, slope, start, epsilon=1e-6) < 1e-3 * size
-    parameters = _starting(kind, frame, field.px, identity())
-    np.testing.assert_allclose(_model(kind, frame, parameters)(px), px, atol=1e-6)
+    family = Family.of(kind, field.px, identity(), None)
+    found = family.model(family.starting(identity()))
+    np.testing.assert_allclose(found(px), px, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["rigid", "similarity", "affine", "polynomial2"])
 def test_parameters_of_a_model_are_found_again(kind: str) -> None:
     px = centres().astype(float)
-    frame = Frame.around(px)
     model = fit_model(kind, px, distortion(kind, px))
-    again = _model(kind, frame, _starting(kind, frame, px, model))
+    family = Family.of(kind, px, model, None)
+    again = family.model(family.starting(model))
     np.testing.assert_allclose(again(px), distortion(kind, px), atol=0.01)
 
 
@@ -175,7 +189,7 @@ def test_the_spline_looks_up_the_surface_itself() -> None:
     """At whole shifts it gives the surface's values, up to the chip's weight; beyond, nothing."""
     px = centres()[:4]
     surfaces = surfaces_of("translation", px, Affine.identity(), 0)
-    field = _fields(px, surfaces, Affine.identity())[-1]
+    field = _fields(px, surfaces, IDENTITY)[-1]
     weights = field.scores(field.px)[0] / surfaces[:, RADIUS, RADIUS]
     assert (weights > 0).all()
     for dx, dy in ((3, -5), (-6, 6), (1, 1)):
@@ -195,3 +209,78 @@ def test_cubic_sum_to_one_and_their_slopes_to_nothing() -> None:
     np.testing.assert_allclose(weights @ [-1, 0, 1, 2], t, atol=1e-12)
     numeric = np.gradient(weights, t, axis=0, edge_order=2)
     np.testing.assert_allclose(slopes[1:-1], numeric[1:-1], atol=1e-3)
+
+
+class TestHeights:
+    """Chips on hills, of which the input was orthorectified with other heights."""
+
+    GRID = Grid(Affine(10, 0, 4e5, 0, -10, 5e6), CRS.from_epsg(32633), 600, 500)
+    SIGHT_PX = np.array([-0.045, 0.01])  # for a metre
+
+    def terrain(self, seed: int = 0) -> Terrain:
+        """Hills of 100 m, of which the input's have errors of about 30 m."""
+        rng = np.random.default_rng(seed)
+        rough = rng.normal(size=(2, 500, 600))
+        hills, errors = (
+            gaussian_filter(one, sigma) * sigma for one, sigma in zip(rough, (40, 30), strict=True)
+        )
+        low, high = self.GRID.pixel_to_map([[0, 499], [599, 0]])
+        rasters = [
+            Raster(values.astype(np.float32), self.GRID.transform, self.GRID.crs)
+            for values in (350 * hills, 350 * hills - 110 * errors)
+        ]
+        found = Terrain.open(rasters[0], rasters[1], self.GRID.crs, (*low, *high))
+        return found.seen_from(self.GRID.centre_transform)
+
+    def truth(self, terrain: Terrain) -> TerrainModel:
+        frame = Frame.around(np.array([[0.0, 0.0], SIZE]))
+        scale = frame.to_map.a
+        affine = np.array([[1.7, -1.2], [0.8, 0.4], [-0.5, 0.7]]) / scale
+        return TerrainModel(
+            TERRAIN, frame, np.vstack([affine, self.SIGHT_PX / scale]), terrain, 0.0
+        )
+
+    def chips(self, truth: Model, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        px = centres()
+        return px, surfaces_at(truth(px.astype(float)) - px, seed)
+
+    @pytest.mark.parametrize("seed", range(2))
+    def test_what_heights_displace_is_found_and_chosen(self, seed: int) -> None:
+        terrain = self.terrain(seed)
+        truth = self.truth(terrain)
+        px, surfaces = self.chips(truth, seed)
+        chosen = choose_alignment(
+            px, surfaces, IDENTITY, identity(), TERRAIN_CANDIDATES, terrain
+        ).model
+        assert isinstance(chosen, TerrainModel)
+        at = np.random.default_rng(1).uniform(40, 450, (200, 2))
+        assert np.hypot(*(truth(at) - truth.affine(at)).T).max() > 2
+        np.testing.assert_allclose(chosen(at), truth(at), atol=0.4)
+        scale = chosen.frame.to_map.a
+        np.testing.assert_allclose(chosen.coefficients[3] * scale, self.SIGHT_PX, atol=0.006)
+
+    @pytest.mark.parametrize("kind", ["affine", "polynomial2"])
+    @pytest.mark.parametrize("seed", range(2))
+    def test_heights_of_another_place_are_not_chosen(self, kind: str, seed: int) -> None:
+        px = centres()
+        surfaces = surfaces_of(kind, px, Affine.identity(), seed)
+        chosen = choose_alignment(
+            px, surfaces, IDENTITY, identity(), TERRAIN_CANDIDATES, self.terrain(seed + 7)
+        )
+        assert TERRAIN in chosen.left_out_score
+        assert chosen.model.kind == kind
+
+    def test_flat_land_says_nothing_on_heights(self) -> None:
+        flat = Raster(np.full((500, 600), 30, np.float32), self.GRID.transform, self.GRID.crs)
+        low, high = self.GRID.pixel_to_map([[0, 499], [599, 0]])
+        terrain = Terrain.open(flat, None, self.GRID.crs, (*low, *high))
+        px, surfaces = self.chips(identity(), 0)
+        chosen = choose_alignment(
+            px,
+            surfaces,
+            IDENTITY,
+            identity(),
+            TERRAIN_CANDIDATES,
+            terrain.seen_from(self.GRID.centre_transform),
+        )
+        assert TERRAIN not in chosen.left_out_score

@@ -49,7 +49,7 @@ def check_points(path: Path) -> np.ndarray:
 class TestRasters:
     def test_reference(self, pair: SimulatedPair, paths: dict[str, Path]) -> None:
         with rasterio.open(paths["reference"]) as raster:
-            assert np.array_equal(raster.read(1), pair.reference)
+            assert np.array_equal(raster.read(), pair.reference)
             assert raster.transform == pair.reference_grid.transform
             assert raster.crs == pair.reference_grid.crs
             assert raster.descriptions == ("Amplitude",)

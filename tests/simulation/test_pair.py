@@ -42,7 +42,7 @@ def country() -> SimulatedPair:
 
 class TestShapes:
     def test_images(self, small: SimulatedPair) -> None:
-        assert small.reference.shape == (200, 240)
+        assert small.reference.shape == (1, 200, 240)
         assert small.input.shape == (2, 200, 240)
         assert small.reference.dtype == small.input.dtype == np.uint16
 
@@ -56,7 +56,7 @@ class TestShapes:
         pair = simulate_pair(replace(SMALL, input_pixel_size_m=size_m))
         assert pair.input.shape[1:] == shape
         assert pair.truth.input_grid.pixel_size == (size_m, size_m)
-        assert pair.reference.shape == (200, 240)
+        assert pair.reference.shape == (1, 200, 240)
 
     @pytest.mark.slow
     def test_pixel_size_of_the_scene(self) -> None:
@@ -103,7 +103,7 @@ class TestContent:
         """Water is dark to the radar and to the camera in the same pixels."""
         cover = country.scene.cover()[country.scene.window]
         water, land = cover == Cover.WATER, cover == Cover.FIELD
-        for image in (country.reference, country.input[0]):
+        for image in (country.reference[0], country.input[0]):
             assert np.median(image[water]) < 0.6 * np.median(image[land])
 
 
@@ -114,7 +114,7 @@ class TestRadiometry:
         cover = country.scene.cover()[country.scene.window]
         radar, camera = (
             {c: np.median(image[cover == c]) for c in Cover if (cover == c).sum() > 500}
-            for image in (country.reference, country.input[0])
+            for image in (country.reference[0], country.input[0])
         )
         assert radar[Cover.WATER] < radar[Cover.FIELD]
         assert camera[Cover.WATER] < camera[Cover.FIELD]
@@ -134,7 +134,7 @@ class TestRadiometry:
         means = np.array(
             [
                 [np.mean(image[labels == n]) for n in fields]
-                for image in (country.reference, country.input[0])
+                for image in (country.reference[0], country.input[0])
             ]
         )
         i, j = np.triu_indices(len(fields), 1)

@@ -26,6 +26,7 @@ STANDARD_ERRORS = {
     "translation": 0.0,
     "similarity": 1.0,
     "affine": 1.0,
+    "terrain": 1.0,
     "polynomial2": 2.0,
     "polynomial3": 2.0,
 }
@@ -46,7 +47,7 @@ class Candidate(Generic[T]):
     Parameters
     ----------
     kind
-        One of `models.KINDS` or of `bias.KINDS`.
+        One of `models.PARAMETERS` or of `bias.KINDS`.
     fitted
         The model, in whatever form its caller has it.
     scores

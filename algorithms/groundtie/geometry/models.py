@@ -14,7 +14,7 @@ import numpy as np
 from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 
-from ..rasters.grid import apply_affine, compose, is_invertible
+from ..rasters.grid import apply_affine, compose
 
 if TYPE_CHECKING:
     from typing import Self  # Python 3.11; annotations alone need it
@@ -39,7 +39,10 @@ PARAMETERS = {
     "polynomial3": 20,
     "tps": 20,
 }
+# Models of the plane alone, and the one that needs heights (see `terrain`).
 KINDS = tuple(PARAMETERS)
+TERRAIN = "terrain"
+PARAMETERS[TERRAIN] = 8
 
 _INVERSE_STEPS = 20
 _INVERSE_PRECISION = 1e-12  # of the frame
@@ -221,30 +224,3 @@ def thin_plate_kernel(uv: FloatArray, knots: FloatArray) -> FloatArray:
 def shift_model(dx: float, dy: float) -> Model:
     """Return a translation in map units as a model."""
     return PolynomialModel("translation", Frame(Affine.identity()), np.array([[dx, dy]]))
-
-
-def model_from_json(values: dict[str, Any]) -> Model:
-    """Return the model that `to_json` described.
-
-    Raises
-    ------
-    KeyError, TypeError, ValueError
-        The values describe none.
-    """
-    kind, frame = values["kind"], Frame(Affine(*(float(number) for number in values["frame"])))
-    if not is_invertible(frame.to_map):
-        raise ValueError("the model's frame has no size")
-    if kind == "tps":
-        knots, weights = _pairs(values["knots"]), _pairs(values["weights"])
-        if len(knots) != len(weights):
-            raise ValueError(f"{len(knots)} knots have {len(weights)} weights")
-        return ThinPlateSpline(kind, frame, knots, weights, _pairs(values["affine"], 3))
-    terms = (DEGREE[kind] + 1) * (DEGREE[kind] + 2) // 2
-    return PolynomialModel(kind, frame, _pairs(values["coefficients"], terms))
-
-
-def _pairs(values: Any, count: int = -1) -> FloatArray:
-    pairs = np.asarray(values, float).reshape(count, 2)
-    if not np.isfinite(pairs).all():
-        raise ValueError("a number of the model is not finite")
-    return pairs

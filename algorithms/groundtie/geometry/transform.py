@@ -15,7 +15,8 @@ from rasterio.errors import CRSError
 from ..errors import TransformFileError
 from ..rasters.grid import MOST_PX, Grid, is_invertible, reproject, require_map
 from ..strict_json import read_json
-from .models import Model, PolynomialModel, model_from_json
+from .models import Model, PolynomialModel
+from .stored_models import model_from_json
 
 FloatArray = NDArray[np.float64]
 FORMAT = "groundtie-transform/1"
@@ -84,8 +85,15 @@ class Transform:
         }
 
     @classmethod
-    def from_json(cls, values: dict[str, Any]) -> Transform:
+    def from_json(cls, values: dict[str, Any], folder: Path | None = None) -> Transform:
         """Return the transform that `to_json` described.
+
+        Parameters
+        ----------
+        values
+            What `to_json` returned.
+        folder
+            Where terrain models are looked for that are not where they were.
 
         Raises
         ------
@@ -105,7 +113,8 @@ class Transform:
             is_sized = all(1 <= side < MOST_PX for side in (grid.width, grid.height))
             if not is_sized or not is_invertible(grid.transform):
                 raise ValueError("the input's grid is none of a raster")
-            return cls(model_from_json(values["model"]), _crs_from_text(values["crs"]), grid)
+            crs = _crs_from_text(values["crs"])
+            return cls(model_from_json(values["model"], crs, folder), crs, grid)
         except (KeyError, TypeError, ValueError, CRSError, OverflowError) as error:
             if isinstance(error, TransformFileError):
                 raise
@@ -121,7 +130,7 @@ def load_transform(path: str | Path) -> Transform:
         The file cannot be read or does not hold a transform.
     """
     try:
-        return Transform.from_json(read_json(Path(path)))
+        return Transform.from_json(read_json(Path(path)), Path(path).parent)
     except TransformFileError as error:
         raise TransformFileError(f"{path}: {error}") from error
     except (OSError, ValueError) as error:

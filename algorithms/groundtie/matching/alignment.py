@@ -7,7 +7,7 @@ the model with the largest sum of similarities is sought.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -24,12 +24,14 @@ from ..geometry.model_choice import (
     left_out_blocks,
     left_out_scores,
 )
-from ..geometry.models import DEGREE, PARAMETERS, Frame, Model, PolynomialModel, monomials
+from ..geometry.models import PARAMETERS, TERRAIN, Model
+from ..geometry.terrain import Terrain
+from ..rasters.grid import apply_affine
 from ..rasters.kernels import bspline_slopes, bspline_weights
 from .belief_propagation import Surfaces
+from .families import Family, Positions, coefficients_of
 
 FloatArray = NDArray[np.float64]
-Positions = Callable[[FloatArray], FloatArray]
 
 # Surfaces are blurred by these, one after the other, so that the fit is caught from afar.
 _BLURS_PX = (1.5, 0.0)
@@ -38,9 +40,13 @@ _BLURS_PX = (1.5, 0.0)
 _SLOPE_PER_PX = 0.01
 _STEPS = 60
 
+# Where a chip is shown depends on the heights there: they are asked for again so often.
+_HEIGHT_PASSES = 3
+
 # From simple to flexible, those that "auto" chooses from; see `choose_alignment`.
 CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3")
 LINEAR_CANDIDATES = CANDIDATES[:3]
+TERRAIN_CANDIDATES = (*LINEAR_CANDIDATES, TERRAIN, *CANDIDATES[3:])
 
 
 @dataclass(frozen=True)
@@ -67,22 +73,27 @@ class Alignment:
 class _Field:
     """Surfaces that can be looked up anywhere: B-spline coefficients of blurred surfaces.
 
-    `px` are the chips' centres, (n, 2); `to_shift` takes nominal pixel positions to places on
-    the resampled input, whose distance from the centre is the shift.
+    `px` are the chips' centres, (n, 2), `predicted` where the input was taken to have them;
+    `to_shift` takes distances from there, in nominal pixels, to shifts.
     """
 
     px: FloatArray
+    predicted: FloatArray
     coefficients: FloatArray
-    to_shift: Affine
+    to_shift: FloatArray
 
     def take(self, which: NDArray[np.bool_]) -> _Field:
-        return _Field(self.px[which], self.coefficients[which], self.to_shift)
+        return replace(
+            self,
+            px=self.px[which],
+            predicted=self.predicted[which],
+            coefficients=self.coefficients[which],
+        )
 
     def scores(self, nominal: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return similarity, (n,), at nominal positions, and its gradient to these, (n, 2)."""
-        t = self.to_shift
-        linear = np.array([[t.a, t.b], [t.d, t.e]])
-        shift = nominal @ linear.T + [t.c, t.f] - self.px
+        linear = self.to_shift
+        shift = (nominal - self.predicted) @ linear.T
         radius = self.coefficients.shape[1] // 2
         # Beyond the window a surface is zero, and so is its gradient.
         place = np.clip(shift + radius, 1.0, 2 * radius - 1.001)
@@ -101,36 +112,70 @@ class _Field:
         return np.where(inside, value, 0.0), slope @ linear
 
 
+@dataclass(frozen=True)
+class Prior:
+    """What the input was resampled by for matching.
+
+    Parameters
+    ----------
+    to_nominal
+        From grid pixels to nominal grid pixels, shapes (n, 2).
+    linear
+        Nominal pixels for each pixel, shape (2, 2): what is common to all places.
+    """
+
+    to_nominal: Positions
+    linear: FloatArray
+
+    @classmethod
+    def of_affine(cls, affine: Affine) -> Prior:
+        """Return the prior that an affine transform is."""
+        linear = np.array([[affine.a, affine.b], [affine.d, affine.e]])
+        return cls(lambda px: apply_affine(affine, px), linear)
+
+
+# The input as it is.
+IDENTITY = Prior.of_affine(Affine.identity())
+
+
 def align(
-    kind: str, px: NDArray[np.int_], surfaces: Surfaces, prior: Affine, start: Positions
+    kind: str,
+    px: NDArray[np.int_],
+    surfaces: Surfaces,
+    prior: Prior,
+    start: Positions,
+    terrain: Terrain | None = None,
 ) -> Alignment:
-    """Fit a polynomial model to surfaces.
+    """Fit a model to surfaces.
 
     Parameters
     ----------
     kind
-        One of `models.DEGREE`.
+        One of `models.DEGREE`, or `models.TERRAIN`.
     px
         The chips' centres in the matching grid, shape (n, 2).
     surfaces
         Their similarity, without that of their neighbours, by the weight of each, about 1 at its
         peak; shape (n, 2 r + 1, 2 r + 1).
     prior
-        From grid pixels to nominal grid pixels: what the input was resampled by for matching.
+        What the input was resampled by for matching.
     start
         What to start from: takes grid pixels, (n, 2), to nominal grid pixels.
+    terrain
+        Heights at the grid's pixels, for the model that needs them.
     """
-    return _align(kind, _fields(px, surfaces, prior), start).fitted
+    return _align(kind, _fields(px, surfaces, prior), start, terrain).fitted
 
 
 def choose_alignment(
     px: NDArray[np.int_],
     surfaces: Surfaces,
-    prior: Affine,
+    prior: Prior,
     start: Positions,
     candidates: Sequence[str] = CANDIDATES,
+    terrain: Terrain | None = None,
 ) -> Alignment:
-    """Fit the simplest polynomial model that the surfaces justify (see `choose_simplest`).
+    """Fit the simplest model that the surfaces justify (see `choose_simplest`).
 
     Its score is the similarity at chips that were left out of its fit. Parameters as `align`, and
     the candidates, from simple to flexible.
@@ -140,21 +185,26 @@ def choose_alignment(
     def fit(kind: str) -> Candidate[Alignment]:
         if kind != candidates[0] and len(px) < CHIPS_PER_PARAMETER * PARAMETERS[kind]:
             raise TooFewPointsError(f"{len(px)} chips are too few for the {kind} model")
-        return _align(kind, fields, start)
+        return _align(kind, fields, start, terrain)
 
     chosen, fitted = choose_simplest(candidates, fit, fields[-1].px)
     scores = {kind: mean for each in fitted for kind, mean in each.left_out_score.items()}
     return replace(chosen, left_out_score=scores)
 
 
-def _align(kind: str, fields: list[_Field], start: Positions) -> Candidate[Alignment]:
+def _align(
+    kind: str, fields: list[_Field], start: Positions, terrain: Terrain | None
+) -> Candidate[Alignment]:
     sharp = fields[-1]
-    frame = Frame.around(sharp.px)
-    parameters = _starting(kind, frame, sharp.px, start)
-    for field in fields:
-        parameters = _maximise(kind, frame, field, parameters)
+    family = Family.of(kind, sharp.px, start, terrain)
+    parameters = family.starting(start)
+    for each in fields:
+        parameters = _maximise(family, each, parameters)
+    for _ in range(_HEIGHT_PASSES if family.terrain else 0):
+        family = family.raised(parameters)
+        parameters = _maximise(family, sharp, parameters)
     models = tuple(
-        _model(kind, frame, _maximise(kind, frame, sharp.take(~block), parameters))
+        family.model(_maximise(family.take(~block), sharp.take(~block), parameters))
         for block in left_out_blocks(sharp.px)
     )
 
@@ -164,16 +214,18 @@ def _align(kind: str, fields: list[_Field], start: Positions) -> Candidate[Align
 
     scores = left_out_scores(sharp.px, models, score)
     mean = float(scores.sum()) / len(scores)
-    return Candidate(kind, Alignment(_model(kind, frame, parameters), models, {kind: mean}), scores)
+    return Candidate(kind, Alignment(family.model(parameters), models, {kind: mean}), scores)
 
 
-def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Affine) -> list[_Field]:
+def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Prior) -> list[_Field]:
     """Return the surfaces to look up, from the most to the least blurred."""
-    fields = []
+    fields, centres = [], px.astype(float)
+    predicted = prior.to_nominal(centres)
+    to_shift = np.asarray(np.linalg.inv(prior.linear), np.float64)
     for blur in _BLURS_PX:
         blurred = (cv2.GaussianBlur(s, (0, 0), blur) if blur else s for s in surfaces)
         coefficients = _spline_coefficients(np.stack(list(blurred)).astype(np.float64))
-        fields.append(_Field(px.astype(float), coefficients, ~prior))
+        fields.append(_Field(centres, predicted, coefficients, to_shift))
     return fields
 
 
@@ -192,13 +244,12 @@ def _cubic(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     return bspline_weights(4, t).T, bspline_slopes(4, t).T
 
 
-def _maximise(kind: str, frame: Frame, field: _Field, start: FloatArray) -> FloatArray:
-    design = monomials(frame.enter(field.px), DEGREE[kind])
-    scale = frame.to_map.a
+def _maximise(family: Family, field: _Field, start: FloatArray) -> FloatArray:
+    design, scale = family.design, family.frame.to_map.a
 
     def cost(parameters: FloatArray) -> tuple[float, FloatArray]:
         # Parameters count in pixels here, so that steps and gradients are of one size.
-        coefficients, jacobian = _coefficients(kind, parameters / scale)
+        coefficients, jacobian = coefficients_of(family.kind, parameters / scale)
         nominal = field.px + scale * (design @ coefficients)
         value, slope = field.scores(nominal)
         return -float(value.sum()), -((design.T @ slope).ravel() @ jacobian)
@@ -206,41 +257,3 @@ def _maximise(kind: str, frame: Frame, field: _Field, start: FloatArray) -> Floa
     options = {"gtol": _SLOPE_PER_PX, "maxiter": _STEPS}
     found = minimize(cost, start * scale, jac=True, method="BFGS", options=options)
     return np.asarray(found.x) / scale
-
-
-def _coefficients(kind: str, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a model's coefficients, (terms, 2), and their derivatives, (2 terms, parameters)."""
-    if kind == "rigid":
-        x, y, angle = parameters
-        cosine, sine = np.cos(angle), np.sin(angle)
-        jacobian = np.zeros((6, 3))
-        jacobian[0, 0] = jacobian[1, 1] = 1
-        jacobian[2:, 2] = [-sine, cosine, -cosine, -sine]
-        return np.array([[x, y], [cosine - 1, sine], [-sine, cosine - 1]]), jacobian
-    if kind == "similarity":
-        x, y, growth, turn = parameters
-        jacobian = np.zeros((6, 4))
-        jacobian[0, 0] = jacobian[1, 1] = 1
-        jacobian[2:, 2] = [1, 0, 0, 1]
-        jacobian[2:, 3] = [0, 1, -1, 0]
-        return np.array([[x, y], [growth, turn], [-turn, growth]]), jacobian
-    return parameters.reshape(-1, 2), np.eye(len(parameters))
-
-
-def _starting(kind: str, frame: Frame, px: FloatArray, start: Positions) -> FloatArray:
-    """Return the parameters of the model of a kind that is nearest to another model."""
-    target = (start(px) - px) / frame.to_map.a
-    design = monomials(frame.enter(px), DEGREE[kind])
-    coefficients = np.linalg.lstsq(design, target, rcond=None)[0]
-    if kind not in ("rigid", "similarity"):
-        return np.asarray(coefficients.ravel())
-    growth = (coefficients[1, 0] + coefficients[2, 1]) / 2
-    turn = (coefficients[1, 1] - coefficients[2, 0]) / 2
-    shift = list(coefficients[0])
-    if kind == "rigid":
-        return np.array([*shift, np.arctan2(turn, 1 + growth)])
-    return np.array([*shift, growth, turn])
-
-
-def _model(kind: str, frame: Frame, parameters: FloatArray) -> Model:
-    return PolynomialModel(kind, frame, _coefficients(kind, parameters)[0])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from affine import Affine
 from numpy.typing import NDArray
 
 from ..context import Context
@@ -15,7 +14,7 @@ from ..geometry.models import PARAMETERS, Model
 from ..geometry.robust import distances, find_consensus
 from ..rasters.grid import Grid
 from ..similarity.peak import find_peak
-from .alignment import align
+from .alignment import IDENTITY, align
 from .belief_propagation import propagate
 from .chips import ChipMatcher
 from .frames import compose
@@ -107,8 +106,7 @@ def fit_level_pooled(
     if len(found.centres) < PARAMETERS["affine"]:
         raise TooFewPointsError(f"only {len(found.centres)} chips show any ground")
     shift = found.common_shift_px
-    identity = Affine.identity()
-    aligned = align("affine", found.centres, found.weighted, identity, lambda px: px + shift)
+    aligned = align("affine", found.centres, found.weighted, IDENTITY, lambda px: px + shift)
     return compose(model, aligned.model, level)
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from affine import Affine
 from numpy.typing import NDArray
 
 from ..context import Context
@@ -20,7 +19,7 @@ from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..similarity.peak import find_peak
 from ..similarity.surface import SimilaritySettings
-from .alignment import align
+from .alignment import IDENTITY, align
 from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .coarse_shift import level_factor
@@ -121,7 +120,7 @@ def _moved(px: NDArray[np.int_], surfaces: Surfaces) -> Model:
     """Return the similarity transform of a grid's pixels on which chips' surfaces agree."""
     # Every chip counts the same; none is as low as 1, but for those that show nothing.
     equal = surfaces / np.maximum(surfaces.max(axis=(1, 2), keepdims=True), 1)
-    return align("similarity", px, equal, Affine.identity(), np.copy).model
+    return align("similarity", px, equal, IDENTITY, np.copy).model
 
 
 def _cross_fitted_px(px: NDArray[np.int_], surfaces: Surfaces, pitch_px: int) -> FloatArray:

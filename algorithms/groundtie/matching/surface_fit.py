@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -10,15 +10,17 @@ import numpy as np
 from ..context import Context
 from ..errors import TooFewPointsError
 from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate
-from ..geometry.models import DEGREE, PARAMETERS, Model
+from ..geometry.models import DEGREE, PARAMETERS, TERRAIN, Model
 from ..geometry.robust import fit_mixture
+from ..geometry.terrain import Terrain, TerrainModel
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
-from ..rasters.grid import apply_affine
+from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..similarity.peak import Peak, find_peak, find_peak_near
-from .alignment import CANDIDATES, Alignment, Positions, align, choose_alignment
+from .alignment import CANDIDATES, Alignment, Prior, align, choose_alignment
 from .belief_propagation import Surfaces
+from .families import Positions
 from .frames import on_grid, on_map
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, Places
@@ -77,12 +79,15 @@ class SurfaceFit:
         What "auto" chooses from, from simple to flexible.
     forward_backward_px
         Largest distance between a match and its match back.
+    terrain
+        Heights on the map, for the model that needs them, which is then a candidate.
     """
 
     matcher: SurfaceMatcher
     layout: ChipLayout
     candidates: tuple[str, ...] = CANDIDATES
     forward_backward_px: float = FORWARD_BACKWARD_PX
+    terrain: Terrain | None = None
 
     def estimate(self, coarse: Model, kind: str, context: Context) -> Estimate:
         """Match the chips of the fit and fit a model to their surfaces.
@@ -105,9 +110,12 @@ class SurfaceFit:
         pair = self.matcher.pair
         surfaces, aligned, expected = self._align(coarse, kind, context)
         for _ in range(self.matcher.rematches):
-            if DEGREE[aligned.model.kind] > 1 or self.matcher.is_settled(expected):
+            if DEGREE.get(aligned.model.kind, 1) > 1 or self.matcher.is_settled(expected):
                 break
             coarse = on_map(aligned.model, pair.grid)
+            if aligned.model.kind == TERRAIN:
+                # Chips that were displaced by heights have lost them: they justify no more.
+                kind = TERRAIN
             surfaces, aligned, expected = self._align(coarse, kind, context)
         points = fit_points(pair, surfaces, coarse, expected, self.forward_backward_px)
         model, fold_models = aligned.model, aligned.fold_models
@@ -135,19 +143,32 @@ class SurfaceFit:
         centres, weighted = surfaces.centres, surfaces.weighted
         if len(centres) < 4:
             raise TooFewPointsError(f"only {len(centres)} chips could be matched")
-        prior = on_grid(coarse, matcher.pair.grid)
+        grid, px = matcher.pair.grid, centres.astype(float)
+        prior = _prior_of(coarse, grid)
+        terrain = None if self.terrain is None else self.terrain.seen_from(grid.centre_transform)
         residual = matcher.first_model(surfaces, self.layout, kind, context.seed)
 
         def start(px: FloatArray) -> FloatArray:
-            return apply_affine(prior, residual(px))
+            return prior.to_nominal(residual(px))
 
         kind = matcher.kind_of(kind)
         if kind in (AUTO, "tps"):
-            aligned = choose_alignment(centres, weighted, prior, start, self.candidates)
+            aligned = choose_alignment(centres, weighted, prior, start, self.candidates, terrain)
         else:
-            aligned = align(kind, centres, weighted, prior, start)
-        px = centres.astype(float)
-        return surfaces, aligned, apply_affine(~prior, aligned.model(px)) - px
+            aligned = align(kind, centres, weighted, prior, start, terrain)
+        moved = aligned.model(px) - prior.to_nominal(px)
+        return surfaces, aligned, moved @ np.linalg.inv(prior.linear).T
+
+
+def _prior_of(model: Model, grid: Grid) -> Prior:
+    """Return a model of map positions as what the input was resampled by."""
+    if not isinstance(model, TerrainModel):
+        return Prior.of_affine(on_grid(model, grid))
+
+    def to_nominal(px: FloatArray) -> FloatArray:
+        return grid.map_to_pixel(model(grid.pixel_to_map(px)))
+
+    return replace(Prior.of_affine(on_grid(model.affine, grid)), to_nominal=to_nominal)
 
 
 def fit_points(

@@ -18,6 +18,7 @@ from ..masks.choice import AUTO
 from ..progress import Progress
 from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.rendered import RADAR, Light
 from ..sensor.rpc_files import rpc_of
 from .delivery import Call
 from .evidence import SCENE, SURVEY
@@ -28,11 +29,16 @@ from .rules import RULES
 from .scene import SceneInfo
 from .sensor_input import Ground, open_sensor_image
 from .sensor_jobs import RefinedRpc, refine
-from .specification import COREGISTER, OPTICAL, SAR_SAR, FreeSearch, Specification
+from .specification import CHIPS, COREGISTER, OPTICAL, SAR_SAR, FreeSearch, Specification
+from .terrain import RADAR_AZIMUTHS_DEG, asked_terrain
 from .verdict import Verdict
 
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
 _DOUBTED_DEG, _DOUBTED_SCALE = 10.0, 1.1
+
+# Where the sun may stand: as it is in the morning first. The opposite side differs in the sign of
+# contrast alone. Measured with `benchmarks/run.py --only mountains`: 15° off costs little.
+SUN_AZIMUTHS_DEG = (150.0, 120.0, 180.0, 90.0, 30.0, 60.0)
 
 # Without georeferencing: a quarter of the side, any rotation, half to twice the size.
 _ANYWHERE = FreeSearch(0.25, 180.0, 2.0)
@@ -94,6 +100,25 @@ def plan(scene: SceneInfo, is_georeferenced: bool) -> tuple[Try, ...]:
     return tuple(tries)
 
 
+def plan_lit(kind: str, azimuth_deg: float | None) -> tuple[Try, ...]:
+    """Return what is tried where the reference is a terrain model, in this order.
+
+    Parameters
+    ----------
+    kind
+        What lights it, one of `rendered.LIGHTS`.
+    azimuth_deg
+        Where that stands; None: that is tried.
+    """
+    usual = RADAR_AZIMUTHS_DEG if kind == RADAR else SUN_AZIMUTHS_DEG
+    azimuths = usual if azimuth_deg is None else (azimuth_deg,)
+    because = "the reference is a terrain model, rendered with the {} in {:g}° from north"
+    return tuple(
+        Try("coregister", replace(COREGISTER, light=Light(kind, a)), because.format(kind, a))
+        for a in azimuths
+    )
+
+
 @dataclass(frozen=True)
 class OrthorectifiedRpc(RefinedRpc):
     """An image with RPCs, orthorectified by RPCs that were refined on the reference."""
@@ -123,24 +148,33 @@ def register_anything(
         return _by_rpcs(parameters, progress)
     call = Call.of(parameters, progress)
     with bounded_cache(), threads(parameters["workers"], progress) as context:
-        found, stack = _first_accepted(call, parameters["max_error"], context.part(0.0, 0.7))
+        asked = asked_terrain(parameters) | {"max_error_px": parameters["max_error"]}
+        light, azimuth = parameters["light"], parameters["light_azimuth"]
+        lit = () if light is None else plan_lit(light, azimuth)
+        found, stack = _first_accepted(call, asked, lit, context.part(0.0, 0.7))
         return call.deliver(found, context.part(0.7, 1.0), stack)
 
 
 def _first_accepted(
-    call: Call, max_error_px: float, context: Context
+    call: Call, asked: Mapping[str, Any], ways: tuple[Try, ...], context: Context
 ) -> tuple[Registration, ExitStack]:
-    """Return the first registration that is accepted, or the first refusal if none is."""
+    """Return the first registration that is accepted, or the first refusal if none is.
+
+    `asked` is what every way's specification is given; without `ways`, the images decide on them.
+    """
     tried: list[str] = []
     with ExitStack() as stack:
-        opened = stack.enter_context(call.open(COREGISTER, context.part(0.0, 0.02)))
+        first = ways[0].spec if ways else COREGISTER
+        opened = stack.enter_context(call.open(first, context.part(0.0, 0.02)))
         scene = SceneInfo.of(opened.pair)
         is_georeferenced = opened.pair.input.source.grid.is_georeferenced
-        ways = plan(scene, is_georeferenced)
+        ways = ways or plan(scene, is_georeferenced)
+        if asked["dem"] is not None:
+            ways = tuple(way for way in ways if way.spec.matcher == CHIPS)
         found = []
         for number, way in enumerate(ways, start=1):
             part = context.part((number - 1) / len(ways), number / len(ways))
-            spec = replace(way.spec, max_error_px=max_error_px, tries=number)
+            spec = replace(way.spec, **asked, tries=number)
             found.append(run(call.with_limits(opened, spec, part), spec, part, scene))
             tried.append(_line(way.name, way.because, found[-1].verdict))
             if found[-1].verdict.accepted or found[-1].verdict.rule in _FINAL:
@@ -172,6 +206,9 @@ def _needs_rpcs(raster: Any) -> bool:
 def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> OrthorectifiedRpc:
     """Refine the RPCs of the input on the reference, and orthorectify it."""
     given = {**_RPC_DEFAULTS, **parameters}
+    for name in ("input_dem", "light"):
+        if given[name] is not None:
+            raise ParameterError(f"{name} is for orthoimages, not for an image with RPCs")
     if given["transform"] is not None:
         raise ParameterError("an image with RPCs is orthorectified: there is no transform to write")
     if given["output"] is None:
@@ -209,6 +246,8 @@ def _orthorectify(
 # What `refine` takes and the tool `register` does not ask for.
 _RPC_DEFAULTS: Mapping[str, Any] = {
     "gcps": None,
+    "input_dem": None,
+    "light": None,
     "geoid": None,
     "dem_cover": 0.0,
     "height": None,

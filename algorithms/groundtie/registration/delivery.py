@@ -24,6 +24,7 @@ from .pipeline import OpenPair, open_pair, pair_images, run
 from .registered_output import RegisteredOutput, grid_of_output, model_for_grid
 from .registration import Registration
 from .specification import Specification, StatedSurface
+from .terrain import asked_light, asked_terrain
 from .user_masks import UserMask
 
 
@@ -280,6 +281,8 @@ def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specifica
         preset = preset.with_surface(surface)
     return replace(
         preset,
+        **asked_terrain(parameters),
+        light=asked_light(parameters),
         model=model_for_grid(
             parameters["model"], grid_of_output(parameters["output"], parameters["output_grid"])
         ),

@@ -17,9 +17,10 @@ from ..errors import NothingFoundError, TooFewPointsError
 from ..features.presets import optical_keypoints, sar_keypoints
 from ..geometry.estimation import Estimate
 from ..geometry.judging import LARGEST_LOG10_CHANCE, LOG10_CHANCE_ON_GROUND
-from ..geometry.models import Model
+from ..geometry.models import TERRAIN, Model
+from ..geometry.terrain import Terrain
 from ..masks.choice import MaskUsed
-from ..matching.alignment import LINEAR_CANDIDATES
+from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
 from ..matching.check import CHECK_RADIUS_PX, Check, check_model
 from ..matching.chips import ChipMatcher
 from ..matching.guided_fit import GuidedFit
@@ -34,6 +35,7 @@ from ..matching.survey import ELSEWHERE_PX, Survey, survey_model, survey_places
 from ..rasters.pair import Image, ImagePair, make_pair
 from ..rasters.patch import Patch
 from ..rasters.reading import Window, bounded_cache, open_raster
+from ..rasters.rendered import rendered
 from ..similarity.surface import SimilaritySettings
 from .evidence import RegistrationEvidence, SearchEvidence
 from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
@@ -133,6 +135,9 @@ def pair_images(
     started: float,
 ) -> OpenPair:
     """Put two open images on a common matching grid, and the user's masks on them."""
+    if spec.light is not None:
+        lit = rendered(reference.source, spec.light, reference.band)
+        reference = Image(lit, 1)
     grid = input.source.grid
     radius_m, rotation_deg, scale = spec.search_radius_m, spec.rotation_deg, spec.scale
     if not grid.is_georeferenced:
@@ -341,7 +346,12 @@ def _fit(
     """Return what fits the model, by the name of the specification's matcher."""
     layout = held_out.layout
     if spec.matcher == CHIPS:
-        return SurfaceFit(matcher, layout, spec.candidates)
+        terrain = None if spec.dem is None else _terrain(pair, spec)
+        candidates = spec.candidates if terrain is None else TERRAIN_CANDIDATES
+        if spec.light is not None:
+            # Polynomials bend along what no rendering shows: land cover and what is laid over.
+            candidates = tuple(kind for kind in candidates if kind in (*LINEAR_CANDIDATES, TERRAIN))
+        return SurfaceFit(matcher, layout, candidates, terrain=terrain)
     presets = {KEYPOINTS: sar_keypoints, GUIDED_CHIPS: optical_keypoints}
     detector, descriptor = presets[spec.matcher]()
     masked = None if pair is images else pair
@@ -352,3 +362,20 @@ def _fit(
     # Polynomials bend along elevated objects: "auto" chooses among what keypoints choose from.
     fit = SurfaceFit(chips, layout, LINEAR_CANDIDATES)
     return GuidedFit(KeypointFit(keypoints, SurfaceFit(matcher, layout)), fit)
+
+
+def _terrain(pair: ImagePair, spec: Specification) -> Terrain:
+    """Return the heights of a specification where a pair may show something.
+
+    Raises
+    ------
+    GeoreferencingError, NoOverlapError, RasterContentError
+        They are not known where the images overlap.
+    """
+    corners = pair.surroundings.pixel_to_map(pair.surroundings.outline())
+    left, bottom = corners.min(axis=0).tolist()
+    right, top = corners.max(axis=0).tolist()
+    crs = pair.grid.crs
+    terrain = Terrain.open(spec.dem, spec.input_dem, crs, (left, bottom, right, top))
+    terrain.require_cover(pair.grid, pair.input.source.grid, crs)
+    return terrain

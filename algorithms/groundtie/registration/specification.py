@@ -10,6 +10,7 @@ from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..geometry.views import RADAR, View
 from ..masks.choice import AUTO, INPUT, REFERENCE
 from ..matching.alignment import CANDIDATES
+from ..rasters.rendered import Light
 
 # What matches the tie points of the fit: chips alone; keypoints refined by chips around them; chips
 # all over around a model of keypoints.
@@ -106,6 +107,12 @@ class Specification:
     tries
         How many registrations of this pair were tried, this one included: the probability of
         agreement by chance is counted for all of them.
+    dem, input_dem
+        Terrain models, as `open_raster` takes them: heights of the ground, and those that the input
+        was orthorectified with (None: one height everywhere). With the first, "auto" may choose
+        `models.TERRAIN`; chips alone know it.
+    light
+        The reference is a terrain model: it is rendered in this light. None: it is an image.
     """
 
     matcher: str = CHIPS
@@ -125,6 +132,9 @@ class Specification:
     chip_px: int | None = None
     spacing_px: float | None = None
     tries: int = 1
+    dem: Any = None
+    input_dem: Any = None
+    light: Light | None = None
 
     def with_surface(self, surface: StatedSurface) -> Specification:
         """Return the same with elevated objects, and whose images show them."""

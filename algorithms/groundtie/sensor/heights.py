@@ -14,9 +14,10 @@ from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
 from ..rasters.grid import Grid
 from ..rasters.lattice import Lattice
 from ..rasters.reading import FloatImage, RasterSource
+from ..rasters.surfaces import RasterSurface, SurfacePiece
 from .geoids import GEOID_GRIDS
 from .smooth_map import Positions
-from .surfaces import WHOLE_PX, RasterSurface, SurfacePiece, surface_over
+from .surfaces import WHOLE_PX, surface_over
 
 FloatArray = NDArray[np.float64]
 

@@ -45,12 +45,10 @@ class RoofPoints:
         Reference pixels (col, row) of their true position on the map.
     height_m : float64 array (n,)
         Height above the ground.
-    reference_px : float64 array (n, 2)
-        Where the radar image shows them: nearer to the radar by height / tan(incidence) on level
-        ground.
-    input_px : float64 array (n, 2)
-        Where the optical image shows them: displaced away from the camera by
-        height · tan(off-nadir angle), and moved as the ground there is.
+    reference_px, input_px : float64 array (n, 2)
+        Where the images show them; in the input moved as the ground there is. A radar image shows
+        them nearer to the radar by height / tan(incidence) on level ground, an optical one away
+        from the camera by height · tan(off-nadir angle).
     """
 
     px: FloatArray
@@ -60,8 +58,8 @@ class RoofPoints:
 
 
 @dataclass(frozen=True)
-class OpticalImage:
-    """Where an optical image shows the ground.
+class InputImage:
+    """Where the input shows the ground.
 
     Attributes
     ----------
@@ -81,7 +79,7 @@ class OpticalImage:
         return shown.reshape(px.shape), inside.reshape(px.shape[:-1])
 
 
-def ground_points(scenes: Scenes, grid: Grid, image: OpticalImage) -> FloatArray:
+def ground_points(scenes: Scenes, grid: Grid, image: InputImage) -> FloatArray:
     """Return one point on open ground in each cell of a lattice, where there is one.
 
     Returns
@@ -98,13 +96,21 @@ def ground_points(scenes: Scenes, grid: Grid, image: OpticalImage) -> FloatArray
 
 
 def roof_points(
-    scenes: Scenes, grid: Grid, image: OpticalImage, sar: SarOptions, optical: OpticalOptions
+    scenes: Scenes,
+    grid: Grid,
+    image: InputImage,
+    sar: SarOptions,
+    optical: OpticalOptions,
+    radar_is_input: bool = False,
 ) -> RoofPoints:
     """Return one point on a roof in each cell of a lattice, where both sensors see one."""
     px, place = _drawn(scenes.radar, grid, Stream.ROOF_POINTS)
     height_m = scenes.radar.object_m[place].astype(float)
     shown = radar_position(scenes.radar, px, height_m, sar)
-    seen, usable = image.seen(camera_position(scenes.camera, px, height_m, optical))
+    before = camera_position(scenes.camera, px, height_m, optical)
+    if radar_is_input:
+        shown, before = before, shown
+    seen, usable = image.seen(before)
     usable &= grid.contains(shown.reshape(-1, 2)).reshape(usable.shape)
     usable &= _inside_a_roof(scenes, place)
     usable &= ~_hidden_from_radar(scenes.radar, place, sar)

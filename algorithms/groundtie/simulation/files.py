@@ -12,14 +12,14 @@ import numpy as np
 import numpy.typing as npt
 from rasterio.io import MemoryFile
 
-from ..geometry.models import DEGREE
+from ..geometry.models import DEGREE, TERRAIN
 from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.grid import Grid
 from ..runs import RUN_TAG, run_tags
 from ..sensor.rpc import RPC
 from ..sensor.rpc_tags import rpc_to_tags
 from .metadata import optical_item, sar_item
-from .pair import SimulatedPair, scene_grid
+from .pair import SAR, SimulatedPair, scene_grid
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -27,6 +27,7 @@ NAMES = {
     "reference": "reference.tif",
     "input": "input.tif",
     "dem": "dem.tif",
+    "input_dem": "input_dem.tif",
     "dsm": "dsm.tif",
     "reference_metadata": "reference.json",
     "input_metadata": "input.json",
@@ -51,8 +52,9 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
     Returns
     -------
     dict
-        Paths of reference, input, dem (bare ground in metres on the reference's pixels), dsm (the
-        same with buildings and trees, and beyond), reference_metadata and input_metadata (STAC
+        Paths of reference, input, dem (bare ground in metres on the reference's pixels), input_dem
+        (what the input was orthorectified with, on these and around, if it is wrong), dsm (the
+        ground with buildings and trees, and beyond), reference_metadata and input_metadata (STAC
         items), truth (JSON, which `load_transform` reads), check_points and roof_points (CSV).
 
     Raises
@@ -61,26 +63,31 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
         A file cannot be written.
     """
     paths = {key: Path(folder) / name for key, name in NAMES.items()}
+    if not pair.options.terrain_error_m:
+        del paths["input_dem"]
     with writing(folder):
         Path(folder).mkdir(parents=True, exist_ok=True)
-    bands = [band.capitalize() for band in pair.options.optical.bands]
+    optical, sar = [band.capitalize() for band in pair.options.optical.bands], ["Amplitude"]
+    reference, input = (optical, sar) if pair.options.input == SAR else (sar, optical)
     with Outputs() as outputs, writing(folder):
         staged = {key: outputs.stage(path) for key, path in paths.items()}
-        write_raster(staged["reference"], pair.reference[None], pair.reference_grid, ["Amplitude"])
-        write_raster(staged["input"], pair.input, pair.truth.input_grid, bands)
+        write_raster(staged["reference"], pair.reference, pair.reference_grid, reference)
+        write_raster(staged["input"], pair.input, pair.truth.input_grid, input)
         terrain = pair.scene.terrain_m[pair.scene.window]
         write_raster(staged["dem"], terrain[None], pair.reference_grid, ["Height of ground (m)"])
         surface, grid = pair.scene.surface_m, pair.reference_grid
         around = scene_grid(grid, pair.scene.margin_px)
         write_raster(staged["dsm"], surface[None], around, ["Height of surface (m)"])
-        write_json(
-            staged["reference_metadata"],
-            sar_item(NAMES["reference"], grid, pair.options.sar),
-        )
-        write_json(
-            staged["input_metadata"],
-            optical_item(NAMES["input"], pair.truth.input_grid, pair.options.optical),
-        )
+        if "input_dem" in staged:
+            write_raster(staged["input_dem"], pair.assumed_m[None], around, ["Height taken (m)"])
+        for name, lies in (("reference", grid), ("input", pair.truth.input_grid)):
+            is_radar = (name == "input") == (pair.options.input == SAR)
+            item = (
+                sar_item(NAMES[name], lies, pair.options.sar)
+                if is_radar
+                else optical_item(NAMES[name], lies, pair.options.optical)
+            )
+            write_json(staged[f"{name}_metadata"], item)
         write_json(staged["truth"], truth_json(pair))
         write_table(staged["check_points"], CHECK_POINT_COLUMNS, _check_points(pair))
         write_table(staged["roof_points"], ROOF_POINT_COLUMNS, _roof_points(pair))
@@ -100,7 +107,9 @@ def truth_json(pair: SimulatedPair) -> dict[str, Any]:
         "sigma_px": 0.0,
         "options": asdict(pair.options),
     }
-    if DEGREE[pair.truth.model.kind] <= 1:
+    if pair.truth.model.kind == TERRAIN:
+        values["model"] |= {key: NAMES[key] for key in ("dem", "input_dem")}
+    elif DEGREE[pair.truth.model.kind] <= 1:
         grid, truth = pair.reference_grid, pair.truth
         centre = np.array(grid.centre_px)
         values["reference_to_input"] = _matrix(lambda px: truth(grid.pixel_to_map(px)), centre)

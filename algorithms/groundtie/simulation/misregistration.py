@@ -156,6 +156,34 @@ class SourcePositions:
         return np.stack([self.rows(row, column), self.columns(row, column)])
 
 
+@dataclass(frozen=True)
+class ExactPositions:
+    """Where the pixels of the input lie on the pixels of the scene, one by one: terrain is rough.
+
+    Attributes
+    ----------
+    truth : Transform
+        Reference map position -> input pixel.
+    scene_grid : Grid
+        The scene.
+    """
+
+    truth: Transform
+    scene_grid: Grid
+
+    @property
+    def width(self) -> int:
+        """Width of the image in pixels."""
+        return self.truth.input_grid.width
+
+    def strip(self, start: int, stop: int) -> npt.NDArray[np.float64]:
+        """Return scene (row, column), shape (2, stop − start, width), of some rows."""
+        column, row = np.meshgrid(np.arange(self.width), np.arange(start, stop))
+        xy = self.truth.inverse(np.stack([column, row], axis=-1).reshape(-1, 2))
+        px = self.scene_grid.map_to_pixel(xy).reshape(*column.shape, 2)
+        return np.ascontiguousarray(px.transpose(2, 0, 1)[::-1])
+
+
 class Positions(Protocol):
     """Where the pixels of an image lie on the pixels of the scene."""
 

@@ -32,6 +32,7 @@ class Stream(IntEnum):
     TRAFFIC = 15
     ROOF_POINTS = 16
     ATTITUDE = 17
+    TERRAIN_ERROR = 18
 
 
 def random_stream(seed: int, stream: Stream, part: int = 0) -> np.random.Generator:

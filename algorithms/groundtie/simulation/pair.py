@@ -3,34 +3,46 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 from affine import Affine
 from rasterio.crs import CRS
 
+from ..arrays import Raster
 from ..errors import ParameterError
+from ..geometry.models import TERRAIN, PolynomialModel
+from ..geometry.terrain import Terrain, TerrainModel
 from ..geometry.transform import Transform
 from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
-from .check_points import OpticalImage, RoofPoints, Scenes, ground_points, roof_points
+from .check_points import InputImage, RoofPoints, Scenes, ground_points, roof_points
 from .misregistration import (
     DistortionOptions,
+    ExactPositions,
+    Positions,
     SourcePositions,
     draw_misregistration,
     needed_margin,
     resample,
 )
-from .noise import Stream, random_stream
-from .optical import OpticalOptions, blur, quantise, render_radiance
-from .sar import SarOptions, render_sar
+from .noise import SmoothNoise, Stream, random_stream
+from .optical import OpticalOptions, blur, direction, quantise, render_radiance
+from .sar import SarOptions, add_speckle, quantise_amplitude, render_sar, sar_power
 from .scene import Scene, SceneOptions, generate_scenes
+
+OPTICAL, SAR = "optical", "sar"
+INPUTS = (OPTICAL, SAR)
 
 CRS_EPSG = 32633
 CORNER_M = (412_000.0, 5_334_000.0)
 
 _MARGIN_STEP_PX = 64
+
+# Half a wavelength of the terrain's error, and how many standard deviations it reaches.
+_ERROR_CELL_PX = 100
+_ERROR_REACH = 4
 
 
 @dataclass(frozen=True)
@@ -42,7 +54,12 @@ class PairOptions:
     scene, sar, optical, distortion
         Options of the parts.
     input_pixel_size_m : float or None
-        Pixel size of the optical image; None for that of the scene.
+        Pixel size of the input; None for that of the scene.
+    input : str
+        Which image is the input, one of `INPUTS`; the other one is the reference.
+    terrain_error_m : float
+        Standard deviation of the heights that the input was orthorectified with, against the true
+        ones; correlated over some 100 pixels.
     """
 
     scene: SceneOptions = field(default_factory=SceneOptions)
@@ -50,6 +67,32 @@ class PairOptions:
     optical: OpticalOptions = field(default_factory=OpticalOptions)
     distortion: DistortionOptions = field(default_factory=DistortionOptions)
     input_pixel_size_m: float | None = None
+    input: str = OPTICAL
+    terrain_error_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be simulated."""
+        if self.input not in INPUTS:
+            raise ParameterError(f"input must be one of {', '.join(INPUTS)}, not {self.input!r}")
+        if self.terrain_error_m < 0:
+            raise ParameterError("terrain_error_m must not be negative")
+        if self.terrain_error_m and self.distortion.kind == "polynomial":
+            raise ParameterError("an error of the terrain goes with any distortion but polynomial")
+        if not 0.25 <= self.pixel_ratio <= (16 if self.input == OPTICAL else 1):
+            raise ParameterError(
+                "input_pixel_size_m must be 0.25 to 16 times the scene's pixel size; no larger "
+                "than that if the input is the SAR image"
+            )
+
+    @property
+    def sight(self) -> tuple[float, float]:
+        """How far east and north the input shows a place for each metre that it is higher."""
+        if self.input == SAR:
+            return (
+                -self.sar.cot_incidence if self.sar.orbit == "ascending" else self.sar.cot_incidence
+            ), 0.0
+        east, south = direction(self.optical.view_azimuth_deg)
+        return -east * self.optical.lean, south * self.optical.lean
 
     @property
     def pixel_ratio(self) -> float:
@@ -65,12 +108,12 @@ class SimulatedPair:
     ----------
     options : PairOptions
         What it was made from.
-    reference : uint16 array (rows, columns)
-        SAR amplitude, geocoded.
+    reference : uint16 array (bands, rows, columns)
+        SAR amplitude, geocoded, or an optical image, 11 bit.
     reference_grid : Grid
         Where it lies.
     input : uint16 array (bands, rows, columns)
-        Optical image, 11 bit.
+        The other one of these.
     truth : Transform
         Reference map position -> input pixel (col, row), exact for points on the ground;
         `truth.input_grid` is the nominal georeferencing of the input.
@@ -80,6 +123,8 @@ class SimulatedPair:
         Points on roofs, which the two images show elsewhere than the ground below them.
     scene : Scene
         The country, with its margin, when the radar took its image.
+    assumed_m : float32 array (rows, columns)
+        Heights, with this margin, that the input was orthorectified with.
     """
 
     options: PairOptions
@@ -90,6 +135,7 @@ class SimulatedPair:
     check_points_px: npt.NDArray[np.float64]
     roof_points: RoofPoints
     scene: Scene
+    assumed_m: npt.NDArray[np.float32]
 
 
 def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> SimulatedPair:
@@ -102,41 +148,106 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
     CancelledError
         The user cancelled the work.
     """
-    if not 0.25 <= options.pixel_ratio <= 16:
-        raise ParameterError("input_pixel_size_m must be 0.25 to 16 times the scene's pixel size")
     scene_options = options.scene
     reference_grid = map_grid(scene_options)
     nominal = reference_grid.scaled(options.pixel_ratio)
     model = draw_misregistration(options.distortion, nominal, scene_options.seed)
-    truth = Transform(model, reference_grid.crs, nominal)
     progress.update(0.0, "laying out the scene")
-    reach = object_reach_px(scene_options, options.sar, options.optical)
+    reach = object_reach_px(scene_options, options.sar, options.optical) + _error_reach_px(options)
     margin = in_steps(needed_margin(model, reference_grid, nominal) + reach)
     scenes = Scenes(*generate_scenes(scene_options, margin))
+    around = scene_grid(reference_grid, margin)
+    assumed_m = _assumed_terrain(scenes.radar, options)
+    truth = Transform(model, reference_grid.crs, nominal)
+    positions: Positions = SourcePositions.of(truth, around)
+    if options.terrain_error_m:
+        displaced = _displaced(model, scenes.radar.terrain_m, assumed_m, around, options)
+        truth = Transform(displaced, reference_grid.crs, nominal)
+        positions = ExactPositions(truth, around)
     progress.update(0.25, "looking with the radar")
-    reference = render_sar(scenes.radar, options.sar)
+    is_radar = options.input == SAR
+    radar = _radar_image(scenes.radar, options, positions if is_radar else None)
     progress.update(0.4, "looking with the camera")
-    radiance = render_radiance(scenes.camera, options.optical)
-    positions = SourcePositions.of(truth, scene_grid(reference_grid, margin))
-    image = np.empty((len(radiance), nominal.height, nominal.width), np.uint16)
+    camera = _camera_image(scenes.camera, options, None if is_radar else positions, progress)
+    image = InputImage(lambda px: truth(reference_grid.pixel_to_map(px)), nominal)
+    return SimulatedPair(
+        options=options,
+        reference=camera if is_radar else radar,
+        reference_grid=reference_grid,
+        input=radar if is_radar else camera,
+        truth=truth,
+        check_points_px=ground_points(scenes, reference_grid, image),
+        roof_points=roof_points(
+            scenes, reference_grid, image, options.sar, options.optical, is_radar
+        ),
+        scene=scenes.radar,
+        assumed_m=assumed_m,
+    )
+
+
+def _radar_image(
+    scene: Scene, options: PairOptions, positions: Positions | None
+) -> npt.NDArray[np.uint16]:
+    """Return the radar's image, (1, rows, columns): as it is, or as the input shows it."""
+    if positions is None:
+        return render_sar(scene, options.sar)[None]
+    power = sar_power(replace(scene, margin_px=0), options.sar)
+    height = map_grid(options.scene).scaled(options.pixel_ratio).height
+    seen = np.maximum(resample(power, positions, height), power.min())
+    speckle = random_stream(options.scene.seed, Stream.SPECKLE)
+    return quantise_amplitude(add_speckle(seen, options.sar.looks, speckle), options.sar)[None]
+
+
+def _camera_image(
+    scene: Scene, options: PairOptions, positions: Positions | None, progress: Progress
+) -> npt.NDArray[np.uint16]:
+    """Return the camera's image, (bands, rows, columns): as it is, or as the input shows it."""
+    radiance = render_radiance(scene, options.optical)
+    rows, columns = scene.window
+    height = map_grid(options.scene).scaled(options.pixel_ratio).height
+    image = []
     for band, light in enumerate(radiance):
         progress.update(0.5 + 0.5 * band / len(radiance), "resampling the optical image")
         # Below 0.6 px the cubic kernel could not follow the scene any more.
-        blur(light, max(options.optical.psf_sigma_px * options.pixel_ratio, 0.6))
-        seen = resample(light, positions, nominal.height)
-        noise = random_stream(scene_options.seed, Stream.OPTICAL_NOISE, band)
-        image[band] = quantise(seen, options.optical, noise)
-    optical = OpticalImage(lambda px: truth(reference_grid.pixel_to_map(px)), nominal)
-    return SimulatedPair(
-        options=options,
-        reference=reference,
-        reference_grid=reference_grid,
-        input=image,
-        truth=truth,
-        check_points_px=ground_points(scenes, reference_grid, optical),
-        roof_points=roof_points(scenes, reference_grid, optical, options.sar, options.optical),
-        scene=scenes.radar,
-    )
+        ratio = 1.0 if positions is None else options.pixel_ratio
+        blur(light, max(options.optical.psf_sigma_px * ratio, 0.6))
+        seen = light[rows, columns] if positions is None else resample(light, positions, height)
+        noise = random_stream(options.scene.seed, Stream.OPTICAL_NOISE, band)
+        image.append(quantise(seen, options.optical, noise))
+    return np.stack(image)
+
+
+def _assumed_terrain(scene: Scene, options: PairOptions) -> npt.NDArray[np.float32]:
+    """Return the heights that the input was orthorectified with, on the scene's pixels."""
+    if not options.terrain_error_m:
+        return scene.terrain_m
+    rows, columns = scene.terrain_m.shape
+    generator = random_stream(options.scene.seed, Stream.TERRAIN_ERROR)
+    error = SmoothNoise.draw((rows, columns), _ERROR_CELL_PX, generator).rows(0, rows)
+    return scene.terrain_m + error * np.float32(options.terrain_error_m)
+
+
+def _displaced(
+    model: PolynomialModel,
+    ground_m: npt.NDArray[np.float32],
+    assumed_m: npt.NDArray[np.float32],
+    grid: Grid,
+    options: PairOptions,
+) -> TerrainModel:
+    """Return a misregistration with what an error of the terrain displaces the input by."""
+    ground, assumed = (Raster(m, grid.transform, grid.crs) for m in (ground_m, assumed_m))
+    (left, top), (right, bottom) = grid.pixel_to_map([[0, 0], [grid.width - 1, grid.height - 1]])
+    terrain = Terrain.open(ground, assumed, grid.crs, (left, bottom, right, top))
+    coefficients = np.zeros((4, 2))
+    coefficients[: len(model.coefficients)] = model.coefficients
+    coefficients[3] = np.array(options.sight) / model.frame.to_map.a
+    return TerrainModel(TERRAIN, model.frame, coefficients, terrain, 0.0)
+
+
+def _error_reach_px(options: PairOptions) -> int:
+    """Return how far an error of the terrain displaces the input."""
+    metres = _ERROR_REACH * options.terrain_error_m * math.hypot(*options.sight)
+    return math.ceil(metres / options.scene.pixel_size_m)
 
 
 def map_grid(options: SceneOptions) -> Grid:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,17 @@ from .city import CITY, CityLayout
 from .cover import Cover, ParcelBook, ParcelTable
 from .layout import DENSITIES, Layout, highest_object_m
 from .noise import SmoothNoise, Stream, random_stream, strips
+
+# Standard deviation of slopes along an axis for each height on a lattice of width 1, by the mean
+# squares of a cubic B-spline and of its derivative: 151/315 and 2/3.
+_SLOPE_OF_SPLINES = math.sqrt((2 / 3) / (151 / 315))
+
+# One place in a thousand is steeper than so many of these standard deviations (Rayleigh), and few
+# are higher than so many of heights above the lowest ones.
+_STEEPEST = math.sqrt(2 * math.log(1000))
+_RELIEF_SIGMAS = 4.6
+
+_LEAST_CELL_PX = 4.0
 
 _CROWN_M = 2.2
 _COARSEST_FULL_SIZE_M = 2.5
@@ -41,6 +53,9 @@ class SceneOptions:
     changed : float
         Share of the buildings that stand in one of the images only: half of them are pulled down
         after the radar's image, half are new in the camera's.
+    slope_deg : float or None
+        Slope that one place in a thousand exceeds, in country that is rough at all scales; None:
+        country is gentle.
     """
 
     size_px: tuple[int, int] = (1000, 1000)
@@ -49,6 +64,7 @@ class SceneOptions:
     relief_m: float = 20.0
     seed: int = 0
     changed: float = 0.0
+    slope_deg: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated."""
@@ -62,6 +78,8 @@ class SceneOptions:
             )
         if not self.pixel_size_m > 0 or self.relief_m < 0:
             raise ParameterError("pixel_size_m must be positive and relief_m not negative")
+        if self.slope_deg is not None and not 1 <= self.slope_deg <= 60:
+            raise ParameterError(f"slope_deg must be 1 to 60, not {self.slope_deg}")
         if not 0 <= self.changed <= 1:
             raise ParameterError(f"changed must be 0 to 1, not {self.changed}")
 
@@ -172,16 +190,45 @@ def _terrain(options: SceneOptions, shape: tuple[int, int]) -> npt.NDArray[np.fl
     terrain = np.zeros(shape, np.float32)
     if options.relief_m == 0:
         return terrain
-    # A lattice as wide as six times the relief keeps slopes below some 20 degrees.
-    hill_m = max(300.0, 6 * options.relief_m)
-    for octave, (size, share) in enumerate(((1.0, 0.9), (0.35, 0.2), (0.12, 0.04))):
-        cell_px = max(hill_m * size / options.pixel_size_m, 4.0)
+    if options.slope_deg is not None:
+        # Above the sea: whoever reads heights takes those below all land for voids.
+        terrain += options.relief_m
+    for octave, (cell_m, sigma_m) in enumerate(_octaves(options)):
+        cell_px = max(cell_m / options.pixel_size_m, _LEAST_CELL_PX)
         noise = SmoothNoise.draw(
             shape, cell_px, random_stream(options.seed, Stream.TERRAIN, octave)
         )
         for _, start, stop in strips(shape[0]):
-            terrain[start:stop] += noise.rows(start, stop) * (share * options.relief_m / 4)
+            terrain[start:stop] += noise.rows(start, stop) * sigma_m
     return terrain
+
+
+def _octaves(options: SceneOptions) -> list[tuple[float, float]]:
+    """Return the terrain's waves: spacing of a lattice and standard deviation of heights, metres.
+
+    Country is gentle unless slopes are asked for. Mountains are rough at all scales alike: each
+    octave down to some pixels has the same slopes.
+    """
+    relief_m = options.relief_m
+    if options.slope_deg is None:
+        # A lattice as wide as six times the relief keeps slopes below some 12 degrees.
+        hill_m = max(300.0, 6 * relief_m)
+        shares = ((1.0, 0.9), (0.35, 0.2), (0.12, 0.04))
+        return [(hill_m * size, share * relief_m / 4) for size, share in shares]
+    sigma_m = relief_m / _RELIEF_SIGMAS
+    steep = math.tan(math.radians(options.slope_deg)) / _STEEPEST
+    least_m = _LEAST_CELL_PX * options.pixel_size_m
+    count = 1
+    # More octaves share the slopes, so that the widest is wider.
+    while _widest_m(sigma_m, steep, count) / 2 ** (count - 1) > 2 * least_m:
+        count += 1
+    widest_m = _widest_m(sigma_m, steep, count)
+    return [(widest_m / 2**k, sigma_m / 2**k) for k in range(count)]
+
+
+def _widest_m(sigma_m: float, steep: float, octaves: int) -> float:
+    """Return the spacing at which as many octaves have a standard deviation of slopes `steep`."""
+    return _SLOPE_OF_SPLINES * sigma_m * math.sqrt(octaves) / steep
 
 
 def _object_heights(

@@ -16,7 +16,7 @@ from ..sensor.rpc_fit import RPCFit, fit_rpc
 from ..sensor.surfaces import LON_LAT
 from .attitude import AttitudeError, AttitudeOptions
 from .camera import PushBroom
-from .check_points import OpticalImage, RoofPoints, Scenes, ground_points, roof_points
+from .check_points import InputImage, RoofPoints, Scenes, ground_points, roof_points
 from .misregistration import resample
 from .noise import Stream, random_stream, strips
 from .optical import OpticalOptions, blur, quantise, render_radiance
@@ -193,7 +193,7 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
         noise = random_stream(scene_options.seed, Stream.OPTICAL_NOISE, band)
         image[band] = quantise(resample(light, seen, size[1]), view, noise)
     exact, delivered = _rpcs(options, camera, error, grid)
-    optical = OpticalImage(
+    optical = InputImage(
         lambda px: camera.project(terrain.under(grid.pixel_to_map(px))),
         Grid(PIXEL_COORDINATES, None, *size),
     )

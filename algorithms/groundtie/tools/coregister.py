@@ -26,9 +26,12 @@ from .common import (
 from .registration_parameters import (
     OUTPUTS,
     DisplacementOut,
+    InputDem,
     InputMask,
     InputMaskValues,
     InputView,
+    LightAzimuth,
+    LightKind,
     Mask,
     MaxError,
     Model,
@@ -41,6 +44,7 @@ from .registration_parameters import (
     SearchRotation,
     SearchScale,
     SurfaceModel,
+    TerrainDem,
     TiePointsOut,
 )
 
@@ -66,6 +70,10 @@ def coregister(
     input_mask: InputMask = None,
     input_mask_values: InputMaskValues = None,
     mask: Mask = AUTO,
+    dem: TerrainDem = None,
+    input_dem: InputDem = None,
+    light: LightKind = None,
+    light_azimuth: LightAzimuth = None,
     surface_model: SurfaceModel = None,
     reference_view: ReferenceView = None,
     input_view: InputView = None,
@@ -81,6 +89,8 @@ def coregister(
     A coarse shift is searched for within the search radius, tie points are matched in chips, and a
     robust model is fitted to them. Parts of the reference are held out of all of this; points in
     them decide whether the registration is accepted. A refused registration writes no image.
+
+    With a terrain model, what wrong heights displace the input by is taken out, too.
 
     The input's pixels are resampled once, by the whole transform. Images without georeferencing
     are matched in pixel coordinates; distances are then in pixels.

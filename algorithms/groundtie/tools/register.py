@@ -21,8 +21,11 @@ from .common import (
 )
 from .registration_parameters import (
     OUTPUTS,
+    InputDem,
     InputMask,
     InputMaskValues,
+    LightAzimuth,
+    LightKind,
     MaxError,
     ReferenceMask,
     ReferenceMaskValues,
@@ -40,6 +43,9 @@ def register(
     max_error: MaxError = 3.0,
     dem: Dem = None,
     dem_datum: DemDatum = None,
+    input_dem: InputDem = None,
+    light: LightKind = None,
+    light_azimuth: LightAzimuth = None,
     tie_points: TiePointsOut = None,
     transform: TransformOut = None,
     report: ReportOut = None,
@@ -58,7 +64,8 @@ def register(
     Radar images, a camera's images and pairs of both are matched as match_sar_sar, match_optical
     and `coregister` do; if that is refused, another way that makes sense is tried, and rotation and
     scale are searched for. An image with RPCs has them refined, and is orthorectified, by a
-    terrain model if one is given. The result names what was tried, and why; the probability of
+    terrain model if one is given; what wrong heights displace another one by is taken out by it, if
+    the points justify that. The result names what was tried, and why; the probability of
     agreement by chance counts all of it. A refused registration writes no image.
     """
     return register_anything(parameters, progress)

@@ -7,9 +7,20 @@ from typing import Annotated
 
 from ..declaration import Output
 from ..geometry.models import KINDS
-from ..kinds import Choice, Distance, FileOut, MaskIn, Number, RasterOut, Text, VectorOut
+from ..kinds import (
+    Choice,
+    Distance,
+    FileOut,
+    MaskIn,
+    Number,
+    RasterIn,
+    RasterOut,
+    Text,
+    VectorOut,
+)
 from ..masks.choice import MASKS
 from ..matching.surface_fit import AUTO
+from ..rasters.rendered import LIGHTS
 from ..registration.registered_output import OUTPUT_GRIDS
 
 Model = Annotated[
@@ -117,6 +128,47 @@ InputMaskValues = Annotated[
 ]
 ImageMaskValues = Annotated[
     str | None, Text(label="Values of the image's mask", help=_MASK_VALUES, advanced=True)
+]
+TerrainDem = Annotated[
+    Path | None,
+    RasterIn(
+        label="Terrain model",
+        help="Heights of the ground, in any CRS. Where the input was orthorectified with others, "
+        "or with one height, it is displaced in proportion to the difference: model auto may "
+        "take this out, too, if the points justify it.",
+        advanced=True,
+    ),
+]
+InputDem = Annotated[
+    Path | None,
+    RasterIn(
+        label="Terrain model of the input",
+        help="The heights that the input was orthorectified with; by default, one height "
+        "everywhere. Goes with a terrain model.",
+        advanced=True,
+    ),
+]
+LightKind = Annotated[
+    str | None,
+    Choice(
+        label="Light of a terrain model",
+        help="The reference is a terrain model, and is rendered: as the sun lights it, for a "
+        "camera's image, or as a radar images it. By default, the reference is an image.",
+        choices=LIGHTS,
+        advanced=True,
+    ),
+]
+LightAzimuth = Annotated[
+    float | None,
+    Number(
+        label="Azimuth of the light",
+        help="Where the sun or the radar stands, clockwise from north. By default a radar stands "
+        "in the west; register tries azimuths.",
+        unit="°",
+        minimum=0,
+        maximum=360,
+        advanced=True,
+    ),
 ]
 Mask = Annotated[
     str,

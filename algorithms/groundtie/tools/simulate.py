@@ -11,7 +11,7 @@ from ..progress import SILENT, Progress
 from ..simulation.files import write_pair
 from ..simulation.misregistration import DISTORTIONS, DistortionOptions
 from ..simulation.optical import OpticalOptions
-from ..simulation.pair import PairOptions, simulate_pair
+from ..simulation.pair import INPUTS, OPTICAL, PairOptions, simulate_pair
 from ..simulation.sar import SarOptions
 from ..simulation.scene import SceneOptions
 from .common import Seed
@@ -37,7 +37,7 @@ def simulate(
             label="Folder",
             help="Gets reference.tif (SAR), input.tif (optical), dem.tif, dsm.tif, "
             "reference.json and input.json (view angles), truth.json, check_points.csv and "
-            "roof_points.csv.",
+            "roof_points.csv; input_dem.tif where the terrain has an error.",
             shows=("input.tif", "reference.tif"),
         ),
     ],
@@ -78,6 +78,36 @@ def simulate(
         float,
         Distance(label="Relief", help="Range of the terrain's heights.", advanced=True),
     ] = 20.0,
+    slope: Annotated[
+        float | None,
+        Number(
+            label="Steepest slopes",
+            help="Slope that one place in a thousand exceeds, of mountains that are rough at all "
+            "scales; by default, country is gentle.",
+            unit="°",
+            minimum=1,
+            maximum=60,
+            advanced=True,
+        ),
+    ] = None,
+    terrain_error: Annotated[
+        float,
+        Distance(
+            label="Error of the terrain",
+            help="Standard deviation of the error, correlated over some 100 pixels, of the "
+            "heights that the input was orthorectified with.",
+            advanced=True,
+        ),
+    ] = 0.0,
+    input: Annotated[
+        str,
+        Choice(
+            label="Input",
+            help="Which image has the wrong georeferencing; the other one is the reference.",
+            choices=INPUTS,
+            advanced=True,
+        ),
+    ] = OPTICAL,
     incidence: Incidence = 35.0,
     orbit: Orbit = "ascending",
     off_nadir: OffNadir = 12.0,
@@ -120,13 +150,16 @@ def simulate(
 
     The scene has terrain, fields, roads, water and buildings. The SAR image has layover, shadow,
     double bounce and speckle; the optical one relief displacement, cast shadows and noise. The
-    same seed gives the same pair. The file truth.json is a transform like those of `coregister`.
+    input may be orthorectified with wrong heights. The same seed gives the same pair. The file
+    truth.json is a transform like those of `coregister`.
     """
     options = PairOptions(
-        scene=SceneOptions((size, size), pixel_size, density, relief, seed, changed / 100),
+        scene=SceneOptions((size, size), pixel_size, density, relief, seed, changed / 100, slope),
         sar=SarOptions(incidence_deg=incidence, orbit=orbit, looks=looks),
         optical=OpticalOptions(view_azimuth_deg=view_azimuth, off_nadir_deg=off_nadir),
         distortion=DistortionOptions(distortion, shift, rotation, scale, warp),
         input_pixel_size_m=input_pixel_size,
+        input=input,
+        terrain_error_m=terrain_error,
     )
     return SimulationResult(write_pair(simulate_pair(options, progress), folder))

@@ -76,8 +76,8 @@
       <translation>Punkt hinzufügen</translation>
     </message>
     <message>
-      <source>Address of a Dask scheduler, as tcp://host:8786, whose workers run the rows instead.</source>
-      <translation>Adresse eines Dask-Schedulers, wie tcp://host:8786, dessen Worker stattdessen die Zeilen rechnen.</translation>
+      <source>Address of a Dask scheduler, as tcp://host:8786, whose workers do the work instead.</source>
+      <translation>Adresse eines Dask-Schedulers, etwa tcp://host:8786, dessen Worker die Arbeit stattdessen tun.</translation>
     </message>
     <message>
       <source>Affine</source>
@@ -150,6 +150,10 @@
     <message>
       <source>Automatic</source>
       <translation>Automatisch</translation>
+    </message>
+    <message>
+      <source>Azimuth of the light</source>
+      <translation>Azimut des Lichts</translation>
     </message>
     <message>
       <source>Back (B)</source>
@@ -412,6 +416,10 @@
       <translation>Fehler vorher (px)</translation>
     </message>
     <message>
+      <source>Error of the terrain</source>
+      <translation>Fehler des Geländes</translation>
+    </message>
+    <message>
       <source>Errors are measured at control points (no measure of accuracy), at test points, at independent check points, and as the consistency of several transforms: RMSE, mean, median, CE90, largest, bias and standard deviation, in input pixels and metres. Only points that took no part in the fit can confirm a registration; inconsistency can refuse it, too.</source>
       <translation>Fehler werden gemessen an Ausgleichspunkten (kein Maß der Genauigkeit), an Testpunkten, an unabhängigen Prüfpunkten und als Konsistenz mehrerer Transformationen: RMSE, Mittel, Median, CE90, größter Fehler, systematischer Fehler und Standardabweichung, in Pixeln der Eingabe und Metern. Nur Punkte, die nicht am Ausgleich teilnahmen, können eine Registrierung bestätigen; auch Inkonsistenz kann sie ablehnen.</translation>
     </message>
@@ -568,8 +576,8 @@
       <translation>Geoidgitter</translation>
     </message>
     <message>
-      <source>Gets reference.tif (SAR), input.tif (optical), dem.tif, dsm.tif, reference.json and input.json (view angles), truth.json, check_points.csv and roof_points.csv.</source>
-      <translation>Bekommt reference.tif (SAR), input.tif (optisch), dem.tif, dsm.tif, reference.json und input.json (Blickwinkel), truth.json, check_points.csv und roof_points.csv.</translation>
+      <source>Gets reference.tif (SAR), input.tif (optical), dem.tif, dsm.tif, reference.json and input.json (view angles), truth.json, check_points.csv and roof_points.csv; input_dem.tif where the terrain has an error.</source>
+      <translation>Bekommt reference.tif (SAR), input.tif (optisch), dem.tif, dsm.tif, reference.json und input.json (Blickwinkel), truth.json, check_points.csv und roof_points.csv; input_dem.tif, wenn das Gelände einen Fehler hat.</translation>
     </message>
     <message>
       <source>Gets sensor.tif (optical, with RPCs), reference.tif (SAR), dem.tif, dsm.tif, reference.json and sensor.json (view angles), exact_rpc.txt, truth.json, check_points.csv and roof_points.csv.</source>
@@ -650,6 +658,10 @@
     <message>
       <source>Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with a field height in metres. Only ground that both images show takes part: no layover, radar shadow, relief displacement or cast shadow. Needs the views of both images.</source>
       <translation>Höhen von Dächern, Baumkronen und Boden (DSM), oder ein Vektorlayer von Gebäuden mit einem Feld height in Metern. Nur Boden, den beide Bilder zeigen, nimmt teil: kein Layover, Radarschatten, Reliefversatz oder Schlagschatten. Braucht die Blickrichtungen beider Bilder.</translation>
+    </message>
+    <message>
+      <source>Heights of the ground, in any CRS. Where the input was orthorectified with others, or with one height, it is displaced in proportion to the difference: model auto may take this out, too, if the points justify it.</source>
+      <translation>Höhen des Bodens, in beliebigem KBS. Wo die Eingabe mit anderen oder mit einer einzigen Höhe orthorektifiziert wurde, ist sie im Verhältnis zum Unterschied versetzt: das Modell auto darf auch das herausnehmen, wenn die Punkte es rechtfertigen.</translation>
     </message>
     <message>
       <source>Heights of the ground, in any CRS; voids are filled from their rims. Without it, one height holds everywhere.</source>
@@ -874,6 +886,10 @@
     <message>
       <source>Length of the skeleton (m)</source>
       <translation>Länge des Skeletts (m)</translation>
+    </message>
+    <message>
+      <source>Light of a terrain model</source>
+      <translation>Licht eines Geländemodells</translation>
     </message>
     <message>
       <source>Linear</source>
@@ -1108,6 +1124,10 @@
       <translation>Bericht öffnen</translation>
     </message>
     <message>
+      <source>Optical</source>
+      <translation>Optisch</translation>
+    </message>
+    <message>
       <source>Optical and optical</source>
       <translation>Optisch und optisch</translation>
     </message>
@@ -1304,8 +1324,8 @@
       <translation>Radarbild</translation>
     </message>
     <message>
-      <source>Radar images, a camera's images and pairs of both are matched as match_sar_sar, match_optical and `coregister` do; if that is refused, another way that makes sense is tried, and rotation and scale are searched for. An image with RPCs has them refined, and is orthorectified, by a terrain model if one is given. The result names what was tried, and why; the probability of agreement by chance counts all of it. A refused registration writes no image.</source>
-      <translation>Radarbilder, Kamerabilder und Paare aus beiden werden zugeordnet wie von match_sar_sar, match_optical und `coregister`; wird das abgelehnt, wird ein anderer sinnvoller Weg versucht und nach Drehung und Maßstab gesucht. Hat ein Bild RPCs, werden sie verbessert, und es wird orthorektifiziert, mit einem Geländemodell, wenn eines angegeben ist. Das Ergebnis nennt, was versucht wurde und warum; die Wahrscheinlichkeit zufälliger Übereinstimmung zählt alles davon. Eine abgelehnte Registrierung schreibt kein Bild.</translation>
+      <source>Radar images, a camera's images and pairs of both are matched as match_sar_sar, match_optical and `coregister` do; if that is refused, another way that makes sense is tried, and rotation and scale are searched for. An image with RPCs has them refined, and is orthorectified, by a terrain model if one is given; what wrong heights displace another one by is taken out by it, if the points justify that. The result names what was tried, and why; the probability of agreement by chance counts all of it. A refused registration writes no image.</source>
+      <translation>Radarbilder, Kamerabilder und Paare aus beiden werden zugeordnet wie von match_sar_sar, match_optical und `coregister`; wird das abgelehnt, wird ein anderer sinnvoller Weg versucht und nach Drehung und Maßstab gesucht. Hat ein Bild RPCs, werden sie verbessert, und es wird orthorektifiziert, mit einem Geländemodell, wenn eines angegeben ist; worum falsche Höhen ein anderes Bild versetzen, wird damit herausgenommen, wenn die Punkte das rechtfertigen. Das Ergebnis nennt, was versucht wurde und warum; die Wahrscheinlichkeit zufälliger Übereinstimmung zählt alles davon. Eine abgelehnte Registrierung schreibt kein Bild.</translation>
     </message>
     <message>
       <source>Radon</source>
@@ -1492,6 +1512,10 @@
       <translation>Rényi</translation>
     </message>
     <message>
+      <source>SAR</source>
+      <translation>SAR</translation>
+    </message>
+    <message>
       <source>SAR and SAR</source>
       <translation>SAR und SAR</translation>
     </message>
@@ -1672,6 +1696,10 @@
       <translation>Zeilen überspringen, die ein früherer Lauf nach seinem Protokoll erledigt oder abgelehnt hat: wo Eingabedateien, Parameter, Version und Ausgaben unverändert sind.</translation>
     </message>
     <message>
+      <source>Slope that one place in a thousand exceeds, of mountains that are rough at all scales; by default, country is gentle.</source>
+      <translation>Neigung, die ein Ort von tausend überschreitet, in Bergen, die in allen Größen rau sind; sonst ist das Land sanft.</translation>
+    </message>
+    <message>
       <source>Smallest scale</source>
       <translation>Kleinster Maßstab</translation>
     </message>
@@ -1684,6 +1712,10 @@
       <translation>Der Speckle wird gefiltert, Regionen wachsen aus homogenen Keimen, und es bleiben die, die lang oder groß und weder hell noch Radarschatten sind. Lange werden zu ihrem Skelett verdünnt und um ein Fenster verbreitert; starke Streuer darin werden maskiert. Die Maske ist für die Registrierung dieses Bildes; `coregister` macht dieselbe selbst, wenn Regionen verlangt sind.</translation>
     </message>
     <message>
+      <source>Standard deviation of the error, correlated over some 100 pixels, of the heights that the input was orthorectified with.</source>
+      <translation>Standardabweichung des über etwa 100 Pixel korrelierten Fehlers der Höhen, mit denen die Eingabe orthorektifiziert wurde.</translation>
+    </message>
+    <message>
       <source>State what is installed, what is missing, and what cannot run therefore.</source>
       <translation>Angeben, was installiert ist, was fehlt und was darum nicht laufen kann.</translation>
     </message>
@@ -1692,8 +1724,16 @@
       <translation>Statistik</translation>
     </message>
     <message>
+      <source>Steepest slopes</source>
+      <translation>Steilste Hänge</translation>
+    </message>
+    <message>
       <source>Suburban</source>
       <translation>Vorstädtisch</translation>
+    </message>
+    <message>
+      <source>Sun</source>
+      <translation>Sonne</translation>
     </message>
     <message>
       <source>Surface model</source>
@@ -1714,6 +1754,10 @@
     <message>
       <source>Terrain model</source>
       <translation>Geländemodell</translation>
+    </message>
+    <message>
+      <source>Terrain model of the input</source>
+      <translation>Geländemodell der Eingabe</translation>
     </message>
     <message>
       <source>Texture</source>
@@ -1754,6 +1798,10 @@
     <message>
       <source>The errors of each point.</source>
       <translation>Die Fehler jedes Punktes.</translation>
+    </message>
+    <message>
+      <source>The heights that the input was orthorectified with; by default, one height everywhere. Goes with a terrain model.</source>
+      <translation>Die Höhen, mit denen die Eingabe orthorektifiziert wurde; sonst überall eine Höhe. Gehört zu einem Geländemodell.</translation>
     </message>
     <message>
       <source>The image is projected onto the reference's map by its RPCs and matched there as `coregister` does; what is found is carried back into the image. A coarse error of the RPCs within the search radius is found first. Held-out points decide whether the points can be trusted; if not, nothing is written.</source>
@@ -1812,6 +1860,10 @@
       <translation>Das Raster kann das registrierte sein oder ein anderes derselben Szene: andere Kanäle, eine andere Pixelgröße, ein anderer Zeitpunkt auf demselben Gitter. Raster mit Georeferenz werden nach ihr gelegt; ein Raster ohne sie muss die Größe des registrierten haben. Alle Kanäle werden einmal neu abgetastet, aus den ursprünglichen Pixeln. Verknüpfungspunkte werden ausgeglichen, wie sie sind: die als verworfen oder als Prüfpunkte bezeichneten bleiben weg.</translation>
     </message>
     <message>
+      <source>The reference is a terrain model, and is rendered: as the sun lights it, for a camera's image, or as a radar images it. By default, the reference is an image.</source>
+      <translation>Die Referenz ist ein Geländemodell und wird gezeichnet: wie die Sonne es beleuchtet, für ein Kamerabild, oder wie ein Radar es abbildet. Sonst ist die Referenz ein Bild.</translation>
+    </message>
+    <message>
       <source>The reference's pixels</source>
       <translation>Die Pixel der Referenz</translation>
     </message>
@@ -1848,8 +1900,8 @@
       <translation>Dasselbe wie die Tabelle, als JSON.</translation>
     </message>
     <message>
-      <source>The scene has terrain, fields, roads, water and buildings. The SAR image has layover, shadow, double bounce and speckle; the optical one relief displacement, cast shadows and noise. The same seed gives the same pair. The file truth.json is a transform like those of `coregister`.</source>
-      <translation>Die Szene hat Gelände, Felder, Straßen, Wasser und Gebäude. Das SAR-Bild hat Layover, Schatten, Doppelreflexion und Speckle; das optische Reliefversatz, Schlagschatten und Rauschen. Derselbe Startwert gibt dasselbe Paar. Die Datei truth.json ist eine Transformation wie die von `coregister`.</translation>
+      <source>The scene has terrain, fields, roads, water and buildings. The SAR image has layover, shadow, double bounce and speckle; the optical one relief displacement, cast shadows and noise. The input may be orthorectified with wrong heights. The same seed gives the same pair. The file truth.json is a transform like those of `coregister`.</source>
+      <translation>Die Szene hat Gelände, Felder, Straßen, Wasser und Gebäude. Das SAR-Bild hat Layover, Schatten, Doppelreflexion und Speckle; das optische Reliefversatz, Schlagschatten und Rauschen. Die Eingabe darf mit falschen Höhen orthorektifiziert sein. Derselbe Startwert gibt dasselbe Paar. Die Datei truth.json ist eine Transformation wie die von `coregister`.</translation>
     </message>
     <message>
       <source>The surface has one distinct peak if the measure is fit for the images. Nothing is registered and no verdict given.</source>
@@ -2076,6 +2128,10 @@
       <translation>Wohin der Satellit mit der Kamera fliegt, im Uhrzeigersinn von Norden.</translation>
     </message>
     <message>
+      <source>Where the sun or the radar stands, clockwise from north. By default a radar stands in the west; register tries azimuths.</source>
+      <translation>Wo die Sonne oder das Radar steht, im Uhrzeigersinn von Norden. Ohne Angabe steht ein Radar im Westen; register probiert Azimute.</translation>
+    </message>
+    <message>
       <source>Where the window's centre lies, in the CRS of the reference; by default the middle of the overlap.</source>
       <translation>Wo die Mitte des Fensters liegt, im KBS der Referenz; ohne Angabe in der Mitte der Überlappung.</translation>
     </message>
@@ -2090,6 +2146,10 @@
     <message>
       <source>Which asset of STAC items is meant; by default the only one that is a raster.</source>
       <translation>Welches Asset von STAC-Items gemeint ist; ohne Angabe das einzige, das ein Raster ist.</translation>
+    </message>
+    <message>
+      <source>Which image has the wrong georeferencing; the other one is the reference.</source>
+      <translation>Welches Bild die falsche Georeferenzierung hat; das andere ist die Referenz.</translation>
     </message>
     <message>
       <source>Which misregistration is taken out of each date; auto takes for each pair the simplest that the points justify.</source>
@@ -2118,6 +2178,10 @@
     <message>
       <source>Window by which skeletons of long regions, and lines of a vector layer, are broadened.</source>
       <translation>Fenster, um das Skelette langer Regionen und Linien eines Vektorlayers verbreitert werden.</translation>
+    </message>
+    <message>
+      <source>With a terrain model, what wrong heights displace the input by is taken out, too.</source>
+      <translation>Mit einem Geländemodell wird auch herausgenommen, worum falsche Höhen die Eingabe versetzen.</translation>
     </message>
     <message>
       <source>Workers</source>

@@ -1,0 +1,138 @@
+"""A terrain model as an image of itself: as the sun lights it, or as a radar images it."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bands import BandInfo
+from .grid import Grid
+from .reading import FloatImage, RasterSource, Window
+
+SUN, RADAR = "sun", "radar"
+LIGHTS = (SUN, RADAR)
+
+# Light from all the sky, as a share of the sun's on level ground; slopes that face the radar are
+# brighter than level ground by so much at most, as what is laid over has no end.
+_AMBIENT = 0.3
+_BRIGHTEST = 10.0
+
+
+@dataclass(frozen=True)
+class Light:
+    """Where the sun or a radar stands, seen from the ground.
+
+    Parameters
+    ----------
+    kind
+        One of `LIGHTS`.
+    azimuth_deg
+        Clockwise from north.
+    elevation_deg
+        Above the horizon: of a radar 90° minus its incidence angle. It hardly counts: similarity
+        asks where brightness changes, not by how much.
+    """
+
+    kind: str
+    azimuth_deg: float
+    elevation_deg: float = 45.0
+
+    def shade(self, east: FloatImage, north: FloatImage) -> FloatImage:
+        """Return how bright ground is that rises by so much per metre to the east and north.
+
+        The sun's light is Lambert's cosine over that of level ground. A radar gathers in a pixel,
+        which is a step in range, what lies in it of the ground: the more, the more this faces the
+        radar. Ground that turns away from it farther than it stands high is in radar shadow.
+        """
+        azimuth = math.radians(self.azimuth_deg)
+        away = -(east * np.float32(math.sin(azimuth)) + north * np.float32(math.cos(azimuth)))
+        if self.kind == SUN:
+            cot = np.float32(1 / math.tan(math.radians(self.elevation_deg)))
+            direct = np.maximum(1 + away * cot, 0) / np.sqrt(1 + east**2 + north**2)
+            return np.asarray(_AMBIENT + (1 - _AMBIENT) * direct, np.float32)
+        tan = np.float32(math.tan(math.radians(self.elevation_deg)))
+        power = 1 / np.maximum(1 - away * tan, np.float32(1 / _BRIGHTEST))
+        return np.asarray(np.where(away < -tan, 0, np.sqrt(power)), np.float32)
+
+
+def rendered(source: RasterSource, light: Light, band: int | None = None) -> RasterSource:
+    """Return a raster of heights as one of brightness; pixels are rendered as they are read.
+
+    Parameters
+    ----------
+    source
+        Heights in metres; or what was rendered of it, which is rendered anew.
+    light
+        What lights it.
+    band
+        Number of the band of heights; None: the first.
+    """
+    before = source._handles
+    heights = source
+    if isinstance(before, _Rendering):
+        heights, band = before.heights, before.band
+    return replace(
+        heights,
+        bands=(BandInfo.plain("float32", float("nan")),),
+        has_mask_band=False,
+        colormap=None,
+        tags={},
+        _handles=_Rendering(heights, light, band or 1),
+    )
+
+
+@dataclass(frozen=True)
+class _Rendering:
+    """Lends itself as handles do, and renders what is read."""
+
+    heights: RasterSource
+    light: Light
+    band: int
+
+    @property
+    def identity(self) -> Hashable:
+        return (self.heights._handles.identity, self.light)
+
+    @contextlib.contextmanager
+    def borrow(self) -> Iterator[_Rendering]:
+        yield self
+
+    def close(self) -> None:
+        self.heights.close()
+
+    def read(
+        self,
+        indexes: int | Sequence[int] | None = None,
+        *,
+        window: Any,
+        out_dtype: Any = None,
+    ) -> NDArray[Any]:
+        """Return the brightness of a window, (h, w), or (1, h, w); NaN if unknown."""
+        (top, bottom), (left, right) = window.toranges()
+        around = Window(int(left) - 1, int(top) - 1, int(right - left) + 2, int(bottom - top) + 2)
+        values, valid = self.heights.read(around, self.band)
+        values[~valid] = np.nan
+        image = self.light.shade(*_slopes(values, self.heights.grid))
+        image = image.astype(out_dtype or np.float32, copy=False)
+        return image if isinstance(indexes, int) else image[None]
+
+    def read_masks(self, indexes: int, *, window: Any) -> NDArray[np.uint8]:
+        """Return 255 where the brightness of a window is known, else 0; shape (h, w)."""
+        return np.where(np.isnan(self.read(1, window=window)), 0, 255).astype(np.uint8)
+
+
+def _slopes(heights_m: FloatImage, grid: Grid) -> tuple[FloatImage, FloatImage]:
+    """Return how heights, (h + 2, w + 2), rise per metre to the east and to the north, (h, w)."""
+    along = (heights_m[1:-1, 2:] - heights_m[1:-1, :-2]) / 2
+    down = (heights_m[2:, 1:-1] - heights_m[:-2, 1:-1]) / 2
+    t, (east_m, north_m) = grid.transform, grid.metres_per_unit
+    determinant = t.a * t.e - t.b * t.d
+    x = (along * t.e - down * t.d) / (determinant * east_m)
+    y = (down * t.a - along * t.b) / (determinant * north_m)
+    return x.astype(np.float32), y.astype(np.float32)

@@ -1,0 +1,189 @@
+"""Values of a raster of heights at positions of its own, interpolated bilinearly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import NoOverlapError, RasterContentError
+from .kernels import interpolate
+from .reading import FloatImage, Mask, RasterSource, Window
+from .voids import fill_voids
+
+FloatArray = NDArray[np.float64]
+Positions = Callable[[FloatArray], FloatArray]
+
+# Pixels of the raster that are read at a time, a side.
+_BLOCK = 1024
+
+# Voids are filled from the region reduced to at most so many pixels a side.
+_FILL_SIDE = 512
+
+# No place of the Earth is lower or higher, in metres: such values are voids that nobody declared.
+_LOWEST_M, _HIGHEST_M = -600.0, 9_200.0
+
+# Positions in pixels of the raster may be wrong by this much.
+TOLERANCE_PX = 1e-3
+
+# The outer pixels' values hold as far as these pixels reach.
+_HALF_PX = 0.5 + TOLERANCE_PX
+
+
+@dataclass(frozen=True)
+class RasterSurface:
+    """A raster whose values are interpolated bilinearly.
+
+    Parameters
+    ----------
+    source
+        The raster, open; its first band holds the values.
+    to_px
+        From positions, of whatever CRS is asked for, to its pixels, shapes (n, 2).
+    region
+        The pixels that are asked for.
+    filled
+        The region, reduced, without voids, for those of the raster.
+    void_share
+        Share of the region that holds no value.
+    margin_px
+        How far beyond the outer pixels' centres their values hold.
+    """
+
+    source: RasterSource
+    to_px: Positions
+    region: Window
+    filled: FloatImage
+    void_share: float
+    margin_px: float = _HALF_PX
+
+    def at(self, positions: FloatArray) -> FloatArray:
+        """Return the values, shape (n,), at positions, (n, 2); NaN beyond the raster."""
+        px = self.to_px(positions)
+        values = np.full(len(px), np.nan)
+        for part in _parts(px):
+            piece = self.piece(px[part])
+            values[part] = piece.at(*(px[part] - piece.corner).T)
+        return values
+
+    def piece(self, px: FloatArray) -> SurfacePiece:
+        """Return the part of the surface that some of its pixel positions, (n, 2), need."""
+        size = np.array([self.source.grid.width, self.source.grid.height])
+        left, top = np.clip(np.floor(px.min(axis=0)), 0, size - 1).astype(int).tolist()
+        right, bottom = np.clip(np.floor(px.max(axis=0)) + 1, 0, size - 1).astype(int).tolist()
+        window = Window(left, top, right + 1 - left, bottom + 1 - top)
+        image, valid = read_heights(self.source, window)
+        if not valid.all():
+            void_rows, void_cols = np.nonzero(~valid)
+            image[void_rows, void_cols] = self._fill_at(void_cols + left, void_rows + top)
+        return SurfacePiece(image, np.array([left, top], float), self.margin_px)
+
+    def _fill_at(self, cols: NDArray[np.int_], rows: NDArray[np.int_]) -> FloatImage:
+        height, width = self.filled.shape
+        x = (cols - self.region.col + 0.5) * width / self.region.width - 0.5
+        y = (rows - self.region.row + 0.5) * height / self.region.height - 0.5
+        inside = np.stack([np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)])
+        return interpolate(self.filled, inside[:, None], "bilinear")[0]
+
+
+@dataclass(frozen=True)
+class SurfacePiece:
+    """A part of a surface in memory.
+
+    Parameters
+    ----------
+    image
+        Its values, without voids.
+    corner
+        Column and row of the raster where it begins, shape (2,).
+    margin_px
+        As `RasterSurface` has it.
+    """
+
+    image: FloatImage
+    corner: FloatArray
+    margin_px: float = _HALF_PX
+
+    def at(self, cols: NDArray[Any], rows: NDArray[Any]) -> FloatImage:
+        """Return the values at columns and rows of the piece, any shape; NaN beyond it."""
+        height, width = self.image.shape
+        inside = (
+            cols.min() >= 0
+            and rows.min() >= 0
+            and cols.max() <= width - 1
+            and rows.max() <= height - 1
+        )
+        px = np.stack([np.atleast_2d(cols), np.atleast_2d(rows)])
+        if inside:
+            return interpolate(self.image, px, "bilinear").reshape(cols.shape)
+        # So that NaN is outside, too.
+        margin = self.margin_px
+        on_it = (px[0] >= -margin) & (px[0] <= width - 1 + margin)
+        on_it &= (px[1] >= -margin) & (px[1] <= height - 1 + margin)
+        last = np.array([width, height])[:, None, None] - 1
+        values = interpolate(self.image, np.where(on_it, np.clip(px, 0, last), 0), "bilinear")
+        values[~on_it] = np.nan
+        return values.reshape(cols.shape)
+
+
+def _parts(px: FloatArray) -> list[NDArray[np.int_]]:
+    """Return which positions, of (n, 2), lie in one block of the raster each; none is NaN."""
+    known = np.flatnonzero(np.isfinite(px[:, 0] + px[:, 1]))
+    if not len(known) or np.ptp(px[known], axis=0).max() < 2 * _BLOCK:
+        return [known] if len(known) else []
+    block = px[known] // _BLOCK @ [1, 1 << 20]
+    return [known[block == each] for each in np.unique(block)]
+
+
+def read_heights(
+    source: RasterSource, window: Window, out_shape: tuple[int, int] | None = None
+) -> tuple[FloatImage, Mask]:
+    """Return heights and which of them are valid, as `RasterSource.read`."""
+    values, valid = source.read(window, 1, out_shape)
+    return values, valid & (values > _LOWEST_M) & (values < _HIGHEST_M)
+
+
+def surface_around(
+    source: RasterSource, to_px: Positions, region: FloatArray, margin_px: int = 2
+) -> RasterSurface:
+    """Return the surface of a raster over a region.
+
+    Parameters
+    ----------
+    source
+        The raster.
+    to_px
+        From positions to its pixels, shapes (n, 2); NaN where they have none.
+    region
+        Positions of the region, (n, 2): those in between are asked for, too.
+    margin_px
+        How far around the region is read for filling voids.
+
+    Raises
+    ------
+    NoOverlapError
+        No place of the region lies on it.
+    RasterContentError
+        It holds no value there.
+    """
+    size = np.array([source.grid.width, source.grid.height])
+    px = to_px(region)
+    px = px[np.isfinite(px).all(axis=1)]
+    if not len(px):
+        raise NoOverlapError(f"{source.path} does not cover the image")
+    # Where the image sees nothing of the raster, its pixels may be any number.
+    px = np.clip(px, -margin_px - 1, size + margin_px)
+    low = np.clip(np.floor(px.min(axis=0)).astype(int) - margin_px, 0, size)
+    high = np.clip(np.ceil(px.max(axis=0)).astype(int) + margin_px + 1, 0, size)
+    if (high <= low).any():
+        raise NoOverlapError(f"{source.path} does not cover the image")
+    window = Window(int(low[0]), int(low[1]), *(high - low).tolist())
+    reduce = max(max(window.width, window.height) / _FILL_SIDE, 1.0)
+    shape = (max(int(window.height / reduce), 1), max(int(window.width / reduce), 1))
+    values, valid = read_heights(source, window, None if reduce == 1 else shape)
+    if not valid.any():
+        raise RasterContentError(f"{source.path} holds no heights in the area of the image")
+    return RasterSurface(source, to_px, window, fill_voids(values, valid), 1 - float(valid.mean()))

@@ -1,0 +1,167 @@
+"""Flat, hilly and mountainous country: heights that are wrong, and terrain as the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from groundtie.rasters.rendered import RADAR, SUN
+from groundtie.simulation.files import NAMES
+
+from .accuracy import SILENTLY_WRONG
+from .attempt import Outcome, Pair, accepted, attempt, count
+from .simulations import Simulation
+from .suites import Goal, Settings, SuiteResult, Table, run_cases
+from .tables import accuracy_table
+
+SIZE_PX = 600
+PIXEL_M = 10.0
+ERROR_M = 30.0
+_QUICK_SEEDS = 1
+
+
+@dataclass(frozen=True)
+class Country:
+    """A kind of terrain, and the largest mean error that is wanted there."""
+
+    relief_m: float
+    slope_deg: float | None
+    rmse_px: float
+
+
+COUNTRIES = {
+    "flat": Country(20.0, None, 1.0),
+    "hilly": Country(300.0, 25.0, 1.2),
+    "mountains": Country(1500.0, 45.0, 1.8),
+}
+# The camera looks as far off nadir as agile satellites do: it shows a height error of 30 m by 14 m.
+VIEWS: dict[str, tuple[tuple[str, float | str], ...]] = {
+    "optical": (("input", "optical"), ("off_nadir", 25.0)),
+    "SAR": (("input", "sar"), ("off_nadir", 0.0)),
+}
+# What is registered with: nothing, both terrain models, and one where the input's was right. And
+# right inputs to the terrain model itself by `register`, and to that of another scene.
+WITHOUT, WITH, NEEDLESS = "without heights", "with heights", "with needless heights"
+LIT, ELSEWHERE = "to the terrain", "to another terrain"
+WAYS = (WITHOUT, WITH, NEEDLESS, LIT, ELSEWHERE)
+_LIT_PX = 1.0
+
+
+@dataclass(frozen=True)
+class MountainCase:
+    """A scene of a kind of country, of which one image was made with wrong heights."""
+
+    country: str
+    view: str
+    way: str
+    seed: int
+    cache: Path
+
+    def run(self, workers: int | None) -> Outcome:
+        """Make the pair if need be, register it and judge the result."""
+        pair = self._scene(self.seed)
+        of = pair
+        if self.way in (LIT, ELSEWHERE):
+            of = replace(pair, reference=pair.reference.with_name(NAMES["dem"]))
+        if self.way == ELSEWHERE:
+            dem = self._scene(self.seed + 1).reference.with_name(NAMES["dem"])
+            of = Pair(dem, pair.input)
+        return attempt(
+            f"{group(self.country, self.view, self.way)}, seed {self.seed}",
+            group(self.country, self.view, self.way),
+            of,
+            workers,
+            tool="register" if of.reference != pair.reference else "coregister",
+            **further(pair, self.view, self.way),
+        )
+
+    def _scene(self, seed: int) -> Pair:
+        return mountain(self.country, self.view, self.way, seed).pair(self.cache)
+
+
+def further(pair: Pair, view: str, way: str) -> dict[str, Any]:
+    """Return what a pair is registered with besides its images."""
+    dem = pair.reference.with_name(NAMES["dem"])
+    if way == WITHOUT:
+        return {}
+    if way in (LIT, ELSEWHERE):
+        return {"light": RADAR if view == "SAR" else SUN}
+    return {"dem": dem, "input_dem": dem.with_name(NAMES["input_dem"]) if way == WITH else None}
+
+
+def group(country: str, view: str, way: str) -> str:
+    """Return what the cases of a kind are called."""
+    return f"{country}, {view} {'wrong' if way in (WITHOUT, WITH) else 'right'}, {way}"
+
+
+def mountain(country: str, view: str, way: str, seed: int) -> Simulation:
+    """Return a scene of 6 km; the radar looks from alternate sides."""
+    terrain = COUNTRIES[country]
+    further: tuple[tuple[str, float | str], ...] = (
+        ("pixel_size", PIXEL_M),
+        ("looks", 4.0),
+        ("warp", 2.0),
+        ("relief", terrain.relief_m),
+        ("terrain_error", ERROR_M if way in (WITHOUT, WITH) else 0.0),
+        ("orbit", "ascending" if seed % 2 else "descending"),
+        ("view_azimuth", 100.0 * seed % 360),
+        *VIEWS[view],
+        *(() if terrain.slope_deg is None else (("slope", terrain.slope_deg),)),
+    )
+    return Simulation(SIZE_PX, "rural", seed, 4.0, further)
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite."""
+    seeds = _QUICK_SEEDS if settings.quick else settings.seeds
+    kinds = [(c, view, way) for c in COUNTRIES for view in VIEWS for way in WAYS]
+    numbers = range(settings.first_seed, settings.first_seed + seeds)
+    scenes = [(*kind, seed) for kind in kinds for seed in numbers]
+    # One after the other, so that processes do not make the same pair at the same time.
+    for scene in scenes:
+        mountain(*scene).pair(settings.cache)
+    outcomes = run_cases([MountainCase(*scene, settings.cache) for scene in scenes], settings.jobs)
+    groups = {group(*kind): [o for o in outcomes if o.group == group(*kind)] for kind in kinds}
+    return SuiteResult(
+        f"Terrain wrong by {ERROR_M:g} m, or the reference: {SIZE_PX}² px of {PIXEL_M:g} m",
+        [goal for kind in kinds for goal in goals(*kind, groups[group(*kind)])],
+        (models_table(groups), accuracy_table("By country", groups)),
+        [outcome.record() for outcome in outcomes],
+        ("The RMSE is the mean of those at check points on open ground, of what was accepted.",),
+    )
+
+
+def goals(country: str, view: str, way: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
+    """Return the goals for one kind of scenes and what was found."""
+    title = group(country, view, way)
+    errors = [outcome.error_px for outcome in accepted(outcomes)]
+    mean = float(np.mean(errors)) if errors else float("nan")
+    wrong = count(outcomes, SILENTLY_WRONG)
+    if way == ELSEWHERE or (way == LIT and country == "flat"):
+        found = f"{len(errors)} of {len(outcomes)}"
+        return (Goal(f"{title}: accepted", "none", found, not errors),)
+    largest = _LIT_PX if way == LIT else COUNTRIES[country].rmse_px
+    largest = None if way == WITHOUT else largest
+    return (
+        Goal(
+            f"{title}: RMSE",
+            "reported" if largest is None else f"below {largest:g} px",
+            f"{mean:.2f} px ({len(errors)} of {len(outcomes)} accepted)",
+            None if largest is None else mean < largest,
+        ),
+        Goal(f"{title}: silently wrong", "none", f"{wrong} of {len(outcomes)}", wrong == 0),
+    )
+
+
+def models_table(groups: dict[str, list[Outcome]]) -> Table:
+    """Return a table of which models were taken, one row for each kind of scenes."""
+    names = sorted({o.model for outcomes in groups.values() for o in accepted(outcomes)})
+    rows = [
+        [name, *(str(sum(o.model == model for o in accepted(found))) for model in names)]
+        for name, found in groups.items()
+    ]
+    return Table("Models", ("pairs", *names), rows)

@@ -1,0 +1,96 @@
+"""Terrain models beside the images, or as the reference."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import groundtie
+from groundtie.errors import NoOverlapError, ParameterError
+from groundtie.rasters.reading import open_raster
+
+SIZE = 400
+
+
+@pytest.fixture(scope="module")
+def hills(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A camera's image 25° off nadir, orthorectified with heights that are wrong by 60 m."""
+    folder = tmp_path_factory.mktemp("hills")
+    groundtie.simulate(
+        folder,
+        size=SIZE,
+        density="rural",
+        pixel_size=10.0,
+        looks=16.0,
+        shift=3.0,
+        warp=1.0,
+        relief=300.0,
+        slope=25.0,
+        terrain_error=60.0,
+        off_nadir=25.0,
+        seed=3,
+    )
+    return folder
+
+
+def error_px(transform: groundtie.Transform, folder: Path) -> np.ndarray:
+    """By how much a transform misses the true positions at check points, shape (n,)."""
+    points = np.genfromtxt(folder / "check_points.csv", delimiter=",", names=True)
+    xy = np.column_stack([points["reference_x"], points["reference_y"]])
+    px = np.column_stack([points["input_col"], points["input_row"]])
+    return np.asarray(np.hypot(*(transform(xy) - px).T))
+
+
+def test_the_stored_truth_holds_at_the_check_points(hills: Path) -> None:
+    truth = groundtie.load_transform(hills / "truth.json")
+    assert error_px(truth, hills).max() < 1e-3
+    displaced = truth.model(points_of(truth)) - truth.model.affine(points_of(truth))
+    # tan 25° of errors of some 60 m.
+    assert 15 < np.hypot(*displaced.T).std() < 45
+
+
+def points_of(truth: groundtie.Transform) -> np.ndarray:
+    side = np.linspace(0, SIZE - 1, 9)
+    px = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    return truth.input_grid.pixel_to_map(px)
+
+
+@pytest.mark.slow
+def test_what_wrong_heights_displace_is_taken_out_and_warped(hills: Path, tmp_path: Path) -> None:
+    files, stored = (hills / "reference.tif", hills / "input.tif"), tmp_path / "transform.json"
+    dems = {"dem": hills / "dem.tif", "input_dem": hills / "input_dem.tif"}
+    found = groundtie.coregister(*files, transform=stored, **dems)
+    assert found.transform is not None
+    assert found.transform.model.kind == "terrain"
+    assert np.sqrt((error_px(found.transform, hills) ** 2).mean()) < 1.0
+    assert json.loads(stored.read_text())["model"]["dem"] == str(dems["dem"].resolve())
+    warped = groundtie.warp(files[1], tmp_path / "warped.tif", transform=stored)
+    xy = points_of(found.transform)
+    np.testing.assert_allclose(warped.transform(xy), found.transform(xy), atol=1e-6)
+    with open_raster(tmp_path / "warped.tif") as source:
+        assert source.read(source.window)[1].mean() > 0.9
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"input_dem": "d.tif"}, "input_dem.* goes with another one"),
+        ({"dem": "d.tif", "model": "affine"}, "goes with model auto, not affine"),
+        ({"light_azimuth": 150.0}, "goes with light"),
+        ({"light": "sun"}, "needs its azimuth"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(
+    hills: Path, given: dict[str, object], message: str
+) -> None:
+    with pytest.raises(ParameterError, match=message):
+        groundtie.coregister(hills / "reference.tif", hills / "input.tif", **given)
+
+
+def test_a_terrain_model_of_elsewhere_is_refused(hills: Path, tmp_path: Path) -> None:
+    groundtie.simulate(tmp_path, size=64, pixel_size=10.0, warp=1.0)
+    with pytest.raises(NoOverlapError, match="covers only"):
+        groundtie.coregister(hills / "reference.tif", hills / "input.tif", dem=tmp_path / "dem.tif")
