@@ -18,7 +18,7 @@ from .unavailable import UnavailableAlgorithm, broken, named_tools
 
 # The endings, without dot, that outputs of the tools may have, the usual one first: to ask the
 # tools would import them all.
-RASTERS = ("tif", "tiff")
+RASTERS = ("tif", "tiff", "vrt")
 VECTORS = ("gpkg", "geojson", "csv", "points", "txt")
 # The tool that runs where packages are missing, and states which.
 DOCTOR = "doctor"

@@ -52,8 +52,16 @@ def test_what_is_shipped_is_what_the_script_makes(provider: Any, tmp_path: Path)
 
 
 def canonical(path: Path) -> str:
-    """Return a file of Qt's XML, whose attributes come in any order, in one form."""
-    return ElementTree.canonicalize(path.read_text(encoding="utf-8"))
+    """Return a file of Qt's XML, whose attributes come in any order, in one form.
+
+    Texts of the tools are left out: QGIS makes outputs anew from the tools when it reads a model.
+    """
+    text = path.read_text(encoding="utf-8")
+    root = ElementTree.fromstring(text.partition("\n")[2])
+    for option in root.iter("Option"):
+        if option.get("name") in ("help", "description"):
+            option.attrib.pop("value", None)
+    return ElementTree.canonicalize(ElementTree.tostring(root, encoding="unicode"))
 
 
 @pytest.mark.parametrize("name", NAMES)
