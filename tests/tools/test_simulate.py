@@ -17,7 +17,10 @@ from groundtie.tools.simulate import simulate
 NAMES = [
     "check_points.csv",
     "dem.tif",
+    "dsm.tif",
+    "input.json",
     "input.tif",
+    "reference.json",
     "reference.tif",
     "roof_points.csv",
     "truth.json",
