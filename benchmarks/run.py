@@ -21,6 +21,7 @@ SUITES = (
     "city",
     "towns",
     "layover",
+    "radar_likeness",
     "masks",
     "large_shift",
     "rotated_pairs",

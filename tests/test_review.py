@@ -10,6 +10,7 @@ import pytest
 import rasterio.transform
 from noise_pairs import ORIGIN, SHIFT, true_input_px, write_pair
 from rasterio.crs import CRS
+from rpc_scenes import SIZE, make_scene
 
 from groundtie.errors import NothingFoundError, TooFewPointsError
 from groundtie.geometry.models import KINDS, PolynomialModel
@@ -17,7 +18,17 @@ from groundtie.geometry.tie_point_files import EDITED
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.grid import Grid
-from groundtie.review import MOST_SPLINE_POINTS, SWITCHED_OFF, Review, refine_click, without_points
+from groundtie.review import (
+    MOST_SPLINE_POINTS,
+    SWITCHED_OFF,
+    Review,
+    of_sensor_image,
+    refine_click,
+    without_points,
+)
+from groundtie.sensor.bias import Bias
+from groundtie.sensor.rpc_files import write_rpc
+from groundtie.tools.refine_rpc import refine_rpc
 from groundtie.tools.warp import warp
 
 CRS_33 = CRS.from_epsg(32633)
@@ -193,3 +204,42 @@ def test_clicks_at_different_places_are_not_refined(tmp_path: Path) -> None:
         except NothingFoundError:
             lost += 1
     assert lost == 3
+
+
+def test_control_of_an_image_with_rpcs_is_reviewed_alike(tmp_path: Path) -> None:
+    """Points by the exact RPCs; the image's own are 8 px off, and a moved point is marked."""
+    scene = make_scene(tmp_path, Bias("shift", SIZE, np.array([[-6.0, 5.0]]), np.zeros((2, 2))))
+    files = scene.reference, scene.image
+    write_rpc(tmp_path / "exact_RPC.TXT", scene.truth)
+    terrain = scene.dem, "ellipsoidal"
+    exact = of_sensor_image(*files, tmp_path / "exact_RPC.TXT", *terrain, None)
+    px = np.stack(np.meshgrid(*(np.linspace(60, side - 60, 4) for side in SIZE)), -1).reshape(-1, 2)
+    xy = exact.nominal.nominal_xy(px)
+    height = exact.input_grid.orientation.heights_at(xy)  # type: ignore[attr-defined]
+    header = "reference_x,reference_y,input_col,input_row,height_m"
+    table = np.column_stack([xy, px, height])
+    np.savetxt(tmp_path / "gcps.csv", table, delimiter=",", header=header, comments="")
+    review = of_sensor_image(*files, tmp_path / "exact_RPC.TXT", *terrain, tmp_path / "gcps.csv")
+    assert review.fit("translation").rmse_px < 0.01
+    np.testing.assert_allclose(review.input_px(review.nominal_xy[0]), px[0], atol=1e-3)
+    moved = review.move(3, reference_xy=xy[3] + 5.0)
+    assert moved.fit("translation").residuals_px[3] > 4
+    # The ground has another height there; where a point stays, it keeps its own.
+    assert np.isnan(moved.points.more["height_m"][3])
+    assert moved.points.more["height_m"][2] == pytest.approx(height[2])
+    moved.write(tmp_path / "moved.gpkg", moved.nominal)
+    refined = refine_rpc(
+        scene.image,
+        tmp_path / "refined_RPC.TXT",
+        gcps=tmp_path / "moved.gpkg",
+        dem=scene.dem,
+        dem_datum="ellipsoidal",
+        model="shift",
+        residuals=tmp_path / "residuals.gpkg",
+    )
+    assert refined.summary()["points_by_hand"] == 1
+    assert "set by hand: 1 points" in refined.lines()
+    again = of_sensor_image(
+        *files, tmp_path / "refined_RPC.TXT", *terrain, tmp_path / "residuals.gpkg"
+    )
+    assert np.flatnonzero(again.edited).tolist() == [3]

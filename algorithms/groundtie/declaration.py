@@ -36,6 +36,9 @@ class ToolResult(Protocol):
 P = ParamSpec("P")
 R = TypeVar("R", bound=ToolResult)
 
+# Parameters that decide where a call runs, and nothing of what it makes.
+_WHERE_IT_RUNS = ("workers", "scheduler")
+
 # Keywords of a tool's function that are no parameters: handed through from Python unchecked.
 HANDED_THROUGH = ("progress", "executor")
 
@@ -114,7 +117,7 @@ class Tool:
         inputs = {
             p.name: checked[p.name]
             for p in self.parameters
-            if p.name != "workers" and not isinstance(p.kind, (OutputKind, FolderOut))
+            if p.name not in _WHERE_IT_RUNS and not isinstance(p.kind, (OutputKind, FolderOut))
         }
         return run_of_call(self.name, inputs)
 

@@ -12,6 +12,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError as FutureCancelledError
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, ParamSpec, TypeVar
@@ -23,6 +24,9 @@ T = TypeVar("T")
 
 # A scheduler answers within a network's round trip; a user waits no longer without a word.
 _CONNECT_SECONDS = 5.0
+
+# So long the user's Cancel waits at most, while tasks run elsewhere.
+POLL_SECONDS = 0.2
 
 # A worker that is killed may be a coincidence, twice with the same task is not.
 _ATTEMPTS = 2
@@ -151,6 +155,24 @@ def _scheduler_executor(address: str) -> Iterator[Executor]:
     with client:
         # Tasks are no pure functions: they write files.
         yield client.get_executor(pure=False)
+
+
+def result_of(future: Future[T]) -> T:
+    """Return what a task that has ended returned.
+
+    Raises
+    ------
+    WorkerLostError
+        The worker that ran it, or the scheduler, was lost. What the task raised is raised, too.
+    """
+    try:
+        return future.result()
+    except FutureCancelledError as error:
+        raise WorkerLostError("the scheduler was lost") from error
+    except Exception as error:
+        if type(error).__module__.partition(".")[0] not in ("concurrent", "distributed"):
+            raise
+        raise WorkerLostError(f"its worker was lost: {error}") from error
 
 
 def _heed(stopped: Callable[[], bool]) -> None:

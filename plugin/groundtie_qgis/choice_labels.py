@@ -54,6 +54,7 @@ _LABELS = {
     "detector_repeatability": "Repeatability of detectors",
     "mask_threshold": "Mask by thresholds",
     "mask_regions": "Mask by regions",
+    "mask_surface": "Mask by a surface model",
     "simulate": "Simulate a SAR–optical pair",
     "simulate_sensor": "Simulate a sensor image",
 }

@@ -47,10 +47,14 @@ def definition(parameter: Any) -> QgsProcessingParameterDefinition:
     return made
 
 
-def file_filter(suffixes: tuple[str, ...]) -> str:
-    """Return the filter of a file dialog for files that end in `suffixes`."""
+def file_filter(suffixes: tuple[str, ...], any_case: bool = False) -> str:
+    """Return the filter of a file dialog for files that end in `suffixes`.
+
+    With `any_case` in capitals, too: QGIS 3.22 refuses _RPC.TXT for *.txt.
+    """
     files = tr("{} files")
-    return ";;".join(f"{files.format(suffix[1:].upper())} (*{suffix})" for suffix in suffixes)
+    endings = {s: f"*{s} *{s.upper()}" if any_case else f"*{s}" for s in suffixes}
+    return ";;".join(f"{files.format(s[1:].upper())} ({endings[s]})" for s in suffixes)
 
 
 # In Processing, "optional" means that a value may be absent: with a default there always is one.
@@ -123,7 +127,7 @@ def _file_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefi
         tr(kind.label),
         behavior=compat.FILE,
         optional=not parameter.required,
-        fileFilter=file_filter(kind.suffixes),
+        fileFilter=file_filter(kind.suffixes, any_case=True),
     )
 
 

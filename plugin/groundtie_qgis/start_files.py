@@ -15,10 +15,12 @@ def points_name() -> str:
 
 
 def has_rpcs(layer: Any) -> bool:
-    """Whether a raster layer is located by RPCs alone."""
+    """Whether a raster layer is located by RPCs alone; QGIS draws it as GDAL warps it by them."""
     from osgeo import gdal
 
-    if layer is None or layer.providerType() != "gdal" or layer.crs().isValid():
+    if layer is None or layer.providerType() != "gdal":
         return False
     dataset = gdal.Open(layer.source())
-    return dataset is not None and bool(dataset.GetMetadata("RPC"))
+    if dataset is None or dataset.GetGeoTransform(can_return_null=True) is not None:
+        return False
+    return bool(dataset.GetMetadata("RPC"))

@@ -31,7 +31,7 @@ from .sensor_run import SensorImage, SensorRun
 from .start_files import has_rpcs, points_name
 from .translation import mark, tr
 from .unavailable import named_tools
-from .wording import in_words
+from .wording import choice_label, in_words
 
 # What a pair may be, and the tool for it.
 PAIRS = {
@@ -82,7 +82,8 @@ class StartPage(QWidget):
         self.dem.setAllowEmptyLayer(True)
         self.dem.setLayer(None)
         self.datum = QComboBox()
-        self.datum.addItems(library_module("sensor.geoids").DATUMS)
+        for datum in library_module("sensor.geoids").DATUMS:
+            self.datum.addItem(choice_label(datum), datum)
         self.heights = QWidget()
         self.register = QPushButton(tr("Register"))
         self.progress = QProgressBar()
@@ -208,11 +209,17 @@ class StartPage(QWidget):
         if reference is None or reference.providerType() != "gdal":
             self._end(Outcome(False, tr("An image with RPCs needs a raster file as reference.")))
             return
-        self.sensor = SensorImage(image, self.dem.currentLayer(), self.datum.currentText())
-        control: dict[str, Any] = {"REFERENCE": reference.id()}
-        control |= {"SEARCH_RADIUS": self.radius.value()} if self.radius.value() else {}
-        self._run = SensorRun(self.sensor, reference.id(), control, self._end, self._show_progress)
+        self.sensor = SensorImage(image, self.dem.currentLayer(), self.datum.currentData())
+        self._run = SensorRun(
+            *(self.sensor, reference.id(), self._control(reference), self._end),
+            self._show_progress,
+        )
         self._run.start()
+
+    def _control(self, reference: Any) -> dict[str, Any]:
+        """Return where ground control comes from: it is matched in the reference."""
+        radius = {"SEARCH_RADIUS": self.radius.value()} if self.radius.value() else {}
+        return {"REFERENCE": reference.id(), **radius}
 
     def _from_map(self) -> bool:
         return bool(self.reference.currentText() == tr(MAP))

@@ -121,7 +121,8 @@ def test_a_mask_is_a_raster_or_a_vector_layer_or_a_file(
 
 def test_files_have_filters(definitions: dict[str, Any]) -> None:
     assert definitions["REPORT"].fileFilter() == "HTML files (*.html)"
-    assert definitions["TRANSFORM"].fileFilter() == "JSON files (*.json)"
+    assert definitions["TRANSFORM"].fileFilter() == "JSON files (*.json *.JSON)"
+    assert definitions["TRANSFORM"].checkValueIsAcceptable("/nowhere/T.JSON")
     assert definitions["OUTPUT"].defaultFileExtension() == "tif"
     assert definitions["TIE_POINTS"].defaultFileExtension() == "gpkg"
 

@@ -404,6 +404,13 @@ def test_without_locked_content_another_place_must_not_match_better() -> None:
     assert refusing(found) == ["pixel-locked content"]
 
 
+def test_without_locked_content_chips_must_not_agree_elsewhere() -> None:
+    shifts = survey().shifts_px.copy()
+    shifts[::8] = [9.0, -5.0]
+    found = evidence(GOOD, survey=survey(), rest=Rest(replace(survey(), shifts_px=shifts)))
+    assert refusing(found) == ["pixel-locked content"]
+
+
 @pytest.mark.parametrize(("off", "expected"), [(7, ["part elsewhere"]), (4, [])])
 def test_chips_far_from_each_other_that_agree(off: int, expected: list[str]) -> None:
     """A strip at an angle has few neighbours; four of 49 agree by chance, once in a hundred."""

@@ -48,7 +48,8 @@ def matching(monkeypatch: pytest.MonkeyPatch, one_thread: Context) -> Make:
     ) -> Matching:
         dates: list[Any] = [FakeDate(str(k)) for k in range(count)]
 
-        def register(first: Any, second: Any, *_: Any) -> PairResult:
+        def register(task: Any, *_: Any) -> PairResult:
+            first, second = task.first, task.second
             ends = int(first.name), int(second.name)
             accepted = not set(bad) & set(ends) and not {ends, ends[::-1]} & set(unlike)
             key = pair_key(first, second, SETTINGS, FRAME)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import pickle
 import shutil
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +15,7 @@ import fiona
 import numpy as np
 import pytest
 import rasterio
+from loopback_cluster import cluster
 from raster_files import utm_grid, write_raster
 from series_dates import Dates, write_dates
 from textured_pairs import listing, pixels
@@ -264,3 +267,54 @@ def test_dates_with_nothing_to_match_are_refused(tmp_path: Path) -> None:
             for k in range(2)]  # fmt: skip
     with pytest.raises(NotRegisteredError, match="none of"):
         coregister_series(tmp_path / "out", flat)
+
+
+class Elsewhere(ThreadPoolExecutor):
+    """Runs tasks as another machine would: by what can be sent there."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        sent = pickle.dumps(fn)
+        # Names and numbers, no pixels.
+        assert len(sent) < 20_000
+        return super().submit(lambda: pickle.loads(pickle.dumps(pickle.loads(sent)())))
+
+
+@pytest.mark.slow
+def test_pairs_that_run_elsewhere_make_the_same_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dates = write_dates(tmp_path / "dates", 3, SIZE)
+    monkeypatch.chdir(tmp_path)
+    options = {**OPTIONS, "reference": dates.files[0]}
+    here = coregister_series("here", ["dates"], **options)
+    with Elsewhere(2) as executor:
+        there = coregister_series("there", ["dates"], executor=executor, **options)
+    assert len(here.registered) == 2 and there.registered_pairs == here.registered_pairs
+    written = sorted((tmp_path / "here").glob("*.tif"))
+    assert len(written) == 2
+    for path in written:
+        assert (tmp_path / "there" / path.name).read_bytes() == path.read_bytes()
+    again = coregister_series("there", ["dates"], **options)
+    assert (again.registered_pairs, again.reused_pairs) == (0, there.registered_pairs)
+
+
+@pytest.mark.slow
+def test_a_cluster_registers_the_same(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    dates = write_dates(tmp_path / "dates", 3, SIZE)
+    coregister_series(tmp_path / "here", [dates.folder], **OPTIONS)
+    with cluster() as workers:
+        coregister_series(tmp_path / "there", [dates.folder], scheduler=workers.address, **OPTIONS)
+    written = sorted((tmp_path / "here").glob("*.tif"))
+    assert len(written) == 3
+    for path in written:
+        assert (tmp_path / "there" / path.name).read_bytes() == path.read_bytes()
+
+
+@pytest.mark.slow
+def test_another_band_is_registered_anew(tmp_path: Path) -> None:
+    dates = write_dates(tmp_path / "dates", 2, SIZE)
+    options = {**OPTIONS, "reference": dates.files[0]}
+    coregister_series(tmp_path / "out", [dates.folder], **options)
+    again = coregister_series(tmp_path / "out", [dates.folder], band=1, **options)
+    assert (again.registered_pairs, again.reused_pairs) == (1, 0)

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError as FutureCancelledError
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from functools import partial
 from queue import Empty, SimpleQueue
 
 from ..declaration import Tool
-from ..errors import GroundTieError, WorkerLostError
+from ..errors import GroundTieError
+from ..executors import POLL_SECONDS, result_of
 from ..progress import Progress
 from .calls import Call
 from .work import FAILED, Outcome, Task, bug
-
-# So long the user's Cancel waits at most, while calls run elsewhere.
-_POLL_SECONDS = 0.2
 
 
 def run_calls(
@@ -50,7 +47,7 @@ def run_calls(
         while waiting:
             check()
             try:
-                call, future = ended.get(timeout=_POLL_SECONDS)
+                call, future = ended.get(timeout=POLL_SECONDS)
             except Empty:
                 continue
             waiting -= 1
@@ -75,21 +72,13 @@ def _cancelling() -> Iterator[list[Future[Outcome]]]:
 
 def _outcome(future: Future[Outcome]) -> Outcome:
     try:
-        return future.result()
+        return result_of(future)
     except GroundTieError as error:
         return Outcome(FAILED, error.one_line())
-    except FutureCancelledError:
-        return Outcome(FAILED, WorkerLostError("the scheduler was lost").one_line())
     except ImportError as error:
         return Outcome(FAILED, f"a worker cannot import what it needs: {error}")
-    except Exception as error:  # of the executor's own: a worker that was killed, say
-        return Outcome(FAILED, _of_executor(error))
-
-
-def _of_executor(error: Exception) -> str:
-    if type(error).__module__.partition(".")[0] in ("concurrent", "distributed"):
-        return " ".join(f"its worker was lost: {error}".split())
-    return bug(error)
+    except Exception as error:
+        return Outcome(FAILED, bug(error))
 
 
 class Reporter:

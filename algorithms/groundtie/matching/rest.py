@@ -32,12 +32,12 @@ class Rest:
     @property
     def is_confirming(self) -> bool:
         """Whether the rest confirms the model, or does not contradict it where that is enough."""
-        survey = self.survey
+        survey, elsewhere = self.survey, self.survey.elsewhere
         if self.is_explained:
-            elsewhere = survey.elsewhere
             is_more = elsewhere.chips >= LEAST_PROPORTION * survey.confirming
             return not (elsewhere.is_evident and is_more)
-        return survey.is_confirming and survey.height > survey.rival_height
+        is_one_place = survey.height > survey.rival_height and not elsewhere.is_evident
+        return survey.is_confirming and is_one_place
 
 
 def survey_rest(

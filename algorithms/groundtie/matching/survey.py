@@ -22,6 +22,7 @@ from ..geometry.models import Model
 from ..rasters.grid import Grid
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
+from .belief_propagation import Surfaces
 from .chips import LEAST_VALID_MASKED, ChipMatcher
 from .ghost import ghost_height
 from .matcher import FloatArray, MaskOf, Places
@@ -231,13 +232,27 @@ def survey_model(
     else:
         rest = replace(matcher, held_out=without, least_valid=LEAST_VALID_MASKED)
         kept, surfaces = rest.match_forward(*asked)
+    surfaces = _of_overlaps(surfaces)
     shifts = np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
     spacing = [float(np.diff(np.unique(places.centres[:, axis])).max(initial=1)) for axis in (0, 1)]
     mean = surfaces.sum(axis=0) / max(len(kept), 1)
     ghost = 0.0
     if own is not None and len(own) > 0:
-        ghost = ghost_height(mean, own.mean(axis=0))
+        ghost = ghost_height(mean, _of_overlaps(own).mean(axis=0))
     return Survey(places.grid, kept, shifts, np.array(spacing), mean, elsewhere_px, ghost)
+
+
+def _of_overlaps(surfaces: Surfaces) -> Surfaces:
+    """Return surfaces in robust standard deviations of the shifts at which enough overlaps.
+
+    Others are 0: where they are many, all seem to vary little, and peaks to be hundreds high.
+    """
+    made = surfaces.copy()
+    for surface in made:
+        known = surface[surface != 0]
+        if known.size:
+            surface /= max(1.4826 * float(np.median(np.abs(known - np.median(known)))), 1.0)
+    return made
 
 
 def _along(size: int, chip_px: int) -> NDArray[np.int_]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 
 from ..context import Context, threads
 from ..errors import ParameterError, SameFileError
+from ..executors import open_executor
 from ..geometry.transform import Transform
 from ..progress import Progress
 from ..raster_names import identity
@@ -49,6 +51,8 @@ class SeriesCall:
         Number of threads; None: one per processor.
     parameters
         All parameters of the tool, for the report.
+    scheduler
+        Address of a Dask scheduler whose workers register; None: threads do.
     """
 
     listed: tuple[Listed, ...]
@@ -58,6 +62,7 @@ class SeriesCall:
     files: SeriesFiles
     workers: int | None
     parameters: Mapping[str, Any]
+    scheduler: str | None = None
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> SeriesCall:
@@ -79,10 +84,26 @@ class SeriesCall:
             given["search_radius"],
             given["matching_pixel_size"],
         )
-        return cls(listed, reference, given["band"], settings, files, given["workers"], given)
+        return cls(
+            listed,
+            reference,
+            given["band"],
+            settings,
+            files,
+            given["workers"],
+            given,
+            given["scheduler"],
+        )
 
-    def run(self, progress: Progress) -> Series:
+    def run(self, progress: Progress, executor: Executor | None = None) -> Series:
         """Register the series, and write its files.
+
+        Parameters
+        ----------
+        progress
+            Receives every step.
+        executor
+            Runs registrations in the place of threads and of the scheduler; it stays open.
 
         Raises
         ------
@@ -92,13 +113,21 @@ class SeriesCall:
         started = time.perf_counter()
         stored = read_series(self.files.folder / SERIES_JSON)
         with threads(self.workers, progress) as context, ExitStack() as stack:
+            if executor is None and self.scheduler is not None:
+                executor = stack.enter_context(open_executor(1, self.scheduler))
             stack.enter_context(bounded_cache())
             opened = open_dates(self.listed, self.band, stack, context.part(0.0, 0.05))
-            series = self._registered(opened, stored, context.part(0.05, 0.8))
+            series = self._registered(opened, stored, context.part(0.05, 0.8), executor)
             series = replace(series, seconds=time.perf_counter() - started)
             return self.files.write(series, stored, context.part(0.8, 1.0))
 
-    def _registered(self, opened: OpenDates, stored: StoredSeries, context: Context) -> Series:
+    def _registered(
+        self,
+        opened: OpenDates,
+        stored: StoredSeries,
+        context: Context,
+        executor: Executor | None,
+    ) -> Series:
         dates, failures = _on_one_map(opened, self.reference)
         hub = next((k for k, date in enumerate(dates) if date.name == self.reference), None)
         home = dates[hub or 0]
@@ -107,7 +136,9 @@ class SeriesCall:
         if stored.frame is not None and stored.reference == key:
             frame = stored.frame  # that of the registrations which need not be done again
         footprints = Footprints.of(dates, frame.grid.crs)
-        matching = Matching(dates, footprints, frame, self.settings, stored.pairs, context)
+        matching = Matching(
+            dates, footprints, frame, self.settings, stored.pairs, context, executor
+        )
         if hub is None:
             hub, datum = matching.freely(), "to each other (mean displacement zero)"
         else:

@@ -22,7 +22,7 @@ from shapely.strtree import STRtree
 from ..context import Context
 from ..errors import CancelledError, GroundTieError
 from ..masks.radar import LEAST_VARIATION2, variation2_of
-from ..rasters.grid import reproject
+from ..rasters.grid import Grid, reproject
 from ..rasters.held import held_grey
 from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
@@ -49,7 +49,7 @@ class Date:
     matched
         What is matched: the same, or its grey image in memory.
     band
-        Which of its bands is matched; None: the mean of all.
+        Which band of the file is matched; None: the mean of all.
     """
 
     listed: Listed
@@ -62,12 +62,22 @@ class Date:
         """What it is called."""
         return self.listed.name
 
+    @property
+    def _matched_band(self) -> int | None:
+        # An image in memory has but the band that is matched.
+        return self.band if self.matched is self.source else None
+
+    def image(self, grid: Grid | None = None) -> Image:
+        """Return what is matched, as if its pixels lay on another grid of the same size."""
+        matched = self.matched if grid is None else replace(self.matched, grid=grid)
+        return Image(matched, self._matched_band)
+
     @cached_property
     def is_radar(self) -> bool:
         """Whether its metadata or its speckle are those of a radar image."""
         if is_known_radar(self.source):
             return True
-        return variation2_of(Image(self.matched, self.band)) >= LEAST_VARIATION2
+        return variation2_of(self.image()) >= LEAST_VARIATION2
 
     @cached_property
     def key(self) -> str:
@@ -80,7 +90,9 @@ class Date:
         grid = self.matched.grid
         factor = max(grid.width, grid.height) / _FOOTPRINT_PX
         small = grid.scaled(factor) if factor > 1 else grid
-        _, valid = self.matched.read(self.matched.window, self.band, (small.height, small.width))
+        _, valid = self.matched.read(
+            self.matched.window, self._matched_band, (small.height, small.width)
+        )
         found = [
             shape(geometry)
             for geometry, value in shapes(valid.astype(np.uint8), transform=small.transform)
@@ -134,7 +146,7 @@ def open_dates(
             held += source.grid.width * source.grid.height
             date = Date(one, source, source, band)
             if held <= _MOST_HELD_PX:
-                date = replace(date, matched=held_grey(source, band), band=None)
+                date = replace(date, matched=held_grey(source, band))
             dates.append(date)
         except CancelledError:
             raise

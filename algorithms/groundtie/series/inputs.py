@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import datetime
+import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..errors import ParameterError
@@ -37,6 +38,15 @@ class Listed:
     raster: Path | str
     time: datetime.datetime | None
     mask: Path | str | None = None
+
+    def anywhere(self) -> Listed:
+        """Return the same for a process in another folder."""
+        raster, mask = (
+            Path(os.path.abspath(path)) if isinstance(path, Path) else path
+            for path in (self.raster, self.mask)
+        )
+        assert raster is not None
+        return replace(self, raster=raster, mask=mask)
 
 
 def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed, ...]:

@@ -4,27 +4,29 @@ from __future__ import annotations
 
 import hashlib
 import time
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..context import Context
+from ..context import Context, threads
 from ..errors import CancelledError, GroundTieError
 from ..geometry.estimation import jackknife_deviations
 from ..geometry.models import Model
 from ..masks.choice import AUTO
 from ..matching.alignment import LINEAR_CANDIDATES
 from ..rasters.grid import Grid, reproject
-from ..rasters.pair import Image
 from ..rasters.reading import bounded_cache
 from ..registration.pipeline import pair_images, run
 from ..registration.registration import Registration
 from ..registration.specification import COREGISTER, SAR_SAR, Specification
 from ..version import __version__
-from .dates import Date
+from .dates import Date, open_dates
 from .frame import PARAMETERS, FloatArray, SeriesFrame
+from .inputs import Listed
 from .network import Link
 
 # Two images of one kind of camera show the same gradients: orientation alone finds as many matches
@@ -135,15 +137,9 @@ def pair_key(first: Date, second: Date, settings: Settings, frame: SeriesFrame) 
     return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
 
 
-def register_pair(
-    first: Date,
-    second: Date,
-    placed: tuple[FloatArray | None, FloatArray | None],
-    settings: Settings,
-    frame: SeriesFrame,
-    context: Context,
-) -> PairResult:
-    """Register one date to another.
+@dataclass(frozen=True)
+class PairTask:
+    """The registration of one date to another, to be done.
 
     Parameters
     ----------
@@ -155,9 +151,38 @@ def register_pair(
         How.
     frame
         The series' frame.
-    context
-        Threads, progress and seed.
     """
+
+    first: Date
+    second: Date
+    placed: tuple[FloatArray | None, FloatArray | None]
+    settings: Settings
+    frame: SeriesFrame
+
+    def elsewhere(self) -> Callable[[], PairResult]:
+        """Return the task for another process: with files, not pixels."""
+        dates = self.first, self.second
+        listed = [date.listed.anywhere() for date in dates]
+        key = pair_key(*dates, self.settings, self.frame)
+        bare = self.placed, self.settings, self.frame
+        return partial(_register_files, listed, self.first.band, key, bare)
+
+
+def _register_files(
+    listed: Sequence[Listed], band: int | None, key: str, bare: tuple[Any, Settings, SeriesFrame]
+) -> PairResult:
+    with threads(1) as context, ExitStack() as stack:
+        opened = open_dates(listed, band, stack, context)
+        if opened.failures:
+            reason = "; ".join(opened.failures.values())
+            return PairResult(listed[0].name, listed[1].name, key, False, "", reason)
+        first, second = opened.dates
+        return replace(register_pair(PairTask(first, second, *bare), context), key=key)
+
+
+def register_pair(task: PairTask, context: Context) -> PairResult:
+    """Register one date to another; the context gives threads, progress and seed."""
+    first, second, settings, frame = task.first, task.second, task.settings, task.frame
     started = time.perf_counter()
     refused = PairResult(
         first.name, second.name, pair_key(first, second, settings, frame), False, "", ""
@@ -165,12 +190,9 @@ def register_pair(
     spec = settings.specification(first, second)
     grids = [
         date.source.grid if one is None else frame.moved_grid(date.source.grid, one)
-        for date, one in zip((first, second), placed, strict=True)
+        for date, one in zip((first, second), task.placed, strict=True)
     ]
-    images = [
-        Image(replace(date.matched, grid=grid), date.band)
-        for date, grid in zip((first, second), grids, strict=True)
-    ]
+    images = [date.image(grid) for date, grid in zip((first, second), grids, strict=True)]
     try:
         with ExitStack() as stack, bounded_cache():
             masks = first.listed.mask, second.listed.mask

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Executor, wait
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..context import Context
+from ..executors import POLL_SECONDS, result_of
 from .dates import Date, Footprints
 from .frame import FloatArray, SeriesFrame
 from .network import Link
-from .pairs import PairResult, Settings, pair_key, register_pair
+from .pairs import PairResult, PairTask, Settings, pair_key, register_pair
 
 # Footprints that have less in common are not worth matching: as many chips as a small scene has do
 # not fit in.
@@ -45,6 +47,8 @@ class Matching:
         Registrations of earlier runs, by their keys.
     context
         Threads and progress.
+    executor
+        Runs pairs, each as a task of files, instead of these threads; None: they do.
     """
 
     dates: Sequence[Date]
@@ -53,6 +57,7 @@ class Matching:
     settings: Settings
     known: Mapping[str, PairResult]
     context: Context
+    executor: Executor | None = None
     results: dict[tuple[int, int], PairResult] = field(default_factory=dict)
     done: int = 0
     reused: int = 0
@@ -74,13 +79,11 @@ class Matching:
     def from_hub(self, hub: int) -> None:
         """Register all dates to one, reach the others by their neighbours, and close loops."""
         others = [date for date in range(len(self.dates)) if date != hub]
-        for date in others:
-            self._attempt(hub, date, hub)
+        self._attempt_all([(hub, date) for date in others], hub)
         self._reach(others, hub)
         placed = self.placed(hub)
         chain = [date for date in range(len(self.dates)) if date in placed]
-        for first, second in self._neighbours(chain):
-            self._attempt(first, second, hub)
+        self._attempt_all(self._neighbours(chain), hub)
         for date in chain:
             for other in self._nearest(date, self.placed(hub)):
                 if self._degree(date) >= _WANTED_LINKS or date == hub:
@@ -142,27 +145,59 @@ class Matching:
 
     def _attempt(self, first: int, second: int, hub: int) -> bool:
         """Register a pair unless that was done; return whether it is linked."""
-        for ends in ((first, second), (second, first)):
-            if ends in self.results:
-                return self.results[ends].accepted
-        if self.footprints.share(first, second) < _LEAST_SHARE:
-            return False
-        names = self.dates[first].name, self.dates[second].name
-        expected = max(2 * len(self.dates) - 2, self.done + 1)
-        self.context.update(self.done / expected, f"registering {names[1]} to {names[0]}")
-        part = self.context.part(self.done / expected, (self.done + 1) / expected)
+        self._attempt_all([(first, second)], hub)
+        found = self._known(first, second)
+        return found is not None and found.accepted
+
+    def _known(self, first: int, second: int) -> PairResult | None:
+        return self.results.get((first, second)) or self.results.get((second, first))
+
+    def _attempt_all(self, pairs: Sequence[tuple[int, int]], hub: int) -> None:
+        """Register pairs unless that was done, from the places that the dates have now.
+
+        What becomes of one does not depend on the others: they may run at once.
+        """
+        new = {
+            frozenset(ends): ends
+            for ends in pairs
+            if self._known(*ends) is None and self.footprints.share(*ends) >= _LEAST_SHARE
+        }
         placed = self.placed(hub)
-        result = register_pair(
-            self.dates[first],
-            self.dates[second],
-            (placed.get(first), placed.get(second)),
-            self.settings,
-            self.frame,
-            part,
-        )
-        self.results[first, second] = result
+        tasks = {
+            (first, second): PairTask(
+                self.dates[first],
+                self.dates[second],
+                (placed.get(first), placed.get(second)),
+                self.settings,
+                self.frame,
+            )
+            for first, second in new.values()
+        }
+        if self.executor is None:
+            for ends, task in tasks.items():
+                part = self._next_part(f"registering {task.second.name} to {task.first.name}")
+                self._add(ends, register_pair(task, part))
+            return
+        futures = {ends: self.executor.submit(task.elsewhere()) for ends, task in tasks.items()}
+        try:
+            # In the order of the pairs, whichever ends first: the same as here.
+            for ends, future in futures.items():
+                part = self._next_part(f"registering {len(tasks)} pairs")
+                while wait([future], timeout=POLL_SECONDS).not_done:
+                    part.progress.check()
+                self._add(ends, result_of(future))
+        finally:
+            for future in futures.values():
+                future.cancel()
+
+    def _next_part(self, message: str) -> Context:
+        expected = max(2 * len(self.dates) - 2, self.done + 1)
+        self.context.update(self.done / expected, message)
+        return self.context.part(self.done / expected, (self.done + 1) / expected)
+
+    def _add(self, ends: tuple[int, int], result: PairResult) -> None:
+        self.results[ends] = result
         self.done += 1
-        return result.accepted
 
     def _neighbours(self, chain: Sequence[int]) -> list[tuple[int, int]]:
         """Return for each date the next in time, and another one if they overlap much more."""

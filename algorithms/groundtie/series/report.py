@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..geometry.transform import Transform
-from ..rasters.pair import Image
 from ..report import figures, pictures
 from ..report.page import Page
 from .series import Series, SeriesDate
@@ -91,7 +90,7 @@ class SeriesReport(Page):
         found = []
         for one in dates:
             assert one.date is not None and one.transform is not None
-            image = Image(one.date.matched, one.date.band)
+            image = one.date.image()
             nominal = Transform.nominal(one.transform.crs, one.transform.input_grid)
             uris = [
                 pictures.jpeg_uri(pictures.grey_picture(image.read_onto(grid, to_px)))

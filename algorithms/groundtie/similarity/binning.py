@@ -11,7 +11,7 @@ MASKED = np.uint8(255)
 BINNINGS = ("equal-frequency", "linear")
 
 # Comparing pixels with so many edges, one after the other, is faster than to search among them.
-_FEW_BINS = 64
+_FEW_EDGES = 63
 
 # Quantiles are taken from at most this many pixels; their error is then far below a bin.
 _SAMPLE = 65_536
@@ -36,6 +36,16 @@ def bin_edges(
     return (low + inner * (high - low)).astype(np.float32)
 
 
+def levels(values: NDArray[np.float32], edges: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Return how many of up to 254 rising edges lie at or below each value, same shape."""
+    if len(edges) > _FEW_EDGES:
+        return np.searchsorted(edges, values, side="right").astype(np.uint8)
+    found = np.zeros(values.shape, np.uint8)
+    for edge in edges:
+        found += values >= edge
+    return found
+
+
 def to_bins(
     values: NDArray[np.float32],
     valid: NDArray[np.bool_],
@@ -54,11 +64,6 @@ def to_bins(
         One of `BINNINGS`.
     """
     edges = bin_edges(values, valid, bins, binning)
-    if bins <= _FEW_BINS:
-        binned = np.zeros(values.shape, np.uint8)
-        for edge in edges:
-            binned += values >= edge
-    else:
-        binned = np.searchsorted(edges, values, side="right").astype(np.uint8)
+    binned = levels(values, edges)
     binned[~valid] = MASKED
     return binned

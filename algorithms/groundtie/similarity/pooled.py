@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
-from .binning import bin_edges
+from .binning import bin_edges, levels
 from .surface import Surface
 
 FloatArray = NDArray[np.float32]
@@ -62,8 +62,8 @@ class PooledHistogram:
         """
         sides = template, search
         edges = [bin_edges(s, np.ones(s.shape, bool), bins, "equal-frequency") for s in sides]
-        levels = [np.searchsorted(e, s, side="right") for e, s in zip(edges, sides, strict=True)]
-        counts = np.bincount(levels[0] * bins + levels[1], minlength=bins * bins) + _UNSEEN
+        own, other = (levels(s, e).astype(np.intp) for e, s in zip(edges, sides, strict=True))
+        counts = np.bincount(own * bins + other, minlength=bins * bins) + _UNSEEN
         joint = counts.reshape(bins, bins) / counts.sum()
         independent = joint.sum(axis=1, keepdims=True) * joint.sum(axis=0, keepdims=True)
         return cls(edges[0], edges[1], np.log(joint / independent).astype(np.float32))
@@ -79,12 +79,14 @@ class PooledHistogram:
             A window with the same centre, larger by r on each side; invalid pixels add 0.
         """
         template = smooth(template)
-        levels = np.searchsorted(self.template_edges, template.values, side="right")
-        others = np.searchsorted(self.search_edges, search.values, side="right")
+        own = levels(template.values, self.template_edges)
+        other = levels(search.values, self.search_edges)
+        # What is invalid takes a level of its own, without information.
+        other[~search.valid] = self.information.shape[1]
         total = np.zeros((), np.float32)
-        for level in np.unique(levels[template.valid]):
-            information = np.where(search.valid, self.information[level][others], np.float32(0))
-            pixels = (template.valid & (levels == level)).astype(np.float32)
+        for level in np.unique(own[template.valid]):
+            information = np.append(self.information[level], np.float32(0))[other]
+            pixels = (template.valid & (own == level)).astype(np.float32)
             total = total + cv2.matchTemplate(information, pixels, cv2.TM_CCORR)
         span = search.values.shape[0] - template.values.shape[0] + 1
         return np.broadcast_to(total, (span, span)).astype(np.float32)

@@ -9,10 +9,11 @@ from typing import Annotated
 from ..batches.batch import Batch
 from ..batches.result import BatchResult
 from ..declaration import Output, tool
-from ..kinds import Choice, FileIn, FileOut, Flag, FolderOut, Number, Text
+from ..kinds import Choice, FileIn, FileOut, Flag, FolderOut, Number
 from ..progress import SILENT, Progress
 from ..tables import SUFFIXES
 from . import NAMES, load_tool
+from .common import Scheduler
 
 
 @tool(
@@ -70,14 +71,7 @@ def batch(
             maximum=256,
         ),
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        Text(
-            label="Scheduler",
-            help="Address of a Dask scheduler, as tcp://host:8786, whose workers run the rows "
-            "instead.",
-        ),
-    ] = None,
+    scheduler: Scheduler = None,
     json_log: Annotated[
         Path | None,
         FileOut(

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from ..kinds import Band, Choice, Distance, FileOut, Number, RasterIn, RasterOut
+from ..kinds import Band, Choice, Distance, FileOut, Number, RasterIn, RasterOut, Text
 from ..rasters.grid import Grid
 from ..rasters.warping import METHODS
 
@@ -50,6 +50,14 @@ Workers = Annotated[
         integer=True,
         minimum=1,
         maximum=256,
+        advanced=True,
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    Text(
+        label="Scheduler",
+        help="Address of a Dask scheduler, as tcp://host:8786, whose workers do the work instead.",
         advanced=True,
     ),
 ]

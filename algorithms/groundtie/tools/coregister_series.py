@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -14,7 +15,7 @@ from ..matching.surface_fit import AUTO
 from ..progress import SILENT, Progress
 from ..series.call import SeriesCall
 from ..series.series import Series
-from .common import MatchingPixelSize, Resampling, Workers
+from .common import MatchingPixelSize, Resampling, Scheduler, Workers
 from .registration_parameters import MASK_HELP, MaxError, OutputGrid, ReportOut, SearchRadius
 
 
@@ -90,7 +91,9 @@ def coregister_series(
     output_grid: OutputGrid = "reference",
     resampling: Resampling = "cubic",
     workers: Workers = None,
+    scheduler: Scheduler = None,
     progress: Progress = SILENT,
+    executor: Executor | None = None,
     parameters: Mapping[str, Any] = MappingProxyType({}),
 ) -> Series:
     """Register the dates of a series to one reference, or to each other.
@@ -102,7 +105,7 @@ def coregister_series(
 
     A date that is added later is registered alone. Without georeferencing, distances are in pixels.
     """
-    return SeriesCall.of(parameters).run(progress)
+    return SeriesCall.of(parameters).run(progress, executor)
 
 
 # As the project's other results are called in Python.

@@ -76,8 +76,8 @@
       <translation>Punkt hinzufügen</translation>
     </message>
     <message>
-      <source>Address of a Dask scheduler, as tcp://host:8786, whose workers run the rows instead.</source>
-      <translation>Adresse eines Dask-Schedulers, wie tcp://host:8786, dessen Worker stattdessen die Zeilen rechnen.</translation>
+      <source>Address of a Dask scheduler, as tcp://host:8786, whose workers do the work instead.</source>
+      <translation>Adresse eines Dask-Schedulers, etwa tcp://host:8786, dessen Worker die Arbeit stattdessen tun.</translation>
     </message>
     <message>
       <source>Affine</source>
@@ -296,6 +296,10 @@
       <translation>Korrelationsverhältnis</translation>
     </message>
     <message>
+      <source>Correlation with the surface model</source>
+      <translation>Korrelation mit dem Oberflächenmodell</translation>
+    </message>
+    <message>
       <source>Cubic</source>
       <translation>Kubisch</translation>
     </message>
@@ -336,6 +340,10 @@
       <translation>Diskretes SPSA</translation>
     </message>
     <message>
+      <source>Displacement</source>
+      <translation>Versatz</translation>
+    </message>
+    <message>
       <source>Distortion</source>
       <translation>Verzerrung</translation>
     </message>
@@ -354,6 +362,10 @@
     <message>
       <source>Edge strength</source>
       <translation>Kantenstärke</translation>
+    </message>
+    <message>
+      <source>Elevated objects are laid over the ground, hide it and cast shadows: that follows from heights and the angles of view, and is computed by casting rays. Without the view of the image that is to be registered, only what the reference itself does not show is masked. `coregister`, `extract_gcps` and `refine_rpc` make the same mask themselves if given a surface model.</source>
+      <translation>Erhöhte Objekte legen sich über den Boden, verdecken ihn und werfen Schatten: das folgt aus Höhen und Blickwinkeln und wird durch Strahlverfolgung berechnet. Ohne die Blickrichtung des Bildes, das registriert werden soll, wird nur maskiert, was die Referenz selbst nicht zeigt. `coregister`, `extract_gcps` und `refine_rpc` machen dieselbe Maske selbst, wenn ein Oberflächenmodell angegeben ist.</translation>
     </message>
     <message>
       <source>Ellipsoid</source>
@@ -508,12 +520,20 @@
       <translation>Fourier–Mellin</translation>
     </message>
     <message>
+      <source>From where the image was taken, for the surface model: a STAC item (.json), or words such as 'radar azimuth=280 incidence=35' and 'camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'; azimuths from the ground to the sensor or sun, clockwise from north, incidence from the vertical. By default the STAC item of the image's own name beside it.</source>
+      <translation>Von wo das Bild aufgenommen wurde, für das Oberflächenmodell: ein STAC-Item (.json) oder Worte wie 'radar azimuth=280 incidence=35' und 'camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'; Azimute vom Boden zum Sensor oder zur Sonne, im Uhrzeigersinn von Norden, der Einfallswinkel von der Senkrechten. Ohne Angabe das STAC-Item mit dem Namen des Bildes daneben.</translation>
+    </message>
+    <message>
       <source>Gamma MAP</source>
       <translation>Gamma MAP</translation>
     </message>
     <message>
       <source>Gaussian (RBF)</source>
       <translation>Gauß (RBF)</translation>
+    </message>
+    <message>
+      <source>GeoTIFF of three bands over the overlap: by how much the input is moved to the east and to the north, and the standard deviation of that; in metres, without georeferencing in pixels to the right and down.</source>
+      <translation>GeoTIFF mit drei Kanälen über der Überlappung: um wie viel die Eingabe nach Osten und nach Norden bewegt wird, und die Standardabweichung davon; in Metern, ohne Georeferenz in Pixeln nach rechts und unten.</translation>
     </message>
     <message>
       <source>GeoTIFF that is 1 on homogeneous regions whose shape is that of roads, waters, fields or squares.</source>
@@ -532,8 +552,24 @@
       <translation>GeoTIFF mit einem Pixel für jede Verschiebung; der erste Kanal hat die Werte des Maßes, der zweite robuste Standardabweichungen vom langsamen Verlauf.</translation>
     </message>
     <message>
+      <source>GeoTIFF with the image's bands, data type, nodata value, colours and metadata. A name that ends in .cog.tif makes it a Cloud Optimized GeoTIFF.</source>
+      <translation>GeoTIFF mit den Kanälen, dem Datentyp, dem Nodata-Wert, den Farben und Metadaten des Bildes. Ein Name, der auf .cog.tif endet, macht es zu einem Cloud Optimized GeoTIFF.</translation>
+    </message>
+    <message>
       <source>GeoTIFF with the input's bands, data type and nodata value; complex images become amplitudes.</source>
       <translation>GeoTIFF mit den Kanälen, dem Datentyp und dem Nodata-Wert der Eingabe; komplexe Bilder werden zu Amplituden.</translation>
+    </message>
+    <message>
+      <source>GeoTIFF with the input's bands, data type, nodata value, colours and metadata. A name that ends in .cog.tif makes it a Cloud Optimized GeoTIFF.</source>
+      <translation>GeoTIFF mit den Kanälen, dem Datentyp, dem Nodata-Wert, den Farben und Metadaten der Eingabe. Ein Name, der auf .cog.tif endet, macht es zu einem Cloud Optimized GeoTIFF.</translation>
+    </message>
+    <message>
+      <source>GeoTIFF with the input's bands, data type, nodata value, colours and metadata. A name that ends in .cog.tif makes it a Cloud Optimized GeoTIFF. A .vrt, for a shift alone, puts the input's own file in its right place: no pixel is written.</source>
+      <translation>GeoTIFF mit den Kanälen, dem Datentyp, dem Nodata-Wert, den Farben und Metadaten der Eingabe. Ein Name, der auf .cog.tif endet, macht es zu einem Cloud Optimized GeoTIFF. Eine .vrt legt bei reiner Verschiebung die eigene Datei der Eingabe an ihren richtigen Ort: kein Pixel wird geschrieben.</translation>
+    </message>
+    <message>
+      <source>GeoTIFF with why each pixel takes no part, as a sum: 1 raised, 2 layover, 4 radar shadow, 8 hidden from the camera, 16 cast shadow, 32 unknown.</source>
+      <translation>GeoTIFF mit dem Grund, warum jedes Pixel nicht teilnimmt, als Summe: 1 erhöht, 2 Layover, 4 Radarschatten, 8 der Kamera verdeckt, 16 Schlagschatten, 32 unbekannt.</translation>
     </message>
     <message>
       <source>Geoid grid</source>
@@ -542,6 +578,10 @@
     <message>
       <source>Gets reference.tif (SAR), input.tif (optical), dem.tif, dsm.tif, reference.json and input.json (view angles), truth.json, check_points.csv and roof_points.csv; input_dem.tif where the terrain has an error.</source>
       <translation>Bekommt reference.tif (SAR), input.tif (optisch), dem.tif, dsm.tif, reference.json und input.json (Blickwinkel), truth.json, check_points.csv und roof_points.csv; input_dem.tif, wenn das Gelände einen Fehler hat.</translation>
+    </message>
+    <message>
+      <source>Gets sensor.tif (optical, with RPCs), reference.tif (SAR), dem.tif, dsm.tif, reference.json and sensor.json (view angles), exact_rpc.txt, truth.json, check_points.csv and roof_points.csv.</source>
+      <translation>Bekommt sensor.tif (optisch, mit RPCs), reference.tif (SAR), dem.tif, dsm.tif, reference.json und sensor.json (Blickwinkel), exact_rpc.txt, truth.json, check_points.csv und roof_points.csv.</translation>
     </message>
     <message>
       <source>Give a mask of level ground where there are high buildings or hills: layover displaces them. Images without georeferencing are matched in pixel coordinates and may have any rotation; distances are then in pixels.</source>
@@ -614,6 +654,10 @@
     <message>
       <source>Heights of another geoid above the ellipsoid, in place of a vertical datum by name.</source>
       <translation>Höhen eines anderen Geoids über dem Ellipsoid, statt eines Höhenbezugs mit Namen.</translation>
+    </message>
+    <message>
+      <source>Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with a field height in metres. Only ground that both images show takes part: no layover, radar shadow, relief displacement or cast shadow. Needs the views of both images.</source>
+      <translation>Höhen von Dächern, Baumkronen und Boden (DSM), oder ein Vektorlayer von Gebäuden mit einem Feld height in Metern. Nur Boden, den beide Bilder zeigen, nimmt teil: kein Layover, Radarschatten, Reliefversatz oder Schlagschatten. Braucht die Blickrichtungen beider Bilder.</translation>
     </message>
     <message>
       <source>Heights of the ground, in any CRS. Where the input was orthorectified with others, or with one height, it is displaced in proportion to the difference: model auto may take this out, too, if the points justify it.</source>
@@ -886,6 +930,14 @@
     <message>
       <source>Mask all of a radar image but homogeneous regions on the ground: roads, waters, squares.</source>
       <translation>Alles von einem Radarbild maskieren außer homogenen Regionen am Boden: Straßen, Gewässern, Plätzen.</translation>
+    </message>
+    <message>
+      <source>Mask all of an image but the ground that a surface model and the views of images leave.</source>
+      <translation>Alles von einem Bild maskieren außer dem Boden, den ein Oberflächenmodell und die Blickrichtungen der Bilder lassen.</translation>
+    </message>
+    <message>
+      <source>Mask by a surface model</source>
+      <translation>Maske aus einem Oberflächenmodell</translation>
     </message>
     <message>
       <source>Mask by regions</source>
@@ -1288,6 +1340,10 @@
       <translation>Grund des Urteils</translation>
     </message>
     <message>
+      <source>Reasons</source>
+      <translation>Gründe</translation>
+    </message>
+    <message>
       <source>Reference</source>
       <translation>Referenz</translation>
     </message>
@@ -1680,6 +1736,10 @@
       <translation>Sonne</translation>
     </message>
     <message>
+      <source>Surface model</source>
+      <translation>Oberflächenmodell</translation>
+    </message>
+    <message>
       <source>Swipe</source>
       <translation>Wischen</translation>
     </message>
@@ -1974,6 +2034,18 @@
     <message>
       <source>View azimuth</source>
       <translation>Blickazimut</translation>
+    </message>
+    <message>
+      <source>View of the image</source>
+      <translation>Blickrichtung des Bildes</translation>
+    </message>
+    <message>
+      <source>View of the input</source>
+      <translation>Blickrichtung der Eingabe</translation>
+    </message>
+    <message>
+      <source>View of the reference</source>
+      <translation>Blickrichtung der Referenz</translation>
     </message>
     <message>
       <source>Warp</source>

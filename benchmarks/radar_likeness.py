@@ -1,0 +1,234 @@
+"""How far simulated radar images are like real ones, by statistics that matching depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from groundtie.arrays import Raster
+from groundtie.masks.choice import share_of_strong_scatterers
+from groundtie.masks.scene import Scene
+from groundtie.rasters.reading import Window, open_raster
+from groundtie.simulation.sar import SarOptions, render_sar
+from groundtie.simulation.scene import SceneOptions, generate_scene
+from groundtie.speckle.statistics import estimate_looks, local_statistics
+
+from .cases import read_cases
+from .suites import Settings, SuiteResult, Table
+
+SIZE_PX = 600
+_MARGIN_PX = 192
+_QUICK_SEEDS = 1
+
+# Window of the texture, lags of the autocorrelation, and the step that is an edge between the means
+# of blocks, where the speckle of one look has 1.4 dB.
+_WINDOW_PX, _LAGS_PX, _BLOCK_PX, _EDGE_DB = 9, 64, 4, 5.0
+
+_Image = NDArray[np.float32]
+
+# Radar images of SAR–optical pairs, by group; not those in decibels or rescaled. Both images of the
+# SAR–SAR pairs are country.
+_TOWNS = {
+    "so-rosenheim": "SAR2_sen.tif",
+    "so-dense-urban": "SAR_sen.png",
+    "so-interchange": "pair10-2.jpg",
+    "so-airport": "t1.tif",
+}
+_COUNTRY = {"so-fields": "SAR1_sen.tif", "so-delta": "SO1a.png", "so-forest-river": "SO3a.png"}
+
+# Share of the sides of a real image that is looked at, in its middle: some have empty corners.
+_MIDDLE = 0.7
+
+SIMULATED: Mapping[str, tuple[float, float]] = {
+    # Pixel size and looks, about as the real images have them.
+    "rural": (3.0, 2.0),
+    "suburban": (3.0, 2.0),
+    "urban": (3.0, 2.0),
+    "city": (3.0, 2.0),
+    "city, 1 m, 1 look": (1.0, 1.0),
+}
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """Statistics of one radar image.
+
+    Parameters
+    ----------
+    name, group
+        Which image, and with which others it is counted.
+    looks
+        Equivalent number of looks in homogeneous areas.
+    span_db, tail_db
+        From the 10 % to the 90 % quantile of the power, and from the median to the 99 % one.
+    strong
+        Share of strong scatterers, 0 to 1: blocks 6 dB above the median.
+    texture
+        Median coefficient of variation in windows, over that of the speckle.
+    near, far
+        Autocorrelation of the logarithm at 1 px, and the lag at which it falls below a tenth; at
+        most `_LAGS_PX`.
+    edges
+        Share of borders between blocks, 0 to 1, with a step of `_EDGE_DB` or more.
+    """
+
+    name: str
+    group: str
+    looks: float
+    span_db: float
+    tail_db: float
+    strong: float
+    texture: float
+    near: float
+    far: float
+    edges: float
+
+
+def likeness(name: str, group: str, amplitude: _Image) -> Likeness:
+    """Return the statistics of a radar image, amplitudes of shape (h, w), all of them valid."""
+    power = np.maximum(amplitude, np.float32(0.5)) ** 2
+    valid = np.ones(power.shape, bool)
+    looks = estimate_looks(power, valid)
+    decibels = 10 * np.log10(power)
+    low, middle, high, tail = np.percentile(decibels, [10, 50, 90, 99])
+    variation = np.sqrt(local_statistics(power, valid, _WINDOW_PX).variation2)
+    near, far = autocorrelation(decibels)
+    return Likeness(
+        name,
+        group,
+        looks,
+        float(high - low),
+        float(tail - middle),
+        strong_share(amplitude),
+        float(np.median(variation) * np.sqrt(looks)),
+        near,
+        far,
+        edge_share(power),
+    )
+
+
+def autocorrelation(values: _Image) -> tuple[float, float]:
+    """Return the autocorrelation at 1 px, and from which lag it is below 0.1: means of both axes.
+
+    The mean around each pixel stays in: large structure is part of what is measured.
+    """
+    centred = values - values.mean()
+    size = [scipy.fft.next_fast_len(n + _LAGS_PX, real=True) for n in centred.shape]
+    found = scipy.fft.irfft2(np.abs(scipy.fft.rfft2(centred, size)) ** 2, size)
+    lags = np.arange(_LAGS_PX + 1)
+    height, width = centred.shape
+    # As many products as there are pixels that far apart.
+    along = found[0, : _LAGS_PX + 1] / (width - lags) * width
+    down = found[: _LAGS_PX + 1, 0] / (height - lags) * height
+    curve = (along + down) / 2 / found[0, 0]
+    below = np.flatnonzero(curve < 0.1)
+    return float(curve[1]), float(below[0] if len(below) else _LAGS_PX)
+
+
+def strong_share(amplitude: _Image) -> float:
+    """Return the share of strong scatterers, as it is counted for every pair."""
+    with open_raster(Raster(amplitude)) as made:
+        return share_of_strong_scatterers(Scene.of(made))
+
+
+def edge_share(power: _Image) -> float:
+    """Return the share of neighbouring blocks whose mean power differs by an edge or more."""
+    height, width = (n // _BLOCK_PX for n in power.shape)
+    inside = power[: height * _BLOCK_PX, : width * _BLOCK_PX]
+    blocks = cv2.resize(inside, (width, height), interpolation=cv2.INTER_AREA)
+    level = 10 * np.log10(blocks)
+    steps = [np.abs(np.diff(level, axis=axis)).ravel() for axis in (0, 1)]
+    return float(np.mean(np.concatenate(steps) >= _EDGE_DB))
+
+
+def real_images(data: Path) -> Iterator[Likeness]:
+    """Yield the statistics of the radar images of the real pairs."""
+    for group, named in (("real, towns", _TOWNS), ("real, country", _COUNTRY)):
+        for case, file in named.items():
+            yield likeness(case, group, _middle_of(data / case / file))
+    for pair in read_cases(data):
+        if pair.kind == "sar-sar":
+            for path in (pair.reference, pair.input):
+                yield likeness(f"{pair.name}/{path.stem}", "real, country", _middle_of(path))
+
+
+def _middle_of(path: Path) -> _Image:
+    with open_raster(path) as source:
+        width, height = source.grid.width, source.grid.height
+        inside = [round(side * _MIDDLE) for side in (width, height)]
+        first = [(side - within) // 2 for side, within in zip((width, height), inside, strict=True)]
+        return source.read(Window(*first, *inside))[0]
+
+
+def simulated_images(seeds: Iterable[int]) -> Iterator[Likeness]:
+    """Yield the statistics of simulated radar images."""
+    for kind, (pixel_m, looks) in SIMULATED.items():
+        for seed in seeds:
+            options = SceneOptions((SIZE_PX, SIZE_PX), pixel_m, kind.split(",")[0], seed=seed)
+            image = render_sar(generate_scene(options, _MARGIN_PX), SarOptions(40.0, looks=looks))
+            amplitude = image.astype(np.float32)
+            yield likeness(f"seed {seed}", f"simulated, {kind}", amplitude)
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite."""
+    seeds = range(1, 1 + (_QUICK_SEEDS if settings.quick else min(settings.seeds, 3)))
+    found = [*real_images(settings.data), *simulated_images(seeds)]
+    return SuiteResult(
+        "How simulated radar images are like real ones",
+        (),
+        (likeness_table(found), image_table(found)),
+        [asdict(one) for one in found],
+        (
+            "Medians of the images of a group, in brackets the least and the largest. Looks from "
+            "homogeneous areas; power from the 10 % to the 90 % quantile, and from the median to "
+            "the 99 % one; blocks 6 dB above the median; median coefficient of variation in "
+            f"{_WINDOW_PX} × {_WINDOW_PX} px over the speckle's; autocorrelation of decibels; "
+            f"borders between blocks of {_BLOCK_PX} × {_BLOCK_PX} px with {_EDGE_DB:g} dB or more. "
+            "The real images have 8 bits, with bright scatterers cut off, and pixels of 1 to 10 m.",
+        ),
+    )
+
+
+_COLUMNS: tuple[tuple[str, Callable[[Likeness], float], str], ...] = (
+    ("looks", lambda one: one.looks, "{:.1f}"),
+    ("10–90 % (dB)", lambda one: one.span_db, "{:.0f}"),
+    ("50–99 % (dB)", lambda one: one.tail_db, "{:.0f}"),
+    ("strong scatterers", lambda one: one.strong, "{:.0%}"),
+    ("texture", lambda one: one.texture, "{:.1f}"),
+    ("correlation at 1 px", lambda one: one.near, "{:.2f}"),
+    ("below 0.1 at (px)", lambda one: one.far, "{:.0f}"),
+    ("edges", lambda one: one.edges, "{:.0%}"),
+)
+
+
+def likeness_table(found: Iterable[Likeness]) -> Table:
+    """Return a table with a row for each group of images."""
+    groups: dict[str, list[Likeness]] = {}
+    for one in found:
+        groups.setdefault(one.group, []).append(one)
+    rows = []
+    for name, group in groups.items():
+        cells = []
+        for _, of, form in _COLUMNS:
+            values = np.array([of(one) for one in group])
+            spread = np.median(values), values.min(), values.max()
+            middle, low, high = (form.format(value) for value in spread)
+            cells.append(f"{middle} ({low}–{high})")
+        rows.append([name, str(len(group)), *cells])
+    return Table("By group", ("", "images", *(column for column, _, _ in _COLUMNS)), rows)
+
+
+def image_table(found: Iterable[Likeness]) -> Table:
+    """Return a table with a row for each image."""
+    rows = [
+        [one.group, one.name, *(form.format(value(one)) for _, value, form in _COLUMNS)]
+        for one in found
+    ]
+    return Table("By image", ("", "image", *(column for column, _, _ in _COLUMNS)), rows)
