@@ -11,6 +11,7 @@ import pytest
 import groundtie
 from groundtie.errors import NoOverlapError, ParameterError
 from groundtie.rasters.reading import open_raster
+from groundtie.registration.terrain import stated_lights
 
 SIZE = 400
 
@@ -79,7 +80,8 @@ def test_what_wrong_heights_displace_is_taken_out_and_warped(hills: Path, tmp_pa
     [
         ({"input_dem": "d.tif"}, "input_dem.* goes with another one"),
         ({"dem": "d.tif", "model": "affine"}, "goes with model auto, not affine"),
-        ({"light_azimuth": 150.0}, "goes with light"),
+        ({"light": "moon"}, "states no light: give sun or radar"),
+        ({"light": "sun azimuth=400"}, "states no light"),
         ({"light": "sun"}, "needs its azimuth"),
     ],
 )
@@ -88,6 +90,21 @@ def test_what_does_not_go_together_is_refused(
 ) -> None:
     with pytest.raises(ParameterError, match=message):
         groundtie.coregister(hills / "reference.tif", hills / "input.tif", **given)
+
+
+@pytest.mark.parametrize(
+    ("words", "azimuths"),
+    [
+        (None, []),
+        ("radar", [270.0, 90.0]),
+        ("radar azimuth=98", [98.0]),
+        ("Sun, azimuth=155.5°", [155.5]),
+    ],
+)
+def test_light_is_stated_as_views_are(words: str | None, azimuths: list[float]) -> None:
+    lights = stated_lights(words)
+    assert [light.azimuth_deg for light in lights] == azimuths
+    assert {light.kind for light in lights} <= {str(words).lower().split(",")[0].split()[0]}
 
 
 def test_a_terrain_model_of_elsewhere_is_refused(hills: Path, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ characteristics" as future work.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -18,7 +18,7 @@ from ..masks.choice import AUTO
 from ..progress import Progress
 from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster
-from ..rasters.rendered import RADAR, Light
+from ..rasters.rendered import Light
 from ..sensor.rpc_files import rpc_of
 from .delivery import Call
 from .evidence import SCENE, SURVEY
@@ -30,15 +30,11 @@ from .scene import SceneInfo
 from .sensor_input import Ground, open_sensor_image
 from .sensor_jobs import RefinedRpc, refine
 from .specification import CHIPS, COREGISTER, OPTICAL, SAR_SAR, FreeSearch, Specification
-from .terrain import RADAR_AZIMUTHS_DEG, asked_terrain
+from .terrain import asked_terrain, stated_lights
 from .verdict import Verdict
 
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
 _DOUBTED_DEG, _DOUBTED_SCALE = 10.0, 1.1
-
-# Where the sun may stand: as it is in the morning first. The opposite side differs in the sign of
-# contrast alone. Measured with `benchmarks/run.py --only mountains`: 15° off costs little.
-SUN_AZIMUTHS_DEG = (150.0, 120.0, 180.0, 90.0, 30.0, 60.0)
 
 # Without georeferencing: a quarter of the side, any rotation, half to twice the size.
 _ANYWHERE = FreeSearch(0.25, 180.0, 2.0)
@@ -100,23 +96,12 @@ def plan(scene: SceneInfo, is_georeferenced: bool) -> tuple[Try, ...]:
     return tuple(tries)
 
 
-def plan_lit(kind: str, azimuth_deg: float | None) -> tuple[Try, ...]:
-    """Return what is tried where the reference is a terrain model, in this order.
-
-    Parameters
-    ----------
-    kind
-        What lights it, one of `rendered.LIGHTS`.
-    azimuth_deg
-        Where that stands; None: that is tried.
-    """
-    usual = RADAR_AZIMUTHS_DEG if kind == RADAR else SUN_AZIMUTHS_DEG
-    azimuths = usual if azimuth_deg is None else (azimuth_deg,)
-    because = "the reference is a terrain model, rendered with the {} in {:g}° from north"
-    return tuple(
-        Try("coregister", replace(COREGISTER, light=Light(kind, a)), because.format(kind, a))
-        for a in azimuths
-    )
+def plan_lit(lights: Iterable[Light]) -> Iterator[Try]:
+    """Yield what is tried where the reference is a terrain model, rendered in these lights."""
+    for light in lights:
+        place = f"{light.kind} in {light.azimuth_deg:g}° from north"
+        because = f"the reference is a terrain model, rendered with the {place}"
+        yield Try("coregister", replace(COREGISTER, light=light), because)
 
 
 @dataclass(frozen=True)
@@ -149,8 +134,7 @@ def register_anything(
     call = Call.of(parameters, progress)
     with bounded_cache(), threads(parameters["workers"], progress) as context:
         asked = asked_terrain(parameters) | {"max_error_px": parameters["max_error"]}
-        light, azimuth = parameters["light"], parameters["light_azimuth"]
-        lit = () if light is None else plan_lit(light, azimuth)
+        lit = tuple(plan_lit(stated_lights(parameters["light"])))
         found, stack = _first_accepted(call, asked, lit, context.part(0.0, 0.7))
         return call.deliver(found, context.part(0.7, 1.0), stack)
 

@@ -282,7 +282,7 @@ def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specifica
     return replace(
         preset,
         **asked_terrain(parameters),
-        light=asked_light(parameters),
+        light=asked_light(parameters.get("light")),
         model=model_for_grid(
             parameters["model"], grid_of_output(parameters["output"], parameters["output_grid"])
         ),

@@ -20,7 +20,6 @@ from ..kinds import (
 )
 from ..masks.choice import MASKS
 from ..matching.surface_fit import AUTO
-from ..rasters.rendered import LIGHTS
 from ..registration.registered_output import OUTPUT_GRIDS
 
 Model = Annotated[
@@ -148,25 +147,14 @@ InputDem = Annotated[
         advanced=True,
     ),
 ]
-LightKind = Annotated[
+LightOfTerrain = Annotated[
     str | None,
-    Choice(
+    Text(
         label="Light of a terrain model",
         help="The reference is a terrain model, and is rendered: as the sun lights it, for a "
-        "camera's image, or as a radar images it. By default, the reference is an image.",
-        choices=LIGHTS,
-        advanced=True,
-    ),
-]
-LightAzimuth = Annotated[
-    float | None,
-    Number(
-        label="Azimuth of the light",
-        help="Where the sun or the radar stands, clockwise from north. By default a radar stands "
-        "in the west; register tries azimuths.",
-        unit="°",
-        minimum=0,
-        maximum=360,
+        "camera's image, or as a radar images it. sun or radar, and where from, clockwise from "
+        "north: sun azimuth=155. Without azimuth a radar stands in the west; register tries "
+        "azimuths. By default, the reference is an image.",
         advanced=True,
     ),
 ]

@@ -152,10 +152,6 @@
       <translation>Automatisch</translation>
     </message>
     <message>
-      <source>Azimuth of the light</source>
-      <translation>Azimut des Lichts</translation>
-    </message>
-    <message>
       <source>Back (B)</source>
       <translation>Zurück (B)</translation>
     </message>
@@ -1732,10 +1728,6 @@
       <translation>Vorstädtisch</translation>
     </message>
     <message>
-      <source>Sun</source>
-      <translation>Sonne</translation>
-    </message>
-    <message>
       <source>Surface model</source>
       <translation>Oberflächenmodell</translation>
     </message>
@@ -1860,8 +1852,8 @@
       <translation>Das Raster kann das registrierte sein oder ein anderes derselben Szene: andere Kanäle, eine andere Pixelgröße, ein anderer Zeitpunkt auf demselben Gitter. Raster mit Georeferenz werden nach ihr gelegt; ein Raster ohne sie muss die Größe des registrierten haben. Alle Kanäle werden einmal neu abgetastet, aus den ursprünglichen Pixeln. Verknüpfungspunkte werden ausgeglichen, wie sie sind: die als verworfen oder als Prüfpunkte bezeichneten bleiben weg.</translation>
     </message>
     <message>
-      <source>The reference is a terrain model, and is rendered: as the sun lights it, for a camera's image, or as a radar images it. By default, the reference is an image.</source>
-      <translation>Die Referenz ist ein Geländemodell und wird gezeichnet: wie die Sonne es beleuchtet, für ein Kamerabild, oder wie ein Radar es abbildet. Sonst ist die Referenz ein Bild.</translation>
+      <source>The reference is a terrain model, and is rendered: as the sun lights it, for a camera's image, or as a radar images it. sun or radar, and where from, clockwise from north: sun azimuth=155. Without azimuth a radar stands in the west; register tries azimuths. By default, the reference is an image.</source>
+      <translation>Die Referenz ist ein Geländemodell und wird gerendert: wie die Sonne es beleuchtet, für ein Kamerabild, oder wie ein Radar es abbildet. sun oder radar, und von wo, im Uhrzeigersinn von Norden: sun azimuth=155. Ohne azimuth steht ein Radar im Westen; register probiert Azimute. Standardmäßig ist die Referenz ein Bild.</translation>
     </message>
     <message>
       <source>The reference's pixels</source>
@@ -2126,10 +2118,6 @@
     <message>
       <source>Where the satellite with the camera flies to, clockwise from north.</source>
       <translation>Wohin der Satellit mit der Kamera fliegt, im Uhrzeigersinn von Norden.</translation>
-    </message>
-    <message>
-      <source>Where the sun or the radar stands, clockwise from north. By default a radar stands in the west; register tries azimuths.</source>
-      <translation>Wo die Sonne oder das Radar steht, im Uhrzeigersinn von Norden. Ohne Angabe steht ein Radar im Westen; register probiert Azimute.</translation>
     </message>
     <message>
       <source>Where the window's centre lies, in the CRS of the reference; by default the middle of the overlap.</source>
