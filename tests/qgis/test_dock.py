@@ -63,7 +63,10 @@ class Desktop:
     def refresh(self) -> None:
         from qgis.core import QgsProject
 
-        self.canvas.setLayers(QgsProject.instance().layerTreeRoot().checkedLayers())
+        layers = QgsProject.instance().layerTreeRoot().checkedLayers()
+        self.canvas.setLayers(layers)
+        if not layers:
+            return  # Nothing is drawn, and no signal comes.
         drawn: list[bool] = []
 
         def note() -> None:
@@ -74,7 +77,7 @@ class Desktop:
         self.wait(lambda: bool(drawn) and not self.canvas.isDrawing())
         self.canvas.mapCanvasRefreshed.disconnect(note)
 
-    def wait(self, until: Callable[[], bool], least: float = 0.0, most: float = 300.0) -> None:
+    def wait(self, until: Callable[[], bool], least: float = 0.0, most: float = 120.0) -> None:
         import time
 
         from qgis.core import QgsApplication
