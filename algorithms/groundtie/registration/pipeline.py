@@ -18,7 +18,6 @@ from ..features.presets import optical_keypoints, sar_keypoints
 from ..geometry.estimation import Estimate
 from ..geometry.judging import LARGEST_LOG10_CHANCE, LOG10_CHANCE_ON_GROUND
 from ..geometry.models import TERRAIN, Model
-from ..geometry.terrain import Terrain
 from ..masks.choice import MaskUsed
 from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
 from ..matching.check import CHECK_RADIUS_PX, Check, check_model
@@ -44,6 +43,7 @@ from .registration import Registration
 from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
 from .surface_masks import ModelFit, fit_of, with_surface_mask
+from .terrain import open_terrain
 from .user_masks import named_masks, with_user_masks
 from .verdict import judge, judge_search
 
@@ -346,7 +346,7 @@ def _fit(
     """Return what fits the model, by the name of the specification's matcher."""
     layout = held_out.layout
     if spec.matcher == CHIPS:
-        terrain = None if spec.dem is None else _terrain(pair, spec)
+        terrain = None if spec.dem is None else open_terrain(pair, spec.dem, spec.input_dem)
         candidates = spec.candidates if terrain is None else TERRAIN_CANDIDATES
         if spec.light is not None:
             # Polynomials bend along what no rendering shows: land cover and what is laid over.
@@ -362,20 +362,3 @@ def _fit(
     # Polynomials bend along elevated objects: "auto" chooses among what keypoints choose from.
     fit = SurfaceFit(chips, layout, LINEAR_CANDIDATES)
     return GuidedFit(KeypointFit(keypoints, SurfaceFit(matcher, layout)), fit)
-
-
-def _terrain(pair: ImagePair, spec: Specification) -> Terrain:
-    """Return the heights of a specification where a pair may show something.
-
-    Raises
-    ------
-    GeoreferencingError, NoOverlapError, RasterContentError
-        They are not known where the images overlap.
-    """
-    corners = pair.surroundings.pixel_to_map(pair.surroundings.outline())
-    left, bottom = corners.min(axis=0).tolist()
-    right, top = corners.max(axis=0).tolist()
-    crs = pair.grid.crs
-    terrain = Terrain.open(spec.dem, spec.input_dem, crs, (left, bottom, right, top))
-    terrain.require_cover(pair.grid, pair.input.source.grid, crs)
-    return terrain

@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import ParameterError
+from ..geometry.terrain import Terrain
 from ..matching.surface_fit import AUTO
+from ..rasters.pair import ImagePair
 from ..rasters.rendered import LIGHTS, RADAR, SUN, Light
 
 # Where it may stand, the likeliest first. Satellites fly nearly from pole to pole: a radar looks
@@ -33,6 +35,30 @@ def asked_terrain(given: Mapping[str, Any]) -> dict[str, Any]:
     if dem is not None and model != AUTO:
         raise ParameterError(f"a terrain model (dem) goes with model {AUTO}, not {model}")
     return {"dem": dem, "input_dem": input_dem}
+
+
+def open_terrain(pair: ImagePair, dem: Any, input_dem: Any | None) -> Terrain:
+    """Return heights where a pair may show something.
+
+    Parameters
+    ----------
+    pair
+        The images.
+    dem, input_dem
+        The ground's heights, and those that the input was made with; None: one height.
+
+    Raises
+    ------
+    GeoreferencingError, NoOverlapError, RasterContentError
+        They are not known where the images overlap.
+    """
+    corners = pair.surroundings.pixel_to_map(pair.surroundings.outline())
+    left, bottom = corners.min(axis=0).tolist()
+    right, top = corners.max(axis=0).tolist()
+    crs = pair.grid.crs
+    terrain = Terrain.open(dem, input_dem, crs, (left, bottom, right, top))
+    terrain.require_cover(pair.grid, pair.input.source.grid, crs)
+    return terrain
 
 
 def stated_lights(words: str | None) -> tuple[Light, ...]:
