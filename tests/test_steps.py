@@ -128,6 +128,7 @@ class TestFromImagesToVerdict:
         assert not verdict.accepted
         assert verdict.rule == "too few points"
 
+    @pytest.mark.slow
     def test_rasters_on_the_map(self) -> None:
         grid = utm_grid(SIZE, SIZE)
         reference, input = (Raster(image, grid.transform, UTM) for image in pair())

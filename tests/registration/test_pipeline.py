@@ -115,6 +115,7 @@ def counting(monkeypatch: pytest.MonkeyPatch) -> Counter[tuple[str, object]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tool", PRESETS)
 def test_each_fact_about_an_image_is_found_once(
     town: tuple[Path, Path], context: Context, monkeypatch: pytest.MonkeyPatch, tool: str
@@ -171,6 +172,7 @@ def test_matchers_are_put_together_by_name(textured: TexturedPair, context: Cont
             assert stages.matcher.held_out is stages.held_out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tries", "more"), [(1, 0.0), (100, 2.0)])
 def test_tries_count_against_agreement_by_chance(
     textured: TexturedPair, context: Context, tries: int, more: float
@@ -239,6 +241,7 @@ def refused_by_house_rules(
 SEARCHED, CHECKED = (SEARCH,), (AGREEMENT, ERROR, SCENE, SURVEY)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tool", [*PRESETS, "register"])
 @pytest.mark.parametrize("stages", [SEARCHED, CHECKED], ids=["search", "check"])
 def test_every_tool_is_judged_by_the_rules_of_every_stage(
@@ -267,6 +270,7 @@ def sensor(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return make_scene(tmp_path_factory.mktemp("sensor"), None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tool", "stages", "expected"),
     [

@@ -22,6 +22,7 @@ from groundtie.tools.filter_speckle import filter_speckle
 from groundtie.tools.simulate import simulate
 
 
+@pytest.mark.slow
 def test_a_threshold_mask_is_used_and_reported(
     simulated: Callable[[str], SimulatedFiles], tmp_path: Path
 ) -> None:
@@ -33,6 +34,7 @@ def test_a_threshold_mask_is_used_and_reported(
     assert pair.error_px(result.transform) < 0.5
 
 
+@pytest.mark.slow
 def test_either_image_can_be_masked(simulated: Callable[[str], SimulatedFiles]) -> None:
     """The optical image is the reference here: the radar's is found all the same."""
     pair = simulated("shift")
@@ -43,6 +45,7 @@ def test_either_image_can_be_masked(simulated: Callable[[str], SimulatedFiles]) 
         assert mask.share == pytest.approx(0.8, abs=0.06)
 
 
+@pytest.mark.slow
 def test_fields_are_left_without_a_mask_by_auto(
     simulated: Callable[[str], SimulatedFiles], tmp_path: Path
 ) -> None:
@@ -52,6 +55,7 @@ def test_fields_are_left_without_a_mask_by_auto(
     assert mask.kind == "none" and "too few buildings" in mask.reason
 
 
+@pytest.mark.slow
 def test_a_layer_does_the_same_job(
     simulated: Callable[[str], SimulatedFiles], tmp_path: Path
 ) -> None:
@@ -100,6 +104,7 @@ def open_city(tmp_path_factory: pytest.TempPathFactory) -> SimulatedFiles:
     return SimulatedFiles(folder)
 
 
+@pytest.mark.slow
 def test_a_dense_city_is_registered_by_its_ground(
     open_city: SimulatedFiles, tmp_path: Path
 ) -> None:
@@ -121,6 +126,7 @@ def filtered(city: SimulatedFiles) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_city_without_speckle_is_refused(open_city: SimulatedFiles, tmp_path: Path) -> None:
     """Nothing but the filter's tag tells that it is a radar's."""
     filtered, report = tmp_path / "filtered.tif", tmp_path / "report.html"
@@ -131,6 +137,7 @@ def test_a_city_without_speckle_is_refused(open_city: SimulatedFiles, tmp_path: 
     assert (told["mask"]["kind"], told["mask"]["image"]) == ("regions", "reference")
 
 
+@pytest.mark.slow
 def test_where_nothing_tells_the_radar_few_who_agree_are_not_enough(
     city: SimulatedFiles, filtered: Path, tmp_path: Path
 ) -> None:
@@ -147,6 +154,7 @@ def test_where_nothing_tells_the_radar_few_who_agree_are_not_enough(
     assert told["mask"]["kind"] == "none"
 
 
+@pytest.mark.slow
 def test_its_buildings_alone_are_refused(city: SimulatedFiles, tmp_path: Path) -> None:
     """They agree with each other at check points, too: only the ground contradicts."""
     with pytest.raises(NotRegisteredError):

@@ -34,6 +34,7 @@ def registered(folder: Path, model: Model, **options: object) -> tuple[float, Re
     return error_px(found.transform, pair), found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("degrees", "growth"), [(25.0, 1.0), (-40.0, 1.1), (150.0, 0.8)])
 def test_a_rotation_and_a_scale_are_searched_for(
     tmp_path: Path, degrees: float, growth: float
@@ -50,6 +51,7 @@ def test_a_rotation_that_is_not_searched_for_is_refused(tmp_path: Path) -> None:
         registered(tmp_path, rotated(25.0))
 
 
+@pytest.mark.slow
 def test_a_shift_and_a_small_rotation_are_searched_for(tmp_path: Path) -> None:
     error, _ = registered(tmp_path, rotated(4.0), search_rotation=10.0)
     assert error < 0.2

@@ -286,6 +286,7 @@ def test_a_folder_that_cannot_be_written_to(
         coregister(textured.reference, textured.input, "/proc/out.tif")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("message", ["coarse", "tie points", "took no part", "writing"])
 def test_cancelling_leaves_nothing(textured: TexturedPair, tmp_path: Path, message: str) -> None:
     said = ""

@@ -39,6 +39,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
     return write_textured_pair(folder, SIZE, shift_on_map(70.0, -45.0), noise=0.1)
 
 
+@pytest.mark.slow
 def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: Path) -> None:
     found = match_optical(
         files.reference,
@@ -61,6 +62,7 @@ def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: 
     assert np.corrcoef(reference.ravel(), registered.ravel())[0, 1] < -0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("matcher", MATCHERS)
 def test_every_matcher_finds_it_where_contrast_is_alike(
     files: TexturedPair, tmp_path: Path, matcher: str
@@ -94,6 +96,7 @@ def test_another_place_is_refused_and_leaves_its_report_only(tmp_path: Path) -> 
     assert not (tmp_path / "o.tif").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("radar", "refused"), [(True, True), (False, False)])
 def test_a_radar_image_that_may_show_a_dense_town_is_in_doubt(
     files: TexturedPair,
@@ -112,6 +115,7 @@ def test_a_radar_image_that_may_show_a_dense_town_is_in_doubt(
     assert (tmp_path / "out.tif").exists() == (not refused)
 
 
+@pytest.mark.slow
 def test_images_without_georeferencing_may_be_turned_and_larger(tmp_path: Path) -> None:
     pair = write_textured_pair(tmp_path, SIZE, shift_on_map(0, 0), noise=0.1)
     values = np.kron(np.rot90(pixels(pair.input)[0]), np.ones((2, 2), np.uint16))[:, 60:]
@@ -128,6 +132,7 @@ def test_images_without_georeferencing_may_be_turned_and_larger(tmp_path: Path) 
     assert np.hypot(*off.T).max() < 1.5
 
 
+@pytest.mark.slow
 def test_what_a_coarser_image_shows_is_matched_all_over(tmp_path: Path) -> None:
     """Without georeferencing, an image of fewer pixels may show just as much."""
     pair = write_textured_pair(tmp_path, SIZE, shift_on_map(0, 0), noise=0.05)
@@ -144,6 +149,7 @@ def test_what_a_coarser_image_shows_is_matched_all_over(tmp_path: Path) -> None:
     assert np.hypot(*off.T).max() < 1.0
 
 
+@pytest.mark.slow
 def test_an_image_that_is_turned_is_classified_all_over(tmp_path: Path) -> None:
     """It may show the reference where, as it claims, it lies far beyond it."""
     pair = write_textured_pair(tmp_path, SIZE, shift_on_map(0, 0), noise=0.1)
@@ -170,6 +176,7 @@ def test_a_classifier_of_other_bands_is_refused(files: TexturedPair, tmp_path: P
     assert list(listing(tmp_path)) == ["c.json"]
 
 
+@pytest.mark.slow
 def test_features_that_a_classifier_leaves_out_take_no_part(
     files: TexturedPair, tmp_path: Path
 ) -> None:

@@ -31,6 +31,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
     return write_speckled_pair(folder, SIZE, shift_on_map(70.0, -45.0))
 
 
+@pytest.mark.slow
 def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: Path) -> None:
     found = match_sar_sar(
         files.reference,
@@ -83,6 +84,7 @@ def test_keypoints_that_a_classifier_leaves_out_take_no_part(
     assert error_px(found.transform, files) < 1.0
 
 
+@pytest.mark.slow
 def test_check_points_lie_where_no_keypoint_was_seen(files: TexturedPair, tmp_path: Path) -> None:
     found = match_sar_sar(files.reference, files.input, tmp_path / "out.tif")
     points = found.tie_points
@@ -105,6 +107,7 @@ def test_another_place_is_refused_and_leaves_its_report_only(tmp_path: Path) -> 
     assert not (tmp_path / "o.tif").exists()
 
 
+@pytest.mark.slow
 def test_an_image_that_may_show_a_dense_town_to_a_camera_is_in_doubt(
     files: TexturedPair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -121,6 +124,7 @@ def test_an_image_that_may_show_a_dense_town_to_a_camera_is_in_doubt(
     match_sar_sar(files.reference, files.input, tmp_path / "other.tif")
 
 
+@pytest.mark.slow
 def test_images_without_georeferencing_may_be_turned(tmp_path: Path) -> None:
     turned = write_speckled_pair(tmp_path, SIZE, shift_on_map(0, 0))
     values = np.rot90(pixels(turned.input)[0]).copy()
@@ -137,6 +141,7 @@ def test_images_without_georeferencing_may_be_turned(tmp_path: Path) -> None:
     assert np.hypot(*off.T).max() < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("image", ["reference", "input"])
 def test_strong_scatterers_of_either_image_may_be_left_out(files: TexturedPair, image: str) -> None:
     spec = replace(SAR_SAR, mask="threshold", radar=image)
@@ -147,6 +152,7 @@ def test_strong_scatterers_of_either_image_may_be_left_out(files: TexturedPair, 
     assert error_px(found.transform, files) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("image", ["reference", "input"])
 def test_keypoints_on_a_mask_of_either_image_take_no_part(
     files: TexturedPair, tmp_path: Path, image: str
@@ -188,6 +194,7 @@ def test_elevated_objects_are_not_taken_for_the_ground(files: TexturedPair, tmp_
     assert "ground and elevated objects" in str(refused.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tool", [match_sar_sar, coregister])
 def test_layover_is_refused(
     files: TexturedPair,

@@ -28,6 +28,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return make_scene(tmp_path_factory.mktemp("scene"), DRIFT)
 
 
+@pytest.mark.slow
 def test_a_reference_and_a_terrain_model_make_the_rpcs_right(scene: Scene, tmp_path: Path) -> None:
     result = groundtie.refine_rpc(
         scene.image,
@@ -84,6 +85,7 @@ def test_a_terrain_model_of_a_part_serves_for_matching_that_part(
     assert scene.error_px(read_rpc(tmp_path / "refined_RPC.TXT")) < 1.0
 
 
+@pytest.mark.slow
 def test_a_refused_matching_leaves_its_report(scene: Scene, tmp_path: Path) -> None:
     """The reference shows other ground."""
     with rasterio.open(scene.reference) as source:
