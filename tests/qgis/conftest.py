@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+from unittest.mock import MagicMock
 
 import pytest
 
@@ -150,3 +151,20 @@ def qgis_process_in(folder: Path, plugins: Path) -> QgisProcess:
 def qgis_process(tmp_path_factory: pytest.TempPathFactory, plugin_folder: Path) -> QgisProcess:
     """Call `qgis_process` with the built plugin; keywords are environment variables."""
     return qgis_process_in(tmp_path_factory.mktemp("qgis_process"), plugin_folder)
+
+
+@pytest.fixture
+def iface(provider: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """What dialogs and dock need of a desktop."""
+    import qgis.utils
+    from qgis.core import QgsProject
+    from qgis.gui import QgsMapCanvas
+    from qgis.PyQt.QtWidgets import QMainWindow
+
+    window, iface = QMainWindow(), MagicMock()
+    iface.mainWindow.return_value = window
+    iface.mapCanvas.return_value = QgsMapCanvas(window)
+    iface.activeLayer.return_value = None
+    monkeypatch.setattr(qgis.utils, "iface", iface)
+    yield iface
+    QgsProject.instance().clear()

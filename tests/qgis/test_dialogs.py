@@ -3,33 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 from noise_pairs import write_pair, write_raster
 
 from groundtie.tools import NAMES
-
-
-@pytest.fixture
-def iface(provider: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    """What the dialogs need of a desktop."""
-    import qgis.utils
-    from qgis.core import QgsProject
-    from qgis.gui import QgsMapCanvas
-    from qgis.PyQt.QtWidgets import QMainWindow
-
-    window, iface = QMainWindow(), MagicMock()
-    iface.mainWindow.return_value = window
-    iface.mapCanvas.return_value = QgsMapCanvas(window)
-    iface.activeLayer.return_value = None
-    monkeypatch.setattr(qgis.utils, "iface", iface)
-    yield iface
-    QgsProject.instance().clear()
 
 
 def add(path: Path) -> Any:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from unittest.mock import MagicMock
 
 import pytest
 from noise_pairs import write_pair
@@ -14,21 +12,12 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture
-def desktop(provider: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    """What the dialogs need of a desktop."""
-    import qgis.utils
+def desktop(iface: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Return the window of a desktop, with no results of other runs."""
     from processing.core.ProcessingResults import resultsList
-    from qgis.core import QgsProject
-    from qgis.gui import QgsMapCanvas
-    from qgis.PyQt.QtWidgets import QMainWindow
 
-    window, iface = QMainWindow(), MagicMock()
-    iface.mainWindow.return_value = window
-    iface.mapCanvas.return_value = QgsMapCanvas(window)
-    monkeypatch.setattr(qgis.utils, "iface", iface)
     monkeypatch.setattr(resultsList, "results", [])
-    yield window
-    QgsProject.instance().clear()
+    return iface.mainWindow()
 
 
 def load(folder: Path, names: list[str]) -> list[Any]:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from unittest.mock import MagicMock
 
 import pytest
 
@@ -18,21 +16,6 @@ def german(provider: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from groundtie_qgis import translation
 
     monkeypatch.setattr(translation, "language", lambda: "de")
-
-
-@pytest.fixture
-def iface(provider: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    """What dialogs and dock need of a desktop."""
-    import qgis.utils
-    from qgis.gui import QgsMapCanvas
-    from qgis.PyQt.QtWidgets import QMainWindow
-
-    window, iface = QMainWindow(), MagicMock()
-    iface.mainWindow.return_value = window
-    iface.mapCanvas.return_value = QgsMapCanvas(window)
-    iface.activeLayer.return_value = None
-    monkeypatch.setattr(qgis.utils, "iface", iface)
-    yield iface
 
 
 def texts_of(widget: Any) -> set[str]:
