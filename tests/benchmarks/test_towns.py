@@ -6,12 +6,15 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pytest
 import rasterio
 from benchmark_outcomes import outcome
 from raster_files import utm_grid, write_raster
 
 from benchmarks import towns
 from benchmarks.accuracy import CORRECT, REFUSED, SILENTLY_WRONG
+from groundtie import simulate
+from groundtie.geometry.views import View
 
 
 def refused(setting: str) -> object:
@@ -48,3 +51,15 @@ def test_a_rough_model_lies_off_and_is_noisy(tmp_path: Path) -> None:
         heights = raster.read(1)
     assert abs(heights.mean() - 50) < 0.1 and abs(heights.std() - 0.5) < 0.05
     assert towns.rough(fine) == path
+
+
+def test_views_are_turned_and_keep_their_angles(tmp_path: Path) -> None:
+    simulate(tmp_path, 64, density="urban", warp=1.0)
+    reference, input = tmp_path / "reference.tif", tmp_path / "input.tif"
+    given = towns.turned_views(reference, input, 90.0, 180.0)
+    for name, file, turn in (("reference", reference, 90.0), ("input", input, 180.0)):
+        right, wrong = View.of(file, None), View.of(file, given[f"{name}_view"])
+        assert right is not None and wrong is not None
+        assert wrong.sensor == right.sensor
+        assert (wrong.azimuth_deg - right.azimuth_deg) % 360 == pytest.approx(turn, abs=0.2)
+        assert wrong.incidence_deg == pytest.approx(right.incidence_deg, abs=0.1)

@@ -8,6 +8,7 @@ from ...geometry.judging import TOLERANCE_PX
 from ...masks.choice import LAYER, REGIONS, SURFACE
 from ..evidence import SCENE, RegistrationEvidence
 from ..layover import count_on_line, scatter_along_line_px
+from ..surface_masks import CLEAR_CORRELATION
 from .rule import Rule
 
 # What the ground shows of a fit that was not made on it: it is itself good to a pixel or two.
@@ -139,8 +140,9 @@ SCENE_RULES: tuple[Rule, ...] = (
     Rule(
         "surface model elsewhere",
         SCENE,
-        "the reference or the registered input does not correlate by 0.1 with what the surface "
-        "model and the view let expect, or the input does elsewhere by more than the largest error",
+        f"the reference or the registered input does not correlate by {CLEAR_CORRELATION:g} with "
+        "what the surface model and the view let expect, or the input does elsewhere by more than "
+        "the largest error",
         "suite towns",
         "give the surface model of this place and the right views, or leave it out",
         _surface_elsewhere,
