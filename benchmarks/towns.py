@@ -21,17 +21,17 @@ from .city import WITHIN_PX, city, median_px, share_within
 from .suites import Goal, Settings, SuiteResult, Table, run_cases
 from .tables import accuracy_table
 
-NONE, MODEL, ROUGH, OTHER, TURNED, OPPOSITE = (
+NONE, MODEL, ROUGH, OTHER, ROTATED, OPPOSITE = (
     "no surface model",
     "surface model",
     "rough surface model",
     "surface model of another city",
-    "the radar's view turned by 90°",
+    "the radar's view rotated by 90°",
     "both views from the other side",
 )
-SETTINGS = (NONE, MODEL, ROUGH, OTHER, TURNED, OPPOSITE)
+SETTINGS = (NONE, MODEL, ROUGH, OTHER, ROTATED, OPPOSITE)
 # By how much the azimuths of the radar, of the camera and of its sun are stated wrong, in degrees.
-_TURNS_DEG = {TURNED: (90.0, 0.0), OPPOSITE: (180.0, 180.0)}
+_ROTATIONS_DEG = {ROTATED: (90.0, 0.0), OPPOSITE: (180.0, 180.0)}
 WANTED_SHARE = 0.9
 LARGEST_PX = 3.0
 _QUICK_SEEDS = 1
@@ -55,13 +55,15 @@ class TownCase:
             other = city(self.seed + 1) if self.setting == OTHER else city(self.seed)
             model = other.pair(self.cache).reference.parent / files.NAMES["dsm"]
             parameters["surface_model"] = rough(model) if self.setting == ROUGH else model
-            if self.setting in _TURNS_DEG:
-                parameters |= turned_views(pair.reference, pair.input, *_TURNS_DEG[self.setting])
+            if self.setting in _ROTATIONS_DEG:
+                parameters |= rotated_views(
+                    pair.reference, pair.input, *_ROTATIONS_DEG[self.setting]
+                )
         name = f"city, seed {self.seed}"
         return attempt(name, self.setting, pair, workers, **parameters)
 
 
-def turned_views(
+def rotated_views(
     reference: Path, input: Path, radar_deg: float, camera_deg: float
 ) -> dict[str, str]:
     """Return the views of the images beside their files, with azimuths that are wrong."""
@@ -71,13 +73,13 @@ def turned_views(
     }
 
 
-def _words(view: View | None, turn_deg: float) -> str:
+def _words(view: View | None, rotation_deg: float) -> str:
     if view is None:
         raise ValueError("a simulated image has no view beside it")
-    words = [view.sensor, f"azimuth={(view.azimuth_deg + turn_deg) % 360:.1f}"]
+    words = [view.sensor, f"azimuth={(view.azimuth_deg + rotation_deg) % 360:.1f}"]
     words.append(f"incidence={view.incidence_deg:.1f}")
     if view.sun_azimuth_deg is not None and view.sun_elevation_deg is not None:
-        words.append(f"sun-azimuth={(view.sun_azimuth_deg + turn_deg) % 360:.1f}")
+        words.append(f"sun-azimuth={(view.sun_azimuth_deg + rotation_deg) % 360:.1f}")
         words.append(f"sun-elevation={view.sun_elevation_deg:.1f}")
     return " ".join(words)
 

@@ -53,10 +53,10 @@ def test_a_rough_model_lies_off_and_is_noisy(tmp_path: Path) -> None:
     assert towns.rough(fine) == path
 
 
-def test_views_are_turned_and_keep_their_angles(tmp_path: Path) -> None:
+def test_views_are_rotated_and_keep_their_angles(tmp_path: Path) -> None:
     simulate(tmp_path, 64, density="urban", warp=1.0)
     reference, input = tmp_path / "reference.tif", tmp_path / "input.tif"
-    given = towns.turned_views(reference, input, 90.0, 180.0)
+    given = towns.rotated_views(reference, input, 90.0, 180.0)
     for name, file, turn in (("reference", reference, 90.0), ("input", input, 180.0)):
         right, wrong = View.of(file, None), View.of(file, given[f"{name}_view"])
         assert right is not None and wrong is not None

@@ -36,7 +36,7 @@ from .user_masks import UserMask, with_mask
 _REACH_PX = 24
 
 # Images correlate with models of other places by up to 0.03, with their own by 0.27 and more, of
-# dense cities by 0.44. Under a view that is turned by 90° or more it was up to 0.31; where such a
+# dense cities by 0.44. Under a view rotated by 90° or more it was up to 0.31; where such a
 # registration was accepted, one of the images had 0.17 or less (suite towns).
 CLEAR_CORRELATION = 0.2
 
