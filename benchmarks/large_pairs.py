@@ -53,7 +53,7 @@ def wrong(size: int) -> Affine:
     centre, rise = size / 2, _WARP_PX / (size / 2)
     around = Affine(1 + rise, -rise, 0, rise, 1 - rise, 0)
     shifted = Affine.translation(centre + _SHIFT_PX[0], centre + _SHIFT_PX[1])
-    return shifted * around * Affine.translation(-centre, -centre)
+    return compose(shifted, around, Affine.translation(-centre, -centre))
 
 
 def repeat(source: Path, target: Path, size: int, moved: Affine) -> None:
