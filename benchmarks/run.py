@@ -30,6 +30,7 @@ SUITES = (
     "rpc_city",
     "sar_sar",
     "speed",
+    "large",
     "guard",
     "kernels",
     "batch",

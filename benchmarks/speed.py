@@ -54,9 +54,6 @@ _TIMES = 3
 _WANTED_RATIO = 60.0
 
 _LARGEST_SHIFT_PX = 20
-LARGEST_PX = 10_000
-SECONDS = {2000: 6.0, LARGEST_PX: 60.0}
-PEAK_BYTES = 1.5e9
 
 # A radar image, filtered and searched for regions on one core.
 RADAR_PX = 4000
@@ -88,19 +85,14 @@ def run(settings: Settings) -> SuiteResult:
     times = 1 if settings.quick else _TIMES
     surfaces = time_surfaces(settings, times)
     affine = time_affine(settings, times)
-    sizes = () if settings.quick else tuple(SECONDS)
-    large = [time_size(settings, size, times if size < LARGEST_PX else 1) for size in sizes]
     radar = time_radar(times)
     timings = rpc_speed.time_points(settings, times, peer_python("orthority"))
     if not settings.quick:
         timings += rpc_speed.time_ortho(settings, times)
-    records = [*surfaces, *affine, *large, *radar]
+    records = [*surfaces, *affine, *radar]
     records += [Record(what, name, seconds, note=note) for what, name, seconds, note in timings]
     goals = [surface_goal(surfaces), *affine_goals(affine), *radar_goals(radar)]
     goals += rpc_speed.goals(timings)
-    goals += [
-        goal for size, record in zip(sizes, large, strict=True) for goal in size_goals(size, record)
-    ]
     return SuiteResult(
         "Speed and memory",
         goals,
@@ -185,18 +177,6 @@ def time_affine(settings: Settings, times: int) -> list[Record]:
         record_of(what, program, measure_often(command, times), pair)
         for program, command in commands.items()
     ]
-
-
-def time_size(settings: Settings, size: int, times: int) -> Record:
-    """Time a registration of images of some size with default parameters."""
-    pair = simulated(settings, size)
-    measured = measure_often(own_command(pair), times)
-    return record_of(size_name(size), OWN, measured, pair)
-
-
-def size_name(size: int) -> str:
-    """Return what `time_size` measures."""
-    return f"default model, {size}×{size} px"
 
 
 def own_command(pair: Pair) -> list[str]:
@@ -303,19 +283,6 @@ def affine_goals(records: Sequence[Record]) -> list[Goal]:
             faster, found = seconds[OWN] < seconds[peer], f"{own} against {seconds[peer]:.1f} s"
         goals.append(Goal(f"Affine against {peer}", "faster", found, faster))
     return goals
-
-
-def size_goals(size: int, record: Record) -> list[Goal]:
-    """Return the goals for images of some size and what was found."""
-    limit = SECONDS[size]
-    fast = Goal(
-        record.what, f"at most {limit:g} s", f"{record.seconds:.1f} s", record.seconds <= limit
-    )
-    if size < LARGEST_PX or record.peak_bytes is None:
-        return [fast]
-    peak = f"{record.peak_bytes / 1e9:.2f} GB"
-    limit_gb = f"at most {PEAK_BYTES / 1e9:g} GB"
-    return [fast, Goal("Its peak memory", limit_gb, peak, record.peak_bytes <= PEAK_BYTES)]
 
 
 def measurements(records: Sequence[Record]) -> Table:

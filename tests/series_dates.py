@@ -11,6 +11,7 @@ from affine import Affine
 from numpy.typing import NDArray
 from raster_files import UTM, utm_grid, write_raster
 from scipy.ndimage import gaussian_filter, map_coordinates
+from speckled_pairs import speckled
 from textured_pairs import texture
 
 from groundtie.rasters.grid import Grid
@@ -70,9 +71,13 @@ def write_dates(
     *,
     elsewhere: Sequence[int] = (),
     cloudy: Sequence[int] = (),
+    looks: float | None = None,
     seed: int = 0,
 ) -> Dates:
-    """Write dates of one texture with random shifts; some show another place, or clouds."""
+    """Write dates of one texture with random shifts; some show another place, or clouds.
+
+    With a number of looks they are amplitudes of a radar, each with its own speckle.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(seed)
     grid = utm_grid(size, size)
@@ -84,7 +89,10 @@ def write_dates(
         canvas = texture(*ground.shape, 900 + date) if date in elsewhere else ground
         place = [rows - shifts[date, 1], cols - shifts[date, 0]]
         seen = map_coordinates(canvas, place, mode="mirror")
-        values = 1000 + 200 * (seen + 0.3 * rng.normal(size=seen.shape))
+        if looks is None:
+            values = 1000 + 200 * (seen + 0.3 * rng.normal(size=seen.shape))
+        else:
+            values = speckled(300 * np.exp(0.6 * seen), looks, 100 * seed + date)
         if date in cloudy:
             deck = gaussian_filter(rng.normal(size=seen.shape), 20)
             cloud = deck > np.quantile(deck, 0.1)

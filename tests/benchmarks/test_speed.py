@@ -17,7 +17,6 @@ from benchmarks.cases import RealCase, write_case
 from benchmarks.speed import (
     AROSICS_LOCAL,
     OWN,
-    PEAK_BYTES,
     SIMPLEITK_AFFINE,
     SIMPLEITK_METRIC,
     Record,
@@ -26,7 +25,6 @@ from benchmarks.speed import (
     measurements,
     peer_python,
     read_window,
-    size_goals,
     surface_goal,
     surface_shifts,
 )
@@ -59,15 +57,6 @@ def test_affine_registrations_are_compared_with_each_peer() -> None:
     records = [record(OWN, 4.0), record(SIMPLEITK_AFFINE, 5.0), record(AROSICS_LOCAL, 3.0)]
     assert [goal.reached for goal in affine_goals(records)] == [True, False]
     assert affine_goals(records)[0].found == "4.0 s against 5.0 s"
-
-
-def test_size_goals_are_on_time_and_for_the_largest_on_memory() -> None:
-    (small,) = size_goals(2000, record(OWN, 6.1, peak_bytes=9e9))
-    assert small.reached is False
-    time, memory = size_goals(10_000, record(OWN, 60.0, peak_bytes=int(PEAK_BYTES)))
-    assert (time.reached, memory.reached) == (True, True)
-    time, memory = size_goals(10_000, record(OWN, 61.0, peak_bytes=int(PEAK_BYTES) + 1))
-    assert (time.reached, memory.reached) == (False, False)
 
 
 def test_missing_peers_stand_in_the_table() -> None:

@@ -77,6 +77,16 @@ def test_bilinear_values_are_scipys(positions: type, dtype: type) -> None:
     np.testing.assert_allclose(found, expected, atol=5e-4)
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.complex64])
+@pytest.mark.parametrize("method", KERNELS)
+def test_bands_that_share_weights_are_what_each_is_alone(method: str, dtype: type) -> None:
+    random = np.random.default_rng(1)
+    bands = random.normal(size=(3, 90, 70)).astype(dtype)
+    px = random.uniform(-3, [[[73]], [[93]]], (2, 200, 150)).astype(np.float32)
+    alone = [interpolate(band, px, method) for band in bands]
+    np.testing.assert_array_equal(interpolate(bands, px, method), np.stack(alone))
+
+
 @pytest.mark.parametrize("order", [2, 3, 4, 7])
 def test_bsplines_are_scipys(order: int) -> None:
     fraction = np.linspace(0, 1, 11)

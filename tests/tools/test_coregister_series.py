@@ -183,6 +183,19 @@ def test_without_a_reference_and_with_untouched_pixels(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_radar_dates_are_registered_and_one_of_another_place_is_named(tmp_path: Path) -> None:
+    dates = write_dates(tmp_path / "dates", 5, 320, elsewhere=[3], looks=1.0)
+    found = coregister_series(tmp_path / "out", [dates.folder], reference=dates.files[0], **OPTIONS)
+    names = dates.names
+    assert all(one.date.is_radar for one in found.dates if one.date is not None)
+    assert {one.name: one.verdict.rule for one in found.left_out} == {names[3]: "date not linked"}
+    for date in (1, 2, 4):
+        assert error_px(found.transforms()[names[date]], dates, date, 0) < 0.3
+    loops = found.loops()
+    assert loops["count"] >= 2 and loops["closed"] == loops["count"]
+
+
+@pytest.mark.slow
 def test_a_refused_series_leaves_its_report_and_exits_3(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -118,8 +118,7 @@ def share_of_strong_scatterers(scene: Scene, progress: Progress = SILENT) -> flo
     Grey values are amplitudes; means over 4 × 4 pixels are compared with their median. Negative
     ones, as decibels have, are none: such an image has no share.
     """
-    parts = [part.values[part.valid] for part in scene.reduced_strips(threshold.BLOCK_PX, progress)]
-    amplitude = np.concatenate(parts)
+    amplitude = scene.sample(threshold.BLOCK_PX, progress)
     if amplitude.size == 0 or amplitude.min() < 0:
         return 0.0
     power = amplitude**2

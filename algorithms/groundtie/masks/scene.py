@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..progress import SILENT, Progress
 from ..rasters.averaging import area_average
@@ -27,6 +28,9 @@ class Selection(NamedTuple):
 
 # Pixels of the result that are averaged at a time.
 _STRIP_PIXELS = 1 << 18
+
+# Means that a histogram is made from, at most: larger scenes are sampled.
+_SAMPLE = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,16 @@ class Scene:
             np.concatenate([strip.values for strip in strips]),
             np.concatenate([strip.valid for strip in strips]),
         )
+
+    def sample(self, factor: int, progress: Progress = SILENT) -> NDArray[np.float32]:
+        """Return the valid means over blocks, shape (n,), of large scenes some spread evenly."""
+        step = max(self.grid.width * self.grid.height // (factor**2 * _SAMPLE), 1)
+        parts, first = [], 0
+        for strip in self.reduced_strips(factor, progress):
+            found = strip.values[strip.valid]
+            parts.append(found[first::step])
+            first = (first - len(found)) % step
+        return np.concatenate(parts)
 
     def reduced_strips(self, factor: int, progress: Progress = SILENT) -> Iterator[Patch]:
         """Yield what `reduced` returns, some rows at a time."""

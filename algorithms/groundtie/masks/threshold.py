@@ -23,9 +23,6 @@ BLOCK_PX = 4
 # Masked by default: 20–30 % served best in [Suri2010].
 HIGH_PERCENT = 20.0
 
-# Blocks of a scene that its histogram is made from, at most.
-_SAMPLE = 4_000_000
-
 
 @dataclass(frozen=True)
 class Threshold:
@@ -51,9 +48,7 @@ class Threshold:
         RasterContentError
             No pixel of the scene is valid.
         """
-        step = max(scene.grid.width * scene.grid.height // (BLOCK_PX**2 * _SAMPLE), 1)
-        strips = scene.reduced_strips(BLOCK_PX, progress)
-        sample = np.concatenate([part.values[::step][part.valid[::step]] for part in strips])
+        sample = scene.sample(BLOCK_PX, progress)
         if sample.size == 0:
             raise RasterContentError(f"{scene.like.path} has no valid pixels to make a mask of")
         low, high = np.percentile(sample, [self.low_percent, 100 - self.high_percent])

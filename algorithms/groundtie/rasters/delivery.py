@@ -34,6 +34,9 @@ from .writing import create_like, fill_value, keep_apart, require_fit
 # Share of the work that is left when all pixels are written: overviews.
 _OVERVIEWS = 0.1
 
+# Bands that are resampled together share their weights, which take as long as one of them.
+_BANDS = 4
+
 
 @dataclass(frozen=True)
 class _Warp:
@@ -89,20 +92,24 @@ class _Warp:
         size = (self.source.grid.width, self.source.grid.height)
         window = source_window(px, size, self.method, self.factor)
         out = np.empty((len(bands), place.height, place.width), self.source.dtype)
-        known = np.zeros(out.shape[1:], bool)
+        valid = np.zeros(out.shape, bool)
         if not window.width or not window.height:
             for i, band in enumerate(bands):
                 out[i] = fill_value(self.source, self.nodata, band)
-            return out, known
+            return out, valid[0]
         px = inside_window(px, window, self.factor)
-        images, valid = self.source.read_bands(window, bands, reduced_shape(window, self.factor))
-        for i in reversed(range(len(bands))):
-            values, known = resample(images[i], valid[i], px, self.method, self.source.dtype)
-            fill = fill_value(self.source, self.nodata, bands[i])
-            if self.nodata is not None or bands[i] == self.source.alpha_band:
+        images, shown = self.source.read_bands(window, bands, reduced_shape(window, self.factor))
+        for first in range(0, len(bands), _BANDS):
+            part = slice(first, first + _BANDS)
+            out[part], valid[part] = resample(
+                images[part], shown[part], px, self.method, self.source.dtype
+            )
+        for values, known, band in zip(out, valid, bands, strict=True):
+            fill = fill_value(self.source, self.nodata, band)
+            if self.nodata is not None or band == self.source.alpha_band:
                 keep_apart(values, fill)
-            out[i] = np.where(known, values, fill)
-        return out, known
+            values[~known] = fill
+        return out, valid[0]
 
 
 def warp_raster(

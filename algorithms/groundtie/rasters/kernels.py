@@ -103,7 +103,7 @@ def interpolate(image: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[A
     Parameters
     ----------
     image
-        Shape (h, w), floating-point or complex.
+        Shape (h, w) or (bands, h, w), floating-point or complex.
     px
         Columns and rows of the positions, shape (2, m, n); they are worked in their own precision.
     method
@@ -111,41 +111,63 @@ def interpolate(image: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[A
 
     Returns
     -------
-    Shape (m, n), dtype of the image.
+    Shape (m, n) or (bands, m, n), dtype of the image.
     """
-    if method == "bilinear" and _is_for_remap(image, px):
-        return np.asarray(cv2.remap(image, px[0], px[1], cv2.INTER_LINEAR))
-    kernel, reach = _KERNELS[method], REACH[method]
-    height, width = image.shape
+    bands = image.reshape(-1, *image.shape[-2:])
+    if method == "bilinear" and _is_for_remap(bands[0], px):
+        found = np.stack([cv2.remap(band, px[0], px[1], cv2.INTER_LINEAR) for band in bands])
+    else:
+        found = _by_kernel(bands, px, _KERNELS[method], REACH[method])
+    return np.asarray(found.reshape(*image.shape[:-2], *px.shape[1:]))
+
+
+def _by_kernel(
+    bands: NDArray[Any], px: NDArray[Any], kernel: Weights, reach: int
+) -> NDArray[Any]:
+    """Return the sums of weighted pixels, shape (bands, m, n); all bands have the same weights."""
+    count, height, width = bands.shape
     # Positions up to a pixel outside, with all that their kernels take.
-    padded = np.zeros((height + 2 * reach + 1, width + 2 * reach + 1), image.dtype)
-    padded[reach : reach + height, reach : reach + width] = image
-    flat, stride = padded.ravel(), padded.shape[1]
+    padded = np.zeros((count, height + 2 * reach + 1, width + 2 * reach + 1), bands.dtype)
+    padded[:, reach : reach + height, reach : reach + width] = bands
+    images, stride = padded.reshape(count, -1), padded.shape[2]
     x, y = (np.asarray(axis).ravel() for axis in px)
-    out = np.empty(x.shape, image.dtype)
+    out = np.empty((count, len(x)), bands.dtype)
     for start in range(0, len(x), _BLOCK_PIXELS):
         part = slice(start, start + _BLOCK_PIXELS)
         left, right_share = _split(x[part], width)
         top, lower_share = _split(y[part], height)
-        across = kernel(right_share.astype(image.real.dtype, copy=False))
-        down = kernel(lower_share.astype(image.real.dtype, copy=False))
+        across = kernel(right_share.astype(bands.real.dtype, copy=False))
+        down = kernel(lower_share.astype(bands.real.dtype, copy=False))
         corner = (top + 1) * stride
         corner += left + 1
-        total, line, value = out[part], *np.empty((2, len(corner)), image.dtype)
-        for j, weight in enumerate(down):
-            for i, share in enumerate(across):
-                into = value if i else line
-                # Clipping, for which there is no need, is faster than a check.
-                flat[j * stride + i :].take(corner, out=into, mode="clip")
-                into *= share
-                if i:
-                    line += value
-            line *= weight
-            if j:
-                total += line
-            else:
-                total[:] = line
-    return out.reshape(px.shape[1:])
+        for flat, total in zip(images, out[:, part], strict=True):
+            _add_weighted(flat, stride, corner, across, down, total)
+    return out
+
+
+def _add_weighted(
+    flat: NDArray[Any],
+    stride: int,
+    corner: NDArray[np.intp],
+    across: list[NDArray[Any]],
+    down: list[NDArray[Any]],
+    total: NDArray[Any],
+) -> None:
+    """Put into `total` the weighted sums of the pixels from `corner` on, in rows of `stride`."""
+    line, value = np.empty((2, len(corner)), flat.dtype)
+    for j, weight in enumerate(down):
+        for i, share in enumerate(across):
+            into = value if i else line
+            # Clipping, for which there is no need, is faster than a check.
+            flat[j * stride + i :].take(corner, out=into, mode="clip")
+            into *= share
+            if i:
+                line += value
+        line *= weight
+        if j:
+            total += line
+        else:
+            total[:] = line
 
 
 def _is_for_remap(image: NDArray[Any], px: NDArray[Any]) -> bool:

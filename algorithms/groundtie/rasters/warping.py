@@ -113,9 +113,9 @@ def resample(
     Parameters
     ----------
     image
-        Shape (h, w), any dtype; finite everywhere.
+        Shape (h, w) or (bands, h, w), any dtype; finite everywhere.
     valid
-        Shape (h, w).
+        Its shape.
     px
         Columns and rows of the positions, shape (2, m, n).
     method
@@ -126,18 +126,28 @@ def resample(
     Returns
     -------
     values
-        Shape (m, n), rounded and clipped for integers; 0 where invalid.
+        Shape (m, n) or (bands, m, n), rounded and clipped for integers; 0 where invalid.
     valid
-        Shape (m, n).
+        Its shape.
     """
     px = np.asarray(px)
     dtype = image.dtype if dtype is None else dtype
     # A few suffice mostly to find that they do not lie on pixels.
     if _on_pixels(px[:, ::_SPARSE, ::_SPARSE]) and _on_pixels(px):
         method = "nearest"  # every kernel gives the pixel itself
-    if method != "nearest" and valid.all() and _touches_no_border(px, image.shape, method):
+    if method != "nearest" and valid.all() and _touches_no_border(px, image.shape[-2:], method):
         values = interpolate(image.astype(working_dtype(image.dtype), copy=False), px, method)
         return _rounded(values, dtype), np.ones(values.shape, bool)
+    if image.ndim > 2:
+        bands = [_resample(*band, px, method, dtype) for band in zip(image, valid, strict=True)]
+        return np.stack([values for values, _ in bands]), np.stack([known for _, known in bands])
+    return _resample(image, valid, px, method, dtype)
+
+
+def _resample(
+    image: NDArray[Any], valid: Mask, px: NDArray[Any], method: str, dtype: np.dtype[Any]
+) -> tuple[NDArray[Any], Mask]:
+    """Return `resample` of an image of one band, of which not all that is needed may be valid."""
     cols, rows = np.rint(px[0]).astype(np.int64), np.rint(px[1]).astype(np.int64)
     inside = (cols >= 0) & (rows >= 0) & (cols < image.shape[1]) & (rows < image.shape[0])
     cols[~inside], rows[~inside] = 0, 0

@@ -15,7 +15,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster
 from ..rasters.grid import Grid, reproject
-from ..rasters.reading import open_raster
+from ..rasters.reading import bounded_cache, open_raster
 from ..rasters.target_grids import covering_grid, registered_grid
 from ..rasters.vrt import SUFFIX as VRT
 from ..rasters.vrt import write_vrt
@@ -93,7 +93,7 @@ def warp(
         raise ParameterError("a .vrt has the input's own pixels: no reference and no pixel size")
     if reference is not None and pixel_size is not None:
         raise ParameterError("give either a reference, which has a pixel size, or a pixel size")
-    with open_raster(input) as source:
+    with bounded_cache(), open_raster(input) as source:
         found, fit = load_stored(transform, model, source)
         found = transform_of(found, source, transform)
         target = moved_grid(found) if is_vrt else _target_grid(found, reference, pixel_size)

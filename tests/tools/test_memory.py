@@ -1,0 +1,80 @@
+"""Memory does not grow with the scene, but for GDAL's cache, which is bounded."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from affine import Affine
+from raster_files import utm_grid, write_raster
+from textured_pairs import texture
+
+from benchmarks.attempt import Pair
+from benchmarks.large_pairs import large_pair, repeat
+from benchmarks.processes import measure
+from groundtie.geometry.models import shift_model
+from groundtie.geometry.transform import Transform
+from groundtie.rasters.reading import open_raster
+
+TILE_PX = 1000
+CACHE_BYTES = 16_000_000
+
+# What the allocator keeps differs from run to run.
+SCATTER_BYTES = 48_000_000
+
+# As much as the machine has would be taken, unless a tool asks for less.
+CALL = f"""
+import os
+os.environ["GDAL_CACHEMAX"] = "4000"
+import groundtie, sys
+from groundtie.rasters import reading
+reading._READING_CACHE_BYTES = {CACHE_BYTES}
+tool, *files = sys.argv[1:]
+"""
+WARP = CALL + "groundtie.warp(*files[:2], transform=files[2], resampling='nearest', workers=2)"
+COREGISTER = CALL + "groundtie.coregister(*files, workers=2)"
+
+
+@pytest.fixture(scope="module")
+def tile(tmp_path_factory: pytest.TempPathFactory) -> Pair:
+    """Two images of one ground, of one band and of four."""
+    folder, grid = tmp_path_factory.mktemp("tile"), utm_grid(TILE_PX, TILE_PX)
+    ground = 1000 + 200 * texture(TILE_PX, TILE_PX)
+    image = (ground + np.random.default_rng(0).normal(0, 40, (5, TILE_PX, TILE_PX))).astype("u2")
+    return Pair(
+        write_raster(folder / "reference.tif", image[0], grid, tiled=True),
+        write_raster(folder / "input.tif", image[1:], grid, tiled=True),
+    )
+
+
+def peak_bytes(code: str, *files: Path) -> int:
+    found = measure([sys.executable, "-c", code, "", *map(str, files)])
+    assert found.exit_code == 0
+    return found.peak_bytes
+
+
+@pytest.mark.slow
+def test_of_warp(tile: Pair, tmp_path: Path) -> None:
+    """A scene of 128 MB takes no more than one of 8 MB and the cache."""
+    peaks = []
+    for size in (1000, 4000):
+        image, transform = tmp_path / f"{size}.tif", tmp_path / f"{size}.json"
+        repeat(tile.input, image, size, Affine.identity())
+        with open_raster(image) as source:
+            moved = Transform(shift_model(20.0, 30.0), source.grid.crs, source.grid)
+        transform.write_text(json.dumps(moved.to_json()))
+        peaks.append(peak_bytes(WARP, image, tmp_path / f"{size}_out.tif", transform))
+    assert peaks[1] - peaks[0] < CACHE_BYTES + SCATTER_BYTES
+
+
+@pytest.mark.slow
+def test_of_a_registration(tile: Pair, tmp_path: Path) -> None:
+    """A whole image of 25 million pixels in memory would take 100 MB."""
+    peaks = []
+    for size in (2000, 5000):
+        pair = large_pair(Pair(tile.reference, tile.reference), size, tmp_path)
+        peaks.append(peak_bytes(COREGISTER, pair.reference, pair.input, tmp_path / "out.tif"))
+    assert peaks[1] - peaks[0] < CACHE_BYTES + SCATTER_BYTES
