@@ -17,8 +17,8 @@ FloatArray = NDArray[np.float64]
 
 _SAMPLES = 600
 
-# Pairs times samples that are looked at together, 16 MB of residuals: large scenes have 50 000 pairs
-# of features.
+# Pairs times samples that are looked at together, 16 MB of residuals: large scenes have 50 000
+# pairs of features.
 _TOGETHER = 1_000_000
 _MIXTURE_STEPS = 40
 _FIT_STEPS = 15
@@ -186,12 +186,11 @@ def _sampled_models(
 ) -> FloatArray:
     """Return coefficients of degree 1, shape (m, 3, 2), each exact on a random minimal sample."""
     size = {"translation": 1, "rigid": 2, "similarity": 2, "affine": 3}[kind]
-    # Numbers are drawn row by row: the same, however many together.
-    drawn = (
-        random.random((some.stop - some.start, len(uv))).argpartition(size - 1, axis=1)[:, :size]
-        for some in _parts(_SAMPLES, len(uv))
-    )
-    picks = np.concatenate(list(drawn))
+    picks = np.empty((_SAMPLES, size), np.intp)
+    for some in _parts(_SAMPLES, len(uv)):
+        # Numbers are drawn row by row: the same, however many together.
+        drawn = random.random((some.stop - some.start, len(uv)))
+        picks[some] = drawn.argpartition(size - 1, axis=1)[:, :size]
     if size == 1:
         coefficients = np.zeros((_SAMPLES, 3, 2))
         coefficients[:, 0] = displacement[picks[:, 0]]
