@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 from groundtie.errors import TooFewPointsError
+from groundtie.geometry import robust
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.models import KINDS, Model
 from groundtie.geometry.robust import (
@@ -122,6 +125,27 @@ def test_consensus_is_the_same_for_the_same_seed(kind: str) -> None:
     px, found, _ = matches(kind, 60, 0.5, 4)
     models = [find_consensus(px, found, 2.0, kind, 7).to_json() for _ in range(2)]
     assert models[0] == models[1]
+
+
+@pytest.mark.parametrize("kind", DEGREE_1)
+@pytest.mark.parametrize("together", [1, 60 * 7, 10**9])
+def test_consensus_is_the_same_however_many_samples_are_looked_at_together(
+    kind: str, together: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    px, found, _ = matches(kind, 60, 0.5, 4)
+    usual = find_consensus(px, found, 2.0, kind, 7)
+    monkeypatch.setattr(robust, "_TOGETHER", together)
+    assert find_consensus(px, found, 2.0, kind, 7).to_json() == usual.to_json()
+
+
+def test_memory_of_the_consensus_is_bounded() -> None:
+    """All residuals of 600 samples of 50 000 pairs would take 480 MB."""
+    px, found, _ = matches("affine", 50_000, 0.5, 4)
+    tracemalloc.start()
+    find_consensus(px, found, 2.0, "affine", 7)
+    peak_bytes = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak_bytes < 120e6
 
 
 @pytest.mark.parametrize("kind", DEGREE_1)

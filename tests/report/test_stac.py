@@ -27,7 +27,7 @@ from groundtie.registration.registered_output import RegisteredOutput
 from groundtie.registration.registration import Registration
 from groundtie.registration.specification import Specification
 from groundtie.registration.verdict import Verdict
-from groundtie.report.stac import stac_item
+from groundtie.report.stac import quality_of, stac_item
 from groundtie.stac_items import raster_of_item
 
 __all__ = ["context", "textured"]
@@ -41,7 +41,7 @@ def item(tmp_path: Path, grid: Grid = GRID, name: str = "s2_20240506.tif") -> di
     transform = Transform(shift_on_map(1.0, 2.0), GRID.crs, GRID)
     with open_raster(path) as source:
         output = tmp_path / "out" / "moved.cog.tif"
-        return stac_item(source, output, grid, tmp_path / "reports", VERDICT, transform)
+        return stac_item(source, output, grid, tmp_path / "reports", quality_of(VERDICT, transform))
 
 
 def test_the_fields_are_those_of_the_extensions(tmp_path: Path) -> None:
@@ -87,7 +87,9 @@ def test_the_time_is_that_of_the_metadata_before_that_of_the_name(tmp_path: Path
         dataset.update_tags(ns="IMAGERY", ACQUISITIONDATETIME="2023-01-02T03:04:05")
     transform = Transform(shift_on_map(1.0, 2.0), GRID.crs, GRID)
     with open_raster(path) as source:
-        found = stac_item(source, tmp_path / "o.tif", GRID, tmp_path, VERDICT, transform)
+        found = stac_item(
+            source, tmp_path / "o.tif", GRID, tmp_path, quality_of(VERDICT, transform)
+        )
     assert found["properties"]["datetime"] == "2023-01-02T03:04:05Z"
 
 

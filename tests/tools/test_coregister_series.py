@@ -26,6 +26,7 @@ from groundtie.errors import NotRegisteredError
 from groundtie.geometry.transform import Transform
 from groundtie.progress import Progress
 from groundtie.series.series import Series
+from groundtie.stac_items import read_items
 from groundtie.tools.coregister_series import coregister_series
 
 ELSEWHERE, CLOUDY = 2, 3
@@ -83,16 +84,40 @@ def test_loops_close(run: Run) -> None:
 
 @pytest.mark.slow
 def test_all_files_and_no_others(run: Run) -> None:
-    rasters = {f"{run.dates.names[date]}_registered.tif" for date in GOOD[1:]}
+    rasters = {f"{run.dates.names[date]}_registered.cog.tif" for date in GOOD[1:]}
     assert set(listing(run.folder)) == {*rasters, "series.csv", "series.gpkg", "series.json"}
     assert run.report.is_file() and run.report.with_suffix(".json").is_file()
+
+
+@pytest.mark.slow
+def test_the_folder_is_a_catalogue_of_cloud_optimized_files(run: Run) -> None:
+    items, _ = read_items(run.folder / "series.json")
+    names = [f"{run.dates.names[date]}_registered" for date in GOOD[1:]]
+    assert [item.id for item in items] == names
+    assert [item.time for item in items] == [
+        f"2021-{date + 1:02d}-10T00:00:00Z" for date in GOOD[1:]
+    ]
+    for item in items:
+        path = item.raster(None)
+        assert path == run.folder / f"{item.id}.cog.tif"
+        with rasterio.open(path) as raster:
+            assert raster.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG"
+            assert raster.transform == utm_grid(SIZE, SIZE).transform
+    stored = json.loads((run.folder / "series.json").read_text())
+    fields = [one["properties"] for one in stored["features"]]
+    with rasterio.open(run.dates.files[0]) as reference:
+        assert all(one["proj:shape"] == [*reference.shape] for one in fields)
+        rows = {row["name"]: row for row in stored["dates"]}
+        sigmas_m = [rows[run.dates.names[date]]["sigma_px"] * reference.res[0] for date in GOOD[1:]]
+    found = [one["accuracy:geometric_rmse"] for one in fields]
+    np.testing.assert_allclose(found, sigmas_m)
 
 
 @pytest.mark.slow
 def test_registered_dates_show_the_same_ground(run: Run) -> None:
     reference = pixels(run.dates.files[0])[0].astype(float)
     for date in GOOD[1:]:
-        path = run.folder / f"{run.dates.names[date]}_registered.tif"
+        path = run.folder / f"{run.dates.names[date]}_registered.cog.tif"
         registered = pixels(path)[0].astype(float)
         both = (registered > 0)[20:-20, 20:-20]
         before = pixels(run.dates.files[date])[0].astype(float)
@@ -175,7 +200,7 @@ def test_without_a_reference_and_with_untouched_pixels(tmp_path: Path) -> None:
     true = dates.displacement_px - dates.displacement_px.mean(axis=0)
     np.testing.assert_allclose(found, true, atol=0.3)
     for path, shift in zip(dates.files, true, strict=True):
-        out = tmp_path / "out" / f"{path.stem}_registered.tif"
+        out = tmp_path / "out" / f"{path.stem}_registered.cog.tif"
         np.testing.assert_array_equal(pixels(out), pixels(path))
         with rasterio.open(out) as moved, rasterio.open(path) as before:
             assert moved.transform.c - before.transform.c == pytest.approx(-10 * shift[0], abs=3)
@@ -218,7 +243,7 @@ def test_a_damaged_file_costs_its_date_alone_and_its_raster(run: Run, tmp_path: 
     shutil.copytree(run.folder, out)
     shutil.copytree(run.dates.folder, inputs)
     names, damaged = run.dates.names, GOOD[-1]
-    assert (out / f"{names[damaged]}_registered.tif").is_file()
+    assert (out / f"{names[damaged]}_registered.cog.tif").is_file()
     (inputs / run.dates.files[damaged].name).write_bytes(b"no raster")
     result = coregister_series(
         out,
@@ -231,7 +256,7 @@ def test_a_damaged_file_costs_its_date_alone_and_its_raster(run: Run, tmp_path: 
     left = {one.name: one.verdict.rule for one in result.left_out}
     assert left[names[damaged]] == "date not readable"
     # It must not lie there as if it was registered.
-    assert not (out / f"{names[damaged]}_registered.tif").exists()
+    assert not (out / f"{names[damaged]}_registered.cog.tif").exists()
 
 
 def test_cancelling_leaves_nothing(tmp_path: Path) -> None:

@@ -16,6 +16,10 @@ from .models import PARAMETERS, Frame, Model, PolynomialModel, monomials
 FloatArray = NDArray[np.float64]
 
 _SAMPLES = 600
+
+# Pairs times samples that are looked at together, 16 MB of residuals: large scenes have 50 000
+# pairs of features.
+_TOGETHER = 1_000_000
 _MIXTURE_STEPS = 40
 _FIT_STEPS = 15
 
@@ -104,10 +108,13 @@ def find_consensus(
     frame = Frame.around(xy)
     uv, displacement = frame.enter(xy), frame.enter(nominal_xy) - frame.enter(xy)
     candidates = _sampled_models(uv, displacement, kind, np.random.default_rng(seed))
-    design = monomials(uv, 1)
-    residuals = displacement[None] - design[None] @ candidates
-    in_frame = tolerance / frame.to_map.a
-    cost = np.minimum((residuals**2).sum(axis=2), in_frame**2).sum(axis=1)
+    design, in_frame = monomials(uv, 1), tolerance / frame.to_map.a
+
+    def costs(some: slice) -> FloatArray:
+        residuals = displacement[None] - design[None] @ candidates[some]
+        return np.asarray(np.minimum((residuals**2).sum(axis=2), in_frame**2).sum(axis=1))
+
+    cost = np.concatenate([costs(some) for some in _parts(len(candidates), len(xy))])
     best: Model = PolynomialModel("affine", frame, candidates[cost.argmin()])
     for _ in range(3):
         agree = distances(best, xy, nominal_xy) < tolerance
@@ -168,12 +175,22 @@ def fit_robustly(
     return model, fit_mixture(nominal_xy - model(xy), window_area, sigma_range)
 
 
+def _parts(samples: int, pairs: int) -> list[slice]:
+    """Return which samples are looked at together."""
+    step = max(_TOGETHER // pairs, 1)
+    return [slice(first, min(first + step, samples)) for first in range(0, samples, step)]
+
+
 def _sampled_models(
     uv: FloatArray, displacement: FloatArray, kind: str, random: np.random.Generator
 ) -> FloatArray:
     """Return coefficients of degree 1, shape (m, 3, 2), each exact on a random minimal sample."""
     size = {"translation": 1, "rigid": 2, "similarity": 2, "affine": 3}[kind]
-    picks = random.random((_SAMPLES, len(uv))).argpartition(size - 1, axis=1)[:, :size]
+    picks = np.empty((_SAMPLES, size), np.intp)
+    for some in _parts(_SAMPLES, len(uv)):
+        # Numbers are drawn row by row: the same, however many together.
+        drawn = random.random((some.stop - some.start, len(uv)))
+        picks[some] = drawn.argpartition(size - 1, axis=1)[:, :size]
     if size == 1:
         coefficients = np.zeros((_SAMPLES, 3, 2))
         coefficients[:, 0] = displacement[picks[:, 0]]

@@ -121,9 +121,7 @@ def interpolate(image: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[A
     return np.asarray(found.reshape(*image.shape[:-2], *px.shape[1:]))
 
 
-def _by_kernel(
-    bands: NDArray[Any], px: NDArray[Any], kernel: Weights, reach: int
-) -> NDArray[Any]:
+def _by_kernel(bands: NDArray[Any], px: NDArray[Any], kernel: Weights, reach: int) -> NDArray[Any]:
     """Return the sums of weighted pixels, shape (bands, m, n); all bands have the same weights."""
     count, height, width = bands.shape
     # Positions up to a pixel outside, with all that their kernels take.

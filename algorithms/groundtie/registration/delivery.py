@@ -18,7 +18,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.grid import Grid
 from ..rasters.reading import bounded_cache
-from ..report.stac import stac_item
+from ..report.stac import quality_of, stac_item
 from .displacement import write_displacement
 from .pipeline import OpenPair, open_pair, pair_images, run
 from .registered_output import RegisteredOutput, grid_of_output, model_for_grid
@@ -72,8 +72,7 @@ class RegistrationFiles:
             self.output.path,
             grid,
             report.parent,
-            registration.verdict,
-            registration.accepted(),
+            quality_of(registration.verdict, registration.accepted()),
         )
 
     def _write_results(

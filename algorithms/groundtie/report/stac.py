@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -35,8 +37,8 @@ def stac_item(
     output: Path,
     grid: Grid,
     folder: Path,
-    verdict: Verdict,
-    transform: Transform,
+    quality: Mapping[str, Any],
+    time: datetime | None = None,
 ) -> dict[str, Any]:
     """Return the members of a STAC item of a registered raster.
 
@@ -51,10 +53,12 @@ def stac_item(
         The registered raster.
     folder
         Where the JSON lies.
-    verdict, transform
-        Of the registration.
+    quality
+        Properties that state how good the registration is; see `quality_of`.
+    time
+        When the image was taken; None: as `source` states it.
     """
-    time = time_of(source.tags.get("IMAGERY", {}).get("ACQUISITIONDATETIME", ""))
+    time = time or time_of(source.tags.get("IMAGERY", {}).get("ACQUISITIONDATETIME", ""))
     time = time or time_of(file_name(source.path))
     if time is None or grid.crs is None:
         return {}
@@ -72,13 +76,20 @@ def stac_item(
         "properties": {
             "datetime": f"{time.isoformat()}Z",
             **_projection(grid),
-            "accuracy:geometric_rmse": verdict.check_rmse_m,
-            "groundtie:ce90_m": verdict.check_ce90_m,
-            "groundtie:points": verdict.points,
-            "groundtie:model": transform.model.kind,
+            **quality,
         },
         "links": [],
         "assets": {"data": _asset(output, folder)},
+    }
+
+
+def quality_of(verdict: Verdict, transform: Transform) -> dict[str, Any]:
+    """Return the properties of the item of one registration that state how good it is."""
+    return {
+        "accuracy:geometric_rmse": verdict.check_rmse_m,
+        "groundtie:ce90_m": verdict.check_ce90_m,
+        "groundtie:points": verdict.points,
+        "groundtie:model": transform.model.kind,
     }
 
 

@@ -15,12 +15,15 @@ from shapely.geometry import LineString, mapping
 from ..context import Context
 from ..errors import NotRegisteredError
 from ..rasters.atomic import Outputs, write_json, writing
+from ..rasters.grid import Grid
+from ..rasters.reading import open_raster
 from ..registration.registered_output import RegisteredOutput
 from ..registration.verdict import Verdict
+from ..report.stac import stac_item
 from ..runs import RUN, run_tags
 from ..version import __version__
 from .dates import file_facts
-from .frame import FloatArray
+from .frame import FloatArray, sigma_px
 from .series import TABLE_COLUMNS, Series, SeriesDate
 from .stored import StoredSeries
 
@@ -81,16 +84,18 @@ class SeriesFiles:
         self, series: Series, stored: StoredSeries, outputs: Outputs, context: Context
     ) -> Series:
         """Write the rasters that are not there yet, and return what the series has then."""
-        dates, written = [], {}
+        dates, written, items = [], {}, []
         for number, one in enumerate(series.dates):
             part = context.part(number / len(series.dates), (number + 1) / len(series.dates))
             if one.is_registered:
-                one, written[one.name] = self._with_raster(one, series, stored, outputs, part)
+                one, written[one.name], grid = self._with_raster(one, series, stored, outputs, part)
+                items.append(self._item(one, series, written[one.name]["file"], grid))
             dates.append(one)
         files = {"output_folder": self.folder}
         if self.report is not None:
             files["report"] = self.report
-        return replace(series, dates=tuple(dates), written=written, files=files)
+        found = tuple(item for item in items if item)
+        return replace(series, dates=tuple(dates), written=written, items=found, files=files)
 
     def _with_raster(
         self,
@@ -99,7 +104,7 @@ class SeriesFiles:
         stored: StoredSeries,
         outputs: Outputs,
         context: Context,
-    ) -> tuple[SeriesDate, dict[str, Any]]:
+    ) -> tuple[SeriesDate, dict[str, Any], Grid]:
         assert one.date is not None and one.transform is not None
         key, before = self.raster_key(one, series), stored.dates.get(one.name)
         if before is not None and before.key == key and before.is_there(self.folder):
@@ -107,12 +112,26 @@ class SeriesFiles:
             moved = one.transform(before.transform.inverse(corners)) - corners
             if np.hypot(*moved.T).max() < _SAME_PX:
                 known = {"file": before.file, "key": key, "run": before.run}
-                return replace(one, transform=before.transform), known
+                with open_raster(self.folder / before.file) as source:
+                    return replace(one, transform=before.transform), known, source.grid
         context.update(0.0, f"writing {one.name}")
-        path = self.folder / f"{one.name}_registered.tif"
+        path = self.folder / f"{one.name}_registered.cog.tif"
         output = RegisteredOutput(path, self.output_grid, self.resampling)
-        output.write(one.date.source, series.map_grid, one.transform, outputs, context)
-        return one, {"file": path.name, "key": key, "run": run_tags().get(RUN)}
+        grid = output.write(one.date.source, series.map_grid, one.transform, outputs, context)
+        return one, {"file": path.name, "key": key, "run": run_tags().get(RUN)}, grid
+
+    def _item(self, one: SeriesDate, series: Series, file: str, grid: Grid) -> dict[str, Any]:
+        """Return the STAC item of a registered date; empty where there can be none."""
+        assert one.date is not None and one.transform is not None
+        covariance = one.verdict.covariance
+        assert covariance is not None
+        quality = {
+            "accuracy:geometric_rmse": sigma_px(covariance) * series.frame.grid.pixel_size_m,
+            "groundtie:worst_loop_px": one.verdict.worst_loop_px,
+            "groundtie:model": one.transform.model.kind,
+        }
+        path, time = self.folder / file, one.listed.time
+        return stac_item(one.date.source, path, grid, self.folder, quality, time)
 
     def _write_refusal(self, series: Series) -> None:
         if self.report is not None:

@@ -137,6 +137,8 @@ class Series:
         How long it took.
     written
         What is known of each raster that was written, by the names of the dates.
+    items
+        STAC items of these rasters.
     files
         What was written, by name.
     """
@@ -154,6 +156,7 @@ class Series:
     parameters: Mapping[str, Any]
     seconds: float = 0.0
     written: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    items: tuple[Mapping[str, Any], ...] = ()
     files: Mapping[str, Path] = field(default_factory=dict)
 
     @property
@@ -223,7 +226,10 @@ class Series:
         return found
 
     def to_json(self) -> dict[str, Any]:
-        """Return `summary` with all that the next run in the folder needs."""
+        """Return `summary` with all that the next run in the folder needs.
+
+        It is a STAC item collection of the registered rasters, too.
+        """
         values = self.summary()
         for row, date in zip(values["dates"], self.dates, strict=True):
             transform = date.transform
@@ -233,6 +239,8 @@ class Series:
             row["covariance_px2"] = None if covariance is None else covariance.tolist()
         return {
             "format": FORMAT,
+            "type": "FeatureCollection",
+            "features": [plain(item) for item in self.items],
             "reference_key": self.reference_key,
             "frame": frame_to_json(self.frame),
             **values,
