@@ -151,7 +151,6 @@ def test_a_tools_parameters_go_into_the_specification_and_the_report(
         "input": textured.input,
         "output": None,
         "output_grid": "untouched",
-        "resampling": "cubic",
         "tie_points": None,
         "transform": None,
         "report": None,
@@ -164,14 +163,13 @@ def test_a_tools_parameters_go_into_the_specification_and_the_report(
         "max_error": 2.5,
         "search_radius": 150.0,
         "search_rotation": None,
-        "search_scale": 1.2,
         "mask": "none",
         "matching_pixel_size": None,
     }
     spec = specified(SAR_SAR, parameters)
     # Untouched pixels allow a shift only.
     assert (spec.model, spec.max_error_px, spec.search_radius_m) == ("translation", 2.5, 150.0)
-    assert (spec.rotation_deg, spec.scale, spec.mask) == (None, 1.2, "none")
+    assert (spec.rotation_deg, spec.scale, spec.mask) == (None, None, "none")
     assert (spec.matcher, spec.radar) == (SAR_SAR.matcher, SAR_SAR.radar)
     call = Call.of(parameters, delivery.SILENT)
     assert (call.bands, call.workers, call.parameters) == ((None, 1), 2, parameters)

@@ -13,7 +13,7 @@ from typing import Any
 from ..context import Context, threads
 from ..errors import NotRegisteredError, ParameterError
 from ..geometry.tie_point_files import write_tie_points
-from ..geometry.views import View
+from ..geometry.views import View, split_views
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.grid import Grid
@@ -24,7 +24,7 @@ from .pipeline import OpenPair, open_pair, pair_images, run
 from .registered_output import RegisteredOutput, grid_of_output, model_for_grid
 from .registration import Registration
 from .specification import Specification, StatedSurface
-from .terrain import asked_light, asked_terrain
+from .terrain import asked_light, asked_lights, asked_terrain
 from .user_masks import UserMask
 
 
@@ -213,8 +213,7 @@ _USUAL: Mapping[str, Any] = {
     "reference_mask_values": None,
     "input_mask_values": None,
     "surface_model": None,
-    "reference_view": None,
-    "input_view": None,
+    "views": None,
 }
 
 
@@ -258,17 +257,18 @@ def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:
         A view is missing or cannot be understood, or has no surface model to go with.
     """
     model = given["surface_model"]
-    names = ("reference", image)
+    words = split_views(given["views"])
     if model is None:
-        if any(given[f"{name}_view"] is not None for name in names):
-            raise ParameterError("a view goes with a surface model (surface_model)")
+        if words[1] is not None or (words[0] is not None and not asked_lights(given)):
+            raise ParameterError("views go with a surface model (surface_model)")
         return None
-    views = [View.of(given[name], given[f"{name}_view"]) for name in names]
+    names = ("reference", image)
+    views = [View.of(given[name], word) for name, word in zip(names, words, strict=True)]
     for name, view in zip(names, views, strict=True):
         if view is None:
             raise ParameterError(
                 f"a surface model needs the view of the {name}: put its STAC item beside it, or "
-                f"give {name}_view"
+                "give views"
             )
     reference, other = (view for view in views if view is not None)
     return StatedSurface(model, (reference, other))
@@ -282,14 +282,13 @@ def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specifica
     return replace(
         preset,
         **asked_terrain(parameters),
-        light=asked_light(parameters.get("light")),
+        light=asked_light(parameters),
         model=model_for_grid(
             parameters["model"], grid_of_output(parameters["output"], parameters["output_grid"])
         ),
         max_error_px=parameters["max_error"],
         search_radius_m=parameters["search_radius"],
         rotation_deg=parameters["search_rotation"],
-        scale=parameters["search_scale"],
         mask=parameters["mask"],
         matching_pixel_size_m=parameters["matching_pixel_size"],
     )

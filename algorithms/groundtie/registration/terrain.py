@@ -8,6 +8,7 @@ from typing import Any
 
 from ..errors import ParameterError
 from ..geometry.terrain import Terrain
+from ..geometry.views import split_views
 from ..matching.surface_fit import AUTO
 from ..rasters.pair import ImagePair
 from ..rasters.rendered import LIGHTS, RADAR, SUN, Light
@@ -17,7 +18,10 @@ from ..rasters.rendered import LIGHTS, RADAR, SUN, Light
 # Measured with `benchmarks/run.py --only mountains`: 15° off costs little.
 _AZIMUTHS_DEG = {RADAR: (270.0, 90.0), SUN: (150.0, 120.0, 180.0, 90.0, 30.0, 60.0)}
 
-_WORDS = re.compile(rf"({'|'.join(LIGHTS)})(?:[\s,]+azimuth=(\d+(?:\.\d+)?)°?)?")
+# What a view begins with that is that of a terrain model.
+_TERRAIN = "terrain"
+
+_WORDS = re.compile(rf"{_TERRAIN}[\s,]+({'|'.join(LIGHTS)})(?:[\s,]+azimuth=(\d+(?:\.\d+)?)°?)?")
 
 
 def asked_terrain(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -61,44 +65,46 @@ def open_terrain(pair: ImagePair, dem: Any, input_dem: Any | None) -> Terrain:
     return terrain
 
 
-def stated_lights(words: str | None) -> tuple[Light, ...]:
+def asked_lights(given: Mapping[str, Any]) -> tuple[Light, ...]:
     """Return in which lights a reference that is a terrain model may be rendered.
 
     Parameters
     ----------
-    words
-        `sun azimuth=155`, or without azimuth, which is then to be tried; None: the reference is an
-        image.
+    given
+        The values of a tool's parameters. The reference's view is `terrain sun azimuth=155`, or
+        without azimuth, which is then to be tried; else the reference is an image.
 
     Raises
     ------
     ParameterError
-        They state no light.
+        The words state no light.
     """
-    if words is None:
+    words = (split_views(given.get("views"))[0] or "").lower()
+    if not words.startswith(_TERRAIN):
         return ()
-    found = _WORDS.fullmatch(words.strip().lower())
+    found = _WORDS.fullmatch(words)
     if found is None or float(found[2] or 0) > 360:
         raise ParameterError(
-            f"{words!r} states no light: give {' or '.join(LIGHTS)}, and its azimuth in degrees if "
-            f"known, as '{SUN} azimuth=155'"
+            f"{words!r} states no light: give '{_TERRAIN} {SUN}' or '{_TERRAIN} {RADAR}', and its "
+            f"azimuth in degrees if known, as '{_TERRAIN} {SUN} azimuth=155'"
         )
     kind = found[1]
     azimuths = _AZIMUTHS_DEG[kind] if found[2] is None else (float(found[2]),)
     return tuple(Light(kind, azimuth) for azimuth in azimuths)
 
 
-def asked_light(words: str | None) -> Light | None:
-    """Return the light that words state for a single try; a radar stands in the west by default.
+def asked_light(given: Mapping[str, Any]) -> Light | None:
+    """Return the light of a single try; a radar stands in the west by default.
 
     Raises
     ------
     ParameterError
-        They state none, or not where the sun stands.
+        The words state none, or not where the sun stands.
     """
-    lights = stated_lights(words)
+    lights = asked_lights(given)
     if len(lights) > 1 and lights[0].kind == SUN:
         raise ParameterError(
-            f"light {SUN} needs its azimuth, as '{SUN} azimuth=155': the tool register tries some"
+            f"'{_TERRAIN} {SUN}' needs its azimuth, as '{_TERRAIN} {SUN} azimuth=155': the tool "
+            "register tries some"
         )
     return lights[0] if lights else None

@@ -17,13 +17,12 @@ from ..sensor.control_points import SUFFIXES
 from .common import MatchingPixelSize, Reference, ReferenceBand, Workers
 from .registration_parameters import (
     ImageMaskValues,
-    ImageView,
     Mask,
     MaxError,
     ReferenceMask,
     ReferenceMaskValues,
-    ReferenceView,
     SurfaceModel,
+    SurfaceViews,
 )
 from .sensor_parameters import (
     Dem,
@@ -76,8 +75,7 @@ def extract_gcps(
     reference_mask_values: ReferenceMaskValues = None,
     mask: Mask = AUTO,
     surface_model: SurfaceModel = None,
-    reference_view: ReferenceView = None,
-    image_view: ImageView = None,
+    views: SurfaceViews = None,
     matching_pixel_size: MatchingPixelSize = None,
     workers: Workers = None,
     progress: Progress = SILENT,

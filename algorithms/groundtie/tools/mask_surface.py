@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import ParameterError
-from ..geometry.views import View
+from ..geometry.views import View, split_views, stated_view
 from ..kinds import RasterOut
 from ..masks.scene import Scene, write_mask
 from ..masks.surface_model import write_reasons
@@ -20,7 +20,7 @@ from ..rasters.reading import bounded_cache, open_raster
 from ..registration.specification import StatedSurface
 from ..registration.surface_masks import ModelFit, fitted_ground
 from .common import MaskOut, Reference
-from .registration_parameters import SURFACE_MODEL, InputView, ReferenceView
+from .registration_parameters import SURFACE_MODEL, SurfaceViews
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,7 @@ def mask_surface(
             "radar shadow, 8 hidden from the camera, 16 cast shadow, 32 unknown.",
         ),
     ] = None,
-    reference_view: ReferenceView = None,
-    input_view: InputView = None,
+    views: SurfaceViews = None,
     progress: Progress = SILENT,
 ) -> SurfaceMaskResult:
     """Mask all of an image but the ground that a surface model and the views of images leave.
@@ -83,15 +82,13 @@ def mask_surface(
     to be registered, only what the reference itself does not show is masked. `coregister`,
     `extract_gcps` and `refine_rpc` make the same mask themselves if given a surface model.
     """
-    views = [View.of(reference, reference_view)]
-    if input_view is not None:
-        views.append(View.of(None, input_view))
-    known = tuple(view for view in views if view is not None)
-    if len(known) < len(views):
+    own, other = split_views(views)
+    view = View.of(reference, own)
+    if view is None:
         raise ParameterError(
-            "the view of the reference is not known: put its STAC item beside it, or give "
-            "reference_view"
+            "the view of the reference is not known: put its STAC item beside it, or give views"
         )
+    known = (view,) if other is None else (view, stated_view(other))
     files = {"mask": output, "reasons": reasons}
     with bounded_cache(), ExitStack() as stack:
         scene = Scene.of(stack.enter_context(open_raster(reference)))

@@ -19,7 +19,6 @@ from .common import (
     OptionalOutput,
     Reference,
     ReferenceBand,
-    Resampling,
     TransformOut,
     Workers,
 )
@@ -37,7 +36,6 @@ from .registration_parameters import (
     ReportOut,
     SearchRadius,
     SearchRotation,
-    SearchScale,
     TiePointsOut,
 )
 
@@ -55,7 +53,6 @@ def match_sar_sar(
     transform: TransformOut = None,
     report: ReportOut = None,
     displacement: DisplacementOut = None,
-    search_scale: SearchScale = None,
     reference_band: ReferenceBand = None,
     input_band: InputBand = None,
     reference_mask: ReferenceMask = None,
@@ -65,7 +62,6 @@ def match_sar_sar(
     mask: Mask = AUTO,
     matching_pixel_size: MatchingPixelSize = None,
     output_grid: OutputGrid = "reference",
-    resampling: Resampling = "cubic",
     workers: Workers = None,
     progress: Progress = SILENT,
     parameters: Mapping[str, Any] = MappingProxyType({}),

@@ -20,13 +20,12 @@ from ..sensor.control_points import READ_SUFFIXES, SUFFIXES
 from .common import MatchingPixelSize, ReferenceBand, Workers
 from .registration_parameters import (
     ImageMaskValues,
-    ImageView,
     Mask,
     MaxError,
     ReferenceMask,
     ReferenceMaskValues,
-    ReferenceView,
     SurfaceModel,
+    SurfaceViews,
 )
 from .sensor_parameters import (
     Dem,
@@ -126,8 +125,7 @@ def refine_rpc(
     reference_mask_values: ReferenceMaskValues = None,
     mask: Mask = AUTO_MASK,
     surface_model: SurfaceModel = None,
-    reference_view: ReferenceView = None,
-    image_view: ImageView = None,
+    views: SurfaceViews = None,
     matching_pixel_size: MatchingPixelSize = None,
     workers: Workers = None,
     progress: Progress = SILENT,

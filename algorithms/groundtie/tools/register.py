@@ -24,11 +24,11 @@ from .registration_parameters import (
     InputDem,
     InputMask,
     InputMaskValues,
-    LightOfTerrain,
     MaxError,
     ReferenceMask,
     ReferenceMaskValues,
     ReportOut,
+    TerrainView,
     TiePointsOut,
 )
 from .sensor_parameters import Dem, DemDatum
@@ -43,7 +43,7 @@ def register(
     dem: Dem = None,
     dem_datum: DemDatum = None,
     input_dem: InputDem = None,
-    light: LightOfTerrain = None,
+    views: TerrainView = None,
     tie_points: TiePointsOut = None,
     transform: TransformOut = None,
     report: ReportOut = None,

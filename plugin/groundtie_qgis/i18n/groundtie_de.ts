@@ -200,10 +200,6 @@
       <translation>Von Hand</translation>
     </message>
     <message>
-      <source>By which factor the input may be larger or smaller than nominal. By default 1; match_optical searches up to 2 where there is no georeferencing.</source>
-      <translation>Um welchen Faktor die Eingabe größer oder kleiner als ihr Soll sein kann. Ohne Angabe 1; match_optical sucht bis 2, wo keine Georeferenz ist.</translation>
-    </message>
-    <message>
       <source>CE90 at check points (m)</source>
       <translation>CE90 an Prüfpunkten (m)</translation>
     </message>
@@ -516,8 +512,12 @@
       <translation>Fourier–Mellin</translation>
     </message>
     <message>
-      <source>From where the image was taken, for the surface model: a STAC item (.json), or words such as 'radar azimuth=280 incidence=35' and 'camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'; azimuths from the ground to the sensor or sun, clockwise from north, incidence from the vertical. By default the STAC item of the image's own name beside it.</source>
-      <translation>Von wo das Bild aufgenommen wurde, für das Oberflächenmodell: ein STAC-Item (.json) oder Worte wie 'radar azimuth=280 incidence=35' und 'camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'; Azimute vom Boden zum Sensor oder zur Sonne, im Uhrzeigersinn von Norden, der Einfallswinkel von der Senkrechten. Ohne Angabe das STAC-Item mit dem Namen des Bildes daneben.</translation>
+      <source>From where both images were taken, for the surface model: STAC items (.json), or words, that of the reference first, as in 'radar azimuth=280 incidence=35; camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'. Azimuths from the ground to the sensor or sun, clockwise from north, incidence from the vertical. By default the STAC items of the images' own names beside them.</source>
+      <translation>Von wo beide Bilder aufgenommen wurden, für das Oberflächenmodell: STAC-Items (.json) oder Worte, die der Referenz zuerst, wie in 'radar azimuth=280 incidence=35; camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'. Azimute vom Boden zum Sensor oder zur Sonne, im Uhrzeigersinn von Norden, der Einfallswinkel von der Senkrechten. Ohne Angabe die STAC-Items mit den Namen der Bilder daneben.</translation>
+    </message>
+    <message>
+      <source>From where both images were taken, for the surface model: STAC items (.json), or words, that of the reference first, as in 'radar azimuth=280 incidence=35; camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'. Azimuths from the ground to the sensor or sun, clockwise from north, incidence from the vertical. By default the STAC items of the images' own names beside them. If the reference is a terrain model, how it is rendered: 'terrain sun azimuth=155' for a camera's image, 'terrain radar' for a radar's; without azimuth a radar stands in the west, and register tries azimuths.</source>
+      <translation>Von wo beide Bilder aufgenommen wurden, für das Oberflächenmodell: STAC-Items (.json) oder Worte, die der Referenz zuerst, wie in 'radar azimuth=280 incidence=35; camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'. Azimute vom Boden zum Sensor oder zur Sonne, im Uhrzeigersinn von Norden, der Einfallswinkel von der Senkrechten. Ohne Angabe die STAC-Items mit den Namen der Bilder daneben. Ist die Referenz ein Geländemodell, wie es gerendert wird: 'terrain sun azimuth=155' für ein Kamerabild, 'terrain radar' für ein Radarbild; ohne azimuth steht ein Radar im Westen, und register probiert Azimute.</translation>
     </message>
     <message>
       <source>Gamma MAP</source>
@@ -728,6 +728,10 @@
       <translation>ISEF</translation>
     </message>
     <message>
+      <source>If the reference is a terrain model, how it is rendered: 'terrain sun azimuth=155' for a camera's image, 'terrain radar' for a radar's; without azimuth a radar stands in the west, and register tries azimuths.</source>
+      <translation>Ist die Referenz ein Geländemodell, wie es gerendert wird: 'terrain sun azimuth=155' für ein Kamerabild, 'terrain radar' für ein Radarbild; ohne azimuth steht ein Radar im Westen, und register probiert Azimute.</translation>
+    </message>
+    <message>
       <source>Image</source>
       <translation>Bild</translation>
     </message>
@@ -882,10 +886,6 @@
     <message>
       <source>Length of the skeleton (m)</source>
       <translation>Länge des Skeletts (m)</translation>
-    </message>
-    <message>
-      <source>Light of a terrain model</source>
-      <translation>Licht eines Geländemodells</translation>
     </message>
     <message>
       <source>Linear</source>
@@ -1852,10 +1852,6 @@
       <translation>Das Raster kann das registrierte sein oder ein anderes derselben Szene: andere Kanäle, eine andere Pixelgröße, ein anderer Zeitpunkt auf demselben Gitter. Raster mit Georeferenz werden nach ihr gelegt; ein Raster ohne sie muss die Größe des registrierten haben. Alle Kanäle werden einmal neu abgetastet, aus den ursprünglichen Pixeln. Verknüpfungspunkte werden ausgeglichen, wie sie sind: die als verworfen oder als Prüfpunkte bezeichneten bleiben weg.</translation>
     </message>
     <message>
-      <source>The reference is a terrain model, and is rendered: as the sun lights it, for a camera's image, or as a radar images it. sun or radar, and where from, clockwise from north: sun azimuth=155. Without azimuth a radar stands in the west; register tries azimuths. By default, the reference is an image.</source>
-      <translation>Die Referenz ist ein Geländemodell und wird gerendert: wie die Sonne es beleuchtet, für ein Kamerabild, oder wie ein Radar es abbildet. sun oder radar, und von wo, im Uhrzeigersinn von Norden: sun azimuth=155. Ohne azimuth steht ein Radar im Westen; register probiert Azimute. Standardmäßig ist die Referenz ein Bild.</translation>
-    </message>
-    <message>
       <source>The reference's pixels</source>
       <translation>Die Pixel der Referenz</translation>
     </message>
@@ -2024,20 +2020,16 @@
       <translation>Höhenbezug</translation>
     </message>
     <message>
+      <source>View</source>
+      <translation>Blickrichtung</translation>
+    </message>
+    <message>
       <source>View azimuth</source>
       <translation>Blickazimut</translation>
     </message>
     <message>
-      <source>View of the image</source>
-      <translation>Blickrichtung des Bildes</translation>
-    </message>
-    <message>
-      <source>View of the input</source>
-      <translation>Blickrichtung der Eingabe</translation>
-    </message>
-    <message>
-      <source>View of the reference</source>
-      <translation>Blickrichtung der Referenz</translation>
+      <source>Views</source>
+      <translation>Blickrichtungen</translation>
     </message>
     <message>
       <source>Warp</source>
