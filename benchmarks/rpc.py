@@ -111,7 +111,7 @@ class HalfRealCase:
             error,
             scene.sigma_px,
             seconds,
-            result.judged.verdict.check_rmse_px,
+            result.verdict.check_rmse_px,
             result.adjustment.bias.kind,
             near_the_truth(kept),
         )
@@ -172,7 +172,7 @@ class SimulatedCase:
             error,
             0.0,
             seconds,
-            result.judged.verdict.check_rmse_px,
+            result.verdict.check_rmse_px,
             result.adjustment.bias.kind,
             near_the_truth(kept),
         )
@@ -249,7 +249,7 @@ class RoundTripCase:
                 error = _distance_px(clean, truth, truth)
         limit = CHANGED_PX if self.wrong else RECOVERED_PX
         verdict = CORRECT if error <= limit else "inaccurate"
-        reason = result.judged.verdict.reason
+        reason = result.verdict.reason
         return Outcome(
             f"{self.sensor}, bias {self.number}",
             self.group,
@@ -259,7 +259,7 @@ class RoundTripCase:
             error,
             limit,
             seconds,
-            result.judged.verdict.check_rmse_px,
+            result.verdict.check_rmse_px,
             result.adjustment.bias.kind,
             reason,
         )

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from ..assessment.statistics import Statistics
 from ..geometry.accuracy import CheckResiduals, predict_accuracy
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.judging import (
@@ -77,6 +78,27 @@ class RefinementEvidence:
     def rms_after_px(self) -> float:
         """Root mean square error by the refined RPCs; infinite without inliers."""
         return _rms(self.after_px)
+
+    @property
+    def before(self) -> Statistics:
+        """Errors at the held-out inliers by the RPCs as delivered, px."""
+        return Statistics.of(self.before_px)
+
+    @property
+    def after(self) -> Statistics:
+        """Errors at the held-out inliers by the refined RPCs, px."""
+        return Statistics.of(self.after_px)
+
+    def summary(self) -> dict[str, Any]:
+        """Return which points were held out, and their errors, as values that JSON can carry."""
+        errors = {
+            name: {
+                key: value if math.isfinite(value) else None
+                for key, value in statistics.summary("px", ("col", "row")).items()
+            }
+            for name, statistics in (("before", self.before), ("after", self.after))
+        }
+        return {"held_out": self.held_out.name, **errors}
 
     @classmethod
     def of(

@@ -97,7 +97,7 @@ class RefinementFiles:
         NotRegisteredError
             The refinement is refused.
         """
-        image, accepted = refinement.image, refinement.judged.verdict.accepted
+        image, accepted = refinement.image, refinement.verdict.accepted
         with Outputs() as outputs:
             if accepted:
                 fit = refinement.accepted()
@@ -127,7 +127,8 @@ def _report(
     image = refinement.image
     return RefinementReport(
         title=f"RPCs of {Path(image.source.path).name}, refined",
-        judged=refinement.judged,
+        verdict=refinement.verdict,
+        evidence=refinement.evidence,
         bias=refinement.adjustment.bias,
         residuals=refinement.residuals(),
         grid=refinement.grid,

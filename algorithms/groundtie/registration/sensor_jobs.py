@@ -22,8 +22,8 @@ from ..sensor.rpc_fit import RPCFit
 from .delivery import asked_masks, asked_surface
 from .ground_control import GroundControl, match_ground_control, require_crs
 from .refinement import Refinement
+from .refinement_evidence import RefinementEvidence
 from .refinement_output import Call, RefinementFiles
-from .refinement_verdict import RefinementVerdict
 from .sensor_input import Ground, OrientedImage, open_oriented_image
 from .specification import Specification
 from .verdict import Verdict
@@ -89,8 +89,10 @@ class RefinedRpc:
         The RPCs, with the bias folded in, and how far they miss it.
     adjustment
         The bias.
-    judged
-        The verdict, and the errors before and after.
+    evidence
+        What the verdict rests on, with the errors before and after.
+    verdict
+        Whether they can be trusted.
     heights
         What contradicts the heights.
     ground
@@ -105,7 +107,8 @@ class RefinedRpc:
 
     fit: RPCFit
     adjustment: Adjustment
-    judged: RefinementVerdict
+    evidence: RefinementEvidence
+    verdict: Verdict
     heights: HeightCheck
     ground: str
     mask: MaskUsed | None
@@ -115,7 +118,7 @@ class RefinedRpc:
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
         return {
-            "verdict": self.judged.summary(),
+            "verdict": self.verdict.summary() | self.evidence.summary(),
             "points_by_hand": self.by_hand,
             "bias": self.adjustment.bias.to_json(),
             "left_out_rmse_px": self.adjustment.left_out_rmse_px,
@@ -127,15 +130,15 @@ class RefinedRpc:
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
-        verdict, bias = self.judged.verdict, self.adjustment.bias
+        verdict, evidence, bias = self.verdict, self.evidence, self.adjustment.bias
         shift, sigma = bias.shift_px()
         return [
             f"accepted: {verdict.reason}",
             f"model: {bias.kind}, {verdict.fit_points_used} of {verdict.fit_points} points",
             f"shift in the middle of the image: {shift[0]:+.2f} ± {sigma[0]:.2f}, "
             f"{shift[1]:+.2f} ± {sigma[1]:.2f} px (column, row)",
-            f"error at {self.judged.held_out}: {self.judged.before.rmse:.2f} px before, "
-            f"{self.judged.after.rmse:.2f} px after",
+            f"error at {evidence.held_out.name}: {evidence.before.rmse:.2f} px before, "
+            f"{evidence.after.rmse:.2f} px after",
             verdict.accuracy_line(),
             f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
             *([f"set by hand: {self.by_hand} points"] if self.by_hand else []),
@@ -201,7 +204,8 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
     return RefinedRpc(
         fit,
         refinement.adjustment,
-        refinement.judged,
+        refinement.evidence,
+        refinement.verdict,
         heights,
         sensor.heights,
         None if found is None else found.registration.mask,
