@@ -19,8 +19,7 @@ from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.specification import StatedSurface
 from ..registration.surface_masks import ModelFit, fitted_ground
-from .common import MaskOut, Reference
-from .registration_parameters import SURFACE_MODEL, SurfaceViews
+from .parameters import general, registration
 
 
 @dataclass(frozen=True)
@@ -61,9 +60,9 @@ class SurfaceMaskResult:
     ),
 )
 def mask_surface(
-    reference: Reference,
-    surface_model: Annotated[Path, replace(SURFACE_MODEL, advanced=False)],
-    output: MaskOut,
+    reference: general.Reference,
+    surface_model: Annotated[Path, replace(registration.SURFACE_MODEL, advanced=False)],
+    output: general.MaskOut,
     reasons: Annotated[
         Path | None,
         RasterOut(
@@ -72,7 +71,7 @@ def mask_surface(
             "radar shadow, 8 hidden from the camera, 16 cast shadow, 32 unknown.",
         ),
     ] = None,
-    views: SurfaceViews = None,
+    views: registration.SurfaceViews = None,
     progress: Progress = SILENT,
 ) -> SurfaceMaskResult:
     """Mask all of an image but the ground that a surface model and the views of images leave.

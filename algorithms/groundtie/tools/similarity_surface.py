@@ -23,17 +23,7 @@ from ..studies.window_surface import (
     SurfaceSettings,
     Window,
 )
-from .common import (
-    GpveOrder,
-    Input,
-    InputBand,
-    MatchingPixelSize,
-    Reference,
-    ReferenceBand,
-    Seed,
-    Workers,
-)
-from .registration_parameters import InputMask, ReferenceMask
+from .parameters import general, registration
 
 
 @tool(
@@ -47,8 +37,8 @@ from .registration_parameters import InputMask, ReferenceMask
     ),
 )
 def similarity_surface(
-    reference: Reference,
-    input: Input,
+    reference: general.Reference,
+    input: general.Input,
     output: Annotated[
         Path,
         RasterOut(
@@ -154,7 +144,7 @@ def similarity_surface(
             advanced=True,
         ),
     ] = "equal-frequency",
-    gpve_order: GpveOrder = 4,
+    gpve_order: general.GpveOrder = 4,
     sample: Annotated[
         int,
         Number(
@@ -166,13 +156,13 @@ def similarity_surface(
             advanced=True,
         ),
     ] = 1000,
-    reference_band: ReferenceBand = None,
-    input_band: InputBand = None,
-    reference_mask: ReferenceMask = None,
-    input_mask: InputMask = None,
-    matching_pixel_size: MatchingPixelSize = None,
-    workers: Workers = None,
-    seed: Seed = 0,
+    reference_band: general.ReferenceBand = None,
+    input_band: general.InputBand = None,
+    reference_mask: registration.ReferenceMask = None,
+    input_mask: registration.InputMask = None,
+    matching_pixel_size: general.MatchingPixelSize = None,
+    workers: general.Workers = None,
+    seed: general.Seed = 0,
     progress: Progress = SILENT,
 ) -> SurfaceResult:
     """Show a measure of similarity at every shift of one window.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from ..declaration import Output
-from ..geometry.models import KINDS
-from ..kinds import (
+from ...declaration import Output
+from ...geometry.models import KINDS
+from ...kinds import (
     Choice,
     Distance,
     FileOut,
@@ -18,9 +18,9 @@ from ..kinds import (
     Text,
     VectorOut,
 )
-from ..masks.choice import MASKS
-from ..matching.surface_fit import AUTO
-from ..registration.registered_output import OUTPUT_GRIDS
+from ...masks.choice import MASKS
+from ...matching.surface_fit import AUTO
+from ...registration.registered_output import OUTPUT_GRIDS
 
 Model = Annotated[
     str,
