@@ -22,7 +22,7 @@ from ..errors import (
     NoOverlapError,
     TransformFileError,
 )
-from ..rasters.grid import Grid, apply_affine, compose, reproject
+from ..rasters.grid import Grid, apply_affine, compose, mesh, reproject
 from ..rasters.reading import open_raster
 from ..rasters.surfaces import RasterSurface, surface_around
 from .models import TERRAIN, FloatArray, Frame, Model, PolynomialModel
@@ -112,8 +112,7 @@ class Terrain:
         NoOverlapError
             Heights are unknown at a part of it.
         """
-        cols, rows = (np.linspace(0, side - 1, _ASKED) for side in (grid.width, grid.height))
-        xy = grid.pixel_to_map(np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2))
+        xy = grid.pixel_to_map(grid.lattice(_ASKED))
         xy = xy[within.contains(within.map_to_pixel(reproject(xy, crs, within.crs)))]
         for surface in (self.ground, self.assumed):
             if surface is None:
@@ -260,7 +259,7 @@ class TerrainModel(Model):
     def _compared_m(self) -> FloatArray:
         """Return both heights at places of the frame, shape (n, 2)."""
         side = np.linspace(-0.5, 0.5, _COMPARED)
-        places = self.frame.leave(np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2))
+        places = self.frame.leave(mesh(side, side))
         terrain = self.terrain
         return np.column_stack([terrain.ground_m(places), terrain.assumed_m(places)])
 
@@ -302,8 +301,8 @@ def _surface(
         asked = np.all((xy >= [left, bottom]) & (xy <= [right, top]), axis=1)
         return np.where(asked[:, None], np.clip(px, 0, last), px)
 
-    x, y = np.meshgrid(np.linspace(left, right, _ASKED), np.linspace(bottom, top, _ASKED))
-    return surface_around(source, to_px, np.column_stack([x.ravel(), y.ravel()]))
+    xy = mesh(np.linspace(left, right, _ASKED), np.linspace(bottom, top, _ASKED))
+    return surface_around(source, to_px, xy)
 
 
 def _place(surface: RasterSurface) -> str:

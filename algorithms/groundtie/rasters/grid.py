@@ -150,6 +150,15 @@ class Grid:
         )
         return np.asarray(unit * [self.width, self.height] - 0.5)
 
+    def lattice(self, count: int = 9) -> FloatArray:
+        """Return pixel positions all over the grid, `count` a side, shape (count², 2)."""
+        return mesh(*(np.linspace(0, side - 1, count) for side in (self.width, self.height)))
+
+
+def mesh(cols: ArrayLike, rows: ArrayLike) -> FloatArray:
+    """Return the positions (col, row) of all columns in all rows, shape (n, 2), row by row."""
+    return np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2)
+
 
 def is_invertible(transform: Affine) -> bool:
     """Return whether a transform takes different positions to different, finite ones."""

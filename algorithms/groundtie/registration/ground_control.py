@@ -43,9 +43,6 @@ _COARSE_PX = 2.0
 # After that so much is left to search for, in matching pixels.
 _LEFT_PX = 20.0
 
-# The coarse shift in the image is the median over a lattice.
-_NODES = 9
-
 
 @dataclass(frozen=True)
 class GroundControl:
@@ -164,10 +161,7 @@ def match_ground_control(
 
 def _shift_in_image(pair: ImagePair, orientation: Orientation, model: Model) -> FloatArray:
     """Return by how much image positions differ from those of the RPCs, by a model on the map."""
-    cols, rows = np.meshgrid(
-        np.linspace(0, pair.grid.width - 1, _NODES), np.linspace(0, pair.grid.height - 1, _NODES)
-    )
-    xy = pair.grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
+    xy = pair.grid.pixel_to_map(pair.grid.lattice())
     shifts = orientation.to_px(model(xy)) - orientation.to_px(xy)
     return np.asarray(np.nanmedian(shifts, axis=0))
 

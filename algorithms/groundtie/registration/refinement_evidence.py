@@ -18,7 +18,7 @@ from ..geometry.judging import (
     sigma_range_px,
 )
 from ..geometry.robust import fit_mixture
-from ..rasters.grid import FloatArray
+from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid
 from ..sensor.adjustment import Adjustment, Control
 from .evidence import AGREEMENT, ERROR, REFINEMENT, HeldOut, hull_share
 
@@ -26,8 +26,6 @@ CHECK_POINTS, LEFT_OUT = "check points", "points left out in turn"
 
 # Outliers lie within this distance at least, in pixels.
 _LEAST_REACH_PX = 50
-
-_NODES = 9
 
 
 @dataclass(frozen=True)
@@ -144,6 +142,7 @@ class RefinementEvidence:
         residuals = CheckResiduals(points.expected_px, after, mixture.probability)
         tolerance = max(TOLERANCE_PX, max_error_px)
         agreeing = int((length <= tolerance).sum())
+        nodes_px = Grid(PIXEL_COORDINATES, None, *control.size).lattice()
         held_out = HeldOut(
             name,
             agreeing,
@@ -152,9 +151,9 @@ class RefinementEvidence:
             LARGEST_LOG10_CHANCE,
             mixture.sigma * math.sqrt(2),
             max_error_px,
-            _spread_px(adjustment, control.size),
+            _spread_px(adjustment, nodes_px),
             "the image",
-            predict_accuracy(adjustment.fold_biases, _nodes(control.size), residuals, np.zeros(2)),
+            predict_accuracy(adjustment.fold_biases, nodes_px, residuals, np.zeros(2)),
         )
         used_px = control.found_px[adjustment.used]
         return cls(
@@ -177,15 +176,8 @@ def _rms(residuals_px: FloatArray) -> float:
     return float(np.sqrt((residuals_px**2).sum(axis=1).mean()))
 
 
-def _spread_px(adjustment: Adjustment, size: tuple[int, int]) -> float:
-    """Return how far the correction varies with its points over the image, root mean square."""
-    px = _nodes(size)
+def _spread_px(adjustment: Adjustment, px: FloatArray) -> float:
+    """Return how far the correction varies with its points at places, root mean square."""
     by_points = adjustment.spread_px(px)
     by_noise = adjustment.bias.sigma_px(px)
     return float(np.sqrt(np.mean(np.maximum(by_points, by_noise) ** 2)))
-
-
-def _nodes(size: tuple[int, int]) -> FloatArray:
-    """Return positions all over an image of a size, (width, height)."""
-    sides = (np.linspace(0, side - 1, _NODES) for side in size)
-    return np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)
