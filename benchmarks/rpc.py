@@ -17,12 +17,11 @@ from rasterio.errors import NotGeoreferencedWarning
 
 import groundtie
 from groundtie.errors import NotRegisteredError
-from groundtie.rasters.grid import reproject
+from groundtie.rasters.grid import LON_LAT, reproject
 from groundtie.sensor.bias import Bias, fold
 from groundtie.sensor.rpc import RPC
 from groundtie.sensor.rpc_files import read_rpc
 from groundtie.sensor.rpc_tags import rpc_to_tags
-from groundtie.sensor.surfaces import LON_LAT
 
 from .accuracy import CORRECT, CORRECT_PX, REFUSED, FloatArray, classify
 from .attempt import Outcome, count, unregistered

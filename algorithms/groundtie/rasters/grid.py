@@ -21,6 +21,9 @@ from ..errors import GeoreferencingError, GridSizeError, raised_by
 
 FloatArray = NDArray[np.float64]
 
+# Longitude and latitude.
+LON_LAT = CRS.from_epsg(4326)
+
 # Metres per degree on the sphere of the Earth's mean radius: for sizes and search radii only.
 METRES_PER_DEGREE = 111_195.0
 

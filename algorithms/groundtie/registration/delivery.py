@@ -20,7 +20,8 @@ from ..rasters.grid import Grid
 from ..rasters.reading import bounded_cache
 from ..report.stac import stac_item
 from .displacement import write_displacement
-from .pipeline import OpenPair, open_pair, pair_images, run
+from .opening import OpenPair, open_pair, pair_images
+from .pipeline import run
 from .registered_output import RegisteredOutput, grid_of_output, model_for_grid
 from .registration import Registration
 from .specification import Specification, StatedSurface
@@ -107,7 +108,7 @@ class Call:
     files
         What is to be written.
     bands, masks
-        See `pipeline.open_pair`.
+        See `opening.open_pair`.
     parameters
         All of its parameters, for the report.
     workers

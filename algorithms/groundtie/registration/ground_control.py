@@ -29,7 +29,8 @@ from ..rasters.reading import RasterSource
 from ..sensor.control_points import ControlPoints
 from ..sensor.orientation import Orientation, sensor_grid
 from .evidence import SearchEvidence
-from .pipeline import OpenPair, Stages, mask_pair, pair_images, register
+from .opening import OpenPair, pair_images
+from .pipeline import Stages, mask_pair, register
 from .registration import Registration
 from .scene import SceneInfo
 from .sensor_input import OrientedImage
@@ -110,7 +111,7 @@ def match_ground_control(
     spec
         How they are matched.
     bands, masks
-        Those of the reference and of the image; see `pipeline.open_pair`.
+        Those of the reference and of the image; see `opening.open_pair`.
     stack
         Keeps what is open as long as the result is used.
     context

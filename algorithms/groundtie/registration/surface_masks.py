@@ -17,13 +17,9 @@ from ..context import Context
 from ..errors import ParameterError
 from ..geometry.views import View
 from ..masks.choice import AUTO, NONE, REFERENCE, SURFACE, MaskUsed
+from ..masks.object_heights import RasterModel, SurfaceModel, read_footprints
 from ..masks.scene import Scene
-from ..masks.surface_model import (
-    RasterModel,
-    SurfaceGround,
-    SurfaceModel,
-    read_footprints,
-)
+from ..masks.surface_model import SurfaceGround
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Window, open_raster

@@ -13,9 +13,9 @@ from rasterio.crs import CRS
 
 from ..errors import GroundTieError, TransformFileError
 from ..geometry.georeferencer import require_places
+from ..rasters.grid import LON_LAT
 from ..rasters.handles import FileHandles
 from ..strict_json import read_json
-from .surfaces import LON_LAT
 
 FloatArray = NDArray[np.float64]
 

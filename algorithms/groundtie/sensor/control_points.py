@@ -18,13 +18,12 @@ from ..geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..rasters.atomic import writing
-from ..rasters.grid import PIXEL_COORDINATES, Grid, reproject
+from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, Grid, reproject
 from .adjustment import Control
 from .control_formats import SUFFIXES as OTHER_SUFFIXES
 from .control_formats import Places, read_places
 from .orientation import Orientation, SensorGrid
 from .rpc import RPC
-from .surfaces import LON_LAT
 
 FloatArray = NDArray[np.float64]
 

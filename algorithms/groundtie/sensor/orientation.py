@@ -10,12 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError, NoOverlapError
-from ..rasters.grid import Grid, mesh, reproject
+from ..rasters.grid import LON_LAT, Grid, mesh, reproject
 from ..rasters.reading import RasterSource
 from .heights import ConstantHeight, Heights, terrain_heights
 from .rpc import RPC
 from .smooth_map import Positions, smooth_map
-from .surfaces import LON_LAT
 
 FloatArray = NDArray[np.float64]
 

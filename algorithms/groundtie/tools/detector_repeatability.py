@@ -18,7 +18,7 @@ from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import bounded_cache
-from ..registration.pipeline import open_pair
+from ..registration.opening import open_pair
 from ..registration.specification import Specification
 from ..registration.stored_transform import transform_of
 from ..studies.evaluation import Evaluation, Variant, evaluate

@@ -11,7 +11,7 @@ from ..declaration import tool
 from ..kinds import Choice, Distance, FileOut, Number, RasterOut
 from ..progress import SILENT, Progress
 from ..rasters.reading import bounded_cache
-from ..registration.pipeline import open_pair
+from ..registration.opening import open_pair
 from ..registration.specification import Specification
 from ..similarity.binning import BINNINGS
 from ..studies.surface_result import SurfaceResult
