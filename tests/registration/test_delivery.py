@@ -16,11 +16,11 @@ from groundtie.context import Context
 from groundtie.errors import NothingFoundError, NotRegisteredError, OutputError
 from groundtie.geometry.transform import FORMAT, load_transform
 from groundtie.registration import delivery
+from groundtie.registration.asked import specified
 from groundtie.registration.delivery import (
     Call,
     RegistrationFiles,
     require_accepted,
-    specified,
 )
 from groundtie.registration.evidence import SearchEvidence
 from groundtie.registration.registered_output import RegisteredOutput

@@ -21,7 +21,7 @@ from groundtie.masks.scene import Scene
 from groundtie.rasters.grid import compose
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.delivery import asked_surface
+from groundtie.registration.asked import asked_surface
 from groundtie.registration.scene import scene_of
 from groundtie.registration.specification import BOTH, INPUT, NEITHER, StatedSurface
 from groundtie.registration.surface_masks import (

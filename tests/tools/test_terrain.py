@@ -11,7 +11,7 @@ import pytest
 import groundtie
 from groundtie.errors import NoOverlapError, ParameterError
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.terrain import asked_lights
+from groundtie.registration.asked import asked_lights
 
 SIZE = 400
 

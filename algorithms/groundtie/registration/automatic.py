@@ -20,6 +20,7 @@ from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster
 from ..rasters.rendered import Light
 from ..sensor.rpc_files import rpc_of
+from .asked import asked_lights, asked_terrain
 from .delivery import Call
 from .evidence import SCENE, SURVEY
 from .orthorectification import Orthorectification
@@ -30,7 +31,6 @@ from .scene import SceneInfo
 from .sensor_input import Ground, open_sensor_image
 from .sensor_jobs import RefinedRpc, refine
 from .specification import CHIPS, COREGISTER, OPTICAL, SAR_SAR, FreeSearch, Specification
-from .terrain import asked_lights, asked_terrain
 from .verdict import Verdict
 
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..context import Context
+from ..geometry.terrain import Terrain
 from ..masks.choice import MaskUsed
 from ..rasters.pair import Image, ImagePair, make_pair
 from ..rasters.reading import open_raster
@@ -121,3 +122,27 @@ def pair_images(
     pair, used = with_user_masks(images, named_masks(masks), stack, context.part(0.0, 0.02))
     require_one_mask(spec.mask, used)
     return OpenPair(images, pair, used, stack, started)
+
+
+def open_terrain(pair: ImagePair, dem: Any, input_dem: Any | None) -> Terrain:
+    """Return heights where a pair may show something.
+
+    Parameters
+    ----------
+    pair
+        The images.
+    dem, input_dem
+        The ground's heights, and those that the input was made with; None: one height.
+
+    Raises
+    ------
+    GeoreferencingError, NoOverlapError, RasterContentError
+        They are not known where the images overlap.
+    """
+    corners = pair.surroundings.pixel_to_map(pair.surroundings.outline())
+    left, bottom = corners.min(axis=0).tolist()
+    right, top = corners.max(axis=0).tolist()
+    crs = pair.grid.crs
+    terrain = Terrain.open(dem, input_dem, crs, (left, bottom, right, top))
+    terrain.require_cover(pair.grid, pair.input.source.grid, crs)
+    return terrain

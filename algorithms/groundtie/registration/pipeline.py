@@ -34,12 +34,11 @@ from ..similarity.surface import SimilaritySettings
 from .evidence import RegistrationEvidence, SearchEvidence
 from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
 from .masks import Masked, with_ground_mask
-from .opening import OpenPair
+from .opening import OpenPair, open_terrain
 from .registration import Registration
 from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
 from .surface_masks import ModelFit, fit_of, with_surface_mask
-from .terrain import open_terrain
 from .verdict import judge, judge_search
 
 

@@ -19,7 +19,7 @@ from ..sensor.adjustment import Adjustment
 from ..sensor.control_points import ControlPoints, read_control_points
 from ..sensor.height_check import HeightCheck
 from ..sensor.rpc_fit import RPCFit
-from .delivery import asked_masks, asked_surface
+from .asked import asked_masks, asked_surface
 from .ground_control import GroundControl, match_ground_control, require_crs
 from .refinement import Refinement
 from .refinement_evidence import RefinementEvidence
