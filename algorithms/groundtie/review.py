@@ -26,7 +26,7 @@ from .geometry.tie_points import USED, TiePoints
 from .geometry.transform import Transform
 from .progress import SILENT
 from .rasters.atomic import Outputs
-from .rasters.grid import Grid, compose
+from .rasters.grid import FloatArray, Grid, compose
 from .rasters.pair import Image
 from .rasters.reading import open_raster
 from .registration.sensor_input import Ground, open_oriented_image
@@ -37,8 +37,6 @@ from .sensor.orientation import sensor_grid
 from .similarity.description import BORDER_PX
 from .similarity.peak import Peak, find_peak
 from .steps import similarity_surface
-
-FloatArray = NDArray[np.float64]
 
 SWITCHED_OFF = "rejected: by a person"
 

@@ -49,7 +49,6 @@ __all__ = [
     "similarity_surface",
 ]
 
-FloatArray = NDArray[np.float64]
 
 # Matches are taken to be as exact as this, in pixels, where no better value is given.
 _USUAL_SIGMA_PX = 0.25

@@ -16,10 +16,8 @@ from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError, NoOverlapError
 from ..geometry.transform import Transform
-from ..rasters.grid import Grid, mesh, reproject
+from ..rasters.grid import FloatArray, Grid, mesh, reproject
 from .point_errors import PointErrors
-
-FloatArray = NDArray[np.float64]
 
 # Places along the input's longer side at which consistency is measured.
 _PLACES = 33

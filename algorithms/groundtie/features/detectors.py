@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rasters.patch import Patch, reduced_patch
+from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from .keypoints import Keypoints
 
-FloatImage = NDArray[np.float32]
 ByteImage = NDArray[np.uint8]
 
 _LAYERS = 3

@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
 from ..errors import OutputError, TransformFileError
 from ..rasters.atomic import write_json, writing
-from ..rasters.grid import LON_LAT, Grid, reproject, require_map
+from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject, require_map
 from ..runs import run_tags
 from ..strict_json import read_json
 from .drawn_points import INPUT, NOMINAL, PIXEL, Row, columns, follow_lines, line_ends
@@ -33,8 +32,6 @@ from .tie_point_frames import NUMBERS, TEXTS, tie_point_columns
 from .tie_points import USED, TiePoints
 from .transform import Transform
 from .vector_layers import read_vector_layer
-
-FloatArray = NDArray[np.float64]
 
 _LOG = logging.getLogger(__name__)
 _SUFFIXES = (".gpkg", ".geojson", ".csv", ".points")

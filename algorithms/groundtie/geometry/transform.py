@@ -8,17 +8,16 @@ from typing import Any
 
 import numpy as np
 from affine import Affine
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
 from ..errors import TransformFileError
-from ..rasters.grid import MOST_PX, Grid, is_invertible, reproject, require_map
+from ..rasters.grid import MOST_PX, FloatArray, Grid, is_invertible, reproject, require_map
 from ..strict_json import read_json
 from .models import DEGREE, TERRAIN, Frame, Model, PolynomialModel, ThinPlateSpline
 from .terrain_model import TerrainModel
 
-FloatArray = NDArray[np.float64]
 FORMAT = "groundtie-transform/1"
 
 

@@ -10,9 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .grid import Grid, mesh
-
-FloatArray = NDArray[np.float64]
+from .grid import FloatArray, Grid, mesh
 
 # Takes map positions, (n, 2), to values, (n, k).
 MapFunction = Callable[[FloatArray], FloatArray]

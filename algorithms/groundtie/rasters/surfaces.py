@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoOverlapError, RasterContentError
+from .grid import FloatArray
 from .kernels import interpolate
 from .reading import FloatImage, Mask, RasterSource, Window
 
-FloatArray = NDArray[np.float64]
 Positions = Callable[[FloatArray], FloatArray]
 
 # Pixels of the raster that are read at a time, a side.

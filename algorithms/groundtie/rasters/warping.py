@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .bands import working_dtype
-from .grid import Grid
+from .grid import FloatArray, Grid
 from .kernels import REACH, interpolate
 from .lattice import Lattice, fine_lattice, row_strips
 from .reading import FloatImage, RasterSource
 from .windows import Mask, Window
 
-FloatArray = NDArray[np.float64]
 ToInputPx = Callable[[FloatArray], FloatArray]
 
 METHODS = tuple(REACH)

@@ -9,11 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.grid import Grid, mesh
+from ..rasters.grid import FloatArray, Grid, mesh
 from ..rasters.patch import Patch
 from ..similarity.surface import Surface
 
-FloatArray = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 ToPixel = Callable[[FloatArray], FloatArray]
 

@@ -16,9 +16,9 @@ from ..geometry.model_choice import (
     left_out_blocks,
 )
 from ..geometry.robust import find_consensus, fit_mixture
+from ..rasters.grid import FloatArray
 from .bias import KINDS, TERMS, Bias, design
 
-FloatArray = NDArray[np.float64]
 AUTO = "auto"
 
 # How blunders are found: all at once, by what is probable, or one after the other, the worst

@@ -12,13 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from ..rasters.lattice import Lattice, fine_lattice, row_strips
 from ..rasters.reading import FloatImage
 from .orientation import Orientation
 from .smooth_map import Positions
-
-FloatArray = NDArray[np.float64]
 
 # Interpolation between the nodes of the lattice may be wrong by this, in image pixels.
 _TOLERANCE_PX = 1e-3

@@ -8,17 +8,14 @@ from functools import cached_property
 from typing import ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
-from ..rasters.grid import LON_LAT, Grid, reproject
+from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject
 from ..rasters.lattice import Lattice
 from ..rasters.reading import FloatImage, RasterSource
 from ..rasters.surfaces import TOLERANCE_PX, RasterSurface, SurfacePiece, surface_around
 from .geoids import GEOID_GRIDS
 from .smooth_map import Positions, smooth_map
-
-FloatArray = NDArray[np.float64]
 
 # Takes a smooth function of longitude and latitude, (n, 2) → (n, k), and its largest error; returns
 # its values for all pixels of a grid.

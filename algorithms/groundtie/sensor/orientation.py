@@ -6,17 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from affine import Affine
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError, NoOverlapError
-from ..rasters.grid import LON_LAT, Grid, mesh, reproject
+from ..rasters.grid import LON_LAT, FloatArray, Grid, mesh, reproject
 from ..rasters.reading import RasterSource
 from .heights import ConstantHeight, Heights, terrain_heights
 from .rpc import RPC
 from .smooth_map import Positions, smooth_map
-
-FloatArray = NDArray[np.float64]
 
 # Heights found by intersecting a line of sight with the terrain are right to this, in metres.
 _PRECISION_M = 1e-4

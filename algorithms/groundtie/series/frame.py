@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 
 from ..geometry.models import Frame, PolynomialModel, monomials
-from ..rasters.grid import Grid, compose, mesh, reproject
+from ..rasters.grid import FloatArray, Grid, compose, mesh, reproject
 
-FloatArray = NDArray[np.float64]
 Move = Callable[[FloatArray], FloatArray]
 
 # Parameters of a displacement: shift, and rise along both axes, (x, y) each.
