@@ -102,21 +102,11 @@ def similarity_surface(
             suffixes=(".json",),
         ),
     ] = None,
-    alpha: Annotated[
+    entropy_order: Annotated[
         float,
         Number(
-            label="Order of Rényi's entropy",
-            help="For renyi; 1 is Shannon's entropy.",
-            minimum=-100,
-            maximum=100,
-            advanced=True,
-        ),
-    ] = 2.0,
-    q: Annotated[
-        float,
-        Number(
-            label="Index of Tsallis' entropy",
-            help="For tsallis; 1 is Shannon's entropy.",
+            label="Order of the entropy",
+            help="Of Rényi's entropy for renyi, of Tsallis' for tsallis; 1 is Shannon's.",
             minimum=-100,
             maximum=100,
             advanced=True,
@@ -174,7 +164,7 @@ def similarity_surface(
     The surface has one distinct peak if the measure is fit for the images. Nothing is registered
     and no verdict given.
     """
-    settings = SurfaceSettings(similarity, bins, binning, gpve_order, alpha, q, sample)
+    settings = SurfaceSettings(similarity, bins, binning, gpve_order, entropy_order, sample)
     files = {"output": output, "picture": picture, "numbers": numbers}
     spec = Specification(search_radius_m=0.0, matching_pixel_size_m=matching_pixel_size)
     bands, masks = (reference_band, input_band), (reference_mask, input_mask)

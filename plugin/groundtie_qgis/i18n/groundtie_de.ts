@@ -480,10 +480,6 @@
       <translation>Für mlmi: Zahl der Pixel des Fensters, die benutzt werden.</translation>
     </message>
     <message>
-      <source>For renyi; 1 is Shannon's entropy.</source>
-      <translation>Für renyi; 1 ist Shannons Entropie.</translation>
-    </message>
-    <message>
       <source>For the report's pictures: the image whose georeferencing is right.</source>
       <translation>Für die Bilder des Berichts: das Bild, dessen Georeferenz stimmt.</translation>
     </message>
@@ -502,10 +498,6 @@
     <message>
       <source>For three-way consistency: the registration of the reference to the third image (the third image is its reference).</source>
       <translation>Für die Konsistenz über drei Wege: die Registrierung der Referenz auf das dritte Bild (das dritte Bild ist ihre Referenz).</translation>
-    </message>
-    <message>
-      <source>For tsallis; 1 is Shannon's entropy.</source>
-      <translation>Für tsallis; 1 ist Shannons Entropie.</translation>
     </message>
     <message>
       <source>Fourier–Mellin</source>
@@ -758,10 +750,6 @@
     <message>
       <source>Incidence angle</source>
       <translation>Einfallswinkel</translation>
-    </message>
-    <message>
-      <source>Index of Tsallis' entropy</source>
-      <translation>Index der Tsallis-Entropie</translation>
     </message>
     <message>
       <source>Information</source>
@@ -1104,6 +1092,10 @@
       <translation>Zahlen</translation>
     </message>
     <message>
+      <source>Of Rényi's entropy for renyi, of Tsallis' for tsallis; 1 is Shannon's.</source>
+      <translation>Der Rényi-Entropie für renyi, der Tsallis-Entropie für tsallis; 1 ist Shannons.</translation>
+    </message>
+    <message>
       <source>Of enhanced-frost: larger values keep more of edges, and of speckle.</source>
       <translation>Für Enhanced Frost: größere Werte erhalten mehr von den Kanten, und vom Speckle.</translation>
     </message>
@@ -1132,12 +1124,12 @@
       <translation>Umlaufbahn</translation>
     </message>
     <message>
-      <source>Order of Rényi's entropy</source>
-      <translation>Ordnung der Rényi-Entropie</translation>
-    </message>
-    <message>
       <source>Order of the B-spline by which pixels enter the joint histogram: 2 is partial volume interpolation, 4 the cubic spline; 4 and more are free of artefacts.</source>
       <translation>Ordnung des B-Splines, mit dem Pixel in das gemeinsame Histogramm eingehen: 2 ist Partial-Volume-Interpolation, 4 der kubische Spline; 4 und mehr sind frei von Artefakten.</translation>
+    </message>
+    <message>
+      <source>Order of the entropy</source>
+      <translation>Ordnung der Entropie</translation>
     </message>
     <message>
       <source>Order of the histogram's spline</source>
