@@ -31,7 +31,7 @@ from .rasters.pair import Image
 from .rasters.reading import open_raster
 from .registration.sensor_input import Ground, open_oriented_image
 from .registration.tie_point_evidence import TiePointEvidence
-from .registration.verdict import first_refusal
+from .registration.verdict import decide
 from .sensor.control_points import HEIGHT
 from .sensor.orientation import sensor_grid
 from .similarity.description import BORDER_PX
@@ -182,8 +182,7 @@ class Review:
         TooFewPointsError
             They are fewer than the model needs.
         """
-        refusal = first_refusal(TiePointEvidence.of(self.points, kind, self.input_grid))
-        return "" if refusal is None else refusal[1]
+        return decide(TiePointEvidence.of(self.points, kind, self.input_grid), "").reason
 
     def fits(self, kinds: Sequence[str] = KINDS) -> dict[str, ModelFit]:
         """Return the models that can be fitted at once, by their kinds."""

@@ -17,7 +17,7 @@ from ..geometry.transform import Transform, load_transform
 from ..rasters.grid import FloatArray, Grid, reproject
 from ..rasters.reading import RasterSource
 from .tie_point_evidence import TiePointEvidence, TiePointFit
-from .verdict import first_refusal
+from .verdict import decide
 
 
 def load_stored(
@@ -53,10 +53,9 @@ def load_stored(
     ).all():
         raise TransformFileError(f"{path} holds points that lie outside of their map's projection")
     evidence = TiePointEvidence.of(points, model, source.grid)
-    refusal = first_refusal(evidence)
-    if refusal is not None:
-        rule, reason = refusal
-        raise NotRegisteredError(f"{path}: {reason}; {rule.advice}")
+    verdict = decide(evidence, "")
+    if not verdict.accepted:
+        raise NotRegisteredError(f"{path}: {verdict.sentence()}")
     return evidence.transform, evidence.fit()
 
 
