@@ -33,7 +33,7 @@ _SINGLE_PX = 2000
 _ROUNDING = 1.5 * 2.0**39
 
 # Stands for positions that are not finite: outside of every image.
-_NOWHERE = -1e9
+NOWHERE = -1e9
 
 
 @runtime_checkable
@@ -92,7 +92,7 @@ def _between_nodes(nodes: Lattice) -> FloatArray:
     for rows in row_strips(grid.height, grid.width):
         px[:, rows] = nodes.lines(rows)
     if np.isnan(nodes.values).any():
-        px[np.isnan(px)] = _NOWHERE
+        px[np.isnan(px)] = NOWHERE
     return px
 
 

@@ -19,13 +19,10 @@ from ..geometry.judging import (
 )
 from ..geometry.robust import fit_mixture
 from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid
-from ..sensor.adjustment import Adjustment, Control
+from ..sensor.adjustment import LEAST_REACH_PX, Adjustment, Control
 from .evidence import AGREEMENT, ERROR, REFINEMENT, HeldOut, hull_share
 
 CHECK_POINTS, LEFT_OUT = "check points", "points left out in turn"
-
-# Outliers lie within this distance at least, in pixels.
-_LEAST_REACH_PX = 50
 
 
 @dataclass(frozen=True)
@@ -137,7 +134,7 @@ class RefinementEvidence:
             after = check.residuals_px(adjustment.bias)
         before = points.residuals_px(None)
         length = np.hypot(*after.T)
-        reach = max(int(np.ceil(length.max(initial=0.0))), _LEAST_REACH_PX)
+        reach = max(int(np.ceil(length.max(initial=0.0))), LEAST_REACH_PX)
         mixture = fit_mixture(after, (2 * reach + 1) ** 2, sigma_range_px(max_error_px))
         residuals = CheckResiduals(points.expected_px, after, mixture.probability)
         tolerance = max(TOLERANCE_PX, max_error_px)

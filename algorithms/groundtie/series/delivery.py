@@ -15,7 +15,7 @@ from shapely.geometry import LineString, mapping
 from ..context import Context
 from ..errors import NotRegisteredError
 from ..rasters.atomic import Outputs, write_json, writing
-from ..registration.registered_output import RegisteredOutput
+from ..registration.registered_output import UNTOUCHED_TOLERANCE_PX, RegisteredOutput
 from ..registration.verdict import Verdict
 from ..runs import RUN, run_tags
 from ..version import __version__
@@ -25,10 +25,6 @@ from .series import TABLE_COLUMNS, Series, SeriesDate
 from .stored import StoredSeries
 
 SERIES_JSON, TABLE_CSV, TABLE_GPKG = "series.json", "series.csv", "series.gpkg"
-
-# A raster is not made again if a further date moves it by less than this, in its own pixels: what
-# untouched pixels may be wrong by, too.
-_SAME_PX = 0.05
 
 
 @dataclass(frozen=True)
@@ -105,7 +101,8 @@ class SeriesFiles:
         if before is not None and before.key == key and before.is_there(self.folder):
             corners = one.transform.input_grid.outline(2)
             moved = one.transform(before.transform.inverse(corners)) - corners
-            if np.hypot(*moved.T).max() < _SAME_PX:
+            # What untouched pixels may be wrong by, too.
+            if np.hypot(*moved.T).max() < UNTOUCHED_TOLERANCE_PX:
                 known = {"file": before.file, "key": key, "run": before.run}
                 return replace(one, transform=before.transform), known
         context.update(0.0, f"writing {one.name}")
