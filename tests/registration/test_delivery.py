@@ -20,7 +20,6 @@ from groundtie.registration.asked import specified
 from groundtie.registration.delivery import (
     Call,
     RegistrationFiles,
-    require_accepted,
 )
 from groundtie.registration.evidence import SearchEvidence
 from groundtie.registration.registered_output import RegisteredOutput
@@ -86,8 +85,8 @@ def test_a_refused_registration_writes_its_report_and_raises(
     assert numbers["verdict"]["accepted"] is False
     assert numbers["verdict"]["rule"] == "nothing in common"
     with pytest.raises(NotRegisteredError):
-        require_accepted(lost)
-    require_accepted(registration)
+        lost.require_accepted()
+    registration.require_accepted()
 
 
 def test_what_fails_later_leaves_no_report_either(

@@ -74,21 +74,26 @@ def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:
 
 def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specification:
     """Return a preset with what a tool was called with."""
-    surface = asked_surface({**USUAL, **parameters}, "input")
-    if surface is not None:
-        preset = preset.with_surface(surface)
     return replace(
-        preset,
+        searched(preset, {**USUAL, **parameters}, "input"),
         **asked_terrain(parameters),
         light=asked_light(parameters),
         model=model_for_grid(
             parameters["model"], grid_of_output(parameters["output"], parameters["output_grid"])
         ),
-        max_error_px=parameters["max_error"],
-        search_radius_m=parameters["search_radius"],
         rotation_deg=parameters["search_rotation"],
-        mask=parameters["mask"],
-        matching_pixel_size_m=parameters["matching_pixel_size"],
+    )
+
+
+def searched(preset: Specification, given: Mapping[str, Any], image: str) -> Specification:
+    """Return a preset with the limits, the mask and the surface model that a tool was given."""
+    surface = asked_surface(given, image)
+    return replace(
+        preset if surface is None else preset.with_surface(surface),
+        max_error_px=given["max_error"],
+        search_radius_m=given["search_radius"],
+        mask=given["mask"],
+        matching_pixel_size_m=given["matching_pixel_size"],
     )
 
 

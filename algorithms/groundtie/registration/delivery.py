@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from ..context import Context, threads
-from ..errors import NotRegisteredError
 from ..geometry.tie_point_files import write_tie_points
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
@@ -197,7 +196,7 @@ class Call:
             # Not for as long as the rasters: environments must be left in the order of entering.
             with bounded_cache():
                 self.files.write(registration, context)
-            require_accepted(registration)
+            registration.require_accepted()
             rasters = stack.pop_all()
         kept = replace(registration, files=self.files.named(registration), rasters=rasters)
         weakref.finalize(kept, rasters.close)
@@ -224,14 +223,3 @@ def register_as(
         The registration was refused.
     """
     return Call.of(parameters, progress).register(specified(preset, parameters))
-
-
-def require_accepted(registration: Registration) -> None:
-    """Raise `NotRegisteredError` if a registration was refused."""
-    if not registration.verdict.accepted:
-        pair, verdict = registration.pair, registration.verdict
-        raise NotRegisteredError(
-            f"{pair.input.source.path} was not registered to {pair.reference.source.path}: "
-            f"{verdict.sentence()}",
-            verdict,
-        )

@@ -18,7 +18,6 @@ from ..context import Context
 from ..errors import (
     GeoreferencingError,
     NothingFoundError,
-    NotRegisteredError,
     TooFewPointsError,
 )
 from ..geometry.models import Model
@@ -68,13 +67,8 @@ class GroundControl:
         NotRegisteredError
             They are refused.
         """
-        pair, verdict = self.registration.pair, self.registration.verdict
-        if not verdict.accepted or self.points is None:
-            raise NotRegisteredError(
-                f"{pair.input.source.path} was not matched with {pair.reference.source.path}: "
-                f"{verdict.sentence()}",
-                verdict,
-            )
+        self.registration.require_accepted("matched with")
+        assert self.points is not None
         return self.points
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -19,11 +18,11 @@ from ..sensor.adjustment import Adjustment
 from ..sensor.control_points import ControlPoints, read_control_points
 from ..sensor.height_check import HeightCheck
 from ..sensor.rpc_fit import RPCFit
-from .asked import asked_masks, asked_surface
+from .asked import asked_masks, searched
 from .ground_control import GroundControl, match_ground_control, require_crs
 from .refinement import Refinement
 from .refinement_evidence import RefinementEvidence
-from .refinement_output import Call, RefinementFiles
+from .refinement_output import RefinementFiles
 from .sensor_input import Ground, OrientedImage, open_oriented_image
 from .specification import Specification
 from .verdict import Verdict
@@ -182,8 +181,9 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
     gcps, dem = parameters["gcps"], parameters["dem"]
     if (parameters["reference"] is None) == (gcps is None):
         raise ParameterError("give either a reference or ground control points (gcps)")
-    call = Call(parameters, time.perf_counter())
-    files = RefinementFiles(parameters["output"], parameters["residuals"], parameters["report"])
+    files = RefinementFiles(
+        parameters["output"], parameters["residuals"], parameters["report"], parameters
+    )
     with threads(parameters["workers"], progress) as context, ExitStack() as stack:
         stack.enter_context(bounded_cache())
         sensor, found = _matched(parameters, stack, context.part(0.0, 0.9))
@@ -192,7 +192,7 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
                 gcps, sensor.orientation, sensor.source.grid, sensor.source.path
             )
         else:
-            points = files.points_or_report(found, call)
+            points = files.points_or_report(found)
         context.update(0.9, "estimating the bias")
         refinement = Refinement.of(
             points, sensor, parameters["model"], parameters["max_error"], gcps is not None
@@ -200,7 +200,7 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
         heights = refinement.heights(own_heights=gcps is not None and dem is not None)
         for warning in heights.warnings():
             context.update(0.9, warning)
-        fit = files.write(refinement, heights, found, call, context.part(0.9, 1.0).progress)
+        fit = files.write(refinement, heights, found, context.part(0.9, 1.0).progress)
     return RefinedRpc(
         fit,
         refinement.adjustment,
@@ -228,15 +228,7 @@ def _matched(
     sensor = open_oriented_image(given["image"], given["rpc"], ground, crs, stack, context.progress)
     if reference is None:
         return sensor, None
-    spec = Specification(
-        max_error_px=given["max_error"],
-        search_radius_m=given["search_radius"],
-        mask=given["mask"],
-        matching_pixel_size_m=given["matching_pixel_size"],
-    )
-    surface = asked_surface(given, "image")
-    if surface is not None:
-        spec = spec.with_surface(surface)
+    spec = searched(Specification(), given, "image")
     bands = given["reference_band"], given["image_band"]
     masks = asked_masks(given, "image")
     return sensor, match_ground_control(sensor, reference, spec, bands, masks, stack, context)

@@ -22,8 +22,6 @@ class RefinementReport(Page):
 
     Parameters
     ----------
-    title
-        Heading of the page.
     verdict
         Whether they can be trusted.
     evidence
@@ -46,13 +44,8 @@ class RefinementReport(Page):
         Reference and image on the map; None: there is no reference.
     mask
         What of the reference took part; None without one.
-    parameters
-        What the tool was called with.
-    seconds
-        How long it took.
     """
 
-    title: str
     verdict: Verdict
     evidence: RefinementEvidence
     bias: Bias
@@ -64,8 +57,6 @@ class RefinementReport(Page):
     warnings: tuple[str, ...]
     comparison: Comparison | None
     mask: MaskUsed | None
-    parameters: dict[str, Any]
-    seconds: float
     template: ClassVar[str] = "refinement.html.j2"
 
     def numbers(self) -> dict[str, Any]:
