@@ -17,7 +17,7 @@ from affine import Affine
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from groundtie.rasters.grid import Grid, reproject
+from groundtie.rasters.grid import LON_LAT, Grid, reproject
 from groundtie.rasters.kernels import interpolate
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor.bias import Bias, fold
@@ -26,7 +26,6 @@ from groundtie.sensor.orientation import Orientation
 from groundtie.sensor.rpc import RPC
 from groundtie.sensor.rpc_files import read_rpc
 from groundtie.sensor.rpc_tags import rpc_from_tags, rpc_to_tags
-from groundtie.sensor.surfaces import LON_LAT
 
 from .cases import RealCase, read_cases
 

@@ -89,7 +89,7 @@ def further(pair: Pair, view: str, way: str) -> dict[str, Any]:
     if way == WITHOUT:
         return {}
     if way in (LIT, ELSEWHERE):
-        return {"light": RADAR if view == "SAR" else SUN}
+        return {"views": f"terrain {RADAR if view == 'SAR' else SUN}"}
     return {"dem": dem, "input_dem": dem.with_name(NAMES["input_dem"]) if way == WITH else None}
 
 

@@ -17,12 +17,11 @@ from rasterio.errors import NotGeoreferencedWarning
 
 import groundtie
 from groundtie.errors import NotRegisteredError
-from groundtie.rasters.grid import reproject
+from groundtie.rasters.grid import LON_LAT, reproject
 from groundtie.sensor.bias import Bias, fold
 from groundtie.sensor.rpc import RPC
 from groundtie.sensor.rpc_files import read_rpc
 from groundtie.sensor.rpc_tags import rpc_to_tags
-from groundtie.sensor.surfaces import LON_LAT
 
 from .accuracy import CORRECT, CORRECT_PX, REFUSED, FloatArray, classify
 from .attempt import Outcome, count, unregistered
@@ -111,7 +110,7 @@ class HalfRealCase:
             error,
             scene.sigma_px,
             seconds,
-            result.judged.verdict.check_rmse_px,
+            result.verdict.check_rmse_px,
             result.adjustment.bias.kind,
             near_the_truth(kept),
         )
@@ -172,7 +171,7 @@ class SimulatedCase:
             error,
             0.0,
             seconds,
-            result.judged.verdict.check_rmse_px,
+            result.verdict.check_rmse_px,
             result.adjustment.bias.kind,
             near_the_truth(kept),
         )
@@ -249,7 +248,7 @@ class RoundTripCase:
                 error = _distance_px(clean, truth, truth)
         limit = CHANGED_PX if self.wrong else RECOVERED_PX
         verdict = CORRECT if error <= limit else "inaccurate"
-        reason = result.judged.verdict.reason
+        reason = result.verdict.reason
         return Outcome(
             f"{self.sensor}, bias {self.number}",
             self.group,
@@ -259,7 +258,7 @@ class RoundTripCase:
             error,
             limit,
             seconds,
-            result.judged.verdict.check_rmse_px,
+            result.verdict.check_rmse_px,
             result.adjustment.bias.kind,
             reason,
         )

@@ -21,14 +21,13 @@ from rasterio.errors import NotGeoreferencedWarning
 from rasterio.transform import RPCTransformer
 
 import groundtie
-from groundtie.rasters.grid import reproject
+from groundtie.rasters.grid import LON_LAT, reproject
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor.dense import DenseOrientation
 from groundtie.sensor.orientation import orient
 from groundtie.sensor.rpc import RPC
 from groundtie.sensor.rpc_files import rpc_of
 from groundtie.sensor.rpc_tags import rpc_to_tags
-from groundtie.sensor.surfaces import LON_LAT
 
 from .half_real import sensor_rpc
 from .processes import OUTPUT, measure, measure_often

@@ -67,10 +67,8 @@ def rotated_views(
     reference: Path, input: Path, radar_deg: float, camera_deg: float
 ) -> dict[str, str]:
     """Return the views of the images beside their files, with azimuths that are wrong."""
-    return {
-        "reference_view": _words(View.of(reference, None), radar_deg),
-        "input_view": _words(View.of(input, None), camera_deg),
-    }
+    radar = _words(View.of(reference, None), radar_deg)
+    return {"views": f"{radar}; {_words(View.of(input, None), camera_deg)}"}
 
 
 def _words(view: View | None, rotation_deg: float) -> str:

@@ -81,7 +81,7 @@ def surface_model(scenes: Scenes) -> Figure:
         folder / "dsm.tif",
         files[0],
         reasons=files[1],
-        input_view=str(folder / "input.json"),
+        views=f"; {folder / 'input.json'}",
     )
     groundtie.warp(camera, files[2], transform=folder / "truth.json", reference=radar)
     taken, why, seen = (read_band(path)[window] for path in files)

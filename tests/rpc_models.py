@@ -13,11 +13,10 @@ from raster_files import write_raster
 from rasterio.crs import CRS
 from rasterio.transform import RPCTransformer
 
-from groundtie.rasters.grid import Grid, reproject
+from groundtie.rasters.grid import LON_LAT, Grid, reproject
 from groundtie.sensor.rpc import RPC
 from groundtie.sensor.rpc_fit import fit_rpc
 from groundtie.sensor.rpc_tags import rpc_to_tags
-from groundtie.sensor.surfaces import LON_LAT
 
 FloatArray = NDArray[np.float64]
 

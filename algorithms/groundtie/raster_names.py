@@ -5,7 +5,6 @@ The one place that tells them apart: whoever takes a raster asks here before it 
 
 from __future__ import annotations
 
-import datetime
 import os
 import posixpath
 import re
@@ -33,9 +32,6 @@ _FILE_SYSTEMS = {
     "oss": "/vsioss/",
     "file": "",
 }
-
-_DAY = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
-_YEAR = re.compile(r"(?<!\d)((?:19|20)\d\d)(?!\d)")
 
 # Those that read over a network, also inside of others, as /vsizip//vsicurl/….
 _REMOTE = re.compile(
@@ -91,22 +87,3 @@ def identity(name: Path | str) -> Hashable:
     """Return what is the same for two names of one raster."""
     found = raster_name(name)
     return found.resolve() if isinstance(found, Path) else found
-
-
-def time_of(text: str) -> datetime.datetime | None:
-    """Return the time that a text states: an ISO 8601 time, else a day or a year in a name."""
-    try:
-        stated = datetime.datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
-    except ValueError:
-        stated = None
-    if stated is not None and not text.strip().isdigit():
-        if stated.tzinfo is not None:
-            stated = stated.astimezone(datetime.timezone.utc).replace(tzinfo=None)
-        return stated
-    if day := _DAY.search(text):
-        try:
-            return datetime.datetime(*map(int, day.groups()))  # type: ignore[arg-type]
-        except ValueError:  # 30 February
-            return None
-    year = _YEAR.search(text)
-    return None if year is None else datetime.datetime(int(year.group(1)), 1, 1)

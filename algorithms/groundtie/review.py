@@ -26,19 +26,17 @@ from .geometry.tie_points import USED, TiePoints
 from .geometry.transform import Transform
 from .progress import SILENT
 from .rasters.atomic import Outputs
-from .rasters.grid import Grid, compose
+from .rasters.grid import FloatArray, Grid, compose
 from .rasters.pair import Image
 from .rasters.reading import open_raster
 from .registration.sensor_input import Ground, open_oriented_image
 from .registration.tie_point_evidence import TiePointEvidence
-from .registration.verdict import first_refusal
+from .registration.verdict import decide
 from .sensor.control_points import HEIGHT
 from .sensor.orientation import sensor_grid
 from .similarity.description import BORDER_PX
 from .similarity.peak import Peak, find_peak
 from .steps import similarity_surface
-
-FloatArray = NDArray[np.float64]
 
 SWITCHED_OFF = "rejected: by a person"
 
@@ -184,8 +182,7 @@ class Review:
         TooFewPointsError
             They are fewer than the model needs.
         """
-        refusal = first_refusal(TiePointEvidence.of(self.points, kind, self.input_grid))
-        return "" if refusal is None else refusal[1]
+        return decide(TiePointEvidence.of(self.points, kind, self.input_grid), "").reason
 
     def fits(self, kinds: Sequence[str] = KINDS) -> dict[str, ModelFit]:
         """Return the models that can be fitted at once, by their kinds."""

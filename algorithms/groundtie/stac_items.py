@@ -6,7 +6,9 @@ Plain JSON is read, of any version of STAC: what is needed has not changed since
 
 from __future__ import annotations
 
+import datetime
 import http.client
+import re
 import urllib.error
 import urllib.request
 from collections.abc import Mapping
@@ -17,6 +19,9 @@ from typing import Any
 from .errors import ParameterError
 from .raster_names import file_name, located
 from .strict_json import parse_json
+
+_DAY = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
+_YEAR = re.compile(r"(?<!\d)((?:19|20)\d\d)(?!\d)")
 
 SUFFIXES = (".json", ".geojson")
 
@@ -144,3 +149,22 @@ def _is_raster(asset: Mapping[str, Any]) -> bool:
     kind, href = str(asset.get("type") or ""), str(asset["href"])
     is_image = kind.startswith("image/") and kind not in ("image/png", "image/jpeg")
     return is_image or (not kind and Path(file_name(href)).suffix.lower() in RASTER_SUFFIXES)
+
+
+def time_of(text: str) -> datetime.datetime | None:
+    """Return the time that a text states: an ISO 8601 time, else a day or a year in a name."""
+    try:
+        stated = datetime.datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
+    except ValueError:
+        stated = None
+    if stated is not None and not text.strip().isdigit():
+        if stated.tzinfo is not None:
+            stated = stated.astimezone(datetime.timezone.utc).replace(tzinfo=None)
+        return stated
+    if day := _DAY.search(text):
+        try:
+            return datetime.datetime(*map(int, day.groups()))  # type: ignore[arg-type]
+        except ValueError:  # 30 February
+            return None
+    year = _YEAR.search(text)
+    return None if year is None else datetime.datetime(int(year.group(1)), 1, 1)

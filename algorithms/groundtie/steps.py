@@ -28,7 +28,8 @@ from .matching.surface_fit import FIT_RADIUS_PX, check_points
 from .rasters.patch import Patch
 from .rasters.reading import bounded_cache, open_raster
 from .registration.evidence import SearchEvidence
-from .registration.pipeline import Stages, mask_pair, open_pair
+from .registration.opening import open_pair
+from .registration.pipeline import Stages, mask_pair
 from .registration.scene import SceneInfo
 from .registration.specification import COREGISTER, Specification
 from .registration.verdict import Verdict, judge_search
@@ -48,7 +49,6 @@ __all__ = [
     "similarity_surface",
 ]
 
-FloatArray = NDArray[np.float64]
 
 # Matches are taken to be as exact as this, in pixels, where no better value is given.
 _USUAL_SIGMA_PX = 0.25

@@ -31,8 +31,8 @@ def test_heights_that_are_given() -> None:
     assert mountains.further(pair, "SAR", WITHOUT) == {}
     assert mountains.further(pair, "SAR", WITH) == {"dem": dem, "input_dem": taken}
     assert mountains.further(pair, "SAR", NEEDLESS) == {"dem": dem, "input_dem": None}
-    assert mountains.further(pair, "SAR", LIT) == {"light": "radar"}
-    assert mountains.further(pair, "optical", ELSEWHERE) == {"light": "sun"}
+    assert mountains.further(pair, "SAR", LIT) == {"views": "terrain radar"}
+    assert mountains.further(pair, "optical", ELSEWHERE) == {"views": "terrain sun"}
 
 
 @pytest.mark.parametrize(

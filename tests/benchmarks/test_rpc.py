@@ -11,10 +11,9 @@ from benchmarks.accuracy import CORRECT, REFUSED
 from benchmarks.attempt import unregistered
 from benchmarks.cases import RealCase
 from benchmarks.half_real import BIASES, LARGEST_SHIFT_PX, SENSORS, bias_of, make_scene, sensor_rpc
-from groundtie.rasters.grid import Grid, reproject
+from groundtie.rasters.grid import LON_LAT, Grid, reproject
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor.orientation import orient
-from groundtie.sensor.surfaces import LON_LAT
 
 
 def test_biases_turn_and_grow() -> None:

@@ -14,7 +14,7 @@ from raster_files import utm_grid, write_raster
 from benchmarks import towns
 from benchmarks.accuracy import CORRECT, REFUSED, SILENTLY_WRONG
 from groundtie import simulate
-from groundtie.geometry.views import View
+from groundtie.geometry.views import View, split_views
 
 
 def refused(setting: str) -> object:
@@ -57,8 +57,9 @@ def test_views_are_rotated_and_keep_their_angles(tmp_path: Path) -> None:
     simulate(tmp_path, 64, density="urban", warp=1.0)
     reference, input = tmp_path / "reference.tif", tmp_path / "input.tif"
     given = towns.rotated_views(reference, input, 90.0, 180.0)
-    for name, file, turn in (("reference", reference, 90.0), ("input", input, 180.0)):
-        right, wrong = View.of(file, None), View.of(file, given[f"{name}_view"])
+    words = split_views(given["views"])
+    for word, file, turn in zip(words, (reference, input), (90.0, 180.0), strict=True):
+        right, wrong = View.of(file, None), View.of(file, word)
         assert right is not None and wrong is not None
         assert wrong.sensor == right.sensor
         assert (wrong.azimuth_deg - right.azimuth_deg) % 360 == pytest.approx(turn, abs=0.2)

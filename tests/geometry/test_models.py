@@ -17,7 +17,7 @@ from groundtie.geometry.models import (
     monomials,
     thin_plate_kernel,
 )
-from groundtie.geometry.stored_models import model_from_json
+from groundtie.geometry.transform import model_from_json
 from groundtie.rasters.grid import apply_affine
 
 CORNER = np.array([500_000.0, 4_990_000.0])

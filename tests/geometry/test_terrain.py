@@ -12,7 +12,8 @@ from rasterio.crs import CRS
 from groundtie.arrays import Raster
 from groundtie.errors import GeoreferencingError, NoOverlapError, TransformFileError
 from groundtie.geometry.models import TERRAIN, Frame
-from groundtie.geometry.terrain import Terrain, TerrainModel
+from groundtie.geometry.terrain import Terrain
+from groundtie.geometry.terrain_model import TerrainModel
 from groundtie.geometry.transform import Transform, load_transform
 from groundtie.rasters.grid import Grid, compose
 from groundtie.simulation.files import write_raster

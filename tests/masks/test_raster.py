@@ -9,9 +9,8 @@ import rasterio
 from raster_files import UTM, utm_grid, write_raster
 from rasterio.warp import calculate_default_transform, reproject
 
-from groundtie.masks.raster import RasterMask
 from groundtie.masks.scene import Scene
-from groundtie.masks.values import mask_values
+from groundtie.masks.values import RasterMask, mask_values
 from groundtie.rasters.reading import Window, open_raster
 
 GRID = utm_grid(80, 60, 2.0)

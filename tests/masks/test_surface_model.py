@@ -16,14 +16,9 @@ from rasterio.crs import CRS
 
 from groundtie.errors import NoOverlapError, VectorLayerError
 from groundtie.geometry.views import View
+from groundtie.masks.object_heights import FootprintModel, RasterModel, read_footprints
 from groundtie.masks.scene import Scene
-from groundtie.masks.surface_model import (
-    FootprintModel,
-    RasterModel,
-    Seen,
-    SurfaceGround,
-    read_footprints,
-)
+from groundtie.masks.surface_model import Seen, SurfaceGround
 from groundtie.rasters.grid import Grid, compose
 from groundtie.rasters.reading import Window, open_raster
 from groundtie.simulation import optical

@@ -10,7 +10,8 @@ from scipy.optimize import check_grad
 from groundtie.arrays import Raster
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.models import DEGREE, TERRAIN, Frame, Model, PolynomialModel
-from groundtie.geometry.terrain import Terrain, TerrainModel
+from groundtie.geometry.terrain import Terrain
+from groundtie.geometry.terrain_model import TerrainModel
 from groundtie.matching.alignment import (
     CANDIDATES,
     IDENTITY,

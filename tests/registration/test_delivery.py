@@ -16,11 +16,10 @@ from groundtie.context import Context
 from groundtie.errors import NothingFoundError, NotRegisteredError, OutputError
 from groundtie.geometry.transform import FORMAT, load_transform
 from groundtie.registration import delivery
+from groundtie.registration.asked import specified
 from groundtie.registration.delivery import (
     Call,
     RegistrationFiles,
-    require_accepted,
-    specified,
 )
 from groundtie.registration.evidence import SearchEvidence
 from groundtie.registration.registered_output import RegisteredOutput
@@ -86,8 +85,8 @@ def test_a_refused_registration_writes_its_report_and_raises(
     assert numbers["verdict"]["accepted"] is False
     assert numbers["verdict"]["rule"] == "nothing in common"
     with pytest.raises(NotRegisteredError):
-        require_accepted(lost)
-    require_accepted(registration)
+        lost.require_accepted()
+    registration.require_accepted()
 
 
 def test_what_fails_later_leaves_no_report_either(
@@ -151,7 +150,6 @@ def test_a_tools_parameters_go_into_the_specification_and_the_report(
         "input": textured.input,
         "output": None,
         "output_grid": "untouched",
-        "resampling": "cubic",
         "tie_points": None,
         "transform": None,
         "report": None,
@@ -164,14 +162,13 @@ def test_a_tools_parameters_go_into_the_specification_and_the_report(
         "max_error": 2.5,
         "search_radius": 150.0,
         "search_rotation": None,
-        "search_scale": 1.2,
         "mask": "none",
         "matching_pixel_size": None,
     }
     spec = specified(SAR_SAR, parameters)
     # Untouched pixels allow a shift only.
     assert (spec.model, spec.max_error_px, spec.search_radius_m) == ("translation", 2.5, 150.0)
-    assert (spec.rotation_deg, spec.scale, spec.mask) == (None, 1.2, "none")
+    assert (spec.rotation_deg, spec.scale, spec.mask) == (None, None, "none")
     assert (spec.matcher, spec.radar) == (SAR_SAR.matcher, SAR_SAR.radar)
     call = Call.of(parameters, delivery.SILENT)
     assert (call.bands, call.workers, call.parameters) == ((None, 1), 2, parameters)

@@ -31,7 +31,8 @@ from groundtie.registration import masks, pipeline, verdict
 from groundtie.registration import scene as scene_module
 from groundtie.registration.evidence import AGREEMENT, ERROR, REFINEMENT, SCENE, SEARCH, SURVEY
 from groundtie.registration.masks import Masked
-from groundtie.registration.pipeline import Stages, mask_pair, open_pair, run
+from groundtie.registration.opening import open_pair
+from groundtie.registration.pipeline import Stages, mask_pair, run
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules import Rule
 from groundtie.registration.scene import SceneInfo

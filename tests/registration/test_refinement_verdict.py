@@ -4,35 +4,37 @@ import numpy as np
 import pytest
 from evidences import IMAGE_SIZE, control, refinement
 
-from groundtie.registration.refinement_verdict import RefinementVerdict
+from groundtie.registration.verdict import judge_refinement
 from groundtie.sensor.adjustment import Control
 
 
 def test_points_that_agree_confirm() -> None:
     fit, check = control((20, -9)), control((20, -9), 15, seed=1)
-    found = RefinementVerdict.of(refinement(fit, check, 0.5))
-    assert found.verdict.accepted
-    assert found.held_out == "check points"
-    assert found.before.rmse == pytest.approx(np.hypot(20, 9), abs=0.2)
-    assert found.after.rmse == pytest.approx(0.3 * np.sqrt(2), rel=0.35)
-    assert found.verdict.check_rmse_m == pytest.approx(0.5 * found.verdict.check_rmse_px)
-    assert found.summary()["before"]["bias_col_px"] == pytest.approx(20, abs=0.3)
+    evidence = refinement(fit, check, 0.5)
+    verdict = judge_refinement(evidence)
+    assert verdict.accepted
+    assert evidence.held_out.name == "check points"
+    assert evidence.before.rmse == pytest.approx(np.hypot(20, 9), abs=0.2)
+    assert evidence.after.rmse == pytest.approx(0.3 * np.sqrt(2), rel=0.35)
+    assert verdict.check_rmse_m == pytest.approx(0.5 * verdict.check_rmse_px)
+    assert evidence.summary()["before"]["bias_col_px"] == pytest.approx(20, abs=0.3)
 
 
 def test_without_check_points_each_is_judged_by_a_fit_without_it() -> None:
     fit = control((20, -9))
-    found = RefinementVerdict.of(refinement(fit))
-    assert found.verdict.accepted
-    assert found.held_out == "points left out in turn"
-    assert found.verdict.check_points == 40
+    evidence = refinement(fit)
+    verdict = judge_refinement(evidence)
+    assert verdict.accepted
+    assert evidence.held_out.name == "points left out in turn"
+    assert verdict.check_points == 40
 
 
 def test_what_is_not_better_than_before_is_refused() -> None:
     fit = control((0, 0))
     check = control((0, 0), 15, noise_px=0.01, seed=1)
-    found = RefinementVerdict.of(refinement(fit, check))
-    assert not found.verdict.accepted
-    assert "not nearer than before" in found.verdict.reason
+    verdict = judge_refinement(refinement(fit, check))
+    assert not verdict.accepted
+    assert "not nearer than before" in verdict.reason
 
 
 @pytest.mark.parametrize(
@@ -45,9 +47,9 @@ def test_what_is_not_better_than_before_is_refused() -> None:
     ],
 )
 def test_refusals(fit: Control, check: Control | None, max_error_px: float, reason: str) -> None:
-    found = RefinementVerdict.of(refinement(fit, check, 1.0, max_error_px, "shift"))
-    assert not found.verdict.accepted
-    assert reason in found.verdict.reason
+    verdict = judge_refinement(refinement(fit, check, 1.0, max_error_px, "shift"))
+    assert not verdict.accepted
+    assert reason in verdict.reason
 
 
 def test_a_model_that_points_do_not_hold_is_refused() -> None:
@@ -55,5 +57,5 @@ def test_a_model_that_points_do_not_hold_is_refused() -> None:
     fit = control((20, -9), 20, 1.2)
     strip = fit.expected_px * [1.0, 0.26]
     narrow = Control(strip, strip + fit.found_px - fit.expected_px, fit.covariance_px2, IMAGE_SIZE)
-    found = RefinementVerdict.of(refinement(narrow, None, 1.0, 2.2, "affine"))
-    assert not found.verdict.accepted
+    verdict = judge_refinement(refinement(narrow, None, 1.0, 2.2, "affine"))
+    assert not verdict.accepted

@@ -21,7 +21,7 @@ from groundtie.masks.scene import Scene
 from groundtie.rasters.grid import compose
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.delivery import asked_surface
+from groundtie.registration.asked import asked_surface
 from groundtie.registration.scene import scene_of
 from groundtie.registration.specification import BOTH, INPUT, NEITHER, StatedSurface
 from groundtie.registration.surface_masks import (
@@ -176,14 +176,13 @@ def test_a_model_needs_both_views_and_a_view_a_model(city: Path, tmp_path: Path)
         "reference": city / "reference.tif",
         "input": city / "input.tif",
         "surface_model": city / "dsm.tif",
-        "reference_view": None,
-        "input_view": None,
+        "views": None,
     }
     found = asked_surface(given, "input")
     assert found == stated(city)
     with pytest.raises(ParameterError, match="needs the view of the input"):
         asked_surface({**given, "input": tmp_path / "alone.tif"}, "input")
-    with pytest.raises(ParameterError, match="goes with a surface model"):
+    with pytest.raises(ParameterError, match="go with a surface model"):
         view = "radar azimuth=90 incidence=40"
-        asked_surface({**given, "surface_model": None, "reference_view": view}, "input")
+        asked_surface({**given, "surface_model": None, "views": view}, "input")
     assert asked_surface({**given, "surface_model": None}, "input") is None

@@ -14,11 +14,10 @@ from rpc_models import camera_rpc, write_dem, write_positions
 
 from groundtie.errors import OutputError, TransformFileError
 from groundtie.geometry.tie_points import TiePoints
-from groundtie.rasters.grid import Grid, reproject
+from groundtie.rasters.grid import LON_LAT, Grid, reproject
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor.control_points import ControlPoints, read_control_points
 from groundtie.sensor.orientation import Orientation, orient
-from groundtie.sensor.surfaces import LON_LAT
 
 RPC = camera_rpc()
 UTM = CRS.from_epsg(32632)

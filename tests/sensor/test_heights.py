@@ -11,11 +11,10 @@ from rpc_models import relief, write_dem
 from scipy.interpolate import RegularGridInterpolator
 
 from groundtie.errors import GeoreferencingError, NoOverlapError, RasterContentError
-from groundtie.rasters.grid import Grid, reproject
+from groundtie.rasters.grid import LON_LAT, Grid, reproject
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor.geoids import find_geoid
-from groundtie.sensor.heights import ConstantHeight, declared_datum, terrain_heights
-from groundtie.sensor.surfaces import LON_LAT, surface_over
+from groundtie.sensor.heights import ConstantHeight, declared_datum, surface_over, terrain_heights
 
 REGION = np.array([[8.998, 45.148], [9.002, 45.152]])
 PLACES = np.random.default_rng(0).uniform(*REGION, (400, 2))

@@ -14,13 +14,12 @@ from rasterio.transform import RPCTransformer
 from rpc_models import REAL, camera_rpc, real_tags, to_rasterio, write_dem, write_positions
 
 from groundtie.errors import NoOverlapError
-from groundtie.rasters.grid import Grid, compose, reproject
+from groundtie.rasters.grid import LON_LAT, Grid, compose, reproject
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor import dense as dense_module
 from groundtie.sensor.dense import DenseOrientation
 from groundtie.sensor.orientation import Orientation, orient, sensor_grid
 from groundtie.sensor.rpc_tags import rpc_from_tags
-from groundtie.sensor.surfaces import LON_LAT
 
 UTM = CRS.from_epsg(32632)
 RPC = camera_rpc()

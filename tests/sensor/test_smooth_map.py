@@ -3,9 +3,8 @@ from __future__ import annotations
 import numpy as np
 from rasterio.crs import CRS
 
-from groundtie.rasters.grid import reproject
+from groundtie.rasters.grid import LON_LAT, reproject
 from groundtie.sensor.smooth_map import SmoothMap, smooth_map
-from groundtie.sensor.surfaces import LON_LAT
 
 UTM = CRS.from_epsg(32632)
 

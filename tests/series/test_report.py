@@ -22,11 +22,11 @@ DAYS = [datetime.datetime(2020, month, 1) for month in (1, 2, 3)]
 
 def series(times: list[datetime.datetime | None]) -> Series:
     """A series of a reference, a date that stays and one that is left out, without rasters."""
-    evidence, covariance = DateEvidence(links=1), 0.01 * np.eye(6)
+    there, covariance = {"evidence": DateEvidence(links=1)}, 0.01 * np.eye(6)
     verdicts = (
-        DateVerdict(evidence, True, "", displacement=shifted(0, 0), covariance=0 * covariance),
-        DateVerdict(evidence, True, "", displacement=shifted(2, -1), covariance=covariance),
-        DateVerdict(DateEvidence(), False, "not linked", "date not linked"),
+        DateVerdict(True, "", **there, displacement=shifted(0, 0), covariance=0 * covariance),
+        DateVerdict(True, "", **there, displacement=shifted(2, -1), covariance=covariance),
+        DateVerdict(False, "not linked", rule="date not linked"),
     )
     dates = tuple(
         SeriesDate(Listed(f"date-{k}", Path(f"{k}.tif"), times[k]), verdicts[k], None, None, k == 0)

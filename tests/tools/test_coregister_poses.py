@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from raster_files import utm_grid
+from specified_runs import register_specified
 from textured_pairs import TexturedPair, error_px, write_textured_pair
 
 from groundtie.errors import NotRegisteredError
 from groundtie.geometry.models import Frame, Model, PolynomialModel
 from groundtie.registration.registration import Registration
+from groundtie.registration.specification import COREGISTER
 from groundtie.tools.coregister import coregister
 
 SIZE = (400, 380)
@@ -39,10 +42,10 @@ def registered(folder: Path, model: Model, **options: object) -> tuple[float, Re
 def test_a_rotation_and_a_scale_are_searched_for(
     tmp_path: Path, degrees: float, growth: float
 ) -> None:
-    error, found = registered(
-        tmp_path, rotated(degrees, growth), search_rotation=180.0, search_scale=1.4
-    )
-    assert error < 0.2
+    pair = write_textured_pair(tmp_path, SIZE, rotated(degrees, growth))
+    spec = replace(COREGISTER, rotation_deg=180.0, scale=1.4)
+    found = register_specified(spec, pair.reference, pair.input)
+    assert error_px(found.transform, pair) < 0.2
     assert found.transform.model.kind == "similarity"
 
 

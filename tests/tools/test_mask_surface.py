@@ -28,7 +28,7 @@ def read(path: Path) -> np.ndarray:
 def test_what_has_a_reason_takes_no_part(city: Path, tmp_path: Path) -> None:
     mask, reasons = tmp_path / "mask.tif", tmp_path / "reasons.tif"
     found = groundtie.mask_surface(
-        city / "reference.tif", city / "dsm.tif", mask, reasons=reasons, input_view=CAMERA
+        city / "reference.tif", city / "dsm.tif", mask, reasons=reasons, views=f"; {CAMERA}"
     )
     np.testing.assert_array_equal(read(mask) > 0, read(reasons) == 0)
     assert found.share == pytest.approx(np.mean(read(mask)), abs=1e-6)
@@ -39,7 +39,7 @@ def test_what_has_a_reason_takes_no_part(city: Path, tmp_path: Path) -> None:
 def test_words_and_the_item_state_the_same_view(city: Path, tmp_path: Path) -> None:
     shares = [
         groundtie.mask_surface(
-            city / "reference.tif", city / "dsm.tif", tmp_path / "mask.tif", input_view=view
+            city / "reference.tif", city / "dsm.tif", tmp_path / "mask.tif", views=f"; {view}"
         ).share
         for view in (CAMERA, str(city / "input.json"))
     ]

@@ -141,7 +141,7 @@ def test_what_a_coarser_image_shows_is_matched_all_over(tmp_path: Path) -> None:
         write_raster(tmp_path / f"{name}.tif", image)
         for name, image in (("fine", reference), ("coarse", pixels(pair.input)[0]))
     ]
-    found = match_optical(*plain, tmp_path / "out.tif", search_scale=2.2)
+    found = register_specified(replace(OPTICAL, scale=2.2), *plain)
     size = np.array(SIZE) * 2
     assert (np.ptp(found.tie_points.reference_xy, axis=0) > 0.75 * size).all()
     corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (size - 1.0)

@@ -42,9 +42,9 @@ def test_a_reference_and_a_terrain_model_make_the_rpcs_right(scene: Scene, tmp_p
     )
     assert scene.error_px(scene.delivered) > 30
     assert scene.error_px(read_rpc(tmp_path / "refined_RPC.TXT")) < 1.0
-    assert result.judged.before.rmse > 30
-    assert result.judged.after.rmse < 1.5
-    assert result.judged.held_out == "check points"
+    assert result.evidence.before.rmse > 30
+    assert result.evidence.after.rmse < 1.5
+    assert result.evidence.held_out.name == "check points"
     assert result.mask is not None
     assert (result.mask.kind, result.mask.image) == ("none", None)
     page = Page((tmp_path / "report.html").read_text())
@@ -53,7 +53,7 @@ def test_a_reference_and_a_terrain_model_make_the_rpcs_right(scene: Scene, tmp_p
     assert "Check points confirm the refined RPCs." in page.text
     assert "The image on the map" in page.text
     numbers = json.loads((tmp_path / "report.json").read_text())
-    assert numbers["verdict"]["check_rmse_px"] == result.judged.verdict.check_rmse_px
+    assert numbers["verdict"]["check_rmse_px"] == result.verdict.check_rmse_px
     assert numbers["bias"]["model"] == result.adjustment.bias.kind
     assert numbers["parameters"]["mask"] == "auto"
     import fiona
@@ -178,7 +178,7 @@ def test_given_points_recover_a_bias(tmp_path: Path, kind: str) -> None:
     result = groundtie.refine_rpc(output=tmp_path / "refined.RPB", dem_datum="ellipsoidal", **files)
     assert result.adjustment.bias.kind == kind
     assert error_px(read_rpc(tmp_path / "refined.RPB")) < 0.35
-    assert result.judged.verdict.fit_points_used == 42
+    assert result.verdict.fit_points_used == 42
     assert result.fit.largest_residual_px <= 0.01
     summary = result.summary()
     assert summary["verdict"]["held_out"] == "points left out in turn"
@@ -281,7 +281,7 @@ def test_a_shift_by_surveyed_points_needs_no_spread(tmp_path: Path) -> None:
     with pytest.raises(NotRegisteredError, match="spread over"):
         groundtie.refine_rpc(output=refined, **call)
     result = groundtie.refine_rpc(output=refined, model="shift", **call)
-    assert result.judged.verdict.fit_points_used == 5
+    assert result.verdict.fit_points_used == 5
     assert error_px(read_rpc(refined)) < 0.35
 
 
@@ -289,7 +289,7 @@ def test_points_outside_of_the_image_count(tmp_path: Path) -> None:
     """A surveyor's points of the whole strip serve for a part of it."""
     files = write_points(tmp_path, bias_of("shift"), corner=3.0)
     result = groundtie.refine_rpc(output=tmp_path / "refined.RPB", dem_datum="ellipsoidal", **files)
-    assert result.judged.verdict.fit_points_used == 40
+    assert result.verdict.fit_points_used == 40
     assert error_px(read_rpc(tmp_path / "refined.RPB")) < 0.35
 
 

@@ -85,8 +85,8 @@ def test_all_measures_can_be_chosen() -> None:
 @pytest.mark.parametrize(
     "more",
     [
-        {"similarity": "renyi", "alpha": 0.5},
-        {"similarity": "tsallis", "q": 0.7},
+        {"similarity": "renyi", "entropy_order": 0.5},
+        {"similarity": "tsallis", "entropy_order": 0.7},
         {"bins": 64, "binning": "linear"},
         {"bins": 256, "chip_size": 41, "search_radius": 80.0},
         {"gpve_order": 2},

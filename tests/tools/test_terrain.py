@@ -11,7 +11,7 @@ import pytest
 import groundtie
 from groundtie.errors import NoOverlapError, ParameterError
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.terrain import stated_lights
+from groundtie.registration.asked import asked_lights
 
 SIZE = 400
 
@@ -80,9 +80,9 @@ def test_what_wrong_heights_displace_is_taken_out_and_warped(hills: Path, tmp_pa
     [
         ({"input_dem": "d.tif"}, "input_dem.* goes with another one"),
         ({"dem": "d.tif", "model": "affine"}, "goes with model auto, not affine"),
-        ({"light": "moon"}, "states no light: give sun or radar"),
-        ({"light": "sun azimuth=400"}, "states no light"),
-        ({"light": "sun"}, "needs its azimuth"),
+        ({"views": "terrain moon"}, "states no light: give 'terrain sun' or"),
+        ({"views": "terrain sun azimuth=400"}, "states no light"),
+        ({"views": "terrain sun"}, "needs its azimuth"),
     ],
 )
 def test_what_does_not_go_together_is_refused(
@@ -96,15 +96,15 @@ def test_what_does_not_go_together_is_refused(
     ("words", "azimuths"),
     [
         (None, []),
-        ("radar", [270.0, 90.0]),
-        ("radar azimuth=98", [98.0]),
-        ("Sun, azimuth=155.5°", [155.5]),
+        ("terrain radar", [270.0, 90.0]),
+        ("terrain radar azimuth=98", [98.0]),
+        ("Terrain sun, azimuth=155.5°", [155.5]),
     ],
 )
 def test_light_is_stated_as_views_are(words: str | None, azimuths: list[float]) -> None:
-    lights = stated_lights(words)
+    lights = asked_lights({"views": words})
     assert [light.azimuth_deg for light in lights] == azimuths
-    assert {light.kind for light in lights} <= {str(words).lower().split(",")[0].split()[0]}
+    assert {light.kind for light in lights} <= set(str(words).lower().replace(",", " ").split())
 
 
 def test_a_terrain_model_of_elsewhere_is_refused(hills: Path, tmp_path: Path) -> None:

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 from ..errors import TooFewPointsError
 from ..registration.evidence import ASSESSMENT, ERROR, HeldOut
-from ..registration.verdict import Verdict, first_refusal
+from ..registration.verdict import Verdict, decide
 from .point_errors import PointErrors
 
 
@@ -79,11 +79,9 @@ class Assessment:
         px, metres = judged.in_pixels, judged.in_metres
         ways = {"two-way": self.two_way, "three-way": self.three_way}
         misses = {name: errors.in_pixels.rmse for name, errors in ways.items()}
-        refusal = first_refusal(AssessmentEvidence(name, judged, max_error_px, misses))
-        rule, reason = (None, f"{name} confirm the registration") if refusal is None else refusal
-        return Verdict(
-            accepted=rule is None,
-            reason=reason,
+        evidence = AssessmentEvidence(name, judged, max_error_px, misses)
+        return replace(
+            decide(evidence, f"{name} confirm the registration"),
             fit_points=len(self.control_points),
             fit_points_used=int(self.control_points.used.sum()),
             check_points=len(judged),
@@ -93,8 +91,6 @@ class Assessment:
             check_ce90_px=px.ce90,
             check_ce90_m=metres.ce90,
             log10_chance=math.nan,
-            rule="" if rule is None else rule.name,
-            advice="" if rule is None else rule.advice,
         )
 
 

@@ -16,10 +16,8 @@ from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError, NoOverlapError
 from ..geometry.transform import Transform
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import FloatArray, Grid, mesh, reproject
 from .point_errors import PointErrors
-
-FloatArray = NDArray[np.float64]
 
 # Places along the input's longer side at which consistency is measured.
 _PLACES = 33
@@ -132,4 +130,4 @@ def lattice(grid: Grid, places: int = _PLACES) -> FloatArray:
         for side in (grid.width, grid.height)
         for count in (max(round(side / step), 1),)
     ]
-    return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    return mesh(*axes)

@@ -8,17 +8,15 @@ from typing import Any
 
 import numpy as np
 from affine import Affine
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..geometry.judging import TOLERANCE_PX, USUAL_MAX_ERROR_PX, sigma_range_px
 from ..geometry.robust import fit_mixture
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
+from ..rasters.reading import Mask
 from .statistics import Statistics
-
-FloatArray = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 # Search window of held-out points, in pixels², if residuals do not show a larger one.
 _WINDOW_AREA_PX2 = 25.0**2

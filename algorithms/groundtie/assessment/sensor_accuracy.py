@@ -9,17 +9,13 @@ from typing import Any
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 
 from ..rasters.atomic import writing
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject
 from ..report.figures import CHECK_COLOUR, FIT_COLOUR, round_length
 from ..sensor.control_points import ControlPoints
 from ..sensor.rpc import RPC
-from ..sensor.surfaces import LON_LAT
 from .statistics import Statistics
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
+from ..rasters.grid import FloatArray
 from .classifier import DEGREE, OFFSET, FeatureClassifier
-
-FloatArray = NDArray[np.float64]
 
 # Fewer labelled points of a class than this carry no information.
 FEWEST_POINTS = 10

@@ -11,16 +11,14 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .gradients import FloatImage, Gradient
 from .keypoints import Keypoints
 from .sampling import sampled_gradient, square_lattice, unit_rows
 from .scale_space import describe_at_scales
-
-FloatArray = NDArray[np.float64]
 
 CELLS = 4
 DIRECTIONS = 8

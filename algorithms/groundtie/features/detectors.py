@@ -17,15 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rasters.patch import Patch, reduced_patch
+from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from .keypoints import Keypoints
+from .scale_space import FIRST_SCALE_PX, LAYERS
 
-FloatImage = NDArray[np.float32]
 ByteImage = NDArray[np.uint8]
 
-_LAYERS = 3
 _EDGE_RATIO = 10.0
-_FIRST_SIGMA_PX = 1.6
 
 # OpenCV enlarges its image so that positions come out a quarter of a pixel too far.
 _OPENCV_OFFSET_PX = 0.25
@@ -78,7 +77,7 @@ class SiftDetector:
         return self._opencv(to_grey(self.prepare(window), window.valid))
 
     def _opencv(self, grey: ByteImage) -> Keypoints:
-        sift = cv2.SIFT.create(0, _LAYERS, self.contrast, _EDGE_RATIO, _FIRST_SIGMA_PX)
+        sift = cv2.SIFT.create(0, LAYERS, self.contrast, _EDGE_RATIO, FIRST_SCALE_PX)
         rows = [(*k.pt, k.size, k.response, k.octave) for k in sift.detect(grey, None)]
         # OpenCV repeats a keypoint for each of its orientations.
         table = np.unique(np.array(rows, float).reshape(-1, 5), axis=0)
@@ -94,7 +93,7 @@ class SiftOctDetector(SiftDetector):
 
     def _detect(self, window: Patch) -> Keypoints:
         half = reduced_patch(window, 2)
-        blur_px = _FIRST_SIGMA_PX / 2
+        blur_px = FIRST_SCALE_PX / 2
         blurred = cv2.GaussianBlur(to_grey(self.prepare(half), half.valid), (0, 0), blur_px)
         found = self._opencv(np.asarray(blurred, np.uint8))
         # Variances add up, so the true scale follows from what OpenCV assumes.

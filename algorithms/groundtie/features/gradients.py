@@ -6,9 +6,8 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-FloatImage = NDArray[np.float32]
+from ..rasters.reading import FloatImage
 
 # Derivatives along columns and rows, shape (h, w) each, and what estimates them.
 Gradient = tuple[FloatImage, FloatImage]

@@ -22,8 +22,6 @@ from .keypoints import Keypoints
 from .sampling import unit_rows
 from .scale_space import gradient_at_scale
 
-FloatArray = NDArray[np.float64]
-
 PATCH_PX = 41
 CELLS = 3
 

@@ -15,7 +15,7 @@ from rasterio.crs import CRS
 from ..context import Context
 from ..errors import ParameterError, VectorLayerError
 from ..geometry.vector_layers import read_vector_layer
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import FloatArray, Grid, reproject
 from ..rasters.pair import Image
 from ..rasters.reading import RasterSource, Window
 from ..rasters.warping import sample
@@ -23,7 +23,6 @@ from .classifier_training import Training
 from .patch_statistics import BAND_RATIOS, NO_BANDS, PATCH_PX, patch_statistics
 from .tiles import MARGIN_PX, Detecting, inside, tiles, widened
 
-FloatArray = NDArray[np.float64]
 Labels = NDArray[np.int8]
 
 # What a keypoint is labelled: to be kept, to be left out, or not at all.

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-FloatArray = NDArray[np.float64]
+from ..rasters.grid import FloatArray
+
 Descriptors = NDArray[np.float32]
 Indices = NDArray[np.intp]
 

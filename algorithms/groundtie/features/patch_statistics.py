@@ -7,12 +7,11 @@ from types import MappingProxyType
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
+from ..rasters.reading import FloatImage
 
-FloatArray = NDArray[np.float64]
-FloatImage = NDArray[np.float32]
 Means = Callable[[FloatArray], FloatArray]
 
 PATCH_PX = 41

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from ..rasters.grid import FloatArray
 from .gradients import FloatImage, Gradient
 from .keypoints import Keypoints
-
-FloatArray = NDArray[np.float64]
 
 
 def square_lattice(half: float, count: int) -> FloatArray:

@@ -17,8 +17,8 @@ Describe = Callable[[Gradient, Keypoints], FloatImage]
 Orient = Callable[[Gradient, Keypoints], tuple[Keypoints, NDArray[np.int_]]]
 
 # Scale space: layers an octave, the first scale, and how much an image is blurred as it is.
-_LAYERS = 3
-_FIRST_SCALE_PX = 1.6
+LAYERS = 3
+FIRST_SCALE_PX = 1.6
 _IMAGE_BLUR_PX = 0.5
 
 # A gradient sees what lies within so many scales, but for the Gaussian's tail.
@@ -106,7 +106,7 @@ def gradient_at_scale(image: FloatImage, valid: NDArray[np.bool_], scale_px: flo
 
 
 def _layer_of(scale_px: Any) -> Any:
-    return np.rint(_LAYERS * np.log2(scale_px / _FIRST_SCALE_PX)).astype(int)
+    return np.rint(LAYERS * np.log2(scale_px / FIRST_SCALE_PX)).astype(int)
 
 
 def _distance(valid: NDArray[np.bool_]) -> FloatImage:
@@ -118,26 +118,26 @@ def _distance(valid: NDArray[np.bool_]) -> FloatImage:
 
 def _scale_space(image: FloatImage, layers: Iterable[int]) -> Iterator[FloatImage]:
     """Return an image blurred to the scales of rising layers, each in the pixels of its octave."""
-    own = _blurred(image, _IMAGE_BLUR_PX, _FIRST_SCALE_PX)
+    own = _blurred(image, _IMAGE_BLUR_PX, FIRST_SCALE_PX)
     octave = 0
     for layer in layers:
         while octave < _octave_of(layer):
             # The first pixels lie on one another.
-            own = _blurred(own, _FIRST_SCALE_PX, 2 * _FIRST_SCALE_PX)[::2, ::2]
+            own = _blurred(own, FIRST_SCALE_PX, 2 * FIRST_SCALE_PX)[::2, ::2]
             octave += 1
         if layer <= 0:
             yield _blurred(image, _IMAGE_BLUR_PX, _scale_of(layer))
         else:
-            yield _blurred(own, _FIRST_SCALE_PX, _scale_of(layer) / 2**octave)
+            yield _blurred(own, FIRST_SCALE_PX, _scale_of(layer) / 2**octave)
 
 
 def _octave_of(layer: int) -> int:
     """Return the octave in whose pixels a layer is; those of the enlarged image stay in 0."""
-    return max((layer - 1) // _LAYERS, 0)
+    return max((layer - 1) // LAYERS, 0)
 
 
 def _scale_of(layer: int) -> float:
-    return float(_FIRST_SCALE_PX * 2 ** (layer / _LAYERS))
+    return float(FIRST_SCALE_PX * 2 ** (layer / LAYERS))
 
 
 def _blurred(image: FloatImage, blur_px: float, wanted_px: float) -> FloatImage:

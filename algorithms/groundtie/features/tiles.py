@@ -6,15 +6,12 @@ from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
 from .detectors import FloatImage
 from .keypoints import Keypoints
-
-FloatArray = NDArray[np.float64]
 
 # Tiles of a grid, and what keypoints near their border see beyond it.
 _TILE_PX = 1024

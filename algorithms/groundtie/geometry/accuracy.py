@@ -13,12 +13,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
+from ..rasters.grid import FloatArray
 from .estimation import jackknife_deviations
-
-FloatArray = NDArray[np.float64]
 
 # Points at a side or a corner of each other are neighbours: √2 spacings are the farthest.
 _NEIGHBOUR_SPACINGS = 1.5

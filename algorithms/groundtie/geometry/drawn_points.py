@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import FloatArray, Grid, reproject
 
-FloatArray = NDArray[np.float64]
 Row = dict[str, Any]
 
 # GeoJSON is usually written with 7 decimals of a degree (RFC 7946, section 11.2), doubles have 15

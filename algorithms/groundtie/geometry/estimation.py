@@ -6,18 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from .fitting import fit_model
 from .model_choice import left_out_blocks
 from .models import Frame, Model
 from .robust import fit_robustly
 from .tie_points import TiePoints
 from .transform import Transform
-
-FloatArray = NDArray[np.float64]
 
 # Standard deviation that inliers may have, in matching pixels.
 SIGMA_RANGE_PX = (0.2, 2.5)

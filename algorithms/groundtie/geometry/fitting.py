@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
+from ..rasters.grid import FloatArray
 from .models import (
     DEGREE,
     PARAMETERS,
@@ -16,8 +16,6 @@ from .models import (
     monomials,
     thin_plate_kernel,
 )
-
-FloatArray = NDArray[np.float64]
 
 # Stiffness of the thin-plate spline: residual variance of a point against bending energy, in
 # frame units. A knot a tenth of the scene away then sways a point's neighbourhood, not a pixel.

@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from ..rasters.grid import Grid, require_map
+from ..rasters.grid import FloatArray, Grid, require_map
 from .tie_points import USED, TiePoints
 from .transform import Transform
 
-FloatArray = NDArray[np.float64]
 Row = dict[str, Any]
 
 # No position on a map of the Earth, in any unit, nor in an image is farther off.

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
+from ..rasters.grid import FloatArray
+from ..rasters.reading import Mask
 
-FloatArray = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 T = TypeVar("T")
 
 # A more flexible model must raise the left-out scores by so many of their standard errors: by one,

@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from affine import Affine
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..rasters.grid import apply_affine, compose
+from ..rasters.grid import FloatArray, apply_affine, compose
 
 if TYPE_CHECKING:
     from typing import Self  # Python 3.11; annotations alone need it
 
-FloatArray = NDArray[np.float64]
 
 # Degree of the polynomial, and fewest points, from the simplest model to the most flexible.
 DEGREE = {

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..rasters.grid import FloatArray
 from .fitting import fit_model
 from .models import PARAMETERS, Frame, Model, PolynomialModel, monomials
-
-FloatArray = NDArray[np.float64]
 
 _SAMPLES = 600
 

@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
 from ..errors import OutputError, TransformFileError
 from ..rasters.atomic import write_json, writing
-from ..rasters.grid import Grid, reproject, require_map
+from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject, require_map
 from ..runs import run_tags
 from ..strict_json import read_json
 from .drawn_points import INPUT, NOMINAL, PIXEL, Row, columns, follow_lines, line_ends
@@ -34,16 +33,11 @@ from .tie_points import USED, TiePoints
 from .transform import Transform
 from .vector_layers import read_vector_layer
 
-FloatArray = NDArray[np.float64]
-
 _LOG = logging.getLogger(__name__)
 _SUFFIXES = (".gpkg", ".geojson", ".csv", ".points")
 _LAYER = "tie_points"
 EDITED = "edited"
 _TEXTS = (*TEXTS, "reference_crs")
-
-# Longitude and latitude, as GeoJSON demands (RFC 7946).
-_GEOJSON_CRS = CRS.from_epsg(4326)
 
 
 def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform: Transform) -> None:
@@ -178,7 +172,7 @@ def _write_gpkg(path: Path, rows: list[Row], numbers: Sequence[str], crs: CRS | 
 
 
 def _write_geojson(path: Path, rows: list[Row], crs: CRS | None) -> None:
-    features = _features(rows, crs, _GEOJSON_CRS)
+    features = _features(rows, crs, LON_LAT)
     collection = {"type": "FeatureCollection", "name": _LAYER, "features": features}
     write_json(path, collection)
 
@@ -203,7 +197,7 @@ def _read_rows(path: Path, suffix: str) -> tuple[list[Row], FloatArray, CRS | No
         ends = line_ends([feature.get("geometry") for feature in features])
         # Older than RFC 7946, but QGIS writes it.
         named = collection.get("crs")
-        crs = CRS.from_user_input(named["properties"]["name"]) if named else _GEOJSON_CRS
+        crs = CRS.from_user_input(named["properties"]["name"]) if named else LON_LAT
         return rows, ends, require_map(crs)
     with path.open(encoding="utf-8-sig", newline="") as file:
         rows = table_rows(file)

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from .transform import Transform
 
-FloatArray = NDArray[np.float64]
 USED = "used"
 
 

@@ -20,8 +20,9 @@ RADAR, CAMERA = "radar", "camera"
 SENSORS = (RADAR, CAMERA)
 
 _USAGE = (
-    f"give a STAC item (.json), or words such as '{RADAR} azimuth=280 incidence=35' and "
-    f"'{CAMERA} azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'"
+    "give STAC items (.json), or words such as "
+    f"'{RADAR} azimuth=280 incidence=35; {CAMERA} azimuth=250 incidence=12 sun-azimuth=155 "
+    "sun-elevation=48'"
 )
 _WORD = re.compile(r"([a-z-]+)=(-?\d+(?:\.\d+)?)°?")
 
@@ -75,12 +76,30 @@ class View:
             What was given states no view.
         """
         if given is not None:
-            is_file = given.strip().lower().endswith(".json")
-            return read_view(Path(given)) if is_file else parse_view(given)
+            return stated_view(given)
         if not isinstance(image, (str, Path)):
             return None
         beside = Path(image).with_suffix(".json")
         return read_view(beside) if _is_item(beside) else None
+
+
+def split_views(words: str | None) -> tuple[str | None, str | None]:
+    """Return what is stated of the reference and of the input, as `reference; input`.
+
+    Raises
+    ------
+    ParameterError
+        More than two views are stated.
+    """
+    parts = [part.strip() or None for part in (words or "").split(";")]
+    if len(parts) > 2:
+        raise ParameterError(f"{words!r} states {len(parts)} views; {_USAGE}")
+    return parts[0], parts[1] if len(parts) > 1 else None
+
+
+def stated_view(given: str) -> View:
+    """Return the view that the name of a STAC item, or words, state; `ParameterError` if none."""
+    return read_view(Path(given)) if given.lower().endswith(".json") else parse_view(given)
 
 
 def parse_view(text: str) -> View:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..rasters.pair import Image
-from ..rasters.patch import Patch
-from ..rasters.reading import Window
+from ..rasters.patch import Patch, middle_window
 from ..speckle.statistics import FloatImage, homogeneous_variation2
 
 # Looked at in the middle of an image, at full resolution: averaging would take speckle away.
@@ -23,9 +22,7 @@ def variation2_of(image: Image) -> float:
 
     Grey values are taken for amplitudes.
     """
-    grid = image.source.grid
-    width, height = min(grid.width, _SAMPLE_PX), min(grid.height, _SAMPLE_PX)
-    middle = Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
+    middle = middle_window(image.source.grid, _SAMPLE_PX)
     patch = Patch(*image.source.read(middle, image.band))
     return homogeneous_variation2(power(patch), patch.valid)
 

@@ -7,27 +7,22 @@ and views all of that is computed, and nothing is guessed from grey values.
 from __future__ import annotations
 
 import math
-import os
-import re
 from dataclasses import dataclass
 from enum import IntFlag
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import NoOverlapError, VectorLayerError
-from ..geometry.vector_layers import read_vector_layer
+from ..errors import NoOverlapError
 from ..geometry.views import RADAR, View, direction
 from ..progress import SILENT, Progress
-from ..rasters.grid import Grid, reproject
-from ..rasters.reading import FloatImage, Mask, RasterSource, Window
+from ..rasters.grid import Grid
+from ..rasters.reading import FloatImage, Mask, Window
 from ..rasters.tiling import tile_count, tiles
-from ..rasters.warping import sample
 from ..rasters.writing import create_like, one_band
+from .object_heights import WIDEST_M, SurfaceModel
 from .ray_casting import Heights, LineOfSight, hidden_ground, radar_echoes
 from .scene import Scene, Selection
 from .threshold import grown
@@ -35,21 +30,11 @@ from .threshold import grown
 # What rises by less is taken for ground: cars, hedges, the noise of a surface model.
 _LOWEST_M = 2.0
 
-# What is wider is taken for ground: halls and blocks are up to so wide, or have courtyards.
-_WIDEST_M = 100.0
-
-# Pixels within which the lowest height counts as ground, in metres: courtyards are wider.
-_GROUND_CELL_M = 4.0
-
 # Brightness of shadow, that of ground being 1; what correlates with it hardly depends on it.
 _SHADOW = np.float32(0.1)
 
 # Borders between pixels of the model and of rays are right to a pixel.
 _GROWN_PX = 1
-
-_AREAS = ("Polygon", "MultiPolygon")
-_HEIGHT_FIELDS = ("height", "height_m", "hoehe", "z_height", "measuredheight")
-_NUMBER = re.compile(r"\s*(\d+(?:\.\d+)?)\s*m?\s*")
 
 
 class Seen(IntFlag):
@@ -61,96 +46,6 @@ class Seen(IntFlag):
     HIDDEN = 8
     CAST_SHADOW = 16
     UNKNOWN = 32
-
-
-class SurfaceModel(Protocol):
-    """Heights over a map."""
-
-    def heights(self, piece: Grid) -> tuple[Heights, Mask]:
-        """Return heights on a grid, and where they are known, shape (h, w)."""
-
-
-@dataclass(frozen=True)
-class RasterModel:
-    """A raster of heights of roofs, canopies and ground (DSM), on any grid and map.
-
-    The ground is what is left if everything narrower than a block of houses is taken off.
-    """
-
-    raster: RasterSource
-
-    def heights(self, piece: Grid) -> tuple[Heights, Mask]:
-        """Return heights on a grid, and where they are known; the ground is found in it."""
-        own = self.raster.grid
-        surface, known = sample(
-            self.raster,
-            piece,
-            lambda xy: own.map_to_pixel(reproject(xy, piece.crs, own.crs)),
-            "bilinear",
-        )
-        if not known.any():
-            return Heights(np.zeros_like(surface), np.zeros_like(surface)), known
-        ground = _bare_ground(surface, known, piece.pixel_size_m)
-        # What is not known hides nothing and is laid over nothing.
-        lowest = np.float32(ground[known].min())
-        return Heights(*(np.where(known, part, lowest) for part in (surface, ground))), known
-
-
-@dataclass(frozen=True)
-class FootprintModel:
-    """Buildings of a vector layer, with heights above their ground; all else is level ground.
-
-    Parameters
-    ----------
-    buildings
-        GeoJSON geometries on the map with their heights in metres, lower ones first.
-    """
-
-    buildings: tuple[tuple[Any, float], ...]
-
-    def heights(self, piece: Grid) -> tuple[Heights, Mask]:
-        """Return heights on a grid, and that all are known."""
-        from rasterio.features import rasterize
-
-        shape = (piece.height, piece.width)
-        surface: NDArray[np.float32] = np.zeros(shape, np.float32)
-        if self.buildings:
-            rasterize(self.buildings, out=surface, transform=piece.transform, all_touched=True)
-        return Heights(surface, np.zeros(shape, np.float32)), np.ones(shape, bool)
-
-
-def read_footprints(path: str | os.PathLike[str], grid: Grid) -> FootprintModel:
-    """Read buildings with their heights from a vector layer.
-
-    Raises
-    ------
-    VectorLayerError
-        The layer cannot be read, or has no polygons with a height.
-    GeoreferencingError
-        Only one of layer and grid has a CRS.
-    """
-    layer = read_vector_layer(path).on_map(grid.crs)
-    field = next((name for name in layer.fields if name.lower() in _HEIGHT_FIELDS), None)
-    if field is None:
-        has = ", ".join(layer.fields) or "none"
-        raise VectorLayerError(f"{path} has no field height with metres; its fields: {has}")
-    found = [
-        (feature["geometry"], _metres(feature["properties"].get(field)))
-        for feature in layer.features
-        if feature["geometry"]["type"] in _AREAS
-    ]
-    buildings = sorted(((area, m) for area, m in found if m is not None), key=lambda one: one[1])
-    if not buildings:
-        raise VectorLayerError(f"{path} has no polygons with a height in {field}")
-    return FootprintModel(tuple(buildings))
-
-
-def _metres(value: Any) -> float | None:
-    """Return a height in metres, as OpenStreetMap writes it, too; None: there is none."""
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return float(value) if math.isfinite(value) else None
-    match = _NUMBER.fullmatch(str(value)) if isinstance(value, str) else None
-    return None if match is None else float(match[1])
 
 
 @dataclass(frozen=True)
@@ -212,7 +107,7 @@ class SurfaceGround:
     def _around(self, window: Window) -> tuple[Grid, Heights, Mask, tuple[slice, slice]]:
         """Return all that matters to a window: grid, heights, where known, and where it lies."""
         longest = max(_longest(view) for view in self.views)
-        reach = self._pixels((self._highest_m or 0.0) * longest + _WIDEST_M) + _GROWN_PX
+        reach = self._pixels((self._highest_m or 0.0) * longest + WIDEST_M) + _GROWN_PX
         piece, heights, known = self._piece(window, reach)
         inside = slice(reach, reach + window.height), slice(reach, reach + window.width)
         return piece, heights, known, inside
@@ -236,7 +131,7 @@ class SurfaceGround:
         """Height of the highest object; None if the model knows nothing here."""
         highest = []
         for tile in tiles(self.scene.grid):
-            _, heights, known = self._piece(tile, self._pixels(_WIDEST_M))
+            _, heights, known = self._piece(tile, self._pixels(WIDEST_M))
             if known.any():
                 highest.append(float((heights.surface_m - heights.ground_m).max()))
         return max(highest, default=None)
@@ -290,22 +185,3 @@ def _on_pixels(azimuth_deg: float, grid: Grid) -> tuple[float, float]:
     linear = np.array([[grid.transform.a, grid.transform.b], [grid.transform.d, grid.transform.e]])
     cols, rows = np.linalg.solve(linear, units).tolist()
     return cols, rows
-
-
-def _bare_ground(surface: FloatImage, known: Mask, pixel_m: float) -> FloatImage:
-    """Return the height of the ground below all that is narrower than `_WIDEST_M`.
-
-    Morphological opening of cells' lowest heights: level ground and slopes stay as they are.
-    """
-    cell = max(round(_GROUND_CELL_M / pixel_m), 1)
-    rows, cols = surface.shape
-    padding = [(0, -n % cell) for n in (rows, cols)]
-    highest = np.float32(surface[known].max())
-    filled = np.pad(np.where(known, surface, highest), padding, mode="edge")
-    blocks = filled.reshape(filled.shape[0] // cell, cell, filled.shape[1] // cell, cell)
-    lowest = blocks.min(axis=(1, 3))
-    side = max(round(_WIDEST_M / (cell * pixel_m)), 1) | 1
-    # Beyond the border nothing is lower, nor higher.
-    opened = cv2.morphologyEx(lowest, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
-    ground = cv2.resize(opened, filled.shape[::-1], interpolation=cv2.INTER_LINEAR)
-    return np.asarray(np.minimum(ground[:rows, :cols], surface))

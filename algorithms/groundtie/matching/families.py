@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
 from ..geometry.models import DEGREE, TERRAIN, Frame, Model, PolynomialModel, monomials
-from ..geometry.terrain import Terrain, TerrainModel
+from ..geometry.terrain import Terrain
+from ..geometry.terrain_model import TerrainModel
 
 FloatArray = NDArray[np.float64]
 Positions = Callable[[FloatArray], FloatArray]

@@ -12,7 +12,8 @@ from ..errors import TooFewPointsError
 from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate
 from ..geometry.models import DEGREE, PARAMETERS, TERRAIN, Model
 from ..geometry.robust import fit_mixture
-from ..geometry.terrain import Terrain, TerrainModel
+from ..geometry.terrain import Terrain
+from ..geometry.terrain_model import TerrainModel
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid

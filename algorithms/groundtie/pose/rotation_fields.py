@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from ..rasters.averaging import area_average
 from ..rasters.patch import Patch
+from ..rasters.reading import FloatImage
 from ..similarity.orientation import orientation_fields
 from ..similarity.surface import Surface
 from .pose import Pose
 
-FloatImage = NDArray[np.float32]
 Spectrum = NDArray[np.complex64]
 
 # What all of an image has in common, such as the direction of its fields, matches anywhere: it

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
 from ..geometry.fitting import fit_model
@@ -14,12 +13,10 @@ from ..geometry.limits import SearchLimits
 from ..geometry.models import Frame, PolynomialModel
 from ..geometry.transform import Transform
 from ..matching.chips import MaskOf
-from ..rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
+from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid, apply_affine, compose
 from ..rasters.pair import Image
 from ..rasters.patch import Patch
 from .pose import Pose
-
-FloatArray = NDArray[np.float64]
 
 # The longer side of windows, in pixels: what is larger is averaged.
 LONGEST_PX = 512

@@ -13,17 +13,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..context import Context
 from ..geometry.limits import SearchLimits
+from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..similarity.surface import SimilaritySettings, Surface
 from .pose import Pose, PoseFound
 from .rotation_fields import Template
 from .rotation_levels import HEIGHT, Climber, Level
-
-FloatArray = NDArray[np.float64]
 
 # Side of the small images on which all is tried, in pixels: the geometric mean of both images'.
 _COARSE_SIDE_PX = 96

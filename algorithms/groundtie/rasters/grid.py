@@ -21,6 +21,9 @@ from ..errors import GeoreferencingError, GridSizeError, raised_by
 
 FloatArray = NDArray[np.float64]
 
+# Longitude and latitude.
+LON_LAT = CRS.from_epsg(4326)
+
 # Metres per degree on the sphere of the Earth's mean radius: for sizes and search radii only.
 METRES_PER_DEGREE = 111_195.0
 
@@ -149,6 +152,15 @@ class Grid:
             ]
         )
         return np.asarray(unit * [self.width, self.height] - 0.5)
+
+    def lattice(self, count: int = 9) -> FloatArray:
+        """Return pixel positions all over the grid, `count` a side, shape (count², 2)."""
+        return mesh(*(np.linspace(0, side - 1, count) for side in (self.width, self.height)))
+
+
+def mesh(cols: ArrayLike, rows: ArrayLike) -> FloatArray:
+    """Return the positions (col, row) of all columns in all rows, shape (n, 2), row by row."""
+    return np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2)
 
 
 def is_invertible(transform: Affine) -> bool:

@@ -10,9 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .grid import Grid
-
-FloatArray = NDArray[np.float64]
+from .grid import FloatArray, Grid, mesh
 
 # Takes map positions, (n, 2), to values, (n, k).
 MapFunction = Callable[[FloatArray], FloatArray]
@@ -119,5 +117,5 @@ def _evaluate(grid: Grid, function: MapFunction, step: int, parts: int) -> Float
         np.arange(-parts, parts * -(-side // step) + 1) * (step / parts) + (step - 1) / 2
         for side in (grid.height, grid.width)
     )
-    px = np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2)
+    px = mesh(cols, rows)
     return function(grid.pixel_to_map(px)).T.reshape(-1, len(rows), len(cols))

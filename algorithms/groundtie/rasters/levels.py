@@ -16,14 +16,13 @@ from affine import Affine
 from numpy.typing import NDArray
 
 from .averaging import area_average, average_by_strips
-from .grid import compose
+from .grid import FloatArray, compose
 from .handles import FileHandles
 from .windows import Mask, Window
 
 if TYPE_CHECKING:
     from .reading import RasterSource
 
-FloatArray = NDArray[np.float64]
 Read = Callable[["RasterSource", Window], tuple[NDArray[Any], Mask]]
 
 # Pixels of a side that are looked at to see how an overview was made, in places of the image.

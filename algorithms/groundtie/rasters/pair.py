@@ -7,16 +7,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import GeoreferencingError, NoOverlapError, SameFileError
 from ..geometry.limits import SearchLimits
-from .grid import Grid, reproject
+from .grid import FloatArray, Grid, reproject
 from .patch import Patch
 from .reading import FloatImage, Mask, RasterSource, Window
 from .warping import sample
 
-FloatArray = NDArray[np.float64]
 ToPixel = Callable[[FloatArray], FloatArray]
 
 # Areas of zeros from this side on hold no data; interpolation reaches this far (side) around them.

@@ -9,6 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .grid import Grid
+from .windows import Window
+
 # A mean over a block is valid if the weights of all its pixels sum up to this.
 _ALL_VALID = 0.999
 
@@ -55,3 +58,9 @@ def reduced_patch(window: Patch, factor: int) -> Patch:
         return window
     valid = reduced(window.valid.astype(np.float32), factor) > _ALL_VALID
     return Patch(reduced(np.where(window.valid, window.values, 0), factor), valid)
+
+
+def middle_window(grid: Grid, side_px: int = 2048) -> Window:
+    """Return the middle of a grid, at most `side_px` a side: enough to see what an image is."""
+    width, height = min(grid.width, side_px), min(grid.height, side_px)
+    return Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)

@@ -6,15 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoOverlapError, RasterContentError
+from .grid import FloatArray
 from .kernels import interpolate
 from .reading import FloatImage, Mask, RasterSource, Window
-from .voids import fill_voids
 
-FloatArray = NDArray[np.float64]
 Positions = Callable[[FloatArray], FloatArray]
 
 # Pixels of the raster that are read at a time, a side.
@@ -22,6 +22,9 @@ _BLOCK = 1024
 
 # Voids are filled from the region reduced to at most so many pixels a side.
 _FILL_SIDE = 512
+
+# Steps by which voids are relaxed at each size.
+_RELAXATIONS = 300
 
 # No place of the Earth is lower or higher, in metres: such values are voids that nobody declared.
 _LOWEST_M, _HIGHEST_M = -600.0, 9_200.0
@@ -187,3 +190,32 @@ def surface_around(
     if not valid.any():
         raise RasterContentError(f"{source.path} holds no heights in the area of the image")
     return RasterSurface(source, to_px, window, fill_voids(values, valid), 1 - float(valid.mean()))
+
+
+def fill_voids(values: FloatImage, valid: Mask) -> FloatImage:
+    """Return values, shape (h, w), in which a membrane through their rims spans the voids.
+
+    From coarse to fine: voids take what a raster of half the size has there, and are relaxed, so
+    that each pixel becomes the mean of its neighbours. A slope goes on through a void.
+
+    Raises
+    ------
+    ValueError
+        Nothing is valid.
+    """
+    if valid.all():
+        return values
+    if not valid.any():
+        raise ValueError("nothing is valid")
+    height, width = valid.shape
+    size = ((width + 1) // 2, (height + 1) // 2)
+    share = cv2.resize(valid.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    known = np.where(valid, values, np.float32(0))
+    sums = cv2.resize(known, size, interpolation=cv2.INTER_AREA)
+    coarse = fill_voids((sums / np.maximum(share, 1e-6)).astype(np.float32), share > 1e-6)
+    filled = np.where(valid, values, cv2.resize(coarse, (width, height)))
+    cross = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]], np.float32) / 4
+    for _ in range(_RELAXATIONS):
+        relaxed = cv2.filter2D(filled, -1, cross, borderType=cv2.BORDER_REPLICATE)
+        filled = np.where(valid, values, relaxed)
+    return filled

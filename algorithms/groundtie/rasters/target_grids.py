@@ -6,13 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 from rasterio.crs import CRS
 
 from ..errors import GridSizeError, NoOverlapError
-from .grid import MOST_PX, Grid, is_invertible, require_workable
-
-FloatArray = NDArray[np.float64]
+from .grid import MOST_PX, FloatArray, Grid, is_invertible, require_workable
 
 # A footprint that reaches into a further row or column by less than this does not need it.
 _TOLERANCE_PX = 1e-3

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .bands import working_dtype
-from .grid import Grid
+from .grid import FloatArray, Grid
 from .kernels import REACH, interpolate
 from .lattice import Lattice, fine_lattice, row_strips
 from .reading import FloatImage, RasterSource
 from .windows import Mask, Window
 
-FloatArray = NDArray[np.float64]
 ToInputPx = Callable[[FloatArray], FloatArray]
 
 METHODS = tuple(REACH)
@@ -34,7 +33,7 @@ _SINGLE_PX = 2000
 _ROUNDING = 1.5 * 2.0**39
 
 # Stands for positions that are not finite: outside of every image.
-_NOWHERE = -1e9
+NOWHERE = -1e9
 
 
 @runtime_checkable
@@ -93,7 +92,7 @@ def _between_nodes(nodes: Lattice) -> FloatArray:
     for rows in row_strips(grid.height, grid.width):
         px[:, rows] = nodes.lines(rows)
     if np.isnan(nodes.values).any():
-        px[np.isnan(px)] = _NOWHERE
+        px[np.isnan(px)] = NOWHERE
     return px
 
 

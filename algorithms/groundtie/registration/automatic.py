@@ -20,6 +20,7 @@ from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster
 from ..rasters.rendered import Light
 from ..sensor.rpc_files import rpc_of
+from .asked import asked_lights, asked_terrain
 from .delivery import Call
 from .evidence import SCENE, SURVEY
 from .orthorectification import Orthorectification
@@ -30,7 +31,6 @@ from .scene import SceneInfo
 from .sensor_input import Ground, open_sensor_image
 from .sensor_jobs import RefinedRpc, refine
 from .specification import CHIPS, COREGISTER, OPTICAL, SAR_SAR, FreeSearch, Specification
-from .terrain import asked_terrain, stated_lights
 from .verdict import Verdict
 
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
@@ -134,7 +134,9 @@ def register_anything(
     call = Call.of(parameters, progress)
     with bounded_cache(), threads(parameters["workers"], progress) as context:
         asked = asked_terrain(parameters) | {"max_error_px": parameters["max_error"]}
-        lit = tuple(plan_lit(stated_lights(parameters["light"])))
+        lit = tuple(plan_lit(asked_lights(parameters)))
+        if parameters["views"] is not None and not lit:
+            raise ParameterError("register takes the view of a terrain model only")
         found, stack = _first_accepted(call, asked, lit, context.part(0.0, 0.7))
         return call.deliver(found, context.part(0.7, 1.0), stack)
 
@@ -190,7 +192,7 @@ def _needs_rpcs(raster: Any) -> bool:
 def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> OrthorectifiedRpc:
     """Refine the RPCs of the input on the reference, and orthorectify it."""
     given = {**_RPC_DEFAULTS, **parameters}
-    for name in ("input_dem", "light"):
+    for name in ("input_dem", "views"):
         if given[name] is not None:
             raise ParameterError(f"{name} is for orthoimages, not for an image with RPCs")
     if given["transform"] is not None:
@@ -231,7 +233,7 @@ def _orthorectify(
 _RPC_DEFAULTS: Mapping[str, Any] = {
     "gcps": None,
     "input_dem": None,
-    "light": None,
+    "views": None,
     "geoid": None,
     "dem_cover": 0.0,
     "height": None,
@@ -241,6 +243,4 @@ _RPC_DEFAULTS: Mapping[str, Any] = {
     "mask": AUTO,
     "matching_pixel_size": None,
     "surface_model": None,
-    "reference_view": None,
-    "image_view": None,
 }

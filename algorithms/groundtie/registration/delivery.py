@@ -11,21 +11,19 @@ from pathlib import Path
 from typing import Any
 
 from ..context import Context, threads
-from ..errors import NotRegisteredError, ParameterError
 from ..geometry.tie_point_files import write_tie_points
-from ..geometry.views import View
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.grid import Grid
 from ..rasters.reading import bounded_cache
 from ..report.stac import quality_of, stac_item
+from .asked import USUAL, asked_masks, specified
 from .displacement import write_displacement
-from .pipeline import OpenPair, open_pair, pair_images, run
-from .registered_output import RegisteredOutput, grid_of_output, model_for_grid
+from .opening import OpenPair, open_pair, pair_images
+from .pipeline import run
+from .registered_output import RegisteredOutput, grid_of_output
 from .registration import Registration
-from .specification import Specification, StatedSurface
-from .terrain import asked_light, asked_terrain
-from .user_masks import UserMask
+from .specification import Specification
 
 
 @dataclass(frozen=True)
@@ -106,7 +104,7 @@ class Call:
     files
         What is to be written.
     bands, masks
-        See `pipeline.open_pair`.
+        See `opening.open_pair`.
     parameters
         All of its parameters, for the report.
     workers
@@ -127,7 +125,7 @@ class Call:
     @classmethod
     def of(cls, parameters: Mapping[str, Any], progress: Progress) -> Call:
         """Return the call of a registering tool; see `register_as`."""
-        given = {**_USUAL, **parameters}
+        given = {**USUAL, **parameters}
         output = None
         if given["output"] is not None:
             grid = grid_of_output(given["output"], given["output_grid"])
@@ -197,24 +195,11 @@ class Call:
             # Not for as long as the rasters: environments must be left in the order of entering.
             with bounded_cache():
                 self.files.write(registration, context)
-            require_accepted(registration)
+            registration.require_accepted()
             rasters = stack.pop_all()
         kept = replace(registration, files=self.files.named(registration), rasters=rasters)
         weakref.finalize(kept, rasters.close)
         return kept
-
-
-# What tools may leave out that do not ask for it.
-_USUAL: Mapping[str, Any] = {
-    "displacement": None,
-    "output_grid": "reference",
-    "resampling": "cubic",
-    "reference_mask_values": None,
-    "input_mask_values": None,
-    "surface_model": None,
-    "reference_view": None,
-    "input_view": None,
-}
 
 
 def register_as(
@@ -237,69 +222,3 @@ def register_as(
         The registration was refused.
     """
     return Call.of(parameters, progress).register(specified(preset, parameters))
-
-
-def asked_masks(given: Mapping[str, Any], image: str) -> tuple[UserMask | None, UserMask | None]:
-    """Return the masks of the reference and of `image`, by the values of a tool's parameters."""
-    reference, other = (
-        UserMask.of(given[name], given[f"{name}_mask"], given[f"{name}_mask_values"])
-        for name in ("reference", image)
-    )
-    return reference, other
-
-
-def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:
-    """Return what a tool is told of elevated objects, by its parameters; None: nothing.
-
-    Raises
-    ------
-    ParameterError
-        A view is missing or cannot be understood, or has no surface model to go with.
-    """
-    model = given["surface_model"]
-    names = ("reference", image)
-    if model is None:
-        if any(given[f"{name}_view"] is not None for name in names):
-            raise ParameterError("a view goes with a surface model (surface_model)")
-        return None
-    views = [View.of(given[name], given[f"{name}_view"]) for name in names]
-    for name, view in zip(names, views, strict=True):
-        if view is None:
-            raise ParameterError(
-                f"a surface model needs the view of the {name}: put its STAC item beside it, or "
-                f"give {name}_view"
-            )
-    reference, other = (view for view in views if view is not None)
-    return StatedSurface(model, (reference, other))
-
-
-def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specification:
-    """Return a preset with what a tool was called with."""
-    surface = asked_surface({**_USUAL, **parameters}, "input")
-    if surface is not None:
-        preset = preset.with_surface(surface)
-    return replace(
-        preset,
-        **asked_terrain(parameters),
-        light=asked_light(parameters.get("light")),
-        model=model_for_grid(
-            parameters["model"], grid_of_output(parameters["output"], parameters["output_grid"])
-        ),
-        max_error_px=parameters["max_error"],
-        search_radius_m=parameters["search_radius"],
-        rotation_deg=parameters["search_rotation"],
-        scale=parameters["search_scale"],
-        mask=parameters["mask"],
-        matching_pixel_size_m=parameters["matching_pixel_size"],
-    )
-
-
-def require_accepted(registration: Registration) -> None:
-    """Raise `NotRegisteredError` if a registration was refused."""
-    if not registration.verdict.accepted:
-        pair, verdict = registration.pair, registration.verdict
-        raise NotRegisteredError(
-            f"{pair.input.source.path} was not registered to {pair.reference.source.path}: "
-            f"{verdict.sentence()}",
-            verdict,
-        )

@@ -9,7 +9,7 @@ import numpy as np
 from affine import Affine
 
 from ..rasters.bands import BandInfo
-from ..rasters.grid import FloatArray, Grid, compose
+from ..rasters.grid import FloatArray, Grid, compose, mesh
 from ..rasters.reading import RasterSource
 from ..rasters.warping import lattice
 from ..rasters.writing import create_like, one_band
@@ -48,7 +48,7 @@ def displacement_field(evidence: RegistrationEvidence) -> tuple[FloatArray, Grid
     rows, cols = values.shape[1:]
     place = compose(matching.transform, Affine.scale(nodes.step))
     grid = Grid(place, matching.crs, cols, rows)
-    px = np.stack(np.meshgrid(np.arange(cols), np.arange(rows)), axis=-1).reshape(-1, 2)
+    px = mesh(np.arange(cols), np.arange(rows))
     xy = grid.pixel_to_map(px)
     if matching.is_georeferenced:
         t, per_unit = matching.transform, matching.metres_per_unit

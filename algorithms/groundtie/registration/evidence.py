@@ -50,8 +50,6 @@ TIE_POINTS, SEARCH, ASSESSMENT, POSE, AGREEMENT, ERROR, SCENE, SURVEY, REFINEMEN
     "series",
 )
 
-_LATTICE = 9
-
 # Scatter along a line is that of heights unless chance explains it with more than 5 %, as usual.
 _LOG10_SIGNIFICANCE = math.log10(0.05)
 
@@ -185,7 +183,7 @@ class RegistrationEvidence:
         agreeing = int((np.hypot(*self.residuals_px.T) <= TOLERANCE_PX).sum())
         probability = agreement_probability(TOLERANCE_PX, self.radius_px)
         mixture = self._mixture(self.residuals_px, self.radius_px)
-        lattice = _lattice(self.grid)
+        lattice = self.grid.lattice()
         return HeldOut(
             "check points",
             agreeing,
@@ -246,10 +244,3 @@ def hull_share(px: FloatArray, size: tuple[int, int]) -> float:
         return float(np.clip(ConvexHull(px).volume / (size[0] * size[1]), 0, 1))
     except (QhullError, ValueError):
         return 0.0
-
-
-def _lattice(grid: Grid) -> FloatArray:
-    cols, rows = np.meshgrid(
-        np.linspace(0, grid.width - 1, _LATTICE), np.linspace(0, grid.height - 1, _LATTICE)
-    )
-    return np.column_stack([cols.ravel(), rows.ravel()])

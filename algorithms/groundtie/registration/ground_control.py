@@ -18,7 +18,6 @@ from ..context import Context
 from ..errors import (
     GeoreferencingError,
     NothingFoundError,
-    NotRegisteredError,
     TooFewPointsError,
 )
 from ..geometry.models import Model
@@ -29,7 +28,8 @@ from ..rasters.reading import RasterSource
 from ..sensor.control_points import ControlPoints
 from ..sensor.orientation import Orientation, sensor_grid
 from .evidence import SearchEvidence
-from .pipeline import OpenPair, Stages, mask_pair, pair_images, register
+from .opening import OpenPair, pair_images
+from .pipeline import Stages, mask_pair, register
 from .registration import Registration
 from .scene import SceneInfo
 from .sensor_input import OrientedImage
@@ -42,9 +42,6 @@ _COARSE_PX = 2.0
 
 # After that so much is left to search for, in matching pixels.
 _LEFT_PX = 20.0
-
-# The coarse shift in the image is the median over a lattice.
-_NODES = 9
 
 
 @dataclass(frozen=True)
@@ -70,13 +67,8 @@ class GroundControl:
         NotRegisteredError
             They are refused.
         """
-        pair, verdict = self.registration.pair, self.registration.verdict
-        if not verdict.accepted or self.points is None:
-            raise NotRegisteredError(
-                f"{pair.input.source.path} was not matched with {pair.reference.source.path}: "
-                f"{verdict.sentence()}",
-                verdict,
-            )
+        self.registration.require_accepted("matched with")
+        assert self.points is not None
         return self.points
 
 
@@ -113,7 +105,7 @@ def match_ground_control(
     spec
         How they are matched.
     bands, masks
-        Those of the reference and of the image; see `pipeline.open_pair`.
+        Those of the reference and of the image; see `opening.open_pair`.
     stack
         Keeps what is open as long as the result is used.
     context
@@ -164,10 +156,7 @@ def match_ground_control(
 
 def _shift_in_image(pair: ImagePair, orientation: Orientation, model: Model) -> FloatArray:
     """Return by how much image positions differ from those of the RPCs, by a model on the map."""
-    cols, rows = np.meshgrid(
-        np.linspace(0, pair.grid.width - 1, _NODES), np.linspace(0, pair.grid.height - 1, _NODES)
-    )
-    xy = pair.grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
+    xy = pair.grid.pixel_to_map(pair.grid.lattice())
     shifts = orientation.to_px(model(xy)) - orientation.to_px(xy)
     return np.asarray(np.nanmedian(shifts, axis=0))
 

@@ -27,14 +27,11 @@ from ..masks.regions import HIGH_PERCENT, WIDTH_M, GroundRegions, find_ground
 from ..masks.scene import Scene, Selection
 from ..masks.surface_model import SurfaceGround
 from ..masks.threshold import Threshold
-from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
+from ..rasters.patch import middle_window
 from ..rasters.reading import Window
 from .scene import SceneInfo
 from .user_masks import with_mask
-
-# In which part of an image the direction of cast shadows, and the like, is looked for.
-_MIDDLE_PX = 2048
 
 
 @dataclass(frozen=True)
@@ -132,7 +129,7 @@ class _Town:
 
     def _find(self) -> GroundRegions:
         other = self._info.other.scene
-        middle = other.read(middle_of(other.grid))
+        middle = other.read(middle_window(other.grid))
         shadow = shadow_azimuth_deg(middle) if middle.valid.any() else None
         return find_ground(self.scene, WIDTH_M, HIGH_PERCENT, self._context.progress, shadow)
 
@@ -141,9 +138,3 @@ def require_one_mask(kind: str, used: MaskUsed | None) -> None:
     """Raise `ParameterError` if a mask is asked for and a vector layer is given as one, too."""
     if used is not None and kind not in (NONE, AUTO):
         raise ParameterError(f"give either mask={kind} or a vector layer as mask")
-
-
-def middle_of(grid: Grid) -> Window:
-    """Return as much of the middle of an image as is enough to tell how it was taken."""
-    width, height = min(grid.width, _MIDDLE_PX), min(grid.height, _MIDDLE_PX)
-    return Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)

@@ -17,9 +17,8 @@ from ..sensor.orientation import sensor_grid
 from ..sensor.rpc_fit import RPCFit
 from .evidence import SearchEvidence
 from .refinement_evidence import RefinementEvidence
-from .refinement_verdict import RefinementVerdict
 from .sensor_input import OrientedImage
-from .verdict import Verdict, judge_search
+from .verdict import Verdict, judge_refinement, judge_search
 
 
 @dataclass(frozen=True)
@@ -39,8 +38,10 @@ class Refinement:
         The bias.
     fit
         RPCs with the bias folded in.
-    judged
-        The verdict, and the errors before and after.
+    evidence
+        What the verdict rests on, with the errors before and after.
+    verdict
+        Whether the refined RPCs can be trusted.
     """
 
     image: OrientedImage
@@ -49,7 +50,8 @@ class Refinement:
     check: Control | None
     adjustment: Adjustment
     fit: RPCFit
-    judged: RefinementVerdict
+    evidence: RefinementEvidence
+    verdict: Verdict
 
     @classmethod
     def of(
@@ -99,8 +101,8 @@ class Refinement:
             control, adjustment, check, pixel_m, max_error_px, fit.largest_residual_px, needs_spread
         )
         kept = points.with_points(table.reject(blunders, "blunder"))
-        judged = RefinementVerdict.of(evidence)
-        return cls(image, kept, control, check, adjustment, fit, judged)
+        verdict = judge_refinement(evidence)
+        return cls(image, kept, control, check, adjustment, fit, evidence, verdict)
 
     @property
     def grid(self) -> Grid:
@@ -133,8 +135,8 @@ class Refinement:
         NotRegisteredError
             The refinement is refused.
         """
-        if not self.judged.verdict.accepted:
-            raise _refused(self.image, self.judged.verdict)
+        if not self.verdict.accepted:
+            raise _refused(self.image, self.verdict)
         return self.fit
 
     def heights(self, own_heights: bool) -> HeightCheck:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from ..assessment.statistics import Statistics
 from ..geometry.accuracy import CheckResiduals, predict_accuracy
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.judging import (
@@ -17,16 +18,11 @@ from ..geometry.judging import (
     sigma_range_px,
 )
 from ..geometry.robust import fit_mixture
-from ..rasters.grid import FloatArray
-from ..sensor.adjustment import Adjustment, Control
+from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid
+from ..sensor.adjustment import LEAST_REACH_PX, Adjustment, Control
 from .evidence import AGREEMENT, ERROR, REFINEMENT, HeldOut, hull_share
 
 CHECK_POINTS, LEFT_OUT = "check points", "points left out in turn"
-
-# Outliers lie within this distance at least, in pixels.
-_LEAST_REACH_PX = 50
-
-_NODES = 9
 
 
 @dataclass(frozen=True)
@@ -78,6 +74,27 @@ class RefinementEvidence:
         """Root mean square error by the refined RPCs; infinite without inliers."""
         return _rms(self.after_px)
 
+    @property
+    def before(self) -> Statistics:
+        """Errors at the held-out inliers by the RPCs as delivered, px."""
+        return Statistics.of(self.before_px)
+
+    @property
+    def after(self) -> Statistics:
+        """Errors at the held-out inliers by the refined RPCs, px."""
+        return Statistics.of(self.after_px)
+
+    def summary(self) -> dict[str, Any]:
+        """Return which points were held out, and their errors, as values that JSON can carry."""
+        errors = {
+            name: {
+                key: value if math.isfinite(value) else None
+                for key, value in statistics.summary("px", ("col", "row")).items()
+            }
+            for name, statistics in (("before", self.before), ("after", self.after))
+        }
+        return {"held_out": self.held_out.name, **errors}
+
     @classmethod
     def of(
         cls,
@@ -117,11 +134,12 @@ class RefinementEvidence:
             after = check.residuals_px(adjustment.bias)
         before = points.residuals_px(None)
         length = np.hypot(*after.T)
-        reach = max(int(np.ceil(length.max(initial=0.0))), _LEAST_REACH_PX)
+        reach = max(int(np.ceil(length.max(initial=0.0))), LEAST_REACH_PX)
         mixture = fit_mixture(after, (2 * reach + 1) ** 2, sigma_range_px(max_error_px))
         residuals = CheckResiduals(points.expected_px, after, mixture.probability)
         tolerance = max(TOLERANCE_PX, max_error_px)
         agreeing = int((length <= tolerance).sum())
+        nodes_px = Grid(PIXEL_COORDINATES, None, *control.size).lattice()
         held_out = HeldOut(
             name,
             agreeing,
@@ -130,9 +148,9 @@ class RefinementEvidence:
             LARGEST_LOG10_CHANCE,
             mixture.sigma * math.sqrt(2),
             max_error_px,
-            _spread_px(adjustment, control.size),
+            _spread_px(adjustment, nodes_px),
             "the image",
-            predict_accuracy(adjustment.fold_biases, _nodes(control.size), residuals, np.zeros(2)),
+            predict_accuracy(adjustment.fold_biases, nodes_px, residuals, np.zeros(2)),
         )
         used_px = control.found_px[adjustment.used]
         return cls(
@@ -155,15 +173,8 @@ def _rms(residuals_px: FloatArray) -> float:
     return float(np.sqrt((residuals_px**2).sum(axis=1).mean()))
 
 
-def _spread_px(adjustment: Adjustment, size: tuple[int, int]) -> float:
-    """Return how far the correction varies with its points over the image, root mean square."""
-    px = _nodes(size)
+def _spread_px(adjustment: Adjustment, px: FloatArray) -> float:
+    """Return how far the correction varies with its points at places, root mean square."""
     by_points = adjustment.spread_px(px)
     by_noise = adjustment.bias.sigma_px(px)
     return float(np.sqrt(np.mean(np.maximum(by_points, by_noise) ** 2)))
-
-
-def _nodes(size: tuple[int, int]) -> FloatArray:
-    """Return positions all over an image of a size, (width, height)."""
-    sides = (np.linspace(0, side - 1, _NODES) for side in size)
-    return np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,35 +29,29 @@ IMAGES = (".tif", ".tiff")
 
 
 @dataclass(frozen=True)
-class Call:
-    """How a report was made.
+class RefinementFiles:
+    """The files that are asked for; None: not.
 
     Parameters
     ----------
     parameters
-        What the tool was called with.
+        What the tool was called with, for the report.
     started
         When, by `time.perf_counter`.
     """
 
-    parameters: Mapping[str, Any]
-    started: float
-
-
-@dataclass(frozen=True)
-class RefinementFiles:
-    """The files that are asked for; None: not."""
-
     output: Path
     residuals: Path | None
     report: Path | None
+    parameters: Mapping[str, Any]
+    started: float = field(default_factory=time.perf_counter)
 
     def written(self) -> dict[str, str]:
         """Return what is written, by name."""
         named = {"output": self.output, "residuals": self.residuals, "report": self.report}
         return {name: str(path) for name, path in named.items() if path is not None}
 
-    def points_or_report(self, found: GroundControl, call: Call) -> ControlPoints:
+    def points_or_report(self, found: GroundControl) -> ControlPoints:
         """Return matched points; if they are refused, write the report on that and raise.
 
         Raises
@@ -66,7 +60,7 @@ class RefinementFiles:
             They are refused.
         """
         if not found.registration.verdict.accepted and self.report is not None:
-            replace(found.registration, parameters=call.parameters).report(self.report)
+            replace(found.registration, parameters=self.parameters).report(self.report)
         return found.accepted()
 
     def write(
@@ -74,7 +68,6 @@ class RefinementFiles:
         refinement: Refinement,
         heights: HeightCheck,
         found: GroundControl | None,
-        call: Call,
         progress: Progress,
     ) -> RPCFit:
         """Write all files and return the refined RPCs; of a refused refinement the report alone.
@@ -87,8 +80,6 @@ class RefinementFiles:
             What contradicts the heights.
         found
             The matching that the points come from; None: they were given.
-        call
-            For the report.
         progress
             Receives every tile of a copied image.
 
@@ -97,7 +88,7 @@ class RefinementFiles:
         NotRegisteredError
             The refinement is refused.
         """
-        image, accepted = refinement.image, refinement.judged.verdict.accepted
+        image, accepted = refinement.image, refinement.verdict.accepted
         with Outputs() as outputs:
             if accepted:
                 fit = refinement.accepted()
@@ -108,8 +99,29 @@ class RefinementFiles:
                     refinement.points.write(staged, by_refined, image.source.grid)
             # Last: who finds it finds all that it is about.
             if self.report is not None:
-                _report(refinement, heights, found, call).write(outputs, self.report)
+                self._page(refinement, heights, found).write(outputs, self.report)
         return refinement.accepted()
+
+    def _page(
+        self, refinement: Refinement, heights: HeightCheck, found: GroundControl | None
+    ) -> RefinementReport:
+        image = refinement.image
+        return RefinementReport(
+            title=f"RPCs of {Path(image.source.path).name}, refined",
+            verdict=refinement.verdict,
+            evidence=refinement.evidence,
+            bias=refinement.adjustment.bias,
+            residuals=refinement.residuals(),
+            grid=refinement.grid,
+            pixel_m=sensor_grid(image.source, image.orientation).pixel_size_m,
+            heights=image.heights,
+            by_hand=refinement.points.by_hand,
+            warnings=tuple(heights.warnings()),
+            comparison=None if found is None else _compared(refinement, found),
+            mask=None if found is None else found.registration.mask,
+            parameters={k: v for k, v in self.parameters.items() if v is not None},
+            seconds=time.perf_counter() - self.started,
+        )
 
 
 def _write_rpcs(image: OrientedImage, fit: RPCFit, path: Path, progress: Progress) -> None:
@@ -119,27 +131,6 @@ def _write_rpcs(image: OrientedImage, fit: RPCFit, path: Path, progress: Progres
         write_with_geotransform(source, source.grid, path, rpc_tags=tags, progress=progress)
         return
     write_rpc(path, fit.rpc)
-
-
-def _report(
-    refinement: Refinement, heights: HeightCheck, found: GroundControl | None, call: Call
-) -> RefinementReport:
-    image = refinement.image
-    return RefinementReport(
-        title=f"RPCs of {Path(image.source.path).name}, refined",
-        judged=refinement.judged,
-        bias=refinement.adjustment.bias,
-        residuals=refinement.residuals(),
-        grid=refinement.grid,
-        pixel_m=sensor_grid(image.source, image.orientation).pixel_size_m,
-        heights=image.heights,
-        by_hand=refinement.points.by_hand,
-        warnings=tuple(heights.warnings()),
-        comparison=None if found is None else _compared(refinement, found),
-        mask=None if found is None else found.registration.mask,
-        parameters={k: v for k, v in call.parameters.items() if v is not None},
-        seconds=time.perf_counter() - call.started,
-    )
 
 
 def _compared(refinement: Refinement, found: GroundControl) -> Comparison:

@@ -24,7 +24,7 @@ UNTOUCHED = "untouched"
 OUTPUT_GRIDS = ("reference", "input", UNTOUCHED)
 
 # Pixels keep their places when only the geotransform changes, but for this error, in pixels.
-_UNTOUCHED_TOLERANCE_PX = 0.05
+UNTOUCHED_TOLERANCE_PX = 0.05
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def moved_grid(transform: Transform) -> Grid:
     xy = reproject(transform.inverse(px), transform.crs, grid.crs)
     shifts = xy - grid.pixel_to_map(px)
     dx, dy = shifts.mean(axis=0)
-    if np.abs(shifts - [dx, dy]).max() > _UNTOUCHED_TOLERANCE_PX * min(grid.pixel_size):
+    if np.abs(shifts - [dx, dy]).max() > UNTOUCHED_TOLERANCE_PX * min(grid.pixel_size):
         raise ParameterError(
             "pixels cannot stay untouched: the correction is no shift in the input's own CRS"
         )

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arrays import Raster
 from ..context import threads
+from ..errors import NotRegisteredError
 from ..geometry.estimation import Estimate
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
@@ -108,6 +109,16 @@ class Registration:
         """Return the transform of a registration that was accepted, so that has one."""
         assert self.verdict.accepted and self.transform is not None
         return self.transform
+
+    def require_accepted(self, done: str = "registered to") -> None:
+        """Raise `NotRegisteredError` if it was refused; `done` is what was not done."""
+        if not self.verdict.accepted:
+            input, reference = (
+                image.source.path for image in (self.pair.input, self.pair.reference)
+            )
+            raise NotRegisteredError(
+                f"{input} was not {done} {reference}: {self.verdict.sentence()}", self.verdict
+            )
 
     def warp(
         self,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -19,11 +18,11 @@ from ..sensor.adjustment import Adjustment
 from ..sensor.control_points import ControlPoints, read_control_points
 from ..sensor.height_check import HeightCheck
 from ..sensor.rpc_fit import RPCFit
-from .delivery import asked_masks, asked_surface
+from .asked import asked_masks, searched
 from .ground_control import GroundControl, match_ground_control, require_crs
 from .refinement import Refinement
-from .refinement_output import Call, RefinementFiles
-from .refinement_verdict import RefinementVerdict
+from .refinement_evidence import RefinementEvidence
+from .refinement_output import RefinementFiles
 from .sensor_input import Ground, OrientedImage, open_oriented_image
 from .specification import Specification
 from .verdict import Verdict
@@ -89,8 +88,10 @@ class RefinedRpc:
         The RPCs, with the bias folded in, and how far they miss it.
     adjustment
         The bias.
-    judged
-        The verdict, and the errors before and after.
+    evidence
+        What the verdict rests on, with the errors before and after.
+    verdict
+        Whether they can be trusted.
     heights
         What contradicts the heights.
     ground
@@ -105,7 +106,8 @@ class RefinedRpc:
 
     fit: RPCFit
     adjustment: Adjustment
-    judged: RefinementVerdict
+    evidence: RefinementEvidence
+    verdict: Verdict
     heights: HeightCheck
     ground: str
     mask: MaskUsed | None
@@ -115,7 +117,7 @@ class RefinedRpc:
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
         return {
-            "verdict": self.judged.summary(),
+            "verdict": self.verdict.summary() | self.evidence.summary(),
             "points_by_hand": self.by_hand,
             "bias": self.adjustment.bias.to_json(),
             "left_out_rmse_px": self.adjustment.left_out_rmse_px,
@@ -127,15 +129,15 @@ class RefinedRpc:
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
-        verdict, bias = self.judged.verdict, self.adjustment.bias
+        verdict, evidence, bias = self.verdict, self.evidence, self.adjustment.bias
         shift, sigma = bias.shift_px()
         return [
             f"accepted: {verdict.reason}",
             f"model: {bias.kind}, {verdict.fit_points_used} of {verdict.fit_points} points",
             f"shift in the middle of the image: {shift[0]:+.2f} ± {sigma[0]:.2f}, "
             f"{shift[1]:+.2f} ± {sigma[1]:.2f} px (column, row)",
-            f"error at {self.judged.held_out}: {self.judged.before.rmse:.2f} px before, "
-            f"{self.judged.after.rmse:.2f} px after",
+            f"error at {evidence.held_out.name}: {evidence.before.rmse:.2f} px before, "
+            f"{evidence.after.rmse:.2f} px after",
             verdict.accuracy_line(),
             f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
             *([f"set by hand: {self.by_hand} points"] if self.by_hand else []),
@@ -179,8 +181,9 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
     gcps, dem = parameters["gcps"], parameters["dem"]
     if (parameters["reference"] is None) == (gcps is None):
         raise ParameterError("give either a reference or ground control points (gcps)")
-    call = Call(parameters, time.perf_counter())
-    files = RefinementFiles(parameters["output"], parameters["residuals"], parameters["report"])
+    files = RefinementFiles(
+        parameters["output"], parameters["residuals"], parameters["report"], parameters
+    )
     with threads(parameters["workers"], progress) as context, ExitStack() as stack:
         stack.enter_context(bounded_cache())
         sensor, found = _matched(parameters, stack, context.part(0.0, 0.9))
@@ -189,7 +192,7 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
                 gcps, sensor.orientation, sensor.source.grid, sensor.source.path
             )
         else:
-            points = files.points_or_report(found, call)
+            points = files.points_or_report(found)
         context.update(0.9, "estimating the bias")
         refinement = Refinement.of(
             points, sensor, parameters["model"], parameters["max_error"], gcps is not None
@@ -197,11 +200,12 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
         heights = refinement.heights(own_heights=gcps is not None and dem is not None)
         for warning in heights.warnings():
             context.update(0.9, warning)
-        fit = files.write(refinement, heights, found, call, context.part(0.9, 1.0).progress)
+        fit = files.write(refinement, heights, found, context.part(0.9, 1.0).progress)
     return RefinedRpc(
         fit,
         refinement.adjustment,
-        refinement.judged,
+        refinement.evidence,
+        refinement.verdict,
         heights,
         sensor.heights,
         None if found is None else found.registration.mask,
@@ -224,15 +228,7 @@ def _matched(
     sensor = open_oriented_image(given["image"], given["rpc"], ground, crs, stack, context.progress)
     if reference is None:
         return sensor, None
-    spec = Specification(
-        max_error_px=given["max_error"],
-        search_radius_m=given["search_radius"],
-        mask=given["mask"],
-        matching_pixel_size_m=given["matching_pixel_size"],
-    )
-    surface = asked_surface(given, "image")
-    if surface is not None:
-        spec = spec.with_surface(surface)
+    spec = searched(Specification(), given, "image")
     bands = given["reference_band"], given["image_band"]
     masks = asked_masks(given, "image")
     return sensor, match_ground_control(sensor, reference, spec, bands, masks, stack, context)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import (
     GeoreferencingError,
@@ -15,12 +14,10 @@ from ..errors import (
 )
 from ..geometry.tie_point_files import read_tie_points
 from ..geometry.transform import Transform, load_transform
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import FloatArray, Grid, reproject
 from ..rasters.reading import RasterSource
 from .tie_point_evidence import TiePointEvidence, TiePointFit
-from .verdict import first_refusal
-
-FloatArray = NDArray[np.float64]
+from .verdict import decide
 
 
 def load_stored(
@@ -56,10 +53,9 @@ def load_stored(
     ).all():
         raise TransformFileError(f"{path} holds points that lie outside of their map's projection")
     evidence = TiePointEvidence.of(points, model, source.grid)
-    refusal = first_refusal(evidence)
-    if refusal is not None:
-        rule, reason = refusal
-        raise NotRegisteredError(f"{path}: {reason}; {rule.advice}")
+    verdict = decide(evidence, "")
+    if not verdict.accepted:
+        raise NotRegisteredError(f"{path}: {verdict.sentence()}")
     return evidence.transform, evidence.fit()
 
 

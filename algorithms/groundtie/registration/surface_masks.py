@@ -17,17 +17,13 @@ from ..context import Context
 from ..errors import ParameterError
 from ..geometry.views import View
 from ..masks.choice import AUTO, NONE, REFERENCE, SURFACE, MaskUsed
+from ..masks.object_heights import RasterModel, SurfaceModel, read_footprints
 from ..masks.scene import Scene
-from ..masks.surface_model import (
-    RasterModel,
-    SurfaceGround,
-    SurfaceModel,
-    read_footprints,
-)
+from ..masks.surface_model import SurfaceGround
 from ..rasters.pair import ImagePair
-from ..rasters.patch import Patch
+from ..rasters.patch import Patch, middle_window
 from ..rasters.reading import FloatImage, Window, open_raster
-from .masks import Masked, middle_of
+from .masks import Masked
 from .scene import scene_of
 from .specification import StatedSurface
 from .user_masks import UserMask, with_mask
@@ -161,7 +157,7 @@ def fit_of(ground: SurfaceGround, view: View, read: Callable[[Window], Patch]) -
     -------
     None where the view does not let expect anything: that of a camera without the sun's place.
     """
-    window = middle_of(ground.scene.grid)
+    window = middle_window(ground.scene.grid)
     patch, expected = read(window), ground.level(window, view)
     if expected.min() == expected.max():
         return None

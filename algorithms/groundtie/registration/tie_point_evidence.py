@@ -18,10 +18,8 @@ from ..geometry.models import DEGREE, PARAMETERS, Frame, monomials
 from ..geometry.tie_point_files import EDITED
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
-from ..rasters.grid import Grid, apply_affine
+from ..rasters.grid import FloatArray, Grid, apply_affine
 from .evidence import TIE_POINTS
-
-FloatArray = NDArray[np.float64]
 
 # Singular values below this share of the largest are rounding errors.
 _ROUNDING = 1e-9

@@ -14,18 +14,19 @@ from typing import Any
 
 from ..context import Context
 from ..errors import ParameterError
+from ..features.classified import ClassifiedScene
+from ..features.classifier import read_classifier
+from ..features.patch_statistics import FloatImage
 from ..masks.beside import mask_beside
 from ..masks.choice import INPUT, LAYER, NONE, REFERENCE, MaskUsed
 from ..masks.layer import read_layer
-from ..masks.raster import RasterMask
 from ..masks.regions import WIDTH_M
 from ..masks.scene import Scene, Selection, write_mask
-from ..masks.values import INSIDE, mask_values
+from ..masks.values import INSIDE, RasterMask, mask_values
 from ..raster_names import file_name, raster_name
 from ..rasters.atomic import scratch_folder
 from ..rasters.pair import ImagePair
 from ..rasters.reading import Window, open_raster
-from .classifying import read_scene_classifier
 from .scene import scene_of
 
 _CLASSIFIER_SUFFIX = ".json"
@@ -176,9 +177,33 @@ def _selection(
         source = stack.enter_context(open_raster(mask.mask))
         return RasterMask(scene, source, mask_values(mask.values)).select
     if not mask.is_layer:
-        return read_scene_classifier(pair, name, scene, Path(mask.mask)).select
+        return _scene_classifier(pair, name, scene, Path(mask.mask)).select
     layer = read_layer(mask.mask, scene, WIDTH_M)
     return layer.select if mask.values is None else replace(layer, is_outside=True).select
+
+
+def _scene_classifier(pair: ImagePair, name: str, scene: Scene, path: Path) -> ClassifiedScene:
+    """Return a classifier applied to one image of a pair.
+
+    Raises
+    ------
+    ParameterError
+        The file is no classifier, or one for an image of other bands.
+    """
+    classifier = read_classifier(path)
+    image, count = scene.like.path, len(scene.like.image_bands)
+    if classifier.bands not in (0, count):
+        raise ParameterError(
+            f"{path} was trained on an image of {classifier.bands} bands; {image} has {count}"
+        )
+
+    def bands(window: Window) -> FloatImage:
+        piece = scene.grid.window(*window)
+        if name == REFERENCE:
+            return pair.reference_bands(piece)
+        return pair.input_bands(piece, pair.nominal_px)
+
+    return ClassifiedScene(scene, bands, classifier)
 
 
 def with_mask(

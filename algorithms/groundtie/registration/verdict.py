@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
 from .evidence import AGREEMENT, RegistrationEvidence, SearchEvidence
@@ -116,6 +116,15 @@ def first_refusal(evidence: Evidence) -> tuple[Rule, str] | None:
     return None
 
 
+def decide(evidence: Evidence, confirmed: str) -> Verdict:
+    """Return what the rules make of evidence, without its numbers; `confirmed` is why it stands."""
+    refusal = first_refusal(evidence)
+    if refusal is None:
+        return Verdict(True, confirmed)
+    rule, reason = refusal
+    return Verdict(False, reason, rule=rule.name, advice=rule.advice)
+
+
 def judge_search(evidence: SearchEvidence) -> Verdict:
     """Return the verdict on a registration that did not come as far as check points.
 
@@ -124,11 +133,10 @@ def judge_search(evidence: SearchEvidence) -> Verdict:
     GroundTieError
         The failure itself, if no rule names it: it is no refusal, but bad input.
     """
-    refusal = first_refusal(evidence)
-    if refusal is None:
+    verdict = decide(evidence, "")
+    if verdict.accepted:
         raise evidence.failure
-    rule, reason = refusal
-    return Verdict(False, reason, rule=rule.name, advice=rule.advice)
+    return verdict
 
 
 def judge(evidence: RegistrationEvidence) -> Verdict:
@@ -163,33 +171,26 @@ def _verdict(
     metres_per_px: float,
 ) -> Verdict:
     points = evidence.held_out
-    refusal = first_refusal(evidence)
-    counts = fit_points, fit_points_used, points.total, points.agreeing
-    if refusal is not None and refusal[0].stage == AGREEMENT:
+    verdict = replace(
+        decide(evidence, confirmed),
+        fit_points=fit_points,
+        fit_points_used=fit_points_used,
+        check_points=points.total,
+        check_points_agreeing=points.agreeing,
+        log10_chance=points.log10_chance,
+    )
+    if any(rule.name == verdict.rule for rule in RULES if rule.stage == AGREEMENT):
         # Errors of matches that may be random measure nothing.
-        rule, reason = refusal
-        return Verdict(
-            False,
-            reason,
-            *counts,
-            log10_chance=points.log10_chance,
-            rule=rule.name,
-            advice=rule.advice,
-        )
-    return Verdict(
-        refusal is None,
-        confirmed if refusal is None else refusal[1],
-        *counts,
-        points.rmse_px,
-        points.rmse_px * metres_per_px,
-        points.accuracy.ce90_px,
-        points.accuracy.ce90_px * metres_per_px,
-        points.log10_chance,
-        points.spread_px,
-        evidence.extrapolated_share,
-        "" if refusal is None else refusal[0].name,
-        "" if refusal is None else refusal[0].advice,
-        points.accuracy.ce50_px,
-        points.accuracy.ce95_px,
-        points.accuracy.ce90_range_px,
+        return verdict
+    return replace(
+        verdict,
+        check_rmse_px=points.rmse_px,
+        check_rmse_m=points.rmse_px * metres_per_px,
+        check_ce90_px=points.accuracy.ce90_px,
+        check_ce90_m=points.accuracy.ce90_px * metres_per_px,
+        spread_px=points.spread_px,
+        extrapolated_share=evidence.extrapolated_share,
+        ce50_px=points.accuracy.ce50_px,
+        ce95_px=points.accuracy.ce95_px,
+        ce90_range_px=points.accuracy.ce90_range_px,
     )

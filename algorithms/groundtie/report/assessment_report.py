@@ -31,8 +31,6 @@ class AssessmentReport(Page):
 
     Parameters
     ----------
-    title
-        Heading of the page.
     assessment
         All that was measured.
     verdict
@@ -41,19 +39,12 @@ class AssessmentReport(Page):
         What was measured.
     comparison
         The images; None if they were not given.
-    parameters
-        What the tool was called with.
-    seconds
-        How long it took.
     """
 
-    title: str
     assessment: Assessment
     verdict: Verdict | None
     transform: Transform
     comparison: Comparison | None
-    parameters: dict[str, Any]
-    seconds: float
     template: ClassVar[str] = "assessment.html.j2"
 
     def numbers(self) -> dict[str, Any]:

@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid
 
-# The correction is looked at on a lattice of so many points a side.
-_LATTICE = 9
-
 
 @dataclass(frozen=True)
 class Correction:
@@ -44,8 +41,7 @@ class Correction:
     @classmethod
     def of(cls, transform: Transform, grid: Grid) -> Correction:
         """Measure a transform over the matching grid."""
-        axes = [np.linspace(0, side - 1, _LATTICE) for side in (grid.width, grid.height)]
-        px = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+        px = grid.lattice()
         xy = grid.pixel_to_map(px)
         nominal = transform.model(xy)
         lengths = np.hypot(*(grid.map_to_pixel(nominal) - px).T)

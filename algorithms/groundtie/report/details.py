@@ -8,7 +8,7 @@ import numpy as np
 
 from ..assessment.point_errors import PointErrors
 from ..geometry.transform import Transform
-from ..rasters.grid import FloatArray, Grid
+from ..rasters.grid import FloatArray, Grid, mesh
 from ..rasters.pair import ImagePair
 from . import pictures
 
@@ -32,8 +32,7 @@ def places(errors: PointErrors, grid: Grid) -> list[tuple[str, FloatArray]]:
         for k in some
     ]
     half = min(SIDE_PX, grid.width, grid.height) / 2
-    cols, rows = np.meshgrid((half, grid.width - half), (half, grid.height - half))
-    corners = np.column_stack([cols.ravel(), rows.ravel()])
+    corners = mesh((half, grid.width - half), (half, grid.height - half))
     return found + list(zip((f"{name} corner" for name in _CORNERS), corners, strict=True))
 
 

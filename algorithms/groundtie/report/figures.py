@@ -12,19 +12,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..assessment.point_errors import PointErrors
 from ..geometry.judging import CE90_FACTOR, FEWEST_CHECK_POINTS, TOLERANCE_PX
 from ..geometry.tie_points import TiePoints
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from ..registration.verdict import Verdict
 from .pictures import data_uri
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
 
 # People with any colour vision see them as different [Okabe2008].
 FIT_COLOUR = "#0072b2"

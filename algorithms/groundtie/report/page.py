@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import platform
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -25,8 +26,19 @@ _TEMPLATES = Path(__file__).with_name("templates")
 _COLOURS = {"fit": FIT_COLOUR, "check": CHECK_COLOUR, "rejected": REJECTED_COLOUR}
 
 
+@dataclass(frozen=True, kw_only=True)
 class Page:
-    """A page and its numbers: subclasses name the template and give its values."""
+    """A page and its numbers: subclasses name the template and give its values.
+
+    Parameters
+    ----------
+    title
+        Heading of the page.
+    parameters
+        What the tool was called with.
+    seconds
+        How long it took.
+    """
 
     template: ClassVar[str]
     title: str

@@ -9,11 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid, mesh
 from ..rasters.patch import Patch
 from ..similarity.surface import Surface
 
-FloatArray = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 ToPixel = Callable[[FloatArray], FloatArray]
 
@@ -49,7 +48,7 @@ def overview_positions(to_input_px: ToPixel, grid: Grid) -> ToPixel:
     from scipy.interpolate import RectBivariateSpline
 
     cols, rows = (np.linspace(-0.5, side - 0.5, _NODES) for side in (grid.width, grid.height))
-    nodes = np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2)
+    nodes = mesh(cols, rows)
     px = to_input_px(grid.pixel_to_map(nodes))
     if not np.isfinite(px).all():
         return to_input_px

@@ -9,7 +9,8 @@ from ..assessment.comparison import Comparison
 from ..assessment.point_errors import PointErrors
 from ..masks.choice import MaskUsed
 from ..rasters.grid import Grid
-from ..registration.refinement_verdict import RefinementVerdict
+from ..registration.refinement_evidence import RefinementEvidence
+from ..registration.verdict import Verdict
 from ..sensor.bias import Bias
 from . import figures
 from .page import Page
@@ -21,10 +22,10 @@ class RefinementReport(Page):
 
     Parameters
     ----------
-    title
-        Heading of the page.
-    judged
-        The verdict, and the errors before and after.
+    verdict
+        Whether they can be trusted.
+    evidence
+        What that rests on, with the errors before and after.
     bias
         What was, or would have been, taken out.
     residuals
@@ -43,14 +44,10 @@ class RefinementReport(Page):
         Reference and image on the map; None: there is no reference.
     mask
         What of the reference took part; None without one.
-    parameters
-        What the tool was called with.
-    seconds
-        How long it took.
     """
 
-    title: str
-    judged: RefinementVerdict
+    verdict: Verdict
+    evidence: RefinementEvidence
     bias: Bias
     residuals: PointErrors
     grid: Grid
@@ -60,14 +57,12 @@ class RefinementReport(Page):
     warnings: tuple[str, ...]
     comparison: Comparison | None
     mask: MaskUsed | None
-    parameters: dict[str, Any]
-    seconds: float
     template: ClassVar[str] = "refinement.html.j2"
 
     def numbers(self) -> dict[str, Any]:
         """Return what was measured, by name."""
         return {
-            "verdict": self.judged.summary(),
+            "verdict": self.verdict.summary() | self.evidence.summary(),
             "bias": self.bias.to_json(),
             "points_by_hand": self.by_hand,
             "heights": {"used": self.heights, "warnings": self.warnings},
@@ -76,13 +71,12 @@ class RefinementReport(Page):
 
     def values(self) -> dict[str, Any]:
         """Return what the template shows."""
-        judged, residuals, grid = self.judged, self.residuals, self.grid
-        verdict = judged.verdict
-        measured = {"before": judged.before, "after": judged.after}
+        verdict, residuals, grid = self.verdict, self.residuals, self.grid
+        measured = {"before": self.evidence.before, "after": self.evidence.after}
         histogram = figures.error_histogram(residuals, verdict, self.pixel_m)
         return {
             "verdict": verdict,
-            "held_out": judged.held_out,
+            "held_out": self.evidence.held_out.name,
             "errors": {
                 name: {"px": each, "m": each.scaled(self.pixel_m)}
                 for name, each in measured.items()

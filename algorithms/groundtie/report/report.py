@@ -28,8 +28,6 @@ class Report(Page):
 
     Parameters
     ----------
-    title
-        Heading of the page.
     verdict
         Whether the registration can be trusted.
     pair
@@ -40,10 +38,6 @@ class Report(Page):
         The transform, also a refused one; None if there is none.
     surfaces
         Labels and similarity surfaces, shape (2 r + 1, 2 r + 1), of remarkable points.
-    parameters
-        What the tool was called with.
-    seconds
-        How long it took.
     mask
         Which mask was used; None: no question of one.
     scene
@@ -52,14 +46,11 @@ class Report(Page):
         Where neighbouring chips agree on another place than the transform has; None: not looked at.
     """
 
-    title: str
     verdict: Verdict
     pair: ImagePair
     points: TiePoints | None
     transform: Transform | None
     surfaces: tuple[tuple[str, Surface], ...]
-    parameters: dict[str, Any]
-    seconds: float
     mask: MaskUsed | None = None
     scene: Mapping[str, Any] | None = None
     parts: Parts | None = None

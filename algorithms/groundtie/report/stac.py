@@ -9,16 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rasterio.crs import CRS
 from shapely.geometry import Polygon, mapping
 
 from ..geometry.transform import Transform
-from ..raster_names import file_name, time_of
-from ..rasters.grid import Grid, reproject
+from ..raster_names import file_name
+from ..rasters.grid import LON_LAT, Grid, reproject
 from ..rasters.reading import RasterSource
 from ..rasters.writing import COG_SUFFIXES
 from ..registration.verdict import Verdict
-from ..stac_items import RASTER_SUFFIXES
+from ..stac_items import RASTER_SUFFIXES, time_of
 
 VERSION = "1.0.0"
 EXTENSIONS = (
@@ -63,7 +62,7 @@ def stac_item(
     if time is None or grid.crs is None:
         return {}
     corners = grid.pixel_to_map(grid.outline(1))
-    places = reproject(corners, grid.crs, CRS.from_epsg(4326))
+    places = reproject(corners, grid.crs, LON_LAT)
     if not np.isfinite(places).all() or np.ptp(places[:, 0]) > _MOST_DEGREES:
         return {}
     return {

@@ -16,9 +16,9 @@ from ..geometry.model_choice import (
     left_out_blocks,
 )
 from ..geometry.robust import find_consensus, fit_mixture
+from ..rasters.grid import FloatArray
 from .bias import KINDS, TERMS, Bias, design
 
-FloatArray = NDArray[np.float64]
 AUTO = "auto"
 
 # How blunders are found: all at once, by what is probable, or one after the other, the worst
@@ -37,7 +37,7 @@ SMALLEST_SIGMA_PX = 1e-3
 _CONSENSUS_PX = 3.0
 
 # Blunders lie anywhere within this distance at least, in pixels.
-_LEAST_REACH_PX = 50.0
+LEAST_REACH_PX = 50
 
 # A model is carried by points that leave it uncertain by less, over the image, in pixels.
 _LARGEST_SIGMA_PX = 1.0
@@ -184,7 +184,7 @@ def _log_likelihoods(adjustment: Adjustment) -> FloatArray:
     share = float(np.clip(adjustment.used.mean(), 0.02, 0.98))
     variance = max(float(squared[adjustment.used].mean()) / 2, _SIGMA_RANGE_PX[0] ** 2)
     inlier = share * np.exp(-squared / (2 * variance)) / (2 * np.pi * variance)
-    return np.asarray(np.log(inlier + (1 - share) / (2 * _LEAST_REACH_PX) ** 2))
+    return np.asarray(np.log(inlier + (1 - share) / (2 * LEAST_REACH_PX) ** 2))
 
 
 def _adjust(
@@ -222,7 +222,7 @@ def _without_improbable(control: Control, kind: str, seed: int) -> tuple[NDArray
     first = "translation" if kind == "shift" else "affine"
     start = find_consensus(control.expected_px, control.found_px, _CONSENSUS_PX, first, seed)
     residuals = control.found_px - start(control.expected_px)
-    reach = max(float(np.abs(residuals).max()), _LEAST_REACH_PX)
+    reach = max(float(np.abs(residuals).max()), LEAST_REACH_PX)
     used, sigma = np.zeros(len(control), bool), _SIGMA_RANGE_PX[0]
     for _ in range(_STEPS):
         mixture = fit_mixture(residuals, (2 * reach) ** 2, _SIGMA_RANGE_PX)

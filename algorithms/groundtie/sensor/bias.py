@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..geometry.models import monomials
+from ..rasters.grid import FloatArray
 from .rpc import RPC
 from .rpc_fit import RPCFit, fit_rpc, ground_lattice
-
-FloatArray = NDArray[np.float64]
 
 # Terms of each model, an axis, from the simplest to the most flexible.
 SHIFT = "shift"

@@ -8,16 +8,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from rasterio.crs import CRS
 
 from ..errors import GroundTieError, TransformFileError
 from ..geometry.georeferencer import require_places
+from ..rasters.grid import LON_LAT, FloatArray
 from ..rasters.handles import FileHandles
 from ..strict_json import read_json
-from .surfaces import LON_LAT
-
-FloatArray = NDArray[np.float64]
 
 # Of GDAL, in a raster's tags.
 RASTERS = (".tif", ".tiff", ".vrt")

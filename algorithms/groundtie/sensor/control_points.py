@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rasterio.crs import CRS
 
 from ..errors import TransformFileError
@@ -18,15 +17,12 @@ from ..geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..rasters.atomic import writing
-from ..rasters.grid import PIXEL_COORDINATES, Grid, reproject
+from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, FloatArray, Grid, reproject
 from .adjustment import Control
 from .control_formats import SUFFIXES as OTHER_SUFFIXES
 from .control_formats import Places, read_places
 from .orientation import Orientation, SensorGrid
 from .rpc import RPC
-from .surfaces import LON_LAT
-
-FloatArray = NDArray[np.float64]
 
 HEIGHT, CORRELATION = "height_m", "sigma_correlation"
 _SIGMAS = ("sigma_x_px", "sigma_y_px")

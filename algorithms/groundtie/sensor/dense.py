@@ -12,19 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from ..rasters.lattice import Lattice, fine_lattice, row_strips
 from ..rasters.reading import FloatImage
+from ..rasters.warping import NOWHERE
 from .orientation import Orientation
 from .smooth_map import Positions
 
-FloatArray = NDArray[np.float64]
-
 # Interpolation between the nodes of the lattice may be wrong by this, in image pixels.
 _TOLERANCE_PX = 1e-3
-
-# Stands for positions that no pixel of the image sees.
-_NOWHERE = -1e9
 
 # Heights are enclosed by planes at least so far apart, in metres.
 _LEAST_RANGE_M = 10.0
@@ -54,7 +50,7 @@ class DenseOrientation:
 
         heights = orientation.heights.on_grid(on_nodes)
         if heights is None:
-            px.fill(_NOWHERE)
+            px.fill(NOWHERE)
             return px
         if heights.side_px > _LARGEST_PX and grid.height > 1:
             half = grid.height // 2
@@ -81,7 +77,7 @@ class DenseOrientation:
             if not everywhere:
                 lost |= self._lost(grid, height, rows)
             if lost.any():
-                seen[:, lost] = _NOWHERE
+                seen[:, lost] = NOWHERE
             px[:, rows] = seen
         return px
 

@@ -18,9 +18,8 @@ from ..rasters.reading import open_raster
 from .adjustment import SMALLEST_SIGMA_PX, Adjustment, Control
 from .bias import KINDS, design
 from .geoids import find_geoid
-from .heights import ConstantHeight
+from .heights import ConstantHeight, surface_over
 from .orientation import FloatArray, Orientation, seen_at
-from .surfaces import surface_over
 
 # Ground beyond the RPCs' range of heights by more gets a warning: metres, and share of the scale.
 _BEYOND_M, _BEYOND_SHARE = 10.0, 0.05

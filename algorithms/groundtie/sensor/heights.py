@@ -8,18 +8,14 @@ from functools import cached_property
 from typing import ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
-from ..rasters.grid import Grid
+from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject
 from ..rasters.lattice import Lattice
 from ..rasters.reading import FloatImage, RasterSource
-from ..rasters.surfaces import RasterSurface, SurfacePiece
+from ..rasters.surfaces import TOLERANCE_PX, RasterSurface, SurfacePiece, surface_around
 from .geoids import GEOID_GRIDS
-from .smooth_map import Positions
-from .surfaces import WHOLE_PX, surface_over
-
-FloatArray = NDArray[np.float64]
+from .smooth_map import Positions, smooth_map
 
 # Takes a smooth function of longitude and latitude, (n, 2) → (n, k), and its largest error; returns
 # its values for all pixels of a grid.
@@ -28,6 +24,9 @@ OnNodes = Callable[[Positions, float], Lattice]
 # Interpolation between nodes may be wrong by this: pixels of the terrain model, and metres.
 _TOLERANCE_PX = 1e-3
 _TOLERANCE_M = 1e-3
+
+# Grids of the whole Earth leave this much open where they meet themselves.
+_WHOLE_PX = 1.0
 
 
 class Heights(Protocol):
@@ -219,7 +218,7 @@ def terrain_heights(
     if geoid is None:
         return TerrainHeights(terrain)
     try:
-        return TerrainHeights(terrain, replace(surface_over(geoid, lon_lat), margin_px=WHOLE_PX))
+        return TerrainHeights(terrain, replace(surface_over(geoid, lon_lat), margin_px=_WHOLE_PX))
     except (GeoreferencingError, NoOverlapError, RasterContentError) as error:
         raise type(error)(f"the geoid cannot be used: {error}") from error
 
@@ -231,3 +230,37 @@ def declared_datum(dem: RasterSource) -> str | None:
     if "VERT_CS" not in text and "VERTCRS" not in text:
         return None
     return next((name for name in GEOID_GRIDS if name in text), None)
+
+
+def surface_over(source: RasterSource, lon_lat: FloatArray, margin_px: int = 2) -> RasterSurface:
+    """Return the surface of a raster over a region.
+
+    Parameters
+    ----------
+    source
+        The raster.
+    lon_lat
+        Places of the region, (n, 2): those in between are asked for, too.
+    margin_px
+        How far around the region is read for filling voids.
+
+    Raises
+    ------
+    GeoreferencingError
+        The raster has no CRS.
+    NoOverlapError, RasterContentError
+        See `surface_around`.
+    """
+    grid = source.grid
+    if grid.crs is None:
+        raise GeoreferencingError(f"{source.path} has no CRS")
+
+    def exact(places: FloatArray) -> FloatArray:
+        xy = reproject(places, LON_LAT, grid.crs)
+        return grid.map_to_pixel(np.where(np.isfinite(xy), xy, np.nan))
+
+    surface = surface_around(source, exact, lon_lat, margin_px)
+    corner, opposite = lon_lat.min(axis=0), lon_lat.max(axis=0)
+    around = 0.05 * (opposite - corner) + 1e-4
+    fast = smooth_map(exact, corner - around, opposite + around, TOLERANCE_PX)
+    return replace(surface, to_px=fast)

@@ -6,18 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from affine import Affine
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError, NoOverlapError
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import LON_LAT, FloatArray, Grid, mesh, reproject
 from ..rasters.reading import RasterSource
 from .heights import ConstantHeight, Heights, terrain_heights
 from .rpc import RPC
 from .smooth_map import Positions, smooth_map
-from .surfaces import LON_LAT
-
-FloatArray = NDArray[np.float64]
 
 # Heights found by intersecting a line of sight with the terrain are right to this, in metres.
 _PRECISION_M = 1e-4
@@ -211,8 +208,7 @@ def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODE
     GeoreferencingError
         The RPCs see no ground: they are not the image's.
     """
-    along = [np.linspace(-0.5, side - 0.5, nodes) for side in size]
-    px = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
+    px = mesh(*(np.linspace(-0.5, side - 0.5, nodes) for side in size))
     lon_lat = rpc.localise(px, height_m)
     seen = lon_lat[np.isfinite(lon_lat).all(axis=1)]
     if not len(seen):

@@ -14,9 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..rasters.grid import FloatArray
 from .polynomials import TERMS, derivative, fill_terms, in_blocks
-
-FloatArray = NDArray[np.float64]
 
 # The inverse has arrived when it misses the image position by less, in pixels.
 _PRECISION_PX = 1e-7

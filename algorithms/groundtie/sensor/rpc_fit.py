@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import TooFewPointsError
+from ..rasters.grid import FloatArray
 from .polynomials import TERMS, fill_terms
 from .rpc import RPC
-
-FloatArray = NDArray[np.float64]
 
 # Unknowns of a ratio: two polynomials, less the denominator's first coefficient, which is 1.
 _UNKNOWNS = 2 * TERMS - 1

@@ -6,11 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..rasters.grid import FloatArray
 from .polynomials import in_blocks
 
-FloatArray = NDArray[np.float64]
 Positions = Callable[[FloatArray], FloatArray]
 
 _DEGREE = 5

@@ -19,7 +19,6 @@ from ..raster_names import identity
 from ..rasters.reading import bounded_cache
 from ..registration.registered_output import model_for_grid
 from ..registration.series_evidence import DateEvidence
-from ..registration.verdict import first_refusal
 from .dates import Date, Footprints, OpenDates, open_dates
 from .delivery import SERIES_JSON, SeriesFiles
 from .frame import SeriesFrame
@@ -27,7 +26,7 @@ from .inputs import Listed, list_dates
 from .pairs import Settings
 from .registering import Matching
 from .series import Series, SeriesDate
-from .settling import DateVerdict, refused_date, settle
+from .settling import DateVerdict, settle
 from .stored import StoredSeries, read_series
 
 
@@ -152,7 +151,8 @@ class SeriesCall:
         }
         for one in self.listed:
             if one.name in failures:
-                found[one.name] = SeriesDate(one, _unreadable(failures[one.name]))
+                unreadable = DateVerdict.of(DateEvidence(failures[one.name]))
+                found[one.name] = SeriesDate(one, unreadable)
         return Series(
             tuple(found[one.name] for one in self.listed),
             frame,
@@ -241,10 +241,3 @@ def _judged(date: Date, verdict: DateVerdict, frame: SeriesFrame, is_reference: 
         model = frame.model(verdict.displacement)
         transform = Transform(model, frame.grid.crs, date.source.grid)
     return SeriesDate(date.listed, verdict, date, transform, is_reference)
-
-
-def _unreadable(failure: str) -> DateVerdict:
-    evidence = DateEvidence(failure)
-    refusal = first_refusal(evidence)
-    assert refusal is not None
-    return refused_date(evidence, refusal)

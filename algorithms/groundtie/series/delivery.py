@@ -17,7 +17,7 @@ from ..errors import NotRegisteredError
 from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.grid import Grid
 from ..rasters.reading import open_raster
-from ..registration.registered_output import RegisteredOutput
+from ..registration.registered_output import UNTOUCHED_TOLERANCE_PX, RegisteredOutput
 from ..registration.verdict import Verdict
 from ..report.stac import stac_item
 from ..runs import RUN, run_tags
@@ -28,10 +28,6 @@ from .series import TABLE_COLUMNS, Series, SeriesDate
 from .stored import StoredSeries
 
 SERIES_JSON, TABLE_CSV, TABLE_GPKG = "series.json", "series.csv", "series.gpkg"
-
-# A raster is not made again if a further date moves it by less than this, in its own pixels: what
-# untouched pixels may be wrong by, too.
-_SAME_PX = 0.05
 
 
 @dataclass(frozen=True)
@@ -110,7 +106,8 @@ class SeriesFiles:
         if before is not None and before.key == key and before.is_there(self.folder):
             corners = one.transform.input_grid.outline(2)
             moved = one.transform(before.transform.inverse(corners)) - corners
-            if np.hypot(*moved.T).max() < _SAME_PX:
+            # What untouched pixels may be wrong by, too.
+            if np.hypot(*moved.T).max() < UNTOUCHED_TOLERANCE_PX:
                 known = {"file": before.file, "key": key, "run": before.run}
                 with open_raster(self.folder / before.file) as source:
                     return replace(one, transform=before.transform), known, source.grid

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 
 from ..geometry.models import Frame, PolynomialModel, monomials
-from ..rasters.grid import Grid, compose, reproject
+from ..rasters.grid import FloatArray, Grid, compose, mesh, reproject
 
-FloatArray = NDArray[np.float64]
 Move = Callable[[FloatArray], FloatArray]
 
 # Parameters of a displacement: shift, and rise along both axes, (x, y) each.
@@ -71,7 +69,7 @@ class SeriesFrame:
     def displacement_of(self, move: Move) -> FloatArray:
         """Return the displacement, (6,), that is nearest to a move of map positions."""
         side = np.linspace(-1, 1, _LATTICE)
-        uv = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+        uv = mesh(side, side)
         moved = (self.enter(move(self.leave(uv))) - uv) * self.half_px
         return np.asarray(np.linalg.lstsq(monomials(uv, 1), moved, rcond=None)[0]).ravel()
 

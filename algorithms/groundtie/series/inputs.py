@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..errors import ParameterError
-from ..raster_names import file_name, identity, located, time_of
-from ..stac_items import RASTER_SUFFIXES, StacItem, is_item, raster_of_item, read_items
+from ..raster_names import file_name, identity, located
+from ..stac_items import RASTER_SUFFIXES, StacItem, is_item, raster_of_item, read_items, time_of
 from ..tables import read_rows
 
 _TABLE = (".csv",)

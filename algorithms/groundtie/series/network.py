@@ -17,9 +17,8 @@ from scipy.sparse.linalg import splu
 from scipy.stats import chi2
 
 from ..geometry.judging import LARGEST_LOG10_CHANCE
+from ..rasters.reading import Mask
 from .frame import PARAMETERS, SHIFT_PX, FloatArray, SeriesFrame
-
-Mask = NDArray[np.bool_]
 
 # What links scatter by beside their own covariance, per parameter, in pixels: seasons, shadows and
 # tides displace all points alike. It is found from the misclosures, between what the best links

@@ -20,7 +20,8 @@ from ..masks.choice import AUTO
 from ..matching.alignment import LINEAR_CANDIDATES
 from ..rasters.grid import Grid, reproject
 from ..rasters.reading import bounded_cache
-from ..registration.pipeline import pair_images, run
+from ..registration.opening import pair_images
+from ..registration.pipeline import run
 from ..registration.registration import Registration
 from ..registration.specification import COREGISTER, SAR_SAR, Specification
 from ..version import __version__

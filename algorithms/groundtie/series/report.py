@@ -41,14 +41,9 @@ class SeriesReport(Page):
     ----------
     series
         The series; its rasters are open.
-    title, parameters, seconds
-        See `Page`.
     """
 
     series: Series
-    title: str
-    parameters: dict[str, Any]
-    seconds: float
     template: ClassVar[str] = "series.html.j2"
 
     @classmethod
@@ -56,7 +51,7 @@ class SeriesReport(Page):
         """Return the report on a series."""
         given = {name: value for name, value in series.parameters.items() if value is not None}
         title = f"Series of {len(series.dates)} dates, registered {series.datum}"
-        return cls(series, title, given, series.seconds)
+        return cls(series, title=title, parameters=given, seconds=series.seconds)
 
     def numbers(self) -> dict[str, Any]:
         """Return what was measured, by name."""

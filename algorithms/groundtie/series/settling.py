@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
-from ..registration.rules import Rule
 from ..registration.series_evidence import DateEvidence
-from ..registration.verdict import first_refusal
+from ..registration.verdict import Verdict, decide
 from .closure import Closure, triplet_closures
 from .frame import FloatArray, SeriesFrame
 from .network import Adjustment, Link, adjust
@@ -17,15 +16,13 @@ Results = Mapping[tuple[int, int], PairResult]
 
 
 @dataclass(frozen=True)
-class DateVerdict:
+class DateVerdict(Verdict):
     """Whether a date belongs to the series, and where it lies.
 
     Parameters
     ----------
     evidence
         What it rests on.
-    accepted, reason, rule, advice
-        See `Verdict`.
     displacement, covariance
         From the series' frame to the date's nominal positions, shapes (6,) and (6, 6); None if the
         date is left out.
@@ -33,14 +30,15 @@ class DateVerdict:
         Largest error of the ways around it; None: there is none.
     """
 
-    evidence: DateEvidence
-    accepted: bool
-    reason: str
-    rule: str = ""
-    advice: str = ""
+    evidence: DateEvidence = field(default_factory=DateEvidence)
     displacement: FloatArray | None = None
     covariance: FloatArray | None = None
     worst_loop_px: float | None = None
+
+    @classmethod
+    def of(cls, evidence: DateEvidence, confirmed: str = "") -> DateVerdict:
+        """Return what the rules make of a date, without its place."""
+        return cls(**vars(decide(evidence, confirmed)), evidence=evidence)
 
 
 @dataclass(frozen=True)
@@ -160,27 +158,20 @@ class _Network:
 
     def verdict(self, date: int) -> DateVerdict:
         around = [one.error_px for one in self.closures if date in one.dates and one.is_closed]
+        evidence = self.evidence(date)
+        reason = _accepted(evidence)
         if date == self.hub:
-            evidence, refusal = self.evidence(date), None
+            verdict = DateVerdict(True, reason, evidence=evidence)
         else:
-            evidence = self.evidence(date)
-            refusal = first_refusal(evidence)
-        if refusal is not None:
-            return refused_date(evidence, refusal)
-        return DateVerdict(
-            evidence,
-            True,
-            _accepted(evidence),
+            verdict = DateVerdict.of(evidence, reason)
+        if not verdict.accepted:
+            return verdict
+        return replace(
+            verdict,
             displacement=self.found.displacements[date],
             covariance=self.found.covariances[date],
             worst_loop_px=max(around, default=None),
         )
-
-
-def refused_date(evidence: DateEvidence, refusal: tuple[Rule, str]) -> DateVerdict:
-    """Return the verdict on a date that a rule refuses."""
-    rule, reason = refusal
-    return DateVerdict(evidence, False, reason, rule.name, rule.advice)
 
 
 def _accepted(evidence: DateEvidence) -> str:

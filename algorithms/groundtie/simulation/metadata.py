@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..rasters.grid import Grid, reproject
-from ..sensor.surfaces import LON_LAT
+from ..rasters.grid import LON_LAT, Grid, reproject
 from .optical import OpticalOptions
 from .sar import SarOptions
 

@@ -13,7 +13,8 @@ from rasterio.crs import CRS
 from ..arrays import Raster
 from ..errors import ParameterError
 from ..geometry.models import TERRAIN, PolynomialModel
-from ..geometry.terrain import Terrain, TerrainModel
+from ..geometry.terrain import Terrain
+from ..geometry.terrain_model import TerrainModel
 from ..geometry.transform import Transform
 from ..progress import SILENT, Progress
 from ..rasters.grid import Grid

@@ -11,9 +11,8 @@ from scipy.ndimage import map_coordinates
 
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
-from ..rasters.grid import PIXEL_COORDINATES, Grid, reproject
+from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, Grid, reproject
 from ..sensor.rpc_fit import RPCFit, fit_rpc
-from ..sensor.surfaces import LON_LAT
 from .attitude import AttitudeError, AttitudeOptions
 from .camera import PushBroom
 from .check_points import InputImage, RoofPoints, Scenes, ground_points, roof_points

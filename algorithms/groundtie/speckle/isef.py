@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-FloatImage = NDArray[np.float32]
+from ..rasters.reading import FloatImage
 
 
 def isef(image: FloatImage, decay: float) -> FloatImage:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..context import Context
 from ..errors import RasterContentError
 from ..rasters.grid import require_workable
+from ..rasters.patch import middle_window
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
 from ..rasters.tiling import in_order, tile_count, tiles
@@ -21,9 +22,6 @@ from .statistics import estimate_looks
 
 AMPLITUDE = "amplitude"
 VALUES = (AMPLITUDE, "intensity")
-
-# Looks are estimated in the middle of a large image.
-_SAMPLE_PX = 2048
 
 # Filters work in float32; its power must not overflow.
 _LARGEST_AMPLITUDE = 1e18
@@ -130,11 +128,8 @@ def looks_of(source: RasterSource, values: str) -> float:
     RasterContentError
         No pixel there is valid.
     """
-    width, height = (min(size, _SAMPLE_PX) for size in (source.grid.width, source.grid.height))
-    middle = Window((source.grid.width - width) // 2, (source.grid.height - height) // 2, 0, 0)
-    bands, valid = source.read_bands(
-        middle._replace(width=width, height=height), source.image_bands[:1]
-    )
+    middle = middle_window(source.grid)
+    bands, valid = source.read_bands(middle, source.image_bands[:1])
     if not valid.any():
         raise RasterContentError(f"{source.path} has no valid pixels in its middle")
     return estimate_looks(np.where(valid[0], _power(bands[0], values), np.float32(0)), valid[0])

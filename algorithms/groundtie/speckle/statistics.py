@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-FloatImage = NDArray[np.float32]
-Mask = NDArray[np.bool_]
+from ..rasters.reading import FloatImage, Mask
 
 # Mean power, squared, below which there is nothing: running sums leave this much behind.
 _NO_POWER = np.float32(1e-30)

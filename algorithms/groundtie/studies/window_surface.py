@@ -133,8 +133,8 @@ class SurfaceSettings:
         One of `binning.BINNINGS`, or `GREY_VALUES`.
     gpve_order
         Order of the histogram's B-spline.
-    alpha, q
-        Orders of Rényi's and of Tsallis' entropy.
+    entropy_order
+        Of Rényi's and of Tsallis' entropy.
     sample
         Pixels that MLMI is estimated from.
     """
@@ -143,8 +143,7 @@ class SurfaceSettings:
     bins: int | None = None
     binning: str = "equal-frequency"
     gpve_order: int = ORDER
-    alpha: float = 2.0
-    q: float = 2.0
+    entropy_order: float = 2.0
     sample: int = 1000
 
     def __post_init__(self) -> None:
@@ -228,9 +227,9 @@ class SurfaceSettings:
     @property
     def _measure(self) -> HistogramMeasure:
         if self.similarity == "renyi":
-            return renyi_mutual_information(self.alpha)
+            return renyi_mutual_information(self.entropy_order)
         if self.similarity == "tsallis":
-            return tsallis_mutual_information(self.q)
+            return tsallis_mutual_information(self.entropy_order)
         return HISTOGRAM_MEASURES[self.similarity]
 
 

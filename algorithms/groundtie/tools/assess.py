@@ -241,9 +241,14 @@ def assess(
     subject = str(transform or tie_points or input)
     given = {name: value for name, value in parameters.items() if value is not None}
     page = AssessmentReport(
-        f"Assessment of {Path(subject).name}",
-        assessment, verdict, found, comparison, given, time.perf_counter() - started,
-    )  # fmt: skip
+        assessment,
+        verdict,
+        found,
+        comparison,
+        title=f"Assessment of {Path(subject).name}",
+        parameters=given,
+        seconds=time.perf_counter() - started,
+    )
     progress.update(0.8, "writing")
     with Outputs() as outputs:
         if report is not None:

@@ -19,7 +19,7 @@ from ..registration.sensor_input import Ground, open_oriented_image, open_sensor
 from ..sensor.control_points import READ_SUFFIXES, read_control_points
 from ..sensor.rpc import RPC
 from ..sensor.rpc_files import read_rpc
-from .sensor_parameters import Dem, DemDatum, Geoid, Height, RpcFile, SensorImage
+from .parameters import sensor
 
 BEFORE, AFTER = "before", "after"
 
@@ -65,7 +65,7 @@ class SensorAssessment:
     ),
 )
 def assess_sensor(
-    image: SensorImage,
+    image: sensor.SensorImage,
     check_points: Annotated[
         Path,
         FileIn(
@@ -83,8 +83,8 @@ def assess_sensor(
             suffixes=(".txt", ".rpb", ".xml", ".tif", ".tiff"),
         ),
     ] = None,
-    dem: Dem = None,
-    dem_datum: DemDatum = None,
+    dem: sensor.Dem = None,
+    dem_datum: sensor.DemDatum = None,
     table: Annotated[
         Path | None,
         FileOut(label="Table", help="The errors of each point.", suffixes=(".csv",)),
@@ -93,9 +93,9 @@ def assess_sensor(
         Path | None,
         FileOut(label="Picture", help="The errors as arrows in the image.", suffixes=(".png",)),
     ] = None,
-    height: Height = None,
-    geoid: Geoid = None,
-    rpc: RpcFile = None,
+    height: sensor.Height = None,
+    geoid: sensor.Geoid = None,
+    rpc: sensor.RpcFile = None,
     progress: Progress = SILENT,
 ) -> SensorAssessment:
     """Judge the RPCs of an image at independent check points, before and after a refinement.

@@ -13,7 +13,7 @@ from ..kinds import Choice, FileIn, FileOut, Flag, FolderOut, Number
 from ..progress import SILENT, Progress
 from ..tables import SUFFIXES
 from . import NAMES, load_tool
-from .common import Scheduler
+from .parameters import general
 
 
 @tool(
@@ -71,7 +71,7 @@ def batch(
             maximum=256,
         ),
     ] = None,
-    scheduler: Scheduler = None,
+    scheduler: general.Scheduler = None,
     json_log: Annotated[
         Path | None,
         FileOut(

@@ -15,8 +15,7 @@ from ..matching.surface_fit import AUTO
 from ..progress import SILENT, Progress
 from ..series.call import SeriesCall
 from ..series.series import Series
-from .common import MatchingPixelSize, Resampling, Scheduler, Workers
-from .registration_parameters import MASK_HELP, MaxError, OutputGrid, ReportOut, SearchRadius
+from .parameters import general, registration
 
 
 @tool(
@@ -53,7 +52,7 @@ def coregister_series(
             "all dates is zero.",
         ),
     ] = None,
-    search_radius: SearchRadius = None,
+    search_radius: registration.SearchRadius = None,
     model: Annotated[
         str,
         Choice(
@@ -63,8 +62,8 @@ def coregister_series(
             choices=(AUTO, *LINEAR_CANDIDATES),
         ),
     ] = AUTO,
-    max_error: MaxError = 3.0,
-    report: ReportOut = None,
+    max_error: registration.MaxError = 3.0,
+    report: registration.ReportOut = None,
     band: Annotated[
         int | None,
         Number(
@@ -85,13 +84,14 @@ def coregister_series(
         ),
     ] = None,
     reference_mask: Annotated[
-        Path | None, MaskIn(label="Mask of the reference", help=MASK_HELP, advanced=True)
+        Path | None,
+        MaskIn(label="Mask of the reference", help=registration.MASK_HELP, advanced=True),
     ] = None,
-    matching_pixel_size: MatchingPixelSize = None,
-    output_grid: OutputGrid = "reference",
-    resampling: Resampling = "cubic",
-    workers: Workers = None,
-    scheduler: Scheduler = None,
+    matching_pixel_size: general.MatchingPixelSize = None,
+    output_grid: registration.OutputGrid = "reference",
+    resampling: general.Resampling = "cubic",
+    workers: general.Workers = None,
+    scheduler: general.Scheduler = None,
     progress: Progress = SILENT,
     executor: Executor | None = None,
     parameters: Mapping[str, Any] = MappingProxyType({}),

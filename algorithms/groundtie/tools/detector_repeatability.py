@@ -18,21 +18,14 @@ from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import bounded_cache
-from ..registration.pipeline import open_pair
+from ..registration.opening import open_pair
 from ..registration.specification import Specification
 from ..registration.stored_transform import transform_of
 from ..studies.evaluation import Evaluation, Variant, evaluate
 from ..studies.matching import METHODS
 from ..studies.repeatability import CLASS_NAMES
 from ..studies.repeatability_picture import draw_evaluations
-from .common import (
-    Input,
-    InputBand,
-    MatchingPixelSize,
-    Reference,
-    ReferenceBand,
-)
-from .registration_parameters import InputMask, ReferenceMask
+from .parameters import general, registration
 
 
 @dataclass(frozen=True)
@@ -73,8 +66,8 @@ class RepeatabilityResult:
 
 @tool(title="Repeatability of detectors", group="Quality")
 def detector_repeatability(
-    reference: Reference,
-    input: Input,
+    reference: general.Reference,
+    input: general.Input,
     output: Annotated[
         Path,
         FileOut(
@@ -153,11 +146,11 @@ def detector_repeatability(
             advanced=True,
         ),
     ] = METHODS[-1],
-    reference_band: ReferenceBand = None,
-    input_band: InputBand = None,
-    reference_mask: ReferenceMask = None,
-    input_mask: InputMask = None,
-    matching_pixel_size: MatchingPixelSize = None,
+    reference_band: general.ReferenceBand = None,
+    input_band: general.InputBand = None,
+    reference_mask: registration.ReferenceMask = None,
+    input_mask: registration.InputMask = None,
+    matching_pixel_size: general.MatchingPixelSize = None,
     progress: Progress = SILENT,
 ) -> RepeatabilityResult:
     """Measure how well feature detectors and descriptors do on a registered pair.

@@ -25,7 +25,7 @@ from ..registration.verdict import Verdict
 from ..report.rotation_picture import draw_rotation
 from ..similarity.surface import SimilaritySettings
 from ..studies.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
-from .common import Input, InputBand, Reference, ReferenceBand, TransformOut, Workers
+from .parameters import general
 
 _AUTO = "auto"
 
@@ -101,8 +101,8 @@ class RotationResult:
     ),
 )
 def estimate_rotation(
-    reference: Reference,
-    input: Input,
+    reference: general.Reference,
+    input: general.Input,
     search: Annotated[
         str,
         Choice(
@@ -153,7 +153,7 @@ def estimate_rotation(
             "default a quarter of the input's longer side.",
         ),
     ] = None,
-    transform: TransformOut = None,
+    transform: general.TransformOut = None,
     picture: Annotated[
         Path | None,
         FileOut(
@@ -174,9 +174,9 @@ def estimate_rotation(
             advanced=True,
         ),
     ] = _AUTO,
-    reference_band: ReferenceBand = None,
-    input_band: InputBand = None,
-    workers: Workers = None,
+    reference_band: general.ReferenceBand = None,
+    input_band: general.InputBand = None,
+    workers: general.Workers = None,
     progress: Progress = SILENT,
 ) -> RotationResult:
     """Estimate rotation, scale and shift between two rasters of the same place.

@@ -14,29 +14,7 @@ from ..masks.choice import AUTO
 from ..progress import SILENT, Progress
 from ..registration.sensor_jobs import GcpResult, extract_control
 from ..sensor.control_points import SUFFIXES
-from .common import MatchingPixelSize, Reference, ReferenceBand, Workers
-from .registration_parameters import (
-    ImageMaskValues,
-    ImageView,
-    Mask,
-    MaxError,
-    ReferenceMask,
-    ReferenceMaskValues,
-    ReferenceView,
-    SurfaceModel,
-)
-from .sensor_parameters import (
-    Dem,
-    DemCover,
-    DemDatum,
-    Geoid,
-    Height,
-    ImageBand,
-    ImageMask,
-    RpcFile,
-    RpcSearchRadius,
-    SensorImage,
-)
+from .parameters import general, registration, sensor
 
 
 @tool(
@@ -48,8 +26,8 @@ from .sensor_parameters import (
     ),
 )
 def extract_gcps(
-    image: SensorImage,
-    reference: Reference,
+    image: sensor.SensorImage,
+    reference: general.Reference,
     output: Annotated[
         Path,
         VectorOut(
@@ -60,26 +38,25 @@ def extract_gcps(
             style="tie_points",
         ),
     ],
-    dem: Dem = None,
-    dem_datum: DemDatum = None,
-    search_radius: RpcSearchRadius = None,
-    max_error: MaxError = 3.0,
-    height: Height = None,
-    geoid: Geoid = None,
-    dem_cover: DemCover = 0.0,
-    rpc: RpcFile = None,
-    image_band: ImageBand = None,
-    image_mask: ImageMask = None,
-    image_mask_values: ImageMaskValues = None,
-    reference_band: ReferenceBand = None,
-    reference_mask: ReferenceMask = None,
-    reference_mask_values: ReferenceMaskValues = None,
-    mask: Mask = AUTO,
-    surface_model: SurfaceModel = None,
-    reference_view: ReferenceView = None,
-    image_view: ImageView = None,
-    matching_pixel_size: MatchingPixelSize = None,
-    workers: Workers = None,
+    dem: sensor.Dem = None,
+    dem_datum: sensor.DemDatum = None,
+    search_radius: sensor.RpcSearchRadius = None,
+    max_error: registration.MaxError = 3.0,
+    height: sensor.Height = None,
+    geoid: sensor.Geoid = None,
+    dem_cover: sensor.DemCover = 0.0,
+    rpc: sensor.RpcFile = None,
+    image_band: sensor.ImageBand = None,
+    image_mask: sensor.ImageMask = None,
+    image_mask_values: registration.ImageMaskValues = None,
+    reference_band: general.ReferenceBand = None,
+    reference_mask: registration.ReferenceMask = None,
+    reference_mask_values: registration.ReferenceMaskValues = None,
+    mask: registration.Mask = AUTO,
+    surface_model: registration.SurfaceModel = None,
+    views: registration.SurfaceViews = None,
+    matching_pixel_size: general.MatchingPixelSize = None,
+    workers: general.Workers = None,
     progress: Progress = SILENT,
     parameters: Mapping[str, Any] = MappingProxyType({}),
 ) -> GcpResult:

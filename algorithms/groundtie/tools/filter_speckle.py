@@ -16,7 +16,7 @@ from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from ..speckle.filters import FILTERS, SpeckleFilter
 from ..speckle.raster_filter import AMPLITUDE, VALUES, RasterFilter, looks_of
-from .common import Radar, Workers
+from .parameters import general
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class SpeckleResult:
     ),
 )
 def filter_speckle(
-    input: Radar,
+    input: general.Radar,
     output: Annotated[
         Path,
         RasterOut(
@@ -105,7 +105,7 @@ def filter_speckle(
             advanced=True,
         ),
     ] = 1.0,
-    workers: Workers = None,
+    workers: general.Workers = None,
     progress: Progress = SILENT,
 ) -> SpeckleResult:
     """Smooth the speckle of a radar image, and keep its edges.

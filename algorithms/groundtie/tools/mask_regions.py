@@ -15,7 +15,7 @@ from ..masks.scene import Scene, write_mask
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
-from .common import HighPercent, MaskOut, MaskWidth, Radar, RadarBand
+from .parameters import general
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ class RegionMaskResult:
     ),
 )
 def mask_regions(
-    input: Radar,
-    output: MaskOut,
+    input: general.Radar,
+    output: general.MaskOut,
     regions: Annotated[
         Path | None,
         RasterOut(
@@ -62,9 +62,9 @@ def mask_regions(
         Path | None,
         RasterOut(label="Skeleton", help="GeoTIFF that is 1 on the skeleton of long regions."),
     ] = None,
-    mask_width: MaskWidth = WIDTH_M,
-    mask_high_percent: HighPercent = None,
-    band: RadarBand = None,
+    mask_width: general.MaskWidth = WIDTH_M,
+    mask_high_percent: general.HighPercent = None,
+    band: general.RadarBand = None,
     progress: Progress = SILENT,
 ) -> RegionMaskResult:
     """Mask all of a radar image but homogeneous regions on the ground: roads, waters, squares.

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import ParameterError
-from ..geometry.views import View
+from ..geometry.views import View, split_views, stated_view
 from ..kinds import RasterOut
 from ..masks.scene import Scene, write_mask
 from ..masks.surface_model import write_reasons
@@ -19,8 +19,7 @@ from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.specification import StatedSurface
 from ..registration.surface_masks import ModelFit, fitted_ground
-from .common import MaskOut, Reference
-from .registration_parameters import SURFACE_MODEL, InputView, ReferenceView
+from .parameters import general, registration
 
 
 @dataclass(frozen=True)
@@ -61,9 +60,9 @@ class SurfaceMaskResult:
     ),
 )
 def mask_surface(
-    reference: Reference,
-    surface_model: Annotated[Path, replace(SURFACE_MODEL, advanced=False)],
-    output: MaskOut,
+    reference: general.Reference,
+    surface_model: Annotated[Path, replace(registration.SURFACE_MODEL, advanced=False)],
+    output: general.MaskOut,
     reasons: Annotated[
         Path | None,
         RasterOut(
@@ -72,8 +71,7 @@ def mask_surface(
             "radar shadow, 8 hidden from the camera, 16 cast shadow, 32 unknown.",
         ),
     ] = None,
-    reference_view: ReferenceView = None,
-    input_view: InputView = None,
+    views: registration.SurfaceViews = None,
     progress: Progress = SILENT,
 ) -> SurfaceMaskResult:
     """Mask all of an image but the ground that a surface model and the views of images leave.
@@ -83,15 +81,13 @@ def mask_surface(
     to be registered, only what the reference itself does not show is masked. `coregister`,
     `extract_gcps` and `refine_rpc` make the same mask themselves if given a surface model.
     """
-    views = [View.of(reference, reference_view)]
-    if input_view is not None:
-        views.append(View.of(None, input_view))
-    known = tuple(view for view in views if view is not None)
-    if len(known) < len(views):
+    own, other = split_views(views)
+    view = View.of(reference, own)
+    if view is None:
         raise ParameterError(
-            "the view of the reference is not known: put its STAC item beside it, or give "
-            "reference_view"
+            "the view of the reference is not known: put its STAC item beside it, or give views"
         )
+    known = (view,) if other is None else (view, stated_view(other))
     files = {"mask": output, "reasons": reasons}
     with bounded_cache(), ExitStack() as stack:
         scene = Scene.of(stack.enter_context(open_raster(reference)))

@@ -13,7 +13,7 @@ from ..masks.threshold import HIGH_PERCENT, Threshold
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
-from .common import HighPercent, LowPercent, MaskGrowth, MaskOut, Radar, RadarBand
+from .parameters import general
 
 
 @dataclass(frozen=True)
@@ -46,12 +46,12 @@ class ThresholdMaskResult:
     outputs=(ResultOutput("SHARE", "Share of the pixels that take part", "share"),),
 )
 def mask_threshold(
-    input: Radar,
-    output: MaskOut,
-    mask_high_percent: HighPercent = None,
-    mask_low_percent: LowPercent = 0.0,
-    mask_growth: MaskGrowth = 0.0,
-    band: RadarBand = None,
+    input: general.Radar,
+    output: general.MaskOut,
+    mask_high_percent: general.HighPercent = None,
+    mask_low_percent: general.LowPercent = 0.0,
+    mask_growth: general.MaskGrowth = 0.0,
+    band: general.RadarBand = None,
     progress: Progress = SILENT,
 ) -> ThresholdMaskResult:
     """Mask the strong scatterers of a radar image, as buildings are.

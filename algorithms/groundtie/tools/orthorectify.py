@@ -20,8 +20,7 @@ from ..rasters.grid import require_map
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.orthorectification import Orthorectification
 from ..registration.sensor_input import Ground, open_sensor_image, utm_of
-from .common import COG_HELP, Resampling, Workers
-from .sensor_parameters import Dem, DemCover, DemDatum, Geoid, Height, RpcFile, SensorImage
+from .parameters import general, sensor
 from .written_raster import SIZE_OUTPUTS, WrittenRaster, like_reference, pixel_size_of_result
 
 
@@ -46,18 +45,18 @@ class OrthoResult(WrittenRaster):
     outputs=SIZE_OUTPUTS,
 )
 def orthorectify(
-    image: SensorImage,
+    image: sensor.SensorImage,
     output: Annotated[
         Path,
         RasterOut(
             label="Orthoimage",
             help="GeoTIFF with the image's bands, data type, nodata value, colours and metadata. "
-            + COG_HELP,
+            + general.COG_HELP,
             like="image",
         ),
     ],
-    dem: Dem = None,
-    dem_datum: DemDatum = None,
+    dem: sensor.Dem = None,
+    dem_datum: sensor.DemDatum = None,
     reference: Annotated[Path | None, like_reference("image")] = None,
     pixel_size: Annotated[
         float | None, pixel_size_of_result("; by default that of the image on the ground")
@@ -69,12 +68,12 @@ def orthorectify(
             help="CRS of the result, as EPSG:32632; by default the UTM zone of the image.",
         ),
     ] = None,
-    height: Height = None,
-    geoid: Geoid = None,
-    dem_cover: DemCover = 0.0,
-    rpc: RpcFile = None,
-    resampling: Resampling = "cubic",
-    workers: Workers = None,
+    height: sensor.Height = None,
+    geoid: sensor.Geoid = None,
+    dem_cover: sensor.DemCover = 0.0,
+    rpc: sensor.RpcFile = None,
+    resampling: general.Resampling = "cubic",
+    workers: general.Workers = None,
     progress: Progress = SILENT,
 ) -> OrthoResult:
     """Orthorectify an image by its RPCs and a terrain model.

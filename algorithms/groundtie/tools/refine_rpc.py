@@ -17,29 +17,7 @@ from ..registration.sensor_jobs import RefinedRpc, refine
 from ..sensor.adjustment import AUTO
 from ..sensor.bias import KINDS
 from ..sensor.control_points import READ_SUFFIXES, SUFFIXES
-from .common import MatchingPixelSize, ReferenceBand, Workers
-from .registration_parameters import (
-    ImageMaskValues,
-    ImageView,
-    Mask,
-    MaxError,
-    ReferenceMask,
-    ReferenceMaskValues,
-    ReferenceView,
-    SurfaceModel,
-)
-from .sensor_parameters import (
-    Dem,
-    DemCover,
-    DemDatum,
-    Geoid,
-    Height,
-    ImageBand,
-    ImageMask,
-    RpcFile,
-    RpcSearchRadius,
-    SensorImage,
-)
+from .parameters import general, registration, sensor
 
 
 @tool(
@@ -53,7 +31,7 @@ from .sensor_parameters import (
     ),
 )
 def refine_rpc(
-    image: SensorImage,
+    image: sensor.SensorImage,
     output: Annotated[
         Path,
         FileOut(
@@ -79,8 +57,8 @@ def refine_rpc(
             suffixes=READ_SUFFIXES,
         ),
     ] = None,
-    dem: Dem = None,
-    dem_datum: DemDatum = None,
+    dem: sensor.Dem = None,
+    dem_datum: sensor.DemDatum = None,
     model: Annotated[
         str,
         Choice(
@@ -90,8 +68,8 @@ def refine_rpc(
             choices=(AUTO, *KINDS),
         ),
     ] = AUTO,
-    search_radius: RpcSearchRadius = None,
-    max_error: MaxError = 3.0,
+    search_radius: sensor.RpcSearchRadius = None,
+    max_error: registration.MaxError = 3.0,
     residuals: Annotated[
         Path | None,
         VectorOut(
@@ -114,22 +92,21 @@ def refine_rpc(
             shown=True,
         ),
     ] = None,
-    height: Height = None,
-    geoid: Geoid = None,
-    dem_cover: DemCover = 0.0,
-    rpc: RpcFile = None,
-    image_band: ImageBand = None,
-    image_mask: ImageMask = None,
-    image_mask_values: ImageMaskValues = None,
-    reference_band: ReferenceBand = None,
-    reference_mask: ReferenceMask = None,
-    reference_mask_values: ReferenceMaskValues = None,
-    mask: Mask = AUTO_MASK,
-    surface_model: SurfaceModel = None,
-    reference_view: ReferenceView = None,
-    image_view: ImageView = None,
-    matching_pixel_size: MatchingPixelSize = None,
-    workers: Workers = None,
+    height: sensor.Height = None,
+    geoid: sensor.Geoid = None,
+    dem_cover: sensor.DemCover = 0.0,
+    rpc: sensor.RpcFile = None,
+    image_band: sensor.ImageBand = None,
+    image_mask: sensor.ImageMask = None,
+    image_mask_values: registration.ImageMaskValues = None,
+    reference_band: general.ReferenceBand = None,
+    reference_mask: registration.ReferenceMask = None,
+    reference_mask_values: registration.ReferenceMaskValues = None,
+    mask: registration.Mask = AUTO_MASK,
+    surface_model: registration.SurfaceModel = None,
+    views: registration.SurfaceViews = None,
+    matching_pixel_size: general.MatchingPixelSize = None,
+    workers: general.Workers = None,
     progress: Progress = SILENT,
     parameters: Mapping[str, Any] = MappingProxyType({}),
 ) -> RefinedRpc:

@@ -10,50 +10,29 @@ from ..declaration import tool
 from ..progress import SILENT, Progress
 from ..registration.automatic import OrthorectifiedRpc, register_anything
 from ..registration.registration import Registration
-from .common import (
-    Input,
-    InputBand,
-    OptionalGeoTiff,
-    Reference,
-    ReferenceBand,
-    TransformOut,
-    Workers,
-)
-from .registration_parameters import (
-    OUTPUTS,
-    InputDem,
-    InputMask,
-    InputMaskValues,
-    LightOfTerrain,
-    MaxError,
-    ReferenceMask,
-    ReferenceMaskValues,
-    ReportOut,
-    TiePointsOut,
-)
-from .sensor_parameters import Dem, DemDatum
+from .parameters import general, registration, sensor
 
 
-@tool(title="Register images", group="Registration", outputs=OUTPUTS)
+@tool(title="Register images", group="Registration", outputs=registration.OUTPUTS)
 def register(
-    reference: Reference,
-    input: Input,
-    output: OptionalGeoTiff = None,
-    max_error: MaxError = 3.0,
-    dem: Dem = None,
-    dem_datum: DemDatum = None,
-    input_dem: InputDem = None,
-    light: LightOfTerrain = None,
-    tie_points: TiePointsOut = None,
-    transform: TransformOut = None,
-    report: ReportOut = None,
-    reference_band: ReferenceBand = None,
-    input_band: InputBand = None,
-    reference_mask: ReferenceMask = None,
-    reference_mask_values: ReferenceMaskValues = None,
-    input_mask: InputMask = None,
-    input_mask_values: InputMaskValues = None,
-    workers: Workers = None,
+    reference: general.Reference,
+    input: general.Input,
+    output: general.OptionalGeoTiff = None,
+    max_error: registration.MaxError = 3.0,
+    dem: sensor.Dem = None,
+    dem_datum: sensor.DemDatum = None,
+    input_dem: registration.InputDem = None,
+    views: registration.TerrainView = None,
+    tie_points: registration.TiePointsOut = None,
+    transform: general.TransformOut = None,
+    report: registration.ReportOut = None,
+    reference_band: general.ReferenceBand = None,
+    input_band: general.InputBand = None,
+    reference_mask: registration.ReferenceMask = None,
+    reference_mask_values: registration.ReferenceMaskValues = None,
+    input_mask: registration.InputMask = None,
+    input_mask_values: registration.InputMaskValues = None,
+    workers: general.Workers = None,
     progress: Progress = SILENT,
     parameters: Mapping[str, Any] = MappingProxyType({}),
 ) -> Registration | OrthorectifiedRpc:

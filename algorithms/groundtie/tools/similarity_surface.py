@@ -11,7 +11,7 @@ from ..declaration import tool
 from ..kinds import Choice, Distance, FileOut, Number, RasterOut
 from ..progress import SILENT, Progress
 from ..rasters.reading import bounded_cache
-from ..registration.pipeline import open_pair
+from ..registration.opening import open_pair
 from ..registration.specification import Specification
 from ..similarity.binning import BINNINGS
 from ..studies.surface_result import SurfaceResult
@@ -23,17 +23,7 @@ from ..studies.window_surface import (
     SurfaceSettings,
     Window,
 )
-from .common import (
-    GpveOrder,
-    Input,
-    InputBand,
-    MatchingPixelSize,
-    Reference,
-    ReferenceBand,
-    Seed,
-    Workers,
-)
-from .registration_parameters import InputMask, ReferenceMask
+from .parameters import general, registration
 
 
 @tool(
@@ -47,8 +37,8 @@ from .registration_parameters import InputMask, ReferenceMask
     ),
 )
 def similarity_surface(
-    reference: Reference,
-    input: Input,
+    reference: general.Reference,
+    input: general.Input,
     output: Annotated[
         Path,
         RasterOut(
@@ -112,21 +102,11 @@ def similarity_surface(
             suffixes=(".json",),
         ),
     ] = None,
-    alpha: Annotated[
+    entropy_order: Annotated[
         float,
         Number(
-            label="Order of Rényi's entropy",
-            help="For renyi; 1 is Shannon's entropy.",
-            minimum=-100,
-            maximum=100,
-            advanced=True,
-        ),
-    ] = 2.0,
-    q: Annotated[
-        float,
-        Number(
-            label="Index of Tsallis' entropy",
-            help="For tsallis; 1 is Shannon's entropy.",
+            label="Order of the entropy",
+            help="Of Rényi's entropy for renyi, of Tsallis' for tsallis; 1 is Shannon's.",
             minimum=-100,
             maximum=100,
             advanced=True,
@@ -154,7 +134,7 @@ def similarity_surface(
             advanced=True,
         ),
     ] = "equal-frequency",
-    gpve_order: GpveOrder = 4,
+    gpve_order: general.GpveOrder = 4,
     sample: Annotated[
         int,
         Number(
@@ -166,13 +146,13 @@ def similarity_surface(
             advanced=True,
         ),
     ] = 1000,
-    reference_band: ReferenceBand = None,
-    input_band: InputBand = None,
-    reference_mask: ReferenceMask = None,
-    input_mask: InputMask = None,
-    matching_pixel_size: MatchingPixelSize = None,
-    workers: Workers = None,
-    seed: Seed = 0,
+    reference_band: general.ReferenceBand = None,
+    input_band: general.InputBand = None,
+    reference_mask: registration.ReferenceMask = None,
+    input_mask: registration.InputMask = None,
+    matching_pixel_size: general.MatchingPixelSize = None,
+    workers: general.Workers = None,
+    seed: general.Seed = 0,
     progress: Progress = SILENT,
 ) -> SurfaceResult:
     """Show a measure of similarity at every shift of one window.
@@ -184,7 +164,7 @@ def similarity_surface(
     The surface has one distinct peak if the measure is fit for the images. Nothing is registered
     and no verdict given.
     """
-    settings = SurfaceSettings(similarity, bins, binning, gpve_order, alpha, q, sample)
+    settings = SurfaceSettings(similarity, bins, binning, gpve_order, entropy_order, sample)
     files = {"output": output, "picture": picture, "numbers": numbers}
     spec = Specification(search_radius_m=0.0, matching_pixel_size_m=matching_pixel_size)
     bands, masks = (reference_band, input_band), (reference_mask, input_mask)

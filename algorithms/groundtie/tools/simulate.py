@@ -14,7 +14,7 @@ from ..simulation.optical import OpticalOptions
 from ..simulation.pair import INPUTS, OPTICAL, PairOptions, simulate_pair
 from ..simulation.sar import SarOptions
 from ..simulation.scene import SceneOptions
-from .common import Seed
+from .parameters import general
 from .simulated import (
     Changed,
     Density,
@@ -63,7 +63,7 @@ def simulate(
     ] = 8.0,
     looks: Looks = 1.0,
     changed: Changed = 0.0,
-    seed: Seed = 0,
+    seed: general.Seed = 0,
     pixel_size: PixelSize = 1.0,
     input_pixel_size: Annotated[
         float | None,

@@ -14,7 +14,7 @@ from ..simulation.sar import SarOptions
 from ..simulation.scene import SceneOptions
 from ..simulation.sensor_files import write_sensor_image
 from ..simulation.sensor_image import SensorOptions, simulate_sensor_image
-from .common import Seed
+from .parameters import general
 from .simulated import (
     Changed,
     Density,
@@ -77,7 +77,7 @@ def simulate_sensor(
     off_nadir: OffNadir = 20.0,
     looks: Looks = 1.0,
     changed: Changed = 0.0,
-    seed: Seed = 0,
+    seed: general.Seed = 0,
     pixel_size: PixelSize = 1.0,
     incidence: Incidence = 35.0,
     orbit: Orbit = "ascending",

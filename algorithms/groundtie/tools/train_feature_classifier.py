@@ -22,7 +22,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.pair import Image
 from ..rasters.reading import bounded_cache, open_raster
-from .common import Seed
+from .parameters import general
 
 # Weaker features than those that are matched are labelled, too: as many as there may be.
 _CONTRAST = 0.02
@@ -130,7 +130,7 @@ def train_feature_classifier(
             advanced=True,
         ),
     ] = None,
-    seed: Seed = 0,
+    seed: general.Seed = 0,
     progress: Progress = SILENT,
 ) -> TrainingResult:
     """Train a classifier that keeps features on clouds, shadows or changes out of the matching.

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+from ..context import threads
 from ..declaration import tool
 from ..errors import GeoreferencingError, ParameterError
 from ..geometry.models import KINDS
@@ -21,7 +22,7 @@ from ..rasters.vrt import SUFFIX as VRT
 from ..rasters.vrt import write_vrt
 from ..registration.registered_output import moved_grid
 from ..registration.stored_transform import TiePointFit, load_stored, transform_of
-from .common import Input, Output, Resampling, Workers, worker_count
+from .parameters import general
 from .written_raster import SIZE_OUTPUTS, WrittenRaster, like_reference, pixel_size_of_result
 
 
@@ -49,8 +50,8 @@ class WarpResult(WrittenRaster):
     outputs=SIZE_OUTPUTS,
 )
 def warp(
-    input: Input,
-    output: Output,
+    input: general.Input,
+    output: general.Output,
     transform: Annotated[
         Path,
         FileIn(
@@ -76,8 +77,8 @@ def warp(
             choices=KINDS,
         ),
     ] = "affine",
-    resampling: Resampling = "cubic",
-    workers: Workers = None,
+    resampling: general.Resampling = "cubic",
+    workers: general.Workers = None,
     progress: Progress = SILENT,
 ) -> WarpResult:
     """Apply a stored transform or tie points to a raster.
@@ -97,7 +98,7 @@ def warp(
         found, fit = load_stored(transform, model, source)
         found = transform_of(found, source, transform)
         target = moved_grid(found) if is_vrt else _target_grid(found, reference, pixel_size)
-        with Outputs() as outputs:
+        with threads(workers, progress) as context, Outputs() as outputs:
             if is_vrt:
                 write_vrt(source, target, outputs.stage(output))
                 return WarpResult(output, target, found, fit)
@@ -107,7 +108,7 @@ def warp(
                 target,
                 outputs.stage(output),
                 resampling,
-                workers=worker_count(workers),
+                workers=context.workers,
                 progress=progress,
             )
     return WarpResult(output, target, found, fit)

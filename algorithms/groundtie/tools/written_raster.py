@@ -9,7 +9,6 @@ from typing import Any
 from ..declaration import Output as ResultOutput
 from ..kinds import Distance, RasterIn
 from ..rasters.grid import Grid
-from .common import crs_name
 
 SIZE_OUTPUTS = (
     ResultOutput("WIDTH", "Width of the result in pixels", "width"),
@@ -53,3 +52,8 @@ class WrittenRaster:
             f"wrote {self.output}",
             f"grid: {grid.width} × {grid.height} pixels of {size}, {crs_name(grid)}",
         ]
+
+
+def crs_name(grid: Grid) -> str:
+    """Return the name of a grid's CRS."""
+    return "no CRS" if grid.crs is None else str(grid.crs.to_string())

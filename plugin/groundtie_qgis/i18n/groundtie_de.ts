@@ -200,10 +200,6 @@
       <translation>Von Hand</translation>
     </message>
     <message>
-      <source>By which factor the input may be larger or smaller than nominal. By default 1; match_optical searches up to 2 where there is no georeferencing.</source>
-      <translation>Um welchen Faktor die Eingabe größer oder kleiner als ihr Soll sein kann. Ohne Angabe 1; match_optical sucht bis 2, wo keine Georeferenz ist.</translation>
-    </message>
-    <message>
       <source>CE90 at check points (m)</source>
       <translation>CE90 an Prüfpunkten (m)</translation>
     </message>
@@ -484,10 +480,6 @@
       <translation>Für mlmi: Zahl der Pixel des Fensters, die benutzt werden.</translation>
     </message>
     <message>
-      <source>For renyi; 1 is Shannon's entropy.</source>
-      <translation>Für renyi; 1 ist Shannons Entropie.</translation>
-    </message>
-    <message>
       <source>For the report's pictures: the image whose georeferencing is right.</source>
       <translation>Für die Bilder des Berichts: das Bild, dessen Georeferenz stimmt.</translation>
     </message>
@@ -508,16 +500,16 @@
       <translation>Für die Konsistenz über drei Wege: die Registrierung der Referenz auf das dritte Bild (das dritte Bild ist ihre Referenz).</translation>
     </message>
     <message>
-      <source>For tsallis; 1 is Shannon's entropy.</source>
-      <translation>Für tsallis; 1 ist Shannons Entropie.</translation>
-    </message>
-    <message>
       <source>Fourier–Mellin</source>
       <translation>Fourier–Mellin</translation>
     </message>
     <message>
-      <source>From where the image was taken, for the surface model: a STAC item (.json), or words such as 'radar azimuth=280 incidence=35' and 'camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'; azimuths from the ground to the sensor or sun, clockwise from north, incidence from the vertical. By default the STAC item of the image's own name beside it.</source>
-      <translation>Von wo das Bild aufgenommen wurde, für das Oberflächenmodell: ein STAC-Item (.json) oder Worte wie 'radar azimuth=280 incidence=35' und 'camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'; Azimute vom Boden zum Sensor oder zur Sonne, im Uhrzeigersinn von Norden, der Einfallswinkel von der Senkrechten. Ohne Angabe das STAC-Item mit dem Namen des Bildes daneben.</translation>
+      <source>From where both images were taken, for the surface model: STAC items (.json), or words, that of the reference first, as in 'radar azimuth=280 incidence=35; camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'. Azimuths from the ground to the sensor or sun, clockwise from north, incidence from the vertical. By default the STAC items of the images' own names beside them.</source>
+      <translation>Von wo beide Bilder aufgenommen wurden, für das Oberflächenmodell: STAC-Items (.json) oder Worte, die der Referenz zuerst, wie in 'radar azimuth=280 incidence=35; camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'. Azimute vom Boden zum Sensor oder zur Sonne, im Uhrzeigersinn von Norden, der Einfallswinkel von der Senkrechten. Ohne Angabe die STAC-Items mit den Namen der Bilder daneben.</translation>
+    </message>
+    <message>
+      <source>From where both images were taken, for the surface model: STAC items (.json), or words, that of the reference first, as in 'radar azimuth=280 incidence=35; camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'. Azimuths from the ground to the sensor or sun, clockwise from north, incidence from the vertical. By default the STAC items of the images' own names beside them. If the reference is a terrain model, how it is rendered: 'terrain sun azimuth=155' for a camera's image, 'terrain radar' for a radar's; without azimuth a radar stands in the west, and register tries azimuths.</source>
+      <translation>Von wo beide Bilder aufgenommen wurden, für das Oberflächenmodell: STAC-Items (.json) oder Worte, die der Referenz zuerst, wie in 'radar azimuth=280 incidence=35; camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48'. Azimute vom Boden zum Sensor oder zur Sonne, im Uhrzeigersinn von Norden, der Einfallswinkel von der Senkrechten. Ohne Angabe die STAC-Items mit den Namen der Bilder daneben. Ist die Referenz ein Geländemodell, wie es gerendert wird: 'terrain sun azimuth=155' für ein Kamerabild, 'terrain radar' für ein Radarbild; ohne azimuth steht ein Radar im Westen, und register probiert Azimute.</translation>
     </message>
     <message>
       <source>Gamma MAP</source>
@@ -728,6 +720,10 @@
       <translation>ISEF</translation>
     </message>
     <message>
+      <source>If the reference is a terrain model, how it is rendered: 'terrain sun azimuth=155' for a camera's image, 'terrain radar' for a radar's; without azimuth a radar stands in the west, and register tries azimuths.</source>
+      <translation>Ist die Referenz ein Geländemodell, wie es gerendert wird: 'terrain sun azimuth=155' für ein Kamerabild, 'terrain radar' für ein Radarbild; ohne azimuth steht ein Radar im Westen, und register probiert Azimute.</translation>
+    </message>
+    <message>
       <source>Image</source>
       <translation>Bild</translation>
     </message>
@@ -754,10 +750,6 @@
     <message>
       <source>Incidence angle</source>
       <translation>Einfallswinkel</translation>
-    </message>
-    <message>
-      <source>Index of Tsallis' entropy</source>
-      <translation>Index der Tsallis-Entropie</translation>
     </message>
     <message>
       <source>Information</source>
@@ -882,10 +874,6 @@
     <message>
       <source>Length of the skeleton (m)</source>
       <translation>Länge des Skeletts (m)</translation>
-    </message>
-    <message>
-      <source>Light of a terrain model</source>
-      <translation>Licht eines Geländemodells</translation>
     </message>
     <message>
       <source>Linear</source>
@@ -1104,6 +1092,10 @@
       <translation>Zahlen</translation>
     </message>
     <message>
+      <source>Of Rényi's entropy for renyi, of Tsallis' for tsallis; 1 is Shannon's.</source>
+      <translation>Der Rényi-Entropie für renyi, der Tsallis-Entropie für tsallis; 1 ist Shannons.</translation>
+    </message>
+    <message>
       <source>Of enhanced-frost: larger values keep more of edges, and of speckle.</source>
       <translation>Für Enhanced Frost: größere Werte erhalten mehr von den Kanten, und vom Speckle.</translation>
     </message>
@@ -1132,12 +1124,12 @@
       <translation>Umlaufbahn</translation>
     </message>
     <message>
-      <source>Order of Rényi's entropy</source>
-      <translation>Ordnung der Rényi-Entropie</translation>
-    </message>
-    <message>
       <source>Order of the B-spline by which pixels enter the joint histogram: 2 is partial volume interpolation, 4 the cubic spline; 4 and more are free of artefacts.</source>
       <translation>Ordnung des B-Splines, mit dem Pixel in das gemeinsame Histogramm eingehen: 2 ist Partial-Volume-Interpolation, 4 der kubische Spline; 4 und mehr sind frei von Artefakten.</translation>
+    </message>
+    <message>
+      <source>Order of the entropy</source>
+      <translation>Ordnung der Entropie</translation>
     </message>
     <message>
       <source>Order of the histogram's spline</source>
@@ -1852,10 +1844,6 @@
       <translation>Das Raster kann das registrierte sein oder ein anderes derselben Szene: andere Kanäle, eine andere Pixelgröße, ein anderer Zeitpunkt auf demselben Gitter. Raster mit Georeferenz werden nach ihr gelegt; ein Raster ohne sie muss die Größe des registrierten haben. Alle Kanäle werden einmal neu abgetastet, aus den ursprünglichen Pixeln. Verknüpfungspunkte werden ausgeglichen, wie sie sind: die als verworfen oder als Prüfpunkte bezeichneten bleiben weg.</translation>
     </message>
     <message>
-      <source>The reference is a terrain model, and is rendered: as the sun lights it, for a camera's image, or as a radar images it. sun or radar, and where from, clockwise from north: sun azimuth=155. Without azimuth a radar stands in the west; register tries azimuths. By default, the reference is an image.</source>
-      <translation>Die Referenz ist ein Geländemodell und wird gerendert: wie die Sonne es beleuchtet, für ein Kamerabild, oder wie ein Radar es abbildet. sun oder radar, und von wo, im Uhrzeigersinn von Norden: sun azimuth=155. Ohne azimuth steht ein Radar im Westen; register probiert Azimute. Standardmäßig ist die Referenz ein Bild.</translation>
-    </message>
-    <message>
       <source>The reference's pixels</source>
       <translation>Die Pixel der Referenz</translation>
     </message>
@@ -2024,20 +2012,16 @@
       <translation>Höhenbezug</translation>
     </message>
     <message>
+      <source>View</source>
+      <translation>Blickrichtung</translation>
+    </message>
+    <message>
       <source>View azimuth</source>
       <translation>Blickazimut</translation>
     </message>
     <message>
-      <source>View of the image</source>
-      <translation>Blickrichtung des Bildes</translation>
-    </message>
-    <message>
-      <source>View of the input</source>
-      <translation>Blickrichtung der Eingabe</translation>
-    </message>
-    <message>
-      <source>View of the reference</source>
-      <translation>Blickrichtung der Referenz</translation>
+      <source>Views</source>
+      <translation>Blickrichtungen</translation>
     </message>
     <message>
       <source>Warp</source>

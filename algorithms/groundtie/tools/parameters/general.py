@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from ..kinds import Band, Choice, Distance, FileOut, Number, RasterIn, RasterOut, Text
-from ..rasters.grid import Grid
-from ..rasters.warping import METHODS
+from ...kinds import Band, Choice, Distance, FileOut, Number, RasterIn, RasterOut, Text
+from ...rasters.warping import METHODS
 
 Reference = Annotated[
     Path, RasterIn(label="Reference image", help="The image whose georeferencing is right.")
@@ -196,13 +194,3 @@ TransformOut = Annotated[
         suffixes=(".json",),
     ),
 ]
-
-
-def worker_count(workers: int | None) -> int:
-    """Return the number of threads to use: as asked for, or one per processor."""
-    return workers or os.cpu_count() or 1
-
-
-def crs_name(grid: Grid) -> str:
-    """Return the name of a grid's CRS."""
-    return "no CRS" if grid.crs is None else str(grid.crs.to_string())

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from ..kinds import Band, Choice, Distance, FileIn, MaskIn, Number, RasterIn
-from ..sensor.geoids import DATUMS
-from .registration_parameters import MASK_HELP
+from ...kinds import Band, Choice, Distance, FileIn, MaskIn, Number, RasterIn
+from ...sensor.geoids import DATUMS
+from .registration import MASK_HELP
 
 SensorImage = Annotated[
     Path,

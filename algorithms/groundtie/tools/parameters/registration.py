@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from ..declaration import Output
-from ..geometry.models import KINDS
-from ..kinds import (
+from ...declaration import Output
+from ...geometry.models import KINDS
+from ...kinds import (
     Choice,
     Distance,
     FileOut,
@@ -18,9 +18,9 @@ from ..kinds import (
     Text,
     VectorOut,
 )
-from ..masks.choice import MASKS
-from ..matching.surface_fit import AUTO
-from ..registration.registered_output import OUTPUT_GRIDS
+from ...masks.choice import MASKS
+from ...matching.surface_fit import AUTO
+from ...registration.registered_output import OUTPUT_GRIDS
 
 Model = Annotated[
     str,
@@ -93,17 +93,6 @@ SearchRotation = Annotated[
         maximum=180,
     ),
 ]
-SearchScale = Annotated[
-    float | None,
-    Number(
-        label="Largest scale",
-        help="By which factor the input may be larger or smaller than nominal. By default 1; "
-        "match_optical searches up to 2 where there is no georeferencing.",
-        minimum=1,
-        maximum=4,
-        advanced=True,
-    ),
-]
 MASK_HELP = (
     "A raster whose zeros take no part, a vector layer of what takes part (polygons, and "
     "lines as 11 m wide), or a classifier of train_feature_classifier (.json)."
@@ -147,17 +136,6 @@ InputDem = Annotated[
         advanced=True,
     ),
 ]
-LightOfTerrain = Annotated[
-    str | None,
-    Text(
-        label="Light of a terrain model",
-        help="The reference is a terrain model, and is rendered: as the sun lights it, for a "
-        "camera's image, or as a radar images it. sun or radar, and where from, clockwise from "
-        "north: sun azimuth=155. Without azimuth a radar stands in the west; register tries "
-        "azimuths. By default, the reference is an image.",
-        advanced=True,
-    ),
-]
 Mask = Annotated[
     str,
     Choice(
@@ -177,17 +155,21 @@ SURFACE_MODEL = MaskIn(
     advanced=True,
 )
 SurfaceModel = Annotated[Path | None, SURFACE_MODEL]
-_VIEW = (
-    "From where the image was taken, for the surface model: a STAC item (.json), or words such as "
-    "'radar azimuth=280 incidence=35' and 'camera azimuth=250 incidence=12 sun-azimuth=155 "
-    "sun-elevation=48'; azimuths from the ground to the sensor or sun, clockwise from north, "
-    "incidence from the vertical. By default the STAC item of the image's own name beside it."
+_VIEWS = (
+    "From where both images were taken, for the surface model: STAC items (.json), or words, that "
+    "of the reference first, as in 'radar azimuth=280 incidence=35; camera azimuth=250 "
+    "incidence=12 sun-azimuth=155 sun-elevation=48'. Azimuths from the ground to the sensor or "
+    "sun, clockwise from north, incidence from the vertical. By default the STAC items of the "
+    "images' own names beside them."
 )
-ReferenceView = Annotated[
-    str | None, Text(label="View of the reference", help=_VIEW, advanced=True)
-]
-InputView = Annotated[str | None, Text(label="View of the input", help=_VIEW, advanced=True)]
-ImageView = Annotated[str | None, Text(label="View of the image", help=_VIEW, advanced=True)]
+_TERRAIN_VIEW = (
+    "If the reference is a terrain model, how it is rendered: 'terrain sun azimuth=155' for a "
+    "camera's image, 'terrain radar' for a radar's; without azimuth a radar stands in the west, "
+    "and register tries azimuths."
+)
+Views = Annotated[str | None, Text(label="Views", help=f"{_VIEWS} {_TERRAIN_VIEW}", advanced=True)]
+SurfaceViews = Annotated[str | None, Text(label="Views", help=_VIEWS, advanced=True)]
+TerrainView = Annotated[str | None, Text(label="View", help=_TERRAIN_VIEW, advanced=True)]
 OutputGrid = Annotated[
     str,
     Choice(

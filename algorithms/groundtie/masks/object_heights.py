@@ -1,0 +1,139 @@
+"""Heights of elevated objects over a map: of a surface model, or of buildings' footprints."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import VectorLayerError
+from ..geometry.vector_layers import read_vector_layer
+from ..rasters.grid import Grid, reproject
+from ..rasters.reading import FloatImage, Mask, RasterSource
+from ..rasters.warping import sample
+from .ray_casting import Heights
+
+# What is wider is taken for ground: halls and blocks are up to so wide, or have courtyards.
+WIDEST_M = 100.0
+
+# Pixels within which the lowest height counts as ground, in metres: courtyards are wider.
+_GROUND_CELL_M = 4.0
+
+_AREAS = ("Polygon", "MultiPolygon")
+_HEIGHT_FIELDS = ("height", "height_m", "hoehe", "z_height", "measuredheight")
+_NUMBER = re.compile(r"\s*(\d+(?:\.\d+)?)\s*m?\s*")
+
+
+class SurfaceModel(Protocol):
+    """Heights over a map."""
+
+    def heights(self, piece: Grid) -> tuple[Heights, Mask]:
+        """Return heights on a grid, and where they are known, shape (h, w)."""
+
+
+@dataclass(frozen=True)
+class RasterModel:
+    """A raster of heights of roofs, canopies and ground (DSM), on any grid and map.
+
+    The ground is what is left if everything narrower than a block of houses is taken off.
+    """
+
+    raster: RasterSource
+
+    def heights(self, piece: Grid) -> tuple[Heights, Mask]:
+        """Return heights on a grid, and where they are known; the ground is found in it."""
+        own = self.raster.grid
+        surface, known = sample(
+            self.raster,
+            piece,
+            lambda xy: own.map_to_pixel(reproject(xy, piece.crs, own.crs)),
+            "bilinear",
+        )
+        if not known.any():
+            return Heights(np.zeros_like(surface), np.zeros_like(surface)), known
+        ground = _bare_ground(surface, known, piece.pixel_size_m)
+        # What is not known hides nothing and is laid over nothing.
+        lowest = np.float32(ground[known].min())
+        return Heights(*(np.where(known, part, lowest) for part in (surface, ground))), known
+
+
+@dataclass(frozen=True)
+class FootprintModel:
+    """Buildings of a vector layer, with heights above their ground; all else is level ground.
+
+    Parameters
+    ----------
+    buildings
+        GeoJSON geometries on the map with their heights in metres, lower ones first.
+    """
+
+    buildings: tuple[tuple[Any, float], ...]
+
+    def heights(self, piece: Grid) -> tuple[Heights, Mask]:
+        """Return heights on a grid, and that all are known."""
+        from rasterio.features import rasterize
+
+        shape = (piece.height, piece.width)
+        surface: NDArray[np.float32] = np.zeros(shape, np.float32)
+        if self.buildings:
+            rasterize(self.buildings, out=surface, transform=piece.transform, all_touched=True)
+        return Heights(surface, np.zeros(shape, np.float32)), np.ones(shape, bool)
+
+
+def read_footprints(path: str | os.PathLike[str], grid: Grid) -> FootprintModel:
+    """Read buildings with their heights from a vector layer.
+
+    Raises
+    ------
+    VectorLayerError
+        The layer cannot be read, or has no polygons with a height.
+    GeoreferencingError
+        Only one of layer and grid has a CRS.
+    """
+    layer = read_vector_layer(path).on_map(grid.crs)
+    field = next((name for name in layer.fields if name.lower() in _HEIGHT_FIELDS), None)
+    if field is None:
+        has = ", ".join(layer.fields) or "none"
+        raise VectorLayerError(f"{path} has no field height with metres; its fields: {has}")
+    found = [
+        (feature["geometry"], _metres(feature["properties"].get(field)))
+        for feature in layer.features
+        if feature["geometry"]["type"] in _AREAS
+    ]
+    buildings = sorted(((area, m) for area, m in found if m is not None), key=lambda one: one[1])
+    if not buildings:
+        raise VectorLayerError(f"{path} has no polygons with a height in {field}")
+    return FootprintModel(tuple(buildings))
+
+
+def _metres(value: Any) -> float | None:
+    """Return a height in metres, as OpenStreetMap writes it, too; None: there is none."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value) if math.isfinite(value) else None
+    match = _NUMBER.fullmatch(str(value)) if isinstance(value, str) else None
+    return None if match is None else float(match[1])
+
+
+def _bare_ground(surface: FloatImage, known: Mask, pixel_m: float) -> FloatImage:
+    """Return the height of the ground below all that is narrower than `WIDEST_M`.
+
+    Morphological opening of cells' lowest heights: level ground and slopes stay as they are.
+    """
+    cell = max(round(_GROUND_CELL_M / pixel_m), 1)
+    rows, cols = surface.shape
+    padding = [(0, -n % cell) for n in (rows, cols)]
+    highest = np.float32(surface[known].max())
+    filled = np.pad(np.where(known, surface, highest), padding, mode="edge")
+    blocks = filled.reshape(filled.shape[0] // cell, cell, filled.shape[1] // cell, cell)
+    lowest = blocks.min(axis=(1, 3))
+    side = max(round(WIDEST_M / (cell * pixel_m)), 1) | 1
+    # Beyond the border nothing is lower, nor higher.
+    opened = cv2.morphologyEx(lowest, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
+    ground = cv2.resize(opened, filled.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    return np.asarray(np.minimum(ground[:rows, :cols], surface))

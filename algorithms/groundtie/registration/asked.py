@@ -1,0 +1,159 @@
+"""What the parameters of a registering tool ask for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from ..errors import ParameterError
+from ..geometry.views import View, split_views
+from ..matching.surface_fit import AUTO
+from ..rasters.rendered import LIGHTS, RADAR, SUN, Light
+from .registered_output import grid_of_output, model_for_grid
+from .specification import Specification, StatedSurface
+from .user_masks import UserMask
+
+# What tools may leave out that do not ask for it.
+USUAL: Mapping[str, Any] = {
+    "displacement": None,
+    "output_grid": "reference",
+    "resampling": "cubic",
+    "reference_mask_values": None,
+    "input_mask_values": None,
+    "surface_model": None,
+    "views": None,
+}
+
+# Where a sun or radar may stand, the likeliest first. Satellites fly nearly from pole to pole: a
+# radar looks east or west, which differ in the sign of contrast above all; so do opposite azimuths
+# of the sun. Measured with `benchmarks/run.py --only mountains`: 15° off costs little.
+_AZIMUTHS_DEG = {RADAR: (270.0, 90.0), SUN: (150.0, 120.0, 180.0, 90.0, 30.0, 60.0)}
+
+# What a view begins with that is that of a terrain model.
+_TERRAIN = "terrain"
+
+_WORDS = re.compile(rf"{_TERRAIN}[\s,]+({'|'.join(LIGHTS)})(?:[\s,]+azimuth=(\d+(?:\.\d+)?)°?)?")
+
+
+def asked_masks(given: Mapping[str, Any], image: str) -> tuple[UserMask | None, UserMask | None]:
+    """Return the masks of the reference and of `image`, by the values of a tool's parameters."""
+    reference, other = (
+        UserMask.of(given[name], given[f"{name}_mask"], given[f"{name}_mask_values"])
+        for name in ("reference", image)
+    )
+    return reference, other
+
+
+def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:
+    """Return what a tool is told of elevated objects, by its parameters; None: nothing.
+
+    Raises
+    ------
+    ParameterError
+        A view is missing or cannot be understood, or has no surface model to go with.
+    """
+    model = given["surface_model"]
+    words = split_views(given["views"])
+    if model is None:
+        if words[1] is not None or (words[0] is not None and not asked_lights(given)):
+            raise ParameterError("views go with a surface model (surface_model)")
+        return None
+    names = ("reference", image)
+    views = [View.of(given[name], word) for name, word in zip(names, words, strict=True)]
+    for name, view in zip(names, views, strict=True):
+        if view is None:
+            raise ParameterError(
+                f"a surface model needs the view of the {name}: put its STAC item beside it, or "
+                "give views"
+            )
+    reference, other = (view for view in views if view is not None)
+    return StatedSurface(model, (reference, other))
+
+
+def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specification:
+    """Return a preset with what a tool was called with."""
+    return replace(
+        searched(preset, {**USUAL, **parameters}, "input"),
+        **asked_terrain(parameters),
+        light=asked_light(parameters),
+        model=model_for_grid(
+            parameters["model"], grid_of_output(parameters["output"], parameters["output_grid"])
+        ),
+        rotation_deg=parameters["search_rotation"],
+    )
+
+
+def searched(preset: Specification, given: Mapping[str, Any], image: str) -> Specification:
+    """Return a preset with the limits, the mask and the surface model that a tool was given."""
+    surface = asked_surface(given, image)
+    return replace(
+        preset if surface is None else preset.with_surface(surface),
+        max_error_px=given["max_error"],
+        search_radius_m=given["search_radius"],
+        mask=given["mask"],
+        matching_pixel_size_m=given["matching_pixel_size"],
+    )
+
+
+def asked_terrain(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the terrain models of a specification by the values of a tool's parameters.
+
+    Raises
+    ------
+    ParameterError
+        They do not go together.
+    """
+    dem, input_dem = given.get("dem"), given.get("input_dem")
+    if input_dem is not None and dem is None:
+        raise ParameterError("the input's terrain model (input_dem) goes with another one (dem)")
+    model = given.get("model", AUTO)
+    if dem is not None and model != AUTO:
+        raise ParameterError(f"a terrain model (dem) goes with model {AUTO}, not {model}")
+    return {"dem": dem, "input_dem": input_dem}
+
+
+def asked_lights(given: Mapping[str, Any]) -> tuple[Light, ...]:
+    """Return in which lights a reference that is a terrain model may be rendered.
+
+    Parameters
+    ----------
+    given
+        The values of a tool's parameters. The reference's view is `terrain sun azimuth=155`, or
+        without azimuth, which is then to be tried; else the reference is an image.
+
+    Raises
+    ------
+    ParameterError
+        The words state no light.
+    """
+    words = (split_views(given.get("views"))[0] or "").lower()
+    if not words.startswith(_TERRAIN):
+        return ()
+    found = _WORDS.fullmatch(words)
+    if found is None or float(found[2] or 0) > 360:
+        raise ParameterError(
+            f"{words!r} states no light: give '{_TERRAIN} {SUN}' or '{_TERRAIN} {RADAR}', and its "
+            f"azimuth in degrees if known, as '{_TERRAIN} {SUN} azimuth=155'"
+        )
+    kind = found[1]
+    azimuths = _AZIMUTHS_DEG[kind] if found[2] is None else (float(found[2]),)
+    return tuple(Light(kind, azimuth) for azimuth in azimuths)
+
+
+def asked_light(given: Mapping[str, Any]) -> Light | None:
+    """Return the light of a single try; a radar stands in the west by default.
+
+    Raises
+    ------
+    ParameterError
+        The words state none, or not where the sun stands.
+    """
+    lights = asked_lights(given)
+    if len(lights) > 1 and lights[0].kind == SUN:
+        raise ParameterError(
+            f"'{_TERRAIN} {SUN}' needs its azimuth, as '{_TERRAIN} {SUN} azimuth=155': the tool "
+            "register tries some"
+        )
+    return lights[0] if lights else None

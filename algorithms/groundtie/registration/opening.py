@@ -1,0 +1,148 @@
+"""A pair of images, opened for its registration, on one matching grid and with the user's masks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from ..context import Context
+from ..geometry.terrain import Terrain
+from ..masks.choice import MaskUsed
+from ..rasters.pair import Image, ImagePair, make_pair
+from ..rasters.reading import open_raster
+from ..rasters.rendered import rendered
+from .masks import require_one_mask
+from .specification import Specification
+from .user_masks import named_masks, with_user_masks
+
+
+@dataclass(frozen=True)
+class OpenPair:
+    """Two images, open, with the masks that the user gave.
+
+    Parameters
+    ----------
+    images
+        The images without any mask: what keypoints may be described by.
+    pair
+        The images with the user's masks.
+    user_mask
+        The mask that a vector layer made; None: none.
+    stack
+        Keeps rasters open, and takes further masks.
+    started
+        When the work began, by `time.perf_counter`.
+    """
+
+    images: ImagePair
+    pair: ImagePair
+    user_mask: MaskUsed | None
+    stack: ExitStack
+    started: float
+
+
+@contextmanager
+def open_pair(
+    reference: Any,
+    input: Any,
+    spec: Specification,
+    context: Context,
+    bands: tuple[int | None, int | None] = (None, None),
+    masks: tuple[Any, Any] = (None, None),
+) -> Iterator[OpenPair]:
+    """Open two images and the masks that the user gave.
+
+    Parameters
+    ----------
+    reference, input
+        What `open_raster` takes.
+    spec
+        How far the input may lie off, and at which pixel size both are matched.
+    context
+        Threads and progress.
+    bands
+        Numbers of the bands that are matched, from 1; None: the mean of all.
+    masks
+        For each image a `UserMask`, or a raster whose zeros take no part, a vector layer of what
+        takes part, or a classifier; None: all takes part.
+    """
+    started = time.perf_counter()
+    with ExitStack() as stack:
+        opened = [
+            Image(stack.enter_context(open_raster(raster)), band)
+            for raster, band in zip((reference, input), bands, strict=True)
+        ]
+        yield pair_images(opened[0], opened[1], spec, context, masks, stack, started)
+
+
+def _reach_notes(images: ImagePair, asked_m: float | None) -> list[str]:
+    """Return a warning where a search was asked for that goes beyond the images."""
+    reach_m = images.limits.radius
+    if asked_m is None or asked_m <= reach_m:
+        return []
+    return [
+        f"warning: a search radius of {asked_m:.6g} m reaches beyond the images: all shifts up to "
+        f"{reach_m:.4g} m are searched, which may take minutes; a smaller one is faster and safer"
+    ]
+
+
+def pair_images(
+    reference: Image,
+    input: Image,
+    spec: Specification,
+    context: Context,
+    masks: tuple[Any, Any],
+    stack: ExitStack,
+    started: float,
+) -> OpenPair:
+    """Put two open images on a common matching grid, and the user's masks on them."""
+    if spec.light is not None:
+        lit = rendered(reference.source, spec.light, reference.band)
+        reference = Image(lit, 1)
+    grid = input.source.grid
+    radius_m, rotation_deg, scale = spec.search_radius_m, spec.rotation_deg, spec.scale
+    if not grid.is_georeferenced:
+        if radius_m is None and spec.free.radius_share is not None:
+            radius_m = spec.free.radius_share * max(grid.width, grid.height)
+        rotation_deg = spec.free.rotation_deg if rotation_deg is None else rotation_deg
+        scale = spec.free.scale if scale is None else scale
+    images = make_pair(
+        reference,
+        input,
+        spec.matching_pixel_size_m,
+        radius_m,
+        0.0 if rotation_deg is None else rotation_deg,
+        1.0 if scale is None else scale,
+    )
+    for note in (*_reach_notes(images, radius_m), *images.notes()):
+        context.update(0.0, note)
+    pair, used = with_user_masks(images, named_masks(masks), stack, context.part(0.0, 0.02))
+    require_one_mask(spec.mask, used)
+    return OpenPair(images, pair, used, stack, started)
+
+
+def open_terrain(pair: ImagePair, dem: Any, input_dem: Any | None) -> Terrain:
+    """Return heights where a pair may show something.
+
+    Parameters
+    ----------
+    pair
+        The images.
+    dem, input_dem
+        The ground's heights, and those that the input was made with; None: one height.
+
+    Raises
+    ------
+    GeoreferencingError, NoOverlapError, RasterContentError
+        They are not known where the images overlap.
+    """
+    corners = pair.surroundings.pixel_to_map(pair.surroundings.outline())
+    left, bottom = corners.min(axis=0).tolist()
+    right, top = corners.max(axis=0).tolist()
+    crs = pair.grid.crs
+    terrain = Terrain.open(dem, input_dem, crs, (left, bottom, right, top))
+    terrain.require_cover(pair.grid, pair.input.source.grid, crs)
+    return terrain
