@@ -7,8 +7,8 @@ VENV := .venv
 PY := $(VENV)/bin/python
 PLUGIN := dist/groundtie_qgis.zip
 
-.PHONY: help install demo check test test-newest test-debian test-qgis lint bench fuzz failures plugin
-.PHONY: docs clean
+.PHONY: help install demo check test test-newest test-debian test-qgis test-newer-qgis lint bench
+.PHONY: fuzz failures plugin docs clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -44,6 +44,9 @@ test-debian:
 # A process of its own: a crash of QGIS must not take the other results with it.
 test-qgis: plugin
 	scripts/test_debian.sh tests/qgis
+
+test-newer-qgis: plugin ## the plugin in a newer Debian's QGIS, unpacked into build/ (as root)
+	scripts/test_newer_debian.sh tests/qgis
 
 lint: $(VENV)/.installed-dev ## ruff, mypy, import contracts
 	$(VENV)/bin/ruff check .

@@ -110,11 +110,13 @@ app = QgsApplication([], False)
 QgsApplication.initQgis()
 import qgis.utils
 qgis.utils.iface = object()
+before = set(sys.modules)
 import groundtie_qgis
 plugin = groundtie_qgis.classFactory(None)
 plugin.initProcessing()
 algorithms = plugin.provider.algorithms()
-print(len(algorithms), sorted({{"cv2", "scipy", "rasterio", "numpy"}} & set(sys.modules)))
+imported = set(sys.modules) - before
+print(len(algorithms), sorted({{"cv2", "scipy", "rasterio", "numpy"}} & imported))
 made = plugin.provider.algorithm("mask_threshold").create()
 print(len(made.parameterDefinitions()) > 3, plugin.provider.algorithm("warp").shortDescription())
 loaded = [name for name in sys.modules if ".groundtie.tools." in name]

@@ -43,6 +43,10 @@ def run(provider: Any, name: str, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_what_is_shipped_is_what_the_script_makes(provider: Any, tmp_path: Path) -> None:
+    from qgis.core import Qgis
+
+    if Qgis.versionInt() >= 32_300:
+        pytest.skip("newer versions write models in another form; the shipped ones are of 3.22")
     made = {path.name: path for path in make_models.write(tmp_path)}
     shipped = {path.name: path for path in make_models.FOLDER.iterdir()}
     assert set(made) == set(shipped)

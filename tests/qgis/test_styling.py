@@ -253,14 +253,15 @@ def write(path: Path, masked: bool = False) -> Path:
 
 def test_a_registered_raster_is_drawn_as_the_input(plugin: Any, tmp_path: Path) -> None:
     """Not stretched from the zeros outside of its mask, which stays transparent."""
-    from qgis.core import QgsRasterLayer
+    from qgis.core import Qgis, QgsRasterLayer
 
     given = QgsRasterLayer(str(write(tmp_path / "a.tif")), "input")
     made = QgsRasterLayer(str(write(tmp_path / "b.tif", masked=True)), "registered")
     alpha = made.renderer().alphaBand()
     assert alpha > 0
-    stretch = made.renderer().contrastEnhancement()
-    assert stretch.minimumValue() < 50
+    # Newer ones leave out what is masked.
+    if Qgis.versionInt() < 34_000:
+        assert made.renderer().contrastEnhancement().minimumValue() < 50
     assert finish(made, renderer=given.renderer().clone()) == ""
     stretch = made.renderer().contrastEnhancement()
     assert stretch.minimumValue() > 90
