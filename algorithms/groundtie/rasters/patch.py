@@ -15,7 +15,10 @@ _ALL_VALID = 0.999
 
 @dataclass(frozen=True)
 class Patch:
-    """Grey values, shape (h, w) float32, and which of them are valid, shape (h, w) bool."""
+    """Grey values, float32, and which of them are valid, bool, both of shape (h, w).
+
+    A stack of patches of one size is one, too: its arrays have the shape (n, h, w).
+    """
 
     values: NDArray[np.float32]
     valid: NDArray[np.bool_]
@@ -39,7 +42,7 @@ class Patch:
     def inner(self, border: int) -> Patch:
         """Return this patch without a border on each side."""
         inside = slice(border, -border or None)
-        return Patch(self.values[inside, inside], self.valid[inside, inside])
+        return Patch(self.values[..., inside, inside], self.valid[..., inside, inside])
 
 
 def reduced(image: NDArray[Any], factor: int) -> NDArray[Any]:

@@ -28,9 +28,9 @@ Histograms: TypeAlias = Any  # an array, or a sparse matrix of scipy
 # pixel or with a constant image, it has the value of independent images.
 HistogramMeasure = Callable[[Histograms], FloatArray]
 
-# Takes a template (h, w), a search window with the same centre that is larger by a radius on each
-# side, the radius, and a context to work in. Returns values over shifts, shape (2 radius + 1,
-# 2 radius + 1), or several such surfaces that count the same, shape (n, …).
+# Takes templates (…, h, w), one or a stack; search windows with the same centres that are larger
+# by a radius on each side; the radius; and a context to work in. Returns values over shifts, shape
+# (…, 2 radius + 1, 2 radius + 1), or several such surfaces that count the same, shape (n, …).
 Measure = Callable[[Description, Description, int, Context | None], FloatArray]
 
 MEASURES: dict[str, Measure] = {}

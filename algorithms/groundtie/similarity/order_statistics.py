@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 
 def upper_median(values: NDArray[Any]) -> Any:
-    """Return the median of values of any shape; of an even number the upper of the middle two."""
-    middle = values.size // 2
-    return np.partition(values, middle, axis=None)[middle]
+    """Return medians along the last axis; of an even number the upper of the middle two."""
+    middle = values.shape[-1] // 2
+    return np.partition(values, middle, axis=-1)[..., middle]
 
 
 def median(values: NDArray[Any]) -> Any:
