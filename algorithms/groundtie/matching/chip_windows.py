@@ -6,7 +6,7 @@ Windows of neighbours overlap: resampled chip by chip, most pixels would be made
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -31,8 +31,8 @@ _BLOCK_PX = 384
 # Images of so many pixels are resampled as a whole: 5 bytes each are held for either.
 _HELD_PIXELS = 4_000_000
 
-# Blocks of these for a thread: none waits long for the others.
-_HELD_BLOCKS = 2
+# Windows are worked in stacks of about so many pixels, which stay in the processor's cache.
+_STACK_PIXELS = 65_536
 
 
 @dataclass(frozen=True)
@@ -114,20 +114,19 @@ class ChipWindows:
     hidden: MaskOf | None
 
     def map(
-        self, function: Callable[[int, Patch, Patch], R | None], context: Context
+        self, function: Callable[[Patch, Patch], Iterable[R | None]], context: Context
     ) -> tuple[list[int], list[R]]:
         """Return what `function` makes of chips' windows, and the numbers of these chips, in order.
 
-        It takes a chip's number, its reference and its input window, and returns None for a chip
-        that is left out.
+        It takes a stack of reference windows, shape (n, h, w), and that of their input windows, and
+        returns what it makes of each, None for a chip that is left out.
         """
 
         def of_block(block: _Numbers) -> list[tuple[int, R | None]]:
-            return [(number, function(number, *both)) for number, *both in self._read(block)]
+            stacks = self._read(block)
+            return [one for of, *both in stacks for one in zip(of, function(*both), strict=True)]
 
-        count = len(self.places.centres)
-        most = -(-count // (_HELD_BLOCKS * context.workers)) if self.images.is_held else None
-        blocks = list(self._blocks(np.arange(count), most))
+        blocks = list(self._blocks(np.arange(len(self.places.centres))))
         done = [one for results in context.map(of_block, blocks) for one in results]
         done.sort(key=operator.itemgetter(0))
         found = [(number, result) for number, result in done if result is not None]
@@ -141,20 +140,25 @@ class ChipWindows:
     def _corners(self) -> NDArray[np.int_]:
         return self.places.centres - self.places.chip_px // 2 - self.reach_px
 
-    def _blocks(self, chips: _Numbers, most: int | None) -> Iterator[_Numbers]:
-        """Yield chips, by number, in blocks that are read as one: of so many, or by their size.
+    @property
+    def _most(self) -> int:
+        """How many chips a stack has."""
+        return max(_STACK_PIXELS // self._side_px**2, 1)
 
-        In files, that reads fewer pixels.
+    def _blocks(self, chips: _Numbers) -> Iterator[_Numbers]:
+        """Yield chips, by number, in blocks that are read as one.
+
+        In files, that reads fewer pixels; from memory, a block is a stack.
         """
+        if self.images.is_held:
+            yield from (chips[k : k + self._most] for k in range(0, len(chips), self._most))
+            return
         if len(chips) == 0:
             return
         corners = self._corners[chips]
         size = np.ptp(corners, axis=0) + self._side_px
-        if most is None:
-            is_dense = np.prod(size) <= len(chips) * self._side_px**2
-            is_block = is_dense and size.max() <= max(_BLOCK_PX, 2 * self._side_px)
-        else:
-            is_block = len(chips) <= most
+        is_dense = np.prod(size) <= len(chips) * self._side_px**2
+        is_block = is_dense and size.max() <= max(_BLOCK_PX, 2 * self._side_px)
         if len(chips) == 1 or is_block:
             yield chips
             return
@@ -164,20 +168,33 @@ class ChipWindows:
         if first.all():
             yield from (chips[k : k + 1] for k in range(len(chips)))
             return
-        yield from self._blocks(chips[first], most)
-        yield from self._blocks(chips[~first], most)
+        yield from self._blocks(chips[first])
+        yield from self._blocks(chips[~first])
 
-    def _read(self, block: _Numbers) -> Iterator[tuple[int, Patch, Patch]]:
-        """Yield the number, reference and input window of each chip of a block."""
+    def _read(self, block: _Numbers) -> Iterator[tuple[_Numbers, Patch, Patch]]:
+        """Yield stacks of a block's chips: their numbers, reference and input windows."""
         side, corners = self._side_px, self._corners[block]
         corner = corners.min(axis=0)
         width, height = (int(n) for n in np.ptp(corners, axis=0) + side)
         piece = self.places.grid.window(int(corner[0]), int(corner[1]), width, height)
         reference, input = self.images.read(piece, self.hidden)
-        for number, (col, row) in zip(block, corners - corner, strict=True):
-            inside = slice(row, row + side), slice(col, col + side)
-            yield int(number), _part(reference, inside), _part(input, inside)
+        for k in range(0, len(block), self._most):
+            stack = slice(k, k + self._most)
+            parts = [np.s_[r : r + side, c : c + side] for c, r in corners[stack] - corner]
+            yield block[stack], _parts(reference, parts), _parts(input, parts)
 
 
-def _part(patch: Patch, inside: tuple[slice, slice]) -> Patch:
-    return Patch(patch.values[inside].copy(), patch.valid[inside].copy())
+def singly(
+    function: Callable[[Patch, Patch], R],
+) -> Callable[[Patch, Patch], Iterable[R]]:
+    """Return the function of stacks of windows that a function of single windows makes."""
+
+    def of_stacks(reference: Patch, input: Patch) -> Iterable[R]:
+        return map(function, reference.images, input.images)
+
+    return of_stacks
+
+
+def _parts(patch: Patch, parts: list[tuple[slice, slice]]) -> Patch:
+    """Return the stack of a patch's parts."""
+    return Patch(*(np.stack([of[part] for part in parts]) for of in (patch.values, patch.valid)))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 # A mean over a block is valid if the weights of all its pixels sum up to this.
 _ALL_VALID = 0.999
@@ -38,6 +39,15 @@ class Patch:
         """Whether the valid pixels, if any, are all the same."""
         values = self.values[self.valid]
         return values.size == 0 or bool(values.min() == values.max())
+
+    @property
+    def images(self) -> Iterator[Patch]:
+        """The patches of a stack, one after the other."""
+        return map(Patch, self.values, self.valid)
+
+    def take(self, which: ArrayLike) -> Patch:
+        """Return the patches of a stack that an index or mask selects."""
+        return Patch(self.values[np.asarray(which)], self.valid[np.asarray(which)])
 
     def inner(self, border: int) -> Patch:
         """Return this patch without a border on each side."""

@@ -33,4 +33,4 @@ def each(function: Callable[..., Array], *stacks: Array) -> Array:
 
 def flat(stack: Array) -> Array:
     """Return the pixels of each image along one axis, shape (…, h w)."""
-    return stack.reshape(*stack.shape[:-2], -1)
+    return stack.reshape(*stack.shape[:-2], stack.shape[-2] * stack.shape[-1])
