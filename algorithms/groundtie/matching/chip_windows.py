@@ -6,7 +6,7 @@ Windows of neighbours overlap: resampled chip by chip, most pixels would be made
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -23,6 +23,9 @@ from .matcher import MaskOf, Places
 
 R = TypeVar("R")
 _Numbers = NDArray[np.intp]
+
+# The upper left corner of a piece of a grid, and both images there.
+_Piece = tuple[NDArray[np.int_], tuple[Patch, Patch]]
 
 # Longest side of a block that is read from files, in pixels: enough of them for all threads, and
 # each in the processor's cache.
@@ -122,11 +125,19 @@ class ChipWindows:
         returns what it makes of each, None for a chip that is left out.
         """
 
-        def of_block(block: _Numbers) -> list[tuple[int, R | None]]:
-            stacks = self._read(block)
-            return [one for of, *both in stacks for one in zip(of, function(*both), strict=True)]
+        chips = np.arange(len(self.places.centres))
+        held = self._read(chips) if self.images.is_held and len(chips) else None
 
-        blocks = list(self._blocks(np.arange(len(self.places.centres))))
+        def of_block(block: _Numbers) -> list[tuple[int, R | None]]:
+            piece = held or self._read(block)
+            stacks = (block[k : k + self._most] for k in range(0, len(block), self._most))
+            return [
+                one
+                for stack in stacks
+                for one in zip(stack, function(*self._cut(piece, stack)), strict=True)
+            ]
+
+        blocks = list(self._blocks(chips))
         done = [one for results in context.map(of_block, blocks) for one in results]
         done.sort(key=operator.itemgetter(0))
         found = [(number, result) for number, result in done if result is not None]
@@ -171,22 +182,33 @@ class ChipWindows:
         yield from self._blocks(chips[first])
         yield from self._blocks(chips[~first])
 
-    def _read(self, block: _Numbers) -> Iterator[tuple[_Numbers, Patch, Patch]]:
-        """Yield stacks of a block's chips: their numbers, reference and input windows."""
+    def _read(self, block: _Numbers) -> _Piece:
+        """Return both images where the windows of a block's chips lie."""
         side, corners = self._side_px, self._corners[block]
         corner = corners.min(axis=0)
         width, height = (int(n) for n in np.ptp(corners, axis=0) + side)
         piece = self.places.grid.window(int(corner[0]), int(corner[1]), width, height)
-        reference, input = self.images.read(piece, self.hidden)
-        for k in range(0, len(block), self._most):
-            stack = slice(k, k + self._most)
-            parts = [np.s_[r : r + side, c : c + side] for c, r in corners[stack] - corner]
-            yield block[stack], _parts(reference, parts), _parts(input, parts)
+        return corner, self.images.read(piece, self.hidden)
+
+    def _cut(self, piece: _Piece, stack: _Numbers) -> tuple[Patch, Patch]:
+        """Return the stacks of chips' reference and input windows in a piece."""
+        corner, (reference, input) = piece
+        corners, side = self._corners[stack] - corner, self._side_px
+        inside = [np.s_[row : row + side, col : col + side] for col, row in corners]
+        return _parts(reference, inside), _parts(input, inside)
 
 
-def singly(
-    function: Callable[[Patch, Patch], R],
-) -> Callable[[Patch, Patch], Iterable[R]]:
+def of_kept(
+    function: Callable[[Patch, Patch], Iterable[R]], kept: Sequence[bool], one: Patch, other: Patch
+) -> list[R | None]:
+    """Return what a function makes of the windows that are kept of two stacks, None of others."""
+    if not any(kept):
+        return [None] * len(kept)
+    found = iter(function(one.take(kept), other.take(kept)))
+    return [next(found) if is_kept else None for is_kept in kept]
+
+
+def singly(function: Callable[[Patch, Patch], R]) -> Callable[[Patch, Patch], Iterable[R]]:
     """Return the function of stacks of windows that a function of single windows makes."""
 
     def of_stacks(reference: Patch, input: Patch) -> Iterable[R]:

@@ -19,7 +19,7 @@ from ..similarity.peak import find_peak
 from ..similarity.surface import SimilaritySettings, Surface, describe, normalise, similarity_surface
 from .alignment import Positions
 from .belief_propagation import Surfaces, propagate
-from .chip_windows import ChipWindows, Resampled
+from .chip_windows import ChipWindows, Resampled, of_kept
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 
@@ -152,20 +152,20 @@ class ChipMatcher:
         images = Resampled.of(self.pair, model, places.grid, reach, context)
         windows = ChipWindows(images, places, reach, self.held_out)
 
-        def surfaces(reference: Patch, input: Patch) -> list[Surfaces | None]:
-            cores = zip(reference.inner(reach).images, input.inner(reach).images, strict=True)
-            kept = [all(map(self._can_be_matched, both)) for both in cores]
-            if not any(kept):
-                return [None] * len(kept)
+        def surfaces(reference: Patch, input: Patch) -> Surfaces:
             of_reference, of_input = (
-                describe(windows.take(kept), places.chip_px**2, self.settings)
+                describe(windows, places.chip_px**2, self.settings)
                 for windows in (reference, input)
             )
             made = [way(of_reference, of_input, radius_px, self.settings) for way in ways]
-            of_chips = iter(np.stack(made, axis=1))
-            return [next(of_chips) if is_kept else None for is_kept in kept]
+            return np.stack(made, axis=1)
 
-        kept, found = windows.map(surfaces, context)
+        def of_stacks(reference: Patch, input: Patch) -> list[Surfaces | None]:
+            cores = zip(reference.inner(reach).images, input.inner(reach).images, strict=True)
+            kept = [all(map(self._can_be_matched, both)) for both in cores]
+            return of_kept(surfaces, kept, reference, input)
+
+        kept, found = windows.map(of_stacks, context)
         _log.debug("%d of %d chips can be matched", len(kept), len(places.centres))
         span = 2 * radius_px + 1
         none = np.zeros((0, len(ways), span, span), np.float32)

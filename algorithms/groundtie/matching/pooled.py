@@ -20,7 +20,8 @@ from ..rasters.reading import FloatImage
 from ..similarity.pooled import PooledHistogram, smooth
 from ..similarity.surface import SimilaritySettings, Surface, normalise
 from .alignment import Positions
-from .chip_windows import ChipWindows, Resampled, singly
+from .belief_propagation import Surfaces
+from .chip_windows import ChipWindows, Resampled, of_kept, singly
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 
@@ -84,14 +85,16 @@ class PooledHistogramMatcher:
         order = 1 if self._is_reference_masked else -1
         windows = self._windows(images, places, radius_px, self.blind)
 
-        def one(reference: Patch, input: Patch) -> Surface | None:
-            template, search = self._template_first(reference, input)
-            chip = template.inner(radius_px)
-            if chip.valid_share < _LEAST_VALID:
-                return None
-            return histogram.surface(chip, search)[::order, ::order]
+        def surfaces(template: Patch, search: Patch) -> Surfaces:
+            return histogram.surface(template.inner(radius_px), search)[..., ::order, ::order]
 
-        kept, found = windows.map(singly(one), context)
+        def of_stacks(reference: Patch, input: Patch) -> list[Surface | None]:
+            template, search = self._template_first(reference, input)
+            chips = template.inner(radius_px).images
+            kept = [chip.valid_share >= _LEAST_VALID for chip in chips]
+            return of_kept(surfaces, kept, template, search)
+
+        kept, found = windows.map(of_stacks, context)
         span = 2 * radius_px + 1
         nats = np.stack(found) if found else np.zeros((0, span, span), np.float32)
         normalised = normalise(nats)

@@ -114,8 +114,9 @@ def entropy(table: FloatArray) -> FloatArray:
     """Return Shannon's entropy in nats along the last axis; the table need not be normalised."""
     count = pairwise_sum(table)
     total = np.where(count > 0, count, 1.0)
-    plogp = pairwise_sum(table * np.log(np.maximum(table, 1e-12)))
-    return np.asarray(np.log(total) - plogp / total)
+    plogp = np.maximum(table, 1e-12)
+    plogp = np.multiply(np.log(plogp, out=plogp), table, out=plogp)
+    return np.asarray(np.log(total) - pairwise_sum(plogp) / total)
 
 
 def pairwise_sum(table: FloatArray) -> FloatArray:
