@@ -12,7 +12,9 @@ from the volume without touching a pixel again.
 
 from __future__ import annotations
 
+import functools
 import math
+import operator
 from dataclasses import dataclass
 
 import cv2
@@ -87,12 +89,15 @@ class JointHistogramVolume:
         """Return the GPVE histograms at the integer shifts -radius … radius, float32."""
         near, far = reach(order), support(order)
         self._require(near)
-        weights = kernel(order, 0.0)[far - near : far + near + 1]
-        planes = np.ascontiguousarray(np.moveaxis(self.counts, (-2, -1), (-4, -3)))
-        # One plane above the other: what the kernel sees of the next one is cut away.
-        tall = cv2.sepFilter2D(planes.reshape(-1, planes.shape[-1]), cv2.CV_32F, weights, weights)
-        inner = slice(self.margin, self.margin + 2 * self.radius + 1)
-        made = tall.reshape(planes.shape)[..., inner, inner]
+        weights = kernel(order, 0.0).astype(np.float32)[far - near : far + near + 1]
+        first, span = self.margin - near, 2 * self.radius + 1
+        inner = slice(first, first + span + 2 * near)
+        counts = np.moveaxis(self.counts[..., inner, inner, :, :], (-2, -1), (-4, -3))
+        made = np.empty((*counts.shape[:-2], span, span), np.float32)
+        # Bin by bin, so that what is worked stays in the processor's cache.
+        for own in range(counts.shape[-4]):
+            rows = _convolve(counts[..., own, :, :, :], weights, span, -2)
+            made[..., own, :, :, :] = _convolve(rows, weights, span, -1)
         return np.moveaxis(made, (-4, -3), (-2, -1))
 
     def at(self, shift: tuple[float, float], order: int) -> NDArray[np.float64]:
@@ -109,6 +114,14 @@ class JointHistogramVolume:
     def _require(self, needed: int) -> None:
         if needed > self.margin:
             raise ValueError(f"the volume's margin of {self.margin} is below the kernel's {needed}")
+
+
+def _convolve(planes: FloatArray, weights: FloatArray, span: int, axis: int) -> FloatArray:
+    """Correlate along an axis with a short kernel; the axis loses the kernel's ends."""
+    ahead = np.moveaxis(planes, axis, 0)
+    parts = (ahead[k : k + span] for k in range(len(weights)))
+    found: FloatArray = functools.reduce(operator.iadd, map(np.multiply, parts, weights))
+    return np.moveaxis(found, 0, axis)
 
 
 def count_joint_histograms(
