@@ -124,7 +124,6 @@ class ChipWindows:
         It takes a stack of reference windows, shape (n, h, w), and that of their input windows, and
         returns what it makes of each, None for a chip that is left out.
         """
-
         chips = np.arange(len(self.places.centres))
         held = self._read(chips) if self.images.is_held and len(chips) else None
 
@@ -219,4 +218,5 @@ def singly(function: Callable[[Patch, Patch], R]) -> Callable[[Patch, Patch], It
 
 def _parts(patch: Patch, parts: list[tuple[slice, slice]]) -> Patch:
     """Return the stack of a patch's parts."""
-    return Patch(*(np.stack([of[part] for part in parts]) for of in (patch.values, patch.valid)))
+    values, valid = ([of[part] for part in parts] for of in (patch.values, patch.valid))
+    return Patch(np.stack(values), np.stack(valid))

@@ -16,7 +16,13 @@ from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.description import BORDER_PX, Description
 from ..similarity.peak import find_peak
-from ..similarity.surface import SimilaritySettings, Surface, describe, normalise, similarity_surface
+from ..similarity.surface import (
+    SimilaritySettings,
+    Surface,
+    describe,
+    normalise,
+    similarity_surface,
+)
 from .alignment import Positions
 from .belief_propagation import Surfaces, propagate
 from .chip_windows import ChipWindows, Resampled, of_kept

@@ -81,7 +81,8 @@ def box_sums(images: NDArray[np.float32], height: int, width: int) -> NDArray[np
     sums = cv2.boxFilter(
         tall, cv2.CV_32F, (width, height), anchor=(0, 0), normalize=False, borderType=_ZERO
     )
-    return sums.reshape(images.shape)[..., : rows - height + 1, : cols - width + 1]
+    inside = sums.reshape(images.shape)[..., : rows - height + 1, : cols - width + 1]
+    return np.asarray(inside, np.float32)
 
 
 def overlap_share(template: Patch, search: Patch) -> NDArray[np.float32]:

@@ -65,7 +65,7 @@ def is_logarithmic(window: Patch) -> bool:
 
 
 def _is_logarithmic(known: NDArray[np.float32]) -> bool:
-    return np.count_nonzero(known < 0) > _NEGATIVE_SHARE * known.size
+    return bool(np.count_nonzero(known < 0) > _NEGATIVE_SHARE * known.size)
 
 
 def orientation_fields(window: Patch) -> NDArray[np.complex64]:
