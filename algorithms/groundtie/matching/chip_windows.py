@@ -34,7 +34,8 @@ _BLOCK_PX = 384
 # Images of so many pixels are resampled as a whole: 5 bytes each are held for either.
 _HELD_PIXELS = 4_000_000
 
-# Windows are worked in stacks of about so many pixels, which stay in the processor's cache.
+# Windows are worked in stacks of about so many pixels, which stay in the processor's cache:
+# `benchmarks/run.py --only kernels`.
 _STACK_PIXELS = 65_536
 
 
