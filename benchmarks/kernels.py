@@ -1,4 +1,7 @@
-"""What counting joint histograms costs by each of its ways: the constants of `joint_histogram`."""
+"""What chips cost: joint histograms by each way of counting, and similarity by stacks' sizes.
+
+The constants of `joint_histogram`, and the size of stacks of `chip_windows`.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,20 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from groundtie.rasters.patch import Patch
 from groundtie.similarity import joint_histogram as counting
+from groundtie.similarity.description import BORDER_PX
+from groundtie.similarity.surface import SimilaritySettings, describe, similarity_surface
 
 from .suites import Settings, SuiteResult, Table
 
 _CHIPS_PX, _RADII_PX, _BINS = (40, 64, 80, 112), (9, 13, 25), (8, 12)
 _TIMES = 7
+
+# Chips of the fit, of a level of the pyramid and of the survey, and how far they are searched.
+_SEARCHES_PX, _STACKED_PIXELS = ((58, 8), (80, 12), (64, 24)), (1, 2**15, 2**16, 2**17, 2**18)
 
 
 def run(settings: Settings) -> SuiteResult:
@@ -27,22 +37,43 @@ def run(settings: Settings) -> SuiteResult:
             for radius in _RADII_PX
             for bins in _BINS
         ]
+        stacks = [_stack_costs(chip, radius) for chip, radius in _SEARCHES_PX]
     finally:
         cv2.setNumThreads(threads)
-    head = list(records[0])
-    rows = [[f"{value:.2f}" for value in record.values()] for record in records]
     return SuiteResult(
         "Kernels",
         (),
         (
-            Table(
-                "Joint histograms: nanoseconds a pixel and shift, or element and halving",
-                head,
-                rows,
+            _table(
+                "Joint histograms: nanoseconds a pixel and shift, or element and halving", records
             ),
+            _table("Chips: milliseconds a chip, by the pixels of a stack of windows", stacks),
         ),
-        records,
+        [*records, *stacks],
     )
+
+
+def _table(title: str, records: list[dict[str, float]]) -> Table:
+    rows = [[f"{value:.2f}" for value in record.values()] for record in records]
+    return Table(title, list(records[0]), rows)
+
+
+def _stack_costs(chip_px: int, radius_px: int) -> dict[str, float]:
+    side, settings = chip_px + 2 * (radius_px + BORDER_PX), SimilaritySettings()
+    random = np.random.default_rng(0)
+    costs = {"chip, px": float(chip_px), "radius, px": float(radius_px)}
+    for pixels in _STACKED_PIXELS:
+        count = max(pixels // side**2, 1)
+        shape = count, side, side
+        images = [random.rayleigh(100, shape).astype(np.float32) for _ in range(2)]
+
+        def match(images: list[NDArray[np.float32]] = images) -> None:
+            windows = (Patch(image, np.ones(image.shape, bool)) for image in images)
+            own, other = (describe(window, chip_px**2, settings) for window in windows)
+            similarity_surface(own.inner(radius_px), other, radius_px, settings)
+
+        costs[f"{pixels} pixels"] = _seconds(match) / count * 1e3
+    return costs
 
 
 def _costs(chip_px: int, radius_px: int, bins: int) -> dict[str, float]:

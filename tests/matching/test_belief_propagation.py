@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from groundtie.matching.belief_propagation import normalise_each, propagate
+from groundtie.matching.belief_propagation import propagate
 from groundtie.similarity.peak import find_peak
+from groundtie.similarity.surface import normalise
 
 RADIUS = 10
 SPACING = 30
@@ -180,7 +181,7 @@ def test_many_neighbours_do_not_overflow() -> None:
 def test_surfaces_are_normalised_one_by_one() -> None:
     surfaces = surfaces_peaking_at(np.zeros((4, 2)), 0.0, 10)
     scaled = surfaces * np.array([1, 5, 0.2, 3], np.float32)[:, None, None] + 7
-    normalised = normalise_each(scaled)
+    normalised = normalise(scaled)
     np.testing.assert_allclose(np.median(normalised, axis=(1, 2)), 0, atol=1e-5)
     np.testing.assert_allclose(normalised.std(axis=(1, 2)), 1, atol=0.15)
-    assert normalise_each(scaled[:0]).shape == (0, 21, 21)
+    assert normalise(scaled[:0]).shape == (0, 21, 21)

@@ -122,6 +122,13 @@ def test_box_sums() -> None:
     )
 
 
+def test_box_sums_of_a_stack_see_nothing_of_its_other_images() -> None:
+    images = np.random.default_rng(0).uniform(0, 9, (3, *SIZE)).astype(np.float32)
+    images[1] *= 1e4
+    expected = [windows_of(image).sum(axis=(2, 3)) for image in images]
+    np.testing.assert_allclose(box_sums(images, *SHAPE), expected, rtol=1e-5)
+
+
 @pytest.mark.parametrize("masked", [False, True])
 def test_overlap_is_the_share_of_the_template_that_meets_valid_pixels(masked: bool) -> None:
     template, search = patches(masked)

@@ -124,6 +124,21 @@ def test_all_ways_to_count_agree(
         np.testing.assert_array_equal(volume.counts, expected)
 
 
+@pytest.mark.parametrize("cost", [0.0, 1e9])
+def test_stacks_are_counted_window_by_window(monkeypatch: pytest.MonkeyPatch, cost: float) -> None:
+    monkeypatch.setattr(joint_histogram, "_SPECTRAL_COST", cost)
+    bins = (4, 3)
+    pairs = [windows(masked, (12, 20), bins) for masked in (False, True)]
+    templates, searches = (np.stack(of) for of in zip(*pairs, strict=True))
+    volume = count_joint_histograms(templates, searches, bins, RADIUS)
+    for of_one, pair in zip(volume.counts, pairs, strict=True):
+        np.testing.assert_array_equal(of_one, with_numpy(*pair, bins))
+    alone = [count_joint_histograms(*pair, bins, RADIUS) for pair in pairs]
+    np.testing.assert_array_equal(volume.histograms(), [one.histograms() for one in alone])
+    shift = (1.3, -0.6)
+    np.testing.assert_allclose(volume.at(shift, 4), [one.at(shift, 4) for one in alone])
+
+
 def test_every_pixel_is_counted_once() -> None:
     template, search = windows(masked=False)
     histograms = count_joint_histograms(template, search, BINS, RADIUS).histograms(4)

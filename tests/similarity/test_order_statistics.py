@@ -38,5 +38,10 @@ def test_quantiles_are_numpys(size: int, count: int) -> None:
 def test_images_are_taken_as_a_whole() -> None:
     values = sample(4096).reshape(64, 64)
     assert median(values) == np.median(values)
-    assert upper_median(values) == upper_median(values.ravel())
     np.testing.assert_array_equal(quantiles(values, np.ones(1)), [values.max()])
+
+
+def test_upper_medians_of_a_stack_are_those_of_its_images() -> None:
+    values = sample(4095).reshape(3, 5, 273)
+    expected = [[np.median(row) for row in image] for image in values]
+    np.testing.assert_array_equal(upper_median(values), expected)

@@ -79,7 +79,11 @@ def test_chips_with_little_ground_find_their_place_together() -> None:
     """What goes with what is told where they lie 2 px off; each has 1 % of its pixels."""
     chips = ground_chips(100, 0.01, shift=(2, -1))
     levels, _ = levels_of(on_each_other(chips))
-    surfaces = np.array([levels.surface(*chip) for chip in chips])
+    stacks = (
+        Patch(np.stack([p.values for p in side]), np.stack([p.valid for p in side]))
+        for side in zip(*chips, strict=True)
+    )
+    surfaces = levels.surface(*stacks)
     together = find_peak(normalise(surfaces.sum(axis=0))).shift_px
     assert together == pytest.approx((2, -1), abs=0.3)
     alone = np.array([find_peak(normalise(surface)).shift_px for surface in surfaces])

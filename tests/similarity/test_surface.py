@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, median_filter
@@ -54,6 +56,11 @@ def patches(
 
 def whole(values: np.ndarray) -> Patch:
     return Patch(values.astype(np.float32), np.ones(values.shape, bool))
+
+
+def stacked(windows: Sequence[Patch]) -> Patch:
+    values, valid = ([getattr(w, of) for w in windows] for of in ("values", "valid"))
+    return Patch(np.stack(values), np.stack(valid))
 
 
 def inverted(patch: Patch) -> Patch:
@@ -167,6 +174,27 @@ def test_threads_change_nothing() -> None:
         threaded = similarity_surface(*windows, RADIUS, settings, context)
     alone = similarity_surface(*windows, RADIUS, settings)
     np.testing.assert_array_equal(threaded, alone)
+
+
+@pytest.mark.parametrize("similarity", EVERY)
+@pytest.mark.parametrize("masked", ["none", "one", "all"])
+def test_windows_of_a_stack_have_the_surfaces_that_they_have_alone(
+    similarity: str, masked: str
+) -> None:
+    settings = SimilaritySettings(similarity)
+    pairs = [patches(shift, seed) for seed, shift in enumerate([(2, 3), (-4, 0), (5, -6)])]
+    if masked != "none":
+        pairs[0][0].valid[:20, :30] = False
+        pairs[0][1].valid[-25:, -20:] = False
+    if masked == "all":
+        pairs[1][0].valid[:, -30:] = False
+        pairs[2][1].valid[10:20] = False
+    found = surface_of(*(stacked(of) for of in zip(*pairs, strict=True)), settings)
+    assert found.shape == (3, SPAN, SPAN)
+    for surface, (template, search) in zip(found, pairs, strict=True):
+        expected = surface_of(template, search, settings)
+        np.testing.assert_allclose(surface, expected, atol=1e-3)
+        assert peak_of(surface) == peak_of(expected)
 
 
 def test_normalised_surfaces_count_in_robust_standard_deviations() -> None:

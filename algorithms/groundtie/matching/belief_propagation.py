@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from ..similarity.surface import normalise
-
 Surfaces = NDArray[np.float32]
 _Pairs = NDArray[np.intp]
 
@@ -33,11 +31,6 @@ _PASSES = 8
 
 # So many pairs' messages are made at a time: they fit into the processor's cache.
 _BLOCK = 128
-
-
-def normalise_each(surfaces: Surfaces) -> Surfaces:
-    """Return surfaces, shape (n, 2 r + 1, 2 r + 1), each in its robust standard deviations."""
-    return np.stack([normalise(s) for s in surfaces]) if len(surfaces) else surfaces
 
 
 def propagate(surfaces: Surfaces, centres: NDArray[np.int_], reach_px: float) -> Surfaces:

@@ -6,7 +6,7 @@ Windows of neighbours overlap: resampled chip by chip, most pixels would be made
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -24,6 +24,9 @@ from .matcher import MaskOf, Places
 R = TypeVar("R")
 _Numbers = NDArray[np.intp]
 
+# The upper left corner of a piece of a grid, and both images there.
+_Piece = tuple[NDArray[np.int_], tuple[Patch, Patch]]
+
 # Longest side of a block that is read from files, in pixels: enough of them for all threads, and
 # each in the processor's cache.
 _BLOCK_PX = 384
@@ -31,8 +34,9 @@ _BLOCK_PX = 384
 # Images of so many pixels are resampled as a whole: 5 bytes each are held for either.
 _HELD_PIXELS = 4_000_000
 
-# Blocks of these for a thread: none waits long for the others.
-_HELD_BLOCKS = 2
+# Windows are worked in stacks of about so many pixels, which stay in the processor's cache:
+# `benchmarks/run.py --only kernels`.
+_STACK_PIXELS = 65_536
 
 
 @dataclass(frozen=True)
@@ -114,20 +118,26 @@ class ChipWindows:
     hidden: MaskOf | None
 
     def map(
-        self, function: Callable[[int, Patch, Patch], R | None], context: Context
+        self, function: Callable[[Patch, Patch], Iterable[R | None]], context: Context
     ) -> tuple[list[int], list[R]]:
         """Return what `function` makes of chips' windows, and the numbers of these chips, in order.
 
-        It takes a chip's number, its reference and its input window, and returns None for a chip
-        that is left out.
+        It takes a stack of reference windows, shape (n, h, w), and that of their input windows, and
+        returns what it makes of each, None for a chip that is left out.
         """
+        chips = np.arange(len(self.places.centres))
+        held = self._read(chips) if self.images.is_held and len(chips) else None
 
         def of_block(block: _Numbers) -> list[tuple[int, R | None]]:
-            return [(number, function(number, *both)) for number, *both in self._read(block)]
+            piece = held or self._read(block)
+            stacks = (block[k : k + self._most] for k in range(0, len(block), self._most))
+            return [
+                one
+                for stack in stacks
+                for one in zip(stack, function(*self._cut(piece, stack)), strict=True)
+            ]
 
-        count = len(self.places.centres)
-        most = -(-count // (_HELD_BLOCKS * context.workers)) if self.images.is_held else None
-        blocks = list(self._blocks(np.arange(count), most))
+        blocks = list(self._blocks(chips))
         done = [one for results in context.map(of_block, blocks) for one in results]
         done.sort(key=operator.itemgetter(0))
         found = [(number, result) for number, result in done if result is not None]
@@ -141,20 +151,25 @@ class ChipWindows:
     def _corners(self) -> NDArray[np.int_]:
         return self.places.centres - self.places.chip_px // 2 - self.reach_px
 
-    def _blocks(self, chips: _Numbers, most: int | None) -> Iterator[_Numbers]:
-        """Yield chips, by number, in blocks that are read as one: of so many, or by their size.
+    @property
+    def _most(self) -> int:
+        """How many chips a stack has."""
+        return max(_STACK_PIXELS // self._side_px**2, 1)
 
-        In files, that reads fewer pixels.
+    def _blocks(self, chips: _Numbers) -> Iterator[_Numbers]:
+        """Yield chips, by number, in blocks that are read as one.
+
+        In files, that reads fewer pixels; from memory, a block is a stack.
         """
+        if self.images.is_held:
+            yield from (chips[k : k + self._most] for k in range(0, len(chips), self._most))
+            return
         if len(chips) == 0:
             return
         corners = self._corners[chips]
         size = np.ptp(corners, axis=0) + self._side_px
-        if most is None:
-            is_dense = np.prod(size) <= len(chips) * self._side_px**2
-            is_block = is_dense and size.max() <= max(_BLOCK_PX, 2 * self._side_px)
-        else:
-            is_block = len(chips) <= most
+        is_dense = np.prod(size) <= len(chips) * self._side_px**2
+        is_block = is_dense and size.max() <= max(_BLOCK_PX, 2 * self._side_px)
         if len(chips) == 1 or is_block:
             yield chips
             return
@@ -164,20 +179,45 @@ class ChipWindows:
         if first.all():
             yield from (chips[k : k + 1] for k in range(len(chips)))
             return
-        yield from self._blocks(chips[first], most)
-        yield from self._blocks(chips[~first], most)
+        yield from self._blocks(chips[first])
+        yield from self._blocks(chips[~first])
 
-    def _read(self, block: _Numbers) -> Iterator[tuple[int, Patch, Patch]]:
-        """Yield the number, reference and input window of each chip of a block."""
+    def _read(self, block: _Numbers) -> _Piece:
+        """Return both images where the windows of a block's chips lie."""
         side, corners = self._side_px, self._corners[block]
         corner = corners.min(axis=0)
         width, height = (int(n) for n in np.ptp(corners, axis=0) + side)
         piece = self.places.grid.window(int(corner[0]), int(corner[1]), width, height)
-        reference, input = self.images.read(piece, self.hidden)
-        for number, (col, row) in zip(block, corners - corner, strict=True):
-            inside = slice(row, row + side), slice(col, col + side)
-            yield int(number), _part(reference, inside), _part(input, inside)
+        return corner, self.images.read(piece, self.hidden)
+
+    def _cut(self, piece: _Piece, stack: _Numbers) -> tuple[Patch, Patch]:
+        """Return the stacks of chips' reference and input windows in a piece."""
+        corner, (reference, input) = piece
+        corners, side = self._corners[stack] - corner, self._side_px
+        inside = [np.s_[row : row + side, col : col + side] for col, row in corners]
+        return _parts(reference, inside), _parts(input, inside)
 
 
-def _part(patch: Patch, inside: tuple[slice, slice]) -> Patch:
-    return Patch(patch.values[inside].copy(), patch.valid[inside].copy())
+def of_kept(
+    function: Callable[[Patch, Patch], Iterable[R]], kept: Sequence[bool], one: Patch, other: Patch
+) -> list[R | None]:
+    """Return what a function makes of the windows that are kept of two stacks, None of others."""
+    if not any(kept):
+        return [None] * len(kept)
+    found = iter(function(one.take(kept), other.take(kept)))
+    return [next(found) if is_kept else None for is_kept in kept]
+
+
+def singly(function: Callable[[Patch, Patch], R]) -> Callable[[Patch, Patch], Iterable[R]]:
+    """Return the function of stacks of windows that a function of single windows makes."""
+
+    def of_stacks(reference: Patch, input: Patch) -> Iterable[R]:
+        return map(function, reference.images, input.images)
+
+    return of_stacks
+
+
+def _parts(patch: Patch, parts: list[tuple[slice, slice]]) -> Patch:
+    """Return the stack of a patch's parts."""
+    values, valid = ([of[part] for part in parts] for of in (patch.values, patch.valid))
+    return Patch(np.stack(values), np.stack(valid))

@@ -16,16 +16,22 @@ from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.description import BORDER_PX, Description
 from ..similarity.peak import find_peak
-from ..similarity.surface import SimilaritySettings, Surface, describe, similarity_surface
+from ..similarity.surface import (
+    SimilaritySettings,
+    Surface,
+    describe,
+    normalise,
+    similarity_surface,
+)
 from .alignment import Positions
-from .belief_propagation import Surfaces, normalise_each, propagate
-from .chip_windows import ChipWindows, Resampled
+from .belief_propagation import Surfaces, propagate
+from .chip_windows import ChipWindows, Resampled, of_kept
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 
 _log = logging.getLogger(__name__)
 
-# Makes a surface of the reference's and the input's window.
+# Makes surfaces of the reference's and the input's windows.
 _Way = Callable[[Description, Description, int, SimilaritySettings], Surface]
 
 # Chips with less valid area than this in either image are not matched. A mask leaves what was
@@ -91,7 +97,7 @@ class ChipMatcher:
         """
         kept, found = self._run(model, places, radius_px, context, _forward, _backward)
         forward, backward = found[:, 0], found[:, 1]
-        weight = _equal_weight(normalise_each(forward + backward))
+        weight = _equal_weight(normalise(forward + backward))
         return ChipSurfaces(kept, forward, backward, weight)
 
     def match_forward(
@@ -152,54 +158,51 @@ class ChipMatcher:
         images = Resampled.of(self.pair, model, places.grid, reach, context)
         windows = ChipWindows(images, places, reach, self.held_out)
 
-        def one(chip: int, reference: Patch, input: Patch) -> Surfaces | None:
-            cores = {"reference": reference.inner(reach), "input": input.inner(reach)}
-            if not all(self._can_be_matched(*core, places.centres[chip]) for core in cores.items()):
-                return None
-            of_reference = describe(reference, places.chip_px**2, self.settings)
-            of_input = describe(input, places.chip_px**2, self.settings)
+        def surfaces(reference: Patch, input: Patch) -> Surfaces:
+            of_reference, of_input = (
+                describe(windows, places.chip_px**2, self.settings)
+                for windows in (reference, input)
+            )
             made = [way(of_reference, of_input, radius_px, self.settings) for way in ways]
-            return np.stack(made)
+            return np.stack(made, axis=1)
 
-        kept, found = windows.map(one, context)
+        def of_stacks(reference: Patch, input: Patch) -> list[Surfaces | None]:
+            cores = zip(reference.inner(reach).images, input.inner(reach).images, strict=True)
+            kept = [all(map(self._can_be_matched, both)) for both in cores]
+            return of_kept(surfaces, kept, reference, input)
+
+        kept, found = windows.map(of_stacks, context)
+        _log.debug("%d of %d chips can be matched", len(kept), len(places.centres))
         span = 2 * radius_px + 1
         none = np.zeros((0, len(ways), span, span), np.float32)
         return places.centres[kept], np.stack(found) if found else none
 
-    def _can_be_matched(self, image: str, core: Patch, centre: NDArray[np.int_]) -> bool:
+    def _can_be_matched(self, core: Patch) -> bool:
         least = self.least_valid
         if least is None:
             least = LEAST_VALID_MASKED if self.pair.is_masked else _LEAST_VALID
-        if core.valid_share < least:
-            _log.debug(
-                "chip at %s: only %.0f %% of the %s valid", centre, 100 * core.valid_share, image
-            )
-            return False
-        if core.is_flat:
-            _log.debug("chip at %s: the %s is constant", centre, image)
-            return False
-        return True
+        return core.valid_share >= least and not core.is_flat
 
 
 def _forward(
     reference: Description, input: Description, radius_px: int, settings: SimilaritySettings
 ) -> Surface:
-    """Return the surface of a chip of the reference in the input."""
+    """Return the surfaces of chips of the reference in the input."""
     return similarity_surface(reference.inner(radius_px), input, radius_px, settings)
 
 
 def _backward(
     reference: Description, input: Description, radius_px: int, settings: SimilaritySettings
 ) -> Surface:
-    """Return the surface of a chip of the input in the reference, as that of the way forward."""
+    """Return the surfaces of chips of the input in the reference, as those of the way forward."""
     backward = similarity_surface(input.inner(radius_px), reference, radius_px, settings)
-    return backward[::-1, ::-1]
+    return backward[..., ::-1, ::-1]
 
 
 def _own(
     reference: Description, input: Description, radius_px: int, settings: SimilaritySettings
 ) -> Surface:
-    """Return the surface of a chip of the reference in the reference itself."""
+    """Return the surfaces of chips of the reference in the reference itself."""
     return similarity_surface(reference.inner(radius_px), reference, radius_px, settings)
 
 

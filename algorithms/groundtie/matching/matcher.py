@@ -21,7 +21,7 @@ from ..geometry.models import Model
 from ..rasters.grid import Grid
 from ..similarity.peak import find_peak
 from ..similarity.surface import normalise
-from .belief_propagation import Surfaces, normalise_each
+from .belief_propagation import Surfaces
 
 FloatArray = NDArray[np.float64]
 ToPixel = Callable[[FloatArray], FloatArray]
@@ -110,7 +110,7 @@ class ChipSurfaces:
     @cached_property
     def combined(self) -> Surfaces:
         """The sum of both directions, in robust standard deviations."""
-        return normalise_each(self.forward + self.backward)
+        return normalise(self.forward + self.backward)
 
     @property
     def weighted(self) -> Surfaces:
@@ -149,7 +149,7 @@ class ChipSurfaces:
 
         def total(surfaces: Surfaces) -> Surfaces:
             added = [(surfaces[of] * weight[of]).sum(axis=0) for of in members]
-            return normalise_each(np.array(added, np.float32).reshape(-1, *surfaces.shape[1:]))
+            return normalise(np.array(added, np.float32).reshape(-1, *surfaces.shape[1:]))
 
         middles = [np.rint(self.centres[of].mean(axis=0)) for of in members]
         return ChipSurfaces(

@@ -18,10 +18,10 @@ from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage
 from ..similarity.pooled import PooledHistogram, smooth
-from ..similarity.surface import SimilaritySettings, Surface
+from ..similarity.surface import SimilaritySettings, Surface, normalise
 from .alignment import Positions
-from .belief_propagation import normalise_each
-from .chip_windows import ChipWindows, Resampled
+from .belief_propagation import Surfaces
+from .chip_windows import ChipWindows, Resampled, of_kept, singly
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 
@@ -85,17 +85,19 @@ class PooledHistogramMatcher:
         order = 1 if self._is_reference_masked else -1
         windows = self._windows(images, places, radius_px, self.blind)
 
-        def one(_: int, reference: Patch, input: Patch) -> Surface | None:
-            template, search = self._template_first(reference, input)
-            chip = template.inner(radius_px)
-            if chip.valid_share < _LEAST_VALID:
-                return None
-            return histogram.surface(chip, search)[::order, ::order]
+        def surfaces(template: Patch, search: Patch) -> Surfaces:
+            return histogram.surface(template.inner(radius_px), search)[..., ::order, ::order]
 
-        kept, found = windows.map(one, context)
+        def of_stacks(reference: Patch, input: Patch) -> list[Surface | None]:
+            template, search = self._template_first(reference, input)
+            chips = template.inner(radius_px).images
+            kept = [chip.valid_share >= _LEAST_VALID for chip in chips]
+            return of_kept(surfaces, kept, template, search)
+
+        kept, found = windows.map(of_stacks, context)
         span = 2 * radius_px + 1
         nats = np.stack(found) if found else np.zeros((0, span, span), np.float32)
-        normalised = normalise_each(nats)
+        normalised = normalise(nats)
         # Chips count by their evidence, in nats; on average as much as those of other similarities.
         spread = np.ptp(nats, axis=(1, 2)) / np.maximum(np.ptp(normalised, axis=(1, 2)), 1e-9)
         heights = normalised.max(axis=(1, 2), initial=0.0) * spread
@@ -129,12 +131,13 @@ class PooledHistogramMatcher:
         """Return the evidence of pairs of grey levels in chips of the fit, as they lie now."""
         every = max(len(places.centres) * places.chip_px**2 // _MOST_PIXELS, 1)
 
-        def pixels(_: int, reference: Patch, input: Patch) -> FloatImage:
+        def pixels(reference: Patch, input: Patch) -> FloatImage:
             template, search = self._template_first(reference, input)
             both = template.valid & search.valid
             return np.stack([smooth(template).values[both], search.values[both]])[:, ::every]
 
-        _, sampled = self._windows(images, places, 0, blind=True).map(pixels, context.quiet())
+        windows = self._windows(images, places, 0, blind=True)
+        _, sampled = windows.map(singly(pixels), context.quiet())
         sample = np.concatenate(sampled, axis=1) if sampled else np.zeros((2, 0), np.float32)
         count = sample.shape[1] * every
         if count < _LEAST_PIXELS:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .grid import Grid
 from .windows import Window
@@ -18,7 +19,10 @@ _ALL_VALID = 0.999
 
 @dataclass(frozen=True)
 class Patch:
-    """Grey values, shape (h, w) float32, and which of them are valid, shape (h, w) bool."""
+    """Grey values, float32, and which of them are valid, bool, both of shape (h, w).
+
+    A stack of patches of one size is one, too: its arrays have the shape (n, h, w).
+    """
 
     values: NDArray[np.float32]
     valid: NDArray[np.bool_]
@@ -39,10 +43,19 @@ class Patch:
         values = self.values[self.valid]
         return values.size == 0 or bool(values.min() == values.max())
 
+    @property
+    def images(self) -> Iterator[Patch]:
+        """The patches of a stack, one after the other."""
+        return map(Patch, self.values, self.valid)
+
+    def take(self, which: ArrayLike) -> Patch:
+        """Return the patches of a stack that an index or mask selects."""
+        return Patch(self.values[np.asarray(which)], self.valid[np.asarray(which)])
+
     def inner(self, border: int) -> Patch:
         """Return this patch without a border on each side."""
         inside = slice(border, -border or None)
-        return Patch(self.values[inside, inside], self.valid[inside, inside])
+        return Patch(self.values[..., inside, inside], self.valid[..., inside, inside])
 
 
 def reduced(image: NDArray[Any], factor: int) -> NDArray[Any]:

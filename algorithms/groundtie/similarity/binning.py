@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .order_statistics import quantiles
+from .stacks import each
 
 MASKED = np.uint8(255)
 BINNINGS = ("equal-frequency", "linear")
@@ -57,13 +58,14 @@ def to_bins(
     Parameters
     ----------
     values, valid
-        Grey values and which of them count, shape (h, w).
+        Grey values and which of them count, shape (…, h, w).
     bins
-        Number of bins, 2 to 255.
+        Number of bins, 2 to 255, of equally many pixels in each image.
     binning
         One of `BINNINGS`.
     """
-    edges = bin_edges(values, valid, bins, binning)
-    binned = levels(values, edges)
-    binned[~valid] = MASKED
-    return binned
+
+    def binned(values: NDArray[np.float32], valid: NDArray[np.bool_]) -> NDArray[np.uint8]:
+        return levels(values, bin_edges(values, valid, bins, binning))
+
+    return np.where(valid, each(binned, values, valid), MASKED)

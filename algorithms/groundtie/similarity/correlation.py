@@ -10,6 +10,11 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
+from .stacks import each
+
+FloatImage = NDArray[np.float32]
+
+_ZERO = cv2.BORDER_CONSTANT
 
 # Overlaps of a smaller share of the template's pixels are not compared.
 MINIMUM_OVERLAP = 0.3
@@ -27,52 +32,67 @@ def correlate(template: NDArray[Any], search: NDArray[Any]) -> NDArray[np.float3
     -------
     Array of shape (…, ny, nx), float32.
     """
-    size, spans = search.shape[-2:], _spans(template.shape[-2:], search.shape[-2:])
     if np.iscomplexobj(template):
-        shape = _fast_shape(size)
-        spectrum = scipy.fft.fft2(template, shape).conj() * scipy.fft.fft2(search, shape)
-        return scipy.fft.ifft2(spectrum)[..., : spans[0], : spans[1]].real.astype(np.float32)
-    of_template, of_search = _spectra(template, search, size)
-    return _inverse(of_template.conj() * of_search, size, spans)
+        parts = [(template.real, search.real), (template.imag, search.imag)]
+    else:
+        parts = [(template, search)]
+    shape = fast_shape(search.shape[-2:])
+    products = (spectrum(t, shape).conj() * spectrum(s, shape) for t, s in parts)
+    return from_spectrum(sum(products), shape, spans(template, search))
 
 
-def _fast_shape(size: tuple[int, ...]) -> list[int]:
-    return [scipy.fft.next_fast_len(n) for n in size]
-
-
-def _spans(template: tuple[int, ...], search: tuple[int, ...]) -> tuple[int, int]:
-    """Return at how many shifts of rows and columns a template lies inside a search window."""
-    rows, cols = (s - t + 1 for s, t in zip(search, template, strict=True))
+def fast_shape(shape: tuple[int, ...]) -> tuple[int, int]:
+    """Return a shape that is quick to transform, in which one of a search window fits."""
+    rows, cols = (scipy.fft.next_fast_len(n, real=True) for n in shape)
     return rows, cols
 
 
-def _spectra(
-    template: NDArray[Any], search: NDArray[Any], size: tuple[int, ...]
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    shape = _fast_shape(size)
-    return scipy.fft.rfft2(template, shape), scipy.fft.rfft2(search, shape)
+def spans(template: NDArray[Any], search: NDArray[Any]) -> tuple[int, int]:
+    """Return at how many shifts of rows and columns a template lies inside a search window."""
+    (own_rows, own_cols), (rows, cols) = template.shape[-2:], search.shape[-2:]
+    return rows - own_rows + 1, cols - own_cols + 1
 
 
-def _inverse(
-    spectrum: NDArray[Any], size: tuple[int, ...], spans: tuple[int, int]
-) -> NDArray[np.float32]:
-    found = scipy.fft.irfft2(spectrum, _fast_shape(size))
-    return np.asarray(found[..., : spans[0], : spans[1]], np.float32)
+def spectrum(images: NDArray[Any], shape: tuple[int, int], workers: int = 1) -> NDArray[Any]:
+    """Return the half spectra of real images, (…, h, w), filled up with 0 to a shape."""
+    # Rows that hold nothing are not transformed.
+    along_rows = scipy.fft.rfft(images, shape[1], workers=workers)
+    return scipy.fft.fft(along_rows, shape[0], axis=-2, overwrite_x=True, workers=workers)
 
 
-def box_sums(image: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
-    """Return the sums of an image over all boxes of a size, shape (h - height + 1, …)."""
-    table = cv2.integral(image, sdepth=cv2.CV_64F)
-    sums = table[height:, width:] - table[:-height, width:] - table[height:, :-width]
-    return (sums + table[:-height, :-width]).astype(np.float32)
+def from_spectrum(
+    spectra: NDArray[Any], shape: tuple[int, int], spans: tuple[int, int], workers: int = 1
+) -> NDArray[Any]:
+    """Return the upper left parts, (…, ny, nx), of the images of a shape that have half spectra.
+
+    The spectra may be overwritten.
+    """
+    # Rows that are not asked for are not transformed.
+    lines = scipy.fft.ifft(spectra, axis=-2, overwrite_x=True, workers=workers)
+    found = scipy.fft.irfft(lines[..., : spans[0], :], shape[1], workers=workers)
+    return found[..., : spans[1]]
+
+
+def box_sums(images: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
+    """Return the sums of images, (…, h, w), over all boxes of a size: (…, h - height + 1, …)."""
+    rows, cols = images.shape[-2:]
+    # One image above the other: boxes inside one see nothing of the next.
+    tall = images.reshape(-1, cols)
+    sums = cv2.boxFilter(
+        tall, cv2.CV_32F, (width, height), anchor=(0, 0), normalize=False, borderType=_ZERO
+    )
+    inside = sums.reshape(images.shape)[..., : rows - height + 1, : cols - width + 1]
+    return np.asarray(inside, np.float32)
 
 
 def overlap_share(template: Patch, search: Patch) -> NDArray[np.float32]:
-    """Return at all shifts which share of the template's valid pixels meets valid pixels."""
-    count = np.float32(max(int(template.valid.sum()), 1))
-    if template.all_valid:
-        return box_sums(search.valid.astype(np.float32), *template.valid.shape) / count
-    overlap = correlate(template.valid.astype(np.float32), search.valid.astype(np.float32))
+    """Return at all shifts which share of the template's valid pixels meets valid pixels.
+
+    Of stacks of windows, (…, h, w), shares are of the shape (…, ny, nx).
+    """
+    count = np.maximum(template.valid.sum(axis=(-2, -1), keepdims=True, dtype=np.float32), 1)
+    own, other = (patch.valid.astype(np.float32) for patch in (template, search))
+    overlap = box_sums(other, *own.shape[-2:]) if template.all_valid else correlate(own, other)
     return overlap / count
 
 
@@ -87,26 +107,26 @@ def correlate_fields(
     Parameters
     ----------
     template, search
-        Fields that are zero where they are not valid, shapes (n, h, w) and
-        (n, h + ny - 1, w + nx - 1). Each shift is normalised by the energy of what overlaps.
+        Fields that are zero where they are not valid, shapes (n, …, h, w) and
+        (n, …, h + ny - 1, w + nx - 1). Each shift is normalised by the energy of what overlaps.
     template_valid, search_valid
-        What is valid, shapes (h, w) and (h + ny - 1, w + nx - 1).
+        What is valid, shapes (…, h, w) and (…, h + ny - 1, w + nx - 1).
 
     Returns
     -------
-    Array of shape (n, ny, nx), float32.
+    Array of shape (n, …, ny, nx), float32.
     """
     template_energy = template.real**2 + template.imag**2
     search_energy = search.real**2 + search.imag**2
     if template_valid.all():
-        energy = np.stack([box_sums(e, *template_valid.shape) for e in search_energy])
+        energy = box_sums(search_energy, *template_valid.shape[-2:])
     else:
         energy = correlate(template_valid.astype(np.float32), search_energy)
     if search_valid.all():
-        energy = energy * template_energy.sum(axis=(1, 2), keepdims=True)
+        energy = energy * template_energy.sum(axis=(-2, -1), keepdims=True)
     else:
         energy = energy * correlate(template_energy, search_valid.astype(np.float32))
-    highest = energy.max(axis=(1, 2), keepdims=True, initial=0)
+    highest = energy.max(axis=(-2, -1), keepdims=True, initial=0)
     floor = np.float32(1e-6) * np.maximum(highest, np.float32(1e-12))
     found = correlate(template, search) / np.sqrt(np.maximum(energy, floor))
     return np.where(energy > floor, found, 0).astype(np.float32)
@@ -116,22 +136,36 @@ def correlate_grey(template: Patch, search: Patch) -> NDArray[np.float32]:
     """Return the normalised cross-correlation of grey values over shifts ([Suri2010] eq 3.2).
 
     With masks, each shift is normalised by the pixels that are valid in both [Padfield2012].
+
+    Parameters
+    ----------
+    template, search
+        Windows of shapes (…, h, w) and (…, h + ny - 1, w + nx - 1).
+
+    Returns
+    -------
+    Array of shape (…, ny, nx), float32.
     """
-    mean = np.float32(search.values[search.valid].mean()) if search.valid.any() else np.float32(0)
-    if template.all_valid and search.all_valid:
-        # Means are taken off first: single precision would lose small contrast on large values.
-        t = template.values - template.values.mean()
-        found = cv2.matchTemplate(search.values - mean, t, cv2.TM_CCOEFF_NORMED)
+    return each(_correlate_grey, template.values, template.valid, search.values, search.valid)
+
+
+def _correlate_grey(
+    t: FloatImage, t_valid: NDArray[np.bool_], s: FloatImage, s_valid: NDArray[np.bool_]
+) -> FloatImage:
+    # Means are taken off first: single precision would lose small contrast on large values.
+    mean = s[s_valid].mean() if s_valid.any() else np.float32(0)
+    own_mean = t[t_valid].mean() if t_valid.any() else mean
+    if t_valid.all() and s_valid.all():
+        found = cv2.matchTemplate(s - mean, t - own_mean, cv2.TM_CCOEFF_NORMED)
         return np.asarray(found, np.float32)
-    tm, sm = (window.valid.astype(np.float32) for window in (template, search))
-    own_mean = np.float32(template.values[template.valid].mean()) if template.valid.any() else mean
-    t, s = (template.values - own_mean) * tm, (search.values - mean) * sm
+    tm, sm = t_valid.astype(np.float32), s_valid.astype(np.float32)
+    t, s = (t - own_mean) * tm, (s - mean) * sm
     # Each of a window's three spectra serves several sums.
-    of_t, of_s = _spectra(np.stack([tm, t, t * t]), np.stack([sm, s, s * s]), search.valid.shape)
-    pairs = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (0, 2))
-    products = np.stack([of_t[i].conj() * of_s[j] for i, j in pairs])
-    spans = _spans(template.valid.shape, search.valid.shape)
-    count, sum_t, sum_s, sum_ts, sum_tt, sum_ss = _inverse(products, search.valid.shape, spans)
+    shape = fast_shape(s.shape)
+    of_t = spectrum(np.stack([tm, t, t * t]), shape).conj()
+    of_s = spectrum(np.stack([sm, s, s * s]), shape)
+    products = of_t[[0, 1, 0, 1, 2, 0]] * of_s[[0, 0, 1, 1, 0, 2]]
+    count, sum_t, sum_s, sum_ts, sum_tt, sum_ss = from_spectrum(products, shape, spans(t, s))
     count = np.maximum(count, 1)
     covariance = sum_ts - sum_t * sum_s / count
     variance_t, variance_s = sum_tt - sum_t**2 / count, sum_ss - sum_s**2 / count

@@ -1,4 +1,4 @@
-"""What measures of similarity compare: bins, orientation fields and edge strength of a window."""
+"""What measures of similarity compare: bins, orientation fields and edge strength of windows."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MARGIN_PX = reach()
 
 @dataclass(frozen=True)
 class _Window:
-    """An image window with `BORDER_PX` on each side; each description is made when first asked."""
+    """Image windows with `BORDER_PX` on each side; each description is made when first asked."""
 
     patch: Patch
     bin_count: int
@@ -43,14 +43,14 @@ class _Window:
 
 @dataclass(frozen=True)
 class Description:
-    """An image window and what measures compare of it, shared by all of its inner parts.
+    """Image windows and what measures compare of them, shared by all of their inner parts.
 
     Parameters
     ----------
     window
-        The whole window.
+        The whole windows: one, or a stack of one size.
     border_px
-        Pixels of it that are left out on each side, at least `BORDER_PX`.
+        Pixels of them that are left out on each side, at least `BORDER_PX`.
     """
 
     window: _Window
@@ -58,11 +58,11 @@ class Description:
 
     @classmethod
     def of(cls, window: Patch, bin_count: int) -> Description:
-        """Return the description of a window with `BORDER_PX` on each side."""
+        """Return the description of windows with `BORDER_PX` on each side."""
         return cls(_Window(window, bin_count))
 
     def inner(self, border_px: int) -> Description:
-        """Return the description of the window without a further border on each side."""
+        """Return the description of the windows without a further border on each side."""
         return replace(self, border_px=self.border_px + border_px)
 
     @property
@@ -87,13 +87,13 @@ class Description:
 
     def _bins(self, border_px: int) -> NDArray[np.uint8]:
         inside = slice(border_px, -border_px or None)
-        return self.window.bins[inside, inside]
+        return self.window.bins[..., inside, inside]
 
     @property
     def fields(self) -> NDArray[np.complex64]:
-        """Orientation fields at all scales, shape (scales, h, w)."""
+        """Orientation fields at all scales, shape (scales, …, h, w)."""
         inside = slice(self.border_px, -self.border_px)
-        return self.window.fields[:, inside, inside]
+        return self.window.fields[..., inside, inside]
 
     @property
     def strength(self) -> Patch:

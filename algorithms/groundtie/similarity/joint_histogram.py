@@ -19,11 +19,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from ..context import Context
 from ..rasters.kernels import bspline_weights
+from .correlation import fast_shape, from_spectrum, spans, spectrum
+from .stacks import each
 
 FloatArray = NDArray[np.float32]
 ORDERS = (2, 3, 4, 5, 6, 7)
@@ -70,7 +71,7 @@ class JointHistogramVolume:
     Parameters
     ----------
     counts
-        Histograms, shape (2 R + 1, 2 R + 1, template bins, search bins), for shifts -R … R of
+        Histograms, shape (…, 2 R + 1, 2 R + 1, template bins, search bins), for shifts -R … R of
         rows and columns.
     radius
         Largest shift for which surfaces are wanted; R - radius shifts remain for the kernel.
@@ -82,47 +83,45 @@ class JointHistogramVolume:
     @property
     def margin(self) -> int:
         """How many further shifts there are on each side for the kernel."""
-        return (self.counts.shape[0] - 1) // 2 - self.radius
+        return (self.counts.shape[-3] - 1) // 2 - self.radius
 
     def histograms(self, order: int = ORDER) -> FloatArray:
         """Return the GPVE histograms at the integer shifts -radius … radius, float32."""
         near, far = reach(order), support(order)
         self._require(near)
         weights = kernel(order, 0.0).astype(np.float32)[far - near : far + near + 1]
-        first = self.margin - near
-        inner = slice(first, self.counts.shape[0] - first)
-        counts, span = self.counts[inner, inner], 2 * self.radius + 1
-        made = np.empty((*counts.shape[2:], span, span), np.float32)
+        first, span = self.margin - near, 2 * self.radius + 1
+        inner = slice(first, first + span + 2 * near)
+        counts = np.moveaxis(self.counts[..., inner, inner, :, :], (-2, -1), (-4, -3))
+        made = np.empty((*counts.shape[:-2], span, span), np.float32)
         # Bin by bin, so that what is worked stays in the processor's cache.
-        for own, planes in enumerate(made):
-            rows = _convolve(counts[:, :, own], weights, 0)
-            planes[:] = np.moveaxis(_convolve(rows, weights, 1), 2, 0)
-        return np.moveaxis(made, (0, 1), (2, 3))
+        for own in range(counts.shape[-4]):
+            rows = _convolve(counts[..., own, :, :, :], weights, span, -2)
+            made[..., own, :, :, :] = _convolve(rows, weights, span, -1)
+        return np.moveaxis(made, (-4, -3), (-2, -1))
 
     def at(self, shift: tuple[float, float], order: int) -> NDArray[np.float64]:
-        """Return the GPVE histogram at one shift (rows, columns), shape (bins, bins)."""
+        """Return the GPVE histogram at one shift (rows, columns), shape (…, bins, bins)."""
         far = support(order)
         self._require(far)
-        centre = self.counts.shape[0] // 2
+        centre = self.counts.shape[-3] // 2
         whole = [round(s) for s in shift]
         weights = [kernel(order, s - w) for s, w in zip(shift, whole, strict=True)]
         rows, cols = (slice(centre + w - far, centre + w + far + 1) for w in whole)
-        return np.einsum("p,q,pqab->ab", *weights, self.counts[rows, cols].astype(np.float64))
+        near = self.counts[..., rows, cols, :, :].astype(np.float64)
+        return np.einsum("p,q,...pqab->...ab", *weights, near)
 
     def _require(self, needed: int) -> None:
         if needed > self.margin:
             raise ValueError(f"the volume's margin of {self.margin} is below the kernel's {needed}")
 
 
-def _convolve(volume: FloatArray, weights: FloatArray, axis: int) -> FloatArray:
-    """Correlate along axis 0 or 1 with a short kernel; the axis loses the kernel's ends."""
-    count = volume.shape[axis] - len(weights) + 1
-    parts = (
-        volume[k : k + count] if axis == 0 else volume[:, k : k + count]
-        for k in range(len(weights))
-    )
-    weighted = map(np.multiply, parts, weights)
-    return functools.reduce(operator.iadd, weighted)
+def _convolve(planes: FloatArray, weights: FloatArray, span: int, axis: int) -> FloatArray:
+    """Correlate along an axis with a short kernel; the axis loses the kernel's ends."""
+    ahead = np.moveaxis(planes, axis, 0)
+    parts = (ahead[k : k + span] for k in range(len(weights)))
+    found: FloatArray = functools.reduce(operator.iadd, map(np.multiply, parts, weights))
+    return np.moveaxis(found, 0, axis)
 
 
 def count_joint_histograms(
@@ -137,9 +136,10 @@ def count_joint_histograms(
     Parameters
     ----------
     template
-        Binned template, shape (h, w), with `binning.MASKED` where a pixel does not count.
+        Binned template, shape (…, h, w), with `binning.MASKED` where a pixel does not count.
     search
-        Binned search window, shape (h + 2 R, w + 2 R), R ≥ `radius`; shift (0, 0) is its centre.
+        Binned search window, shape (…, h + 2 R, w + 2 R), R ≥ `radius`; shift (0, 0) is its
+        centre.
     bins
         Number of bins of template and search window.
     radius
@@ -150,8 +150,8 @@ def count_joint_histograms(
     # Masked pixels go to one extra bin that is dropped; OpenCV's own mask is much slower.
     template = np.minimum(template, bins[0]).astype(np.uint8)
     search = np.minimum(search, bins[1]).astype(np.uint8)
-    span = search.shape[0] - template.shape[0] + 1
-    if _spectral_cost(search.size, bins) < _direct_cost(template.size, span):
+    (own_rows, own_cols), (rows, cols) = template.shape[-2:], search.shape[-2:]
+    if _spectral_cost(rows * cols, bins) < _direct_cost(own_rows * own_cols, rows - own_rows + 1):
         workers = 1 if context is None else context.workers
         counts = _count_spectrally(template, search, bins, workers)
     else:
@@ -174,21 +174,25 @@ def _count_directly(
     context: Context | None,
 ) -> FloatArray:
     """Count one shift after the other."""
-    height, width = template.shape
-    rows, cols = (s - t + 1 for s, t in zip(search.shape, template.shape, strict=True))
+    height, width = template.shape[-2:]
+    rows, cols = spans(template, search)
     sizes = [n + 1 for n in bins]
     ranges = [0, sizes[0], 0, sizes[1]]
-    counts = np.empty((rows, cols, *bins), np.float32)
 
-    def count_row(dy: int) -> None:
-        for dx in range(cols):
-            window = search[dy : dy + height, dx : dx + width]
-            counted = cv2.calcHist([template, window], [0, 1], None, sizes, ranges)
-            counts[dy, dx] = counted[: bins[0], : bins[1]]
+    def of_one(template: NDArray[np.uint8], search: NDArray[np.uint8]) -> FloatArray:
+        counts = np.empty((rows, cols, *bins), np.float32)
 
-    for _ in (map if context is None else context.quiet().map)(count_row, range(rows)):
-        pass
-    return counts
+        def count_row(dy: int) -> None:
+            for dx in range(cols):
+                window = search[dy : dy + height, dx : dx + width]
+                counted = cv2.calcHist([template, window], [0, 1], None, sizes, ranges)
+                counts[dy, dx] = counted[: bins[0], : bins[1]]
+
+        for _ in (map if context is None else context.quiet().map)(count_row, range(rows)):
+            pass
+        return counts
+
+    return each(of_one, template, search)
 
 
 def _count_spectrally(
@@ -199,21 +203,19 @@ def _count_spectrally(
     Counts are whole numbers: several bins of the search window, times powers of 2, share a plane,
     and their counts are the digits of what is found.
     """
-    shape = [scipy.fft.next_fast_len(n, real=True) for n in search.shape]
-    ny, nx = (s - t + 1 for s, t in zip(search.shape, template.shape, strict=True))
+    shape = fast_shape(search.shape[-2:])
     digits = _Digits.of(template, search, bins)
-    own = (template == np.arange(bins[0])[:, None, None]).astype(digits.dtype)
-    other = np.take(digits.weights(bins[1]), search, axis=1)
-    # Rows that hold nothing, or are not asked for, are not transformed.
-    along_rows = scipy.fft.rfft(own, shape[1], workers=workers)
-    of_template = scipy.fft.fft(along_rows, shape[0], axis=-2, workers=workers).conj()
-    of_search = scipy.fft.rfft2(other, shape, workers=workers)
-    counts = np.empty((*bins, ny, nx), np.float32)
-    for spectrum, into in zip(of_template, counts, strict=True):
-        product = of_search * spectrum
-        lines = scipy.fft.ifft(product, axis=-2, overwrite_x=True, workers=workers)[:, :ny]
-        digits.read(scipy.fft.irfft(lines, shape[1], workers=workers)[:, :, :nx], into)
-    return np.moveaxis(counts, (0, 1), (2, 3))
+    other = np.moveaxis(np.take(digits.weights(bins[1]), search, axis=1), 0, -3)
+    of_search = spectrum(other, shape, workers)
+    counts = np.empty((*template.shape[:-2], *bins, *spans(template, search)), np.float32)
+    # Bin by bin, so that what is worked stays in the processor's cache.
+    for bin in range(bins[0]):
+        of_template = spectrum((template == bin).astype(digits.dtype), shape, workers).conj()
+        product = of_search * of_template[..., None, :, :]
+        digits.read(
+            from_spectrum(product, shape, counts.shape[-2:], workers), counts[..., bin, :, :, :]
+        )
+    return np.moveaxis(counts, (-4, -3), (-2, -1))
 
 
 @dataclass(frozen=True)
@@ -238,9 +240,9 @@ class _Digits:
     def of(
         cls, template: NDArray[np.uint8], search: NDArray[np.uint8], bins: tuple[int, int]
     ) -> _Digits:
-        """Return the digits that hold the counts of two binned windows exactly."""
+        """Return the digits that hold the counts of all pairs of binned windows exactly."""
         own, other = (
-            max(int(np.bincount(window.ravel(), minlength=n)[:n].max()), 1)
+            max(int(each(_bin_counts, window)[..., :n].max()), 1)
             for window, n in zip((template, search), bins, strict=True)
         )
         bits = min(own, other).bit_length()
@@ -264,8 +266,13 @@ class _Digits:
         return weights
 
     def read(self, planes: NDArray[np.floating], counts: FloatArray) -> None:
-        """Write what planes, shape (planes, …), hold as counts, shape (bins, …)."""
+        """Write what planes, (…, planes, ny, nx), hold as counts, shape (…, bins, ny, nx)."""
         whole = np.rint(planes).astype(np.int32 if self.dtype is np.float32 else np.int64)
         for digit in range(self.count):
-            part = counts[digit :: self.count]
-            part[:] = (whole[: len(part)] >> (digit * self.bits)) & ((1 << self.bits) - 1)
+            part = counts[..., digit :: self.count, :, :]
+            held = whole[..., : part.shape[-3], :, :]
+            part[:] = (held >> (digit * self.bits)) & ((1 << self.bits) - 1)
+
+
+def _bin_counts(window: NDArray[np.uint8]) -> NDArray[np.intp]:
+    return np.bincount(window.ravel(), minlength=256)

@@ -28,9 +28,9 @@ Histograms: TypeAlias = Any  # an array, or a sparse matrix of scipy
 # pixel or with a constant image, it has the value of independent images.
 HistogramMeasure = Callable[[Histograms], FloatArray]
 
-# Takes a template (h, w), a search window with the same centre that is larger by a radius on each
-# side, the radius, and a context to work in. Returns values over shifts, shape (2 radius + 1,
-# 2 radius + 1), or several such surfaces that count the same, shape (n, …).
+# Takes templates (…, h, w), one or a stack; search windows with the same centres that are larger
+# by a radius on each side; the radius; and a context to work in. Returns values over shifts, shape
+# (…, 2 radius + 1, 2 radius + 1), or several such surfaces that count the same, shape (n, …).
 Measure = Callable[[Description, Description, int, Context | None], FloatArray]
 
 MEASURES: dict[str, Measure] = {}
@@ -114,8 +114,9 @@ def entropy(table: FloatArray) -> FloatArray:
     """Return Shannon's entropy in nats along the last axis; the table need not be normalised."""
     count = pairwise_sum(table)
     total = np.where(count > 0, count, 1.0)
-    plogp = pairwise_sum(table * np.log(np.maximum(table, 1e-12)))
-    return np.asarray(np.log(total) - plogp / total)
+    plogp = np.maximum(table, 1e-12)
+    plogp = np.multiply(np.log(plogp, out=plogp), table, out=plogp)
+    return np.asarray(np.log(total) - pairwise_sum(plogp) / total)
 
 
 def pairwise_sum(table: FloatArray) -> FloatArray:

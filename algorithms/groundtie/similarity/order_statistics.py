@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 
 def upper_median(values: NDArray[Any]) -> Any:
-    """Return the median of values of any shape; of an even number the upper of the middle two."""
-    middle = values.size // 2
-    return np.partition(values, middle, axis=None)[middle]
+    """Return medians along the last axis; of an even number the upper of the middle two."""
+    middle = values.shape[-1] // 2
+    return np.partition(values, middle, axis=-1)[..., middle]
 
 
 def median(values: NDArray[Any]) -> Any:
@@ -28,11 +28,11 @@ def median(values: NDArray[Any]) -> Any:
 
 def quantiles(values: NDArray[Any], shares: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the values, (n,), below which shares of values lie, interpolated linearly, (n,)."""
-    ordered = np.sort(values, axis=None)
-    place = shares * (ordered.size - 1)
+    place = shares * (values.size - 1)
     below = np.floor(place).astype(int)
-    fraction = place - below
-    low, high = ordered[below], ordered[np.minimum(below + 1, ordered.size - 1)]
+    above = np.minimum(below + 1, values.size - 1)
+    ordered = np.partition(values, np.union1d(below, above), axis=None)
+    low, high, fraction = ordered[below], ordered[above], place - below
     # From the nearer of the two, as numpy has it.
     step = high - low
     return np.where(fraction < 0.5, low + step * fraction, high - step * (1 - fraction))

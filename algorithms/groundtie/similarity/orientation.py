@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
 from .order_statistics import median, upper_median
+from .stacks import each, flat
+
+FloatArray = NDArray[np.floating]
 
 # Standard deviations of the Gaussian derivatives, in pixels; their surfaces are added up.
 SCALES_PX = (0.8, 1.2, 2.0)
@@ -36,30 +39,37 @@ _NEGATIVE_SHARE = 0.02
 
 
 def compress(window: Patch) -> NDArray[np.float32]:
-    """Return grey values on a logarithmic scale, on which speckle is additive.
+    """Return grey values on a logarithmic scale, on which speckle is additive, shape (…, h, w).
 
     Images with negative values are taken to be on such a scale already (decibels); a few may
     come from resampling. Masked pixels get the median.
     """
-    values = window.values[window.valid]
-    if values.size == 0:
-        return np.zeros_like(window.values)
-    if is_logarithmic(window):
-        return np.where(window.valid, window.values, median(values))
-    positive = values[values > 0]
+    return each(_compressed, window.values, window.valid)
+
+
+def _compressed(values: NDArray[np.float32], valid: NDArray[np.bool_]) -> NDArray[np.float32]:
+    known = values[valid]
+    if known.size == 0:
+        return np.zeros_like(values)
+    if _is_logarithmic(known):
+        return np.where(valid, values, median(known))
+    positive = known[known > 0]
     middle = median(positive) if positive.size else np.float32(1)
-    filled = np.where(window.valid, window.values, middle)
+    filled = np.where(valid, values, middle)
     return np.log(np.maximum(filled, 0) / middle + np.float32(_LOG_OFFSET))
 
 
 def is_logarithmic(window: Patch) -> bool:
     """Return whether grey values are in decibels already: many are negative."""
-    values = window.values[window.valid]
-    return values.size > 0 and bool(np.mean(values < 0) > _NEGATIVE_SHARE)
+    return _is_logarithmic(window.values[window.valid])
+
+
+def _is_logarithmic(known: NDArray[np.float32]) -> bool:
+    return bool(np.count_nonzero(known < 0) > _NEGATIVE_SHARE * known.size)
 
 
 def orientation_fields(window: Patch) -> NDArray[np.complex64]:
-    """Return the squared gradients of a window at all of `SCALES_PX`, shape (scales, h, w)."""
+    """Return the squared gradients of a window at all of `SCALES_PX`, shape (scales, …, h, w)."""
     return squared_gradients(compress(window), window.valid)
 
 
@@ -73,32 +83,32 @@ def squared_gradients(
     Parameters
     ----------
     compressed, valid
-        Grey values (see `compress`) and which of them count, shape (h, w).
+        Grey values (see `compress`) and which of them count, shape (…, h, w).
     scales_px
         Standard deviations of the Gaussian derivatives.
 
     Returns
     -------
-    Shape (scales, h, w).
+    Shape (scales, …, h, w).
     """
-    gradients = np.stack([_gradient(compressed, scale) for scale in scales_px])
-    gx, gy = gradients[:, 0], gradients[:, 1]
-    square_x, square_y = gx * gx, gy * gy
-    # Not cv2.magnitude, whose last digits depend on where arrays lie in memory.
-    size = np.sqrt(square_x + square_y)
-    rounding = np.float32(_ROUNDING * np.abs(compressed).max(initial=0))
-    usable = size > rounding
-    if not valid.all():
-        usable &= np.stack([_erode(valid, scale) for scale in scales_px])
-    typical = np.array([_typical(s[u]) for s, u in zip(size, usable, strict=True)], np.float32)
-    divisor = (size + typical[:, None, None]) * size
-    weight = np.zeros_like(size)
-    np.divide(1, divisor, out=weight, where=usable)
-    real, imaginary = (square_x - square_y) * weight, 2 * gx * gy * weight
-    fields = np.empty((*size.shape, 2), np.float32)
-    for field, *parts in zip(fields, real, imaginary, strict=True):
-        cv2.merge(parts, field)
-    return fields.view(np.complex64)[..., 0]
+    fields = np.empty((len(scales_px), *compressed.shape), np.complex64)
+    largest = np.abs(compressed).max(axis=(-2, -1), keepdims=True, initial=0)
+    rounding = np.float32(_ROUNDING) * largest
+    whole = valid.all()
+    for field, scale in zip(fields, scales_px, strict=True):
+        gx, gy = _gradient(compressed, scale)
+        square_x, square_y = gx * gx, gy * gy
+        # Not cv2.magnitude, whose last digits depend on where arrays lie in memory.
+        size = np.sqrt(square_x + square_y)
+        usable = size > rounding
+        if not whole:
+            usable &= _erode(valid, scale)
+        divisor = (size + _typical(size, usable)) * size
+        divisor[~usable] = np.inf
+        weight = 1 / divisor
+        field.real = (square_x - square_y) * weight
+        field.imag = 2 * gx * gy * weight
+    return fields
 
 
 def edge_strength(finest: NDArray[np.complex64], valid: NDArray[np.bool_]) -> Patch:
@@ -107,32 +117,42 @@ def edge_strength(finest: NDArray[np.complex64], valid: NDArray[np.bool_]) -> Pa
     Parameters
     ----------
     finest
-        The squared gradients at the first of `SCALES_PX`, shape (h, w).
+        The squared gradients at the first of `SCALES_PX`, shape (…, h, w).
     valid
-        Which pixels of the image count, shape (h, w). Strength counts a few pixels less.
+        Which pixels of the image count, shape (…, h, w). Strength counts a few pixels less.
     """
     # Not np.abs, whose last digits may depend on where arrays lie in memory.
     strength = np.sqrt(finest.real**2 + finest.imag**2)
     return Patch(strength, valid if valid.all() else _erode(valid, SCALES_PX[0]))
 
 
-def _gradient(image: NDArray[np.float32], scale_px: float) -> NDArray[np.float32]:
-    """Return the derivatives of an image along columns and rows, shape (2, h, w)."""
+def _gradient(images: FloatArray, scale_px: float) -> tuple[FloatArray, FloatArray]:
+    """Return the derivatives of images along columns and along rows, each shape (…, h, w)."""
     reach = int(np.ceil(4 * scale_px))
     x = np.arange(-reach, reach + 1, dtype=np.float64)
     smooth = np.exp(-(x**2) / (2 * scale_px**2))
     smooth /= smooth.sum()
     slope = x / scale_px**2 * smooth
-    border = cv2.BORDER_REFLECT
-    along_cols = cv2.sepFilter2D(image, cv2.CV_32F, slope, smooth, borderType=border)
-    along_rows = cv2.sepFilter2D(image, cv2.CV_32F, smooth, slope, borderType=border)
-    return np.stack([along_cols, along_rows])
+
+    def filtered(along_cols: FloatArray, along_rows: FloatArray) -> FloatArray:
+        kernels, border = (along_cols, along_rows), cv2.BORDER_REFLECT
+        return each(lambda i: cv2.sepFilter2D(i, cv2.CV_32F, *kernels, borderType=border), images)
+
+    return filtered(slope, smooth), filtered(smooth, slope)
 
 
-def _typical(sizes: NDArray[np.float32]) -> np.float32:
-    return np.float32(upper_median(sizes)) if sizes.size else np.float32(1)
+def _typical(sizes: FloatArray, usable: NDArray[np.bool_]) -> FloatArray:
+    """Return the median of usable sizes of each image, 1 where there are none, (…, 1, 1)."""
+    if usable.all():
+        return upper_median(flat(sizes))[..., None, None]
+
+    def median_of(size: FloatArray, counts: NDArray[np.bool_]) -> FloatArray:
+        return upper_median(size[counts] if counts.any() else np.ones(1, np.float32))
+
+    return each(median_of, sizes, usable)[..., None, None]
 
 
 def _erode(valid: NDArray[np.bool_], scale_px: float) -> NDArray[np.bool_]:
     size = 2 * int(np.ceil(_REACH * scale_px)) + 1
-    return cv2.erode(valid.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
+    around = np.ones((size, size), np.uint8)
+    return each(lambda mask: cv2.erode(mask, around), valid.view(np.uint8)) > 0

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
 from .binning import bin_edges, levels
+from .correlation import fast_shape, from_spectrum, spans, spectrum
+from .stacks import each
 from .surface import Surface
 
 FloatArray = NDArray[np.float32]
@@ -69,34 +71,36 @@ class PooledHistogram:
         return cls(edges[0], edges[1], np.log(joint / independent).astype(np.float32))
 
     def surface(self, template: Patch, search: Patch) -> Surface:
-        """Return the sums of information over shifts, in nats, shape (2 r + 1, 2 r + 1).
+        """Return the sums of information over shifts, in nats, shape (…, 2 r + 1, 2 r + 1).
 
         Parameters
         ----------
         template
-            The chip; invalid pixels take no part.
+            The chip, or a stack of them, (…, h, w); invalid pixels take no part.
         search
-            A window with the same centre, larger by r on each side; invalid pixels add 0.
+            Windows with the same centres, larger by r on each side; invalid pixels add 0.
         """
         template = smooth(template)
         own = levels(template.values, self.template_edges)
         other = levels(search.values, self.search_edges)
         # What is invalid takes a level of its own, without information.
         other[~search.valid] = self.information.shape[1]
-        total = np.zeros((), np.float32)
-        for level in np.unique(own[template.valid]):
-            information = np.append(self.information[level], np.float32(0))[other]
+        shape, total = fast_shape(other.shape[-2:]), np.zeros((), np.complex64)
+        for level, information in enumerate(self.information):
             pixels = (template.valid & (own == level)).astype(np.float32)
-            total = total + cv2.matchTemplate(information, pixels, cv2.TM_CCORR)
-        span = search.values.shape[0] - template.values.shape[0] + 1
-        return np.broadcast_to(total, (span, span)).astype(np.float32)
+            found = np.append(information, np.float32(0))[other]
+            total = total + spectrum(pixels, shape).conj() * spectrum(found, shape)
+        return np.asarray(from_spectrum(total, shape, spans(own, other)), np.float32)
 
 
 def smooth(patch: Patch) -> Patch:
     """Return a patch with its power averaged over what is valid around each pixel."""
     counts = patch.valid.astype(np.float32)
-    side = (_SMOOTH_PX, _SMOOTH_PX)
+
+    def mean(image: FloatArray) -> FloatArray:
+        return np.asarray(cv2.blur(image, (_SMOOTH_PX, _SMOOTH_PX)), np.float32)
+
     # Running sums leave a little, of either sign, where all is 0.
-    power = np.maximum(cv2.blur(np.square(patch.values) * counts, side), 0)
-    share = np.maximum(cv2.blur(counts, side), np.float32(1e-6))
+    power = np.maximum(each(mean, np.square(patch.values) * counts), 0)
+    share = np.maximum(each(mean, counts), np.float32(1e-6))
     return Patch(np.sqrt(power / share), patch.valid)

@@ -18,6 +18,7 @@ from .correlation import MINIMUM_OVERLAP, overlap_share
 from .description import Description
 from .measures import MEASURES
 from .order_statistics import upper_median
+from .stacks import each, flat
 
 Surface = NDArray[np.float32]
 
@@ -63,17 +64,16 @@ class SimilaritySettings:
 
 
 def normalise(surface: Surface) -> Surface:
-    """Return a surface in robust standard deviations from its median (median and MAD)."""
-    centred = surface - upper_median(surface)
-    spread = 1.4826 * upper_median(np.abs(centred))
-    if spread <= _FLAT:
-        return np.zeros_like(surface)
-    return (centred / np.float32(spread)).astype(np.float32)
+    """Return surfaces, (…, ny, nx), in robust standard deviations from their medians (by MAD)."""
+    centred = surface - upper_median(flat(surface))[..., None, None]
+    spread = np.float32(1.4826) * upper_median(flat(np.abs(centred)))[..., None, None]
+    return (centred / np.where(spread > _FLAT, spread, np.inf)).astype(np.float32)
 
 
 def detrend(surface: Surface, width_px: float = TREND_PX) -> Surface:
-    """Return a surface without its slow trend, normalised."""
-    return normalise(surface - cv2.GaussianBlur(surface, (0, 0), width_px))
+    """Return surfaces, (…, ny, nx), without their slow trend, normalised."""
+    trend = each(lambda one: cv2.GaussianBlur(one, (0, 0), width_px), surface)
+    return normalise(surface - trend)
 
 
 def describe(window: Patch, chip_pixels: int, settings: SimilaritySettings) -> Description:
@@ -82,7 +82,7 @@ def describe(window: Patch, chip_pixels: int, settings: SimilaritySettings) -> D
     Parameters
     ----------
     window
-        The window, with `description.BORDER_PX` on each side.
+        The window, or a stack of them, with `description.BORDER_PX` on each side.
     chip_pixels
         Number of pixels of the template that will be matched.
     settings
@@ -104,7 +104,7 @@ def similarity_surface(
     Parameters
     ----------
     template
-        Description of the chip, shape (h, w).
+        Description of the chip, shape (h, w), or of a stack of them, (…, h, w).
     search
         Description of a window with the same centre, larger by `radius` on each side.
     radius
@@ -118,15 +118,16 @@ def similarity_surface(
 
     Returns
     -------
-    Surface, shape (2 radius + 1, 2 radius + 1), float32: rows and columns by which the search
+    Surface, shape (…, 2 radius + 1, 2 radius + 1), float32: rows and columns by which the search
     window's content lies further down and right than the template's. Shifts with too little
     overlap get 0, the background's value.
     """
-    parts = [
-        _standardised(MEASURES[name](template, search, radius, context)) * _WEIGHTS.get(name, 1.0)
-        for name in settings.measures
-    ]
-    surface = normalise(np.sum(parts, axis=0))
+    shape = *template.patch.values.shape[:-2], 2 * radius + 1, 2 * radius + 1
+    total = np.zeros(shape, np.float32)
+    for name in settings.measures:
+        values = MEASURES[name](template, search, radius, context)
+        total += _standardised(values.reshape(-1, *shape)) * np.float32(_WEIGHTS.get(name, 1.0))
+    surface = normalise(total)
     if template.patch.all_valid and search.patch.all_valid:
         return surface
     overlap = overlap_share(template.patch, search.patch)
@@ -135,5 +136,5 @@ def similarity_surface(
 
 def _standardised(values: NDArray[np.floating]) -> Surface:
     """Return the detrended sum of one or several surfaces of a measure, each normalised."""
-    parts = [detrend(surface) for surface in values.reshape(-1, *values.shape[-2:])]
-    return parts[0] if len(parts) == 1 else normalise(np.sum(parts, axis=0))
+    parts = detrend(values)
+    return parts[0] if len(parts) == 1 else normalise(parts.sum(axis=0))
