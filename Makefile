@@ -6,6 +6,7 @@ SHELL := /bin/bash
 VENV := .venv
 PY := $(VENV)/bin/python
 PLUGIN := dist/groundtie_qgis.zip
+QUICK := -m "not slow"
 
 .PHONY: help install demo check test test-newest test-debian test-qgis test-newer-qgis lint bench
 .PHONY: fuzz failures plugin docs clean
@@ -29,17 +30,19 @@ demo: install ## simulate a SAR-optical pair, register it, compare with the trut
 	$(PY) scripts/demo.py demo
 
 check: lint ## lint and the quick tests of every module, in a minute or so
-	env -u GROUNDTIE_REQUIRE_QGIS $(PY) -m pytest -n 2 --dist=loadfile -m "not slow" \
+	env -u GROUNDTIE_REQUIRE_QGIS $(PY) -m pytest -n 2 --dist=loadfile $(QUICK) \
 		--ignore=tests/qgis --durations=0 --durations-min=2
 
-test: test-newest test-debian test-qgis ## everything; the product with Debian's packages, too
+test: test-newest test-debian test-qgis ## everything; quick tests and QGIS with Debian's packages
 
 test-newest: lint
 	env -u GROUNDTIE_REQUIRE_QGIS $(PY) -m pytest --ignore=tests/qgis
 
-# What looks at the repository or at the benchmarks is the same with any packages.
+# The quick tests meet every module, and test-qgis runs the tools with the same packages. What looks
+# at the repository or at the benchmarks is the same with any. `make test-debian QUICK=` runs all.
 test-debian:
-	scripts/test_debian.sh --ignore=tests/house --ignore=tests/benchmarks --ignore=tests/qgis
+	scripts/test_debian.sh $(QUICK) --ignore=tests/house --ignore=tests/benchmarks \
+		--ignore=tests/qgis
 
 # A process of its own: a crash of QGIS must not take the other results with it.
 test-qgis: plugin
