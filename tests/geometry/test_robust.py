@@ -138,6 +138,7 @@ def test_consensus_is_the_same_however_many_samples_are_looked_at_together(
     assert find_consensus(px, found, 2.0, kind, 7).to_json() == usual.to_json()
 
 
+@pytest.mark.slow
 def test_memory_of_the_consensus_is_bounded() -> None:
     """All residuals of 600 samples of 50 000 pairs would take 480 MB."""
     px, found, _ = matches("affine", 50_000, 0.5, 4)
