@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from groundtie.errors import ParameterError
-from groundtie.geometry.views import View, parse_view, read_view
+from groundtie.geometry.views import View, parse_view, read_view, split_views
 
 STAC = {
     "view:azimuth": 100.0,
@@ -26,6 +26,26 @@ def test_words() -> None:
     assert parse_view("radar azimuth=280 incidence=35.5") == View("radar", 280.0, 35.5)
     words = "Camera azimuth=250°, incidence=12, sun-azimuth=155, sun-elevation=48°"
     assert parse_view(words) == View("camera", 250.0, 12.0, 155.0, 48.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (None, (None, None)),
+        ("a.json", ("a.json", None)),
+        ("; camera azimuth=1", (None, "camera azimuth=1")),
+        ("a.json;b.json", ("a.json", "b.json")),
+    ],
+)
+def test_the_references_view_stands_first(
+    words: str | None, expected: tuple[str | None, str | None]
+) -> None:
+    assert split_views(words) == expected
+
+
+def test_a_pair_has_two_views() -> None:
+    with pytest.raises(ParameterError, match="states 3 views"):
+        split_views("a.json; b.json; c.json")
 
 
 def test_an_items_azimuth_points_from_the_sensor_to_the_ground(tmp_path: Path) -> None:

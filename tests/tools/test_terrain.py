@@ -83,6 +83,7 @@ def test_what_wrong_heights_displace_is_taken_out_and_warped(hills: Path, tmp_pa
         ({"views": "terrain moon"}, "states no light: give 'terrain sun' or"),
         ({"views": "terrain sun azimuth=400"}, "states no light"),
         ({"views": "terrain sun"}, "needs its azimuth"),
+        ({"views": "terrain radar; camera azimuth=1 incidence=2"}, "go with a surface model"),
     ],
 )
 def test_what_does_not_go_together_is_refused(
@@ -90,6 +91,13 @@ def test_what_does_not_go_together_is_refused(
 ) -> None:
     with pytest.raises(ParameterError, match=message):
         groundtie.coregister(hills / "reference.tif", hills / "input.tif", **given)
+
+
+def test_register_takes_the_view_of_a_terrain_model_only(hills: Path) -> None:
+    with pytest.raises(ParameterError, match="view of a terrain model only"):
+        groundtie.register(
+            hills / "reference.tif", hills / "input.tif", views="radar azimuth=280 incidence=35"
+        )
 
 
 @pytest.mark.parametrize(
