@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import cv2
@@ -32,18 +33,19 @@ def correlate(template: NDArray[Any], search: NDArray[Any]) -> NDArray[np.float3
     -------
     Array of shape (…, ny, nx), float32.
     """
+    shape, (rows, cols) = fast_shape(search), spans(template, search)
     if np.iscomplexobj(template):
-        parts = [(template.real, search.real), (template.imag, search.imag)]
+        product = scipy.fft.fft2(template, shape).conj() * scipy.fft.fft2(search, shape)
+        found = scipy.fft.ifft2(product, overwrite_x=True)[..., :rows, :cols].real
     else:
-        parts = [(template, search)]
-    shape = fast_shape(search.shape[-2:])
-    products = (spectrum(t, shape).conj() * spectrum(s, shape) for t, s in parts)
-    return from_spectrum(sum(products), shape, spans(template, search))
+        product = spectrum(template, shape).conj() * spectrum(search, shape)
+        found = from_spectrum(product, shape, (rows, cols))
+    return np.asarray(found, np.float32)
 
 
-def fast_shape(shape: tuple[int, ...]) -> tuple[int, int]:
-    """Return a shape that is quick to transform, in which one of a search window fits."""
-    rows, cols = (scipy.fft.next_fast_len(n, real=True) for n in shape)
+def fast_shape(search: NDArray[Any]) -> tuple[int, int]:
+    """Return a shape that is quick to transform and not smaller than a search window."""
+    rows, cols = (scipy.fft.next_fast_len(n) for n in search.shape[-2:])
     return rows, cols
 
 
@@ -68,9 +70,11 @@ def from_spectrum(
     The spectra may be overwritten.
     """
     # Rows that are not asked for are not transformed.
-    lines = scipy.fft.ifft(spectra, axis=-2, overwrite_x=True, workers=workers)
-    found = scipy.fft.irfft(lines[..., : spans[0], :], shape[1], workers=workers)
-    return found[..., : spans[1]]
+    lines = scipy.fft.ifft(spectra, axis=-2, norm="forward", overwrite_x=True, workers=workers)[
+        ..., : spans[0], :
+    ]
+    found = scipy.fft.irfft(lines, shape[1], norm="forward", workers=workers)[..., : spans[1]]
+    return found * found.dtype.type(1 / math.prod(shape))
 
 
 def box_sums(images: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
@@ -91,9 +95,16 @@ def overlap_share(template: Patch, search: Patch) -> NDArray[np.float32]:
     Of stacks of windows, (…, h, w), shares are of the shape (…, ny, nx).
     """
     count = np.maximum(template.valid.sum(axis=(-2, -1), keepdims=True, dtype=np.float32), 1)
-    own, other = (patch.valid.astype(np.float32) for patch in (template, search))
-    overlap = box_sums(other, *own.shape[-2:]) if template.all_valid else correlate(own, other)
-    return overlap / count
+    return _sums_where(template.valid, search.valid.astype(np.float32)) / count
+
+
+def _sums_where(valid: NDArray[np.bool_], images: FloatImage) -> FloatImage:
+    """Return the sums of images over the valid pixels of a template, at all of its shifts."""
+    whole = valid.all(axis=(-2, -1), keepdims=True)
+    sums = box_sums(images, *valid.shape[-2:])
+    return (
+        sums if whole.all() else np.where(whole, sums, correlate(valid.astype(np.float32), images))
+    )
 
 
 def correlate_fields(
@@ -118,14 +129,12 @@ def correlate_fields(
     """
     template_energy = template.real**2 + template.imag**2
     search_energy = search.real**2 + search.imag**2
-    if template_valid.all():
-        energy = box_sums(search_energy, *template_valid.shape[-2:])
-    else:
-        energy = correlate(template_valid.astype(np.float32), search_energy)
-    if search_valid.all():
-        energy = energy * template_energy.sum(axis=(-2, -1), keepdims=True)
-    else:
-        energy = energy * correlate(template_energy, search_valid.astype(np.float32))
+    own_energy = template_energy.sum(axis=(-2, -1), keepdims=True)
+    whole = search_valid.all(axis=(-2, -1), keepdims=True)
+    if not whole.all():
+        seen = correlate(template_energy, search_valid.astype(np.float32))
+        own_energy = np.where(whole, own_energy, seen)
+    energy = _sums_where(template_valid, search_energy) * own_energy
     highest = energy.max(axis=(-2, -1), keepdims=True, initial=0)
     floor = np.float32(1e-6) * np.maximum(highest, np.float32(1e-12))
     found = correlate(template, search) / np.sqrt(np.maximum(energy, floor))
@@ -161,7 +170,7 @@ def _correlate_grey(
     tm, sm = t_valid.astype(np.float32), s_valid.astype(np.float32)
     t, s = (t - own_mean) * tm, (s - mean) * sm
     # Each of a window's three spectra serves several sums.
-    shape = fast_shape(s.shape)
+    shape = fast_shape(s)
     of_t = spectrum(np.stack([tm, t, t * t]), shape).conj()
     of_s = spectrum(np.stack([sm, s, s * s]), shape)
     products = of_t[[0, 1, 0, 1, 2, 0]] * of_s[[0, 0, 1, 1, 0, 2]]

@@ -159,7 +159,8 @@ def shift_along(
     count = scipy.fft.next_fast_len(max(sizes) if wrap else sum(sizes))
     cross = scipy.fft.fft(reference, count).conj() * scipy.fft.fft(input, count)
     weights = np.exp(-(scipy.fft.fftfreq(count) ** 2) / (2 * _SHIFT_BAND**2))
-    values = normalise(scipy.fft.fftshift(scipy.fft.ifft(whitened(cross) * weights).real))
+    line = scipy.fft.fftshift(scipy.fft.ifft(whitened(cross) * weights).real)
+    values = normalise(line[None])[0]
     shifts = np.arange(count) - count // 2 - (sizes[1] - sizes[0]) / 2
     best = int(np.where(np.abs(shifts) <= reach_px + 0.5, values, -np.inf).argmax())
     return float(shifts[best] + gaussian_peak(values, best)), float(values[best])
