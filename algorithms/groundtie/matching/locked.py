@@ -13,27 +13,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
+from ..geometry.judging import SMALLEST_INLIER_SHARE
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
-from ..similarity.sameness import REACH_PX, covered, reduced, same_windows, without
+from ..similarity.sameness import (
+    REACH_PX,
+    WINDOW_PX,
+    Gradients,
+    count_same,
+    covered,
+    reduced,
+    same_windows,
+    without,
+)
 from .matcher import FloatArray, Places
 
 # A transform that moves all of the overlap by whole pixels, but for this, may be content's.
 _LARGEST_BEND_PX = 1.5
 
-# More of the area varies alike than two sensors show of one ground; what else they show is asked
-# then. Measured on the shared pairs at their true places: up to 1.6 % of different sensors and
-# physics. With content drawn into both: 3 to 80 %.
-_LEAST_AREA = 0.02
+# Gradients above this percentile of their image are strong.
+_STRONG_PERCENT = 70.0
+
+# Offsets at which gradients are the same by chance: so many, on a spiral around the found one.
+_CHANCE_OFFSETS = 8
+_FIRST_TURN_PX, _GOLDEN_ANGLE = 7.0, np.pi * (3 - np.sqrt(5))
+
+# So many times as many as by chance, and this share of the strong ones, are more than two sensors
+# show of one ground; what else they show is asked then. Measured on the shared pairs at their true
+# places: 0.7 to 2.2 % of different sensors and physics, up to twice as many as by chance; 3.5 to
+# 28 % of one sensor's. With content drawn into both: 3 to 43 %.
+_LEAST_RATIO, _LEAST_SHARE = 2.0, 0.02
 
 # One sensor's views of one ground vary alike where nothing is drawn, too, on images that are so
-# much smaller. Measured as above: 35 % of what is left and more; of different ground 0 to 25 %.
+# much smaller. Measured as above: 25 % of what is left and more; of different ground 0 to 21 %.
 # Less than a tenth of the area shows nothing.
 _REDUCTION = 4
-_GROUND_SHARE = 0.35
+_GROUND_SHARE = 0.23
 _LEAST_LEFT = 0.1
+
+# Shares differ, but by chance with 5 %, if they are so many standard errors apart.
+_STANDARD_ERRORS = 1.645
 
 # Nothing is left to be judged of copies: this share is the same, in the images and reduced ones.
 _COPY_SHARE = 0.75
@@ -47,28 +68,43 @@ class Sameness:
 
     Parameters
     ----------
+    gradients, chance
+        Share of the strong gradients that are the same there, and at other offsets.
     area, reduced_area
         Share of the area that varies alike, in the images and in reduced ones.
     ground
         The latter, of what does not vary alike in the images.
+    windows
+        How many windows of the reduced images do not overlap.
     """
 
+    gradients: float
+    chance: float
     area: float
     reduced_area: float
     ground: float
+    windows: float
 
     @property
     def is_evident(self) -> bool:
-        """Whether more is the same than two views show of one ground."""
-        return self.area >= _LEAST_AREA
+        """Whether more is the same than two views show of one ground.
+
+        Or so much of the area that what is the same could make up a share that is believed.
+        """
+        is_more = self.gradients >= max(_LEAST_RATIO * self.chance, _LEAST_SHARE)
+        return is_more or self.area >= SMALLEST_INLIER_SHARE
 
     @property
     def is_explained(self) -> bool:
         """Whether one image is a copy of the other, or both are one sensor's views of one ground.
 
         What is left of them need not confirm the transform, as copies leave nothing, and what one
-        sensor shows alike is most of what it shows.
+        sensor shows alike is most of what it shows. Ground is no less alike in reduced images,
+        where noise has averaged out; noise that is the same in both is.
         """
+        error = np.sqrt(self.area * (1 - self.area) / max(self.windows, 1.0))
+        if self.reduced_area < self.area - _STANDARD_ERRORS * error:
+            return False
         is_copy = min(self.area, self.reduced_area) >= _COPY_SHARE
         return is_copy or self.ground >= _GROUND_SHARE
 
@@ -96,13 +132,15 @@ class LockedContent:
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
 
-        All of a window that varies alike does, not only its middle: what is drawn ends there.
+        What is drawn ends somewhere in the windows that vary alike: all of them is taken, unless
+        the surroundings are one sensor's views of the ground.
         """
         reach = 2 * REACH_PX
         size = piece.width + 2 * reach, piece.height + 2 * reach
         around = piece.window(-reach, -reach, *size)
-        same = covered(same_windows(*_patches(self.pair, around, self.offset_px)))
-        return same[reach:-reach, reach:-reach]
+        same = same_windows(*_patches(self.pair, around, self.offset_px))
+        whole = same if self.sameness.is_explained else covered(same)
+        return whole[reach:-reach, reach:-reach]
 
 
 def find_locked_content(
@@ -129,35 +167,55 @@ def find_locked_content(
     if offset is None:
         return None
 
-    def count(centre: NDArray[np.int_]) -> _Counts:
-        corner, side = centre - places.chip_px // 2, places.chip_px
+    def look(centre: NDArray[np.int_]) -> _Look:
+        side = places.chip_px + 2 * _REACH_PX
+        corner = centre - side // 2
         piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
-        return _count(*_patches(pair, piece, offset))
+        return _Look.of(*_patches(pair, piece, offset))
 
-    counts = list(context.map(count, list(places.centres)))
-    return LockedContent(pair, offset, _sameness(counts))
-
-
-def _sameness(counts: list[_Counts]) -> Sameness:
-    area, reduced_area = (_share([one[k] for one in counts]) for k in (0, 1))
-    least = int(_LEAST_LEFT * sum(one[1][1] for one in counts))
-    return Sameness(area, reduced_area, _share([one[2] for one in counts], least))
+    looks = list(context.map(look, list(places.centres)))
+    return LockedContent(pair, offset, _sameness(looks))
 
 
-# How many pixels are the same, and how many there are: of the images, of reduced ones, and of what
-# is left of the latter without what is the same in the former.
-_Count = tuple[int, int]
-_Counts = tuple[_Count, _Count, _Count]
-
-
-def _count(reference: Patch, input: Patch) -> _Counts:
-    same = same_windows(reference, input)
-    every = int((reference.valid & input.valid).sum())
-    return (
-        (int(same.sum()), every),
-        _count_reduced(reference, input),
-        _count_reduced(without(reference, same), without(input, same)),
+def _sameness(looks: list[_Look]) -> Sameness:
+    strong = (
+        _strong([one.gradients[0] for one in looks]),
+        _strong([one.gradients[1] for one in looks]),
     )
+    same = [_share([one.same(shift, strong) for one in looks]) for shift in _offsets()]
+    area, reduced_area = (_share([one.counts[k] for one in looks]) for k in (0, 1))
+    every = sum(one.counts[1][1] for one in looks)
+    ground = _share([one.counts[2] for one in looks], int(_LEAST_LEFT * every))
+    chance = float(np.median(same[1:]))
+    return Sameness(same[0], chance, area, reduced_area, ground, every / WINDOW_PX**2)
+
+
+_Count = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What one window shows: its gradients, and (same, all) pixels as `LockedContent` has them."""
+
+    gradients: tuple[Gradients, Gradients]
+    counts: tuple[_Count, _Count, _Count]
+
+    @classmethod
+    def of(cls, reference: Patch, input: Patch) -> _Look:
+        same = same_windows(reference, input)
+        rest = without(reference, same), without(input, same)
+        counts = (
+            (int(same.sum()), int((reference.valid & input.valid).sum())),
+            _count_reduced(reference, input),
+            _count_reduced(*rest),
+        )
+        return cls((Gradients.of(reference.inner(_REACH_PX)), Gradients.of(input)), counts)
+
+    def same(self, shift: NDArray[np.int_], strong: tuple[float, float]) -> _Count:
+        """Return how many strong gradients are the same at a shift of the input, and all."""
+        reference, input = self.gradients
+        col, row = (int(_REACH_PX + by) for by in shift)
+        return count_same(reference, input.part(col, row, reference.x.shape), strong)
 
 
 def _count_reduced(reference: Patch, input: Patch) -> _Count:
@@ -169,6 +227,22 @@ def _share(counts: list[_Count], least: int = 1) -> float:
     """Return the share of what is the same, of at least so many."""
     same, every = np.sum(counts, axis=0) if counts else (0, 0)
     return float(same / max(every, least, 1))
+
+
+def _strong(gradients: list[Gradients]) -> float:
+    lengths = [one.length[one.valid] for one in gradients if one.valid.any()]
+    return float(np.percentile(np.concatenate(lengths), _STRONG_PERCENT)) if lengths else 0.0
+
+
+def _offsets() -> NDArray[np.int_]:
+    """Return none, and offsets (x, y) on a spiral around it, shape (n, 2)."""
+    steps = np.arange(_CHANCE_OFFSETS)
+    angle, length = steps * _GOLDEN_ANGLE, _FIRST_TURN_PX + 2 * steps
+    spiral = np.rint(np.column_stack([length * np.cos(angle), length * np.sin(angle)]))
+    return np.vstack([[0, 0], spiral]).astype(int)
+
+
+_REACH_PX = int(np.abs(_offsets()).max())
 
 
 def _patches(pair: ImagePair, piece: Grid, offset_px: tuple[int, int]) -> tuple[Patch, Patch]:

@@ -17,7 +17,7 @@ from scipy.spatial import Delaunay, QhullError
 
 from ..context import Context
 from ..geometry.chance import agreement_probability, log10_chance
-from ..geometry.judging import LARGEST_LOG10_CHANCE
+from ..geometry.judging import LARGEST_LOG10_CHANCE, SMALLEST_INLIER_SHARE
 from ..geometry.models import Model
 from ..rasters.grid import Grid
 from ..similarity.peak import find_peak
@@ -91,10 +91,13 @@ class Survey:
 
     @property
     def is_confirming(self) -> bool:
-        """Whether more of them do than would by chance."""
-        probability = agreement_probability(_SAME_PX, SURVEY_RADIUS_PX)
-        chance = log10_chance(self.confirming, len(self.centres), probability)
-        return chance <= LARGEST_LOG10_CHANCE
+        """Whether more of them do than would by chance, and a share as of check points does."""
+        count = len(self.centres)
+        chance = log10_chance(
+            self.confirming, count, agreement_probability(_SAME_PX, SURVEY_RADIUS_PX)
+        )
+        enough = self.confirming >= SMALLEST_INLIER_SHARE * count
+        return enough and chance <= LARGEST_LOG10_CHANCE
 
     @property
     def height(self) -> float:

@@ -1,4 +1,4 @@
-"""What two arrays have the same: windows that vary alike.
+"""What two arrays have the same: gradients, and windows that vary alike.
 
 Independent views of one ground are similar, but hardly ever the same: noise, light, physics and
 the phase of the pixels differ. What is drawn into both arrays is the same.
@@ -6,7 +6,7 @@ the phase of the pixels differ. What is drawn into both arrays is the same.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -14,14 +14,63 @@ import numpy as np
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask
 
+# Two gradients are the same if they differ by no more than this share of the larger one.
+_SAME_SHARE = 0.25
+
 # Where one thing is drawn into both, their difference varies less than this share of what both
 # vary, in windows of this side; independent content would have it vary as much as both.
 _DIFFERING_SHARE = 0.5
-_WINDOW_PX = 9
-REACH_PX = _WINDOW_PX // 2
+WINDOW_PX = 9
+REACH_PX = WINDOW_PX // 2
 
 # Means of a reduced image need this share of their pixels.
 _LEAST_VALID = 0.25
+
+
+@dataclass(frozen=True)
+class Gradients:
+    """Differences along columns and rows, and where they are known, each shape (h, w)."""
+
+    x: FloatImage
+    y: FloatImage
+    valid: Mask
+
+    @classmethod
+    def of(cls, patch: Patch) -> Gradients:
+        """Return the central differences of a patch."""
+        x, y = (
+            np.asarray(cv2.Sobel(patch.values, cv2.CV_32F, *order, ksize=1), np.float32)
+            for order in ((1, 0), (0, 1))
+        )
+        valid = cv2.erode(patch.valid.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        return cls(x, y, np.asarray(valid))
+
+    def part(self, col: int, row: int, shape: tuple[int, ...]) -> Gradients:
+        """Return a part of a shape from a column and row on."""
+        window = np.s_[row : row + shape[0], col : col + shape[1]]
+        return Gradients(self.x[window], self.y[window], self.valid[window])
+
+    @property
+    def length(self) -> FloatImage:
+        """Their lengths."""
+        return np.asarray(np.hypot(self.x, self.y), np.float32)
+
+
+def count_same(one: Gradients, other: Gradients, strong: tuple[float, float]) -> tuple[int, int]:
+    """Return how many gradients are the same, and how many there are, of those that are strong.
+
+    Parameters
+    ----------
+    one, other
+        Of the same shape.
+    strong
+        The length from which a gradient is strong in the one and in the other.
+    """
+    lengths = one.length, other.length
+    is_strong = one.valid & other.valid & ((lengths[0] > strong[0]) | (lengths[1] > strong[1]))
+    apart = np.hypot(one.x - other.x, one.y - other.y)
+    is_same = apart <= _SAME_SHARE * np.maximum(*lengths)
+    return int((is_strong & is_same).sum()), int(is_strong.sum())
 
 
 def same_windows(one: Patch, other: Patch) -> Mask:
@@ -34,7 +83,7 @@ def same_windows(one: Patch, other: Patch) -> Mask:
 
 def covered(middles: Mask) -> Mask:
     """Return all pixels of windows around some."""
-    window = np.ones((_WINDOW_PX, _WINDOW_PX), np.uint8)
+    window = np.ones((WINDOW_PX, WINDOW_PX), np.uint8)
     return np.asarray(cv2.dilate(middles.astype(np.uint8), window) > 0)
 
 
@@ -61,7 +110,7 @@ def _variance(values: FloatImage, valid: Mask) -> FloatImage:
     """Return the variance of valid values in windows around pixels, shape (h, w)."""
 
     def mean(of: FloatImage) -> FloatImage:
-        return np.asarray(cv2.blur(of, (_WINDOW_PX, _WINDOW_PX)), np.float32)
+        return np.asarray(cv2.blur(of, (WINDOW_PX, WINDOW_PX)), np.float32)
 
     # About a middle: of squares of large values, small differences would lose digits.
     middle = np.median(values[valid]) if valid.any() else 0.0
