@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
-from ..geometry.judging import SMALLEST_INLIER_SHARE
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
@@ -45,6 +44,10 @@ _FIRST_TURN_PX, _GOLDEN_ANGLE = 7.0, np.pi * (3 - np.sqrt(5))
 # places: 0.7 to 2.2 % of different sensors and physics, up to twice as many as by chance; 3.5 to
 # 28 % of one sensor's. With content drawn into both: 3 to 43 %.
 _LEAST_RATIO, _LEAST_SHARE = 2.0, 0.02
+
+# The same of the area that varies alike: where holes or waters of one shape are cut into noise,
+# few gradients are the same. Different sensors' views: up to 12 %.
+_LEAST_AREA = 0.15
 
 # One sensor's views of one ground vary alike where nothing is drawn, too, on images that are so
 # much smaller. Measured as above: 25 % of what is left and more; of different ground 0 to 21 %.
@@ -87,12 +90,9 @@ class Sameness:
 
     @property
     def is_evident(self) -> bool:
-        """Whether more is the same than two views show of one ground.
-
-        Or so much of the area that what is the same could make up a share that is believed.
-        """
+        """Whether more is the same than two views show of one ground."""
         is_more = self.gradients >= max(_LEAST_RATIO * self.chance, _LEAST_SHARE)
-        return is_more or self.area >= SMALLEST_INLIER_SHARE
+        return is_more or self.area >= _LEAST_AREA
 
     @property
     def is_explained(self) -> bool:
