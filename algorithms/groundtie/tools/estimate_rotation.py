@@ -188,7 +188,7 @@ def estimate_rotation(
 
     Whatever the search, its pose is accepted only if an exhaustive search over all rotations
     finds it, too, and nothing nearly as good elsewhere, and if pieces all over the images match
-    there, each by itself. They give the pose its last digits.
+    there, each by itself.
     """
     if smallest_scale > largest_scale:
         raise ParameterError("the smallest scale is larger than the largest")
