@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from affine import Affine
@@ -35,7 +37,7 @@ def looked_at(
     with open_raster(paths[0]) as one, open_raster(paths[1]) as other:
         pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
         transform = Transform(model or shift_on_map(0.0, 0.0), pair.grid.crs, other.grid)
-        return find_locked_content(pair, transform, survey_places(pair.grid), context)
+        return find_locked_content(pair, transform, survey_places(pair.grid), 4.0, context)
 
 
 def drawn_into(values: np.ndarray, offset: tuple[int, int] = (0, 0)) -> np.ndarray:
@@ -66,17 +68,45 @@ def test_lines_that_are_drawn_over_different_ground_are_found(
     assert locked.sameness.gradients > 10 * locked.sameness.chance
 
 
-def test_its_mask_covers_the_lines_and_little_else(tmp_path: Path, context: Context) -> None:
-    reference, input = drawn_into(sensed(1)), drawn_into(sensed(2, place=9))
-    locked = looked_at(tmp_path, reference, input, context)
+def test_lines_are_found_at_their_offset_where_the_transform_bends(
+    tmp_path: Path, context: Context
+) -> None:
+    """It goes from -2 to 3 columns: half between what is drawn and the ground."""
+    grid = utm_grid(SIDE, SIDE)
+    around = Frame(Affine.translation(*grid.pixel_to_map([grid.centre_px])[0]))
+    model = PolynomialModel("affine", around, np.array([[5.0, 0.0], [50 / 3200, 0.0], [0.0, 0.0]]))
+    images = drawn_into(sensed(1)), drawn_into(sensed(2, place=9))
+    locked = looked_at(tmp_path, *images, context, model)
+    assert locked is not None and locked.offset_px == (0, 0)
+    assert locked.sameness.is_evident
+
+
+def masked(folder: Path, locked: LockedContent | None) -> np.ndarray:
+    """Return what is masked of 200 × 200 pixels, from column 20 and row 0 on."""
     assert locked is not None
-    with open_raster(tmp_path / "reference.tif") as one, open_raster(tmp_path / "input.tif") as two:
+    with open_raster(folder / "reference.tif") as one, open_raster(folder / "input.tif") as two:
         pair = make_pair(Image(one), Image(two), search_radius_m=500.0)
-        grid = one.grid.window(20, 0, 200, 200)
-        mask = LockedContent(pair, locked.offset_px, locked.sameness)(grid)
+        return replace(locked, pair=pair)(one.grid.window(20, 0, 200, 200))
+
+
+def test_its_mask_covers_the_lines_and_their_surroundings_alone(
+    tmp_path: Path, context: Context
+) -> None:
+    plain = sensed(1), sensed(2, place=9)
+    without = masked(tmp_path, looked_at(tmp_path, *plain, context))
+    mask = masked(tmp_path, looked_at(tmp_path, *map(drawn_into, plain), context))
     drawn = drawn_into(np.zeros((SIDE, SIDE)))[:200, 20:220] > 0
-    assert mask[drawn].mean() > 0.95
-    assert mask[60:90, 40:70].mean() < 0.2
+    assert mask[drawn].mean() > 0.99
+    # Windows of 9 pixels that reach the rows 40 to 43 and 110 to 113, or such columns, end here.
+    far = np.s_[52:102, 32:82]
+    np.testing.assert_array_equal(mask[far], without[far])
+
+
+def test_edges_of_what_is_drawn_are_masked(tmp_path: Path, context: Context) -> None:
+    """Beside a line, windows vary alike no more where the ground varies as much as the line."""
+    reference, input = (drawn_into(3 * sensed(n, place=place)) for n, place in ((1, 1), (2, 9)))
+    mask = masked(tmp_path, looked_at(tmp_path, reference, input, context))
+    assert mask[39:45].mean() > 0.9
 
 
 @pytest.mark.parametrize("place", [1, 9])
@@ -110,6 +140,29 @@ def test_one_pattern_of_noise_over_different_ground_is_found(
     assert not locked.sameness.is_explained
 
 
+def test_a_pattern_of_rows_and_columns_is_no_ground(tmp_path: Path, context: Context) -> None:
+    """It is left in reduced images, too, but less than in the images."""
+    rng = np.random.default_rng(6)
+    pattern = 0.6 * rng.normal(size=(SIDE, SIDE))
+    pattern += rng.normal(size=(SIDE, 1)) + rng.normal(size=(1, SIDE))
+    reference, input = sensed(1, 0.1) + pattern, sensed(2, 0.1, place=9) + pattern
+    locked = looked_at(tmp_path, reference, input, context)
+    assert locked is not None and locked.sameness.is_evident
+    assert locked.sameness.reduced_area < locked.sameness.area
+    assert not locked.sameness.is_explained
+
+
+def test_the_same_holes_are_found_in_speckle(tmp_path: Path, context: Context) -> None:
+    """They have no gradients but at their edges, where the ground differs."""
+    holes = cv2.GaussianBlur(texture(SIDE, SIDE, 5), (0, 0), 12.0) > 0
+    speckled = (np.random.default_rng(n).exponential(3.0, holes.shape) for n in (1, 2))
+    reference, input = (np.where(holes, -3.0, values) for values in speckled)
+    locked = looked_at(tmp_path, reference, input, context)
+    assert locked is not None and 0.4 < locked.sameness.area < 0.6
+    assert replace(locked.sameness, gradients=0.0).is_evident
+    assert not locked.sameness.is_explained
+
+
 @pytest.mark.parametrize("side_m", [10.0, 12.0])
 def test_arrays_that_are_resampled_have_none(
     tmp_path: Path, context: Context, side_m: float
@@ -130,4 +183,5 @@ def test_arrays_that_are_resampled_have_none(
         )
         model = turned if side_m == 10.0 else shift_on_map(0.0, 0.0)
         transform = Transform(model, pair.grid.crs, other.grid)
-        assert find_locked_content(pair, transform, survey_places(pair.grid), context) is None
+        found = pair, transform, survey_places(pair.grid), 1.5
+        assert find_locked_content(*found, context) is None

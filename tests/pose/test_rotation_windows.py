@@ -137,6 +137,15 @@ class TestWithoutGeoreferencing:
 
 
 class TestTransform:
+    @pytest.mark.parametrize("pose", [Pose(), Pose(-30.0, 1.3, (12.5, -7.0))])
+    def test_the_pose_of_its_transform_is_the_same(self, tmp_path: Path, pose: Pose) -> None:
+        reference = waves(tmp_path / "reference.tif", utm_grid(100, 80))
+        windows = windows_of(reference, waves(tmp_path / "input.tif", utm_grid(90, 120, 20.0)))
+        again = windows.pose(windows.transform(pose))
+        assert again.rotation_deg == pytest.approx(pose.rotation_deg, abs=1e-6)
+        assert again.scale == pytest.approx(pose.scale, rel=1e-9)
+        np.testing.assert_allclose(again.shift_px, pose.shift_px, atol=1e-6)
+
     def test_without_a_pose_it_is_the_nominal_one(self, tmp_path: Path) -> None:
         grid, other = utm_grid(100, 90), utm_grid(60, 50, 20.0)
         windows = windows_of(waves(tmp_path / "a.tif", grid), waves(tmp_path / "b.tif", other))

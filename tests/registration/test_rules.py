@@ -481,7 +481,8 @@ def test_rules_of_registrations_judge_poses(
 ) -> None:
     """Of 21 chips, about as many agree as at the worst real pose that is right."""
     errors = np.where(np.arange(21) < agreeing, 4.9, 5.1)
-    assert refusing(PoseSurveyEvidence(PoseSurvey(errors, found, rest))) == expected
+    moved = estimated(fit_points()).transform
+    assert refusing(PoseSurveyEvidence(PoseSurvey(errors, found, rest, moved))) == expected
 
 
 def test_a_failure_that_is_no_refusal_decides_nothing() -> None:

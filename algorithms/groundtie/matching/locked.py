@@ -17,11 +17,17 @@ from ..geometry.transform import Transform
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
-from ..similarity.sameness import Gradients, count_same, reduced, same_windows, without
+from ..similarity.sameness import (
+    REACH_PX,
+    WINDOW_PX,
+    Gradients,
+    count_same,
+    covered,
+    reduced,
+    same_windows,
+    without,
+)
 from .matcher import FloatArray, Places
-
-# A transform that moves all of the overlap by whole pixels, but for this, may be content's.
-_LARGEST_BEND_PX = 1.5
 
 # Gradients above this percentile of their image are strong.
 _STRONG_PERCENT = 70.0
@@ -36,12 +42,19 @@ _FIRST_TURN_PX, _GOLDEN_ANGLE = 7.0, np.pi * (3 - np.sqrt(5))
 # 28 % of one sensor's. With content drawn into both: 3 to 43 %.
 _LEAST_RATIO, _LEAST_SHARE = 2.0, 0.02
 
+# The same of the area that varies alike: where holes or waters of one shape are cut into noise,
+# few gradients are the same. Different sensors' views: up to 12 %.
+_LEAST_AREA = 0.15
+
 # One sensor's views of one ground vary alike where nothing is drawn, too, on images that are so
-# much smaller. Measured as above: 35 % of what is left and more; of different ground 0 to 25 %.
+# much smaller. Measured as above: 25 % of what is left and more; of different ground 0 to 21 %.
 # Less than a tenth of the area shows nothing.
 _REDUCTION = 4
-_GROUND_SHARE = 0.35
+_GROUND_SHARE = 0.23
 _LEAST_LEFT = 0.1
+
+# Shares differ, but by chance with 5 %, if they are so many standard errors apart.
+_STANDARD_ERRORS = 1.645
 
 # Nothing is left to be judged of copies: this share is the same, in the images and reduced ones.
 _COPY_SHARE = 0.75
@@ -61,6 +74,8 @@ class Sameness:
         Share of the area that varies alike, in the images and in reduced ones.
     ground
         The latter, of what does not vary alike in the images.
+    windows
+        How many windows of the reduced images do not overlap.
     """
 
     gradients: float
@@ -68,19 +83,25 @@ class Sameness:
     area: float
     reduced_area: float
     ground: float
+    windows: float
 
     @property
     def is_evident(self) -> bool:
         """Whether more is the same than two views show of one ground."""
-        return self.gradients >= max(_LEAST_RATIO * self.chance, _LEAST_SHARE)
+        is_more = self.gradients >= max(_LEAST_RATIO * self.chance, _LEAST_SHARE)
+        return is_more or self.area >= _LEAST_AREA
 
     @property
     def is_explained(self) -> bool:
         """Whether one image is a copy of the other, or both are one sensor's views of one ground.
 
         What is left of them need not confirm the transform, as copies leave nothing, and what one
-        sensor shows alike is most of what it shows.
+        sensor shows alike is most of what it shows. Ground is no less alike in reduced images,
+        where noise has averaged out; noise that is the same in both is.
         """
+        error = np.sqrt(self.area * (1 - self.area) / max(self.windows, 1.0))
+        if self.reduced_area < self.area - _STANDARD_ERRORS * error:
+            return False
         is_copy = min(self.area, self.reduced_area) >= _COPY_SHARE
         return is_copy or self.ground >= _GROUND_SHARE
 
@@ -106,12 +127,21 @@ class LockedContent:
     sameness: Sameness
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
-        """Return around which pixels of a part of the matching grid both are the same, (h, w)."""
-        return same_windows(*_patches(self.pair, piece, self.offset_px))
+        """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
+
+        What is drawn ends somewhere in the windows that vary alike: all of them is taken, unless
+        the surroundings are one sensor's views of the ground.
+        """
+        reach = 2 * REACH_PX
+        size = piece.width + 2 * reach, piece.height + 2 * reach
+        around = piece.window(-reach, -reach, *size)
+        same = same_windows(*_patches(self.pair, around, self.offset_px))
+        whole = same if self.sameness.is_explained else covered(same)
+        return whole[reach:-reach, reach:-reach]
 
 
 def find_locked_content(
-    pair: ImagePair, transform: Transform, places: Places, context: Context
+    pair: ImagePair, transform: Transform, places: Places, bend_px: float, context: Context
 ) -> LockedContent | None:
     """Return what the images repeat where a transform puts the input's array.
 
@@ -123,6 +153,8 @@ def find_locked_content(
         What was found.
     places
         Where it is looked for.
+    bend_px
+        A transform that moves all of the overlap by whole pixels, but for this, may be content's.
     context
         Threads.
 
@@ -130,30 +162,52 @@ def find_locked_content(
     -------
     None where the transform does more than move the array, which nothing drawn into both does.
     """
-    offset = _whole_offset(pair, transform)
-    if offset is None:
+    moved = _moved_px(pair, transform)
+    if moved is None:
+        return None
+    offset = np.rint(np.median(moved, axis=0))
+    bend = np.abs(moved - offset).max()
+    # Not a number, where the transform has none, is no small bend either.
+    if not bend <= bend_px:
         return None
 
-    def look(centre: NDArray[np.int_]) -> _Look:
-        side = places.chip_px + 2 * _REACH_PX
-        corner = centre - side // 2
-        piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
-        return _Look.of(*_patches(pair, piece, offset))
+    def looks_at(offset_px: tuple[int, int]) -> list[_Look]:
+        def look(centre: NDArray[np.int_]) -> _Look:
+            side = places.chip_px + 2 * _REACH_PX
+            corner = centre - side // 2
+            piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
+            return _Look.of(*_patches(pair, piece, offset_px))
 
-    looks = list(context.map(look, list(places.centres)))
-    return LockedContent(pair, offset, _sameness(looks))
+        return list(context.map(look, list(places.centres)))
+
+    found = int(offset[0]), int(offset[1])
+    looks = looks_at(found)
+    # Content has one offset; a transform that bends passes through several.
+    right, down = _most_alike(looks, int(np.rint(bend)))
+    if (right, down) != (0, 0):
+        found = found[0] + right, found[1] + down
+        looks = looks_at(found)
+    return LockedContent(pair, found, _sameness(looks))
+
+
+def _most_alike(looks: list[_Look], radius_px: int) -> tuple[int, int]:
+    """Return at which offset, up to a radius, the most strong gradients are the same."""
+    reach = min(radius_px, _REACH_PX)
+    steps = range(-reach, reach + 1)
+    shifts = [(right, down) for right in steps for down in steps]
+    strong = _strong_of(looks)
+    same = [_share([one.same(np.array(shift), strong) for one in looks]) for shift in shifts]
+    return shifts[int(np.argmax(same))]
 
 
 def _sameness(looks: list[_Look]) -> Sameness:
-    strong = (
-        _strong([one.gradients[0] for one in looks]),
-        _strong([one.gradients[1] for one in looks]),
-    )
+    strong = _strong_of(looks)
     same = [_share([one.same(shift, strong) for one in looks]) for shift in _offsets()]
     area, reduced_area = (_share([one.counts[k] for one in looks]) for k in (0, 1))
-    least = int(_LEAST_LEFT * sum(one.counts[1][1] for one in looks))
-    ground = _share([one.counts[2] for one in looks], least)
-    return Sameness(same[0], float(np.median(same[1:])), area, reduced_area, ground)
+    every = sum(one.counts[1][1] for one in looks)
+    ground = _share([one.counts[2] for one in looks], int(_LEAST_LEFT * every))
+    chance = float(np.median(same[1:]))
+    return Sameness(same[0], chance, area, reduced_area, ground, every / WINDOW_PX**2)
 
 
 _Count = tuple[int, int]
@@ -195,6 +249,14 @@ def _share(counts: list[_Count], least: int = 1) -> float:
     return float(same / max(every, least, 1))
 
 
+def _strong_of(looks: list[_Look]) -> tuple[float, float]:
+    """Return the length from which gradients of either image are strong."""
+    return (
+        _strong([one.gradients[0] for one in looks]),
+        _strong([one.gradients[1] for one in looks]),
+    )
+
+
 def _strong(gradients: list[Gradients]) -> float:
     lengths = [one.length[one.valid] for one in gradients if one.valid.any()]
     return float(np.percentile(np.concatenate(lengths), _STRONG_PERCENT)) if lengths else 0.0
@@ -221,8 +283,11 @@ def _patches(pair: ImagePair, piece: Grid, offset_px: tuple[int, int]) -> tuple[
     return pair.reference_patch(piece), pair.input_patch(piece, to_input)
 
 
-def _whole_offset(pair: ImagePair, transform: Transform) -> tuple[int, int] | None:
-    """Return by how many columns and rows a transform moves the input; None: it does more."""
+def _moved_px(pair: ImagePair, transform: Transform) -> FloatArray | None:
+    """Return by how many columns and rows a transform moves the input, on a lattice, (n, 2).
+
+    None where pixels differ in size.
+    """
     grid, reference = pair.grid, pair.reference.source.grid
     if not np.isclose(grid.pixel_size_m, reference.pixel_size_m, rtol=1e-6):
         return None
@@ -230,9 +295,4 @@ def _whole_offset(pair: ImagePair, transform: Transform) -> tuple[int, int] | No
         np.linspace(0, grid.width - 1, _LATTICE), np.linspace(0, grid.height - 1, _LATTICE)
     )
     xy = grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
-    moved = transform(xy) - reference.map_to_pixel(xy)
-    offset = np.rint(np.median(moved, axis=0))
-    # Not a number, where the transform has none, is no small bend either.
-    if not np.abs(moved - offset).max() <= _LARGEST_BEND_PX:
-        return None
-    return int(offset[0]), int(offset[1])
+    return np.asarray(transform(xy) - reference.map_to_pixel(xy))

@@ -52,11 +52,14 @@ class PoseSurvey:
         Where they match around the pose that was moved by all of them.
     rest
         The same without content that is the same in both arrays; None: there is none.
+    transform
+        The pose that was moved by all of them.
     """
 
     errors_px: FloatArray
     survey: Survey
     rest: Rest | None
+    transform: Transform
 
 
 def survey_pose(
@@ -87,7 +90,8 @@ def survey_pose(
     elsewhere_px = max(accuracy_share * max(level.width, level.height), POSE_TOLERANCE_PX)
     survey = survey_model(matcher, model, quiet, None, places, elsewhere_px)
     moved = Transform(model, transform.crs, transform.input_grid)
-    return PoseSurvey(errors, survey, survey_rest(matcher, moved, places, elsewhere_px, quiet))
+    rest = survey_rest(matcher, moved, places, elsewhere_px, quiet)
+    return PoseSurvey(errors, survey, rest, moved)
 
 
 def _covered(grid: Grid, transform: Transform) -> Grid:

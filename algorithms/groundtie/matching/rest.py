@@ -63,7 +63,9 @@ def survey_rest(
         Threads and progress.
     """
     pair = matcher.pair
-    locked = find_locked_content(pair, transform, survey_places(pair.grid), context.quiet())
+    # What lies nearer than elsewhere is where the transform has it.
+    found = pair, transform, survey_places(pair.grid), elsewhere_px
+    locked = find_locked_content(*found, context.quiet())
     if locked is None or not locked.sameness.is_evident:
         return None
     # What a mask leaves is little: one measure alone would miss most of it.

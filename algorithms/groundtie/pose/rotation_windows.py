@@ -72,6 +72,19 @@ class PoseWindows:
         model = fit_model("affine", xy, self.nominal.model(self.input_grid.pixel_to_map(moved)))
         return Transform(model, self.nominal.crs, self.nominal.input_grid)
 
+    def pose(self, transform: Transform) -> Pose:
+        """Return the pose that is nearest to a transform between the rasters."""
+        own, other = self.reference_grid.centre_px, self.input_grid.centre_px
+        outline = self.reference_grid.outline(4)
+        input_px = transform(self.reference_grid.pixel_to_map(outline))
+        moved = self.input_grid.map_to_pixel(self.nominal.inverse(input_px))
+        # Rotation and scale of positions (right, down) are one complex factor.
+        start, end = ((px - centre) @ (1, 1j) for px, centre in ((outline, own), (moved, other)))
+        design = np.column_stack([start, np.ones(len(start))])
+        factor, shift = np.linalg.lstsq(design, end, rcond=None)[0]
+        rotation = -float(np.degrees(np.angle(factor)))
+        return Pose(rotation, float(abs(factor)), (float(shift.real), float(shift.imag)))
+
 
 def read_windows(
     reference: Image,

@@ -186,8 +186,8 @@ def confirm_pose(
     windows: PoseWindows,
     pose: Pose,
     context: Context,
-) -> PoseVerdict:
-    """Return the verdict on a pose that the search believes, by chips all over the images.
+) -> tuple[PoseVerdict, Pose]:
+    """Return the verdict on a pose that the search believes, and where chips all over move it.
 
     Parameters
     ----------
@@ -207,6 +207,8 @@ def confirm_pose(
     found = survey_pose(pair, windows.transform(pose), SAME_SHARE, context)
     refusal = first_refusal(PoseSurveyEvidence(found))
     if refusal is None:
-        return verdict
+        # What the chips confirm is where they have moved it.
+        return verdict, windows.pose(found.transform)
     rule, reason = refusal
-    return replace(verdict, accepted=False, reason=reason, rule=rule.name, advice=rule.advice)
+    refused = replace(verdict, accepted=False, reason=reason, rule=rule.name, advice=rule.advice)
+    return refused, pose

@@ -20,7 +20,8 @@ _SAME_SHARE = 0.25
 # Where one thing is drawn into both, their difference varies less than this share of what both
 # vary, in windows of this side; independent content would have it vary as much as both.
 _DIFFERING_SHARE = 0.5
-_WINDOW_PX = 9
+WINDOW_PX = 9
+REACH_PX = WINDOW_PX // 2
 
 # Means of a reduced image need this share of their pixels.
 _LEAST_VALID = 0.25
@@ -80,6 +81,12 @@ def same_windows(one: Patch, other: Patch) -> Mask:
     return valid & (differing <= _DIFFERING_SHARE * both)
 
 
+def covered(middles: Mask) -> Mask:
+    """Return all pixels of windows around some."""
+    window = np.ones((WINDOW_PX, WINDOW_PX), np.uint8)
+    return np.asarray(cv2.dilate(middles.astype(np.uint8), window) > 0)
+
+
 def without(patch: Patch, hidden: Mask) -> Patch:
     """Return a patch of which some pixels are invalid besides."""
     return replace(patch, valid=patch.valid & ~hidden)
@@ -103,7 +110,7 @@ def _variance(values: FloatImage, valid: Mask) -> FloatImage:
     """Return the variance of valid values in windows around pixels, shape (h, w)."""
 
     def mean(of: FloatImage) -> FloatImage:
-        return np.asarray(cv2.blur(of, (_WINDOW_PX, _WINDOW_PX)), np.float32)
+        return np.asarray(cv2.blur(of, (WINDOW_PX, WINDOW_PX)), np.float32)
 
     # About a middle: of squares of large values, small differences would lose digits.
     middle = np.median(values[valid]) if valid.any() else 0.0

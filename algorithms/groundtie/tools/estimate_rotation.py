@@ -214,7 +214,8 @@ def estimate_rotation(
         verdict = judge_pose(*pair, limits, found, exhaustive, context.quiet())
         pose = found[0].pose if found else None
         if verdict.accepted and pose is not None:
-            verdict = confirm_pose(verdict, (own, other), windows, pose, context.quiet())
+            images = own, other
+            verdict, pose = confirm_pose(verdict, images, windows, pose, context.quiet())
         context.update(0.8, "writing")
         if picture is not None:
             title = f"{'accepted' if verdict.accepted else 'refused'}: {verdict.reason}"
