@@ -13,8 +13,7 @@ from .matcher import Places
 from .parts import LEAST_PROPORTION
 from .survey import Survey, survey_model, survey_places
 
-# A transform that moves all of the overlap by whole pixels, but for this, may be content's. Of more
-# that bends, one sensor's views of a relief are taken for content (oo-port, rotated by a pose).
+# A transform that moves all of the overlap by whole pixels, but for this, may be content's.
 _LARGEST_BEND_PX = 1.5
 
 
