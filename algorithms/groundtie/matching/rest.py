@@ -13,6 +13,9 @@ from .matcher import Places
 from .parts import LEAST_PROPORTION
 from .survey import Survey, survey_model, survey_places
 
+# A transform that moves all of the overlap by whole pixels, but for this, may be content's.
+_LARGEST_BEND_PX = 1.5
+
 
 @dataclass(frozen=True)
 class Rest:
@@ -63,8 +66,7 @@ def survey_rest(
         Threads and progress.
     """
     pair = matcher.pair
-    # What lies nearer than elsewhere is where the transform has it.
-    found = pair, transform, survey_places(pair.grid), elsewhere_px
+    found = pair, transform, survey_places(pair.grid), _LARGEST_BEND_PX
     locked = find_locked_content(*found, context.quiet())
     if locked is None or not locked.sameness.is_evident:
         return None
