@@ -10,7 +10,7 @@ from raster_files import write_raster
 from turned_pairs import turned_pair
 
 from groundtie.context import Context
-from groundtie.matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey, survey_pose
+from groundtie.matching.pose_survey import PoseSurvey, survey_pose
 from groundtie.pose.pose import Pose
 from groundtie.pose.rotation_windows import read_windows
 from groundtie.rasters.pair import Image, make_pair
@@ -36,9 +36,9 @@ def surveyed(folder: Path, pose: Pose, context: Context, **more: int) -> PoseSur
 @pytest.mark.parametrize("pose", [TRUTH, replace(TRUTH, rotation_deg=51.5)])
 def test_chips_confirm_a_pose(pose: Pose, tmp_path: Path, context: Context) -> None:
     found = surveyed(tmp_path, pose, context)
-    assert len(found.errors_px) >= 15
-    assert (found.errors_px <= POSE_TOLERANCE_PX).mean() > 0.9
-    assert found.survey.confirming > 0.9 * len(found.errors_px)
+    assert len(found.agrees) >= 15
+    assert found.agrees.mean() > 0.9
+    assert found.survey.confirming > 0.9 * len(found.agrees)
     assert found.survey.parts == []
     assert found.rest is None
 
@@ -54,9 +54,9 @@ def test_chips_confirm_no_wrong_pose(
     pose: Pose, more: dict[str, int], tmp_path: Path, context: Context
 ) -> None:
     found = surveyed(tmp_path, pose, context, **more)
-    assert (found.errors_px <= POSE_TOLERANCE_PX).mean() < 0.25
+    assert found.agrees.mean() < 0.25
 
 
 def test_images_that_hardly_overlap_confirm_nothing(tmp_path: Path, context: Context) -> None:
     found = surveyed(tmp_path, replace(TRUTH, shift_px=(170.0, 150.0)), context)
-    assert (found.errors_px <= POSE_TOLERANCE_PX).mean() < 0.25
+    assert found.agrees.mean() < 0.25

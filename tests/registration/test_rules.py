@@ -50,6 +50,7 @@ from groundtie.registration.evidence import (
     RegistrationEvidence,
     SearchEvidence,
 )
+from groundtie.registration.layover import CHIPS_MEAN_OVER_SCATTER
 from groundtie.registration.pose_verdict import PoseEvidence, PoseSurveyEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
@@ -67,6 +68,7 @@ RANK = (
     stages.AGREEMENT,
     stages.ERROR,
     stages.SCENE,
+    stages.LAYOVER,
     stages.SURVEY,
     stages.REFINEMENT,
     stages.SERIES,
@@ -189,6 +191,11 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, ground_shift_px=1.1),
         evidence(GOOD, ground_shift_px=0.9),
     ),
+    "despeckled town": (evidence(GOOD, scene=DESPECKLED), evidence(GOOD, scene=SPECKLED)),
+    "town matched whole": (
+        evidence(two_thirds(20), scene=PERHAPS),
+        evidence(two_thirds(26), scene=PERHAPS),
+    ),
     "layover of check points": (
         evidence(np.concatenate([scatter(24, 0.3), displaced(20, 4, 10)]), layover_factor=3.0),
         evidence(np.concatenate([scatter(24, 0.3), displaced(10, 4, 10)]), layover_factor=3.0),
@@ -196,11 +203,6 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "layover of fit points": (
         evidence(GOOD, estimated(fit_with(displaced(100, -2.5, 2.5))), layover_factor=3.0),
         evidence(GOOD, estimated(fit_with(displaced(100, -0.8, 0.8))), layover_factor=3.0),
-    ),
-    "despeckled town": (evidence(GOOD, scene=DESPECKLED), evidence(GOOD, scene=SPECKLED)),
-    "town matched whole": (
-        evidence(two_thirds(20), scene=PERHAPS),
-        evidence(two_thirds(26), scene=PERHAPS),
     ),
     "part elsewhere": (
         evidence(GOOD, survey=survey(35, part=14)),
@@ -457,11 +459,12 @@ def test_only_rules_of_the_evidence_are_asked() -> None:
         stages.AGREEMENT,
         stages.ERROR,
         stages.SCENE,
+        stages.LAYOVER,
         stages.SURVEY,
     )
     assert RefinementEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.REFINEMENT)
     assert PoseEvidence.stages == (stages.POSE,)
-    assert PoseSurveyEvidence.stages == (stages.AGREEMENT, stages.SURVEY)
+    assert PoseSurveyEvidence.stages == (stages.AGREEMENT, stages.LAYOVER, stages.SURVEY)
 
 
 @pytest.mark.parametrize(
@@ -481,8 +484,31 @@ def test_rules_of_registrations_judge_poses(
 ) -> None:
     """Of 21 chips, about as many agree as at the worst real pose that is right."""
     errors = np.where(np.arange(21) < agreeing, 4.9, 5.1)
+    residuals = np.column_stack([errors, np.zeros(21)])
     moved = estimated(fit_points()).transform
-    assert refusing(PoseSurveyEvidence(PoseSurvey(errors, found, rest, moved))) == expected
+    assert refusing(PoseSurveyEvidence(PoseSurvey(residuals, found, rest, moved))) == expected
+
+
+@pytest.mark.parametrize(
+    ("residuals", "factor", "expected"),
+    [
+        (scatter(25, 0.5), CHIPS_MEAN_OVER_SCATTER, []),
+        (
+            np.concatenate([scatter(13, 0.5), displaced(12, 6, 12)]),
+            CHIPS_MEAN_OVER_SCATTER,
+            ["layover of check points"],
+        ),
+        (displaced(25, -2, 2), CHIPS_MEAN_OVER_SCATTER, ["layover of fit points"]),
+        (displaced(25, -2, 2), None, []),
+    ],
+)
+def test_poses_of_elevated_objects_are_refused(
+    residuals: np.ndarray, factor: float | None, expected: list[str]
+) -> None:
+    """Between two radar images, canopies and roofs lie along a line beside the ground."""
+    moved = estimated(fit_points()).transform
+    found = PoseSurvey(residuals, survey(), None, moved)
+    assert refusing(PoseSurveyEvidence(found, factor)) == expected
 
 
 def test_a_failure_that_is_no_refusal_decides_nothing() -> None:

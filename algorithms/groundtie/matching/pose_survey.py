@@ -45,9 +45,9 @@ class PoseSurvey:
 
     Parameters
     ----------
-    errors_px
-        Distance of each chip's match from where a pose has it that was moved without the chip,
-        shape (n,).
+    residuals_px
+        Where each chip matches, (x, y) from where a pose has it that was moved without the chip,
+        shape (n, 2); infinite where too few chips are left.
     survey
         Where they match around the pose that was moved by all of them.
     rest
@@ -56,10 +56,15 @@ class PoseSurvey:
         The pose that was moved by all of them.
     """
 
-    errors_px: FloatArray
+    residuals_px: FloatArray
     survey: Survey
     rest: Rest | None
     transform: Transform
+
+    @property
+    def agrees(self) -> NDArray[np.bool_]:
+        """Which chips agree with a pose that was moved without them, shape (n,)."""
+        return np.asarray(np.hypot(*self.residuals_px.T) <= POSE_TOLERANCE_PX)
 
 
 def survey_pose(
@@ -83,7 +88,7 @@ def survey_pose(
     level = places.grid
     quiet = context.quiet()
     kept, surfaces = matcher.match_forward(transform.model, places, SURVEY_RADIUS_PX, quiet)
-    errors = _cross_fitted_px(kept, surfaces, places.chip_px)
+    residuals = _cross_fitted_px(kept, surfaces, places.chip_px)
     model = transform.model
     if len(kept) >= _FEWEST:
         model = compose(model, _moved(kept, surfaces), level)
@@ -91,7 +96,7 @@ def survey_pose(
     survey = survey_model(matcher, model, quiet, None, places, elsewhere_px)
     moved = Transform(model, transform.crs, transform.input_grid)
     rest = survey_rest(matcher, moved, places, elsewhere_px, quiet)
-    return PoseSurvey(errors, survey, rest, moved)
+    return PoseSurvey(residuals, survey, rest, moved)
 
 
 def _covered(grid: Grid, transform: Transform) -> Grid:
@@ -128,13 +133,13 @@ def _moved(px: NDArray[np.int_], surfaces: Surfaces) -> Model:
 
 
 def _cross_fitted_px(px: NDArray[np.int_], surfaces: Surfaces, pitch_px: int) -> FloatArray:
-    """Return how far each chip matches from where every other chip, as on a chessboard, has it."""
+    """Return where each chip matches, from where every other chip, as on a chessboard, has it."""
     is_black = (px // pitch_px).sum(axis=1) % 2 == 0
-    errors = np.full(len(px), np.inf)
+    residuals = np.full((len(px), 2), np.inf)
     if min(is_black.sum(), (~is_black).sum()) < _FEWEST:
-        return errors
+        return residuals
     found = px + np.array([find_peak(surface).shift_px for surface in surfaces])
     for which in (is_black, ~is_black):
         model = _moved(px[~which], surfaces[~which])
-        errors[which] = np.hypot(*(found[which] - model(px[which].astype(float))).T)
-    return errors
+        residuals[which] = found[which] - model(px[which].astype(float))
+    return residuals

@@ -37,18 +37,9 @@ from .scene import SceneInfo
 from .surface_masks import ModelFit
 
 # Stages of a registration, in the order in which their rules are asked.
-TIE_POINTS, SEARCH, ASSESSMENT, POSE, AGREEMENT, ERROR, SCENE, SURVEY, REFINEMENT, SERIES = (
-    "tie points",
-    "search",
-    "assessment",
-    "pose",
-    "agreement",
-    "error",
-    "scene",
-    "survey",
-    "refinement",
-    "series",
-)
+TIE_POINTS, SEARCH, ASSESSMENT, POSE = "tie points", "search", "assessment", "pose"
+AGREEMENT, ERROR, SCENE, LAYOVER = "agreement", "error", "scene", "layover"
+SURVEY, REFINEMENT, SERIES = "survey", "refinement", "series"
 
 # Scatter along a line is that of heights unless chance explains it with more than 5 %, as usual.
 _LOG10_SIGNIFICANCE = math.log10(0.05)
@@ -165,7 +156,7 @@ class RegistrationEvidence:
     rest: Rest | None = None
     input_fit: ModelFit | None = None
 
-    stages: ClassVar = (AGREEMENT, ERROR, SCENE, SURVEY)
+    stages: ClassVar = (AGREEMENT, ERROR, SCENE, LAYOVER, SURVEY)
 
     @cached_property
     def counted(self) -> TiePoints:
@@ -176,6 +167,17 @@ class RegistrationEvidence:
     def residuals_px(self) -> FloatArray:
         """Their residuals, in matching pixels, shape (n, 2)."""
         return self.counted.residual_on(self.grid, self.estimate.transform)
+
+    @property
+    def check_residuals_px(self) -> FloatArray:
+        """Residuals of all check points, in matching pixels, shape (n, 2)."""
+        return self.check.residual_on(self.grid, self.estimate.transform)
+
+    @property
+    def fit_residuals_px(self) -> FloatArray:
+        """Residuals of the points of the fit, in matching pixels, shape (n, 2)."""
+        used = self.estimate.points.take(self.estimate.points.used)
+        return used.residual_on(self.grid, self.estimate.transform)
 
     @cached_property
     def held_out(self) -> HeldOut:

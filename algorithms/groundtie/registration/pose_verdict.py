@@ -20,11 +20,14 @@ from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..pose.pose import Pose, PoseFound
 from ..pose.rotation_windows import PoseWindows
 from ..pose.search import find_poses, moved_px
+from ..rasters.grid import FloatArray
 from ..rasters.pair import Image, make_pair
 from ..rasters.patch import Patch
 from ..similarity.surface import SimilaritySettings
-from .evidence import AGREEMENT, POSE, SURVEY, HeldOut
+from .evidence import AGREEMENT, LAYOVER, POSE, SURVEY, HeldOut
+from .layover import CHIPS_MEAN_OVER_SCATTER
 from .rules.pose import SAME_SHARE
+from .scene import SceneInfo
 from .verdict import first_refusal
 
 
@@ -144,12 +147,17 @@ class PoseSurveyEvidence:
     ----------
     found
         What they show.
+    layover_factor
+        See `RegistrationEvidence`.
     """
 
     found: PoseSurvey
+    layover_factor: float | None = None
 
-    stages: ClassVar = (AGREEMENT, SURVEY)
+    stages: ClassVar = (AGREEMENT, LAYOVER, SURVEY)
     mask: ClassVar = MaskUsed(NONE, None, 1.0, "a pose is searched for without a mask")
+    radius_px: ClassVar = SURVEY_RADIUS_PX
+    max_error_px: ClassVar = POSE_TOLERANCE_PX
 
     @property
     def survey(self) -> Survey:
@@ -162,10 +170,20 @@ class PoseSurveyEvidence:
         return self.found.rest
 
     @property
+    def check_residuals_px(self) -> FloatArray:
+        """Where each chip matches, from where the others have it, shape (n, 2)."""
+        return self.found.residuals_px
+
+    @property
+    def fit_residuals_px(self) -> FloatArray:
+        """The same of chips that agree, shape (n, 2)."""
+        return self.found.residuals_px[self.found.agrees]
+
+    @property
     def held_out(self) -> HeldOut:
         """How each chip agrees with the pose as the others have it."""
-        agrees = self.found.errors_px <= POSE_TOLERANCE_PX
-        agreeing, total = int(agrees.sum()), len(agrees)
+        errors = np.hypot(*self.fit_residuals_px.T)
+        agreeing, total = len(errors), len(self.found.agrees)
         probability = agreement_probability(POSE_TOLERANCE_PX, SURVEY_RADIUS_PX)
         return HeldOut(
             "chips all over",
@@ -173,7 +191,7 @@ class PoseSurveyEvidence:
             total,
             min(log10_chance(agreeing, total, probability), 0.0),
             LARGEST_LOG10_CHANCE,
-            float(np.sqrt(np.mean(self.found.errors_px[agrees] ** 2))) if agreeing else math.nan,
+            float(np.sqrt(np.mean(errors**2))) if agreeing else math.nan,
             POSE_TOLERANCE_PX,
             math.nan,
             "the overlap",
@@ -205,7 +223,8 @@ def confirm_pose(
     scale = max(pose.scale, 1 / pose.scale)
     pair = make_pair(*images, None, windows.radius_m, 180.0, scale)
     found = survey_pose(pair, windows.transform(pose), SAME_SHARE, context)
-    refusal = first_refusal(PoseSurveyEvidence(found))
+    factor = CHIPS_MEAN_OVER_SCATTER if SceneInfo.of(pair).are_both_radar else None
+    refusal = first_refusal(PoseSurveyEvidence(found, factor))
     if refusal is None:
         # What the chips confirm is where they have moved it.
         return verdict, windows.pose(found.transform)

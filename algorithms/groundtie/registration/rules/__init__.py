@@ -14,6 +14,7 @@ from __future__ import annotations
 from .agreement import AGREEMENT_RULES
 from .assessment import ASSESSMENT_RULES
 from .error import ERROR_RULES
+from .layover import LAYOVER_RULES
 from .pose import POSE_RULES
 from .refinement import REFINEMENT_RULES
 from .rule import Rule
@@ -33,6 +34,7 @@ RULES: tuple[Rule, ...] = (
     *AGREEMENT_RULES,
     *ERROR_RULES,
     *SCENE_RULES,
+    *LAYOVER_RULES,
     *SURVEY_RULES,
     *REFINEMENT_RULES,
     *SERIES_RULES,

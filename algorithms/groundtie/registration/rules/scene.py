@@ -1,15 +1,13 @@
-"""Rules on what the images are: dense towns, their ground, and layover."""
+"""Rules on what the images are: dense towns and their ground."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...geometry.judging import TOLERANCE_PX
 from ...masks.choice import LAYER, REGIONS, SURFACE
 from ..evidence import SCENE, RegistrationEvidence
-from ..layover import count_on_line, scatter_along_line_px
 from ..surface_masks import CLEAR_CORRELATION
-from .rule import Rule
+from .rule import GROUND, Rule
 
 # What the ground shows of a fit that was not made on it: it is itself good to a pixel or two.
 # Measured by the suite city.
@@ -24,16 +22,10 @@ _LEAST_GROUND_SHARE, _LARGEST_EXTRAPOLATED = 0.10, 0.5
 # in images of 700 px, the suite rpc_city has errors up to 6 px; with five and more, below 1 px.
 _FEWEST_IN_SENSOR_GEOMETRY = 5
 
-# Check points along a line, over those that agree: from here on it is open which are the ground.
-# Measured on pairs that were registered right: up to 0.56; on others: from 0.78 (suite sar_sar).
-_LAYOVER_SHARE = 2 / 3
-
 # From this share of agreeing check points on, more agree than roofs alone do. Measured where a
 # dense town was matched whole and a wrong registration accepted: 28 to 56 %; on other scenes with
 # as many strong scatterers: from 72 % (suite city).
 _CLEAR_SHARE = 2 / 3
-
-_GROUND = "give a mask of the ground, such as roads and waters"
 
 
 def _little_ground(evidence: RegistrationEvidence) -> str | None:
@@ -76,33 +68,6 @@ def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
     return f"the ground alone matches {evidence.ground_shift_px:.1f} px elsewhere"
 
 
-def _layover_of_check_points(evidence: RegistrationEvidence) -> str | None:
-    if evidence.layover_factor is None:
-        return None
-    residuals = evidence.check.residual_on(evidence.grid, evidence.estimate.transform)
-    agreeing = int((np.hypot(*residuals.T) <= TOLERANCE_PX).sum())
-    on_line = count_on_line(residuals, evidence.radius_px)
-    if on_line < max(_LAYOVER_SHARE * agreeing, 1):
-        return None
-    return (
-        f"{on_line} of {len(residuals)} check points lie along a line beside the {agreeing} that "
-        "agree, as layover displaces elevated objects"
-    )
-
-
-def _layover_of_fit_points(evidence: RegistrationEvidence) -> str | None:
-    if evidence.layover_factor is None:
-        return None
-    used = evidence.estimate.points.take(evidence.estimate.points.used)
-    scatter = scatter_along_line_px(used.residual_on(evidence.grid, evidence.estimate.transform))
-    if evidence.layover_factor * scatter <= evidence.max_error_px:
-        return None
-    return (
-        f"matched points scatter by {scatter:.1f} px along a line more than across it, as layover "
-        "scatters heights"
-    )
-
-
 def _despeckled_town(evidence: RegistrationEvidence) -> str | None:
     kind = evidence.mask.kind
     if evidence.scene is None or kind in (LAYER, SURFACE):
@@ -134,7 +99,7 @@ SCENE_RULES: tuple[Rule, ...] = (
         f"{1 - _LARGEST_EXTRAPOLATED:.0%} of the overlap, or, in an image with RPCs, fewer than "
         f"{_FEWEST_IN_SENSOR_GEOMETRY} check points that agree",
         "suite rpc_city",
-        _GROUND,
+        GROUND,
         _little_ground,
     ),
     Rule(
@@ -153,33 +118,15 @@ SCENE_RULES: tuple[Rule, ...] = (
         f"the ground of a dense town alone matches more than {_LARGEST_GROUND_SHIFT_PX:g} px from "
         "the transform",
         "suite city",
-        _GROUND,
+        GROUND,
         _ground_elsewhere,
-    ),
-    Rule(
-        "layover of check points",
-        SCENE,
-        "between two radar images, check points that disagree lie along one line, "
-        f"{_LAYOVER_SHARE:.2f} times as many as agree",
-        "suite sar_sar",
-        _GROUND,
-        _layover_of_check_points,
-    ),
-    Rule(
-        "layover of fit points",
-        SCENE,
-        "between two radar images, points of the fit scatter so far along one line that heights "
-        "displace the model by more than the largest error",
-        "[Mauchly1940]; suite sar_sar",
-        _GROUND,
-        _layover_of_fit_points,
     ),
     Rule(
         "despeckled town",
         SCENE,
         "a radar image of a dense town has no speckle, by which its ground is found",
         "suite city",
-        f"give the radar image unfiltered; {_GROUND}",
+        f"give the radar image unfiltered; {GROUND}",
         _despeckled_town,
     ),
     Rule(
@@ -188,7 +135,7 @@ SCENE_RULES: tuple[Rule, ...] = (
         f"less than {_CLEAR_SHARE:.0%} of the check points agree, an image may be a radar's of a "
         "dense town, and its ground did not confirm the transform",
         "suite city",
-        f"if it is a town, give the radar image unfiltered; {_GROUND}",
+        f"if it is a town, give the radar image unfiltered; {GROUND}",
         _town_matched_whole,
     ),
 )
