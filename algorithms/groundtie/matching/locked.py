@@ -47,8 +47,9 @@ _LEAST_RATIO, _LEAST_SHARE = 2.0, 0.02
 _LEAST_AREA = 0.15
 
 # One sensor's views of one ground vary alike where nothing is drawn, too, on images that are so
-# much smaller. Measured as above: 25 % of what is left and more; of different ground 0 to 21 %.
-# Less than a tenth of the area shows nothing.
+# much smaller. Measured as above: 25 % of what is left and more; of different ground 0 to 21 %, of
+# ground that was displaced up to 43 %, which is left to the rules on a second place. Less than a
+# tenth of the area shows nothing.
 _REDUCTION = 4
 _GROUND_SHARE = 0.23
 _LEAST_LEFT = 0.1
