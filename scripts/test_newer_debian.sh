@@ -49,12 +49,12 @@ END
     archives+=("$folder"/apt/cache/archives/*.deb)
     for archive in "${archives[@]}"; do
         dpkg-deb --fsys-tarfile "$archive" |
-            tar --extract --keep-directory-symlink --directory="$folder/unpacking"
+            tar --extract --keep-directory-symlink --directory="$folder/unpacking" || return 1
     done
     # What the packages' scripts, which do not run, would have set up.
     printf '/usr/lib/%s-linux-gnu/%s\n' "$(uname -m)" blas "$(uname -m)" lapack \
         >"$folder/unpacking/etc/ld.so.conf.d/alternatives.conf"
-    chroot "$folder/unpacking" /usr/sbin/ldconfig
+    chroot "$folder/unpacking" /usr/sbin/ldconfig || return 1
     mkdir -p "$folder/unpacking"/{proc,dev,repository,data}
     rm -rf "$folder/apt"
     mv "$folder/unpacking" "$folder/root"

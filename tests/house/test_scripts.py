@@ -168,6 +168,31 @@ def test_missing_qgis_is_never_skipped_in_ci(
     assert f"test_debian.sh: {word}: the tests with QGIS" in done.stderr.splitlines()[-1]
 
 
+@pytest.mark.parametrize(
+    ("user", "without", "reason"),
+    [
+        (1000, "", "needs root"),
+        (0, "apt-get", "needs apt-get"),
+        (0, "", "trixie's packages cannot be had"),
+    ],
+)
+@pytest.mark.parametrize(("required", "code"), [("0", 0), ("1", 1)])
+def test_where_a_newer_qgis_cannot_be_had_a_line_states_it(
+    machine: Machine, user: int, without: str, reason: str, required: str, code: int
+) -> None:
+    """The third machine's apt-get names no source."""
+    machine.add("id", f"echo {user}")
+    machine.add("realpath", "echo /data")
+    for name in ("sed", "head"):
+        (machine.bin / name).symlink_to(shutil.which(name) or f"/usr/bin/{name}")
+    if without:
+        (machine.bin / without).unlink()
+    done = machine.run("scripts/test_newer_debian.sh", GROUNDTIE_REQUIRE_QGIS=required)
+    assert done.returncode == code
+    line = f"test_newer_debian.sh: {reason}: the tests with trixie's QGIS did not run"
+    assert done.stderr.splitlines() == [line]
+
+
 def test_suite_runs_in_a_clean_environment(machine: Machine) -> None:
     machine.add("dpkg-query", "echo -n installed")
     (machine.bin / "env").unlink()
@@ -190,13 +215,14 @@ def test_suite_runs_in_a_clean_environment(machine: Machine) -> None:
 
 
 def test_ci_runs_the_tests_then_the_demo(machine: Machine) -> None:
-    machine.add("make", 'read -r line && exit 9; [ "$GROUNDTIE_REQUIRE_QGIS" = 1 ]')
+    required = '[ "$GROUNDTIE_REQUIRE_QGIS" = 1 ] || [ "$1" = test-newer-qgis ]'
+    machine.add("make", f"read -r line && exit 9; {required}")
     done = machine.run(".ci/run")
     assert done.returncode == 0, done.stderr
-    assert machine.calls("make") == ["make test --jobs=2 --output-sync=target", "make demo"]
+    assert machine.calls("make") == ["make test", "make test-newer-qgis", "make demo"]
 
 
-@pytest.mark.parametrize(("failing", "ran"), [("test", 1), ("demo", 2)])
+@pytest.mark.parametrize(("failing", "ran"), [("test", 1), ("test-newer-qgis", 2), ("demo", 3)])
 def test_ci_fails_with_its_parts(machine: Machine, failing: str, ran: int) -> None:
     machine.add("make", f'[ "$1" != {failing} ]')
     assert machine.run(".ci/run").returncode == 1
