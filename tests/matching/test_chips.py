@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 
 import numpy as np
@@ -77,6 +78,15 @@ def test_chips_without_enough_valid_pixels_are_left_out(pair: ImagePair, context
     assert none.centres.shape == (0, 2)
     assert none.combined.shape == (0, 21, 21)
     assert none.radius_px == RADIUS
+
+
+def test_the_log_has_why_chips_are_left_out_and_where(
+    pair: ImagePair, context: Context, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.DEBUG, "groundtie"):
+        matched(matcher(pair), context, np.array([[130, 120], [1000, 900]]))
+    assert "a chip is not matched: 0 % of it are valid" in caplog.text
+    assert "chips that are not matched lie at [[1000, 900]]" in caplog.text
 
 
 def test_chips_that_are_held_out_are_left_out(pair: ImagePair, context: Context) -> None:

@@ -172,7 +172,8 @@ class ChipMatcher:
             return of_kept(surfaces, kept, reference, input)
 
         kept, found = windows.map(of_stacks, context)
-        _log.debug("%d of %d chips can be matched", len(kept), len(places.centres))
+        left_out = np.delete(places.centres, kept, axis=0)
+        _log.debug("chips that are not matched lie at %s", left_out.tolist())
         span = 2 * radius_px + 1
         none = np.zeros((0, len(ways), span, span), np.float32)
         return places.centres[kept], np.stack(found) if found else none
@@ -181,7 +182,13 @@ class ChipMatcher:
         least = self.least_valid
         if least is None:
             least = LEAST_VALID_MASKED if self.pair.is_masked else _LEAST_VALID
-        return core.valid_share >= least and not core.is_flat
+        if core.valid_share < least:
+            _log.debug("a chip is not matched: %.0f %% of it are valid", 100 * core.valid_share)
+            return False
+        if core.is_flat:
+            _log.debug("a chip is not matched: it is constant")
+            return False
+        return True
 
 
 def _forward(
