@@ -19,6 +19,7 @@ from groundtie.errors import NotRegisteredError
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
+from groundtie.registration.rules import layover as layover_rules
 from groundtie.registration.rules import scene as scene_rules
 from groundtie.registration.specification import SAR_SAR
 
@@ -202,7 +203,7 @@ def test_layover_is_refused(
     monkeypatch: pytest.MonkeyPatch,
     tool: Callable[..., object],
 ) -> None:
-    monkeypatch.setattr(scene_rules, "scatter_along_line_px", lambda _: 99.0)
+    monkeypatch.setattr(layover_rules, "scatter_along_line_px", lambda _: 99.0)
     report = tmp_path / "report.html"
     with pytest.raises(NotRegisteredError, match="as layover scatters heights"):
         tool(files.reference, files.input, tmp_path / "out.tif", report=report)
