@@ -176,8 +176,11 @@ class RegistrationEvidence:
     @property
     def fit_residuals_px(self) -> FloatArray:
         """Residuals of the points of the fit, in matching pixels, shape (n, 2)."""
-        used = self.estimate.points.take(self.estimate.points.used)
-        return used.residual_on(self.grid, self.estimate.transform)
+        return self._fitted.residual_on(self.grid, self.estimate.transform)
+
+    @property
+    def _fitted(self) -> TiePoints:
+        return self.estimate.points.take(self.estimate.points.used)
 
     @cached_property
     def held_out(self) -> HeldOut:
@@ -235,9 +238,8 @@ class RegistrationEvidence:
     @property
     def extrapolated_share(self) -> float:
         """Share of the overlap outside of the hull of the points that were used."""
-        used = self.estimate.points.take(self.estimate.points.used)
         size = self.grid.width, self.grid.height
-        return 1 - hull_share(self.grid.map_to_pixel(used.reference_xy), size)
+        return 1 - hull_share(self.grid.map_to_pixel(self._fitted.reference_xy), size)
 
 
 def hull_share(px: FloatArray, size: tuple[int, int]) -> float:
