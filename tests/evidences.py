@@ -109,10 +109,11 @@ def survey(confirming: int = 49, part: int = 0, height: float = 8.0, rival: floa
     shifts[49 - confirming :] = scatter(confirming, 0.4)
     shifts[:part] = [9.0, -5.0]
     side = 2 * SURVEY_RADIUS_PX + 1
-    mean = np.zeros((side, side), np.float32)
-    mean[SURVEY_RADIUS_PX, SURVEY_RADIUS_PX] = height
-    mean[SURVEY_RADIUS_PX + 9, SURVEY_RADIUS_PX] = rival
-    return Survey(GRID, centres, shifts, np.array([70.0, 70.0]), mean)
+    surfaces = np.zeros((49, side, side), np.float32)
+    surfaces[part:, SURVEY_RADIUS_PX, SURVEY_RADIUS_PX] = height
+    surfaces[part:, SURVEY_RADIUS_PX + 9, SURVEY_RADIUS_PX] = rival
+    surfaces[:part, SURVEY_RADIUS_PX - 5, SURVEY_RADIUS_PX + 9] = height
+    return Survey(GRID, centres, shifts, surfaces)
 
 
 def facts(

@@ -23,15 +23,15 @@ def test_a_part_is_named_by_place_distance_and_direction() -> None:
     assert line.startswith(
         "upper: 14 neighbouring chips lie 10.3 px off (90.0 m east, 50.0 m north)"
     )
-    assert line.endswith("of the 14 chips there, 0 confirm the transform")
+    assert line.endswith("; 0 of them match where the transform has them")
 
 
 def test_numbers_of_a_part() -> None:
     (part,) = TWO_ROWS.summary()
     assert part["shift_px"] == (9.0, -5.0)
     assert part["distance_px"] == pytest.approx(np.hypot(9, 5))
-    assert (part["chips"], part["surrounded"], part["confirming"]) == (14, 14, 0)
-    assert part["is_evident"]
+    assert (part["chips"], part["confirming"]) == (14, 0)
+    assert (part["height"], part["model_height"]) == pytest.approx((8 * np.sqrt(14), 0.0))
 
 
 def test_chips_that_fell_anywhere_are_no_part() -> None:

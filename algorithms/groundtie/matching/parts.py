@@ -1,25 +1,41 @@
-"""Chips that agree with each other on another place than a model has."""
+"""Parts of a pair that match elsewhere than a model has them.
+
+Single chips match badly, but their similarity surfaces add up: in any rectangle of chips, what all
+of them have in common stands out of noise by the square root of their number. Where that lies
+elsewhere, and not where the model has it, that part of an image does: the seam of a mosaic, a strip
+of another pass, layover. It is a scan statistic [Kulldorff1997].
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-# Expected false alarms (log10) below which chance does not explain a part, and how many chips of it
-# must disagree for each that confirms the model. Measured by the suites real and attacks: parts of
-# true transforms have -1.1 at least; where towns' layover has less, every third chip confirms.
-LOG10_FALSE_ALARMS = -2.0
-LEAST_PROPORTION = 2
+from ..rasters.grid import Grid
+from .belief_propagation import Surfaces
+from .matcher import FloatArray
 
-# The same of chips that need not be neighbours: true transforms have -2.9 at least, between clouds;
-# strips at an angle and drawings -4.0 at most.
-LOG10_FALSE_ALARMS_ALL_OVER = -3.5
+# Chips agree with each other, or with the model, within this distance.
+SAME_PX = 2.0
+
+# How much higher a part is elsewhere than where the model has it, in standard deviations of noise.
+# Measured by the suite parts: 5.5 at most where a registration is right, 10.0 at least where a part
+# was moved.
+LEAST_EXCESS = 8.5
+
+# Fewer chips are no part, and none counts for more than this: one alone cannot make a part.
+_FEWEST_CHIPS = 3
+_MOST_OF_ONE = 8.0
+
+_ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
 
 
 @dataclass(frozen=True)
 class Part:
-    """Neighbouring chips that agree with each other on another place than the model has.
+    """Neighbouring chips that together match elsewhere than a model has them.
 
     Parameters
     ----------
@@ -27,25 +43,23 @@ class Part:
         In which part of the grid they lie, such as "upper left".
     shift_px
         By how much they lie elsewhere, (x, y) in pixels of the grid.
-    chips
-        How many they are.
-    surrounded
-        How many chips lie in their convex hull, they included.
-    confirming
-        How many of those agree with the model.
-    log10_false_alarms
-        log10 of the expected number of such parts if all chips but these agreed by chance.
+    height, model_height
+        How high the sum of their surfaces is there, and where the model has them, in standard
+        deviations of a sum of noise.
     members
         Which chips of the survey they are, by number.
     """
 
     where: str
     shift_px: tuple[float, float]
-    chips: int
-    surrounded: int
-    confirming: int
-    log10_false_alarms: float
-    members: tuple[int, ...] = ()
+    height: float
+    model_height: float
+    members: tuple[int, ...]
+
+    @property
+    def chips(self) -> int:
+        """How many chips they are."""
+        return len(self.members)
 
     @property
     def distance_px(self) -> float:
@@ -53,31 +67,101 @@ class Part:
         return float(np.hypot(*self.shift_px))
 
     @property
-    def is_evident(self) -> bool:
-        """Whether chance does not explain it, and the model hardly holds among its chips."""
-        evident = self.log10_false_alarms <= LOG10_FALSE_ALARMS
-        return evident and self.chips >= LEAST_PROPORTION * self.confirming
-
-
-@dataclass(frozen=True)
-class Elsewhere:
-    """Chips all over that agree with each other on another place than the model has.
-
-    Parameters
-    ----------
-    shift_px
-        By how much they lie elsewhere, (x, y) in pixels of the grid.
-    chips
-        How many they are.
-    log10_false_alarms
-        log10 of the expected number of such places if all chips agreed by chance.
-    """
-
-    shift_px: tuple[float, float]
-    chips: int
-    log10_false_alarms: float
+    def excess(self) -> float:
+        """How much higher they are elsewhere than where the model has them."""
+        return self.height - self.model_height
 
     @property
     def is_evident(self) -> bool:
-        """Whether chance does not explain it."""
-        return self.log10_false_alarms <= LOG10_FALSE_ALARMS_ALL_OVER
+        """Whether neither noise nor the model explains it."""
+        return self.excess >= LEAST_EXCESS
+
+
+def find_parts(
+    grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces, elsewhere_px: float
+) -> list[Part]:
+    """Return evident parts, the most evident first; no chip is in two of them.
+
+    Parameters
+    ----------
+    grid
+        The grid.
+    centres
+        Pixel positions (col, row) of chips on a regular lattice, shape (n, 2).
+    surfaces
+        Their similarity around where the model has them, in robust standard deviations, shape
+        (n, 2 r + 1, 2 r + 1).
+    elsewhere_px
+        Farther from where the model has it, a place is elsewhere.
+    """
+    found = []
+    left = np.arange(len(centres))
+    while (part := _highest(grid, centres, surfaces, left, elsewhere_px)) and part.is_evident:
+        found.append(part)
+        left = np.setdiff1d(left, part.members)
+    return found
+
+
+def _highest(
+    grid: Grid,
+    centres: NDArray[np.int_],
+    surfaces: Surfaces,
+    which: NDArray[np.int_],
+    elsewhere_px: float,
+) -> Part | None:
+    """Return the rectangle of some chips that is highest elsewhere against where the model has it."""
+    radius = surfaces.shape[-1] // 2
+    shifts = np.stack(np.meshgrid(*2 * [np.arange(-radius, radius + 1)]), axis=-1).reshape(-1, 2)
+    distance = np.hypot(*shifts.T)
+    is_far = distance > elsewhere_px
+    highest = np.maximum(surfaces[which].max(axis=(1, 2), keepdims=True), _MOST_OF_ONE)
+    shown = (surfaces[which] * (_MOST_OF_ONE / highest)).reshape(len(which), (2 * radius + 1) ** 2)
+    best: Part | None = None
+    if len(which) < _FEWEST_CHIPS:
+        return best
+    cols, rows = (np.unique(of, return_inverse=True)[1] for of in centres[which].T)
+    for boxes, sums in _rectangles(rows, cols, shown):
+        own = sums[:, distance <= SAME_PX].max(axis=1)
+        excess = sums[:, is_far].max(axis=1) - own
+        first = int(np.argmax(excess))
+        if best is None or excess[first] > best.excess:
+            top, bottom, left, right = boxes[first]
+            chips = which[(rows >= top) & (rows < bottom) & (cols >= left) & (cols < right)]
+            shift = shifts[is_far][sums[first, is_far].argmax()]
+            best = Part(
+                _where(grid, centres[chips].mean(axis=0)),
+                (float(shift[0]), float(shift[1])),
+                float(excess[first] + own[first]),
+                float(own[first]),
+                tuple(int(chip) for chip in chips),
+            )
+    return best
+
+
+def _rectangles(
+    rows: NDArray[np.int_], cols: NDArray[np.int_], values: FloatArray
+) -> Iterator[tuple[NDArray[np.int_], FloatArray]]:
+    """Yield the sums of values in rectangles, over the square root of how many they hold.
+
+    All rectangles of the same rows at once: (top, bottom, left, right), shape (k, 4), and the sums
+    of values of shape (n, s), shape (k, s).
+    """
+    sums = np.zeros((rows.max() + 2, cols.max() + 2, values.shape[1] + 1))
+    sums[rows + 1, cols + 1] = np.column_stack([values, np.ones(len(values))])
+    sums = sums.cumsum(axis=0).cumsum(axis=1)
+    left, right = np.triu_indices(sums.shape[1], 1)
+    for top, bottom in zip(*np.triu_indices(sums.shape[0], 1), strict=True):
+        between = sums[bottom] - sums[top]
+        inside = between[right] - between[left]
+        counts = np.rint(inside[:, -1])
+        kept = counts >= _FEWEST_CHIPS
+        if kept.any():
+            boxes = np.column_stack([np.full_like(left, top), np.full_like(left, bottom), left, right])
+            yield boxes[kept], inside[kept, :-1] / np.sqrt(counts[kept, None])
+
+
+def _where(grid: Grid, px: FloatArray) -> str:
+    """Return in which third of a grid along each axis a position (col, row) lies."""
+    size = grid.width, grid.height
+    col, row = (min(int(3 * at / side), 2) for at, side in zip(px, size, strict=True))
+    return " ".join(filter(None, (_ROWS[row], _COLUMNS[col]))) or "middle"

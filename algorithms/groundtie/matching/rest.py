@@ -10,7 +10,6 @@ from ..similarity.surface import SimilaritySettings
 from .chips import ChipMatcher
 from .locked import find_locked_content
 from .matcher import Places
-from .parts import LEAST_PROPORTION
 from .survey import Survey, survey_model, survey_places
 
 # A transform that moves all of the overlap by whole pixels, but for this, may be content's.
@@ -35,12 +34,11 @@ class Rest:
     @property
     def is_confirming(self) -> bool:
         """Whether the rest confirms the model, or does not contradict it where that is enough."""
-        survey, elsewhere = self.survey, self.survey.elsewhere
-        if self.is_explained:
-            is_more = elsewhere.chips >= LEAST_PROPORTION * survey.confirming
-            return not (elsewhere.is_evident and is_more)
-        is_one_place = survey.height > survey.rival_height and not elsewhere.is_evident
-        return survey.is_confirming and is_one_place
+        survey = self.survey
+        if survey.parts:
+            return False
+        is_one_place = survey.height > survey.rival_height
+        return self.is_explained or (survey.is_confirming and is_one_place)
 
 
 def survey_rest(

@@ -29,7 +29,7 @@ class Parts:
     survey
         Where the chips match.
     parts
-        Those parts that chance does not explain by itself, the largest first.
+        Those parts, the most evident first.
     """
 
     survey: Survey
@@ -37,8 +37,8 @@ class Parts:
 
     @classmethod
     def of(cls, survey: Survey) -> Parts:
-        """Take the parts of which less than one is expected by chance."""
-        return cls(survey, [part for part in survey.parts if part.log10_false_alarms < 0])
+        """Take the parts that a survey found."""
+        return cls(survey, survey.parts)
 
     def summary(self) -> list[dict[str, Any]]:
         """Return the parts as values that JSON can carry."""
@@ -48,17 +48,16 @@ class Parts:
                 "distance_px": part.distance_px,
                 "shift_px": part.shift_px,
                 "chips": part.chips,
-                "surrounded": part.surrounded,
-                "confirming": part.confirming,
-                "log10_false_alarms": part.log10_false_alarms,
-                "is_evident": part.is_evident,
+                "confirming": confirming(self.survey, part),
+                "height": part.height,
+                "model_height": part.model_height,
             }
             for part in self.parts
         ]
 
     def lines(self) -> list[str]:
         """Return each part in words: where it lies, and how far off."""
-        return [_in_words(part, self.survey.grid) for part in self.parts]
+        return [_in_words(part, self.survey) for part in self.parts]
 
     def shown(self) -> dict[str, Any] | None:
         """Return what a page shows of the parts; None: there are none."""
@@ -70,7 +69,6 @@ class Parts:
             "rows": list(zip(colours, self.lines(), self.parts, strict=True)),
             "chips": len(self.survey.centres),
             "confirming": self.survey.confirming,
-            "is_evident": any(part.is_evident for part in self.parts),
         }
 
 
@@ -96,12 +94,17 @@ def parts_map(parts: Parts) -> Figure:
     return axes.figure
 
 
-def _in_words(part: Part, grid: Grid) -> str:
+def confirming(survey: Survey, part: Part) -> int:
+    """Return how many chips of a part match where the transform has them."""
+    return int(survey.is_confirming_chip[list(part.members)].sum())
+
+
+def _in_words(part: Part, survey: Survey) -> str:
     """Return a part as "upper left: 9 neighbouring chips lie 10.3 px off (10.0 m east, …)"."""
-    origin, end = grid.pixel_to_map(np.array([(0.0, 0.0), part.shift_px]))
-    direction = move_in_words(end - origin, grid)
+    origin, end = survey.grid.pixel_to_map(np.array([(0.0, 0.0), part.shift_px]))
+    direction = move_in_words(end - origin, survey.grid)
     return (
         f"{part.where}: {part.chips} neighbouring chips lie {part.distance_px:.1f} px off"
-        f"{f' ({direction})' if direction else ''}; of the {part.surrounded} chips there, "
-        f"{part.confirming} confirm the transform"
+        f"{f' ({direction})' if direction else ''}; {confirming(survey, part)} of them "
+        "match where the transform has them"
     )

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from ...matching.parts import LEAST_PROPORTION, LOG10_FALSE_ALARMS, LOG10_FALSE_ALARMS_ALL_OVER
+from ...matching.parts import LEAST_EXCESS
 from ...matching.survey import SURVEY_RADIUS_PX
 from ..evidence import SURVEY, RegistrationEvidence
 from .rule import WITHOUT, Rule
@@ -23,21 +21,10 @@ _GHOST_HEIGHT = 9.0
 
 
 def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
-    parts = [] if evidence.survey is None else evidence.survey.parts
-    evident = [part for part in parts if part.is_evident]
-    if not evident:
-        return _chips_elsewhere(evidence)
-    part = max(evident, key=lambda one: one.chips)
-    distance = f"{part.distance_px:.1f} px off"
-    return f"{part.chips} neighbouring chips in the {part.where} agree on a place {distance}"
-
-
-def _chips_elsewhere(evidence: RegistrationEvidence) -> str | None:
-    if evidence.survey is None or not evidence.survey.elsewhere.is_evident:
+    if evidence.survey is None or not evidence.survey.parts:
         return None
-    elsewhere, count = evidence.survey.elsewhere, len(evidence.survey.centres)
-    distance = f"{np.hypot(*elsewhere.shift_px):.1f} px off"
-    return f"{elsewhere.chips} of {count} chips all over agree on a place {distance}"
+    part = evidence.survey.parts[0]
+    return f"{part.chips} chips in the {part.where} match {part.distance_px:.1f} px off"
 
 
 def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
@@ -78,10 +65,9 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "part elsewhere",
         SURVEY,
-        "chips agree with each other on another place, too many for chance: neighbours "
-        f"(10^{LOG10_FALSE_ALARMS:g} such parts expected), {LEAST_PROPORTION} for each that "
-        f"confirms the transform, or chips all over (10^{LOG10_FALSE_ALARMS_ALL_OVER:g})",
-        "[Moisan2004]; suites real and attacks",
+        "neighbouring chips together match elsewhere "
+        f"{LEAST_EXCESS:g} standard deviations of noise better than where the transform has them",
+        "[Kulldorff1997]; suite parts",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,
     ),
