@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +25,7 @@ from ..similarity.sameness import (
     count_same,
     covered,
     reduced,
+    same_lines,
     same_windows,
     without,
 )
@@ -136,8 +138,12 @@ class LockedContent:
         reach = 2 * REACH_PX
         size = piece.width + 2 * reach, piece.height + 2 * reach
         around = piece.window(-reach, -reach, *size)
-        same = same_windows(*_patches(self.pair, around, self.offset_px))
-        whole = same if self.sameness.is_explained else covered(same)
+        patches = _patches(self.pair, around, self.offset_px)
+        same = same_windows(*patches)
+        if not self.sameness.is_explained:
+            lines = cv2.dilate(same_lines(*patches).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+            whole = covered(same) | lines
+        else: whole = same
         return whole[reach:-reach, reach:-reach]
 
 

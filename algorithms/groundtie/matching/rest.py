@@ -66,7 +66,7 @@ def survey_rest(
     pair = matcher.pair
     found = pair, transform, survey_places(pair.grid), _LARGEST_BEND_PX
     locked = find_locked_content(*found, context.quiet())
-    if locked is None or not locked.sameness.is_evident:
+    if locked is None:
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())

@@ -23,6 +23,9 @@ _DIFFERING_SHARE = 0.5
 WINDOW_PX = 9
 REACH_PX = WINDOW_PX // 2
 
+# Of lines in a window, so many per cent of the pixels are less.
+_THIN_PERCENT = 90.0
+
 # Means of a reduced image need this share of their pixels.
 _LEAST_VALID = 0.25
 
@@ -79,6 +82,22 @@ def same_windows(one: Patch, other: Patch) -> Mask:
     differing = _variance(one.values - other.values, valid)
     both = _variance(one.values, valid) + _variance(other.values, valid)
     return valid & (differing <= _DIFFERING_SHARE * both)
+
+
+def same_lines(one: Patch, other: Patch) -> Mask:
+    """Return where two patches have a thin line at the same place, dark or bright in both, (h, w)."""
+    both = one.valid & other.valid
+    thin = [_thin(patch) for patch in (one, other)]
+    strong = [np.abs(t) >= np.percentile(np.abs(t[both]), _THIN_PERCENT) if both.any() else both for t in thin]
+    return np.asarray(both & strong[0] & strong[1] & (thin[0] * thin[1] > 0))
+
+
+def _thin(patch: Patch) -> FloatImage:
+    """Return by how much pixels differ from the median of what is around them."""
+    values = np.where(patch.valid, patch.values, 0).astype(np.float32)
+    thin = values - cv2.medianBlur(values, 5)
+    around = cv2.blur(np.abs(thin), (31, 31))
+    return np.asarray(thin / np.maximum(around, np.finfo(np.float32).tiny), np.float32)
 
 
 def covered(middles: Mask) -> Mask:
