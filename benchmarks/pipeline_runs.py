@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from groundtie.context import threads
 from groundtie.registration.delivery import Call, RegistrationFiles
+from groundtie.registration.opening import open_pair
+from groundtie.registration.pipeline import run
 from groundtie.registration.registered_output import RegisteredOutput
 from groundtie.registration.registration import Registration
 from groundtie.registration.specification import Specification
@@ -22,3 +28,28 @@ def register_specified(
     """
     files = RegistrationFiles(RegisteredOutput(output, "reference", "cubic"))
     return Call(reference, input, files, workers=workers).register(spec)
+
+
+def found_by(
+    spec: Specification,
+    reference: Any,
+    input: Any,
+    search_radius: float | None = None,
+    workers: int | None = None,
+) -> Registration:
+    """Return what is found, whatever the verdict on it is; its rasters are closed.
+
+    Parameters
+    ----------
+    spec
+        How it is registered.
+    reference, input
+        What `open_raster` takes.
+    search_radius
+        On the map.
+    workers
+        Number of threads.
+    """
+    spec = replace(spec, search_radius_m=search_radius)
+    with threads(workers) as context, ExitStack() as stack:
+        return run(stack.enter_context(open_pair(reference, input, spec, context)), spec, context)

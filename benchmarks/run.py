@@ -40,6 +40,7 @@ SUITES = (
     "optical",
     "series",
     "attacks",
+    "margins",
     "calibration",
     "mountains",
 )

@@ -143,7 +143,8 @@ class LockedContent:
         if not self.sameness.is_explained:
             lines = cv2.dilate(same_lines(*patches).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
             whole = covered(same) | lines
-        else: whole = same
+        else:
+            whole = same
         return whole[reach:-reach, reach:-reach]
 
 

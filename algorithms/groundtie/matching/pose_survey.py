@@ -92,7 +92,7 @@ def survey_pose(
     model = transform.model
     if len(kept) >= _FEWEST:
         model = compose(model, _moved(kept, surfaces), level)
-    elsewhere_px = POSE_TOLERANCE_PX
+    elsewhere_px = max(accuracy_share * max(level.width, level.height), POSE_TOLERANCE_PX)
     survey = survey_model(matcher, model, quiet, None, places, elsewhere_px)
     moved = Transform(model, transform.crs, transform.input_grid)
     rest = survey_rest(matcher, moved, places, elsewhere_px, quiet)

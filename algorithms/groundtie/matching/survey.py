@@ -20,7 +20,7 @@ from .belief_propagation import Surfaces
 from .chips import LEAST_VALID_MASKED, ChipMatcher
 from .ghost import ghost_height
 from .matcher import FloatArray, MaskOf, Places
-from .parts import SAME_PX, Part, find_parts
+from .parts import ELSEWHERE_PX, SAME_PX, Part, find_parts, highest_part
 
 # Chips lie side by side: so many along the shorter side of the grid if their sides allow it, and no
 # more than so many along any.
@@ -28,9 +28,6 @@ _CHIP_RANGE_PX, _ALONG, _MOST_ALONG = (40, 64), 7, 9
 
 # How far off a part may lie.
 SURVEY_RADIUS_PX = 24
-
-# Farther from where the model has them, they lie elsewhere.
-ELSEWHERE_PX = 2 * SAME_PX
 
 
 @dataclass(frozen=True)
@@ -49,7 +46,7 @@ class Survey:
         Their similarity around where the model has them, in robust standard deviations of each,
         shape (n, 2 r + 1, 2 r + 1).
     elsewhere_px
-        Chips farther than this from where the model has them lie elsewhere.
+        Places farther than this from where the model has all chips are second places.
     ghost_height
         How high the mean is elsewhere when what the reference repeats of itself is taken out, in
         robust standard deviations of what is left.
@@ -105,7 +102,13 @@ class Survey:
     @cached_property
     def parts(self) -> Sequence[Part]:
         """Neighbouring chips that together match elsewhere, the most evident first."""
-        return find_parts(self.grid, self.centres, self.surfaces, self.elsewhere_px)
+        return find_parts(self.grid, self.centres, self.surfaces)
+
+    @property
+    def highest_part(self) -> Part | None:
+        """The most evident part, evident or not; None: there are too few chips."""
+        everyone = np.arange(len(self.centres))
+        return highest_part(self.grid, self.centres, self.surfaces, everyone)
 
 
 def survey_places(grid: Grid) -> Places:

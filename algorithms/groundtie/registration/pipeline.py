@@ -22,11 +22,12 @@ from ..matching.guided_fit import GuidedFit
 from ..matching.held_out import HeldOut
 from ..matching.keypoint_fit import KeypointFit
 from ..matching.keypoints import KeypointMatcher
+from ..matching.parts import ELSEWHERE_PX
 from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
 from ..matching.rest import Rest, survey_rest
 from ..matching.surface_fit import SurfaceFit
-from ..matching.survey import ELSEWHERE_PX, Survey, survey_model, survey_places
+from ..matching.survey import Survey, survey_model, survey_places
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import Window, bounded_cache

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..matching.survey import Part, Survey
-from ..rasters.grid import Grid
 from . import figures
 from .correction import move_in_words
 

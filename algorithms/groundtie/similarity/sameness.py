@@ -88,7 +88,10 @@ def same_lines(one: Patch, other: Patch) -> Mask:
     """Return where two patches have a thin line at the same place, dark or bright in both, (h, w)."""
     both = one.valid & other.valid
     thin = [_thin(patch) for patch in (one, other)]
-    strong = [np.abs(t) >= np.percentile(np.abs(t[both]), _THIN_PERCENT) if both.any() else both for t in thin]
+    strong = [
+        np.abs(t) >= np.percentile(np.abs(t[both]), _THIN_PERCENT) if both.any() else both
+        for t in thin
+    ]
     return np.asarray(both & strong[0] & strong[1] & (thin[0] * thin[1] > 0))
 
 

@@ -11,13 +11,13 @@ from .rule import WITHOUT, Rule
 # robust standard deviations. Measured on pairs that were registered right: up to 0.76, and from
 # 2.2 on; on images with much noise that were registered wrong: 0.43 to 0.98, and 1.5 to 2.9 (suites
 # real and attacks).
-_RIVAL_HEIGHT = 0.8
-_WEAK_HEIGHT = 2.0
+RIVAL_HEIGHT = 0.8
+WEAK_HEIGHT = 2.0
 
 # A second place that the reference's own repetition does not explain, in robust standard deviations
 # of such surfaces. Measured on 18 shared pairs at their places: up to 5.5, at poses of the rotated
 # ones up to 8.3; where the reference or a cloud deck covers ground that lies elsewhere: from 9.9.
-_GHOST_HEIGHT = 9.0
+GHOST_HEIGHT = 9.0
 
 
 def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
@@ -31,9 +31,9 @@ def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
     survey = evidence.survey
     if survey is None or evidence.mask.is_ground:
         return None
-    if survey.rival_height >= _RIVAL_HEIGHT * survey.height:
+    if survey.rival_height >= RIVAL_HEIGHT * survey.height:
         return "moved elsewhere as a whole, chips all over match about as well"
-    if survey.ghost_height >= _GHOST_HEIGHT:
+    if survey.ghost_height >= GHOST_HEIGHT:
         return "chips all over match at a second place, too, where the reference does not repeat"
     return None
 
@@ -42,7 +42,7 @@ def _weak(evidence: RegistrationEvidence) -> str | None:
     survey = evidence.survey
     if survey is None or evidence.mask.is_ground:
         return None
-    if survey.height >= _WEAK_HEIGHT:
+    if survey.height >= WEAK_HEIGHT:
         return None
     return (
         f"only {survey.confirming} of {len(survey.centres)} chips all over match where the "
@@ -67,7 +67,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         SURVEY,
         "neighbouring chips together match elsewhere "
         f"{LEAST_EXCESS:g} standard deviations of noise better than where the transform has them",
-        "[Kulldorff1997]; suite parts",
+        "[Kulldorff1997]; suite margins",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,
     ),
@@ -75,8 +75,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "second place nearby",
         SURVEY,
         "without a mask of the ground, chips all over match at least "
-        f"{_RIVAL_HEIGHT:g} times as well if all are moved elsewhere, within {SURVEY_RADIUS_PX} "
-        f"px, or {_GHOST_HEIGHT:g} robust standard deviations better there than the reference "
+        f"{RIVAL_HEIGHT:g} times as well if all are moved elsewhere, within {SURVEY_RADIUS_PX} "
+        f"px, or {GHOST_HEIGHT:g} robust standard deviations better there than the reference "
         "matches itself",
         "suites real and attacks",
         "give a larger part of the scene, which shows more than what repeats",
@@ -86,7 +86,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "weak similarity",
         SURVEY,
         "without a mask of the ground, the mean similarity of chips all over, where the transform "
-        f"has them, is below {_WEAK_HEIGHT:g} robust standard deviations of one of them",
+        f"has them, is below {WEAK_HEIGHT:g} robust standard deviations of one of them",
         "suites real and attacks",
         "give images with less noise, or a larger pixel size for matching",
         _weak,

@@ -1,0 +1,201 @@
+"""How near right and wrong transforms come to the limits of the rules on the survey.
+
+Whatever the verdict is, a transform that was found is right or wrong by the truth. What the survey
+measures of both kinds gives the limits: this suite is their source.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from groundtie.errors import GroundTieError
+from groundtie.matching.parts import LEAST_EXCESS
+from groundtie.registration.evidence import RegistrationEvidence
+from groundtie.registration.registration import Registration
+from groundtie.registration.rules.survey import GHOST_HEIGHT, RIVAL_HEIGHT, WEAK_HEIGHT
+from groundtie.registration.specification import COREGISTER
+
+from .accuracy import SILENTLY_WRONG_PX
+from .attacks.cases import AttackCase, cases
+from .attacks.suite import sample
+from .attempt import on_pixels
+from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
+from .pipeline_runs import found_by
+from .real import LARGEST_SHIFT_PX
+from .suites import Settings, SuiteResult, Table, run_cases
+
+_QUICK, _SAMPLE = 10, 200
+_PERCENT = (0, 5, 50, 95, 100)
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """What a rule compares with its limit: too large, or too small, it refuses."""
+
+    name: str
+    limit: float
+    of: Callable[[RegistrationEvidence], float]
+    is_refused_above: bool = True
+
+
+def _excess(evidence: RegistrationEvidence) -> float:
+    part = None if evidence.survey is None else evidence.survey.highest_part
+    return math.nan if part is None else part.excess
+
+
+def _of_survey(name: str) -> Callable[[RegistrationEvidence], float]:
+    def value(evidence: RegistrationEvidence) -> float:
+        return math.nan if evidence.survey is None else float(getattr(evidence.survey, name))
+
+    return value
+
+
+def _rival(evidence: RegistrationEvidence) -> float:
+    survey = evidence.survey
+    return math.nan if survey is None else survey.rival_height / max(survey.height, 0.1)
+
+
+STATISTICS = (
+    Statistic("part elsewhere: excess", LEAST_EXCESS, _excess),
+    Statistic("second place: share of the height", RIVAL_HEIGHT, _rival),
+    Statistic("second place: ghost", GHOST_HEIGHT, _of_survey("ghost_height")),
+    Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),
+)
+
+
+@dataclass(frozen=True)
+class Margins:
+    """What the survey of one transform measured.
+
+    Parameters
+    ----------
+    name
+        Which case.
+    error_px, is_right
+        Error of the transform, and whether it is right, whatever the verdict is.
+    rule
+        What refused it; empty: nothing.
+    values
+        A value for each of `STATISTICS`; NaN: there is none.
+    """
+
+    name: str
+    error_px: float
+    is_right: bool
+    rule: str
+    values: tuple[float, ...]
+
+    def record(self) -> dict[str, Any]:
+        """Return what was measured as values that JSON can carry."""
+        values = {
+            statistic.name: value if math.isfinite(value) else None
+            for statistic, value in zip(STATISTICS, self.values, strict=True)
+        }
+        error_px = self.error_px if math.isfinite(self.error_px) else None
+        return {
+            "name": self.name,
+            "error_px": error_px,
+            "is_right": self.is_right,
+            "rule": self.rule,
+            **values,
+        }
+
+    def line(self) -> str:
+        """Return what was measured as a line of text."""
+        kind = "right" if self.is_right else "wrong"
+        values = ", ".join(f"{value:.1f}" for value in self.values)
+        return f"{self.name}: {kind} ({self.error_px:.1f} px), {values}; {self.rule}"
+
+
+@dataclass(frozen=True)
+class AttackedPair:
+    """A pair of the red team; controls are among them."""
+
+    case: AttackCase
+
+    def run(self, workers: int | None) -> Margins:
+        """Register the pair and measure."""
+        pair = self.case.make()
+        try:
+            found = found_by(COREGISTER, *pair.rasters(), **pair.arguments(), workers=workers)
+        except GroundTieError as error:
+            return Margins(self.case.name, math.inf, False, str(error), _NOTHING)
+        error_px = math.inf if found.transform is None else pair.errors_px(found.transform)[0]
+        return _measured(self.case.name, found, error_px, pair.sigma_px)
+
+
+@dataclass(frozen=True)
+class RealPair:
+    """A whole real pair."""
+
+    case: RealCase
+
+    def run(self, workers: int | None) -> Margins:
+        """Register the pair and measure."""
+        with tempfile.TemporaryDirectory() as folder:
+            shift = draw_shift(self.case, LARGEST_SHIFT_PX, 0)
+            pair = write_case(self.case, shift, Path(folder))
+            radius_m = search_radius_m(LARGEST_SHIFT_PX)
+            found = found_by(COREGISTER, pair.reference, pair.input, radius_m, workers)
+            error_px = math.inf
+            if found.transform is not None and pair.truth is not None:
+                error_px = pair.truth.error_px(on_pixels(found.transform, pair.reference))
+        return _measured(self.case.name, found, error_px, pair.sigma_px)
+
+
+_NOTHING = (math.nan,) * len(STATISTICS)
+
+
+def _measured(name: str, found: Registration, error_px: float, sigma_px: float) -> Margins:
+    evidence = found.evidence
+    values = _NOTHING if evidence is None else tuple(one.of(evidence) for one in STATISTICS)
+    is_right = error_px <= SILENTLY_WRONG_PX + sigma_px
+    return Margins(name, error_px, is_right, found.verdict.rule, values)
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite: `--sample` attacks of `--classes`, and the real pairs."""
+    seeds = range(settings.first_seed, settings.first_seed + settings.seeds)
+    attacks = [
+        case
+        for case in cases(seeds, settings.data, settings.cache)
+        if isinstance(case, AttackCase)
+        and case.tool == "coregister"
+        and (not settings.classes or {case.attack, case.group} & set(settings.classes))
+    ]
+    wanted = _QUICK if settings.quick else settings.sample or _SAMPLE
+    chosen = [AttackedPair(case) for case in sample(attacks, wanted)]
+    real = [] if settings.quick else [RealPair(case) for case in read_cases(settings.data)]
+    found: list[Margins] = list(run_cases([*real, *chosen], settings.jobs))
+    return SuiteResult(
+        "Margins: what right and wrong transforms leave to the limits of rules",
+        (),
+        tuple(_table(number, statistic, found) for number, statistic in enumerate(STATISTICS)),
+        [one.record() for one in found],
+        (
+            "Right and wrong are transforms, whatever the verdict on them is: other rules may "
+            "refuse what is wrong.",
+        ),
+    )
+
+
+def _table(number: int, statistic: Statistic, found: Sequence[Margins]) -> Table:
+    """Return how a statistic is distributed among right and wrong transforms."""
+    rows = []
+    for kind, is_right in (("right", True), ("wrong", False)):
+        of_kind = [one for one in found if one.is_right is is_right]
+        values = np.array([one.values[number] for one in of_kind])
+        values = values[np.isfinite(values)]
+        beyond = values >= statistic.limit
+        refused = beyond if statistic.is_refused_above else ~beyond
+        cells = [f"{np.percentile(values, p):.2f}" for p in _PERCENT] if len(values) else ["–"] * 5
+        rows.append([kind, str(len(values)), *cells, str(int(refused.sum()))])
+    head = ("", "transforms", *(f"{p} %" for p in _PERCENT), f"refused at {statistic.limit:g}")
+    return Table(statistic.name, head, rows)
