@@ -37,7 +37,7 @@ def looked_at(
     with open_raster(paths[0]) as one, open_raster(paths[1]) as other:
         pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
         transform = Transform(model or shift_on_map(0.0, 0.0), pair.grid.crs, other.grid)
-        return find_locked_content(pair, transform, survey_places(pair.grid), 4.0, context)
+        return find_locked_content(pair, transform, survey_places(pair.grid), context)
 
 
 def drawn_into(values: np.ndarray, offset: tuple[int, int] = (0, 0)) -> np.ndarray:
@@ -63,22 +63,8 @@ def test_lines_that_are_drawn_over_different_ground_are_found(
     # The grid has rows from north to south and pixels of 10 m.
     model = shift_on_map(10.0 * offset[0], -10.0 * offset[1])
     locked = looked_at(tmp_path, reference, input, context, model)
-    assert locked is not None and locked.sameness.is_evident
-    assert locked.offset_px == offset
-    assert locked.sameness.gradients > 10 * locked.sameness.chance
-
-
-def test_lines_are_found_at_their_offset_where_the_transform_bends(
-    tmp_path: Path, context: Context
-) -> None:
-    """It goes from -2 to 3 columns: half between what is drawn and the ground."""
-    grid = utm_grid(SIDE, SIDE)
-    around = Frame(Affine.translation(*grid.pixel_to_map([grid.centre_px])[0]))
-    model = PolynomialModel("affine", around, np.array([[5.0, 0.0], [50 / 3200, 0.0], [0.0, 0.0]]))
-    images = drawn_into(sensed(1)), drawn_into(sensed(2, place=9))
-    locked = looked_at(tmp_path, *images, context, model)
-    assert locked is not None and locked.offset_px == (0, 0)
-    assert locked.sameness.is_evident
+    assert locked is not None and locked.offset_px == offset
+    assert not locked.sameness.is_explained
 
 
 def masked(folder: Path, locked: LockedContent | None) -> np.ndarray:
@@ -93,13 +79,25 @@ def test_its_mask_covers_the_lines_and_their_surroundings_alone(
     tmp_path: Path, context: Context
 ) -> None:
     plain = sensed(1), sensed(2, place=9)
-    without = masked(tmp_path, looked_at(tmp_path, *plain, context))
     mask = masked(tmp_path, looked_at(tmp_path, *map(drawn_into, plain), context))
     drawn = drawn_into(np.zeros((SIDE, SIDE)))[:200, 20:220] > 0
     assert mask[drawn].mean() > 0.99
     # Windows of 9 pixels that reach the rows 40 to 43 and 110 to 113, or such columns, end here.
-    far = np.s_[52:102, 32:82]
-    np.testing.assert_array_equal(mask[far], without[far])
+    assert mask[52:102, 32:82].mean() < 0.5
+
+
+@pytest.mark.parametrize("colours", [(8.0, 8.0), (-5.0, 8.0)])
+def test_thin_lines_are_masked_in_any_colour_over_any_ground(
+    tmp_path: Path, context: Context, colours: tuple[float, float]
+) -> None:
+    """One pixel wide; where the reference shows nothing else, a tenth as strong."""
+    images = [sensed(1), sensed(2, place=9)]
+    images[0][:, :160] *= 0.05
+    for image, colour, faint in zip(images, colours, (0.1, 1.0), strict=True):
+        image[60::20, :160] = colour * faint
+        image[60::20, 160:] = colour
+    mask = masked(tmp_path, looked_at(tmp_path, *images, context))
+    assert mask[60::20].mean() > 0.95
 
 
 def test_edges_of_what_is_drawn_are_masked(tmp_path: Path, context: Context) -> None:
@@ -109,24 +107,24 @@ def test_edges_of_what_is_drawn_are_masked(tmp_path: Path, context: Context) -> 
     assert mask[39:45].mean() > 0.9
 
 
-@pytest.mark.parametrize("place", [1, 9])
-def test_views_without_anything_drawn_have_none(
-    tmp_path: Path, context: Context, place: int
-) -> None:
-    locked = looked_at(tmp_path, sensed(1), -sensed(2, place=place), context)
-    assert locked is not None and not locked.sameness.is_evident
+def test_most_is_left_of_views_without_anything_drawn(tmp_path: Path, context: Context) -> None:
+    """Of other physics: a tenth of the pixels stands out in each, a hundredth in both by chance.
+
+    With all pixels within two of them, and clusters of them, a quarter to a third of the area.
+    """
+    mask = masked(tmp_path, looked_at(tmp_path, sensed(1), -sensed(2), context))
+    assert mask.mean() < 0.5
 
 
 def test_one_sensors_views_of_one_ground_are_explained(tmp_path: Path, context: Context) -> None:
-    """Most gradients are the same; so are reduced images where single pixels are not."""
+    """Reduced images are the same where single pixels are not."""
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
-    assert locked is not None and locked.sameness.gradients > 0.1
-    assert locked.sameness.is_explained
+    assert locked is not None and locked.sameness.is_explained
 
 
 def test_a_copy_is_explained(tmp_path: Path, context: Context) -> None:
     locked = looked_at(tmp_path, sensed(1), sensed(1), context)
-    assert locked is not None and locked.sameness.gradients > 0.9
+    assert locked is not None and locked.sameness.area > 0.9
     assert locked.sameness.is_explained
 
 
@@ -136,8 +134,7 @@ def test_one_pattern_of_noise_over_different_ground_is_found(
     pattern = 2 * np.random.default_rng(5).normal(size=(SIDE, SIDE))
     reference, input = sensed(1, 0.1) + pattern, sensed(2, 0.1, place=9) + pattern
     locked = looked_at(tmp_path, reference, input, context)
-    assert locked is not None and locked.sameness.is_evident
-    assert not locked.sameness.is_explained
+    assert locked is not None and not locked.sameness.is_explained
 
 
 def test_a_pattern_of_rows_and_columns_is_no_ground(tmp_path: Path, context: Context) -> None:
@@ -147,7 +144,7 @@ def test_a_pattern_of_rows_and_columns_is_no_ground(tmp_path: Path, context: Con
     pattern += rng.normal(size=(SIDE, 1)) + rng.normal(size=(1, SIDE))
     reference, input = sensed(1, 0.1) + pattern, sensed(2, 0.1, place=9) + pattern
     locked = looked_at(tmp_path, reference, input, context)
-    assert locked is not None and locked.sameness.is_evident
+    assert locked is not None
     assert locked.sameness.reduced_area < locked.sameness.area
     assert not locked.sameness.is_explained
 
@@ -159,7 +156,6 @@ def test_the_same_holes_are_found_in_speckle(tmp_path: Path, context: Context) -
     reference, input = (np.where(holes, -3.0, values) for values in speckled)
     locked = looked_at(tmp_path, reference, input, context)
     assert locked is not None and 0.4 < locked.sameness.area < 0.6
-    assert replace(locked.sameness, gradients=0.0).is_evident
     assert not locked.sameness.is_explained
 
 
@@ -183,5 +179,5 @@ def test_arrays_that_are_resampled_have_none(
         )
         model = turned if side_m == 10.0 else shift_on_map(0.0, 0.0)
         transform = Transform(model, pair.grid.crs, other.grid)
-        found = pair, transform, survey_places(pair.grid), 1.5
+        found = pair, transform, survey_places(pair.grid)
         assert find_locked_content(*found, context) is None

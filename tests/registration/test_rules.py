@@ -217,8 +217,8 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(height=2.1, rival=1.0)),
     ),
     "pixel-locked content": (
-        evidence(GOOD, survey=survey(), rest=Rest(survey(5))),
-        evidence(GOOD, survey=survey(), rest=Rest(survey(20))),
+        evidence(GOOD, survey=survey(), rest=Rest(survey(height=1.9, rival=1.0))),
+        evidence(GOOD, survey=survey(), rest=Rest(survey(height=2.1, rival=1.0))),
     ),
     "narrow control": (
         refinement(control((20, -9), corner=0.2), kind="shift"),
@@ -458,7 +458,7 @@ def test_only_rules_of_the_evidence_are_asked() -> None:
         (7, survey(35, part=14), None, ["part elsewhere"]),
         (7, survey(height=4.0, rival=3.5), None, ["second place nearby"]),
         (7, survey(height=1.9, rival=0.5), None, ["weak similarity"]),
-        (7, survey(), Rest(survey(5)), ["pixel-locked content"]),
+        (7, survey(), Rest(survey(height=1.9, rival=1.0)), ["pixel-locked content"]),
     ],
 )
 def test_rules_of_registrations_judge_poses(

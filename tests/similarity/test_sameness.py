@@ -4,7 +4,7 @@ import numpy as np
 from textured_pairs import texture
 
 from groundtie.rasters.patch import Patch
-from groundtie.similarity.sameness import Gradients, count_same, reduced, same_windows, without
+from groundtie.similarity.sameness import reduced, same_lines, same_windows, without
 
 
 def patch(values: np.ndarray, hidden: tuple[slice, slice] | None = None) -> Patch:
@@ -14,29 +14,30 @@ def patch(values: np.ndarray, hidden: tuple[slice, slice] | None = None) -> Patc
     return Patch(values.astype(np.float32), valid)
 
 
-def test_all_gradients_of_an_array_and_its_offset_copy_are_the_same() -> None:
-    one = texture(60, 60)
-    gradients = [Gradients.of(patch(values)) for values in (one, one + 100.0)]
-    same, every = count_same(*gradients, (0.1, 0.1))
-    assert same == every > 1000
+def test_lines_and_dots_are_the_same_in_other_colours_and_over_faint_ground() -> None:
+    rng = np.random.default_rng(3)
+    ground = [rng.normal(size=(90, 90)), rng.normal(size=(90, 90))]
+    ground[0][:, :45] *= 0.01
+    for values, colour in zip(ground, (8.0, -8.0), strict=True):
+        values[40] = colour
+        values[10, ::9] = colour
+    ground[0][40, :45] = ground[0][10, :45:9] = 0.08
+    same = same_lines(*map(patch, ground))
+    # Where both kinds of ground are near, the faint line is.
+    assert same[40, :30].all() and same[40, 60:].all()
+    assert same[10, ::9].mean() > 0.7
+    # A tenth of each by definition; a hundredth of both by chance.
+    away = np.ones_like(same)
+    away[[10, 40]] = False
+    assert 0.002 < same[away].mean() < 0.03
 
 
-def test_gradients_of_two_places_are_rarely_the_same() -> None:
-    """Two vectors of like lengths in any directions: within a quarter of the length, a few %."""
-    gradients = [Gradients.of(patch(texture(200, 200, seed))) for seed in (1, 2)]
-    limit = float(np.median(gradients[0].length))
-    same, every = count_same(*gradients, (limit, limit))
-    assert 0 < same < 0.03 * every
-
-
-def test_gradients_beside_invalid_pixels_do_not_count() -> None:
-    one = texture(60, 60)
+def test_invalid_pixels_hold_no_lines() -> None:
     hidden = np.s_[20:30, 20:30]
-    counts = [
-        count_same(Gradients.of(patch(one, where)), Gradients.of(patch(one)), (0.0, 0.0))[1]
-        for where in (None, hidden)
-    ]
-    assert counts[0] - counts[1] == 12 * 12
+    same = same_lines(patch(texture(60, 60), hidden), patch(texture(60, 60)))
+    assert same.any() and not same[hidden].any()
+    everything = np.s_[:, :]
+    assert not same_lines(patch(texture(60, 60), everything), patch(texture(60, 60))).any()
 
 
 def test_windows_are_the_same_where_one_thing_is_drawn_into_both() -> None:

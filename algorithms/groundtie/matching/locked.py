@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,8 +20,6 @@ from ..rasters.patch import Patch
 from ..similarity.sameness import (
     REACH_PX,
     WINDOW_PX,
-    Gradients,
-    count_same,
     covered,
     reduced,
     same_lines,
@@ -30,23 +27,6 @@ from ..similarity.sameness import (
     without,
 )
 from .matcher import FloatArray, Places
-
-# Gradients above this percentile of their image are strong.
-_STRONG_PERCENT = 70.0
-
-# Offsets at which gradients are the same by chance: so many, on a spiral around the found one.
-_CHANCE_OFFSETS = 8
-_FIRST_TURN_PX, _GOLDEN_ANGLE = 7.0, np.pi * (3 - np.sqrt(5))
-
-# So many times as many as by chance, and this share of the strong ones, are more than two sensors
-# show of one ground; what else they show is asked then. Measured on the shared pairs at their true
-# places: 0.7 to 2.2 % of different sensors and physics, up to twice as many as by chance; 3.5 to
-# 28 % of one sensor's. With content drawn into both: 3 to 43 %.
-_LEAST_RATIO, _LEAST_SHARE = 2.0, 0.02
-
-# The same of the area that varies alike: where holes or waters of one shape are cut into noise,
-# few gradients are the same. Different sensors' views: up to 12 %.
-_LEAST_AREA = 0.15
 
 # One sensor's views of one ground vary alike where nothing is drawn, too, on images that are so
 # much smaller. Measured as above: 25 % of what is left and more; of different ground 0 to 21 %, of
@@ -64,6 +44,12 @@ _COPY_SHARE = 0.75
 
 _LATTICE = 9
 
+# A transform that moves all of the overlap by whole pixels, but for this, may be content's.
+_LARGEST_BEND_PX = 1.5
+
+# Around a line, chips see it this far off.
+_LINE_SURROUNDINGS_PX = 5
+
 
 @dataclass(frozen=True)
 class Sameness:
@@ -71,8 +57,6 @@ class Sameness:
 
     Parameters
     ----------
-    gradients, chance
-        Share of the strong gradients that are the same there, and at other offsets.
     area, reduced_area
         Share of the area that varies alike, in the images and in reduced ones.
     ground
@@ -81,18 +65,10 @@ class Sameness:
         How many windows of the reduced images do not overlap.
     """
 
-    gradients: float
-    chance: float
     area: float
     reduced_area: float
     ground: float
     windows: float
-
-    @property
-    def is_evident(self) -> bool:
-        """Whether more is the same than two views show of one ground."""
-        is_more = self.gradients >= max(_LEAST_RATIO * self.chance, _LEAST_SHARE)
-        return is_more or self.area >= _LEAST_AREA
 
     @property
     def is_explained(self) -> bool:
@@ -132,8 +108,8 @@ class LockedContent:
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
 
-        What is drawn ends somewhere in the windows that vary alike: all of them is taken, unless
-        the surroundings are one sensor's views of the ground.
+        What is drawn ends somewhere in the windows that vary alike: all of them is taken, and what
+        is around lines, unless the surroundings are one sensor's views of the ground.
         """
         reach = 2 * REACH_PX
         size = piece.width + 2 * reach, piece.height + 2 * reach
@@ -141,15 +117,12 @@ class LockedContent:
         patches = _patches(self.pair, around, self.offset_px)
         same = same_windows(*patches)
         if not self.sameness.is_explained:
-            lines = cv2.dilate(same_lines(*patches).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-            whole = covered(same) | lines
-        else:
-            whole = same
-        return whole[reach:-reach, reach:-reach]
+            same = covered(same, WINDOW_PX) | covered(same_lines(*patches), _LINE_SURROUNDINGS_PX)
+        return same[reach:-reach, reach:-reach]
 
 
 def find_locked_content(
-    pair: ImagePair, transform: Transform, places: Places, bend_px: float, context: Context
+    pair: ImagePair, transform: Transform, places: Places, context: Context
 ) -> LockedContent | None:
     """Return what the images repeat where a transform puts the input's array.
 
@@ -161,8 +134,6 @@ def find_locked_content(
         What was found.
     places
         Where it is looked for.
-    bend_px
-        A transform that moves all of the overlap by whole pixels, but for this, may be content's.
     context
         Threads.
 
@@ -174,76 +145,38 @@ def find_locked_content(
     if moved is None:
         return None
     offset = np.rint(np.median(moved, axis=0))
-    bend = np.abs(moved - offset).max()
     # Not a number, where the transform has none, is no small bend either.
-    if not bend <= bend_px:
+    if not np.abs(moved - offset).max() <= _LARGEST_BEND_PX:
         return None
-
-    def looks_at(offset_px: tuple[int, int]) -> list[_Look]:
-        def look(centre: NDArray[np.int_]) -> _Look:
-            side = places.chip_px + 2 * _REACH_PX
-            corner = centre - side // 2
-            piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
-            return _Look.of(*_patches(pair, piece, offset_px))
-
-        return list(context.map(look, list(places.centres)))
-
     found = int(offset[0]), int(offset[1])
-    looks = looks_at(found)
-    # Content has one offset; a transform that bends passes through several.
-    right, down = _most_alike(looks, int(np.rint(bend)))
-    if (right, down) != (0, 0):
-        found = found[0] + right, found[1] + down
-        looks = looks_at(found)
-    return LockedContent(pair, found, _sameness(looks))
+
+    def count(centre: NDArray[np.int_]) -> tuple[_Count, _Count, _Count]:
+        corner = centre - places.chip_px // 2
+        piece = places.grid.window(int(corner[0]), int(corner[1]), *[places.chip_px] * 2)
+        return _counts(*_patches(pair, piece, found))
+
+    return LockedContent(pair, found, _sameness(list(context.map(count, list(places.centres)))))
 
 
-def _most_alike(looks: list[_Look], radius_px: int) -> tuple[int, int]:
-    """Return at which offset, up to a radius, the most strong gradients are the same."""
-    reach = min(radius_px, _REACH_PX)
-    steps = range(-reach, reach + 1)
-    shifts = [(right, down) for right in steps for down in steps]
-    strong = _strong_of(looks)
-    same = [_share([one.same(np.array(shift), strong) for one in looks]) for shift in shifts]
-    return shifts[int(np.argmax(same))]
-
-
-def _sameness(looks: list[_Look]) -> Sameness:
-    strong = _strong_of(looks)
-    same = [_share([one.same(shift, strong) for one in looks]) for shift in _offsets()]
-    area, reduced_area = (_share([one.counts[k] for one in looks]) for k in (0, 1))
-    every = sum(one.counts[1][1] for one in looks)
-    ground = _share([one.counts[2] for one in looks], int(_LEAST_LEFT * every))
-    chance = float(np.median(same[1:]))
-    return Sameness(same[0], chance, area, reduced_area, ground, every / WINDOW_PX**2)
-
-
+# How many pixels are the same, and all.
 _Count = tuple[int, int]
 
 
-@dataclass(frozen=True)
-class _Look:
-    """What one window shows: its gradients, and (same, all) pixels as `LockedContent` has them."""
+def _sameness(counts: list[tuple[_Count, _Count, _Count]]) -> Sameness:
+    area, reduced_area = (_share([one[k] for one in counts]) for k in (0, 1))
+    every = sum(one[1][1] for one in counts)
+    ground = _share([one[2] for one in counts], int(_LEAST_LEFT * every))
+    return Sameness(area, reduced_area, ground, every / WINDOW_PX**2)
 
-    gradients: tuple[Gradients, Gradients]
-    counts: tuple[_Count, _Count, _Count]
 
-    @classmethod
-    def of(cls, reference: Patch, input: Patch) -> _Look:
-        same = same_windows(reference, input)
-        rest = without(reference, same), without(input, same)
-        counts = (
-            (int(same.sum()), int((reference.valid & input.valid).sum())),
-            _count_reduced(reference, input),
-            _count_reduced(*rest),
-        )
-        return cls((Gradients.of(reference.inner(_REACH_PX)), Gradients.of(input)), counts)
-
-    def same(self, shift: NDArray[np.int_], strong: tuple[float, float]) -> _Count:
-        """Return how many strong gradients are the same at a shift of the input, and all."""
-        reference, input = self.gradients
-        col, row = (int(_REACH_PX + by) for by in shift)
-        return count_same(reference, input.part(col, row, reference.x.shape), strong)
+def _counts(reference: Patch, input: Patch) -> tuple[_Count, _Count, _Count]:
+    """Return what varies alike in two windows, on reduced ones, and there of the rest."""
+    same = same_windows(reference, input)
+    return (
+        (int(same.sum()), int((reference.valid & input.valid).sum())),
+        _count_reduced(reference, input),
+        _count_reduced(without(reference, same), without(input, same)),
+    )
 
 
 def _count_reduced(reference: Patch, input: Patch) -> _Count:
@@ -255,30 +188,6 @@ def _share(counts: list[_Count], least: int = 1) -> float:
     """Return the share of what is the same, of at least so many."""
     same, every = np.sum(counts, axis=0) if counts else (0, 0)
     return float(same / max(every, least, 1))
-
-
-def _strong_of(looks: list[_Look]) -> tuple[float, float]:
-    """Return the length from which gradients of either image are strong."""
-    return (
-        _strong([one.gradients[0] for one in looks]),
-        _strong([one.gradients[1] for one in looks]),
-    )
-
-
-def _strong(gradients: list[Gradients]) -> float:
-    lengths = [one.length[one.valid] for one in gradients if one.valid.any()]
-    return float(np.percentile(np.concatenate(lengths), _STRONG_PERCENT)) if lengths else 0.0
-
-
-def _offsets() -> NDArray[np.int_]:
-    """Return none, and offsets (x, y) on a spiral around it, shape (n, 2)."""
-    steps = np.arange(_CHANCE_OFFSETS)
-    angle, length = steps * _GOLDEN_ANGLE, _FIRST_TURN_PX + 2 * steps
-    spiral = np.rint(np.column_stack([length * np.cos(angle), length * np.sin(angle)]))
-    return np.vstack([[0, 0], spiral]).astype(int)
-
-
-_REACH_PX = int(np.abs(_offsets()).max())
 
 
 def _patches(pair: ImagePair, piece: Grid, offset_px: tuple[int, int]) -> tuple[Patch, Patch]:

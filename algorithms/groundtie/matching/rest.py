@@ -12,9 +12,6 @@ from .locked import find_locked_content
 from .matcher import Places
 from .survey import Survey, survey_model, survey_places
 
-# A transform that moves all of the overlap by whole pixels, but for this, may be content's.
-_LARGEST_BEND_PX = 1.5
-
 
 @dataclass(frozen=True)
 class Rest:
@@ -30,15 +27,6 @@ class Rest:
 
     survey: Survey
     is_explained: bool = False
-
-    @property
-    def is_confirming(self) -> bool:
-        """Whether the rest confirms the model, or does not contradict it where that is enough."""
-        survey = self.survey
-        if survey.parts:
-            return False
-        is_one_place = survey.height > survey.rival_height
-        return self.is_explained or (survey.is_confirming and is_one_place)
 
 
 def survey_rest(
@@ -64,8 +52,7 @@ def survey_rest(
         Threads and progress.
     """
     pair = matcher.pair
-    found = pair, transform, survey_places(pair.grid), _LARGEST_BEND_PX
-    locked = find_locked_content(*found, context.quiet())
+    locked = find_locked_content(pair, transform, survey_places(pair.grid), context.quiet())
     if locked is None:
         return None
     # What a mask leaves is little: one measure alone would miss most of it.

@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
-from ..geometry.chance import agreement_probability, log10_chance
-from ..geometry.judging import LARGEST_LOG10_CHANCE, SMALLEST_INLIER_SHARE
 from ..geometry.models import Model
 from ..rasters.grid import Grid
 from ..similarity.peak import find_peak
@@ -73,16 +71,6 @@ class Survey:
     def confirming(self) -> int:
         """How many chips match where the model has them."""
         return int(self.is_confirming_chip.sum())
-
-    @property
-    def is_confirming(self) -> bool:
-        """Whether more of them do than would by chance, and a share as of check points does."""
-        count = len(self.centres)
-        chance = log10_chance(
-            self.confirming, count, agreement_probability(SAME_PX, SURVEY_RADIUS_PX)
-        )
-        enough = self.confirming >= SMALLEST_INLIER_SHARE * count
-        return enough and chance <= LARGEST_LOG10_CHANCE
 
     @property
     def height(self) -> float:

@@ -1,4 +1,4 @@
-"""What two arrays have the same: gradients, and windows that vary alike.
+"""What two arrays have the same: windows that vary alike, and lines.
 
 Independent views of one ground are similar, but hardly ever the same: noise, light, physics and
 the phase of the pixels differ. What is drawn into both arrays is the same.
@@ -6,7 +6,7 @@ the phase of the pixels differ. What is drawn into both arrays is the same.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -14,66 +14,19 @@ import numpy as np
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask
 
-# Two gradients are the same if they differ by no more than this share of the larger one.
-_SAME_SHARE = 0.25
-
 # Where one thing is drawn into both, their difference varies less than this share of what both
 # vary, in windows of this side; independent content would have it vary as much as both.
 _DIFFERING_SHARE = 0.5
 WINDOW_PX = 9
 REACH_PX = WINDOW_PX // 2
 
-# Of lines in a window, so many per cent of the pixels are less.
+# Lines and dots are narrower than half of the first, and stand out from so many per cent of the
+# pixels, each against those around it.
+_LINE_PX, _AROUND_PX = 5, 31
 _THIN_PERCENT = 90.0
 
 # Means of a reduced image need this share of their pixels.
 _LEAST_VALID = 0.25
-
-
-@dataclass(frozen=True)
-class Gradients:
-    """Differences along columns and rows, and where they are known, each shape (h, w)."""
-
-    x: FloatImage
-    y: FloatImage
-    valid: Mask
-
-    @classmethod
-    def of(cls, patch: Patch) -> Gradients:
-        """Return the central differences of a patch."""
-        x, y = (
-            np.asarray(cv2.Sobel(patch.values, cv2.CV_32F, *order, ksize=1), np.float32)
-            for order in ((1, 0), (0, 1))
-        )
-        valid = cv2.erode(patch.valid.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-        return cls(x, y, np.asarray(valid))
-
-    def part(self, col: int, row: int, shape: tuple[int, ...]) -> Gradients:
-        """Return a part of a shape from a column and row on."""
-        window = np.s_[row : row + shape[0], col : col + shape[1]]
-        return Gradients(self.x[window], self.y[window], self.valid[window])
-
-    @property
-    def length(self) -> FloatImage:
-        """Their lengths."""
-        return np.asarray(np.hypot(self.x, self.y), np.float32)
-
-
-def count_same(one: Gradients, other: Gradients, strong: tuple[float, float]) -> tuple[int, int]:
-    """Return how many gradients are the same, and how many there are, of those that are strong.
-
-    Parameters
-    ----------
-    one, other
-        Of the same shape.
-    strong
-        The length from which a gradient is strong in the one and in the other.
-    """
-    lengths = one.length, other.length
-    is_strong = one.valid & other.valid & ((lengths[0] > strong[0]) | (lengths[1] > strong[1]))
-    apart = np.hypot(one.x - other.x, one.y - other.y)
-    is_same = apart <= _SAME_SHARE * np.maximum(*lengths)
-    return int((is_strong & is_same).sum()), int(is_strong.sum())
 
 
 def same_windows(one: Patch, other: Patch) -> Mask:
@@ -85,27 +38,30 @@ def same_windows(one: Patch, other: Patch) -> Mask:
 
 
 def same_lines(one: Patch, other: Patch) -> Mask:
-    """Return where two patches have a thin line at the same place, dark or bright in both, (h, w)."""
+    """Return where two patches have a thin line or dot at the same place, shape (h, w).
+
+    Dark or bright, as the same may be drawn in other colours, and as faint as they are among what
+    is around them.
+    """
     both = one.valid & other.valid
-    thin = [_thin(patch) for patch in (one, other)]
-    strong = [
-        np.abs(t) >= np.percentile(np.abs(t[both]), _THIN_PERCENT) if both.any() else both
-        for t in thin
-    ]
-    return np.asarray(both & strong[0] & strong[1] & (thin[0] * thin[1] > 0))
+    if not both.any():
+        return both
+    thin = [_thinness(patch) for patch in (one, other)]
+    strong = [of >= np.percentile(of[both], _THIN_PERCENT) for of in thin]
+    return np.asarray(both & strong[0] & strong[1])
 
 
-def _thin(patch: Patch) -> FloatImage:
-    """Return by how much pixels differ from the median of what is around them."""
+def _thinness(patch: Patch) -> FloatImage:
+    """Return how far pixels are from the median around them, against others there."""
     values = np.where(patch.valid, patch.values, 0).astype(np.float32)
-    thin = values - cv2.medianBlur(values, 5)
-    around = cv2.blur(np.abs(thin), (31, 31))
-    return np.asarray(thin / np.maximum(around, np.finfo(np.float32).tiny), np.float32)
+    apart = np.abs(values - cv2.medianBlur(values, _LINE_PX))
+    usual = cv2.blur(apart, (_AROUND_PX, _AROUND_PX))
+    return np.asarray(apart / np.maximum(usual, np.finfo(np.float32).tiny), np.float32)
 
 
-def covered(middles: Mask) -> Mask:
-    """Return all pixels of windows around some."""
-    window = np.ones((WINDOW_PX, WINDOW_PX), np.uint8)
+def covered(middles: Mask, side_px: int) -> Mask:
+    """Return all pixels of windows of a side around some."""
+    window = np.ones((side_px, side_px), np.uint8)
     return np.asarray(cv2.dilate(middles.astype(np.uint8), window) > 0)
 
 

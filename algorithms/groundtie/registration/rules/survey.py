@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...matching.parts import LEAST_EXCESS
-from ...matching.survey import SURVEY_RADIUS_PX
+from ...matching.survey import SURVEY_RADIUS_PX, Survey
 from ..evidence import SURVEY, RegistrationEvidence
 from .rule import WITHOUT, Rule
 
@@ -31,11 +31,15 @@ def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
     survey = evidence.survey
     if survey is None or evidence.mask.is_ground:
         return None
-    if survey.rival_height >= RIVAL_HEIGHT * survey.height:
+    if _has_rival(survey):
         return "moved elsewhere as a whole, chips all over match about as well"
     if survey.ghost_height >= GHOST_HEIGHT:
         return "chips all over match at a second place, too, where the reference does not repeat"
     return None
+
+
+def _has_rival(survey: Survey) -> bool:
+    return survey.rival_height >= RIVAL_HEIGHT * survey.height
 
 
 def _weak(evidence: RegistrationEvidence) -> str | None:
@@ -51,13 +55,17 @@ def _weak(evidence: RegistrationEvidence) -> str | None:
 
 
 def _locked(evidence: RegistrationEvidence) -> str | None:
+    """Ask of the rest what is asked of all; where one sensor shows one ground, little is left."""
     rest = evidence.rest
-    if rest is None or rest.is_confirming:
+    if rest is None:
+        return None
+    survey = rest.survey
+    is_weak = survey.height < WEAK_HEIGHT or _has_rival(survey)
+    if not survey.parts and (rest.is_explained or not is_weak):
         return None
     return (
-        "both images have the same content at the same columns and rows; without it, only "
-        f"{rest.survey.confirming} of {len(rest.survey.centres)} chips match where the transform "
-        "has them"
+        "without what both images show at the same columns and rows, only "
+        f"{survey.confirming} of {len(survey.centres)} chips match where the transform has them"
     )
 
 
@@ -94,9 +102,10 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "pixel-locked content",
         SURVEY,
-        "both images have the same content at the same columns and rows, such as labels or clouds, "
-        "and what else they show does not confirm the transform",
-        "suites real and attacks",
+        "the transform only moves the array, and without what is the same at the same columns and "
+        "rows, such as labels or clouds, a part lies elsewhere, a second place matches about as "
+        "well, or the similarity is weak",
+        "suites margins and attacks",
         WITHOUT,
         _locked,
     ),
