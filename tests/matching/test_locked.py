@@ -68,6 +68,7 @@ def test_lines_that_are_drawn_over_different_ground_are_found(
     assert locked.sameness.gradients > 10 * locked.sameness.chance
 
 
+@pytest.mark.slow
 def test_lines_are_found_at_their_offset_where_the_transform_bends(
     tmp_path: Path, context: Context
 ) -> None:
@@ -89,6 +90,7 @@ def masked(folder: Path, locked: LockedContent | None) -> np.ndarray:
         return replace(locked, pair=pair)(one.grid.window(20, 0, 200, 200))
 
 
+@pytest.mark.slow
 def test_its_mask_covers_the_lines_and_their_surroundings_alone(
     tmp_path: Path, context: Context
 ) -> None:

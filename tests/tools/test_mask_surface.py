@@ -25,6 +25,7 @@ def read(path: Path) -> np.ndarray:
         return raster.read(1)
 
 
+@pytest.mark.slow
 def test_what_has_a_reason_takes_no_part(city: Path, tmp_path: Path) -> None:
     mask, reasons = tmp_path / "mask.tif", tmp_path / "reasons.tif"
     found = groundtie.mask_surface(
@@ -36,6 +37,7 @@ def test_what_has_a_reason_takes_no_part(city: Path, tmp_path: Path) -> None:
     assert all((read(reasons) & reason).any() for reason in Seen if reason != Seen.UNKNOWN)
 
 
+@pytest.mark.slow
 def test_words_and_the_item_state_the_same_view(city: Path, tmp_path: Path) -> None:
     shares = [
         groundtie.mask_surface(
