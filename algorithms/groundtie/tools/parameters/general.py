@@ -100,19 +100,6 @@ MatchingPixelSize = Annotated[
         advanced=True,
     ),
 ]
-ChipSize = Annotated[
-    int | None,
-    Number(
-        label="Chip size",
-        help="Side of the windows that are matched, in pixels of the matching grid; by default by "
-        "the size of the overlap.",
-        unit="px",
-        integer=True,
-        minimum=16,
-        maximum=1024,
-        advanced=True,
-    ),
-]
 GpveOrder = Annotated[
     int,
     Number(
