@@ -60,6 +60,7 @@ def test_bytes_are_the_same_for_any_number_of_workers(masked: Path, cog: bool) -
     assert all(other == first for other in others)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interleave", ["pixel", "band"])
 @pytest.mark.parametrize("dtype", TYPES)
 def test_pixels_of_all_types_are_what_gdal_reads(

@@ -29,6 +29,9 @@ from ..similarity.sameness import (
 )
 from .matcher import FloatArray, Places
 
+# A transform that moves all of the overlap by whole pixels, but for this, may be content's.
+_LARGEST_BEND_PX = 1.5
+
 # Gradients above this percentile of their image are strong.
 _STRONG_PERCENT = 70.0
 
@@ -142,7 +145,7 @@ class LockedContent:
 
 
 def find_locked_content(
-    pair: ImagePair, transform: Transform, places: Places, bend_px: float, context: Context
+    pair: ImagePair, transform: Transform, places: Places, context: Context
 ) -> LockedContent | None:
     """Return what the images repeat where a transform puts the input's array.
 
@@ -154,8 +157,6 @@ def find_locked_content(
         What was found.
     places
         Where it is looked for.
-    bend_px
-        A transform that moves all of the overlap by whole pixels, but for this, may be content's.
     context
         Threads.
 
@@ -167,42 +168,23 @@ def find_locked_content(
     if moved is None:
         return None
     offset = np.rint(np.median(moved, axis=0))
-    bend = np.abs(moved - offset).max()
     # Not a number, where the transform has none, is no small bend either.
-    if not bend <= bend_px:
+    if not np.abs(moved - offset).max() <= _LARGEST_BEND_PX:
         return None
-
-    def looks_at(offset_px: tuple[int, int]) -> list[_Look]:
-        def look(centre: NDArray[np.int_]) -> _Look:
-            side = places.chip_px + 2 * _REACH_PX
-            corner = centre - side // 2
-            piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
-            return _Look.of(*_patches(pair, piece, offset_px))
-
-        return list(context.map(look, list(places.centres)))
-
     found = int(offset[0]), int(offset[1])
-    looks = looks_at(found)
-    # Content has one offset; a transform that bends passes through several.
-    right, down = _most_alike(looks, int(np.rint(bend)))
-    if (right, down) != (0, 0):
-        found = found[0] + right, found[1] + down
-        looks = looks_at(found)
-    return LockedContent(pair, found, _sameness(looks))
 
+    def look(centre: NDArray[np.int_]) -> _Look:
+        side = places.chip_px + 2 * _REACH_PX
+        corner = centre - side // 2
+        piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
+        return _Look.of(*_patches(pair, piece, found))
 
-def _most_alike(looks: list[_Look], radius_px: int) -> tuple[int, int]:
-    """Return at which offset, up to a radius, the most strong gradients are the same."""
-    reach = min(radius_px, _REACH_PX)
-    steps = range(-reach, reach + 1)
-    shifts = [(right, down) for right in steps for down in steps]
-    strong = _strong_of(looks)
-    same = [_share([one.same(np.array(shift), strong) for one in looks]) for shift in shifts]
-    return shifts[int(np.argmax(same))]
+    return LockedContent(pair, found, _sameness(list(context.map(look, list(places.centres)))))
 
 
 def _sameness(looks: list[_Look]) -> Sameness:
-    strong = _strong_of(looks)
+    own, others = ([look.gradients[k] for look in looks] for k in (0, 1))
+    strong = _strong(own), _strong(others)
     same = [_share([one.same(shift, strong) for one in looks]) for shift in _offsets()]
     area, reduced_area = (_share([one.counts[k] for one in looks]) for k in (0, 1))
     every = sum(one.counts[1][1] for one in looks)
@@ -250,15 +232,8 @@ def _share(counts: list[_Count], least: int = 1) -> float:
     return float(same / max(every, least, 1))
 
 
-def _strong_of(looks: list[_Look]) -> tuple[float, float]:
-    """Return the length from which gradients of either image are strong."""
-    return (
-        _strong([one.gradients[0] for one in looks]),
-        _strong([one.gradients[1] for one in looks]),
-    )
-
-
 def _strong(gradients: list[Gradients]) -> float:
+    """Return the length from which gradients of an image are strong."""
     lengths = [one.length[one.valid] for one in gradients if one.valid.any()]
     return float(np.percentile(np.concatenate(lengths), _STRONG_PERCENT)) if lengths else 0.0
 

@@ -13,9 +13,6 @@ from .matcher import Places
 from .parts import LEAST_PROPORTION
 from .survey import Survey, survey_model, survey_places
 
-# A transform that moves all of the overlap by whole pixels, but for this, may be content's.
-_LARGEST_BEND_PX = 1.5
-
 
 @dataclass(frozen=True)
 class Rest:
@@ -66,8 +63,7 @@ def survey_rest(
         Threads and progress.
     """
     pair = matcher.pair
-    found = pair, transform, survey_places(pair.grid), _LARGEST_BEND_PX
-    locked = find_locked_content(*found, context.quiet())
+    locked = find_locked_content(pair, transform, survey_places(pair.grid), context.quiet())
     if locked is None or not locked.sameness.is_evident:
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
