@@ -8,6 +8,9 @@ PY := $(VENV)/bin/python
 PLUGIN := dist/groundtie_qgis.zip
 QUICK := -m "not slow"
 
+# Tests start many processes, each of which would compile the package again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help install demo check test test-newest test-debian test-qgis test-newer-qgis lint bench
 .PHONY: fuzz failures plugin docs clean
 

@@ -72,7 +72,7 @@ class RotatedCase:
         right = not crossed and error_px <= LARGEST_ERROR_PX[case.kind]
         verdict = CORRECT if right else SILENTLY_WRONG
         reason = (
-            f"height {found.verdict.height:.1f}, rival ratio {found.verdict.rival_ratio:.2f}, "
+            f"height {found.evidence.height:.1f}, rival ratio {found.evidence.rival_ratio:.2f}, "
             f"{found.pose.rotation_deg:.2f}°, scale {found.pose.scale:.3f}"
         )
         unknown = float("nan")

@@ -19,7 +19,7 @@ trap 'rm -rf "$runtime"' EXIT
 # A virtual environment or pyenv on PATH makes QGIS load the wrong Python and crash.
 environment=(
     PATH=/usr/bin:/bin HOME="$runtime" XDG_RUNTIME_DIR="$runtime" LC_ALL=C.UTF-8
-    QT_QPA_PLATFORM=offscreen PYTHONDONTWRITEBYTECODE=1 GROUNDTIE_REQUIRE_QGIS=1
+    QT_QPA_PLATFORM=offscreen GROUNDTIE_REQUIRE_QGIS=1
 )
 for name in CI GROUNDTIE_DATA GROUNDTIE_PICTURES; do
     [ -z "${!name:-}" ] || environment+=("$name=${!name}")

@@ -12,10 +12,13 @@ from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.model_choice import block_folds
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
+from groundtie.masks.choice import MaskUsed
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
+from groundtie.registration.rules import RULES
 from groundtie.registration.scene import ImageFacts, SceneInfo
+from groundtie.registration.verdict import Evidence
 from groundtie.sensor.adjustment import Control, adjust
 
 GRID = utm_grid(600, 500)
@@ -165,3 +168,26 @@ def refinement(
     """Return the evidence of RPCs that are refined by ground control."""
     adjusted = adjust(fit, kind)
     return RefinementEvidence.of(fit, adjusted, check, pixel_m, max_error_px, folding_px)
+
+
+# Check points that all agree.
+GOOD = scatter(36, 0.4)
+
+# A dense town, of who knows which sensor.
+TOWN = {"strong_share": 0.25}
+PERHAPS = scene(facts(**TOWN))
+
+
+def two_thirds(right: int) -> np.ndarray:
+    """Return errors of 36 check points of which so many agree."""
+    return np.concatenate([scatter(right, 0.4), fallen(36 - right)])
+
+
+def masked(kind: str) -> MaskUsed:
+    return MaskUsed(kind, "reference", 0.3, "as asked for")
+
+
+def refusing(found: Evidence) -> list[str]:
+    """Return the names of all rules that refuse, whichever decides."""
+    asked = [rule for rule in RULES if rule.stage in found.stages]
+    return [rule.name for rule in asked if rule.reason(found) is not None]

@@ -104,6 +104,7 @@ def test_check_points_stay_check_points() -> None:
     assert after.check_px > before.check_px + 5  # type: ignore[operator]
 
 
+@pytest.mark.slow
 def test_points_of_a_person_are_marked_in_the_file_and_by_warp(tmp_path: Path) -> None:
     write_pair(tmp_path, 0)
     reference_xy = np.array(ORIGIN) + [
@@ -159,6 +160,7 @@ def test_points_at_one_place_are_objected_to() -> None:
     assert review_of(6).objection("affine") == ""
 
 
+@pytest.mark.slow
 def test_two_thousand_points_are_fitted_again_within_a_fifth_of_a_second() -> None:
     """All models but the spline, with the left-out error; in time of the processor."""
     review = review_of(2000, check=200)
@@ -206,6 +208,7 @@ def test_clicks_at_different_places_are_not_refined(tmp_path: Path) -> None:
     assert lost == 3
 
 
+@pytest.mark.slow
 def test_control_of_an_image_with_rpcs_is_reviewed_alike(tmp_path: Path) -> None:
     """Points by the exact RPCs; the image's own are 8 px off, and a moved point is marked."""
     scene = make_scene(tmp_path, Bias("shift", SIZE, np.array([[-6.0, 5.0]]), np.zeros((2, 2))))

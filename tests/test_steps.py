@@ -99,6 +99,7 @@ class TestFit:
 class TestFromImagesToVerdict:
     """Match, fit and judge, without files."""
 
+    @pytest.mark.slow
     def test_arrays_in_pixel_coordinates(self) -> None:
         reference, input = pair()
         points = steps.match_chips(reference, input)
@@ -112,6 +113,7 @@ class TestFromImagesToVerdict:
         assert verdict.fit_points_used == fit.inliers.sum()
         assert verdict.check_rmse_px < 0.5
 
+    @pytest.mark.slow
     def test_a_wrong_model_is_refused(self) -> None:
         reference, input = pair()
         points = steps.match_chips(reference, input)
@@ -120,6 +122,7 @@ class TestFromImagesToVerdict:
         assert not verdict.accepted
         assert verdict.rule == "chance agreement"
 
+    @pytest.mark.slow
     def test_different_places_are_refused(self) -> None:
         reference, input = pair()[0], pair(seed=5)[1]
         points = steps.match_chips(reference, input)

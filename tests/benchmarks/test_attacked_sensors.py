@@ -40,6 +40,7 @@ def test_a_part_moves_by_what_its_truth_states(seed: int) -> None:
     assert lengths[0] == 0 and 5 <= lengths[-1] <= 21 and len(lengths) == 2
 
 
+@pytest.mark.slow
 def test_rpcs_that_follow_what_moved_are_right(scene: Path, tmp_path: Path) -> None:
     exact, output = read_rpc(scene / "exact_rpc.txt"), tmp_path / "refined_RPC.TXT"
     write_rpc(output, exact.shifted(MOVE))

@@ -57,6 +57,7 @@ def before(job: Job, tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_sample(careful: Job, tmp_path: Path) -> None:
     old, work, found = before(careful, tmp_path), tmp_path / "work", Findings()
     count = steps_of(careful, tmp_path / "before")
@@ -69,6 +70,7 @@ def test_a_sample(careful: Job, tmp_path: Path) -> None:
     assert sum(found.tried.values()) > 5
 
 
+@pytest.mark.slow
 def test_a_sample_on_full_disks(careful: Job, tmp_path: Path) -> None:
     old, found = before(careful, tmp_path), Findings()
     try:
@@ -80,6 +82,7 @@ def test_a_sample_on_full_disks(careful: Job, tmp_path: Path) -> None:
     assert found.wrong == []
 
 
+@pytest.mark.slow
 def test_careless_jobs_are_found(careless: Job, tmp_path: Path) -> None:
     old, work, found = before(careless, tmp_path), tmp_path / "work", Findings()
     failures.kill(careless, old, 2, found, work)

@@ -54,6 +54,7 @@ def test_the_input_is_wrong_by_its_shift_and_at_the_borders_by_more(size: int) -
     np.testing.assert_allclose(moved, [[5, -6], [5 - 3 + 3, -6 - 3 + 3]], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_pair_of_any_size_is_registered_to_its_truth(tile: Pair, tmp_path: Path) -> None:
     found = register(large_pair(tile, 900, tmp_path), 900)
     assert found.verdict == CORRECT

@@ -32,6 +32,7 @@ def test_table_counts_distances_from_the_truth() -> None:
     assert float(along) <= 2.0 and float(across) <= 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 3])
 def test_roofs_lie_along_the_line_of_heights(seed: int, tmp_path: Path) -> None:
     """The simulator's own roof points, between their places in both images."""

@@ -64,6 +64,7 @@ def test_the_highest_value_is_the_peak() -> None:
     assert not is_true((2, -3), 1.0)
 
 
+@pytest.mark.slow
 def test_every_number_of_bins_finds_the_peak(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(peaks, "BIN_COUNTS", (16, 32))
     records = measure_bins(aligned((4, -2)))

@@ -63,6 +63,7 @@ def test_only_the_comparisons_set_a_mask_or_a_surface_model() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_scene_is_made_once(city: City, scene: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(groundtie, "simulate_sensor", None)
     assert city.scene(scene.parent) == scene

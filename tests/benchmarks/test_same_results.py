@@ -91,6 +91,7 @@ class Words:
         return Prepared(self.words, (), lambda: POSITIONS)
 
 
+@pytest.mark.slow
 def test_what_cannot_run_has_failed_and_its_last_words_are_kept() -> None:
     found = run_in(TREE, Words("coregister", "no.tif", "no2.tif", "out.tif"))
     assert found.verdict == FAILED

@@ -47,6 +47,7 @@ def run(
     return found, float(np.hypot(*(model(place) - place)[0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["translation", "affine", "polynomial2"])
 @pytest.mark.parametrize("check_sigma", [0.1, 1.5])
 def test_radii_hold_as_many_errors_as_they_say(kind: str, check_sigma: float) -> None:

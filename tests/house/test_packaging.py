@@ -189,12 +189,14 @@ def build(tree: Path, hook: str, target: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_sdist_carries_the_version_file(distributions: tuple[Path, Path]) -> None:
     with tarfile.open(distributions[0]) as archive:
         names = {name.split("/", 1)[-1] for name in archive.getnames()}
     assert {"metadata.txt", "LICENSE", "README.md", "pyproject.toml"} <= names
 
 
+@pytest.mark.slow
 def test_wheel_is_complete(distributions: tuple[Path, Path]) -> None:
     with zipfile.ZipFile(distributions[1]) as archive:
         names = set(archive.namelist())

@@ -1,17 +1,24 @@
-"""The examples of docs/python.md run, from the first to the last, in one folder."""
+"""The examples of docs/python.md run, in their order; so does that of a tool, for developers."""
 
 from __future__ import annotations
 
 import logging
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
+from raster_files import write_raster
+
+from groundtie.declaration import tool_of
 
 PAGE = Path(__file__).resolve().parents[2] / "docs/python.md"
-BLOCKS = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.M | re.S)
+BLOCK = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
+BLOCKS = BLOCK.findall(PAGE.read_text(encoding="utf-8"))
 
 
 @pytest.fixture
@@ -39,3 +46,15 @@ def test_the_examples_run_in_their_order(
     for written in ("registered.tif", "warped.tif", "report.html"):
         assert Path(written).is_file()
     assert "groundtie.progress" in caplog.text
+
+
+def test_the_example_of_a_new_tool_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = PAGE.with_name("development.md").read_text(encoding="utf-8")
+    (example,) = BLOCK.findall(page)
+    module = ModuleType("groundtie.tools.raster_size")
+    module.__package__ = "groundtie.tools"
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    exec(compile(example, "docs/development.md", "exec"), vars(module))
+    image = write_raster(tmp_path / "a.tif", np.ones((3, 5), np.uint8))
+    assert tool_of(module.raster_size).name == "raster_size"
+    assert module.raster_size(image).summary() == {"width": 5, "height": 3}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from functools import cache
 from pathlib import Path
 
@@ -18,12 +19,15 @@ def dotted(path: Path) -> str:
 
 
 MODULES = {dotted(path): path for path in sorted(PACKAGE.rglob("*.py"))}
-TOOLS = {name.rpartition(".")[2]: name for name in MODULES if name.startswith("groundtie.tools.")}
+TOOLS = {
+    name.rpartition(".")[2]: name
+    for name in MODULES
+    if name.rpartition(".")[0] == "groundtie.tools"
+}
 
 
-@cache
-def parsed(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
+IMPORT = re.compile(r"^ *from (\.*)([\w.]*) import (\([^)]*\)|.*)|^ *import ([\w.]+)", re.MULTILINE)
+CALLED = re.compile(r"\bgroundtie\.(\w+)\(")
 
 
 @cache
@@ -32,16 +36,12 @@ def imported(path: Path) -> set[str]:
     package = dotted(path).split(".") if path.is_relative_to(PACKAGE) else []
     if path.name != "__init__.py":
         package = package[:-1]
-    names: set[str] = set()
-    for node in ast.walk(parsed(path)):
-        if isinstance(node, ast.ImportFrom):
-            above = package[: len(package) + 1 - node.level] if node.level else []
-            module = ".".join([*above, *([node.module] if node.module else [])])
-            names |= {module, *(f"{module}.{alias.name}" for alias in node.names)}
-        elif isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            names.add(TOOLS.get(node.attr, "") if node.value.id == "groundtie" else "")
+    text = path.read_text(encoding="utf-8")
+    names = {TOOLS.get(name, "") for name in CALLED.findall(text)}
+    for dots, module, imports, whole in IMPORT.findall(text):
+        above = package[: len(package) + 1 - len(dots)] if dots else []
+        module = ".".join([*above, *([module] if module else [])])
+        names |= {whole, module, *(f"{module}.{name}" for name in re.findall(r"\w+", imports))}
     names |= {TOOLS.get(name.removeprefix("groundtie."), "") for name in names}
     return names & MODULES.keys()
 
@@ -59,7 +59,7 @@ def is_quick(path: Path) -> bool:
                 return True
         return False
 
-    return tests(parsed(path).body)
+    return tests(ast.parse(path.read_text(encoding="utf-8")).body)
 
 
 def test_every_module_is_met_by_a_quick_test() -> None:

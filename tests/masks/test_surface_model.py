@@ -146,6 +146,7 @@ def part(country: Country, tmp_path_factory: pytest.TempPathFactory) -> np.ndarr
     return ground.select(Window(cols.start, rows.start, 220, 220)).part
 
 
+@pytest.mark.slow
 def test_the_simulators_radar_shows_nothing_else_with_it(
     country: Country, part: np.ndarray
 ) -> None:

@@ -245,6 +245,7 @@ class TestHeights:
         px = centres()
         return px, surfaces_at(truth(px.astype(float)) - px, seed)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("seed", range(2))
     def test_what_heights_displace_is_found_and_chosen(self, seed: int) -> None:
         terrain = self.terrain(seed)
@@ -260,6 +261,7 @@ class TestHeights:
         scale = chosen.frame.to_map.a
         np.testing.assert_allclose(chosen.coefficients[3] * scale, self.SIGHT_PX, atol=0.006)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", ["affine", "polynomial2"])
     @pytest.mark.parametrize("seed", range(2))
     def test_heights_of_another_place_are_not_chosen(self, kind: str, seed: int) -> None:
@@ -271,6 +273,7 @@ class TestHeights:
         assert TERRAIN in chosen.left_out_score
         assert chosen.model.kind == kind
 
+    @pytest.mark.slow
     def test_flat_land_says_nothing_on_heights(self) -> None:
         flat = Raster(np.full((500, 600), 30, np.float32), self.GRID.transform, self.GRID.crs)
         low, high = self.GRID.pixel_to_map([[0, 499], [599, 0]])

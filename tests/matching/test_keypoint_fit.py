@@ -52,10 +52,9 @@ def estimate_of(
     coarse: Model = COARSE,
     detector: Detecting = KEYPOINTS[0],
     descriptor: Describing = KEYPOINTS[1],
-    ratio: float = 1.0,
 ) -> Estimate:
     held_out = HeldOut.of(pair)
-    matcher = KeypointMatcher(pair, detector, descriptor, ratio, held_out=held_out)
+    matcher = KeypointMatcher(pair, detector, descriptor, held_out=held_out)
     with threads(2) as context:
         return fit_of(pair, held_out, matcher, refinement).estimate(coarse, kind, context)
 
@@ -238,7 +237,7 @@ def test_another_place_has_too_few_matches_that_agree(tmp_path: Path) -> None:
     other = write_speckled_pair(tmp_path, SIZE, TRUTH, input_seed=77)
     with other.opened() as pair:
         try:
-            found = estimate_of(pair, "affine", ratio=0.6)
+            found = estimate_of(pair, "affine")
         except TooFewPointsError:
             return
     assert found.points.used.sum() < 12

@@ -19,16 +19,12 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> RasterSource:
 
 
 def laid_out(
-    source: RasterSource,
-    size: tuple[int, int],
-    chip: int | None = None,
-    spacing: float | None = None,
-    overlap: tuple[int, int] | None = None,
+    source: RasterSource, size: tuple[int, int], overlap: tuple[int, int] | None = None
 ) -> ChipLayout:
     pair = ImagePair(
         Image(source), Image(source), utm_grid(*size), overlap or size, utm_grid(*size)
     )
-    return lay_out_chips(pair, chip, spacing)
+    return lay_out_chips(pair)
 
 
 def pixels_of(centres: np.ndarray, chip: int, size: tuple[int, int]) -> np.ndarray:
@@ -44,18 +40,16 @@ def held_out_of(layout: ChipLayout, size: tuple[int, int]) -> np.ndarray:
 
 
 SIZES = st.tuples(st.integers(200, 900), st.integers(200, 900))
-CHIPS = st.one_of(st.none(), st.integers(16, 33))
-SPACINGS = st.one_of(st.none(), st.floats(5, 200))
 
 
 @pytest.mark.slow
 @settings(max_examples=100)
-@given(size=SIZES, chip=CHIPS, spacing=SPACINGS)
+@given(size=SIZES)
 def test_check_chips_share_no_pixel_with_the_fit_nor_leave_the_grid(
-    source: RasterSource, size: tuple[int, int], chip: int | None, spacing: float | None
+    source: RasterSource, size: tuple[int, int]
 ) -> None:
-    layout = laid_out(source, size, chip, spacing)
-    assert layout.chip_px == (chip or default_chip_px(*size))
+    layout = laid_out(source, size)
+    assert layout.chip_px == default_chip_px(*size)
     groups = (layout.fit_centres, layout.chip_px), (layout.check_centres, layout.check_chip_px)
     for centres, side in groups:
         corners = centres - side // 2
@@ -69,11 +63,11 @@ def test_check_chips_share_no_pixel_with_the_fit_nor_leave_the_grid(
 
 
 @settings(max_examples=50)
-@given(size=SIZES, chip=CHIPS, spacing=SPACINGS)
+@given(size=SIZES)
 def test_the_same_share_of_every_cell_is_held_out_and_chips_of_the_fit_reach_all_corners(
-    source: RasterSource, size: tuple[int, int], chip: int | None, spacing: float | None
+    source: RasterSource, size: tuple[int, int]
 ) -> None:
-    layout = laid_out(source, size, chip, spacing)
+    layout = laid_out(source, size)
     cells = np.array([layout.columns.cells, layout.rows.cells])
     inner = np.array(size) - layout.chip_px
     expected = (_HELD_OUT * inner).prod()
@@ -148,22 +142,10 @@ def test_cells_are_counted_over_the_overlap_not_over_the_search_margin(
     assert (layout.columns.cells, layout.rows.cells) == (12, 6)
 
 
-@pytest.mark.parametrize("spacing", [20.0, 40.0, 90.0])
-def test_chips_of_the_fit_are_as_far_apart_as_asked_for(
-    source: RasterSource, spacing: float
-) -> None:
-    layout = laid_out(source, (1400, 1100), chip=32, spacing=spacing)
-    assert layout.spacing_px == pytest.approx(spacing, rel=0.15)
-    along_first_row = np.sort(layout.fit_centres[layout.fit_centres[:, 1] == 16][:, 0])
-    assert np.diff(along_first_row).mean() == pytest.approx(spacing, rel=0.15)
-
-
-@pytest.mark.parametrize(("size", "chip"), [((60, 60), None), ((500, 70), None), ((280, 400), 100)])
-def test_too_small_an_overlap_is_refused(
-    source: RasterSource, size: tuple[int, int], chip: int | None
-) -> None:
+@pytest.mark.parametrize("size", [(60, 60), (500, 70)])
+def test_too_small_an_overlap_is_refused(source: RasterSource, size: tuple[int, int]) -> None:
     with pytest.raises(NoOverlapError, match=rf"any\.tif.*{size[0]} × {size[1]} matching pixels"):
-        laid_out(source, size, chip)
+        laid_out(source, size)
 
 
 @pytest.mark.parametrize("side", range(60, 260, 5))

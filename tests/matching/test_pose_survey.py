@@ -33,6 +33,7 @@ def surveyed(folder: Path, pose: Pose, context: Context, **more: int) -> PoseSur
 
 
 # How accurate a pose is to be, and what it may be wrong by.
+@pytest.mark.slow
 @pytest.mark.parametrize("pose", [TRUTH, replace(TRUTH, rotation_deg=51.5)])
 def test_chips_confirm_a_pose(pose: Pose, tmp_path: Path, context: Context) -> None:
     found = surveyed(tmp_path, pose, context)
@@ -43,6 +44,7 @@ def test_chips_confirm_a_pose(pose: Pose, tmp_path: Path, context: Context) -> N
     assert found.rest is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pose", "more"),
     [
@@ -57,6 +59,7 @@ def test_chips_confirm_no_wrong_pose(
     assert found.agrees.mean() < 0.25
 
 
+@pytest.mark.slow
 def test_images_that_hardly_overlap_confirm_nothing(tmp_path: Path, context: Context) -> None:
     found = surveyed(tmp_path, replace(TRUTH, shift_px=(170.0, 150.0)), context)
     assert found.agrees.mean() < 0.25

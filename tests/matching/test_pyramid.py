@@ -62,6 +62,7 @@ def test_cancelling(pair: ImagePair, context: Context) -> None:
         coarse_model(pair, 200.0, replace(context, progress=progress))
 
 
+@pytest.mark.slow
 def test_two_places_are_not_found_in_each_other(
     other_place: TexturedPair, context: Context
 ) -> None:

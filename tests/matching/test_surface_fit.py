@@ -34,6 +34,7 @@ def error_px(model: Model, files: TexturedPair) -> float:
     return rms(model(xy) - files.truth.model(xy)) / 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [AUTO, *KINDS])
 def test_every_model_is_fitted_from_a_coarse_one(
     textured: TexturedPair, pair: ImagePair, context: Context, kind: str
@@ -108,6 +109,7 @@ def test_the_model_reaches_the_input_through_its_own_georeferencing(
     assert rms(right.residual_px(estimate.transform)) < 0.5
 
 
+@pytest.mark.slow
 def test_the_seed_decides(pair: ImagePair, context: Context) -> None:
     seeded = replace(context, seed=5)
     found = [fit_of(pair).estimate(COARSE, "affine", seeded) for _ in range(2)]

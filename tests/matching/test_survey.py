@@ -66,6 +66,7 @@ def test_chips_lie_side_by_side_and_farther_apart_in_large_grids() -> None:
         assert (places.centres.max(axis=0) <= np.array([grid.width, grid.height]) - half + 1).all()
 
 
+@pytest.mark.slow
 def test_chips_of_a_right_model_confirm_it(tmp_path: Path, context: Context) -> None:
     survey = surveyed(tmp_path, noisy(place(), 1), noisy(place(), 2), context)
     assert survey.confirming == len(survey.centres) == 49
@@ -73,6 +74,7 @@ def test_chips_of_a_right_model_confirm_it(tmp_path: Path, context: Context) -> 
     assert survey.parts == []
 
 
+@pytest.mark.slow
 def test_chips_of_another_place_confirm_nothing(tmp_path: Path, context: Context) -> None:
     survey = surveyed(tmp_path, noisy(place(), 1), noisy(place(seed=9), 2), context)
     assert survey.confirming < 5
@@ -80,6 +82,7 @@ def test_chips_of_another_place_confirm_nothing(tmp_path: Path, context: Context
     assert not any(part.is_evident for part in survey.parts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shift", "where"), [((9, -6), "left"), ((-14, 11), "upper right")])
 def test_a_part_that_lies_elsewhere_is_found_with_its_place(
     tmp_path: Path, context: Context, shift: tuple[int, int], where: str
@@ -96,6 +99,7 @@ def test_a_part_that_lies_elsewhere_is_found_with_its_place(
     assert not any(other.is_evident for other in survey.parts[1:])
 
 
+@pytest.mark.slow
 def test_a_part_beyond_the_radius_is_no_part(tmp_path: Path, context: Context) -> None:
     input = noisy(place(), 2)
     input[:, : SIDE // 3] = noisy(place((SURVEY_RADIUS_PX + 5, 0)), 2)[:, : SIDE // 3]
@@ -103,6 +107,7 @@ def test_a_part_beyond_the_radius_is_no_part(tmp_path: Path, context: Context) -
     assert not any(part.is_evident for part in survey.parts)
 
 
+@pytest.mark.slow
 def test_scattered_disagreement_is_no_part(tmp_path: Path, context: Context) -> None:
     """Every other chip shows another place, each its own."""
     input = noisy(place(), 2)

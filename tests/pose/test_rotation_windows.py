@@ -83,6 +83,7 @@ class TestWithGeoreferencing:
         # At 60° north a degree of longitude is half as long as one of latitude.
         assert width / height == pytest.approx(2, rel=0.01)
 
+    @pytest.mark.slow
     def test_large_images_are_reduced(self, tmp_path: Path) -> None:
         grid = utm_grid(1300, 900)
         windows = windows_of(waves(tmp_path / "a.tif", grid), waves(tmp_path / "b.tif", grid))

@@ -12,7 +12,7 @@ from affine import Affine
 from raster_files import UTM, full_disk, utm_grid, wave_image, waves, write_raster
 from rasterio.enums import ColorInterp
 
-from groundtie.errors import CancelledError, OutputError, ParameterError, RasterOpenError
+from groundtie.errors import CancelledError, OutputError, RasterOpenError
 from groundtie.progress import Progress
 from groundtie.rasters import tiling
 from groundtie.rasters.atomic import Outputs
@@ -154,16 +154,6 @@ def test_nodata_is_kept_and_no_pixel_becomes_it(small_tiles: None, tmp_path: Pat
     # At 0.4 px from a pixel that is still the nearest one.
     np.testing.assert_array_equal(values > 0, image > 0)
     assert values[values > 0].min() == 1
-
-
-def test_a_nodata_value_of_the_callers_choice(tmp_path: Path) -> None:
-    path = write_raster(tmp_path / "a.tif", IMAGE, GRID, nodata=1)
-    wide = GRID.window(-10, 0, 100, 70)
-    with rasterio.open(warped(path, wide, nodata=65535)) as dataset:
-        assert dataset.nodata == 65535
-        assert (dataset.read(1)[:, :10] == 65535).all()
-    with pytest.raises(ParameterError, match="uint16 cannot hold"):
-        warped(path, nodata=-1)
 
 
 def test_without_nodata_integers_get_a_mask_where_pixels_are_missing(

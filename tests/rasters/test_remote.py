@@ -68,6 +68,7 @@ def test_a_reduced_image_is_read_from_overviews(
     assert server.sent["average.tif"] < 0.2 * averaged.stat().st_size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(1024, 1024), (1037, 1101)])
 def test_larger_pixels_lie_where_they_do_without_overviews(
     server: Loopback, size: tuple[int, int]

@@ -93,8 +93,9 @@ def test_pixel_coordinates_stay() -> None:
 
 
 def test_a_nodata_value_that_does_not_fit() -> None:
-    with open_raster(np.zeros((40, 50), np.uint8)) as source, pytest.raises(ParameterError):
-        warp_to_array(source, source.grid.map_to_pixel, source.grid, nodata=-1)
+    image = Raster(np.zeros((40, 50), np.uint8), nodata=-1)
+    with open_raster(image) as source, pytest.raises(ParameterError):
+        warp_to_array(source, source.grid.map_to_pixel, source.grid)
 
 
 def test_progress_and_cancelling() -> None:

@@ -53,12 +53,14 @@ def masked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_raster(folder / "a.tif", np.stack([NOISE, NOISE // 2]), GRID, mask=MASK)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cog", [False, True])
 def test_bytes_are_the_same_for_any_number_of_workers(masked: Path, cog: bool) -> None:
     first, *others = [copied(masked, workers, cog).read_bytes() for workers in (1, 2, 3, 8)]
     assert all(other == first for other in others)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interleave", ["pixel", "band"])
 @pytest.mark.parametrize("dtype", TYPES)
 def test_pixels_of_all_types_are_what_gdal_reads(

@@ -101,6 +101,7 @@ def test_what_fails_later_leaves_no_report_either(
     assert listing(tmp_path) == {}
 
 
+@pytest.mark.slow
 def test_the_reports_numbers_leave_the_transform_its_name(
     registration: Registration, context: Context, tmp_path: Path
 ) -> None:

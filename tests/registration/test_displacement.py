@@ -29,6 +29,7 @@ def evidence(registration: Registration) -> RegistrationEvidence:
     return registration.evidence
 
 
+@pytest.mark.slow
 def test_the_file_holds_the_known_shift_and_how_well_it_is_known(
     registration: Registration, tmp_path: Path, context: Context
 ) -> None:

@@ -53,6 +53,7 @@ def test_whoever_names_the_radar_image_is_believed(
         assert used.kind == "none" and "too few buildings" in used.reason
 
 
+@pytest.mark.slow
 def test_a_towns_ground_is_masked_once_for_fit_and_check(
     tmp_path: Path, stack: ExitStack, context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -101,6 +102,7 @@ def test_masks_of_the_reference_go_with_it(
             assert moved.ground.reference is result.ground.reference
 
 
+@pytest.mark.slow
 def test_layers_and_classifiers_become_rasters(
     tmp_path: Path, stack: ExitStack, context: Context
 ) -> None:

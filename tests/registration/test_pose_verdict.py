@@ -11,7 +11,7 @@ from groundtie.geometry.limits import SearchLimits
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.pose.search import find_poses
 from groundtie.rasters.patch import Patch
-from groundtie.registration.pose_verdict import judge_pose
+from groundtie.registration.pose_verdict import PoseEvidence, judge_pose
 from groundtie.similarity.surface import SimilaritySettings
 
 TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
@@ -29,26 +29,19 @@ def windows() -> tuple[Patch, Patch]:
 
 class TestWhatAnExhaustiveSearchFound:
     def test_a_pose_that_stands_out(self, windows: tuple[Patch, Patch], context: Context) -> None:
-        verdict = judge_pose(*windows, ANY, candidates(12.0, 4.0), exhaustive=True, context=context)
-        assert verdict.accepted
-        assert verdict.summary() == {
-            "accepted": True,
-            "reason": "no other pose matches nearly as well",
-            "height": 12.0,
-            "rival_ratio": 3.0,
-            "rule": "",
-            "advice": "",
-        }
+        evidence = PoseEvidence.of(windows, ANY, candidates(12.0, 4.0), True, context)
+        assert judge_pose(evidence).accepted
+        assert evidence.summary() == {"height": 12.0, "rival_ratio": 3.0}
 
     def test_a_rival(self, windows: tuple[Patch, Patch], context: Context) -> None:
         found = candidates(12.0, 12.0 / 1.6 + 0.1)
-        verdict = judge_pose(*windows, ANY, found, exhaustive=True, context=context)
+        verdict = judge_pose(PoseEvidence.of(windows, ANY, found, True, context))
         assert not verdict.accepted
         assert "another pose" in verdict.reason
 
     def test_no_higher_than_chance(self, windows: tuple[Patch, Patch], context: Context) -> None:
         found = candidates(4.9, 1.0)
-        verdict = judge_pose(*windows, ANY, found, exhaustive=True, context=context)
+        verdict = judge_pose(PoseEvidence.of(windows, ANY, found, True, context))
         assert not verdict.accepted
         assert "chance" in verdict.reason
 
@@ -56,9 +49,9 @@ class TestWhatAnExhaustiveSearchFound:
     def test_nothing_to_compare_with(
         self, windows: tuple[Patch, Patch], heights: tuple[float, ...], context: Context
     ) -> None:
-        verdict = judge_pose(*windows, ANY, candidates(*heights), exhaustive=True, context=context)
-        assert not verdict.accepted
-        assert verdict.rival_ratio is None
+        evidence = PoseEvidence.of(windows, ANY, candidates(*heights), True, context)
+        assert not judge_pose(evidence).accepted
+        assert evidence.rival_ratio is None
 
 
 class TestWhatAnotherSearchFound:
@@ -78,7 +71,7 @@ class TestWhatAnotherSearchFound:
         self, windows: tuple[Patch, Patch], context: Context, pose: Pose, accepted: bool
     ) -> None:
         found = [PoseFound(pose, 99.0)]
-        verdict = judge_pose(*windows, ANY, found, exhaustive=False, context=context)
+        verdict = judge_pose(PoseEvidence.of(windows, ANY, found, False, context))
         assert verdict.accepted == accepted
         assert accepted or "prefers" in verdict.reason
 
@@ -88,7 +81,7 @@ class TestWhatAnotherSearchFound:
     ) -> None:
         limits = SearchLimits(30, 10, (1.0, 1.0))
         found = find_poses(*windows, limits, SimilaritySettings(), context)
-        verdict = judge_pose(*windows, limits, found, exhaustive=True, context=context)
+        verdict = judge_pose(PoseEvidence.of(windows, limits, found, True, context))
         assert not verdict.accepted
         assert "prefers 50" in verdict.reason or "prefers 49" in verdict.reason
 
@@ -98,13 +91,13 @@ class TestWhatAnotherSearchFound:
 def test_two_places_are_refused(seed: int, context: Context) -> None:
     windows = turned_pair(TRUTH, seed=seed, input_seed=seed + 100)
     found = find_poses(*windows, ANY, SimilaritySettings(), context)
-    assert not judge_pose(*windows, ANY, found, exhaustive=True, context=context).accepted
+    assert not judge_pose(PoseEvidence.of(windows, ANY, found, True, context)).accepted
 
 
 def test_windows_without_content_are_refused(context: Context) -> None:
     flat = patch(np.ones((50, 50)))
     verdict = judge_pose(
-        flat, flat, ANY, [PoseFound(Pose(), 9.0)], exhaustive=False, context=context
+        PoseEvidence.of((flat, flat), ANY, [PoseFound(Pose(), 9.0)], False, context)
     )
     assert not verdict.accepted
     assert "too little" in verdict.reason

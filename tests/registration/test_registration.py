@@ -100,6 +100,7 @@ def test_a_refusal_is_one_line_with_what_to_try(registration: Registration) -> N
         lost.accepted()
 
 
+@pytest.mark.slow
 def test_the_report_is_a_page_and_its_numbers(registration: Registration, tmp_path: Path) -> None:
     registration.report(tmp_path / "r.html")
     assert set(listing(tmp_path)) == {"r.html", "r.json"}
@@ -118,6 +119,7 @@ def test_a_page_without_surfaces_has_the_same_numbers(registration: Registration
     assert one == other
 
 
+@pytest.mark.slow
 def test_left_as_a_context_manager_it_closes_its_rasters(textured: TexturedPair) -> None:
     spec = Specification(similarity="orientation", search_radius_m=200.0)
     call = Call(textured.reference, textured.input, RegistrationFiles())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -12,8 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from evidences import (
+    GOOD,
     GRID,
-    RANGE,
+    PERHAPS,
+    TOWN,
     control,
     displaced,
     estimated,
@@ -24,9 +25,11 @@ from evidences import (
     fit_with,
     points,
     refinement,
+    refusing,
     scatter,
     scene,
     survey,
+    two_thirds,
 )
 
 from groundtie.assessment.accuracy import AssessmentEvidence
@@ -39,10 +42,8 @@ from groundtie.errors import (
     TooFewPointsError,
 )
 from groundtie.geometry.estimation import Estimate
-from groundtie.masks.choice import LAYER, REGIONS, SURFACE, THRESHOLD, MaskUsed
-from groundtie.matching.pose_survey import PoseSurvey
+from groundtie.masks.choice import REGIONS, SURFACE, MaskUsed
 from groundtie.matching.rest import Rest
-from groundtie.matching.survey import Survey
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
 from groundtie.registration import rules
@@ -50,16 +51,13 @@ from groundtie.registration.evidence import (
     RegistrationEvidence,
     SearchEvidence,
 )
-from groundtie.registration.layover import CHIPS_MEAN_OVER_SCATTER
 from groundtie.registration.pose_verdict import PoseEvidence, PoseSurveyEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
 from groundtie.registration.series_evidence import DateEvidence
-from groundtie.registration.surface_masks import ModelFit
 from groundtie.registration.tie_point_evidence import TiePointEvidence
-from groundtie.registration.verdict import Evidence, first_refusal
+from groundtie.registration.verdict import first_refusal
 
-GOOD = scatter(36, 0.4)
 RANK = (
     stages.TIE_POINTS,
     stages.SEARCH,
@@ -74,20 +72,9 @@ RANK = (
     stages.SERIES,
 )
 
-# Dense towns: of a radar with speckle, of a radar whose speckle a filter took, of who knows what.
-TOWN = {"strong_share": 0.25}
+# Dense towns: of a radar with speckle, and of one whose speckle a filter took.
 SPECKLED = scene(facts(variation2=0.2, **TOWN))
 DESPECKLED = scene(facts(is_known_radar=True, **TOWN))
-PERHAPS = scene(facts(**TOWN))
-
-
-def masked(kind: str) -> MaskUsed:
-    return MaskUsed(kind, "reference", 0.3, "as asked for")
-
-
-def two_thirds(right: int) -> np.ndarray:
-    """Return errors of 36 check points of which so many agree."""
-    return np.concatenate([scatter(right, 0.4), fallen(36 - right)])
 
 
 def beside(right: int, others: int) -> np.ndarray:
@@ -248,12 +235,6 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
 }
 
 
-def refusing(found: Evidence) -> list[str]:
-    """Return the names of all rules that refuse, whichever decides."""
-    asked = [rule for rule in RULES if rule.stage in found.stages]
-    return [rule.name for rule in asked if rule.reason(found) is not None]
-
-
 def test_evidence_stands_here_for_every_rule_and_for_no_other() -> None:
     assert list(EVIDENCE) == [rule.name for rule in RULES]
 
@@ -299,141 +280,6 @@ def test_a_rule_states_its_limit_its_source_and_what_to_try(rule: Rule) -> None:
         assert text and text == text.strip() and not text.endswith(".")
 
 
-def test_what_heights_may_displace_all_points_by_is_refused() -> None:
-    """Chips that scatter evenly along a line by ± n px may be n px off, all of them."""
-
-    def along(reach_px: float) -> RegistrationEvidence:
-        seen = survey()
-        return evidence(GOOD, survey=replace(seen, shifts_px=displaced(49, -reach_px, reach_px)))
-
-    assert refusing(along(2.0)) == []
-    assert refusing(along(3.5)) == ["uncertain transform"]
-
-
-@pytest.mark.parametrize("folds", [0, 1, 5])
-def test_a_transform_whose_error_is_unknown_is_refused(folds: int) -> None:
-    """No model without a block, one alone, and models that have no values."""
-    unknown = replace(
-        estimated(fit_points()), fold_models=(lambda px: np.full(px.shape, np.nan),) * folds
-    )
-    assert "uncertain transform" in refusing(evidence(GOOD, unknown))
-
-
-@pytest.mark.parametrize(
-    ("more", "expected_px"),
-    [({}, 6.0), ({"mask": masked(REGIONS)}, 3.0), ({"layover_factor": 3.0}, 6.0 * math.sqrt(3))],
-)
-def test_heights_that_spread_evenly_displace_by_their_width(
-    more: dict[str, Any], expected_px: float
-) -> None:
-    """Chips that spread by ± 3 px along the range: the ground is the lowest, or the middle."""
-    seen = replace(survey(), shifts_px=displaced(49, -3.0, 3.0))
-    found = evidence(GOOD, survey=seen, **more).displacement_px
-    assert np.hypot(*found) == pytest.approx(expected_px, rel=0.15)
-    assert abs(found @ RANGE) == pytest.approx(np.hypot(*found), rel=0.01)
-
-
-@pytest.mark.parametrize("kind", [REGIONS, LAYER, SURFACE])
-def test_a_town_whose_ground_was_matched_is_not_suspected(kind: str) -> None:
-    found = evidence(two_thirds(20), scene=PERHAPS, mask=masked(kind))
-    assert "town matched whole" not in refusing(found)
-
-
-def test_a_town_whose_ground_confirms_is_not_suspected() -> None:
-    assert refusing(evidence(two_thirds(20), scene=PERHAPS, is_ground_checked=True)) == []
-
-
-def test_an_image_of_fields_is_not_suspected() -> None:
-    assert refusing(evidence(two_thirds(20), scene=scene())) == []
-
-
-@pytest.mark.parametrize(
-    ("fit", "reason"),
-    [
-        (ModelFit(0.4, (2, -2)), None),
-        (ModelFit(0.4, (-3, 1)), "3.2 px off"),
-        (ModelFit(0.08, (0, 0)), "the registered input does not show"),
-    ],
-)
-def test_the_input_shows_elevated_objects_where_the_surface_model_has_them(
-    fit: ModelFit, reason: str | None
-) -> None:
-    found = evidence(GOOD, mask=masked(SURFACE), input_fit=fit, max_error_px=3.0)
-    decided = first_refusal(found)
-    assert (decided is None) == (reason is None)
-    assert decided is None or (reason is not None and reason in decided[1])
-
-
-def test_ground_must_be_reliable_and_span_the_overlap() -> None:
-    regions = MaskUsed(REGIONS, "reference", 0.3, "as in a dense town")
-    assert refusing(evidence(GOOD, mask=regions)) == []
-    doubted = replace(regions, is_reliable=False)
-    assert refusing(evidence(GOOD, mask=doubted)) == ["too little ground"]
-    narrow = estimated(fit_points(within=(0.6, 0.6)))
-    assert refusing(evidence(GOOD, narrow, mask=regions)) == ["too little ground"]
-    assert refusing(evidence(GOOD, narrow)) == []
-
-
-@pytest.mark.parametrize(("agreeing", "expected"), [(4, ["too little ground"]), (5, [])])
-def test_an_oblique_view_needs_more_check_points_on_the_ground(
-    agreeing: int, expected: list[str]
-) -> None:
-    regions = MaskUsed(REGIONS, "reference", 0.3, "as in a dense town")
-    oblique = scene(facts(variation2=0.25, strong_share=0.2), facts(is_in_sensor_geometry=True))
-    errors = scatter(agreeing, 0.3)
-    assert refusing(evidence(errors, mask=regions, scene=oblique)) == expected
-    assert refusing(evidence(errors, mask=regions)) == []
-
-
-@pytest.mark.parametrize("kind", [REGIONS, LAYER, SURFACE])
-def test_little_ground_may_be_weakly_similar(kind: str) -> None:
-    """A mask leaves little of each chip; other rules judge what it leaves."""
-    weak = survey(height=1.9, rival=1.8)
-    assert refusing(evidence(GOOD, survey=weak, mask=masked(kind))) == []
-    assert refusing(evidence(GOOD, survey=weak)) == ["second place nearby", "weak similarity"]
-
-
-def test_a_part_of_which_half_confirms_is_layover_not_a_part() -> None:
-    found = survey(49, part=12)
-    surfaces = found.surfaces.copy()
-    surfaces[:12:2] = survey(49).surfaces[:12:2]
-    assert refusing(evidence(GOOD, survey=replace(found, surfaces=surfaces))) == []
-
-
-def test_without_locked_content_another_place_must_not_match_better() -> None:
-    rest = survey(20, height=4.0, rival=5.0)
-    found = evidence(GOOD, survey=survey(), rest=Rest(rest))
-    assert refusing(found) == ["pixel-locked content"]
-
-
-def test_without_locked_content_no_part_must_match_elsewhere() -> None:
-    found = evidence(GOOD, survey=survey(), rest=Rest(survey(part=10)))
-    assert refusing(found) == ["pixel-locked content"]
-
-
-@pytest.mark.parametrize(("height", "expected"), [(8.9, []), (9.1, ["second place nearby"])])
-def test_a_second_place_beneath_a_copy(height: float, expected: list[str]) -> None:
-    found = replace(survey(), ghost_height=height)
-    assert refusing(evidence(GOOD, survey=found)) == expected
-
-
-@pytest.mark.parametrize(("part", "expected"), [(7, ["pixel-locked content"]), (2, [])])
-def test_what_copies_leave_may_contradict(part: int, expected: list[str]) -> None:
-    """It need not confirm the transform, as a cloud deck looks like a copy, but not another."""
-    left = survey(3, part, height=6.0)
-    found = evidence(GOOD, survey=survey(), rest=Rest(left, is_explained=True))
-    assert refusing(found) == expected
-
-
-@pytest.mark.parametrize(
-    ("kind", "expected"),
-    [(LAYER, []), (SURFACE, []), (REGIONS, ["despeckled town"]), (THRESHOLD, [])],
-)
-def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list[str]) -> None:
-    """Regions of a camera's image that pass for a radar's are no ground."""
-    assert refusing(evidence(GOOD, scene=PERHAPS, mask=masked(kind))) == expected
-
-
 def test_only_rules_of_the_evidence_are_asked() -> None:
     """Rules of agreement and error judge refinements, too; those of scenes do not."""
     assert SearchEvidence.stages == (stages.SEARCH,)
@@ -447,50 +293,6 @@ def test_only_rules_of_the_evidence_are_asked() -> None:
     assert RefinementEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.REFINEMENT)
     assert PoseEvidence.stages == (stages.POSE,)
     assert PoseSurveyEvidence.stages == (stages.AGREEMENT, stages.LAYOVER, stages.SURVEY)
-
-
-@pytest.mark.parametrize(
-    ("agreeing", "found", "rest", "expected"),
-    [
-        (7, survey(), None, []),
-        (5, survey(), None, ["small share of check points"]),
-        (4, survey(), None, ["chance agreement", "small share of check points"]),
-        (7, survey(35, part=14), None, ["part elsewhere"]),
-        (7, survey(height=4.0, rival=3.5), None, ["second place nearby"]),
-        (7, survey(height=1.9, rival=0.5), None, ["weak similarity"]),
-        (7, survey(), Rest(survey(height=1.9, rival=1.0)), ["pixel-locked content"]),
-    ],
-)
-def test_rules_of_registrations_judge_poses(
-    agreeing: int, found: Survey, rest: Rest | None, expected: list[str]
-) -> None:
-    """Of 21 chips, about as many agree as at the worst real pose that is right."""
-    errors = np.where(np.arange(21) < agreeing, 4.9, 5.1)
-    residuals = np.column_stack([errors, np.zeros(21)])
-    moved = estimated(fit_points()).transform
-    assert refusing(PoseSurveyEvidence(PoseSurvey(residuals, found, rest, moved))) == expected
-
-
-@pytest.mark.parametrize(
-    ("residuals", "factor", "expected"),
-    [
-        (scatter(25, 0.5), CHIPS_MEAN_OVER_SCATTER, []),
-        (
-            np.concatenate([scatter(13, 0.5), displaced(12, 6, 12)]),
-            CHIPS_MEAN_OVER_SCATTER,
-            ["layover of check points"],
-        ),
-        (displaced(25, -2, 2), CHIPS_MEAN_OVER_SCATTER, ["layover of fit points"]),
-        (displaced(25, -2, 2), None, []),
-    ],
-)
-def test_poses_of_elevated_objects_are_refused(
-    residuals: np.ndarray, factor: float | None, expected: list[str]
-) -> None:
-    """Between two radar images, canopies and roofs lie along a line beside the ground."""
-    moved = estimated(fit_points()).transform
-    found = PoseSurvey(residuals, survey(), None, moved)
-    assert refusing(PoseSurveyEvidence(found, factor)) == expected
 
 
 def test_a_failure_that_is_no_refusal_decides_nothing() -> None:

@@ -93,11 +93,13 @@ def moved(model: Path, path: Path, east_m: float, north_m: float) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_model_that_lies_right_is_found_there(city: Path, stack: ExitStack) -> None:
     fit = fit_on(scene_of(pair_of(city, stack), REFERENCE), stated(city), stack)
     assert fit.is_clear and max(np.abs(fit.offset_px)) <= 1
 
 
+@pytest.mark.slow
 def test_a_model_that_lies_off_is_moved_to_where_the_reference_shows_it(
     city: Path, stack: ExitStack, tmp_path: Path, context: Context
 ) -> None:
@@ -117,6 +119,7 @@ def test_a_model_that_lies_off_is_moved_to_where_the_reference_shows_it(
     np.testing.assert_array_equal(*parts)
 
 
+@pytest.mark.slow
 def test_a_model_of_another_city_is_not_found(
     city: Path, other_city: Path, stack: ExitStack, context: Context
 ) -> None:
@@ -125,6 +128,7 @@ def test_a_model_of_another_city_is_not_found(
     assert not used.is_reliable and "shows nothing" in used.reason
 
 
+@pytest.mark.slow
 def test_a_view_from_the_other_side_is_not_the_references(city: Path, stack: ExitStack) -> None:
     pair, right = pair_of(city, stack), stated(city)
     other_side = replace(right.views[0], azimuth_deg=right.views[0].azimuth_deg - 180)

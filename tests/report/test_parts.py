@@ -52,6 +52,7 @@ def test_the_map_has_an_arrow_for_every_chip_of_a_part_in_its_colour() -> None:
     assert [len(line.get_xdata()) for line in axes.lines if line.get_color() == COLOURS[0]] == [14]
 
 
+@pytest.mark.slow
 def test_a_page_shows_parts_whatever_the_verdict(pair: ImagePair, tmp_path: Path) -> None:
     page: Page = written(report_of(pair, parts=TWO_ROWS), tmp_path)
     assert "Parts that lie elsewhere" in [e.text for e in page.all("h2")]

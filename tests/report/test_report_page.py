@@ -54,7 +54,7 @@ def test_the_verdict_comes_first(page: Page) -> None:
 
 def test_a_covered_overlap_is_not_said_to_be_extrapolated(pair: ImagePair, tmp_path: Path) -> None:
     verdict = replace(ACCEPTED, extrapolated_share=0.0)
-    page = written(report_of(pair, verdict=verdict), tmp_path)
+    page = written(refused(pair, verdict=verdict), tmp_path)
     assert "surround the whole overlap" in page.text
     assert "lies outside" not in page.text
 
@@ -67,7 +67,7 @@ def test_how_chance_is_said(
     pair: ImagePair, tmp_path: Path, log10_chance: float, shown: str
 ) -> None:
     verdict = replace(ACCEPTED, log10_chance=log10_chance)
-    page = written(report_of(pair, verdict=verdict), tmp_path)
+    page = written(refused(pair, verdict=verdict), tmp_path)
     assert page.numbers["Agreement by chance"] == shown
 
 
@@ -127,12 +127,13 @@ def test_the_deciding_rule_and_its_advice_are_shown(pair: ImagePair, tmp_path: P
 
 
 def test_facts_about_the_images(pair: ImagePair, tmp_path: Path) -> None:
-    page = written(report_of(pair, scene={"reference": "radar, 1 look", "urban": None}), tmp_path)
+    page = written(refused(pair, scene={"reference": "radar, 1 look", "urban": None}), tmp_path)
     assert "The images" in [e.text for e in page.all("h2")]
     assert {"radar, 1 look", "–"} <= {e.text for e in page.all("td")}
     assert numbers_in(tmp_path)["scene"] == {"reference": "radar, 1 look", "urban": None}
 
 
+@pytest.mark.slow
 def test_what_is_masked_is_shown_with_a_tint(pair: ImagePair, tmp_path: Path) -> None:
     keep = np.ones((120, 160), np.uint8)
     keep[:, :80] = 0

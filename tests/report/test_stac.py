@@ -93,6 +93,7 @@ def test_the_time_is_that_of_the_metadata_before_that_of_the_name(tmp_path: Path
     assert found["properties"]["datetime"] == "2023-01-02T03:04:05Z"
 
 
+@pytest.mark.slow
 def test_the_numbers_of_a_report_are_an_item_that_tools_read(
     textured: TexturedPair, tmp_path: Path, context: Context
 ) -> None:

@@ -49,6 +49,7 @@ def test_two_ways_of_one_length_halve_the_variance() -> None:
     np.testing.assert_allclose(found.covariances[3], (SIGMA**2 + LEAST**2) * np.eye(6), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_stated_covariance_is_that_of_many_trials() -> None:
     """Links err by their covariance and the scatter; estimates do as their covariance has it."""
     true, ends, spread = truth(4), star_and_chain(4), np.hypot(SIGMA, LEAST)
@@ -63,6 +64,7 @@ def test_the_stated_covariance_is_that_of_many_trials() -> None:
     assert np.mean(normalised) == pytest.approx(6.0, abs=4 * np.sqrt(12 / len(normalised)))
 
 
+@pytest.mark.slow
 def test_statistics_of_links_are_chi_squared() -> None:
     true, ends, spread = truth(8), star_and_chain(8), np.hypot(SIGMA, LEAST)
     found = []

@@ -143,6 +143,7 @@ def city() -> SimulatedPair:
 
 
 class TestPair:
+    @pytest.mark.slow
     def test_roofs_are_displaced_by_their_height(self, city: SimulatedPair) -> None:
         roofs = city.roof_points
         assert len(roofs.px) > 10

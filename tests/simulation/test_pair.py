@@ -51,6 +51,7 @@ class TestShapes:
         assert small.reference_grid.crs.to_epsg() == 32633
         assert small.reference_grid.is_georeferenced
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("size_m", "shape"), [(0.5, (400, 480)), (2.5, (80, 96))])
     def test_input_of_another_pixel_size(self, size_m: float, shape: tuple[int, int]) -> None:
         pair = simulate_pair(replace(SMALL, input_pixel_size_m=size_m))

@@ -70,6 +70,7 @@ def check_points(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 class TestRpcs:
+    @pytest.mark.slow
     def test_exact_ones_are_the_camera(self, made: SensorImage) -> None:
         assert made.exact.largest_residual_px < 0.01
         assert made.delivered.largest_residual_px < 0.01
@@ -81,6 +82,7 @@ class TestRpcs:
         expected = made.error(px)
         np.testing.assert_allclose(made.delivered.rpc.project(lon_lat, height), expected, atol=0.01)
 
+    @pytest.mark.slow
     def test_files_hold_them(self, made: SensorImage, paths: dict[str, Path]) -> None:
         assert read_rpc(paths["exact_rpc"]) == made.exact.rpc
         with rasterio.open(paths["image"]) as image:

@@ -30,6 +30,7 @@ def is_right(found: PoseFound, truth: Pose) -> bool:
     return turned_by(found, truth) < 0.1 and error_px(found, truth, (160, 160)) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [GREY, FIELD], ids=lambda s: s.similarity)
 @pytest.mark.parametrize(
     ("truth", "side"),
@@ -106,6 +107,7 @@ def test_masked_pixels_do_not_count(context: Context) -> None:
     assert is_right(found[0], truth)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "limits",
     [
@@ -141,6 +143,7 @@ def test_the_half_turn_is_told_by_the_shift(context: Context) -> None:
         assert all(turned_by(other, truth) > 1 for other in found[1:])
 
 
+@pytest.mark.slow
 def test_another_place_does_not_stand_out(context: Context) -> None:
     true = fourier_mellin(REFERENCE, window((160, 160)), ANY, GREY, context)[0].height
     found = fourier_mellin(REFERENCE, window((160, 160), seed=5), ANY, GREY, context)

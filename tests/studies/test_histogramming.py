@@ -378,6 +378,7 @@ def artefacts() -> dict[str | int, np.ndarray]:
     return {e: np.array([artefact(e, seed) for seed in range(5)]) for e in estimators}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", ["bilinear", "cubic", 2])
 def test_interpolation_artefacts(
     estimator: str | int, artefacts: dict[str | int, np.ndarray]
@@ -392,6 +393,7 @@ def test_interpolation_artefacts(
     assert ((found.real > 0) == (estimator == 2)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [4, 5, 6, 7])
 def test_no_artefacts_from_order_4_on(order: int, artefacts: dict[str | int, np.ndarray]) -> None:
     """S fig 3.10: less than a fiftieth of the peak, and less than a hundredth of the energy."""

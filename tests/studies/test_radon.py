@@ -50,6 +50,7 @@ def test_poses_of_thesis_p(truth: Pose, settings: SimilaritySettings, context: C
     assert found[0].pose.scale == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [65.0, -118.0, 172.0])
 def test_any_rotation(degrees: float, context: Context) -> None:
     truth = Pose(degrees, 1.0, (7.0, -4.0))
@@ -78,6 +79,7 @@ def test_inverted_contrast(context: Context) -> None:
     assert is_right(radon(REFERENCE, inverted, LIMITS, FIELD, context)[0], truth)
 
 
+@pytest.mark.slow
 def test_a_known_scale(context: Context) -> None:
     truth = Pose(24.0, 1.25, (8.0, -12.0))
     limits = SearchLimits(20.0, 30.0, (1.25, 1.25))
@@ -99,6 +101,7 @@ def test_masked_pixels_do_not_count(context: Context) -> None:
     assert is_right(radon(REFERENCE, input, LIMITS, GREY, context)[0], truth)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "limits",
     [SearchLimits(20.0, 10.0), SearchLimits(5.0, 30.0), SearchLimits(20.0, 180.0, (1.3, 1.6))],
@@ -127,6 +130,7 @@ def test_another_place_does_not_stand_out(context: Context) -> None:
     assert found[0].height < true / 2
 
 
+@pytest.mark.slow
 def test_threads_change_nothing(context: Context, one_thread: Context) -> None:
     input = window((160, 160), Pose(10.0))
     alone = radon(REFERENCE, input, LIMITS, GREY, one_thread)

@@ -160,6 +160,7 @@ def right_after_a_turn(estimator: str, quarter_turns: int) -> int:
     return int((np.hypot(*off.T) < 2).sum())
 
 
+@pytest.mark.slow
 def test_ratios_with_a_sign_survive_a_quarter_turn_and_those_without_do_not() -> None:
     kept = {
         name: right_after_a_turn(name, 1) / right_after_a_turn(name, 0)

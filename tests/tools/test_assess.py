@@ -78,6 +78,7 @@ class TestEvidence:
         assert control.in_pixels.bias == pytest.approx((1, 0), abs=1e-6)
         assert test.in_pixels.bias == pytest.approx((0, 0.5), abs=1e-6)
 
+    @pytest.mark.slow
     def test_without_a_transform_one_is_fitted(self, files: Files) -> None:
         """The fit takes up what all control points have in common; the test points show it."""
         result = assess(
@@ -172,6 +173,7 @@ class TestVerdict:
         with pytest.raises(NotRegisteredError, match=r"two-way inconsistency is 2\.00 px"):
             assess(files.path("t.json"), **evidence, max_error=1.9)
 
+    @pytest.mark.slow
     def test_test_points_are_judged_where_there_are_no_others(self, files: Files) -> None:
         """Residuals of the fit are 1 px, held-out points are off by 0.5 px."""
         calls = {"transform": files.path("t.json"), "tie_points": files.path("points.gpkg")}
@@ -191,6 +193,7 @@ class TestVerdict:
 
 
 class TestReport:
+    @pytest.mark.slow
     def test_swipe_and_checkerboard_of_the_two_rasters(self, files: Files, tmp_path: Path) -> None:
         result = assess(
             files.path("t.json"),
@@ -302,6 +305,7 @@ class TestWithOtherTools:
         error = np.hypot(*(registered.transform(xy) - textured.truth(xy)).T)
         assert measured.in_pixels.rmse == pytest.approx(np.sqrt((error**2).mean()), abs=1e-5)
 
+    @pytest.mark.slow
     def test_the_check_points_of_simulate(
         self, simulated: Callable[[str], Any], tmp_path: Path
     ) -> None:

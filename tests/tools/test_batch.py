@@ -147,6 +147,7 @@ def test_a_scheduler_that_is_not_there_is_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_summary_lies_beside_the_table_by_default(images: Path, tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("input\nnone.tif\n")
     assert main(["batch", "filter-speckle", str(tmp_path / "t.csv"), "--workers", "1"]) == 2

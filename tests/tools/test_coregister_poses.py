@@ -49,6 +49,7 @@ def test_a_rotation_and_a_scale_are_searched_for(
     assert found.transform.model.kind == "similarity"
 
 
+@pytest.mark.slow
 def test_a_rotation_that_is_not_searched_for_is_refused(tmp_path: Path) -> None:
     with pytest.raises(NotRegisteredError):
         registered(tmp_path, rotated(25.0))

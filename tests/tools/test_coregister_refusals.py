@@ -71,6 +71,7 @@ def test_what_is_not_the_same_place_is_refused(
     assert listing(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_a_refusal_on_the_command_line(
     textured: TexturedPair, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -97,6 +98,7 @@ def test_a_refusal_on_the_command_line(
     assert numbers["verdict"]["reason"] in printed.err
 
 
+@pytest.mark.slow
 def test_an_error_limit_below_what_is_possible_is_refused(
     textured: TexturedPair, tmp_path: Path
 ) -> None:
@@ -264,6 +266,7 @@ def test_a_link_to_the_reference_is_the_reference(textured: TexturedPair, tmp_pa
         coregister(textured.reference, link, tmp_path / "out.tif")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("free_bytes", [0, 40_000])
 def test_a_full_disk_leaves_nothing(
     textured: TexturedPair, tmp_path: Path, free_bytes: int
@@ -276,6 +279,7 @@ def test_a_full_disk_leaves_nothing(
     assert listing(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_to(
     textured: TexturedPair, tmp_path: Path, capsys: Any
 ) -> None:
@@ -309,6 +313,7 @@ def test_cancelling_leaves_nothing(textured: TexturedPair, tmp_path: Path, messa
     assert listing(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_progress_rises_to_the_end(textured: TexturedPair, tmp_path: Path) -> None:
     fractions: list[float] = []
     registered(textured, tmp_path, progress=Progress(lambda f, _: fractions.append(f)))

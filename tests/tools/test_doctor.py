@@ -46,6 +46,7 @@ def test_what_is_missing_is_named_with_what_cannot_run(
     assert lines[-1] == 'to install what is missing: pip install "fiona>=1.9" "scikit-learn>=1.2"'
 
 
+@pytest.mark.slow
 def test_it_runs_where_no_tool_can() -> None:
     code = (
         "import sys; sys.modules.update(dict.fromkeys(('numpy', 'rasterio', 'cv2', 'scipy')));"

@@ -70,7 +70,9 @@ class TestWithoutGeoreferencing:
             pytest.approx(-9, abs=0.6),
             "px",
         )
-        assert result.verdict.accepted
+        verdict = result.summary()["verdict"]
+        assert verdict["accepted"] and verdict["height"] > 5 and verdict["rival_ratio"] > 1.6
+        assert 6 <= verdict["check_points_agreeing"] <= verdict["check_points"]
         px = np.array([[0.0, 0.0], [159, 0], [0, 149], [159, 149]])
         expected = apply_affine(TRUTH.between((150, 160), (170, 150)), px)
         stored = load_transform(tmp_path / "t.json")

@@ -26,7 +26,7 @@ def test_mask_regions_and_skeleton_are_written(tmp_path: Path) -> None:
     assert regions[town.ground].mean() > 0.7 and regions[~town.ground].mean() < 0.05
     assert 0 < skeleton.sum() < 0.2 * regions.sum()
     assert result.share == pytest.approx(mask.mean())
-    assert result.skeleton_m > 600
+    assert result.numbers["skeleton_m"] > 600
     assert list(result.summary()["files"]) == ["mask", "regions", "skeleton"]
 
 

@@ -16,14 +16,14 @@ def test_the_brightest_part_and_its_surroundings_are_masked(tmp_path: Path) -> N
     path = write_raster(tmp_path / "in.tif", image, utm_grid(600, 400, 2.0))
     percent = 100 * 40 * 60 / image.size
     result = mask_threshold(path, tmp_path / "mask.tif", percent, mask_growth=6.0)
-    with rasterio.open(result.output) as dataset:
+    with rasterio.open(result.files["mask"]) as dataset:
         mask = dataset.read(1)
     # 6 m are 3 px; the corners of the growth are round.
     assert not mask[97:143, 200:260].any() and not mask[100:140, 197:263].any()
     assert mask[:96].all() and mask[144:].all() and mask[97, 197] == 1
     assert result.share == pytest.approx(mask.mean())
     assert result.summary()["low"] is None
-    assert result.high < 5000
+    assert result.numbers["high"] < 5000
 
 
 def test_without_a_percentage_all_valid_pixels_take_part(tmp_path: Path) -> None:
@@ -32,5 +32,5 @@ def test_without_a_percentage_all_valid_pixels_take_part(tmp_path: Path) -> None
     path = write_raster(tmp_path / "in.tif", image, nodata=0)
     result = mask_threshold(path, tmp_path / "mask.tif", 0, 0)
     assert result.share == 1.0
-    with rasterio.open(result.output) as dataset:
+    with rasterio.open(result.files["mask"]) as dataset:
         np.testing.assert_array_equal(dataset.read(1), image)

@@ -74,6 +74,7 @@ def test_every_matcher_finds_it_where_contrast_is_alike(
     assert error_px(found.transform, files) < 0.5
 
 
+@pytest.mark.slow
 def test_check_points_lie_where_no_keypoint_was_seen(files: TexturedPair, tmp_path: Path) -> None:
     found = match_optical(files.reference, files.input, tmp_path / "out.tif")
     fit, check = (
@@ -85,6 +86,7 @@ def test_check_points_lie_where_no_keypoint_was_seen(files: TexturedPair, tmp_pa
     assert apart.min() > 15
 
 
+@pytest.mark.slow
 def test_another_place_is_refused_and_leaves_its_report_only(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     other = write_textured_pair(tmp_path / "in", SIZE, shift_on_map(0, 0), input_seed=77)

@@ -57,6 +57,7 @@ def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: 
     assert np.corrcoef(reference.ravel(), registered.ravel())[0, 1] > 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("image", ["reference", "input"])
 def test_keypoints_that_a_classifier_leaves_out_take_no_part(
     files: TexturedPair, tmp_path: Path, image: str
@@ -187,6 +188,7 @@ def lifted(files: TexturedPair, folder: Path, share: float, by_px: int) -> Textu
     return replace(files, input=write_raster(folder / "lifted.tif", moved, files.grid))
 
 
+@pytest.mark.slow
 def test_elevated_objects_are_not_taken_for_the_ground(files: TexturedPair, tmp_path: Path) -> None:
     pair = lifted(files, tmp_path, 0.5, 9)
     with pytest.raises(NotRegisteredError) as refused:

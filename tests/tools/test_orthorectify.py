@@ -67,6 +67,7 @@ def test_positions_are_those_of_gdal(files: dict[str, Path], resampling: str) ->
     assert (np.isfinite(own[0]) != np.isfinite(expected[0])).mean() < 0.01
 
 
+@pytest.mark.slow
 def test_where_no_height_is_known_there_is_no_data(files: dict[str, Path], tmp_path: Path) -> None:
     whole = groundtie.orthorectify(**files, dem_datum="ellipsoidal")
     assert "covers" not in whole.heights

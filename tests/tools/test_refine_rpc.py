@@ -194,6 +194,7 @@ def test_an_image_is_copied_with_its_refined_tags(tmp_path: Path) -> None:
         assert error_px(rpc_from_tags(after.tags(ns="RPC"), "refined")) < 0.35
 
 
+@pytest.mark.slow
 def test_refined_images_orthorectify_to_where_they_belong(tmp_path: Path) -> None:
     files = write_points(tmp_path, bias_of("affine"))
     groundtie.refine_rpc(output=tmp_path / "refined.tif", dem_datum="ellipsoidal", **files)

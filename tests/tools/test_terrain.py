@@ -45,6 +45,7 @@ def error_px(transform: groundtie.Transform, folder: Path) -> np.ndarray:
     return np.asarray(np.hypot(*(transform(xy) - px).T))
 
 
+@pytest.mark.slow
 def test_the_stored_truth_holds_at_the_check_points(hills: Path) -> None:
     truth = groundtie.load_transform(hills / "truth.json")
     assert error_px(truth, hills).max() < 1e-3
@@ -75,6 +76,7 @@ def test_what_wrong_heights_displace_is_taken_out_and_warped(hills: Path, tmp_pa
         assert source.read(source.window)[1].mean() > 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("given", "message"),
     [
@@ -93,6 +95,7 @@ def test_what_does_not_go_together_is_refused(
         groundtie.coregister(hills / "reference.tif", hills / "input.tif", **given)
 
 
+@pytest.mark.slow
 def test_register_takes_the_view_of_a_terrain_model_only(hills: Path) -> None:
     with pytest.raises(ParameterError, match="view of a terrain model only"):
         groundtie.register(
@@ -115,6 +118,7 @@ def test_light_is_stated_as_views_are(words: str | None, azimuths: list[float]) 
     assert {light.kind for light in lights} <= set(str(words).lower().replace(",", " ").split())
 
 
+@pytest.mark.slow
 def test_a_terrain_model_of_elsewhere_is_refused(hills: Path, tmp_path: Path) -> None:
     groundtie.simulate(tmp_path, size=64, pixel_size=10.0, warp=1.0)
     with pytest.raises(NoOverlapError, match="covers only"):

@@ -73,6 +73,7 @@ def told(path: Path, seed: int = 20) -> tuple[float, float]:
     return float(kept[clear].mean()), float((~kept[~clear]).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("statistics", STATISTICS)
 def test_clouds_of_a_mask_are_learned(image: Path, tmp_path: Path, statistics: str) -> None:
     found = train_feature_classifier(
@@ -116,6 +117,7 @@ def test_other_values_may_be_left_out(image: Path, tmp_path: Path) -> None:
     assert min(told(tmp_path / "c.json")) > 0.98
 
 
+@pytest.mark.slow
 def test_polygons_of_another_crs_label_the_features_in_them(image: Path, tmp_path: Path) -> None:
     from rasterio.warp import transform_geom
 
@@ -128,6 +130,7 @@ def test_polygons_of_another_crs_label_the_features_in_them(image: Path, tmp_pat
     assert found.accuracy == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.slow
 def test_points_of_a_layer_are_taken_as_they_are(image: Path, tmp_path: Path) -> None:
     px = np.random.default_rng(1).uniform(25, SIDE - 25, (60, 2))
     px = px[np.abs(px[:, 0] - BORDER) > 25]
@@ -172,6 +175,7 @@ def test_labels_of_one_class_are_refused(image: Path, tmp_path: Path) -> None:
     assert list(listing(tmp_path)) == ["mask.tif"]
 
 
+@pytest.mark.slow
 def test_a_layer_that_says_nothing_is_refused(image: Path, tmp_path: Path) -> None:
     labels = layer(tmp_path / "l.gpkg", [(box(0, 150), "ground")])
     with pytest.raises(VectorLayerError, match="no attribute 'kind'; it has: class"):

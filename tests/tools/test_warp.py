@@ -209,6 +209,7 @@ def test_a_reference_of_another_place_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "out.tif").exists()
 
 
+@pytest.mark.slow
 def test_tie_points_say_how_well_they_fit(tmp_path: Path) -> None:
     path, points = misregistered(tmp_path / "a.tif"), stored(tmp_path / "t.gpkg")
     result = warp(path, tmp_path / "out.tif", points)

@@ -49,7 +49,7 @@ class Matches:
         )
 
     @classmethod
-    def of(cls, nearest: Nearest, ratio: float) -> Matches:
+    def of(cls, nearest: Nearest, ratio: float = 1.0) -> Matches:
         """Return the nearest partners whose ratio is no larger than `ratio`."""
         which = np.nonzero(nearest.index >= 0)[0]
         distance, following = nearest.distance[which], nearest.next_distance[which]
@@ -74,10 +74,8 @@ def match_near(
     predicted_px: FloatArray,
     position_px: FloatArray,
     gate_px: float = GATE_PX,
-    ratio: float = 1.0,
-    mutual: bool = True,
 ) -> Matches:
-    """Match keypoints whose partner is known to lie near a predicted place.
+    """Match keypoints that are each other's nearest, near where partners are predicted.
 
     Only partners within the gate are compared, which leaves hundreds of times fewer wrong ones
     than the whole image has; so the ratio need not separate inliers from outliers ([Suri2010] 6.9).
@@ -92,17 +90,10 @@ def match_near(
         Where the second lie, shape (m, 2).
     gate_px
         How far a partner may lie from there.
-    ratio
-        Largest ratio of the distances to the nearest and to the next partner; at 1 each keypoint
-        keeps its nearest one.
-    mutual
-        Whether each must be the other's nearest.
     """
     pairs = _pairs_within(predicted_px, position_px, gate_px)
     distance = _pair_distances(first, second, pairs)
-    found = Matches.of(_best_of_each(pairs, distance, len(first)), ratio)
-    if not mutual:
-        return found
+    found = Matches.of(_best_of_each(pairs, distance, len(first)))
     back = _best_of_each(pairs[:, ::-1], distance, len(second)).index
     return found.take(back[found.second] == found.first)
 

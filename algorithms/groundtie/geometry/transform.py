@@ -13,7 +13,14 @@ from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
 from ..errors import TransformFileError
-from ..rasters.grid import MOST_PX, FloatArray, Grid, is_invertible, reproject, require_map
+from ..rasters.grid import (
+    FloatArray,
+    Grid,
+    crs_from_text,
+    crs_to_text,
+    is_invertible,
+    reproject,
+)
 from ..strict_json import read_json
 from .models import DEGREE, TERRAIN, Frame, Model, PolynomialModel, ThinPlateSpline
 from .terrain_model import TerrainModel
@@ -70,17 +77,11 @@ class Transform:
 
     def to_json(self) -> dict[str, Any]:
         """Return the transform as values that JSON can carry."""
-        grid = self.input_grid
         return {
             "format": FORMAT,
-            "crs": _crs_to_text(self.crs),
+            "crs": crs_to_text(self.crs),
             "model": self.model.to_json(),
-            "input": {
-                "crs": _crs_to_text(grid.crs),
-                "geotransform": list(grid.transform.to_gdal()),
-                "width": grid.width,
-                "height": grid.height,
-            },
+            "input": self.input_grid.to_json(),
         }
 
     @classmethod
@@ -102,17 +103,7 @@ class Transform:
         try:
             if values["format"] != FORMAT:
                 raise TransformFileError(f"not a {FORMAT} file but {values['format']!r:.60}")
-            stored = values["input"]
-            grid = Grid(
-                Affine.from_gdal(*(float(number) for number in stored["geotransform"])),
-                _crs_from_text(stored["crs"]),
-                int(stored["width"]),
-                int(stored["height"]),
-            )
-            is_sized = all(1 <= side < MOST_PX for side in (grid.width, grid.height))
-            if not is_sized or not is_invertible(grid.transform):
-                raise ValueError("the input's grid is none of a raster")
-            crs = _crs_from_text(values["crs"])
+            grid, crs = Grid.from_json(values["input"]), crs_from_text(values["crs"])
             return cls(model_from_json(values["model"], crs, folder), crs, grid)
         except (KeyError, TypeError, ValueError, CRSError, OverflowError) as error:
             if isinstance(error, TransformFileError):
@@ -134,14 +125,6 @@ def load_transform(path: str | Path) -> Transform:
         raise TransformFileError(f"{path}: {error}") from error
     except (OSError, ValueError) as error:
         raise TransformFileError(f"cannot read the transform {path}: {error}") from error
-
-
-def _crs_to_text(crs: CRS | None) -> str | None:
-    return None if crs is None else str(crs.to_wkt())
-
-
-def _crs_from_text(text: str | None) -> CRS | None:
-    return None if text is None else require_map(CRS.from_wkt(text))
 
 
 def model_from_json(

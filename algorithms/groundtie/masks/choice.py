@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ..progress import SILENT, Progress
 from . import threshold
 from .regions import GroundRegions
 from .scene import Scene
@@ -112,13 +111,13 @@ def is_perhaps_dense(strong_share: float) -> bool:
     return strong_share >= _PERHAPS_DENSE
 
 
-def share_of_strong_scatterers(scene: Scene, progress: Progress = SILENT) -> float:
+def share_of_strong_scatterers(scene: Scene) -> float:
     """Return the share of an image, 0 to 1, that is brighter than usual by 6 dB or more.
 
     Grey values are amplitudes; means over 4 × 4 pixels are compared with their median. Negative
     ones, as decibels have, are none: such an image has no share.
     """
-    amplitude = scene.sample(threshold.BLOCK_PX, progress)
+    amplitude = scene.sample(threshold.BLOCK_PX)
     if amplitude.size == 0 or amplitude.min() < 0:
         return 0.0
     power = amplitude**2

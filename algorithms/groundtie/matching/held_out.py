@@ -34,12 +34,9 @@ class HeldOut:
     reference_grid: Grid
 
     @classmethod
-    def of(
-        cls, pair: ImagePair, chip_px: int | None = None, spacing_px: float | None = None
-    ) -> HeldOut:
-        """Lay out a pair; parameters and errors as `lay_out_chips`."""
-        layout = lay_out_chips(pair, chip_px, spacing_px)
-        return cls(layout, pair.grid, pair.reference.source.grid)
+    def of(cls, pair: ImagePair) -> HeldOut:
+        """Lay out a pair; errors as `lay_out_chips`."""
+        return cls(lay_out_chips(pair), pair.grid, pair.reference.source.grid)
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a grid, of any pixel size, see a part of held-out blocks, (h, w).

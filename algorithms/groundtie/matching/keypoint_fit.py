@@ -100,9 +100,18 @@ class KeypointFit:
             chips_kind = "affine" if kind == AUTO else kind
             return self.chips.estimate(coarse, chips_kind, context.part(0.7, 1.0))
         if self.refinement is not None:
-            matches, coarse, fit = self._refined(
-                self.refinement, kind, matches, coarse, fit, context.part(0.7, 1.0)
-            )
+            refining = self.refinement, kind, matches, coarse
+            try:
+                refined = self._refined(*refining, fit, context.part(0.7, 1.0))
+            except TooFewPointsError:
+                # Keypoints may agree on a wrong model where few match. If chips around it do not
+                # agree, the coarse model may still be right.
+                known = apply_affine(on_grid(coarse, self._grid), matches.px)
+                model = fit_model("affine", matches.px, known)
+                # Without models of its folds: how far it may be wrong is unknown.
+                start = Fit(model, (), fit.mixture)
+                refined = self._refined(*refining, start, context.part(0.7, 1.0))
+            matches, coarse, fit = refined
         return self._estimate(kind, matches, coarse, fit)
 
     @property
@@ -134,32 +143,8 @@ class KeypointFit:
     ) -> tuple[Correspondences, Model, Fit]:
         """Return chips around keypoints, the model that they were resampled by, and their fit.
 
-        Keypoints may agree on a wrong model where few match. If chips around it do not agree, the
-        coarse model may still be right.
-        """
-        try:
-            return self._in_rounds(chips, kind, matches, coarse, fit, context)
-        except TooFewPointsError:
-            model = fit_model(
-                "affine", matches.px, apply_affine(on_grid(coarse, self._grid), matches.px)
-            )
-            # Without models of its folds: how far it may be wrong is unknown.
-            start = Fit(model, (), fit.mixture)
-            return self._in_rounds(chips, kind, matches, coarse, start, context)
-
-    def _in_rounds(
-        self,
-        chips: ChipMatcher,
-        kind: str,
-        matches: Correspondences,
-        coarse: Model,
-        fit: Fit,
-        context: Context,
-    ) -> tuple[Correspondences, Model, Fit]:
-        """Return what `_refined` does, from a first model.
-
-        Matches with larger errors may have led it astray: if chips show it, they are matched
-        again from their own.
+        Matches with larger errors may have led the first model, `fit`, astray: if chips show it,
+        they are matched again from their own.
         """
         nominal_px = apply_affine(on_grid(coarse, self._grid), matches.partner_px)
         for _ in range(_ROUNDS):

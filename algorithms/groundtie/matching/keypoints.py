@@ -74,8 +74,6 @@ class KeypointMatcher:
         The images.
     detector, descriptor
         How keypoints are found and described.
-    ratio
-        Largest ratio of the distances to the nearest and the next partner.
     held_out
         Returns for a piece of the grid which pixels of the reference must not be seen; None: all
         may be.
@@ -87,7 +85,6 @@ class KeypointMatcher:
     pair: ImagePair
     detector: Detecting
     descriptor: Describing
-    ratio: float = 1.0
     held_out: MaskOf | None = None
     shown: ImagePair | None = None
 
@@ -146,7 +143,6 @@ class KeypointMatcher:
             points.position_px,
             partners.position_px,
             gate,
-            self.ratio,
         )
         return KeypointMatches(
             points.take(matches.first).moved(corner),

@@ -32,9 +32,6 @@ _LARGEST_CHECK_CHIP_PX = 112
 # Above so many chips of the fit they are laid out half as densely.
 _MANY_CHIPS = 200
 
-# Nearer than this share of a chip's side, chips overlap much.
-_OVERLAPPING = 0.75
-
 
 def default_chip_px(width: int, height: int) -> int:
     """Return the side of a chip of the fit for a scene of this size, in pixels."""
@@ -172,26 +169,15 @@ def _middle_pixels(centres: NDArray[np.float64], chip_px: int) -> NDArray[np.int
     return np.asarray(corners + chip_px // 2)
 
 
-def lay_out_chips(
-    pair: ImagePair, chip_px: int | None = None, spacing_px: float | None = None
-) -> ChipLayout:
-    """Lay chips out over the matching grid of a pair.
-
-    Parameters
-    ----------
-    pair
-        The images.
-    chip_px
-        Side of a chip; None: by the size of the overlap.
-    spacing_px
-        Distance between chips of the fit; None: by the sizes of overlap and chip.
+def lay_out_chips(pair: ImagePair) -> ChipLayout:
+    """Lay chips out over the matching grid of a pair, by the size of its overlap.
 
     Raises
     ------
     NoOverlapError
         The overlap is too small for a single cell of chips.
     """
-    chip = chip_px or default_chip_px(*pair.overlap_px)
+    chip = default_chip_px(*pair.overlap_px)
     smallest_pitch = chip / (1 - _HELD_OUT)
     if min(pair.overlap_px) < chip + 2 * smallest_pitch:
         raise NoOverlapError(
@@ -205,14 +191,9 @@ def lay_out_chips(
         sizes = (pair.grid.width, pair.grid.height)
         for size, overlap in zip(sizes, pair.overlap_px, strict=True):
             most = max(int((size - chip) / smallest_pitch + 1e-6), 1)
-            if spacing_px is None:
-                cells = _MOST_CELLS * size / overlap
-            else:
-                cells = (size - chip) / (parts * spacing_px)
-            axes.append(Axis(size, chip, int(np.clip(round(cells), 1, most))))
+            cells = round(_MOST_CELLS * size / overlap)
+            axes.append(Axis(size, chip, int(np.clip(cells, 1, most))))
         return ChipLayout(axes[0], axes[1], parts)
 
     dense = layout(4)
-    if spacing_px is None:
-        return dense if len(dense.fit_centres) <= _MANY_CHIPS else layout(2)
-    return dense if spacing_px <= _OVERLAPPING * chip else layout(2)
+    return dense if len(dense.fit_centres) <= _MANY_CHIPS else layout(2)

@@ -57,10 +57,9 @@ class _Warp:
         to_input_px: ToInputPx,
         target: Grid,
         resampling: str,
-        nodata: float | None,
     ) -> _Warp:
         method = "nearest" if source.colormap else resampling
-        nodata = _choose_nodata(source) if nodata is None else nodata
+        nodata = _choose_nodata(source)
         if nodata is not None:
             require_fit(nodata, source.dtype)
         size = source.grid.width, source.grid.height
@@ -119,7 +118,6 @@ def warp_raster(
     path: str | os.PathLike[str],
     resampling: str = "cubic",
     *,
-    nodata: float | None = None,
     workers: int = 2,
     progress: Progress = SILENT,
 ) -> None:
@@ -144,8 +142,6 @@ def warp_raster(
     resampling
         One of `warping.METHODS`. Where the target's pixels are larger than 1.5 input pixels,
         the mean over the area is taken first (not with `nearest`).
-    nodata
-        Another nodata value for the result.
     workers
         Number of threads.
     progress
@@ -158,11 +154,11 @@ def warp_raster(
     RasterOpenError
         The pixels cannot be read.
     ParameterError
-        The pixel type cannot hold `nodata`.
+        The pixel type cannot hold the raster's nodata value.
     CancelledError
         The user cancelled.
     """
-    warp = _Warp.of(source, to_input_px, target, resampling, nodata)
+    warp = _Warp.of(source, to_input_px, target, resampling)
     masked = warp.leaves_gaps
     interleave = "band" if len(warp.groups) > 1 else None
     pixels = progress.part(0, 1 - _OVERVIEWS)
@@ -192,7 +188,6 @@ def warp_to_array(
     target: Grid,
     resampling: str = "cubic",
     *,
-    nodata: float | None = None,
     workers: int = 2,
     progress: Progress = SILENT,
 ) -> Raster:
@@ -206,7 +201,7 @@ def warp_to_array(
     Raster
         Of shape (bands, h, w), dtype of the raster.
     """
-    warp = _Warp.of(source, to_input_px, target, resampling, nodata)
+    warp = _Warp.of(source, to_input_px, target, resampling)
     values = np.empty((source.count, target.height, target.width), source.dtype)
     valid = np.ones(values.shape[1:], bool)
     with ThreadPoolExecutor(workers) as pool:

@@ -8,8 +8,10 @@ everywhere else (the first pixel's centre is at 0).
 from __future__ import annotations
 
 import operator
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
+from typing import Any
 
 import numpy as np
 import rasterio.warp
@@ -153,6 +155,30 @@ class Grid:
         )
         return np.asarray(unit * [self.width, self.height] - 0.5)
 
+    def to_json(self) -> dict[str, Any]:
+        """Return the grid as values that JSON can carry."""
+        return {
+            "crs": crs_to_text(self.crs),
+            "geotransform": list(self.transform.to_gdal()),
+            "width": self.width,
+            "height": self.height,
+        }
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Grid:
+        """Return the grid that `to_json` described.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError, CRSError
+            The values describe none.
+        """
+        transform = Affine.from_gdal(*map(float, values["geotransform"]))
+        width, height = int(values["width"]), int(values["height"])
+        if not (1 <= width < MOST_PX and 1 <= height < MOST_PX) or not is_invertible(transform):
+            raise ValueError("the grid is none of a raster")
+        return Grid(transform, crs_from_text(values["crs"]), width, height)
+
     def lattice(self, count: int = 9) -> FloatArray:
         """Return pixel positions all over the grid, `count` a side, shape (count², 2)."""
         return mesh(*(np.linspace(0, side - 1, count) for side in (self.width, self.height)))
@@ -210,6 +236,16 @@ def require_map(crs: CRS | None) -> CRS | None:
 
 # The product is `*` in affine 2; affine 3 has `@` and warns of `*`.
 _product = operator.matmul if hasattr(Affine, "__matmul__") else operator.mul
+
+
+def crs_to_text(crs: CRS | None) -> str | None:
+    """Return a CRS as text that files can carry."""
+    return None if crs is None else str(crs.to_wkt())
+
+
+def crs_from_text(text: str | None) -> CRS | None:
+    """Return the CRS that `crs_to_text` described; errors as `require_map`, and `CRSError`."""
+    return None if text is None else require_map(CRS.from_wkt(text))
 
 
 def compose(*transforms: Affine) -> Affine:

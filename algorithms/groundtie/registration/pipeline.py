@@ -139,7 +139,7 @@ class Stages:
     @classmethod
     def of(cls, images: ImagePair, masked: Masked, spec: Specification) -> Stages:
         """Put the stages together; `images` have no masks."""
-        held_out = HeldOut.of(images, spec.chip_px, spec.spacing_px)
+        held_out = HeldOut.of(images)
 
         def pooled(pair: ImagePair) -> PooledHistogramMatcher:
             return PooledHistogramMatcher(pair, held_out.layout.chip_px, held_out)

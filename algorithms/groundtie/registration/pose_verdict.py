@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -28,7 +28,7 @@ from .evidence import AGREEMENT, LAYOVER, POSE, SURVEY, HeldOut
 from .layover import CHIPS_MEAN_OVER_SCATTER
 from .rules.pose import SAME_SHARE
 from .scene import SceneInfo
-from .verdict import first_refusal
+from .verdict import Verdict, decide
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,40 @@ class PoseEvidence:
 
     stages: ClassVar = (POSE,)
 
+    @classmethod
+    def of(
+        cls,
+        windows: tuple[Patch, Patch],
+        limits: SearchLimits,
+        found: Sequence[PoseFound],
+        exhaustive: bool,
+        context: Context,
+    ) -> PoseEvidence:
+        """Put the candidates of a search beside those of an exhaustive one over all rotations.
+
+        Rotations beyond the limits measure how high chance is, and may hold a better pose.
+
+        Parameters
+        ----------
+        windows
+            Reference and input.
+        limits
+            Those of the search.
+        found
+            What the search found, best first.
+        exhaustive
+            Whether the search was `find_poses`; it is not repeated if it was over all rotations.
+        context
+            Threads to work in.
+        """
+        everything = found
+        if found and (not exhaustive or limits.rotation_deg < 180):
+            low, high = limits.scale
+            wide = SearchLimits(limits.radius, 180.0, (min(low, 0.8), max(high, 1.25)))
+            everything = find_poses(*windows, wide, SimilaritySettings(), context)
+        rows, cols = windows[0].values.shape
+        return cls(found, everything, (rows, cols))
+
     @property
     def height(self) -> float:
         """Height of the best exhaustive pose, in robust standard deviations."""
@@ -68,75 +102,14 @@ class PoseEvidence:
         """By how much the found pose moves the reference's corners against the exhaustive one."""
         return moved_px(self.exhaustive[0].pose, self.found[0].pose, self.shape)
 
-
-@dataclass(frozen=True)
-class PoseVerdict:
-    """Whether a pose can be trusted.
-
-    Parameters
-    ----------
-    accepted
-        Whether it can.
-    reason
-        Why, or why not, in a sentence.
-    height
-        Height of the best pose of an exhaustive search, in robust standard deviations.
-    rival_ratio
-        Its height over that of the best one elsewhere; None if nothing was found.
-    rule, advice
-        See `Verdict`.
-    """
-
-    accepted: bool
-    reason: str
-    height: float = 0.0
-    rival_ratio: float | None = None
-    rule: str = ""
-    advice: str = ""
-
     def summary(self) -> dict[str, Any]:
-        """Return the verdict as values that JSON can carry."""
-        return asdict(self)
+        """Return how high the pose stands, as values that JSON can carry."""
+        return {"height": self.height, "rival_ratio": self.rival_ratio}
 
 
-def judge_pose(
-    reference: Patch,
-    input: Patch,
-    limits: SearchLimits,
-    found: Sequence[PoseFound],
-    exhaustive: bool,
-    context: Context,
-) -> PoseVerdict:
-    """Judge the best candidate of a search by an exhaustive one over all rotations.
-
-    Rotations beyond the limits measure how high chance is, and may hold a better pose.
-
-    Parameters
-    ----------
-    reference, input
-        The windows.
-    limits
-        Those of the search.
-    found
-        What the search found, best first.
-    exhaustive
-        Whether the search was `find_poses`; it is not repeated if it was over all rotations.
-    context
-        Threads to work in.
-    """
-    everything = found
-    if found and (not exhaustive or limits.rotation_deg < 180):
-        low, high = limits.scale
-        wide = SearchLimits(limits.radius, 180.0, (min(low, 0.8), max(high, 1.25)))
-        everything = find_poses(reference, input, wide, SimilaritySettings(), context)
-    rows, cols = reference.values.shape
-    evidence = PoseEvidence(found, everything, (rows, cols))
-    refusal = first_refusal(evidence)
-    height, ratio = evidence.height, evidence.rival_ratio
-    if refusal is None:
-        return PoseVerdict(True, "no other pose matches nearly as well", height, ratio)
-    rule, reason = refusal
-    return PoseVerdict(False, reason, height, ratio, rule.name, rule.advice)
+def judge_pose(evidence: PoseEvidence) -> Verdict:
+    """Return the verdict on the best candidate of a search."""
+    return decide(evidence, "no other pose matches nearly as well")
 
 
 @dataclass(frozen=True)
@@ -199,18 +172,12 @@ class PoseSurveyEvidence:
 
 
 def confirm_pose(
-    verdict: PoseVerdict,
-    images: tuple[Image, Image],
-    windows: PoseWindows,
-    pose: Pose,
-    context: Context,
-) -> tuple[PoseVerdict, Pose]:
+    images: tuple[Image, Image], windows: PoseWindows, pose: Pose, context: Context
+) -> tuple[Verdict, Pose]:
     """Return the verdict on a pose that the search believes, and where chips all over move it.
 
     Parameters
     ----------
-    verdict
-        That of the search, which accepted it.
     images
         Reference and input.
     windows
@@ -224,10 +191,13 @@ def confirm_pose(
     pair = make_pair(*images, None, windows.radius_m, 180.0, scale)
     found = survey_pose(pair, windows.transform(pose), SAME_SHARE, context)
     factor = CHIPS_MEAN_OVER_SCATTER if SceneInfo.of(pair).are_both_radar else None
-    refusal = first_refusal(PoseSurveyEvidence(found, factor))
-    if refusal is None:
-        # What the chips confirm is where they have moved it.
-        return verdict, windows.pose(found.transform)
-    rule, reason = refusal
-    refused = replace(verdict, accepted=False, reason=reason, rule=rule.name, advice=rule.advice)
-    return refused, pose
+    evidence = PoseSurveyEvidence(found, factor)
+    points = evidence.held_out
+    verdict = replace(
+        decide(evidence, "chips all over confirm it, and no other pose matches nearly as well"),
+        check_points=points.total,
+        check_points_agreeing=points.agreeing,
+        log10_chance=points.log10_chance,
+    )
+    # What the chips confirm is where they have moved it.
+    return verdict, windows.pose(found.transform) if verdict.accepted else pose

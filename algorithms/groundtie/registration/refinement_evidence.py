@@ -65,16 +65,6 @@ class RefinementEvidence:
     stages: ClassVar = (AGREEMENT, ERROR, REFINEMENT)
 
     @property
-    def rms_before_px(self) -> float:
-        """Root mean square error by the RPCs as delivered; infinite without inliers."""
-        return _rms(self.before_px)
-
-    @property
-    def rms_after_px(self) -> float:
-        """Root mean square error by the refined RPCs; infinite without inliers."""
-        return _rms(self.after_px)
-
-    @property
     def before(self) -> Statistics:
         """Errors at the held-out inliers by the RPCs as delivered, px."""
         return Statistics.of(self.before_px)
@@ -165,12 +155,6 @@ class RefinementEvidence:
             folding_px,
             needs_spread,
         )
-
-
-def _rms(residuals_px: FloatArray) -> float:
-    if len(residuals_px) == 0:
-        return math.inf
-    return float(np.sqrt((residuals_px**2).sum(axis=1).mean()))
 
 
 def _spread_px(adjustment: Adjustment, px: FloatArray) -> float:

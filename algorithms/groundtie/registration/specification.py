@@ -101,9 +101,8 @@ class Specification:
         made for such pairs; "auto": inferred from metadata and speckle.
     surface
         Its elevated objects; None: unknown.
-    matching_pixel_size_m, chip_px, spacing_px
-        Pixel size of the matching grid, side of the chips and distance between them; None: by the
-        images.
+    matching_pixel_size_m
+        Pixel size of the matching grid; None: by the images.
     tries
         How many registrations of this pair were tried, this one included: the probability of
         agreement by chance is counted for all of them.
@@ -129,8 +128,6 @@ class Specification:
     radar: str = AUTO
     surface: StatedSurface | None = None
     matching_pixel_size_m: float | None = None
-    chip_px: int | None = None
-    spacing_px: float | None = None
     tries: int = 1
     dem: Any = None
     input_dem: Any = None

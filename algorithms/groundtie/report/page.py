@@ -6,6 +6,7 @@ import math
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -115,6 +116,12 @@ def plain(value: Any) -> Any:
 
 
 def _rendered(template: str, **values: Any) -> str:
+    return str(_environment().get_template(template).render(**values))
+
+
+@cache
+def _environment() -> Any:
+    """Return what renders pages; it keeps compiled templates for all pages of a process."""
     import jinja2  # heavy
 
     environment = jinja2.Environment(
@@ -127,7 +134,7 @@ def _rendered(template: str, **values: Any) -> str:
     environment.globals.update(colours=_COLOURS, tolerance_px=TOLERANCE_PX)
     environment.filters.update(number=_number, percent=_percent, sentence=_sentence)
     environment.tests["finite"] = math.isfinite
-    return environment.get_template(template).render(**values)
+    return environment
 
 
 def _number(value: float | None, digits: int = 2) -> str:

@@ -21,11 +21,6 @@ from .bias import KINDS, TERMS, Bias, design
 
 AUTO = "auto"
 
-# How blunders are found: all at once, by what is probable, or one after the other, the worst
-# first ([Suri2010] section 5.4.1).
-ROBUST, WORST_FIRST = "robust", "worst-first"
-METHODS = (ROBUST, WORST_FIRST)
-
 # Standard deviation that inliers may have beyond their own, in pixels.
 _SIGMA_RANGE_PX = (0.1, 2.5)
 _STEPS = 30
@@ -115,13 +110,7 @@ class Adjustment:
         return jackknife_spread(self.fold_biases, px)
 
 
-def adjust(
-    control: Control,
-    kind: str = AUTO,
-    method: str = ROBUST,
-    largest_residual_px: float = 2.0,
-    seed: int = 0,
-) -> Adjustment:
+def adjust(control: Control, kind: str = AUTO) -> Adjustment:
     """Estimate the bias of RPCs by weighted least squares without the blunders.
 
     Parameters
@@ -131,12 +120,6 @@ def adjust(
     kind
         One of `bias.KINDS`, or "auto": the simplest model that left-out points justify and that
         the points' number and spread carry.
-    method
-        One of `METHODS`.
-    largest_residual_px
-        For the method worst-first: points with larger residuals are blunders.
-    seed
-        Of random samples.
 
     Raises
     ------
@@ -144,10 +127,10 @@ def adjust(
         Fewer points, or fewer that agree, than the model needs.
     """
     if kind != AUTO:
-        return _adjust(control, kind, method, largest_residual_px, seed)
+        return _adjust(control, kind)
 
     def fit(each: str) -> Candidate[Adjustment]:
-        tried = _adjust(control, each, method, largest_residual_px, seed)
+        tried = _adjust(control, each)
         return Candidate(each, tried, _log_likelihoods(tried))
 
     def is_held(tried: Adjustment, chosen: Adjustment) -> bool:
@@ -187,18 +170,13 @@ def _log_likelihoods(adjustment: Adjustment) -> FloatArray:
     return np.asarray(np.log(inlier + (1 - share) / (2 * LEAST_REACH_PX) ** 2))
 
 
-def _adjust(
-    control: Control, kind: str, method: str, largest_residual_px: float, seed: int
-) -> Adjustment:
+def _adjust(control: Control, kind: str) -> Adjustment:
     needed = round(CONTROL_PER_PARAMETER * 2 * TERMS[kind])
     if len(control) < needed:
         raise TooFewPointsError(
             f"the model {kind} needs at least {needed} control points; there are {len(control)}"
         )
-    if method == WORST_FIRST:
-        used, sigma = _without_worst(control, kind, largest_residual_px)
-    else:
-        used, sigma = _without_improbable(control, kind, seed)
+    used, sigma = _without_improbable(control, kind)
     if used.sum() < needed:
         raise TooFewPointsError(
             f"only {used.sum()} of {len(control)} control points agree; the model {kind} needs "
@@ -217,10 +195,10 @@ def _adjust(
     return Adjustment(_fit(kept, kind, sigma), used, sigma, tuple(biases), left_out, {kind: rmse})
 
 
-def _without_improbable(control: Control, kind: str, seed: int) -> tuple[NDArray[np.bool_], float]:
+def _without_improbable(control: Control, kind: str) -> tuple[NDArray[np.bool_], float]:
     """Return which points are more probably inliers than blunders, and the spread of these."""
     first = "translation" if kind == "shift" else "affine"
-    start = find_consensus(control.expected_px, control.found_px, _CONSENSUS_PX, first, seed)
+    start = find_consensus(control.expected_px, control.found_px, _CONSENSUS_PX, first)
     residuals = control.found_px - start(control.expected_px)
     reach = max(float(np.abs(residuals).max()), LEAST_REACH_PX)
     used, sigma = np.zeros(len(control), bool), _SIGMA_RANGE_PX[0]
@@ -232,22 +210,6 @@ def _without_improbable(control: Control, kind: str, seed: int) -> tuple[NDArray
             break
         residuals = control.residuals_px(_fit(control.take(used), kind, sigma))
     return used, sigma
-
-
-def _without_worst(
-    control: Control, kind: str, largest_residual_px: float
-) -> tuple[NDArray[np.bool_], float]:
-    """Take the point with the largest residual out until none exceeds the largest allowed."""
-    used = np.ones(len(control), bool)
-    while used.sum() > TERMS[kind]:
-        bias = _fit(control.take(used), kind, 0.0)
-        distance = np.where(used, np.hypot(*control.residuals_px(bias).T), 0.0)
-        if distance.max() <= largest_residual_px:
-            break
-        used[distance.argmax()] = False
-    kept = control.take(used)
-    residuals = kept.residuals_px(_fit(kept, kind, 0.0))
-    return used, _excess(kept, float(np.sqrt(np.mean(residuals**2))))
 
 
 def _excess(control: Control, sigma_px: float) -> float:

@@ -105,26 +105,23 @@ class TerrainHeights:
         The model.
     geoid
         What its heights count from, as heights above the ellipsoid; None: the ellipsoid.
-    offset_m
-        What is added everywhere, in metres.
     """
 
     terrain: RasterSurface
     geoid: RasterSurface | None = None
-    offset_m: float = 0.0
 
     @property
     def typical_m(self) -> float:
         """A height of the region: its median, and the geoid's."""
         geoid = 0.0 if self.geoid is None else float(np.median(self.geoid.filled))
-        return float(np.median(self.terrain.filled)) + geoid + self.offset_m
+        return float(np.median(self.terrain.filled)) + geoid
 
     def at(self, lon_lat: FloatArray) -> FloatArray:
         """Return heights in metres, shape (n,), at longitudes and latitudes; NaN if unknown."""
         heights = self.terrain.at(lon_lat)
         if self.geoid is not None:
             heights = heights + self.geoid.at(lon_lat)
-        return heights + self.offset_m
+        return heights
 
     def on_grid(self, on_nodes: OnNodes) -> HeightsOnGrid | None:
         """Return the heights at all pixels of a grid; None if none is known."""
@@ -177,16 +174,14 @@ class _TerrainOnGrid:
     def bounds_m(self) -> tuple[float, float]:
         """Bounds that no height exceeds."""
         image, geoid = self._piece.image, self.geoid
-        zero = self.heights.offset_m
         low, high = (0.0, 0.0) if geoid is None else _range(geoid.values)
-        return zero + float(image.min()) + low, zero + float(image.max()) + high
+        return float(image.min()) + low, float(image.max()) + high
 
     def lines(self, rows: slice) -> FloatImage:
         """Return heights in metres at the pixels of some rows; NaN if unknown."""
         height = self._piece.at(*self._local.lines(rows))
         if self.geoid is not None:
             height += self.geoid.lines(rows)[0]
-        height += self.heights.offset_m
         return height
 
 
@@ -232,7 +227,7 @@ def declared_datum(dem: RasterSource) -> str | None:
     return next((name for name in GEOID_GRIDS if name in text), None)
 
 
-def surface_over(source: RasterSource, lon_lat: FloatArray, margin_px: int = 2) -> RasterSurface:
+def surface_over(source: RasterSource, lon_lat: FloatArray) -> RasterSurface:
     """Return the surface of a raster over a region.
 
     Parameters
@@ -241,8 +236,6 @@ def surface_over(source: RasterSource, lon_lat: FloatArray, margin_px: int = 2) 
         The raster.
     lon_lat
         Places of the region, (n, 2): those in between are asked for, too.
-    margin_px
-        How far around the region is read for filling voids.
 
     Raises
     ------
@@ -259,7 +252,7 @@ def surface_over(source: RasterSource, lon_lat: FloatArray, margin_px: int = 2) 
         xy = reproject(places, LON_LAT, grid.crs)
         return grid.map_to_pixel(np.where(np.isfinite(xy), xy, np.nan))
 
-    surface = surface_around(source, exact, lon_lat, margin_px)
+    surface = surface_around(source, exact, lon_lat)
     corner, opposite = lon_lat.min(axis=0), lon_lat.max(axis=0)
     around = 0.05 * (opposite - corner) + 1e-4
     fast = smooth_map(exact, corner - around, opposite + around, TOLERANCE_PX)

@@ -35,11 +35,11 @@ _PRODUCTS = (
 BLOCK = 4096
 
 
-def fill_terms(lph: FloatArray, terms: FloatArray, count: int = TERMS) -> None:
-    """Write the first `count` terms, (≥ count, n), of normalised positions L, P, H, (3, n)."""
+def fill_terms(lph: FloatArray, terms: FloatArray) -> None:
+    """Write the terms, (20, n), of normalised positions L, P, H, (3, n)."""
     terms[0] = 1.0
     terms[1:4] = lph
-    for term, factor, coordinate in _PRODUCTS[: count - 4]:
+    for term, factor, coordinate in _PRODUCTS:
         np.multiply(terms[factor], lph[coordinate], out=terms[term])
 
 

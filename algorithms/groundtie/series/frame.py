@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from affine import Affine
@@ -42,6 +43,23 @@ class SeriesFrame:
     grid: Grid
     centre_px: tuple[float, float]
     half_px: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the frame as values that JSON can carry."""
+        return {
+            **self.grid.to_json(),
+            "centre_px": list(self.centre_px),
+            "half_px": self.half_px,
+        }
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> SeriesFrame:
+        """Return the frame that `to_json` described; errors as `Grid.from_json`."""
+        half = float(values["half_px"])
+        if not half > 0:
+            raise ValueError("the frame has no size")
+        col, row = map(float, values["centre_px"])
+        return cls(Grid.from_json(values), (col, row), half)
 
     @classmethod
     def around(cls, hub: Grid, dates: Sequence[Grid]) -> SeriesFrame:

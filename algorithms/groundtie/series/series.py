@@ -17,7 +17,7 @@ from .frame import SeriesFrame, rms_px, sigma_px
 from .inputs import Listed
 from .pairs import PairResult
 from .settling import DateVerdict, Settled
-from .stored import FORMAT, frame_to_json
+from .stored import FORMAT
 
 TABLE_COLUMNS = {
     "name": "str",
@@ -242,7 +242,7 @@ class Series:
             "type": "FeatureCollection",
             "features": [plain(item) for item in self.items],
             "reference_key": self.reference_key,
-            "frame": frame_to_json(self.frame),
+            "frame": self.frame.to_json(),
             **values,
             "pairs": [plain(pair.to_json()) for pair in self.pairs],
         }

@@ -7,13 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from affine import Affine
-from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
 from ..errors import GroundTieError, ParameterError, RasterOpenError
 from ..geometry.transform import Transform
-from ..rasters.grid import Grid, is_invertible
 from ..rasters.reading import open_raster
 from ..runs import RUN_TAG
 from ..strict_json import read_json
@@ -93,7 +90,7 @@ def read_series(path: Path) -> StoredSeries:
         pairs = [PairResult.from_json(one) for one in values["pairs"]]
         return StoredSeries(
             values["reference_key"],
-            frame_from_json(values["frame"]),
+            SeriesFrame.from_json(values["frame"]),
             {pair.key: pair for pair in pairs},
             {one["name"]: _stored_date(one) for one in values["dates"] if one["written"]},
         )
@@ -102,37 +99,6 @@ def read_series(path: Path) -> StoredSeries:
             f"{path} is no series that can be continued ({error!s:.80}): give another folder, or "
             "remove it"
         ) from error
-
-
-def frame_to_json(frame: SeriesFrame) -> dict[str, Any]:
-    """Return a frame as values that JSON can carry."""
-    grid = frame.grid
-    return {
-        "crs": None if grid.crs is None else str(grid.crs.to_wkt()),
-        "geotransform": list(grid.transform.to_gdal()),
-        "width": grid.width,
-        "height": grid.height,
-        "centre_px": list(frame.centre_px),
-        "half_px": frame.half_px,
-    }
-
-
-def frame_from_json(values: dict[str, Any]) -> SeriesFrame:
-    """Return the frame that `frame_to_json` described.
-
-    Raises
-    ------
-    KeyError, TypeError, ValueError, CRSError
-        The values describe none.
-    """
-    transform = Affine.from_gdal(*map(float, values["geotransform"]))
-    half = float(values["half_px"])
-    if not is_invertible(transform) or not half > 0:
-        raise ValueError("the frame has no size")
-    crs = None if values["crs"] is None else CRS.from_wkt(values["crs"])
-    col, row = map(float, values["centre_px"])
-    grid = Grid(transform, crs, int(values["width"]), int(values["height"]))
-    return SeriesFrame(grid, (col, row), half)
 
 
 def _stored_date(values: dict[str, Any]) -> StoredDate:

@@ -20,7 +20,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.pair import Image
 from ..rasters.reading import bounded_cache, open_raster
-from ..registration.pose_verdict import PoseVerdict, confirm_pose, judge_pose
+from ..registration.pose_verdict import PoseEvidence, confirm_pose, judge_pose
 from ..registration.verdict import Verdict
 from ..report.rotation_picture import draw_rotation
 from ..similarity.surface import SimilaritySettings
@@ -38,6 +38,8 @@ class RotationResult:
     ----------
     verdict
         Whether it can be trusted.
+    evidence
+        What an exhaustive search found beside it.
     pose
         Rotation and scale; the shift is in pixels of the windows.
     right, down
@@ -53,7 +55,8 @@ class RotationResult:
         What was written, by name.
     """
 
-    verdict: PoseVerdict
+    verdict: Verdict
+    evidence: PoseEvidence
     pose: Pose
     right: float
     down: float
@@ -68,7 +71,7 @@ class RotationResult:
             "rotation_deg": self.pose.rotation_deg,
             "scale": self.pose.scale,
             "shift": {"right": self.right, "down": self.down, "unit": self.unit},
-            "verdict": self.verdict.summary(),
+            "verdict": self.verdict.summary() | self.evidence.summary(),
             "search": self.search,
             "transform": self.transform.to_json(),
             "files": self.files,
@@ -80,8 +83,8 @@ class RotationResult:
             f"rotation: {self.pose.rotation_deg:+.2f}° (counter-clockwise)",
             f"scale: {self.pose.scale:.4f}",
             f"shift: {self.right:+.2f} {self.unit} right, {self.down:+.2f} {self.unit} down",
-            f"accepted: {self.verdict.reason}; height {self.verdict.height:.1f}, "
-            f"{self.verdict.rival_ratio:.2f} times that of the best elsewhere",
+            f"accepted: {self.verdict.reason}; height {self.evidence.height:.1f}, "
+            f"{self.evidence.rival_ratio:.2f} times that of the best elsewhere",
             *(f"{name}: {path}" for name, path in self.files.items()),
         ]
 
@@ -211,23 +214,22 @@ def estimate_rotation(
         found = SEARCHES[search](*pair, limits, settings, context.quiet())
         context.update(0.5, "checking")
         exhaustive = search == DEFAULT_SEARCH
-        verdict = judge_pose(*pair, limits, found, exhaustive, context.quiet())
+        evidence = PoseEvidence.of(pair, limits, found, exhaustive, context.quiet())
+        verdict = judge_pose(evidence)
         pose = found[0].pose if found else None
         if verdict.accepted and pose is not None:
-            images = own, other
-            verdict, pose = confirm_pose(verdict, images, windows, pose, context.quiet())
+            verdict, pose = confirm_pose((own, other), windows, pose, context.quiet())
         context.update(0.8, "writing")
         if picture is not None:
             title = f"{'accepted' if verdict.accepted else 'refused'}: {verdict.reason}"
             draw_rotation(outputs.stage(picture), *pair, limits, pose, title, context.quiet())
         if verdict.accepted and pose is not None:
             files = {"transform": transform, "picture": picture}
-            result = _result(windows, pose, verdict, search, files)
+            result = _result(windows, pose, (verdict, evidence), search, files)
             _write_transform(outputs, transform, result.transform)
             return result
-    refused = Verdict(False, verdict.reason, rule=verdict.rule, advice=verdict.advice)
     raise NotRegisteredError(
-        f"no rotation of {input} against {reference} was found: {refused.sentence()}", refused
+        f"no rotation of {input} against {reference} was found: {verdict.sentence()}", verdict
     )
 
 
@@ -242,13 +244,13 @@ def _similarity(search: str, wanted: str) -> str:
 def _result(
     windows: PoseWindows,
     pose: Pose,
-    verdict: PoseVerdict,
+    judged: tuple[Verdict, PoseEvidence],
     search: str,
     files: Mapping[str, Path | None],
 ) -> RotationResult:
     right, down = (float(shift) * windows.pixel_m for shift in pose.shift_px)
     return RotationResult(
-        verdict,
+        *judged,
         pose,
         right,
         down,

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
@@ -16,27 +15,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from .parameters import general
-
-
-@dataclass(frozen=True)
-class RegionMaskResult:
-    """The mask, the share of pixels that take part, and the length of the skeleton in metres."""
-
-    share: float
-    skeleton_m: float
-    files: dict[str, Path]
-
-    def summary(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry."""
-        files = {name: str(path) for name, path in self.files.items()}
-        return {"share": self.share, "skeleton_m": self.skeleton_m, "files": files}
-
-    def lines(self) -> list[str]:
-        """Return the result as lines of text."""
-        return [
-            f"{self.share:.1%} of the pixels take part; {self.skeleton_m:.0f} m of skeleton",
-            *(f"{name}: {path}" for name, path in self.files.items()),
-        ]
+from .written_mask import WrittenMask
 
 
 @tool(
@@ -66,7 +45,7 @@ def mask_regions(
     mask_high_percent: general.HighPercent = None,
     band: general.RadarBand = None,
     progress: Progress = SILENT,
-) -> RegionMaskResult:
+) -> WrittenMask:
     """Mask all of a radar image but homogeneous regions on the ground: roads, waters, squares.
 
     Speckle is filtered, regions grow from homogeneous seeds, and those stay that are long or large
@@ -89,5 +68,5 @@ def mask_regions(
                         partial(ground.cut, part),
                         progress.part(0.8, 1.0),
                     )
-    written = {name: path for name, path in files.items() if path is not None}
-    return RegionMaskResult(share, ground.skeleton_m, written)
+    words = f"{ground.skeleton_m:.0f} m of skeleton"
+    return WrittenMask(share, {"skeleton_m": ground.skeleton_m}, words, files)

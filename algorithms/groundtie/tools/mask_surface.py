@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
@@ -18,37 +18,9 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.specification import StatedSurface
-from ..registration.surface_masks import ModelFit, fitted_ground
+from ..registration.surface_masks import fitted_ground
 from .parameters import general, registration
-
-
-@dataclass(frozen=True)
-class SurfaceMaskResult:
-    """The mask, the share of pixels that take part, and how the surface model fits the image."""
-
-    share: float
-    fit: ModelFit | None
-    files: dict[str, Path]
-
-    def summary(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry."""
-        files = {name: str(path) for name, path in self.files.items()}
-        values: dict[str, Any] = {"share": self.share, "correlation": None, "offset_px": None}
-        if self.fit is not None:
-            offset = list(self.fit.offset_px)
-            values |= {"correlation": self.fit.correlation, "offset_px": offset}
-        return {**values, "files": files}
-
-    def lines(self) -> list[str]:
-        """Return the result as lines of text."""
-        return [
-            f"{self.share:.1%} of the pixels take part",
-            "nothing is expected of the image"
-            if self.fit is None
-            else f"the image correlates by {self.fit.correlation:.2f} with the surface model"
-            f"{self.fit.note}",
-            *(f"{name}: {path}" for name, path in self.files.items()),
-        ]
+from .written_mask import WrittenMask
 
 
 @tool(
@@ -73,7 +45,7 @@ def mask_surface(
     ] = None,
     views: registration.SurfaceViews = None,
     progress: Progress = SILENT,
-) -> SurfaceMaskResult:
+) -> WrittenMask:
     """Mask all of an image but the ground that a surface model and the views of images leave.
 
     Elevated objects are laid over the ground, hide it and cast shadows: that follows from heights
@@ -96,6 +68,9 @@ def mask_surface(
             share = write_mask(scene, outputs.stage(output), ground.select, progress.part(0.1, 0.6))
             if reasons is not None:
                 write_reasons(ground, outputs.stage(reasons), progress.part(0.6, 1.0))
-    return SurfaceMaskResult(
-        share, fit, {name: path for name, path in files.items() if path is not None}
-    )
+    if fit is None:
+        unknown = {"correlation": None, "offset_px": None}
+        return WrittenMask(share, unknown, "nothing is expected of the image", files)
+    numbers = {"correlation": fit.correlation, "offset_px": list(fit.offset_px)}
+    words = f"the image correlates by {fit.correlation:.2f} with the surface model{fit.note}"
+    return WrittenMask(share, numbers, words, files)

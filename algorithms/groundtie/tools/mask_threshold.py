@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+import math
 
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
@@ -14,30 +12,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from .parameters import general
-
-
-@dataclass(frozen=True)
-class ThresholdMaskResult:
-    """The mask, the share of pixels that take part, and the grey values they lie between."""
-
-    output: Path
-    share: float
-    low: float
-    high: float
-
-    def summary(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry; a threshold that is not set is None."""
-        limits = {"low": self.low, "high": self.high}
-        finite = {name: None if abs(at) == float("inf") else at for name, at in limits.items()}
-        return {"output": str(self.output), "share": self.share, **finite}
-
-    def lines(self) -> list[str]:
-        """Return the result as lines of text."""
-        return [
-            f"wrote {self.output}",
-            f"{self.share:.1%} of the pixels take part: block means of {self.low:g} to "
-            f"{self.high:g}",
-        ]
+from .written_mask import WrittenMask
 
 
 @tool(
@@ -53,7 +28,7 @@ def mask_threshold(
     mask_growth: general.MaskGrowth = 0.0,
     band: general.RadarBand = None,
     progress: Progress = SILENT,
-) -> ThresholdMaskResult:
+) -> WrittenMask:
     """Mask the strong scatterers of a radar image, as buildings are.
 
     The thresholds are percentiles of the means over blocks of 4 × 4 pixels; whole blocks take
@@ -68,4 +43,7 @@ def mask_threshold(
         mask = threshold.on(scene, progress.part(0.0, 0.3))
         with Outputs() as outputs:
             share = write_mask(scene, outputs.stage(output), mask.select, progress.part(0.3, 1.0))
-    return ThresholdMaskResult(output, share, mask.low, mask.high)
+    limits = {"low": mask.low, "high": mask.high}
+    finite = {name: at if math.isfinite(at) else None for name, at in limits.items()}
+    words = f"block means of {mask.low:g} to {mask.high:g}"
+    return WrittenMask(share, finite, words, {"mask": output})

@@ -134,7 +134,18 @@ def similarity_surface(
             advanced=True,
         ),
     ] = "equal-frequency",
-    gpve_order: general.GpveOrder = 4,
+    gpve_order: Annotated[
+        int,
+        Number(
+            label="Order of the histogram's spline",
+            help="Order of the B-spline by which pixels enter the joint histogram: 2 is partial "
+            "volume interpolation, 4 the cubic spline; 4 and more are free of artefacts.",
+            integer=True,
+            minimum=2,
+            maximum=7,
+            advanced=True,
+        ),
+    ] = 4,
     sample: Annotated[
         int,
         Number(

@@ -21,7 +21,8 @@ def _narrow_control(evidence: RefinementEvidence) -> str | None:
 
 
 def _not_nearer(evidence: RefinementEvidence) -> str | None:
-    before, after = evidence.rms_before_px, evidence.rms_after_px
+    before, after = evidence.before.rmse, evidence.after.rmse
+    # Without inliers both are not a number, and nothing shows that they are nearer.
     if before > after:
         return None
     name = evidence.held_out.name

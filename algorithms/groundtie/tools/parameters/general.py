@@ -72,24 +72,17 @@ Seed = Annotated[
     ),
 ]
 
-ReferenceBand = Annotated[
-    int | None,
-    Band(
-        label="Band of the reference",
-        help="The band that is matched; by default the mean of all bands.",
-        of="reference",
-        advanced=True,
-    ),
-]
+MATCHED_BAND = Band(
+    label="Band of the reference",
+    help="The band that is matched; by default the mean of all bands.",
+    of="reference",
+    advanced=True,
+)
+ReferenceBand = Annotated[int | None, MATCHED_BAND]
+_INPUT_BAND_HELP = f"{MATCHED_BAND.help} A registered image has all bands."
 InputBand = Annotated[
     int | None,
-    Band(
-        label="Band of the input",
-        help="The band that is matched; by default the mean of all bands. A registered image "
-        "has all bands.",
-        of="input",
-        advanced=True,
-    ),
+    replace(MATCHED_BAND, label="Band of the input", help=_INPUT_BAND_HELP, of="input"),
 ]
 MatchingPixelSize = Annotated[
     float | None,
@@ -100,42 +93,12 @@ MatchingPixelSize = Annotated[
         advanced=True,
     ),
 ]
-ChipSize = Annotated[
-    int | None,
-    Number(
-        label="Chip size",
-        help="Side of the windows that are matched, in pixels of the matching grid; by default by "
-        "the size of the overlap.",
-        unit="px",
-        integer=True,
-        minimum=16,
-        maximum=1024,
-        advanced=True,
-    ),
-]
-GpveOrder = Annotated[
-    int,
-    Number(
-        label="Order of the histogram's spline",
-        help="Order of the B-spline by which pixels enter the joint histogram: 2 is partial "
-        "volume interpolation, 4 the cubic spline; 4 and more are free of artefacts.",
-        integer=True,
-        minimum=2,
-        maximum=7,
-        advanced=True,
-    ),
-]
 Radar = Annotated[
     Path, RasterIn(label="Radar image", help="A SAR image, as amplitude, intensity or complex.")
 ]
+_RADAR_BAND_HELP = "The band that is looked at; by default the mean of all bands."
 RadarBand = Annotated[
-    int | None,
-    Band(
-        label="Band",
-        help="The band that is looked at; by default the mean of all bands.",
-        of="input",
-        advanced=True,
-    ),
+    int | None, replace(MATCHED_BAND, label="Band", help=_RADAR_BAND_HELP, of="input")
 ]
 MaskOut = Annotated[
     Path,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from ...kinds import Band, Choice, Distance, FileIn, MaskIn, Number, RasterIn
+from ...kinds import Choice, Distance, FileIn, MaskIn, Number, RasterIn
 from ...sensor.geoids import DATUMS
+from .general import MATCHED_BAND
 from .registration import MASK_HELP
 
 SensorImage = Annotated[
@@ -85,13 +87,5 @@ RpcSearchRadius = Annotated[
         "coarser image, whichever is larger.",
     ),
 ]
-ImageBand = Annotated[
-    int | None,
-    Band(
-        label="Band of the image",
-        help="The band that is matched; by default the mean of all bands.",
-        of="image",
-        advanced=True,
-    ),
-]
+ImageBand = Annotated[int | None, replace(MATCHED_BAND, label="Band of the image", of="image")]
 ImageMask = Annotated[Path | None, MaskIn(label="Mask of the image", help=MASK_HELP, advanced=True)]

@@ -1,0 +1,169 @@
+"""Rules on registrations: what several facts together refuse, or let pass."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from evidences import (
+    GOOD,
+    PERHAPS,
+    RANGE,
+    displaced,
+    estimated,
+    evidence,
+    facts,
+    fit_points,
+    masked,
+    refusing,
+    scatter,
+    scene,
+    survey,
+    two_thirds,
+)
+
+from groundtie.masks.choice import LAYER, REGIONS, SURFACE, THRESHOLD, MaskUsed
+from groundtie.matching.rest import Rest
+from groundtie.registration.evidence import (
+    RegistrationEvidence,
+)
+from groundtie.registration.surface_masks import ModelFit
+from groundtie.registration.verdict import first_refusal
+
+
+def test_what_heights_may_displace_all_points_by_is_refused() -> None:
+    """Chips that scatter evenly along a line by ± n px may be n px off, all of them."""
+
+    def along(reach_px: float) -> RegistrationEvidence:
+        seen = survey()
+        return evidence(GOOD, survey=replace(seen, shifts_px=displaced(49, -reach_px, reach_px)))
+
+    assert refusing(along(2.0)) == []
+    assert refusing(along(3.5)) == ["uncertain transform"]
+
+
+@pytest.mark.parametrize("folds", [0, 1, 5])
+def test_a_transform_whose_error_is_unknown_is_refused(folds: int) -> None:
+    """No model without a block, one alone, and models that have no values."""
+    unknown = replace(
+        estimated(fit_points()), fold_models=(lambda px: np.full(px.shape, np.nan),) * folds
+    )
+    assert "uncertain transform" in refusing(evidence(GOOD, unknown))
+
+
+@pytest.mark.parametrize(
+    ("more", "expected_px"),
+    [({}, 6.0), ({"mask": masked(REGIONS)}, 3.0), ({"layover_factor": 3.0}, 6.0 * math.sqrt(3))],
+)
+def test_heights_that_spread_evenly_displace_by_their_width(
+    more: dict[str, Any], expected_px: float
+) -> None:
+    """Chips that spread by ± 3 px along the range: the ground is the lowest, or the middle."""
+    seen = replace(survey(), shifts_px=displaced(49, -3.0, 3.0))
+    found = evidence(GOOD, survey=seen, **more).displacement_px
+    assert np.hypot(*found) == pytest.approx(expected_px, rel=0.15)
+    assert abs(found @ RANGE) == pytest.approx(np.hypot(*found), rel=0.01)
+
+
+@pytest.mark.parametrize("kind", [REGIONS, LAYER, SURFACE])
+def test_a_town_whose_ground_was_matched_is_not_suspected(kind: str) -> None:
+    found = evidence(two_thirds(20), scene=PERHAPS, mask=masked(kind))
+    assert "town matched whole" not in refusing(found)
+
+
+def test_a_town_whose_ground_confirms_is_not_suspected() -> None:
+    assert refusing(evidence(two_thirds(20), scene=PERHAPS, is_ground_checked=True)) == []
+
+
+def test_an_image_of_fields_is_not_suspected() -> None:
+    assert refusing(evidence(two_thirds(20), scene=scene())) == []
+
+
+@pytest.mark.parametrize(
+    ("fit", "reason"),
+    [
+        (ModelFit(0.4, (2, -2)), None),
+        (ModelFit(0.4, (-3, 1)), "3.2 px off"),
+        (ModelFit(0.08, (0, 0)), "the registered input does not show"),
+    ],
+)
+def test_the_input_shows_elevated_objects_where_the_surface_model_has_them(
+    fit: ModelFit, reason: str | None
+) -> None:
+    found = evidence(GOOD, mask=masked(SURFACE), input_fit=fit, max_error_px=3.0)
+    decided = first_refusal(found)
+    assert (decided is None) == (reason is None)
+    assert decided is None or (reason is not None and reason in decided[1])
+
+
+def test_ground_must_be_reliable_and_span_the_overlap() -> None:
+    regions = MaskUsed(REGIONS, "reference", 0.3, "as in a dense town")
+    assert refusing(evidence(GOOD, mask=regions)) == []
+    doubted = replace(regions, is_reliable=False)
+    assert refusing(evidence(GOOD, mask=doubted)) == ["too little ground"]
+    narrow = estimated(fit_points(within=(0.6, 0.6)))
+    assert refusing(evidence(GOOD, narrow, mask=regions)) == ["too little ground"]
+    assert refusing(evidence(GOOD, narrow)) == []
+
+
+@pytest.mark.parametrize(("agreeing", "expected"), [(4, ["too little ground"]), (5, [])])
+def test_an_oblique_view_needs_more_check_points_on_the_ground(
+    agreeing: int, expected: list[str]
+) -> None:
+    regions = MaskUsed(REGIONS, "reference", 0.3, "as in a dense town")
+    oblique = scene(facts(variation2=0.25, strong_share=0.2), facts(is_in_sensor_geometry=True))
+    errors = scatter(agreeing, 0.3)
+    assert refusing(evidence(errors, mask=regions, scene=oblique)) == expected
+    assert refusing(evidence(errors, mask=regions)) == []
+
+
+@pytest.mark.parametrize("kind", [REGIONS, LAYER, SURFACE])
+def test_little_ground_may_be_weakly_similar(kind: str) -> None:
+    """A mask leaves little of each chip; other rules judge what it leaves."""
+    weak = survey(height=1.9, rival=1.8)
+    assert refusing(evidence(GOOD, survey=weak, mask=masked(kind))) == []
+    assert refusing(evidence(GOOD, survey=weak)) == ["second place nearby", "weak similarity"]
+
+
+def test_a_part_of_which_half_confirms_is_layover_not_a_part() -> None:
+    found = survey(49, part=12)
+    surfaces = found.surfaces.copy()
+    surfaces[:12:2] = survey(49).surfaces[:12:2]
+    assert refusing(evidence(GOOD, survey=replace(found, surfaces=surfaces))) == []
+
+
+def test_without_locked_content_another_place_must_not_match_better() -> None:
+    rest = survey(20, height=4.0, rival=5.0)
+    found = evidence(GOOD, survey=survey(), rest=Rest(rest))
+    assert refusing(found) == ["pixel-locked content"]
+
+
+def test_without_locked_content_no_part_must_match_elsewhere() -> None:
+    found = evidence(GOOD, survey=survey(), rest=Rest(survey(part=10)))
+    assert refusing(found) == ["pixel-locked content"]
+
+
+@pytest.mark.parametrize(("height", "expected"), [(8.9, []), (9.1, ["second place nearby"])])
+def test_a_second_place_beneath_a_copy(height: float, expected: list[str]) -> None:
+    found = replace(survey(), ghost_height=height)
+    assert refusing(evidence(GOOD, survey=found)) == expected
+
+
+@pytest.mark.parametrize(("part", "expected"), [(7, ["pixel-locked content"]), (2, [])])
+def test_what_copies_leave_may_contradict(part: int, expected: list[str]) -> None:
+    """It need not confirm the transform, as a cloud deck looks like a copy, but not another."""
+    left = survey(3, part, height=6.0)
+    found = evidence(GOOD, survey=survey(), rest=Rest(left, is_explained=True))
+    assert refusing(found) == expected
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [(LAYER, []), (SURFACE, []), (REGIONS, ["despeckled town"]), (THRESHOLD, [])],
+)
+def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list[str]) -> None:
+    """Regions of a camera's image that pass for a radar's are no ground."""
+    assert refusing(evidence(GOOD, scene=PERHAPS, mask=masked(kind))) == expected
