@@ -5,17 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 from qgis.core import (
-    QgsContrastEnhancement,
     QgsMapRendererParallelJob,
     QgsMapSettings,
     QgsPointXY,
     QgsRasterLayer,
-    QgsRasterMinMaxOrigin,
     QgsRectangle,
 )
 from qgis.gui import QgsMapCanvas, QgsMapCanvasItem
 from qgis.PyQt.QtCore import QPointF, QRectF, Qt
 from qgis.PyQt.QtGui import QColor, QImage, QPen
+
+from .compat import STRETCH, WITHOUT_EXTREMES
 
 # Residuals up to 1 px, up to 2 px and above, as in styles/tie_points.qml.
 _COLOURS = ((1.0, QColor("#1a9850")), (2.0, QColor("#f59b00")), (float("inf"), QColor("#d73027")))
@@ -30,9 +30,7 @@ def clearly(layer: Any) -> Any:
     if not isinstance(layer, QgsRasterLayer) or layer.renderer().type() != "singlebandgray":
         return layer
     copy = layer.clone()
-    copy.setContrastEnhancement(
-        QgsContrastEnhancement.StretchToMinimumMaximum, QgsRasterMinMaxOrigin.CumulativeCut
-    )
+    copy.setContrastEnhancement(STRETCH, WITHOUT_EXTREMES)
     return copy
 
 

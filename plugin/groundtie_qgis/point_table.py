@@ -5,8 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from qgis.PyQt.QtCore import QAbstractTableModel, QModelIndex, Qt, pyqtSignal
+from qgis.PyQt.QtCore import (
+    QAbstractTableModel,
+    QModelIndex,
+    QSortFilterProxyModel,
+    Qt,
+    pyqtSignal,
+)
+from qgis.PyQt.QtWidgets import QAbstractItemView, QTableView
 
+from .compat import RIGHT
 from .translation import mark, tr
 
 HEADERS = (
@@ -15,11 +23,16 @@ HEADERS = (
     mark("Residual (px)"),
     mark("Score"),
     mark("Role"),
-    mark("By hand"),
+    "✎",
 )
+ROLES = (mark("fit"), mark("check"))
 _USE, _POINT, _RESIDUAL, _SCORE, _ROLE, _EDITED = range(len(HEADERS))
 # What a column is sorted by, as opposed to what it shows.
 SORT_ROLE = Qt.ItemDataRole.UserRole
+# The widest that columns show, besides their headings; space around texts, and for the arrow of the
+# column that sorts, in pixels of the screen.
+_WIDEST = ("", "0000", "00.00", "000.00", "", "")
+_SPACE_PX, _ARROW_PX = 12, 16
 
 
 class PointTable(QAbstractTableModel):
@@ -51,9 +64,11 @@ class PointTable(QAbstractTableModel):
         return len(HEADERS)
 
     def headerData(self, section: int, orientation: Any, role: int = 0) -> Any:
-        across = orientation == Qt.Orientation.Horizontal
-        shown = across and role == Qt.ItemDataRole.DisplayRole
-        return tr(HEADERS[section]) if shown else None
+        if orientation != Qt.Orientation.Horizontal:
+            return None
+        if role == Qt.ItemDataRole.ToolTipRole and section == _EDITED:
+            return tr("By hand")
+        return tr(HEADERS[section]) if role == Qt.ItemDataRole.DisplayRole else None
 
     def flags(self, index: QModelIndex) -> Any:
         checkable = index.column() == _USE
@@ -67,6 +82,8 @@ class PointTable(QAbstractTableModel):
             return checked if self._review.points.used[row] else unchecked
         if role == Qt.ItemDataRole.ToolTipRole:
             return str(self._review.points.state[row])
+        if role == Qt.ItemDataRole.TextAlignmentRole and column in (_POINT, _RESIDUAL, _SCORE):
+            return RIGHT
         if role not in (Qt.ItemDataRole.DisplayRole, SORT_ROLE):
             return None
         value = self._value(row, column)
@@ -86,11 +103,63 @@ class PointTable(QAbstractTableModel):
             values = self._residuals if column == _RESIDUAL else points.score
             return float(values[row]) if row < len(values) else float("nan")
         if column == _ROLE:
-            return tr("check") if points.is_check[row] else tr("fit")
-        return tr("yes") if self._review.edited[row] else ""
+            return tr(ROLES[int(points.is_check[row])])
+        return "✎" if self._review.edited[row] else ""
 
     def setData(self, index: QModelIndex, value: Any, role: int = 0) -> bool:
         if role != Qt.ItemDataRole.CheckStateRole or index.column() != _USE:
             return False
         self.switched.emit(index.row(), Qt.CheckState(value) == Qt.CheckState.Checked)
         return True
+
+
+class PointView(QTableView):
+    """Shows a `PointTable`, the largest residual first; a click on a heading sorts by it.
+
+    Parameters
+    ----------
+    table
+        The points.
+    """
+
+    # The row of the table that was clicked.
+    row_clicked = pyqtSignal(int)
+
+    def __init__(self, table: PointTable) -> None:
+        super().__init__()
+        self._table = table
+        self._proxy = QSortFilterProxyModel(self)
+        self._proxy.setSourceModel(table)
+        self._proxy.setSortRole(SORT_ROLE)
+        self.setModel(self._proxy)
+        self.setSortingEnabled(True)
+        self.sortByColumn(_RESIDUAL, Qt.SortOrder.DescendingOrder)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.clicked.connect(
+            lambda index: self.row_clicked.emit(self._proxy.mapToSource(index).row())
+        )
+        self._fit_sizes()
+
+    def show_row(self, row: int) -> None:
+        """Select a row of the table and scroll to it."""
+        shown = self._proxy.mapFromSource(self._table.index(row, 0))
+        self.selectRow(shown.row())
+        self.scrollTo(shown)
+
+    def _fit_sizes(self) -> None:
+        """Make all columns fit into the view, once: points may be many, and change often."""
+        rows, columns = self.verticalHeader(), self.horizontalHeader()
+        rows.hide()
+        rows.setMinimumSectionSize(0)
+        rows.setDefaultSectionSize(self.fontMetrics().height() + _SPACE_PX // 2)
+        columns.setHighlightSections(False)
+        columns.setMinimumSectionSize(0)
+        width_of = self.fontMetrics().horizontalAdvance
+        roles = max(map(tr, ROLES), key=width_of)
+        for column, (heading, widest) in enumerate(zip(HEADERS, _WIDEST, strict=True)):
+            shown = (tr(heading), roles if column == _ROLE else widest)
+            arrow = _ARROW_PX if column == _RESIDUAL else 0
+            columns.resizeSection(column, max(map(width_of, shown)) + _SPACE_PX + arrow)
+        around = self.verticalScrollBar().sizeHint().width() + 2 * self.frameWidth()
+        self.setMinimumWidth(columns.length() + around)
+        columns.setStretchLastSection(True)
