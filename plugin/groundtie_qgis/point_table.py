@@ -8,7 +8,6 @@ import numpy as np
 from qgis.PyQt.QtCore import (
     QAbstractTableModel,
     QModelIndex,
-    QSortFilterProxyModel,
     Qt,
     pyqtSignal,
 )
@@ -27,8 +26,6 @@ HEADERS = (
 )
 ROLES = (mark("fit"), mark("check"))
 _USE, _POINT, _RESIDUAL, _SCORE, _ROLE, _EDITED = range(len(HEADERS))
-# What a column is sorted by, as opposed to what it shows.
-SORT_ROLE = Qt.ItemDataRole.UserRole
 # The widest that columns show, besides their headings; space around texts, and for the arrow of the
 # column that sorts, in pixels of the screen.
 _WIDEST = ("", "0000", "00.00", "000.00", "", "")
@@ -44,18 +41,55 @@ class PointTable(QAbstractTableModel):
         super().__init__(parent)
         self._review: Any = None
         self._residuals = np.zeros(0)
+        self._sorted_by, self._descending = _RESIDUAL, True
+        # The points in the order of the table's rows, which is the table's own: a proxy would ask
+        # for every value some twenty times.
+        self._order = np.zeros(0, int)
 
     def show_review(self, review: Any, residuals: Any) -> None:
         """Show another state of the points."""
         same = self._review is not None and len(review.points) == len(self._review.points)
-        if not same:
-            self.beginResetModel()
+        (self.layoutAboutToBeChanged if same else self.modelAboutToBeReset).emit()
         self._review, self._residuals = review, residuals
-        if not same:
-            self.endResetModel()
-        elif self.rowCount():
-            last = self.index(self.rowCount() - 1, len(HEADERS) - 1)
-            self.dataChanged.emit(self.index(0, 0), last)
+        self._arrange()
+        (self.layoutChanged if same else self.modelReset).emit()
+
+    def sort(self, column: int, order: Any = Qt.SortOrder.AscendingOrder) -> None:
+        self.layoutAboutToBeChanged.emit()
+        self._sorted_by, self._descending = column, order == Qt.SortOrder.DescendingOrder
+        self._arrange()
+        self.layoutChanged.emit()
+
+    def _arrange(self) -> None:
+        """Put the points in the order that is asked for; what is selected goes with them."""
+        if self._review is None:
+            return
+        values = self._sorted_values()
+        before = self._order
+        # Without a number: last, in both directions.
+        self._order = np.argsort(-values if self._descending else values, kind="stable")
+        if len(before) == len(self._order):
+            row_of = np.argsort(self._order)
+            held = self.persistentIndexList()
+            moved = [self.index(int(row_of[before[i.row()]]), i.column()) for i in held]
+            self.changePersistentIndexList(held, moved)
+
+    def _sorted_values(self) -> Any:
+        points = self._review.points
+        if self._sorted_by == _POINT:
+            return np.arange(len(points))
+        if self._sorted_by in (_RESIDUAL, _SCORE):
+            return self._residuals if self._sorted_by == _RESIDUAL else points.score
+        flags = {_USE: points.used, _ROLE: points.is_check, _EDITED: self._review.edited}
+        return np.asarray(flags[self._sorted_by], int)
+
+    def point_at(self, row: int) -> int:
+        """Return which point a row of the table shows."""
+        return int(self._order[row])
+
+    def row_of(self, point: int) -> int:
+        """Return the row that shows a point."""
+        return int(np.flatnonzero(self._order == point)[0])
 
     def rowCount(self, parent: QModelIndex = QModelIndex()) -> int:  # noqa: B008
         return 0 if self._review is None or parent.isValid() else len(self._review.points)
@@ -76,7 +110,7 @@ class PointTable(QAbstractTableModel):
         return flags | Qt.ItemFlag.ItemIsUserCheckable if checkable else flags
 
     def data(self, index: QModelIndex, role: int = 0) -> Any:
-        row, column = index.row(), index.column()
+        row, column = self.point_at(index.row()), index.column()
         if role == Qt.ItemDataRole.CheckStateRole and column == _USE:
             checked, unchecked = Qt.CheckState.Checked, Qt.CheckState.Unchecked
             return checked if self._review.points.used[row] else unchecked
@@ -84,19 +118,17 @@ class PointTable(QAbstractTableModel):
             return str(self._review.points.state[row])
         if role == Qt.ItemDataRole.TextAlignmentRole and column in (_POINT, _RESIDUAL, _SCORE):
             return RIGHT
-        if role not in (Qt.ItemDataRole.DisplayRole, SORT_ROLE):
+        if role != Qt.ItemDataRole.DisplayRole:
             return None
         value = self._value(row, column)
-        if role == SORT_ROLE:
-            return value
         if isinstance(value, float):
             return f"{value:.2f}" if np.isfinite(value) else "–"
-        return "" if column == _USE else value
+        return value
 
     def _value(self, row: int, column: int) -> Any:
         points = self._review.points
         if column == _USE:
-            return int(points.used[row])
+            return ""
         if column == _POINT:
             return row + 1
         if column in (_RESIDUAL, _SCORE):
@@ -109,7 +141,9 @@ class PointTable(QAbstractTableModel):
     def setData(self, index: QModelIndex, value: Any, role: int = 0) -> bool:
         if role != Qt.ItemDataRole.CheckStateRole or index.column() != _USE:
             return False
-        self.switched.emit(index.row(), Qt.CheckState(value) == Qt.CheckState.Checked)
+        self.switched.emit(
+            self.point_at(index.row()), Qt.CheckState(value) == Qt.CheckState.Checked
+        )
         return True
 
 
@@ -122,27 +156,22 @@ class PointView(QTableView):
         The points.
     """
 
-    # The row of the table that was clicked.
-    row_clicked = pyqtSignal(int)
+    # The point that was clicked.
+    point_clicked = pyqtSignal(int)
 
     def __init__(self, table: PointTable) -> None:
         super().__init__()
         self._table = table
-        self._proxy = QSortFilterProxyModel(self)
-        self._proxy.setSourceModel(table)
-        self._proxy.setSortRole(SORT_ROLE)
-        self.setModel(self._proxy)
+        self.setModel(table)
         self.setSortingEnabled(True)
         self.sortByColumn(_RESIDUAL, Qt.SortOrder.DescendingOrder)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.clicked.connect(
-            lambda index: self.row_clicked.emit(self._proxy.mapToSource(index).row())
-        )
+        self.clicked.connect(lambda index: self.point_clicked.emit(table.point_at(index.row())))
         self._fit_sizes()
 
-    def show_row(self, row: int) -> None:
-        """Select a row of the table and scroll to it."""
-        shown = self._proxy.mapFromSource(self._table.index(row, 0))
+    def show_point(self, point: int) -> None:
+        """Select the row of a point and scroll to it."""
+        shown = self._table.index(self._table.row_of(point), 0)
         self.selectRow(shown.row())
         self.scrollTo(shown)
 

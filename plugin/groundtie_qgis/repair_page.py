@@ -79,7 +79,7 @@ class RepairPage(QWidget):
         self.table = PointTable(self)
         self.table.switched.connect(self._switch)
         self.view = PointView(self.table)
-        self.view.row_clicked.connect(self._zoom)
+        self.view.point_clicked.connect(self._zoom)
         self.drag, self.add = QPushButton(tr("Move points")), QPushButton(tr("Add a point"))
         self.drag.setCheckable(True)
         self.add.setCheckable(True)
@@ -208,7 +208,7 @@ class RepairPage(QWidget):
     def _choose(self, row: int) -> None:
         self.points.chosen = row
         self.points.update()
-        self.view.show_row(row)
+        self.view.show_point(row)
 
     def _set_dragging(self, on: bool) -> None:
         self._set_tool(self._drag, on)

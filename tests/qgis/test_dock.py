@@ -203,10 +203,9 @@ def test_repair_moves_switches_and_writes(
     desktop.picture("5_dragged")
 
     # The worst stands first in the sorted table; switched off, it takes no part.
-    proxy = repair.view.model()
-    first = proxy.mapToSource(proxy.index(0, 0)).row()
-    assert first == index
-    assert proxy.setData(proxy.index(0, 0), Qt.CheckState.Unchecked, Qt.ItemDataRole.CheckStateRole)
+    table = repair.table
+    assert table.point_at(0) == index
+    assert table.setData(table.index(0, 0), Qt.CheckState.Unchecked, Qt.ItemDataRole.CheckStateRole)
     assert not repair.review.points.used[index]
     assert repair.fits["affine"].rmse_px < after.rmse_px
 
@@ -222,6 +221,33 @@ def test_repair_moves_switches_and_writes(
     # The input is the reference's negative: where it lies right they are opposite.
     assert np.corrcoef(one.ravel(), other.ravel())[0, 1] < -0.9
     desktop.picture("6_written")
+
+
+def test_the_table_is_sorted_by_its_headings_and_the_choice_goes_with_its_point(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    from qgis.PyQt.QtCore import Qt
+
+    dock = open_registered(tmp_path, desktop, registered_files)
+    repair = dock.repair
+    dock.tabs.setCurrentWidget(repair)
+    points, table = repair.review.points, repair.table
+    residuals = repair.fits[repair.kind()].residuals_px
+    repair._choose(7)
+    keys = {1: np.arange(len(points)), 2: residuals, 3: points.score, 4: points.is_check}
+    for column, values in keys.items():
+        for order in (Qt.SortOrder.AscendingOrder, Qt.SortOrder.DescendingOrder):
+            repair.view.sortByColumn(column, order)
+            shown = [values[table.point_at(row)] for row in range(len(points))]
+            assert shown == sorted(values, reverse=order == Qt.SortOrder.DescendingOrder)
+            (selected,) = repair.view.selectionModel().selectedRows()
+            assert table.point_at(selected.row()) == 7
+            assert table.data(table.index(selected.row(), 1)) == 8
+    # What is switched off has no say, stays in the table, and is the one that was meant.
+    row = table.row_of(3)
+    off = Qt.CheckState.Unchecked
+    table.setData(table.index(row, 0), off, Qt.ItemDataRole.CheckStateRole)
+    assert np.flatnonzero(~repair.review.points.used).tolist() == [3]
 
 
 def test_two_thousand_points_answer_a_drag_within_a_fifth_of_a_second(
