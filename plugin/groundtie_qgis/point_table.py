@@ -49,10 +49,10 @@ class PointTable(QAbstractTableModel):
     def show_review(self, review: Any, residuals: Any) -> None:
         """Show another state of the points."""
         same = self._review is not None and len(review.points) == len(self._review.points)
-        (self.layoutAboutToBeChanged if same else self.modelAboutToBeReset).emit()
+        self.layoutAboutToBeChanged.emit() if same else self.beginResetModel()
         self._review, self._residuals = review, residuals
         self._arrange()
-        (self.layoutChanged if same else self.modelReset).emit()
+        self.layoutChanged.emit() if same else self.endResetModel()
 
     def sort(self, column: int, order: Any = Qt.SortOrder.AscendingOrder) -> None:
         self.layoutAboutToBeChanged.emit()
@@ -141,9 +141,8 @@ class PointTable(QAbstractTableModel):
     def setData(self, index: QModelIndex, value: Any, role: int = 0) -> bool:
         if role != Qt.ItemDataRole.CheckStateRole or index.column() != _USE:
             return False
-        self.switched.emit(
-            self.point_at(index.row()), Qt.CheckState(value) == Qt.CheckState.Checked
-        )
+        on = Qt.CheckState(value) == Qt.CheckState.Checked
+        self.switched.emit(self.point_at(index.row()), on)
         return True
 
 
