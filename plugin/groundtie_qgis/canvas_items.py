@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from qgis.core import (
-    QgsContrastEnhancement,
     QgsMapRendererParallelJob,
     QgsMapSettings,
     QgsPointXY,
     QgsRasterLayer,
-    QgsRasterMinMaxOrigin,
     QgsRectangle,
 )
 from qgis.gui import QgsMapCanvas, QgsMapCanvasItem
-from qgis.PyQt.QtCore import QPointF, QRectF, Qt
-from qgis.PyQt.QtGui import QColor, QImage, QPen
+from qgis.PyQt.QtCore import QLineF, QPointF, QRectF, Qt
+from qgis.PyQt.QtGui import QColor, QImage, QPen, QPolygonF
+
+from .compat import STRETCH, WITHOUT_EXTREMES
 
 # Residuals up to 1 px, up to 2 px and above, as in styles/tie_points.qml.
 _COLOURS = ((1.0, QColor("#1a9850")), (2.0, QColor("#f59b00")), (float("inf"), QColor("#d73027")))
@@ -30,9 +32,7 @@ def clearly(layer: Any) -> Any:
     if not isinstance(layer, QgsRasterLayer) or layer.renderer().type() != "singlebandgray":
         return layer
     copy = layer.clone()
-    copy.setContrastEnhancement(
-        QgsContrastEnhancement.StretchToMinimumMaximum, QgsRasterMinMaxOrigin.CumulativeCut
-    )
+    copy.setContrastEnhancement(STRETCH, WITHOUT_EXTREMES)
     return copy
 
 
@@ -127,14 +127,36 @@ class PointsItem(QgsMapCanvasItem):
         self.setRect(self._canvas.extent())
         self.update()
 
+    def on_screen(self) -> NDArray[np.float64]:
+        """Return the pixels of the screen of nominal and reference places, shape (n, 2, 2).
+
+        QGIS is asked for three places; the map's projection onto the screen is affine.
+        """
+        if not self.rows:
+            return np.zeros((0, 2, 2))
+        map_xy = np.array([[(end.x(), end.y()) for end in row[:2]] for row in self.rows])
+        extent = self._canvas.extent()
+        x, y = extent.xMinimum(), extent.yMinimum()
+        corners = (x, y), (extent.xMaximum(), y), (x, extent.yMaximum())
+        seen = [self.toCanvasCoordinates(QgsPointXY(*corner)) for corner in corners]
+        first, *others = np.array([(one.x(), one.y()) for one in seen])
+        share = (map_xy.reshape(-1, 2, 2) - (x, y)) / (extent.width(), extent.height())
+        return np.asarray(first + share @ (np.array(others) - first))
+
     def paint(self, painter: Any, option: Any = None, widget: Any = None) -> None:
+        """Draw points that are drawn alike at once: they may be thousands."""
         painter.setRenderHint(painter.RenderHint.Antialiasing)
-        for index, (nominal, place, residual, used, check) in enumerate(self.rows):
-            start, end = self.toCanvasCoordinates(nominal), self.toCanvasCoordinates(place)
-            colour = next(c for limit, c in _COLOURS if not residual > limit) if used else _OFF
-            painter.setPen(QPen(colour, 3 if index == self.chosen else 1.5))
-            painter.drawLine(start, end)
-            painter.setBrush(colour if used else Qt.BrushStyle.NoBrush)
-            reach = 6 if index == self.chosen else 4
-            mark = QRectF(end.x() - reach, end.y() - reach, 2 * reach, 2 * reach)
-            painter.drawRect(mark) if check else painter.drawEllipse(mark)
+        alike: dict[tuple[int, bool, bool], list[int]] = {}
+        for index, (_, _, residual, used, check) in enumerate(self.rows):
+            colour = sum(residual > limit for limit, _ in _COLOURS) if used else -1
+            alike.setdefault((colour, check, index == self.chosen), []).append(index)
+        places = self.on_screen()
+        for (colour, check, chosen), indices in alike.items():
+            pen = QPen(_OFF if colour < 0 else _COLOURS[colour][1], 3 if chosen else 1.5)
+            ends = places[indices].reshape(-1, 4).tolist()
+            painter.setPen(pen)
+            painter.drawLines([QLineF(*four) for four in ends])
+            pen.setWidthF((12 if chosen else 8) if colour >= 0 else 5)
+            pen.setCapStyle(Qt.PenCapStyle.SquareCap if check else Qt.PenCapStyle.RoundCap)
+            painter.setPen(pen)
+            painter.drawPoints(QPolygonF([QPointF(*four[2:]) for four in ends]))

@@ -6,12 +6,17 @@ from typing import Any
 
 from qgis.core import (
     Qgis,
+    QgsContrastEnhancement,
+    QgsMapLayerProxyModel,
     QgsProcessing,
     QgsProcessingParameterDefinition,
     QgsProcessingParameterFile,
     QgsProcessingParameterNumber,
+    QgsRasterMinMaxOrigin,
+    QgsUnitTypes,
     QgsWkbTypes,
 )
+from qgis.PyQt.QtCore import Qt
 
 
 def _member(owner: Any, enumeration: str, member: str) -> Any:
@@ -27,3 +32,11 @@ RASTER = _member(QgsProcessing, "SourceType", "TypeRaster")
 ANY_VECTOR = _member(QgsProcessing, "SourceType", "TypeVector")
 LINE = _member(QgsWkbTypes, "GeometryType", "LineGeometry")
 WARNING = _member(Qgis, "MessageLevel", "Warning")
+RASTER_LAYERS = _member(QgsMapLayerProxyModel, "Filter", "RasterLayer")
+METRES = _member(QgsUnitTypes, "DistanceUnit", "DistanceMeters")
+STRETCH = _member(QgsContrastEnhancement, "ContrastEnhancementAlgorithm", "StretchToMinimumMaximum")
+WITHOUT_EXTREMES = _member(QgsRasterMinMaxOrigin, "Limits", "CumulativeCut")
+
+_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+# What a table's model returns: Qt 5 takes a number alone.
+RIGHT = int(getattr(_RIGHT, "value", _RIGHT))

@@ -52,7 +52,7 @@ class LookPage(QWidget):
         self._build()
 
     def _build(self) -> None:
-        self.hint = QLabel(tr("Register two images first."))
+        self.hint = QLabel()
         self.hint.setWordWrap(True)
         self.swipe, self.flicker = QPushButton(tr("Swipe")), QPushButton(tr("Flicker"))
         for button in (self.swipe, self.flicker):
@@ -101,13 +101,11 @@ class LookPage(QWidget):
             button.setEnabled(ready)
         for button in (self.next, self.previous):
             button.setEnabled(bool(self._worst))
-        if ready:
-            self.hint.setText(
-                tr(
-                    "Left of the line: the reference. Swipe: move the mouse over the map. Roads "
-                    "and shores must run on over the line."
-                )
-            )
+        how = tr(
+            "Left of the line: the reference. Swipe: move the mouse over the map. Roads "
+            "and shores must run on over the line."
+        )
+        self.hint.setText(how if ready else tr("Register two images first."))
 
     def stop(self) -> None:
         """Show the map as it is."""
@@ -129,13 +127,20 @@ class LookPage(QWidget):
             self.swipe.setChecked(False)
             self._show_registered()
             self._overlay.show_layers([clearly(self._reference)])
+            self._name_what_is_shown()
             self._timer.start(_FLICKER_MS)
         else:
             self._timer.stop()
             self._overlay.show_layers([])
+            self._enable()
 
     def _flick(self) -> None:
         self._overlay.set_share(0.0 if self._overlay.share else 1.0)
+        self._name_what_is_shown()
+
+    def _name_what_is_shown(self) -> None:
+        reference, registered = tr("Shown is the reference."), tr("Shown is the registered image.")
+        self.hint.setText(reference if self._overlay.share else registered)
 
     def _show_registered(self) -> None:
         from qgis.core import QgsProject

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from qgis.core import QgsPointXY
 from qgis.gui import QgsMapCanvas, QgsMapTool
 from qgis.PyQt.QtCore import Qt
@@ -71,14 +72,13 @@ class DragTool(QgsMapTool):
         self._held = None
 
     def _nearest(self, position: Any) -> tuple[int, int] | None:
-        ends = [
-            ((place.x() - position.x()) ** 2 + (place.y() - position.y()) ** 2, index, end)
-            for index, row in enumerate(self._points.rows)
-            for end in (1, 0)
-            for place in (self._points.toCanvasCoordinates(row[end]),)
-        ]
-        squared, index, end = min(ends, default=(float("inf"), -1, 0), key=lambda one: one[0])
-        return (index, end) if squared <= _REACH_PX**2 else None
+        off = self._points.on_screen() - (position.x(), position.y())
+        # The mark first: a line of no length ends there, too.
+        squared = (off[:, ::-1] ** 2).sum(-1)
+        if not (squared <= _REACH_PX**2).any():
+            return None
+        index, end = np.unravel_index(squared.argmin(), squared.shape)
+        return int(index), 1 - int(end)
 
 
 class ClickTool(QgsMapTool):

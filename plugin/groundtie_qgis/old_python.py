@@ -30,12 +30,13 @@ class OldPython:
 
     def initProcessing(self) -> None:
         """Leave the sentence in the log."""
-        QgsMessageLog.logMessage(self.complaint, "GroundTie", Qgis.Warning)
+        QgsMessageLog.logMessage(self.complaint, "GroundTie", Qgis.MessageLevel.Warning)
 
     def initGui(self) -> None:
         """Show the sentence."""
         self.initProcessing()
-        self._iface.messageBar().pushMessage("GroundTie", self.complaint, Qgis.Warning, 0)
+        warning = Qgis.MessageLevel.Warning
+        self._iface.messageBar().pushMessage("GroundTie", self.complaint, warning, 0)
 
     def unload(self) -> None:
         """Leave nothing behind."""

@@ -8,6 +8,7 @@ import qgis.utils
 from qgis.core import QgsProject, QgsRasterLayer, QgsUnitTypes
 from qgis.PyQt.QtCore import QCoreApplication, QThread
 
+from .compat import METRES
 from .definitions import qgis_name
 from .library import kinds
 from .start_files import has_rpcs
@@ -52,9 +53,7 @@ def proposed_pair(rasters: list[Any], active: Any = None) -> tuple[Any, Any]:
 
 
 def _as_input(layer: Any) -> tuple[bool, float, int]:
-    to_metres = QgsUnitTypes.fromUnitToUnitFactor(
-        layer.crs().mapUnits(), QgsUnitTypes.DistanceMeters
-    )
+    to_metres = QgsUnitTypes.fromUnitToUnitFactor(layer.crs().mapUnits(), METRES)
     pixel = layer.rasterUnitsPerPixelX() * (to_metres or 1.0)
     return has_rpcs(layer), -float(f"{pixel:.2g}"), layer.bandCount()
 

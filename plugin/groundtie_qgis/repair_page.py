@@ -8,15 +8,12 @@ from typing import Any
 
 import numpy as np
 from qgis.core import QgsCoordinateReferenceSystem, QgsPointXY, QgsRasterLayer
-from qgis.PyQt.QtCore import QSortFilterProxyModel, Qt
 from qgis.PyQt.QtWidgets import (
-    QAbstractItemView,
     QCheckBox,
     QComboBox,
     QHBoxLayout,
     QLabel,
     QPushButton,
-    QTableView,
     QVBoxLayout,
     QWidget,
 )
@@ -25,7 +22,7 @@ from .canvas_items import Overlay, PointsItem, clearly
 from .library import errors, library_module
 from .map_tools import ClickTool, DragTool
 from .model_list import BIASES, FIRST_POINTS, model_text
-from .point_table import SORT_ROLE, PointTable
+from .point_table import PointTable, PointView
 from .reference_export import between, layer_of
 from .run import Outcome
 from .sensor_run import SensorImage
@@ -81,16 +78,8 @@ class RepairPage(QWidget):
         self.model.currentIndexChanged.connect(lambda *_: self._show_fit())
         self.table = PointTable(self)
         self.table.switched.connect(self._switch)
-        proxy = QSortFilterProxyModel(self)
-        proxy.setSourceModel(self.table)
-        proxy.setSortRole(SORT_ROLE)
-        self.view = QTableView()
-        self.view.setModel(proxy)
-        self.view.setSortingEnabled(True)
-        self.view.sortByColumn(2, Qt.SortOrder.DescendingOrder)
-        self.view.verticalHeader().hide()
-        self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.view.clicked.connect(lambda index: self._zoom(proxy.mapToSource(index).row()))
+        self.view = PointView(self.table)
+        self.view.point_clicked.connect(self._zoom)
         self.drag, self.add = QPushButton(tr("Move points")), QPushButton(tr("Add a point"))
         self.drag.setCheckable(True)
         self.add.setCheckable(True)
@@ -101,15 +90,13 @@ class RepairPage(QWidget):
         self.write = QPushButton(tr("Write image"))
         self.write.clicked.connect(self.start_writing)
         layout = QVBoxLayout(self)
-        for row in ((self.model,), (self.drag, self.add)):
-            line = QHBoxLayout()
-            for widget in row:
-                line.addWidget(widget)
-            layout.addLayout(line)
-        layout.addWidget(self.match)
-        layout.addWidget(self.view)
-        layout.addWidget(self.text)
-        layout.addWidget(self.write)
+        layout.addWidget(self.model)
+        tools = QHBoxLayout()
+        tools.addWidget(self.drag)
+        tools.addWidget(self.add)
+        layout.addLayout(tools)
+        for widget in (self.match, self.view, self.text, self.write):
+            layout.addWidget(widget)
         self._enable()
 
     def _enable(self) -> None:
@@ -189,7 +176,6 @@ class RepairPage(QWidget):
         nominal = self._on_map(self.review.nominal_xy)
         places = self._on_map(self.review.points.reference_xy)
         used, check = self.review.points.used, self.review.points.is_check
-        self.view.resizeColumnsToContents()
         self.points.show_points(
             [*zip(nominal, places, residuals.tolist(), used.tolist(), check.tolist(), strict=True)]
         )
@@ -222,10 +208,7 @@ class RepairPage(QWidget):
     def _choose(self, row: int) -> None:
         self.points.chosen = row
         self.points.update()
-        proxy = self.view.model()
-        shown = proxy.mapFromSource(self.table.index(row, 0))
-        self.view.selectRow(shown.row())
-        self.view.scrollTo(shown)
+        self.view.show_point(row)
 
     def _set_dragging(self, on: bool) -> None:
         self._set_tool(self._drag, on)

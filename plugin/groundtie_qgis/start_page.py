@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from typing import Any
 
-from qgis.core import QgsMapLayerProxyModel
 from qgis.gui import QgsMapLayerComboBox
-from qgis.PyQt.QtCore import Qt, QTimer, QUrl
+from qgis.PyQt.QtCore import QTimer, QUrl
 from qgis.PyQt.QtGui import QDesktopServices
 from qgis.PyQt.QtWidgets import (
     QCheckBox,
@@ -16,13 +14,13 @@ from qgis.PyQt.QtWidgets import (
     QDoubleSpinBox,
     QFormLayout,
     QHBoxLayout,
-    QLabel,
     QProgressBar,
     QPushButton,
     QVBoxLayout,
     QWidget,
 )
 
+from .compat import RASTER_LAYERS
 from .library import library_module
 from .preselection import proposed_pair, raster_files
 from .reference_export import MAP, with_files
@@ -30,8 +28,9 @@ from .run import Outcome, Run, new_file
 from .sensor_run import SensorImage, SensorRun
 from .start_files import has_rpcs, points_name
 from .translation import mark, tr
-from .unavailable import named_tools
-from .wording import choice_label, in_words
+from .tries import WITH_GROUND, BandRows, Tries, have_bands
+from .verdict_label import VerdictLabel, first_lines
+from .wording import choice_label
 
 # What a pair may be, and the tool for it.
 PAIRS = {
@@ -42,7 +41,6 @@ PAIRS = {
 }
 _FIRST_RADIUS_M = 200.0
 _ANY_ROTATION_DEG = 180.0
-_GREEN, _RED = "#1a7f37", "#b3261e"
 
 
 class StartPage(QWidget):
@@ -63,6 +61,7 @@ class StartPage(QWidget):
         self.sensor: SensorImage | None = None
         self.outcome: Outcome | None = None
         self._layers: tuple[Any, ...] = ()
+        self._masked = False
         self._build()
         self.propose()
 
@@ -88,18 +87,16 @@ class StartPage(QWidget):
         self.register = QPushButton(tr("Register"))
         self.progress = QProgressBar()
         self.progress.hide()
-        self.verdict = QLabel()
-        self.verdict.setWordWrap(True)
-        self.verdict.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.wider = QPushButton(tr("Search farther"))
-        self.turn = QPushButton(tr("Allow any rotation"))
+        self.verdict = VerdictLabel()
+        self.tries, self.bands = Tries(), BandRows()
         self.report = QPushButton(tr("Open report"))
-        for button in (self.wider, self.turn, self.report):
-            button.hide()
+        self.report.hide()
         self._lay_out()
-        self.register.clicked.connect(self.start_or_cancel)
-        self.wider.clicked.connect(self.search_farther)
-        self.turn.clicked.connect(self.allow_rotation)
+        self.register.clicked.connect(lambda *_: self.start_or_cancel())
+        self.tries.wider.clicked.connect(self.search_farther)
+        self.tries.turn.clicked.connect(self.allow_rotation)
+        self.tries.bands.clicked.connect(self.choose_bands)
+        self.tries.ground.clicked.connect(self.match_ground)
         self.report.clicked.connect(self.open_report)
         self.pair.currentIndexChanged.connect(self._show_options)
         # Later: while layers are taken out of the project, some of them are gone already.
@@ -127,12 +124,9 @@ class StartPage(QWidget):
         layout = QVBoxLayout(self)
         layout.addLayout(form)
         layout.addWidget(self.heights)
-        for widget in (self.register, self.progress, self.verdict):
+        layout.addWidget(self.bands)
+        for widget in (self.register, self.progress, self.verdict, self.tries, self.report):
             layout.addWidget(widget)
-        tries = QHBoxLayout()
-        for button in (self.wider, self.turn, self.report):
-            tries.addWidget(button)
-        layout.addLayout(tries)
         layout.addStretch()
 
     def propose(self) -> None:
@@ -162,14 +156,15 @@ class StartPage(QWidget):
         sensor = has_rpcs(self.input.currentLayer())
         self.heights.setVisible(sensor)
         self.pair.setEnabled(not sensor)
+        self.bands.take(self.reference.currentLayer(), self.input.currentLayer())
         asked = sensor or self.pair.currentData() != "register"
         for widget in (self.radius, self.rotated):
             widget.setEnabled(asked)
             widget.setToolTip("" if asked else tr("Choose what the images are to set the search."))
         self.rotated.setEnabled(asked and not sensor)
 
-    def start_or_cancel(self) -> None:
-        """Begin to register, or stop that."""
+    def start_or_cancel(self, masked: bool = False) -> None:
+        """Begin to register, on the ground alone if it is to be masked; or stop that."""
         if self._run is not None:
             self._run.cancel()
             return
@@ -179,6 +174,7 @@ class StartPage(QWidget):
             self._state(False, tr("Choose two raster layers."))
             return
         self._begin()
+        self._masked = masked
         if has_rpcs(input):
             self._start_sensor(input)
             return
@@ -187,6 +183,9 @@ class StartPage(QWidget):
         names = {"OUTPUT": "registered.tif", "TIE_POINTS": points_name(), "REPORT": "report.html"}
         files = {name: new_file(file) for name, file in names.items()}
         tool = self.pair.currentData()
+        values |= self.bands.values()
+        if masked:
+            values["MASK"] = "regions"
         if tool != "register":
             values |= {"SEARCH_RADIUS": self.radius.value()} if self.radius.value() else {}
             values |= {"SEARCH_ROTATION": _ANY_ROTATION_DEG} if self.rotated.isChecked() else {}
@@ -199,8 +198,8 @@ class StartPage(QWidget):
         self.progress.setValue(0)
         self.progress.show()
         self.verdict.setText("")
-        for button in (self.wider, self.turn, self.report):
-            button.hide()
+        self.tries.offer(())
+        self.report.hide()
 
     def _start_sensor(self, image: Any) -> None:
         """Refine the RPCs of an image in the reference, and orthorectify it."""
@@ -234,8 +233,7 @@ class StartPage(QWidget):
         report = outcome.files.get("REPORT")
         self.report.setVisible(report is not None)
         refused = not outcome.succeeded and report is not None
-        self.wider.setVisible(refused)
-        self.turn.setVisible(refused and self.sensor is None and not self.rotated.isChecked())
+        self.tries.offer(self._worth_a_try() if refused else ())
         if outcome.succeeded:
             self._state(True, "\n".join(first_lines(outcome.lines)))
         else:
@@ -243,14 +241,30 @@ class StartPage(QWidget):
         self._finished(outcome, *self._layers)
 
     def _state(self, good: bool, text: str) -> None:
-        heading = tr("✔ Accepted") if good else tr("✘ Not registered")
-        for layer in self._layers:
-            text = text.replace(layer.source(), layer.name())
-        lines = html.escape(in_words(text, None, named_tools())).split("\n")
-        self.verdict.setText(
-            f'<p style="color: {_GREEN if good else _RED}"><b>{heading}</b></p>'
-            f"<p>{'<br>'.join(lines)}</p>"
-        )
+        self.verdict.state(good, text, tuple(layer for layer in self._layers if layer is not None))
+
+    def _worth_a_try(self) -> tuple[QPushButton, ...]:
+        """Return the buttons for what was not tried yet."""
+        tries = self.tries
+        if self.sensor is not None:
+            return (tries.wider,)
+        offered = {
+            tries.wider: True,
+            tries.turn: not self.rotated.isChecked(),
+            tries.bands: have_bands(self._layers) and self.bands.isHidden(),
+            tries.ground: self.pair.currentData() in WITH_GROUND and not self._masked,
+        }
+        return tuple(button for button, is_new in offered.items() if is_new)
+
+    def choose_bands(self) -> None:
+        """Ask which bands are matched."""
+        self.bands.show()
+        self.tries.offer(self._worth_a_try())
+
+    def match_ground(self) -> None:
+        """Try again with the ground of the radar image alone."""
+        self._ask_for_a_search()
+        self.start_or_cancel(masked=True)
 
     def search_farther(self) -> None:
         """Try again with a radius twice as large."""
@@ -276,17 +290,7 @@ class StartPage(QWidget):
             QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
 
 
-def first_lines(lines: tuple[str, ...], most: int = 6) -> list[str]:
-    """Return what a tool stated of its result: what comes after its steps."""
-    starts = [
-        i
-        for i, line in enumerate(lines)
-        if line.startswith(("the input", "correction", "accepted"))
-    ]
-    return list(lines[starts[0] if starts else -most :][:most])
-
-
 def _raster_box() -> QgsMapLayerComboBox:
     box = QgsMapLayerComboBox()
-    box.setFilters(QgsMapLayerProxyModel.RasterLayer)
+    box.setFilters(RASTER_LAYERS)
     return box

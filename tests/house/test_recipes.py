@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
+import sysconfig
+import venv
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -102,3 +107,71 @@ def test_the_image_is_built_from_what_an_sdist_needs() -> None:
     assert set(copied) == needed | {*manifest, "MANIFEST.in"}
     ignore = (ROOT / ".dockerignore").read_text(encoding="utf-8").split()
     assert {line[1:] for line in ignore if line.startswith("!")} == set(copied)
+
+
+@pytest.mark.slow
+def test_what_the_dockerfile_runs_does_run(tmp_path: Path) -> None:
+    """Its instructions one after the other, in folders in place of images.
+
+    apt-get is a stand-in, and the dependencies are those of the Python that runs the tests.
+    """
+    if int(metadata.version("setuptools").split(".")[0]) < 77:
+        pytest.skip("building needs setuptools 77 (PEP 639 licences)")
+    images: dict[str, Path] = {}
+    image, folder, variables = tmp_path, tmp_path, {"PATH": ""}
+    for name, rest in instructions():
+        if name == "FROM":
+            image = images[rest.partition(" AS ")[2]] = tmp_path / f"image{len(images)}"
+            folder, variables = image, {"PATH": f"{bare_python(image)}:/usr/bin:/bin"}
+        elif name == "WORKDIR":
+            folder = image / rest.lstrip("/")
+            folder.mkdir(parents=True, exist_ok=True)
+        elif name == "COPY":
+            copy(rest, images, image, folder)
+        elif name == "ENV":
+            variables |= dict([rest.split("=")])
+        elif name == "RUN":
+            shell = ["bash", "-euo", "pipefail", "-c", within(rest, image)]
+            offline = {"PIP_NO_DEPS": "1", "PIP_NO_INDEX": "1", "PIP_NO_BUILD_ISOLATION": "0"}
+            subprocess.run(shell, cwd=folder, env=variables | offline, check=True)
+    assert not (image / "wheels").exists()
+    command = [image / "venv/bin/groundtie", "--version"]
+    done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, check=True)
+    assert done.stdout.decode() == f"groundtie {__version__}\n"
+
+
+def bare_python(image: Path) -> Path:
+    """Make an image's Python with what its wheels would bring; return its commands."""
+    image.mkdir()
+    venv.create(image / "venv", symlinks=True)
+    (packages,) = image.glob("venv/lib/python*/site-packages")
+    for path in Path(sysconfig.get_path("purelib")).iterdir():
+        # What is installed of this tree would pass for what the Dockerfile installs.
+        if "groundtie" not in path.name and path.suffix != ".pth":
+            (packages / path.name).symlink_to(path)
+    commands = image / "venv/bin"
+    (commands / "apt-get").write_text("#!/bin/sh\n", encoding="utf-8")
+    (commands / "apt-get").chmod(0o755)
+    return commands
+
+
+def within(command: str, image: Path) -> str:
+    """Return a command with its absolute paths in the folder of an image."""
+    return re.sub(r"(?<=\s)/(?=\w)", f"{image}/", command)
+
+
+def copy(rest: str, images: dict[str, Path], image: Path, folder: Path) -> None:
+    """Do what COPY does: several files into a folder, or one folder's content into another."""
+    words = rest.split()
+    here = ROOT
+    if words[0].startswith("--from="):
+        here = images[words.pop(0).partition("=")[2]]
+    *sources, target = words
+    to = (image if target.startswith("/") else folder) / target.lstrip("/")
+    for source in sources:
+        path = here / source.lstrip("/")
+        if path.is_dir():
+            junk = shutil.ignore_patterns("__pycache__", "*.egg-info")
+            shutil.copytree(path, to, ignore=junk, dirs_exist_ok=True)
+        else:
+            shutil.copy(path, to)

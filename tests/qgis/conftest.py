@@ -52,9 +52,10 @@ def load_tools():
 
 
 @pytest.fixture(scope="session")
-def toy_plugin_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def toy_plugin_folder(plugin_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a built plugin whose library has one tool more: that of tests/toys.py."""
-    folder = unpack_plugin(tmp_path_factory.mktemp("toy_plugins"))
+    folder = tmp_path_factory.mktemp("toy_plugins")
+    shutil.copytree(plugin_folder / "groundtie_qgis", folder / "groundtie_qgis")
     library = folder / "groundtie_qgis" / "groundtie"
     toys = (ROOT / "tests" / "toys.py").read_text(encoding="utf-8")
     (library / "toys.py").write_text(toys.replace("from groundtie.", "from ."), encoding="utf-8")

@@ -8,15 +8,19 @@ from __future__ import annotations
 import gc
 import json
 import os
+import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
+import rasterio
+import rasterio.transform
 from desktops import Desktop
-from noise_pairs import ORIGIN, SHIFT, write_pair
+from noise_pairs import ORIGIN, SHIFT, write_pair, write_raster
 from rpc_scenes import SIZE, Scene, make_scene
 
 from groundtie.sensor.bias import Bias
@@ -109,7 +113,7 @@ def test_from_two_layers_to_a_reviewed_image(desktop: Desktop, tmp_path: Path) -
     assert "Accepted" in dock.start.verdict.text()
     assert "<p>correction: 5.0 px (5.0 m)" in dock.start.verdict.text()
     assert dock.start.report.isVisible()
-    assert not dock.start.wider.isVisible()
+    assert not dock.start.tries.wider.isVisible()
     desktop.picture("2_verdict")
     names = [layer.name() for layer in QgsProject.instance().layerTreeRoot().layerOrder()]
     assert names[0] == "Registered image"
@@ -170,7 +174,6 @@ def drag(desktop: Desktop, tool: Any, start: Any, by: tuple[int, int]) -> None:
 def test_repair_moves_switches_and_writes(
     desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
 ) -> None:
-    import rasterio
     from qgis.core import QgsProject
     from qgis.PyQt.QtCore import Qt
 
@@ -182,6 +185,8 @@ def test_repair_moves_switches_and_writes(
     assert "left-out error" in repair.model.currentText()
     assert {"translation", "affine"} <= set(repair.fits)
     desktop.picture("4_repair")
+    # No column is cut off, in a dock as wide as its pages ask for.
+    assert repair.view.horizontalHeader().length() <= repair.view.viewport().width()
 
     # A point that is dragged: its residual and the fit change, its row tells who did it.
     index = int(np.flatnonzero(repair.review.points.used & ~repair.review.points.is_check)[0])
@@ -198,10 +203,9 @@ def test_repair_moves_switches_and_writes(
     desktop.picture("5_dragged")
 
     # The worst stands first in the sorted table; switched off, it takes no part.
-    proxy = repair.view.model()
-    first = proxy.mapToSource(proxy.index(0, 0)).row()
-    assert first == index
-    assert proxy.setData(proxy.index(0, 0), Qt.CheckState.Unchecked, Qt.ItemDataRole.CheckStateRole)
+    table = repair.table
+    assert table.point_at(0) == index
+    assert table.setData(table.index(0, 0), Qt.CheckState.Unchecked, Qt.ItemDataRole.CheckStateRole)
     assert not repair.review.points.used[index]
     assert repair.fits["affine"].rmse_px < after.rmse_px
 
@@ -217,6 +221,63 @@ def test_repair_moves_switches_and_writes(
     # The input is the reference's negative: where it lies right they are opposite.
     assert np.corrcoef(one.ravel(), other.ravel())[0, 1] < -0.9
     desktop.picture("6_written")
+
+
+def test_the_table_is_sorted_by_its_headings_and_the_choice_goes_with_its_point(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    from qgis.PyQt.QtCore import Qt
+
+    dock = open_registered(tmp_path, desktop, registered_files)
+    repair = dock.repair
+    dock.tabs.setCurrentWidget(repair)
+    points, table = repair.review.points, repair.table
+    residuals = repair.fits[repair.kind()].residuals_px
+    repair._choose(7)
+    keys = {1: np.arange(len(points)), 2: residuals, 3: points.score, 4: points.is_check}
+    for column, values in keys.items():
+        for order in (Qt.SortOrder.AscendingOrder, Qt.SortOrder.DescendingOrder):
+            repair.view.sortByColumn(column, order)
+            shown = [values[table.point_at(row)] for row in range(len(points))]
+            assert shown == sorted(values, reverse=order == Qt.SortOrder.DescendingOrder)
+            (selected,) = repair.view.selectionModel().selectedRows()
+            assert table.point_at(selected.row()) == 7
+            assert table.data(table.index(selected.row(), 1)) == 8
+    # What is switched off has no say, stays in the table, and is the one that was meant.
+    row = table.row_of(3)
+    off = Qt.CheckState.Unchecked
+    table.setData(table.index(row, 0), off, Qt.ItemDataRole.CheckStateRole)
+    assert np.flatnonzero(~repair.review.points.used).tolist() == [3]
+
+
+def test_two_thousand_points_answer_a_drag_within_a_fifth_of_a_second(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    """From the mouse's release to all models, the table and the map; in time of the processor."""
+    from qgis.core import QgsApplication
+
+    dock = open_registered(tmp_path, desktop, registered_files)
+    repair = dock.repair
+    dock.tabs.setCurrentWidget(repair)
+    random = np.random.Generator(np.random.PCG64(0))
+    count, few = 2000, repair.review.points
+    many = few.take(random.integers(0, len(few), count))
+    # All at different places, as the registration has them.
+    off = random.uniform(-20, 20, (count, 2))
+    places = {"reference_xy": many.reference_xy + off * [1, -1], "input_px": many.input_px + off}
+    repair.change(replace(repair.review, points=replace(many, **places)))
+    assert repair.table.rowCount() == count
+    repair.drag.click()
+    desktop.refresh()
+    seconds = []
+    for index in range(3):
+        start = repair.points.toCanvasCoordinates(repair.points.rows[index][1])
+        began = time.process_time()
+        drag(desktop, repair._drag, start, (9, 5))
+        QgsApplication.processEvents()
+        seconds.append(time.process_time() - began)
+    assert repair.review.edited.sum() == 3
+    assert min(seconds) < 0.2, seconds
 
 
 def test_a_point_is_added_by_a_click_in_each_image(
@@ -263,19 +324,86 @@ def test_a_refusal_says_why_and_what_to_try(desktop: Desktop, tmp_path: Path) ->
     assert not outcome.succeeded
     assert "input was not registered to reference: " in start.verdict.text()
     assert start.report.isVisible()
-    assert start.wider.isVisible()
-    assert start.turn.isVisible()
+    tries = start.tries
+    offered = (tries.wider, tries.turn, tries.bands, tries.ground)
+    assert [button.text() for button in offered if not button.isVisible()] == []
     assert "refused" in outcome.files["REPORT"].read_text(encoding="utf-8")
     desktop.picture("8_refused")
     assert not dock.look.swipe.isEnabled()
     # A person may begin with points of their own.
     assert len(dock.repair.review.points) == 0
     assert not dock.repair.write.isEnabled()
-    start.wider.click()
+    tries.wider.click()
     assert start.radius.value() == 24
     start.register.click()  # it is Cancel now
     desktop.wait(lambda: start._run is None)
     assert not start.outcome.succeeded
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, dict[str, Any]]]:
+    """Tool and values of every run, each of which is refused with a report."""
+    from groundtie_qgis import start_page
+    from groundtie_qgis.run import Outcome
+
+    runs: list[tuple[str, dict[str, Any]]] = []
+
+    class Refused:
+        def __init__(self, *parts: Any) -> None:
+            tool, values, files, _, self._done, _ = parts
+            runs.append((tool, values))
+            self._files = {"REPORT": files["REPORT"]}
+
+        def start(self) -> None:
+            self._files["REPORT"].write_text("refused", encoding="utf-8")
+            self._done(Outcome(False, "nothing in common was found", files=self._files))
+
+    monkeypatch.setattr(start_page, "Run", Refused)
+    return runs
+
+
+def test_what_a_refusal_offers_is_what_is_asked_for(
+    desktop: Desktop, tmp_path: Path, asked: list[tuple[str, dict[str, Any]]]
+) -> None:
+    random = np.random.Generator(np.random.PCG64(0))
+    right = rasterio.transform.from_origin(*ORIGIN, 1, 1)
+    for name, bands in (("reference", 1), ("input", 3)):
+        write_raster(tmp_path / f"{name}.tif", random.uniform(1, 254, (bands, 64, 64)), right)
+    desktop.load(tmp_path, "reference", "input")
+    start = desktop.open().start
+    tries = start.tries
+    desktop.register()
+    tool, values = asked.pop()
+    assert tool == "register"
+    assert not {"MASK", "SEARCH_RADIUS", "SEARCH_ROTATION", "INPUT_BAND"} & set(values)
+
+    assert tries.bands.isVisible()
+    desktop.picture("12_what_to_try")
+    tries.bands.click()
+    assert start.bands.isVisible()
+    start.bands.boxes["INPUT_BAND"].setBand(3)
+    desktop.picture("13_other_bands")
+    start.register.click()
+    tool, values = asked.pop()
+    assert (tool, values["INPUT_BAND"]) == ("register", 3)
+    assert "REFERENCE_BAND" not in values
+    assert not tries.bands.isVisible()
+
+    tries.ground.click()
+    tool, values = asked.pop()
+    assert (tool, values["MASK"], values["INPUT_BAND"]) == ("coregister", "regions", 3)
+    assert not tries.ground.isVisible()
+    tries.turn.click()
+    tool, values = asked.pop()
+    assert (tool, values["SEARCH_ROTATION"]) == ("coregister", 180)
+    assert "MASK" not in values
+    assert not tries.turn.isVisible()
+    assert tries.ground.isVisible()
+
+    # Another input: its bands are not those that were set.
+    start.input.setLayer(start.reference.currentLayer())
+    desktop.wait(lambda: not start._apart.isActive())
+    assert start.bands.values() == {}
 
 
 def test_wrong_values_are_told_at_once(desktop: Desktop) -> None:
@@ -309,14 +437,68 @@ def test_the_map_as_it_is_drawn_may_be_the_reference(desktop: Desktop, tmp_path:
     assert made.rasterUnitsPerPixelX() == pytest.approx(1, rel=0.01)
     assert made.extent().contains(input.extent())
     # What is drawn there is what lies there.
-    import rasterio
-
     with rasterio.open(made.source()) as drawn, rasterio.open(reference.source()) as ground:
         place = [(ORIGIN[0] + x + 0.5, ORIGIN[1] - y - 0.5) for x, y in ((50, 60), (200, 300))]
         there = np.array([values[0] for values in drawn.sample(place)], float)
         truth = np.array([values[0] for values in ground.sample(place)], float)
     # The stretch is linear: order and sign of differences stay.
     assert np.sign(np.diff(there)) == np.sign(np.diff(truth))
+
+
+ZOOM, TILES = 16, 3
+
+
+def write_tiles(folder: Path, centre: tuple[float, float]) -> tuple[int, int]:
+    """Write a web map's tiles around a place in EPSG:3857: red grows by 1 a column, green a row.
+
+    Returns the column and row of the whole map, in pixels, at which they begin.
+    """
+    side = 2 * np.pi * 6378137 / 2**ZOOM
+    middle = np.array([centre[0], -centre[1]]) / side + 2 ** (ZOOM - 1)
+    first = np.floor(middle).astype(int) - TILES // 2
+    for x in range(first[0], first[0] + TILES):
+        for y in range(first[1], first[1] + TILES):
+            columns, rows = (
+                np.arange(256) + 256 * (n - f) for n, f in zip((x, y), first, strict=True)
+            )
+            bands = np.zeros((3, 256, 256), "uint8")
+            bands[0], bands[1] = (columns % 250)[None], (rows % 250)[:, None]
+            path = folder / str(ZOOM) / str(x) / f"{y}.png"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            profile = {"driver": "PNG", "dtype": "uint8", "count": 3, "width": 256, "height": 256}
+            with rasterio.open(path, "w", **profile) as tile:
+                tile.write(bands)
+    return int(256 * first[0]), int(256 * first[1])
+
+
+@pytest.mark.filterwarnings("ignore:Dataset has no geotransform")
+def test_a_web_map_may_be_the_reference(desktop: Desktop, tmp_path: Path) -> None:
+    """Its tiles are drawn where they lie, over the input's extent with the input's pixel size."""
+    from groundtie_qgis.reference_export import with_files
+    from qgis.core import QgsProject, QgsRasterLayer
+    from rasterio.warp import transform
+
+    _, input = pair(tmp_path, desktop)
+    xy = np.array(
+        [(ORIGIN[0] + x + 0.5, ORIGIN[1] - y - 0.5) for x in (40, 300) for y in (60, 200)]
+    )
+    mercator = np.transpose(transform("EPSG:32633", "EPSG:3857", *xy.T))
+    begins = write_tiles(tmp_path / "tiles", tuple(mercator[0]))
+    source = f"type=xyz&url=file://{tmp_path}/tiles/{{z}}/{{x}}/{{y}}.png&zmin={ZOOM}&zmax={ZOOM}"
+    tiles = QgsRasterLayer(source, "web", "wms")
+    assert tiles.isValid()
+    QgsProject.instance().addMapLayer(tiles)
+    made, values = with_files(tiles, input, desktop.canvas)
+    assert values == {"REFERENCE": made.source(), "INPUT": input.id()}
+    assert made.extent().contains(input.extent())
+    assert made.rasterUnitsPerPixelX() == pytest.approx(1, rel=0.01)
+    pixel = 2 * np.pi * 6378137 / 2**ZOOM / 256
+    truth = mercator * [1, -1] / pixel + 2 ** (ZOOM - 1) * 256 - begins - 0.5
+    with rasterio.open(made.source()) as drawn:
+        seen = np.array([values[:2] for values in drawn.sample(xy)], float)
+    away = (truth % 250 > 5) & (truth % 250 < 245)  # from where the colours begin anew
+    assert away.sum() >= 6
+    np.testing.assert_allclose(seen[away], (truth % 250)[away], atol=1.5)
 
 
 def write_exact_control(scene: Scene, path: Path) -> Path:

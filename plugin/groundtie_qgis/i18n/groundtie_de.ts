@@ -588,6 +588,10 @@
       <translation>Passpunkte</translation>
     </message>
     <message>
+      <source>Ground only</source>
+      <translation>Nur der Boden</translation>
+    </message>
+    <message>
       <source>GroundTie cannot use a Python package: {}</source>
       <translation>GroundTie kann ein Python-Paket nicht benutzen: {}</translation>
     </message>
@@ -964,6 +968,10 @@
       <translation>SAR mit SAR zuordnen</translation>
     </message>
     <message>
+      <source>Match only roads, waters and squares: high buildings are displaced by layover.</source>
+      <translation>Nur Straßen, Gewässer und Plätze vergleichen: Hohe Gebäude verschiebt das Layover.</translation>
+    </message>
+    <message>
       <source>Match optical images</source>
       <translation>Optische Bilder zuordnen</translation>
     </message>
@@ -1150,6 +1158,10 @@
     <message>
       <source>Orthorectify an image by its RPCs and a terrain model.</source>
       <translation>Ein Bild nach seinen RPCs und einem Geländemodell orthorektifizieren.</translation>
+    </message>
+    <message>
+      <source>Other bands…</source>
+      <translation>Andere Kanäle…</translation>
     </message>
     <message>
       <source>Output folder</source>
@@ -1628,8 +1640,16 @@
       <translation>Gezeigt ist die Eingabe, wo ihre eigene Georeferenz sie hat: dort klicken.</translation>
     </message>
     <message>
+      <source>Shown is the reference.</source>
+      <translation>Gezeigt wird das Referenzbild.</translation>
+    </message>
+    <message>
       <source>Shown is the reference: click a place that both images have.</source>
       <translation>Gezeigt ist die Referenz: auf eine Stelle klicken, die beide Bilder haben.</translation>
+    </message>
+    <message>
+      <source>Shown is the registered image.</source>
+      <translation>Gezeigt wird das registrierte Bild.</translation>
     </message>
     <message>
       <source>Side of the window, an odd number; isef smooths as much as the mean of it.</source>
@@ -2198,10 +2218,6 @@
     <message>
       <source>usual</source>
       <translation>üblich</translation>
-    </message>
-    <message>
-      <source>yes</source>
-      <translation>ja</translation>
     </message>
     <message>
       <source>{agree} of {all} check points agree within {limit} px</source>
