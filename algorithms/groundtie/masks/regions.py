@@ -33,8 +33,8 @@ HIGH_PERCENT = 10.0
 
 # So many of the darkest take no part either: the radar shadows of trees, cars and fences, which lie
 # behind what casts them, so that they draw a match away from the ground. Measured with
-# `benchmarks/run.py --only ground`.
-_LOW_PERCENT = 10.0
+# `benchmarks/run.py --only layover`.
+LOW_PERCENT = 10.0
 
 # Larger scenes are reduced to larger pixels.
 _MOST_PIXELS = 24_000_000
@@ -132,6 +132,7 @@ def find_ground(
     high_percent: float = HIGH_PERCENT,
     progress: Progress = SILENT,
     shadow_azimuth_deg: float | None = None,
+    low_percent: float = LOW_PERCENT,
 ) -> GroundRegions:
     """Find the ground in a radar image.
 
@@ -148,6 +149,8 @@ def find_ground(
     shadow_azimuth_deg
         Direction in which cast shadows of the other image fall, clockwise from the top: ground
         that they may reach takes no part. None: there are none.
+    low_percent
+        Percentage of the darkest pixels inside that take no part after all.
 
     Raises
     ------
@@ -169,7 +172,7 @@ def find_ground(
     if shadow_azimuth_deg is not None:
         part = out_of_shadow(part, shadow_azimuth_deg, pixel_m)
     inside = _smooth(patch)[part]
-    shares = [_LOW_PERCENT, 100 - high_percent]
+    shares = [low_percent, 100 - high_percent]
     low, high = np.percentile(inside, shares).tolist() if inside.size else (-np.inf, np.inf)
     return GroundRegions(
         scene,
