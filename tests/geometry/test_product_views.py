@@ -20,8 +20,8 @@ TERRASAR_X = """<level1Product><productInfo><acquisitionInfo><lookDirection>RIGH
 </sceneInfo></productInfo></level1Product>"""
 ICEYE = """<Metadata><look_side>left</look_side><orbit_direction>ASCENDING</orbit_direction>
 <incidence_center>29.5</incidence_center><heading>347.0</heading></Metadata>"""
-MAXAR = """<isd><IMD><IMAGE><SATID>WV03</SATID><MEANSUNAZ>151.3</MEANSUNAZ><MEANSUNEL>62.7</MEANSUNEL>
-<MEANSATAZ>24.1</MEANSATAZ><MEANSATEL>77.0</MEANSATEL></IMAGE></IMD></isd>"""
+MAXAR = """<isd><IMD><IMAGE><SATID>WV03</SATID><MEANSUNAZ>151.3</MEANSUNAZ>
+<MEANSUNEL>62.7</MEANSUNEL><MEANSATAZ>24.1</MEANSATAZ><MEANSATEL>77.0</MEANSATEL></IMAGE></IMD></isd>"""
 IMD = """BEGIN_GROUP = IMAGE_1
 \tsatId = "WV03";
 \tmeanSunAz = 151.3;

@@ -96,9 +96,7 @@ def _terrasar_x(root: ElementTree.Element) -> Stated:
 
 def _iceye(root: ElementTree.Element) -> Stated:
     incidence = _number(root, ".//incidence_center")
-    return RADAR, _from_track(
-        _number(root, ".//heading"), _text(root, ".//look_side"), incidence
-    )
+    return RADAR, _from_track(_number(root, ".//heading"), _text(root, ".//look_side"), incidence)
 
 
 def _maxar(root: ElementTree.Element) -> Stated:

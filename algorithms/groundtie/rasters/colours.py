@@ -16,6 +16,7 @@ FloatImage = NDArray[np.float32]
 # Equally frequent levels of brightness and of colour.
 _BRIGHTNESS, _HUES = 12, 4
 
+# Values are no less than this share of the brightest before their logarithm is taken.
 _DARKEST = 1e-3
 
 
@@ -52,7 +53,7 @@ class Colours:
             Which pixels count, shape (h, w).
         """
         values = bands[:, valid]
-        darkest = float(max(_DARKEST * np.percentile(values, 99), 1e-9))
+        darkest = max(_DARKEST * float(np.percentile(values, 99)), 1e-9)
         hues = _hues(values, darkest)
         component = np.linalg.eigh(np.cov(hues))[1][:, -1].astype(np.float32)
         return cls(
