@@ -31,9 +31,6 @@ from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
 _LEAST_VALID = 0.02
 _LEAST_PIXELS, _MOST_PIXELS = 5_000, 4_000_000
 
-# Fewer bands make no colour.
-_LEAST_BANDS = 3
-
 # The evidence of masked chips separates kinds of models badly, and linear distortion is common.
 _AUTO_KIND = "affine"
 
@@ -76,7 +73,7 @@ class PooledHistogramMatcher:
         """Return the matcher of a masked pair, by colours where the other image has some."""
         plain = cls(pair, pooled_chip_px, held_out)
         other = getattr(pair, plain._searched)
-        if other.band is not None or len(other.source.image_bands) < _LEAST_BANDS:
+        if not other.has_colours:
             return plain
         window = middle_window(other.source.grid)
         bands, valid = other.source.read_bands(window, other.source.image_bands)

@@ -25,6 +25,9 @@ _EMPTY_MARGIN_PX = 5
 # Rotated images are tried at angles this far apart for what they reach.
 _ANGLE_STEP_DEG = 5.0
 
+# Fewer bands make no colour.
+_LEAST_BANDS = 3
+
 # For pairs that are not searched.
 _NOWHERE = SearchLimits(0.0)
 
@@ -59,6 +62,11 @@ class Image:
     mask_note: str = ""
     mask_hides: bool = False
     colours: Colours | None = None
+
+    @property
+    def has_colours(self) -> bool:
+        """Whether its bands make classes of colour: nobody chose one, and there are enough."""
+        return self.band is None and len(self.source.image_bands) >= _LEAST_BANDS
 
     def values_onto(self, grid: Grid, to_px: ToPixel) -> tuple[FloatImage, Mask]:
         """Return grey values, or classes of colour, on a grid, and where they are valid."""
