@@ -1,10 +1,15 @@
-"""How far layover and lean draw the similarity of whole scenes away from the ground."""
+"""How far layover and lean draw the similarity of whole scenes away from the ground.
+
+And of what is taken for the ground alone: by grey levels and by classes of colour, with and without
+its darkest pixels, which are radar shadow. Directions that are inferred from the images, too.
+"""
 
 from __future__ import annotations
 
 import math
 import tempfile
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,13 +17,39 @@ from typing import Any
 import numpy as np
 
 import groundtie
+from groundtie.context import threads
+from groundtie.geometry.models import shift_model
+from groundtie.masks.cast_shadow import shadow_azimuth_deg
+from groundtie.masks.regions import HIGH_PERCENT, LOW_PERCENT, WIDTH_M, find_ground
+from groundtie.masks.scene import Scene
+from groundtie.matching.matcher import Places
+from groundtie.matching.pooled import PooledHistogramMatcher
+from groundtie.rasters.grid import Grid
+from groundtie.rasters.pair import Image, make_pair
+from groundtie.rasters.reading import open_raster
+from groundtie.simulation.optical import OpticalOptions
 
+from .attempt import Pair
 from .city import city
+from .masks import masked_by
 from .simulations import Simulation
 from .suites import Settings, SuiteResult, Table, run_cases
 
 SIMILARITIES = ("nmi", "orientation", "fused")
 RADIUS_PX = 40
+
+# The ground alone: whether by colours, and how many percent of the darkest are left out.
+GROUND = {
+    "ground, grey levels, darkest too": (False, 0.0),
+    "ground, grey levels": (False, LOW_PERCENT),
+    "ground, colours, darkest too": (True, 0.0),
+    "ground, colours": (True, LOW_PERCENT),
+}
+_GROUND_RADIUS_PX, _GROUND_CHIP_PX = 10, 80
+
+# Where the search of the ground starts, right and down of the truth, and how often it is repeated,
+# as its joint histogram gets the better the nearer it is.
+_START_PX, _ROUNDS = (2.0, 2.0), 3
 _CHIP_PX = 901
 _QUICK_SEEDS = 1
 
@@ -51,10 +82,19 @@ class Drawn:
 
 
 @dataclass(frozen=True)
+class Directions:
+    """By how many degrees directions are off that are inferred from images."""
+
+    range_deg: float
+    sun_deg: float
+
+
+@dataclass(frozen=True)
 class Peaks:
     """The peaks of one scene."""
 
     records: tuple[Drawn, ...]
+    directions: Directions
 
     def line(self) -> str:
         """Return the peaks as a line of text."""
@@ -85,7 +125,50 @@ class LayoverCase:
                     workers=workers,
                 ).peak
                 records.append(Drawn(self.seed, similarity, *peak.shift_px, peak.height))
-        return Peaks(tuple(records))
+        ground, directions = of_ground(self.seed, pair)
+        return Peaks((*records, *ground), directions)
+
+
+def of_ground(seed: int, pair: Pair) -> tuple[list[Drawn], Directions]:
+    """Return where the ground of a city without misregistration peaks, and what directions show."""
+    found = []
+    with ExitStack() as stack:
+        context = stack.enter_context(threads(1))
+        images = make_pair(
+            Image(stack.enter_context(open_raster(pair.reference))),
+            Image(stack.enter_context(open_raster(pair.input))),
+        )
+        scene = Scene.of(images.reference.source)
+        camera = Scene.of(images.input.source)
+        azimuths = [shadow_azimuth_deg(one.read(one.whole)) for one in (scene, camera)]
+        for name, (is_coloured, low) in GROUND.items():
+            ground = find_ground(
+                scene, WIDTH_M, HIGH_PERCENT, shadow_azimuth_deg=azimuths[1], low_percent=low
+            )
+            masked = masked_by(images, scene, ground.select, stack)
+            matcher = PooledHistogramMatcher.of(masked, _GROUND_CHIP_PX, nothing_hidden)
+            if not is_coloured:
+                matcher = replace(matcher, colours=None)
+            places, at = Places.tiles(masked.grid, _GROUND_CHIP_PX), np.array(_START_PX)
+            for _ in range(_ROUNDS):
+                # Pixels are of 1 m; rows run south.
+                model = shift_model(at[0], -at[1])
+                surfaces = matcher.match(model, places, _GROUND_RADIUS_PX, context)
+                at = at + surfaces.common_shift_px
+            found.append(Drawn(seed, name, float(at[0]), float(at[1]), 0.0))
+    # Radar shadow falls away from the radar, a cast shadow away from the sun.
+    away = 90.0 if dict(city(seed).further)["orbit"] == "ascending" else 270.0
+    of_sun = OpticalOptions().sun_azimuth_deg + 180
+    return found, Directions(_apart_deg(azimuths[0], away), _apart_deg(azimuths[1], of_sun))
+
+
+def nothing_hidden(grid: Grid) -> np.ndarray:
+    """Return which pixels of a grid are hidden: none."""
+    return np.zeros((grid.height, grid.width), bool)
+
+
+def _apart_deg(one: float, other: float) -> float:
+    return abs((one - other + 180) % 360 - 180)
 
 
 def aligned_city(seed: int) -> Simulation:
@@ -117,11 +200,12 @@ def run(settings: Settings) -> SuiteResult:
     return SuiteResult(
         "Layover in a simulated dense city",
         (),
-        (peaks_table(records),),
+        (peaks_table(records), directions_table([peaks.directions for peaks in found])),
         [{**asdict(record), "error_px": record.error_px} for record in records],
         (
             f"Peaks of windows of {_CHIP_PX}×{_CHIP_PX} px within ± {RADIUS_PX} px, without mask, "
-            "of images whose ground lies as it should.",
+            "of images whose ground lies as it should; of the ground alone by one joint histogram, "
+            f"within ± {_GROUND_RADIUS_PX} px.",
         ),
     )
 
@@ -139,7 +223,7 @@ def peaks_table(records: Sequence[Drawn]) -> Table:
         "seeds",
     )
     rows = []
-    for similarity in SIMILARITIES:
+    for similarity in dict.fromkeys(record.similarity for record in records):
         own = [record for record in records if record.similarity == similarity]
         errors, along, across = (
             np.array([of(record) for record in own])
@@ -150,3 +234,16 @@ def peaks_table(records: Sequence[Drawn]) -> Table:
         size = (*medians, f"{errors.max():.1f}")
         rows.append([similarity, *size, *shares, str(len(errors))])
     return Table("Where whole scenes peak", head, rows)
+
+
+def directions_table(directions: Sequence[Directions]) -> Table:
+    """Return a table of how far inferred directions are off."""
+    head = ("direction inferred from", "median (°)", "largest (°)", "seeds")
+    rows = []
+    for name, of in (
+        ("radar shadow: range", lambda one: one.range_deg),
+        ("cast shadows: sun", lambda one: one.sun_deg),
+    ):
+        off = [of(one) for one in directions]
+        rows.append([name, f"{np.median(off):.0f}", f"{max(off):.0f}", str(len(off))])
+    return Table("Directions", head, rows)

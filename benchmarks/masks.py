@@ -109,7 +109,7 @@ def of_seed(seed: int, cache: Path) -> list[Found]:
         scene = Scene.of(images.reference.source)
         input = images.input_patch(images.reference.source.grid, truth)
         for name, mask in MASKS.items():
-            masked = images if mask is None else _masked(images, scene, mask(scene), stack)
+            masked = images if mask is None else masked_by(images, scene, mask(scene), stack)
             reference = masked.reference_patch(scene.grid)
             for similarity in SIMILARITIES:
                 how = SimilaritySettings(similarity)
@@ -119,7 +119,8 @@ def of_seed(seed: int, cache: Path) -> list[Found]:
     return found
 
 
-def _masked(images: ImagePair, scene: Scene, select: Select, stack: ExitStack) -> ImagePair:
+def masked_by(images: ImagePair, scene: Scene, select: Select, stack: ExitStack) -> ImagePair:
+    """Return a pair whose reference is masked."""
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     write_mask(scene, folder / "mask.tif", select)
     mask = stack.enter_context(open_raster(folder / "mask.tif"))

@@ -74,6 +74,30 @@ def test_heights_may_displace_all_points_evenly_up_to_the_largest() -> None:
     assert accuracy.ce90_px == pytest.approx(3.6, rel=0.05)
 
 
+@pytest.mark.parametrize("angle_deg", [0.0, 30.0, 90.0, 135.0])
+def test_the_ellipse_is_longest_along_what_heights_displace(angle_deg: float) -> None:
+    # Clockwise from the top; rows run down.
+    angle = math.radians(angle_deg)
+    along = np.array([math.sin(angle), -math.cos(angle)])
+    folds = [partial(np.add, (0.01 * k, 0.01 * k**2)) for k in range(5)]
+    check = CheckResiduals(CHECK, np.zeros_like(CHECK), np.ones(len(CHECK)))
+    accuracy = predict_accuracy(folds, PLACES, check, 4.0 * along)
+    # An even distribution to ±4 px has a standard deviation of 4 / √3; 90 % of two normal
+    # variates lie within 2.146 of theirs.
+    assert accuracy.ellipse.major_px == pytest.approx(2.146 * 4 / math.sqrt(3), rel=0.01)
+    assert accuracy.ellipse.minor_px < 0.5
+    off = (accuracy.ellipse.angle_deg - angle_deg + 90) % 180 - 90
+    assert abs(off) < 1
+    assert accuracy.heights_px == pytest.approx(4.0)
+
+
+def test_the_ellipse_of_random_errors_holds_nine_in_ten() -> None:
+    """A shift known to 0.5 / √64 px an axis from all points: 90 % in a circle of 2.146 times it."""
+    axes = [run(seed, "translation", 0.5, 0.0)[0].ellipse for seed in range(RUNS)]
+    mean = np.mean([(one.major_px * one.minor_px) for one in axes]) ** 0.5
+    assert mean == pytest.approx(2.146 * 0.5 / math.sqrt(len(FIT)), rel=0.3)
+
+
 def test_the_interval_holds_the_true_radius_as_often_as_it_says() -> None:
     """For a shift of σ = 0.5 / √64 px an axis, with the interval's 90 %, or a little more."""
     true = 2.146 * 0.5 / math.sqrt(len(FIT))

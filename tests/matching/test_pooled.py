@@ -74,6 +74,35 @@ def checked(pair: ImagePair, model: Model, context: Context) -> Check:
     return check_model(matcher_of(pair), HeldOut.of(pair).layout, model, context)
 
 
+def with_colour(pair: ImagePair, folder: Path) -> ImagePair:
+    """Return a pair whose input shows its texture by colour alone: the mean band is constant."""
+    values = pair.input.source.read(pair.input.source.window)[0]
+    bands = np.stack([values, np.full_like(values, 2000), 4000 - values])
+    path = write_raster(folder / "colour.tif", bands, pair.input.source.grid)
+    return replace(pair, input=replace(pair.input, source=open_raster(path)))
+
+
+@pytest.mark.parametrize("band", [None, 2], ids=["all bands", "a band that shows nothing"])
+def test_colour_is_matched_where_brightness_shows_nothing(
+    tmp_path: Path, context: Context, band: int | None
+) -> None:
+    with masked(tmp_path, shift_on_map(30.0, -20.0), lines(SIZE)) as (plain, truth):
+        pair = with_colour(plain, tmp_path)
+        pair = replace(pair, input=replace(pair.input, band=band))
+        matcher = PooledHistogramMatcher.of(pair, 64, HeldOut.of(pair))
+        found = matcher.match(truth, Places.tiles(pair.grid, 64), 8, context)
+        off_px = np.hypot(*found.common_shift_px)
+        if band is None:
+            assert off_px < 0.3
+        else:
+            assert matcher.colours is None, "whoever asks for a band has it matched"
+
+
+def test_images_of_fewer_bands_are_matched_by_grey_levels(tmp_path: Path) -> None:
+    with masked(tmp_path, shift_on_map(30.0, -20.0), lines(SIZE)) as (pair, _):
+        assert PooledHistogramMatcher.of(pair, 64, HeldOut.of(pair)).colours is None
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("input", [False, True], ids=["reference", "input"])
 def test_lines_alone_are_registered(tmp_path: Path, context: Context, input: bool) -> None:

@@ -189,7 +189,8 @@ def test_summaries_are_json_whatever_happened() -> None:
         assert summary["reason"] == verdict.reason
         assert summary["points"] == verdict.points
         more = {"points", "chance", "ce90_low_px", "ce90_high_px"}
-        assert set(summary) == set(vars(verdict)) - {"ce90_range_px"} | more
+        more |= {"ellipse_major_px", "ellipse_minor_px", "ellipse_angle_deg"}
+        assert set(summary) == set(vars(verdict)) - {"ce90_range_px", "ellipse"} | more
     assert LOST.summary()["check_rmse_px"] is None
     assert NOT_JUDGED.summary()["check_rmse_px"] is None
 

@@ -17,6 +17,7 @@ from scipy.special import gammaincinv
 
 from ..rasters.grid import FloatArray
 from .estimation import jackknife_deviations
+from .judging import CE90_FACTOR
 
 # Points at a side or a corner of each other are neighbours: √2 spacings are the farthest.
 _NEIGHBOUR_SPACINGS = 1.5
@@ -31,6 +32,37 @@ _CONFIDENCE = 0.9
 
 
 @dataclass(frozen=True)
+class Ellipse:
+    """The ellipse that holds 90 % of the errors at a random place, by their covariance.
+
+    Parameters
+    ----------
+    major_px, minor_px
+        Its semi-axes.
+    angle_deg
+        Direction of the longer one, clockwise from the top of the grid, 0 to 180.
+    """
+
+    major_px: float
+    minor_px: float
+    angle_deg: float
+
+    @classmethod
+    def of(cls, covariance_px2: FloatArray) -> Ellipse:
+        """Return the ellipse of a covariance of errors (x, y), shape (2, 2)."""
+        (minor, major), axes = np.linalg.eigh(covariance_px2)
+        x, y = axes[:, 1]
+        return cls(
+            CE90_FACTOR * math.sqrt(max(major, 0.0)),
+            CE90_FACTOR * math.sqrt(max(minor, 0.0)),
+            math.degrees(math.atan2(x, -y)) % 180,
+        )
+
+
+UNKNOWN_ELLIPSE = Ellipse(math.nan, math.nan, math.nan)
+
+
+@dataclass(frozen=True)
 class Accuracy:
     """Radii within which the error of a transform at a random place lies, in pixels.
 
@@ -40,12 +72,18 @@ class Accuracy:
         With probabilities of 50, 90 and 95 %.
     ce90_range_px
         Interval that holds `ce90_px` with 90 %: it is known from few points only.
+    ellipse
+        How the errors lie about the place.
+    heights_px
+        How much of the error heights may make, the same at all places.
     """
 
     ce50_px: float
     ce90_px: float
     ce95_px: float
     ce90_range_px: tuple[float, float]
+    ellipse: Ellipse = UNKNOWN_ELLIPSE
+    heights_px: float = math.nan
 
 
 UNKNOWN = Accuracy(math.nan, math.nan, math.nan, (math.nan, math.nan))
@@ -143,7 +181,18 @@ def predict_accuracy(
         radii(math.sqrt(freedom / (2 * float(gammaincinv(freedom / 2, share)))), (0.9,))[0]
         for share in ((1 + _CONFIDENCE) / 2, (1 - _CONFIDENCE) / 2)
     )
-    return Accuracy(ce50, ce90, ce95, (min(low, ce90), max(high, ce90)))
+    deviations = _deviations(fold_models, places_px) * _factor(blocks, check)
+    # Heights displace evenly between both limits.
+    covariance = np.einsum("kmx,kmy->xy", deviations, deviations) / len(places_px)
+    covariance += np.outer(displacement_px, displacement_px) / 3
+    return Accuracy(
+        ce50,
+        ce90,
+        ce95,
+        (min(low, ce90), max(high, ce90)),
+        Ellipse.of(covariance),
+        float(np.hypot(*displacement_px)),
+    )
 
 
 def standard_deviation_px(

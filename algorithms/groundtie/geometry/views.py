@@ -1,7 +1,7 @@
 """From where an image was taken: the sensor's azimuth and angle, and the sun's.
 
-Stated in words, or by the STAC item that providers put beside an image (view extension,
-[STAC2021]).
+Stated in words, by the STAC item that providers put beside an image (view extension, [STAC2021]),
+or by a product's own metadata (`product_views`).
 """
 
 from __future__ import annotations
@@ -15,16 +15,18 @@ from typing import Any
 
 from ..errors import ParameterError
 from ..strict_json import read_json
+from .product_views import CAMERA, RADAR, metadata_beside, read_product_view
 
-RADAR, CAMERA = "radar", "camera"
 SENSORS = (RADAR, CAMERA)
 
 _USAGE = (
-    "give STAC items (.json), or words such as "
+    "give STAC items (.json), a product's metadata (.json, .xml, .imd), or words such as "
     f"'{RADAR} azimuth=280 incidence=35; {CAMERA} azimuth=250 incidence=12 sun-azimuth=155 "
     "sun-elevation=48'"
 )
 _WORD = re.compile(r"([a-z-]+)=(-?\d+(?:\.\d+)?)°?")
+
+_SUFFIXES = (".json", ".xml", ".imd")
 
 # What of these a user states, and the range of each.
 _RANGES = {
@@ -61,14 +63,15 @@ class View:
 
     @classmethod
     def of(cls, image: Any, given: str | None) -> View | None:
-        """Return the view of an image as it was asked for, or of the STAC item beside it.
+        """Return the view of an image as it was asked for, or of the metadata beside it.
 
         Parameters
         ----------
         image
             The image, as `open_raster` takes it.
         given
-            The name of a STAC item, or words; None: the item of the image's own name is taken.
+            The name of a STAC item or of a product's metadata, or words; None: what lies beside the
+            image under its own name is taken, a STAC item first.
 
         Raises
         ------
@@ -80,7 +83,10 @@ class View:
         if not isinstance(image, (str, Path)):
             return None
         beside = Path(image).with_suffix(".json")
-        return read_view(beside) if _is_item(beside) else None
+        if _is_item(beside):
+            return read_view(beside)
+        of_product = map(_product_view, metadata_beside(Path(image)))
+        return next((view for view in of_product if view is not None), None)
 
 
 def split_views(words: str | None) -> tuple[str | None, str | None]:
@@ -98,8 +104,15 @@ def split_views(words: str | None) -> tuple[str | None, str | None]:
 
 
 def stated_view(given: str) -> View:
-    """Return the view that the name of a STAC item, or words, state; `ParameterError` if none."""
-    return read_view(Path(given)) if given.lower().endswith(".json") else parse_view(given)
+    """Return the view that the name of a file, or words, state; `ParameterError` if none."""
+    if not given.lower().endswith(_SUFFIXES):
+        return parse_view(given)
+    path = Path(given)
+    try:
+        stated = read_product_view(path)
+    except (OSError, ValueError) as error:
+        raise ParameterError(f"cannot read the view in {path}: {error}") from error
+    return read_view(path) if stated is None else _view(*stated, str(path))
 
 
 def parse_view(text: str) -> View:
@@ -145,6 +158,17 @@ def read_view(path: Path) -> View:
     # The sun does not matter to a radar.
     wanted = given if sensor == CAMERA else {k: given[k] for k in given if "sun" not in k}
     return _view(sensor, {**wanted, "azimuth": wanted["azimuth"] % 360}, str(path))
+
+
+def _product_view(path: Path) -> View | None:
+    """Return the view that a file beside an image states, if it is metadata that state one."""
+    if not path.is_file():
+        return None
+    try:
+        stated = read_product_view(path)
+    except (OSError, ValueError):
+        return None
+    return None if stated is None else _view(*stated, str(path))
 
 
 def _view(sensor: str, values: Mapping[str, float], origin: str) -> View:

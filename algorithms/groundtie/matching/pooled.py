@@ -14,8 +14,9 @@ import numpy as np
 from ..context import Context
 from ..errors import TooFewPointsError
 from ..geometry.models import Model
+from ..rasters.colours import Colours
 from ..rasters.pair import ImagePair
-from ..rasters.patch import Patch
+from ..rasters.patch import Patch, middle_window
 from ..rasters.reading import FloatImage
 from ..similarity.pooled import PooledHistogram, smooth
 from ..similarity.surface import SimilaritySettings, Surface, normalise
@@ -51,18 +52,34 @@ class PooledHistogramMatcher:
         Returns for a piece of a grid which pixels of the reference must not be seen.
     blind
         Whether chips may not see what is held out; the joint histogram never counts it.
+    colours
+        By whose classes the image without mask is counted; None: by grey levels.
     """
 
     pair: ImagePair
     pooled_chip_px: int
     held_out: MaskOf
     blind: bool = True
+    colours: Colours | None = None
 
     # What the coarse shift is searched for by.
     settings = SimilaritySettings("nmi")
 
     # The joint histogram gets the better the nearer chips lie: they are always matched again.
     rematches = 2
+
+    @classmethod
+    def of(cls, pair: ImagePair, pooled_chip_px: int, held_out: MaskOf) -> PooledHistogramMatcher:
+        """Return the matcher of a masked pair, by colours where the other image has some."""
+        plain = cls(pair, pooled_chip_px, held_out)
+        other = getattr(pair, plain._searched)
+        if not other.has_colours:
+            return plain
+        window = middle_window(other.source.grid)
+        bands, valid = other.source.read_bands(window, other.source.image_bands)
+        if valid.all(axis=0).sum() < _LEAST_PIXELS:
+            return plain
+        return replace(plain, colours=Colours.of(np.abs(bands), valid.all(axis=0)))
 
     def seeing_all(self) -> PooledHistogramMatcher:
         """Return this matcher for check chips, which may see what is held out of the fit."""
@@ -79,7 +96,7 @@ class PooledHistogramMatcher:
         TooFewPointsError
             The mask leaves too few pixels.
         """
-        images = Resampled.of(self.pair, model, places.grid, radius_px, context)
+        images = Resampled.of(self._coloured, model, places.grid, radius_px, context)
         tiles = Places.tiles(places.grid, self.pooled_chip_px)
         histogram = self._histogram(images, tiles, context)
         order = 1 if self._is_reference_masked else -1
@@ -142,7 +159,21 @@ class PooledHistogramMatcher:
         count = sample.shape[1] * every
         if count < _LEAST_PIXELS:
             raise TooFewPointsError(f"the mask leaves only about {count} pixels to match")
-        return PooledHistogram.of(sample[0], sample[1])
+        edges = None if self.colours is None else self.colours.edges
+        return PooledHistogram.of(sample[0], sample[1], search_edges=edges)
+
+    @property
+    def _searched(self) -> str:
+        """Which image has no mask, or none that chips are cut by."""
+        return "input" if self._is_reference_masked else "reference"
+
+    @property
+    def _coloured(self) -> ImagePair:
+        """The pair, with classes of colour where they are counted."""
+        if self.colours is None:
+            return self.pair
+        other = replace(getattr(self.pair, self._searched), colours=self.colours)
+        return replace(self.pair, **{self._searched: other})
 
     @property
     def _is_reference_masked(self) -> bool:

@@ -14,7 +14,6 @@ from .handles import ArrayHandles
 from .pair import Image, ToPixel
 from .reading import FloatImage, Mask, RasterSource
 from .tiling import tiles
-from .warping import sample
 from .windows import Window
 
 
@@ -51,9 +50,7 @@ def held_onto(image: Image, grid: Grid, to_px: ToPixel, context: Context) -> Ima
 
     def resample(tile: Window) -> None:
         piece = grid.window(*tile)
-        values[tile.slices], valid[tile.slices] = sample(
-            image.source, piece, to_px, "cubic", image.band
-        )
+        values[tile.slices], valid[tile.slices] = image.values_onto(piece, to_px)
         if shown is not None:
             shown[tile.slices] = image.shown_on(piece, to_px)
 
@@ -69,7 +66,8 @@ def held_onto(image: Image, grid: Grid, to_px: ToPixel, context: Context) -> Ima
             has_mask_band=False,
             _handles=ArrayHandles(Raster(shown)),
         )
-    return replace(image, source=_held(image.source, grid, values, valid), band=1, mask=mask)
+    source = _held(image.source, grid, values, valid)
+    return replace(image, source=source, band=1, mask=mask, colours=None)
 
 
 def _held(source: RasterSource, grid: Grid, values: FloatImage, valid: Mask) -> RasterSource:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import GeoreferencingError, NoOverlapError, SameFileError
 from ..geometry.limits import SearchLimits
+from .colours import Colours
 from .grid import FloatArray, Grid, reproject
 from .patch import Patch
 from .reading import FloatImage, Mask, RasterSource, Window
@@ -23,6 +24,9 @@ _EMPTY_MARGIN_PX = 5
 
 # Rotated images are tried at angles this far apart for what they reach.
 _ANGLE_STEP_DEG = 5.0
+
+# Fewer bands make no colour.
+_LEAST_BANDS = 3
 
 # For pairs that are not searched.
 _NOWHERE = SearchLimits(0.0)
@@ -48,6 +52,8 @@ class Image:
         What a user should know of the mask.
     mask_hides
         Whether it hides clouds and the like, and states nothing of the ground.
+    colours
+        Whose classes are read in place of grey values; None: grey values are.
     """
 
     source: RasterSource
@@ -55,10 +61,26 @@ class Image:
     mask: RasterSource | None = None
     mask_note: str = ""
     mask_hides: bool = False
+    colours: Colours | None = None
+
+    @property
+    def has_colours(self) -> bool:
+        """Whether its bands make classes of colour: nobody chose one, and there are enough."""
+        return self.band is None and len(self.source.image_bands) >= _LEAST_BANDS
+
+    def values_onto(self, grid: Grid, to_px: ToPixel) -> tuple[FloatImage, Mask]:
+        """Return grey values, or classes of colour, on a grid, and where they are valid."""
+        if self.colours is None:
+            return sample(self.source, grid, to_px, "cubic", self.band)
+        bands = [
+            sample(self.source, grid, to_px, "cubic", band) for band in self.source.image_bands
+        ]
+        valid = np.logical_and.reduce([known for _, known in bands])
+        return self.colours.classes(np.stack([values for values, _ in bands])), valid
 
     def read_onto(self, grid: Grid, to_px: ToPixel, hidden: Mask | None = None) -> Patch:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
-        values, valid = sample(self.source, grid, to_px, "cubic", self.band)
+        values, valid = self.values_onto(grid, to_px)
         if hidden is not None:
             # Before anything is inferred from the values: nothing may be inferred from these.
             values, valid = np.where(hidden, np.float32(0), values), valid & ~hidden

@@ -142,7 +142,7 @@ class Stages:
         held_out = HeldOut.of(images)
 
         def pooled(pair: ImagePair) -> PooledHistogramMatcher:
-            return PooledHistogramMatcher(pair, held_out.layout.chip_px, held_out)
+            return PooledHistogramMatcher.of(pair, held_out.layout.chip_px, held_out)
 
         settings = SimilaritySettings(spec.similarity)
         chips = ChipMatcher(masked.pair, settings, held_out)

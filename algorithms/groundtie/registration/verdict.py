@@ -7,6 +7,7 @@ from collections.abc import Collection
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
+from ..geometry.accuracy import UNKNOWN_ELLIPSE, Ellipse
 from .evidence import AGREEMENT, RegistrationEvidence, SearchEvidence
 from .refinement_evidence import RefinementEvidence
 from .rules import RULES, Rule
@@ -44,6 +45,10 @@ class Verdict:
         As `check_ce90_px`, with 50 and 95 %.
     ce90_range_px
         Interval that holds the radius of 90 %, as it is known from few points only.
+    ellipse
+        The ellipse that holds 90 % of the errors at a random place.
+    heights_px
+        How far heights may displace all points, along its longer axis where that is much.
     """
 
     accepted: bool
@@ -64,6 +69,8 @@ class Verdict:
     ce50_px: float = math.nan
     ce95_px: float = math.nan
     ce90_range_px: tuple[float, float] = (math.nan, math.nan)
+    ellipse: Ellipse = UNKNOWN_ELLIPSE
+    heights_px: float = math.nan
 
     @property
     def points(self) -> int:
@@ -84,7 +91,9 @@ class Verdict:
         low, high = self.ce90_range_px
         return (
             f"accuracy at a random place: CE90 {self.check_ce90_px:.2f} px "
-            f"({self.check_ce90_m:.2f} m), known to {low:.2f}–{high:.2f} px"
+            f"({self.check_ce90_m:.2f} m), known to {low:.2f}–{high:.2f} px; 90 % in an ellipse of "
+            f"{self.ellipse.major_px:.2f} × {self.ellipse.minor_px:.2f} px, longer at "
+            f"{self.ellipse.angle_deg:.0f}°, of which heights {self.heights_px:.2f} px"
         )
 
     def summary(self) -> dict[str, Any]:
@@ -92,7 +101,8 @@ class Verdict:
         low, high = self.ce90_range_px
         values = asdict(self) | {"points": self.points, "chance": self.chance}
         values |= {"ce90_low_px": low, "ce90_high_px": high}
-        del values["ce90_range_px"]
+        values |= {f"ellipse_{name}": value for name, value in asdict(self.ellipse).items()}
+        del values["ce90_range_px"], values["ellipse"]
         unknown = {k for k, v in values.items() if isinstance(v, float) and not math.isfinite(v)}
         return {k: None if k in unknown else v for k, v in values.items()}
 
@@ -193,4 +203,6 @@ def _verdict(
         ce50_px=points.accuracy.ce50_px,
         ce95_px=points.accuracy.ce95_px,
         ce90_range_px=points.accuracy.ce90_range_px,
+        ellipse=points.accuracy.ellipse,
+        heights_px=points.accuracy.heights_px,
     )

@@ -52,7 +52,13 @@ class PooledHistogram:
     information: FloatArray
 
     @classmethod
-    def of(cls, template: FloatArray, search: FloatArray, bins: int = BINS) -> PooledHistogram:
+    def of(
+        cls,
+        template: FloatArray,
+        search: FloatArray,
+        bins: int = BINS,
+        search_edges: FloatArray | None = None,
+    ) -> PooledHistogram:
         """Return the pointwise mutual information by a sample of pairs.
 
         Parameters
@@ -61,12 +67,20 @@ class PooledHistogram:
             Grey values of corresponding pixels, the template's `smooth`, shape (n,).
         bins
             Number of grey levels, equally frequent each.
+        search_edges
+            Inner edges between levels of the second image; None: as many as of the first.
         """
-        sides = template, search
-        edges = [bin_edges(s, np.ones(s.shape, bool), bins, "equal-frequency") for s in sides]
-        own, other = (levels(s, e).astype(np.intp) for e, s in zip(edges, sides, strict=True))
-        counts = np.bincount(own * bins + other, minlength=bins * bins) + _UNSEEN
-        joint = counts.reshape(bins, bins) / counts.sum()
+
+        def equal(values: FloatArray) -> FloatArray:
+            return bin_edges(values, np.ones(values.shape, bool), bins, "equal-frequency")
+
+        edges = equal(template), equal(search) if search_edges is None else search_edges
+        own, other = (
+            levels(s, e).astype(np.intp) for e, s in zip(edges, (template, search), strict=True)
+        )
+        shape = len(edges[0]) + 1, len(edges[1]) + 1
+        counts = np.bincount(own * shape[1] + other, minlength=shape[0] * shape[1]) + _UNSEEN
+        joint = counts.reshape(shape) / counts.sum()
         independent = joint.sum(axis=1, keepdims=True) * joint.sum(axis=0, keepdims=True)
         return cls(edges[0], edges[1], np.log(joint / independent).astype(np.float32))
 

@@ -156,7 +156,8 @@ SURFACE_MODEL = MaskIn(
 )
 SurfaceModel = Annotated[Path | None, SURFACE_MODEL]
 _VIEWS = (
-    "From where both images were taken, for the surface model: STAC items (.json), or words, that "
+    "From where both images were taken, for the surface model: STAC items or products' metadata "
+    "(.json, .xml, .imd), or words, that "
     "of the reference first, as in 'radar azimuth=280 incidence=35; camera azimuth=250 "
     "incidence=12 sun-azimuth=155 sun-elevation=48'. Azimuths from the ground to the sensor or "
     "sun, clockwise from north, incidence from the vertical. By default the STAC items of the "

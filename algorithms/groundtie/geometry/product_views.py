@@ -1,0 +1,180 @@
+"""Views that products state in metadata of their own, which lie beside the image.
+
+Sentinel-1 (annotation), TerraSAR-X and ICEYE (XML), Capella (extended JSON), Umbra (metadata JSON),
+and the XML and IMD files of Maxar. Azimuths are those of the sensor, or of the sun, seen from the
+ground.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ..strict_json import read_json
+
+RADAR, CAMERA = "radar", "camera"
+
+# Of each sensor, what is known of it by name.
+Stated = tuple[str, Mapping[str, float]]
+
+_IMD = re.compile(r"\b(mean(?:Sat|Sun)(?:Az|El))\s*=\s*(-?\d[\d.eE+-]*)", re.IGNORECASE)
+
+# A larger file is none of metadata.
+_LARGEST_BYTES = 100_000_000
+
+# Of the Earth's ellipsoid of WGS 84.
+_FLATTENING = 1 / 298.257223563
+
+
+def metadata_beside(image: Path) -> Iterator[Path]:
+    """Yield the files beside an image that a product's metadata may be, by the products' names."""
+    folder, stem = image.parent, image.stem
+    yield folder / f"{stem}_extended.json"  # Capella
+    yield folder / f"{re.sub('_(GEC|SICD|MM)$', '', stem)}_METADATA.json"  # Umbra
+    yield from (image.with_suffix(suffix) for suffix in (".xml", ".XML", ".IMD"))
+    yield folder.parent / "annotation" / f"{stem}.xml"  # Sentinel-1
+    if folder.name == "IMAGEDATA":  # TerraSAR-X
+        yield folder.parent / f"{folder.parent.name}.xml"
+
+
+def read_product_view(path: Path) -> Stated | None:
+    """Return the sensor and the angles that a product's metadata state, by name; None: none.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    ValueError
+        It is damaged, or lacks what such metadata state.
+    """
+    if path.stat().st_size > _LARGEST_BYTES:
+        raise ValueError("it is too large")
+    try:
+        if path.suffix.lower() == ".json":
+            return _of_json(read_json(path))
+        if path.suffix.lower() == ".imd":
+            return _of_imd(path.read_text(encoding="utf-8-sig"))
+        return _of_xml(ElementTree.parse(path).getroot())
+    except ElementTree.ParseError as error:
+        raise ValueError(str(error)) from error
+    except (KeyError, IndexError, TypeError, AttributeError) as error:
+        raise ValueError(f"it lacks {error}") from error
+
+
+def _of_json(found: Any) -> Stated | None:
+    if not isinstance(found, dict):
+        return None
+    if isinstance(found.get("collects"), list):
+        return _umbra(found["collects"][0])
+    if isinstance(found.get("collect"), dict):
+        return _capella(found["collect"])
+    return None
+
+
+def _of_xml(root: ElementTree.Element) -> Stated | None:
+    for tag, reader in _XML.items():
+        if root.find(tag) is not None:
+            return reader(root)
+    return None
+
+
+def _sentinel_1(root: ElementTree.Element) -> Stated:
+    heading = _number(root, ".//platformHeading")
+    return RADAR, _from_track(heading, "right", _number(root, ".//incidenceAngleMidSwath"))
+
+
+def _terrasar_x(root: ElementTree.Element) -> Stated:
+    side = _text(root, ".//acquisitionInfo/lookDirection")
+    incidence = _number(root, ".//sceneCenterCoord/incidenceAngle")
+    return RADAR, _from_track(_number(root, ".//headingAngle"), side, incidence)
+
+
+def _iceye(root: ElementTree.Element) -> Stated:
+    incidence = _number(root, ".//incidence_center")
+    return RADAR, _from_track(_number(root, ".//heading"), _text(root, ".//look_side"), incidence)
+
+
+def _maxar(root: ElementTree.Element) -> Stated:
+    return _of_means({tag: _number(root, f".//IMAGE/{tag}") for tag in _MEANS})
+
+
+def _of_imd(text: str) -> Stated:
+    return _of_means({key.upper(): float(value) for key, value in _IMD.findall(text)})
+
+
+def _umbra(collect: Mapping[str, Any]) -> Stated:
+    """Return the view of a collect, whose azimuth is that of the satellite from the ground."""
+    return RADAR, {
+        "azimuth": float(collect["angleAzimuthDegrees"]) % 360,
+        "incidence": float(collect["angleIncidenceDegrees"]),
+    }
+
+
+def _capella(collect: Mapping[str, Any]) -> Stated:
+    """Return the view of a collect: from its centre to the middle of the satellite's states."""
+    centre = collect["image"]["center_pixel"]
+    states = collect["state"]["state_vectors"]
+    azimuth = _azimuth_deg(centre["target_position"], states[len(states) // 2]["position"])
+    return RADAR, {"azimuth": azimuth, "incidence": float(centre["incidence_angle"])}
+
+
+def _azimuth_deg(ground: Any, sensor: Any) -> float:
+    """Return the azimuth of one geocentric position, seen from another one on the ground."""
+    x, y, z = (float(value) for value in ground)
+    east = np.array([-y, x, 0.0]) / np.hypot(x, y)
+    # On the ground the normal of the ellipsoid has this latitude.
+    latitude = np.arctan2(z, (1 - _FLATTENING) ** 2 * np.hypot(x, y))
+    longitude = np.arctan2(y, x)
+    north = np.array(
+        [
+            -np.sin(latitude) * np.cos(longitude),
+            -np.sin(latitude) * np.sin(longitude),
+            np.cos(latitude),
+        ]
+    )
+    away = np.asarray(sensor, float) - np.asarray(ground, float)
+    return float(np.degrees(np.arctan2(away @ east, away @ north)) % 360)
+
+
+def _from_track(heading_deg: float, side: str, incidence_deg: float) -> dict[str, float]:
+    """Return the view of a radar that looks to one side of its track, at right angles."""
+    if side.lower() not in ("left", "right"):
+        raise ValueError(f"a radar does not look to the {side!r}")
+    look = heading_deg + (90.0 if side.lower() == "right" else -90.0)
+    return {"azimuth": (look + 180.0) % 360, "incidence": incidence_deg}
+
+
+def _of_means(means: Mapping[str, float]) -> Stated:
+    return CAMERA, {
+        "azimuth": means["MEANSATAZ"] % 360,
+        "incidence": 90.0 - means["MEANSATEL"],
+        "sun-azimuth": means["MEANSUNAZ"] % 360,
+        "sun-elevation": means["MEANSUNEL"],
+    }
+
+
+def _text(root: ElementTree.Element, path: str) -> str:
+    found = root.findtext(path)
+    if found is None:
+        raise KeyError(path.rpartition("/")[2])
+    return found.strip()
+
+
+def _number(root: ElementTree.Element, path: str) -> float:
+    return float(_text(root, path))
+
+
+_MEANS = ("MEANSATAZ", "MEANSATEL", "MEANSUNAZ", "MEANSUNEL")
+
+# By an element that only such metadata have.
+_XML: Mapping[str, Callable[[ElementTree.Element], Stated]] = {
+    ".//platformHeading": _sentinel_1,
+    ".//productInfo/sceneInfo/headingAngle": _terrasar_x,
+    ".//incidence_center": _iceye,
+    ".//IMD/IMAGE/MEANSATAZ": _maxar,
+}

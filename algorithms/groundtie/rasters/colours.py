@@ -1,0 +1,87 @@
+"""Classes of colour: what several bands show of the ground beyond how bright it is.
+
+A joint histogram of classes needs no order among them. Grass, water and asphalt differ in colour
+where they are as bright as each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatImage = NDArray[np.float32]
+
+# Equally frequent levels of brightness and of colour.
+_BRIGHTNESS, _HUES = 12, 4
+
+# Values are no less than this share of the brightest before their logarithm is taken.
+_DARKEST = 1e-3
+
+
+@dataclass(frozen=True)
+class Colours:
+    """Levels of brightness, and of the component of colour that varies most.
+
+    Parameters
+    ----------
+    brightness_edges
+        Inner edges between levels of the mean of all bands, shape (levels - 1,).
+    component
+        Weights of the bands' logarithms, shape (bands,).
+    hue_edges
+        Inner edges between levels of that component, shape (hues - 1,).
+    darkest
+        Values are no less than this before their logarithm is taken.
+    """
+
+    brightness_edges: FloatImage
+    component: FloatImage
+    hue_edges: FloatImage
+    darkest: float
+
+    @classmethod
+    def of(cls, bands: FloatImage, valid: NDArray[np.bool_]) -> Colours:
+        """Return the classes of an image.
+
+        Parameters
+        ----------
+        bands
+            Shape (bands, h, w), two or more.
+        valid
+            Which pixels count, shape (h, w).
+        """
+        values = bands[:, valid]
+        darkest = max(_DARKEST * float(np.percentile(values, 99)), 1e-9)
+        hues = _hues(values, darkest)
+        component = np.linalg.eigh(np.cov(hues))[1][:, -1].astype(np.float32)
+        return cls(
+            _edges(values.mean(axis=0), _BRIGHTNESS),
+            component,
+            _edges(component @ hues, _HUES),
+            darkest,
+        )
+
+    def classes(self, bands: FloatImage) -> FloatImage:
+        """Return the numbers of the classes, from 1, of bands (bands, h, w); shape (h, w)."""
+        hue = np.tensordot(self.component, _hues(bands, self.darkest), 1)
+        level = np.searchsorted(self.brightness_edges, bands.mean(axis=0), side="right")
+        numbers = level * _HUES + np.searchsorted(self.hue_edges, hue, side="right")
+        return np.asarray(numbers + 1, np.float32)
+
+    @property
+    def edges(self) -> FloatImage:
+        """Inner edges between the numbers of classes, shape (classes - 1,)."""
+        return np.arange(1.5, _BRIGHTNESS * _HUES, dtype=np.float32)
+
+
+def _hues(bands: FloatImage, darkest: float) -> FloatImage:
+    """Return the logarithms of bands without that of their geometric mean."""
+    logarithms = np.log(np.maximum(bands, np.float32(darkest)))
+    return np.asarray(logarithms - logarithms.mean(axis=0), np.float32)
+
+
+def _edges(values: FloatImage, levels: int) -> FloatImage:
+    shares = np.linspace(0, 100, levels + 1)[1:-1]
+    return np.percentile(values, shares).astype(np.float32)
