@@ -53,7 +53,7 @@ def test_dense_towns_get_regions_which_must_be_reliable(
     assert kind == "regions" and "dense town" in reason
     part = np.zeros(bright.shape, bool)
     part[: round(share * 400)] = True
-    ground = GroundRegions(scene, 1, part, part, part, skeleton_m, np.inf, part.size)
+    ground = GroundRegions(scene, 1, part, part, part, skeleton_m, -np.inf, np.inf, part.size)
     assert is_reliable(ground) is expected
 
 
