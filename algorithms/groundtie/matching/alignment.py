@@ -241,21 +241,7 @@ def _spline_coefficients(values: FloatArray) -> FloatArray:
 
 def _cubic(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the cubic B-spline's four weights and their derivatives at offsets `t`, (n, 4)."""
-    left = 1 - t
-    square, left_square = t * t, left * left
-    weights = [
-        left_square * left / 6,
-        (square * (3 * t - 6) + 4) / 6,
-        (left_square * (3 * left - 6) + 4) / 6,
-        square * t / 6,
-    ]
-    slopes = [
-        -left_square / 2,
-        t * (1.5 * t - 2),
-        left * (2 - 1.5 * left),
-        square / 2,
-    ]
-    return np.stack(weights, axis=1), np.stack(slopes, axis=1)
+    return bspline_weights(4, t).T, bspline_slopes(4, t).T
 
 
 def _maximise(family: Family, field: _Field, start: FloatArray) -> FloatArray:

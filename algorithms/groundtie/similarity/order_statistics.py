@@ -42,7 +42,7 @@ def _middle(values: NDArray[Any]) -> tuple[NDArray[Any], int]:
         sample = np.sort(values[:: len(values) // _SAMPLE])
         apart = 2 * math.isqrt(len(sample))
         low, high = sample[len(sample) // 2 - apart], sample[len(sample) // 2 + apart]
-        place = middle - np.count_nonzero(values < low)
+        place = middle - int(np.count_nonzero(values < low))
         near = values[(values >= low) & (values <= high)]
         if 0 < place < len(near):
             return np.partition(near, place), place
