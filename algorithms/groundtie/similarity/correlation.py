@@ -35,12 +35,8 @@ def correlate(template: NDArray[Any], search: NDArray[Any]) -> NDArray[np.float3
     """
     shape, (rows, cols) = fast_shape(search), spans(template, search)
     if np.iscomplexobj(template):
-        own, other = (scipy.fft.fft2(images, shape) for images in (template, search))
-        # New memory takes longer than to multiply.
-        product = np.multiply(np.conjugate(own, out=own), other, out=other)
-        # Rows that are not asked for are not transformed.
-        lines = scipy.fft.ifft(product, axis=-2, overwrite_x=True)[..., :rows, :]
-        found = scipy.fft.ifft(lines)[..., :cols].real
+        product = scipy.fft.fft2(template, shape).conj() * scipy.fft.fft2(search, shape)
+        found = scipy.fft.ifft2(product, overwrite_x=True)[..., :rows, :cols].real
     else:
         product = spectrum(template, shape).conj() * spectrum(search, shape)
         found = from_spectrum(product, shape, (rows, cols))
