@@ -75,7 +75,7 @@ def test_a_registration_is_lines_for_people_and_json_for_programs(
     assert f"RMSE {verdict.check_rmse_px:.2f} px" in lines[3]
     low, high = verdict.ce90_range_px
     assert f"CE90 {verdict.check_ce90_px:.2f} px" in lines[4]
-    assert lines[4].endswith(f"known to {low:.2f}–{high:.2f} px")
+    assert f"known to {low:.2f}–{high:.2f} px; 90 % in an ellipse of " in lines[4]
     assert f"{verdict.check_points_agreeing} of {verdict.check_points}" in lines[5]
     assert lines[-1] == "output: out.tif"
     # 10 m pixels, in both units.

@@ -113,6 +113,7 @@ def survey_model(
     without: MaskOf | None = None,
     places: Places | None = None,
     elsewhere_px: float = ELSEWHERE_PX,
+    seeks_ghost: bool = True,
 ) -> Survey:
     """Match chips all over a pair around what a model on the map predicts.
 
@@ -130,16 +131,18 @@ def survey_model(
         The chips, on a regular layout; None: side by side on the matching grid.
     elsewhere_px
         See `Survey`.
+    seeks_ghost
+        Whether a ghost is looked for, which takes as long again; never where pixels are left out.
     """
     places = places or survey_places(matcher.pair.grid)
     asked = model, places, SURVEY_RADIUS_PX, context
+    least = None if without is None else LEAST_VALID_MASKED
+    seen = replace(matcher, held_out=without, least_valid=least)
     own = None
-    if without is None:
-        whole = replace(matcher, held_out=None, least_valid=None)
-        kept, surfaces, own = whole.match_forward_and_own(*asked)
+    if seeks_ghost and without is None:
+        kept, surfaces, own = seen.match_forward_and_own(*asked)
     else:
-        rest = replace(matcher, held_out=without, least_valid=LEAST_VALID_MASKED)
-        kept, surfaces = rest.match_forward(*asked)
+        kept, surfaces = seen.match_forward(*asked)
     surfaces = _of_overlaps(surfaces)
     shifts = np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
     survey = Survey(places.grid, kept, shifts, surfaces, elsewhere_px)

@@ -176,7 +176,9 @@ class Stages:
         pair, transform = self.masked.pair, estimate.transform
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
         places = survey_places(pair.grid)
-        survey = survey_model(chips, transform.model, context.part(0.0, 0.5))
+        # No rule asks for ghosts where a mask leaves nothing but ground.
+        ghosts, first = not self.masked.used.is_ground, context.part(0.0, 0.5)
+        survey = survey_model(chips, transform.model, first, seeks_ghost=ghosts)
         return survey, survey_rest(chips, transform, places, ELSEWHERE_PX, context.part(0.5, 1.0))
 
     def evidence(

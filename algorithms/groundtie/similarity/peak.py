@@ -53,13 +53,16 @@ def find_peak(surface: Surface) -> Peak:
     if at_border or height <= 0:
         return Peak(whole, height, wide, True)
     patch = surface[row - 1 : row + 2, col - 1 : col + 2].ravel().astype(float)
-    _, bx, by, axx, axy, ayy = _PARABOLOID @ patch
-    hessian = np.array([[2 * axx, axy], [axy, 2 * ayy]])
-    if np.linalg.det(hessian) <= 0 or axx >= 0:
+    _, bx, by, axx, axy, ayy = (_PARABOLOID @ patch).tolist()
+    xx, yy = 2 * axx, 2 * ayy
+    determinant = xx * yy - axy * axy
+    if determinant <= 0 or axx >= 0:
         return Peak(whole, height, wide, False)
-    dx, dy = np.clip(-np.linalg.solve(hessian, [bx, by]), -1, 1)
-    shift = (whole[0] + float(dx), whole[1] + float(dy))
-    return Peak(shift, height, np.linalg.inv(-hessian) / height, False)
+    # The inverse of the Hessian, by hand: for a single one, numpy takes many times as long.
+    dx = min(max((axy * by - yy * bx) / determinant, -1.0), 1.0)
+    dy = min(max((axy * bx - xx * by) / determinant, -1.0), 1.0)
+    covariance = np.array([[-yy, axy], [axy, -xx]]) / (determinant * height)
+    return Peak((whole[0] + dx, whole[1] + dy), height, covariance, False)
 
 
 def find_peak_near(surface: Surface, expected_px: ArrayLike, within_px: int) -> Peak:
