@@ -19,7 +19,12 @@ from groundtie.errors import GroundTieError
 from groundtie.matching.parts import LEAST_EXCESS
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
-from groundtie.registration.rules.survey import GHOST_HEIGHT, RIVAL_HEIGHT, WEAK_HEIGHT
+from groundtie.registration.rules.survey import (
+    GHOST_HEIGHT,
+    RIVAL_HEIGHT,
+    WEAK_HEIGHT,
+    WEAK_REST_HEIGHT,
+)
 from groundtie.registration.specification import COREGISTER
 
 from .accuracy import SILENTLY_WRONG_PX
@@ -62,11 +67,17 @@ def _rival(evidence: RegistrationEvidence) -> float:
     return math.nan if survey is None else survey.rival_height / max(survey.height, 0.1)
 
 
+def _rest_height(evidence: RegistrationEvidence) -> float:
+    rest = evidence.rest
+    return math.nan if rest is None or rest.is_explained else rest.survey.height
+
+
 STATISTICS = (
     Statistic("part elsewhere: excess", LEAST_EXCESS, _excess),
     Statistic("second place: share of the height", RIVAL_HEIGHT, _rival),
     Statistic("second place: ghost", GHOST_HEIGHT, _of_survey("ghost_height")),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),
+    Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),
 )
 
 

@@ -204,8 +204,8 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(height=2.1, rival=1.0)),
     ),
     "pixel-locked content": (
-        evidence(GOOD, survey=survey(), rest=Rest(survey(height=1.9, rival=1.0))),
-        evidence(GOOD, survey=survey(), rest=Rest(survey(height=2.1, rival=1.0))),
+        evidence(GOOD, survey=survey(), rest=Rest(survey(height=2.4, rival=1.0))),
+        evidence(GOOD, survey=survey(), rest=Rest(survey(height=2.6, rival=1.0))),
     ),
     "narrow control": (
         refinement(control((20, -9), corner=0.2), kind="shift"),

@@ -31,9 +31,9 @@ from .threshold import disc
 WIDTH_M = 11.0
 HIGH_PERCENT = 10.0
 
-# So many of the darkest take no part either: the radar shadows of trees, cars and fences, which lie
-# behind what casts them, so that they draw a match away from the ground. Measured with
-# `benchmarks/run.py --only layover`.
+# In a dense town, so many of the darkest take no part either: the radar shadows of trees, cars and
+# fences, which lie behind what casts them, so that they draw a match away from the ground. Measured
+# with `benchmarks/run.py --only layover`. In the country, the darkest are roads and waters.
 LOW_PERCENT = 10.0
 
 # Larger scenes are reduced to larger pixels.
@@ -132,7 +132,7 @@ def find_ground(
     high_percent: float = HIGH_PERCENT,
     progress: Progress = SILENT,
     shadow_azimuth_deg: float | None = None,
-    low_percent: float = LOW_PERCENT,
+    low_percent: float = 0.0,
 ) -> GroundRegions:
     """Find the ground in a radar image.
 
@@ -174,6 +174,7 @@ def find_ground(
     inside = _smooth(patch)[part]
     shares = [low_percent, 100 - high_percent]
     low, high = np.percentile(inside, shares).tolist() if inside.size else (-np.inf, np.inf)
+    low = low if low_percent > 0 else -np.inf
     return GroundRegions(
         scene,
         factor,

@@ -23,7 +23,7 @@ from ..masks.choice import (
     choose,
     is_reliable,
 )
-from ..masks.regions import HIGH_PERCENT, WIDTH_M, GroundRegions, find_ground
+from ..masks.regions import HIGH_PERCENT, LOW_PERCENT, WIDTH_M, GroundRegions, find_ground
 from ..masks.scene import Scene, Selection
 from ..masks.surface_model import SurfaceGround
 from ..masks.threshold import Threshold
@@ -131,7 +131,8 @@ class _Town:
         other = self._info.other.scene
         middle = other.read(middle_window(other.grid))
         shadow = shadow_azimuth_deg(middle) if middle.valid.any() else None
-        return find_ground(self.scene, WIDTH_M, HIGH_PERCENT, self._context.progress, shadow)
+        low = LOW_PERCENT if self._info.is_dense_town else 0.0
+        return find_ground(self.scene, WIDTH_M, HIGH_PERCENT, self._context.progress, shadow, low)
 
 
 def require_one_mask(kind: str, used: MaskUsed | None) -> None:
