@@ -1,10 +1,18 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from textured_pairs import texture
 
 from groundtie.rasters.patch import Patch
-from groundtie.similarity.sameness import reduced, same_lines, same_windows, without
+from groundtie.similarity.sameness import (
+    Gradients,
+    count_same,
+    lines,
+    reduced,
+    same_windows,
+    without,
+)
 
 
 def patch(values: np.ndarray, hidden: tuple[slice, slice] | None = None) -> Patch:
@@ -14,30 +22,50 @@ def patch(values: np.ndarray, hidden: tuple[slice, slice] | None = None) -> Patc
     return Patch(values.astype(np.float32), valid)
 
 
-def test_lines_and_dots_are_the_same_in_other_colours_and_over_faint_ground() -> None:
-    rng = np.random.default_rng(3)
-    ground = [rng.normal(size=(90, 90)), rng.normal(size=(90, 90))]
-    ground[0][:, :45] *= 0.01
-    for values, colour in zip(ground, (8.0, -8.0), strict=True):
-        values[40] = colour
-        values[10, ::9] = colour
-    ground[0][40, :45] = ground[0][10, :45:9] = 0.08
-    same = same_lines(*map(patch, ground))
-    # Where both kinds of ground are near, the faint line is.
-    assert same[40, :30].all() and same[40, 60:].all()
-    assert same[10, ::9].mean() > 0.7
-    # A tenth of each by definition; a hundredth of both by chance.
-    away = np.ones_like(same)
-    away[[10, 40]] = False
-    assert 0.002 < same[away].mean() < 0.03
+def test_all_gradients_of_an_array_and_its_offset_copy_are_the_same() -> None:
+    one = texture(60, 60)
+    gradients = [Gradients.of(patch(values)) for values in (one, one + 100.0)]
+    same, every = count_same(*gradients, (0.1, 0.1))
+    assert same == every > 1000
+
+
+def test_gradients_of_two_places_are_rarely_the_same() -> None:
+    """Two vectors of like lengths in any directions: within a quarter of the length, a few %."""
+    gradients = [Gradients.of(patch(texture(200, 200, seed))) for seed in (1, 2)]
+    limit = float(np.median(gradients[0].length))
+    same, every = count_same(*gradients, (limit, limit))
+    assert 0 < same < 0.03 * every
+
+
+def test_gradients_beside_invalid_pixels_do_not_count() -> None:
+    one = texture(60, 60)
+    hidden = np.s_[20:30, 20:30]
+    counts = [
+        count_same(Gradients.of(patch(one, where)), Gradients.of(patch(one)), (0.0, 0.0))[1]
+        for where in (None, hidden)
+    ]
+    assert counts[0] - counts[1] == 12 * 12
+
+
+def test_lines_and_dots_are_found_in_any_colour_and_over_faint_ground() -> None:
+    ground = np.random.default_rng(3).normal(size=(90, 90))
+    ground[:, :45] *= 0.01
+    for colour in (8.0, -8.0):
+        values = ground.copy()
+        values[40, 45:] = values[10, 45::9] = colour
+        values[40, :45] = values[10, :45:9] = colour / 100
+        found = lines(patch(values))
+        # Where both kinds of ground are near, the faint line is.
+        assert found[40, :30].all() and found[40, 60:].all()
+        assert found[10, 0:30:9].all() and found[10, 63::9].all()
+        assert found.mean() == pytest.approx(0.1, abs=0.01)
 
 
 def test_invalid_pixels_hold_no_lines() -> None:
     hidden = np.s_[20:30, 20:30]
-    same = same_lines(patch(texture(60, 60), hidden), patch(texture(60, 60)))
-    assert same.any() and not same[hidden].any()
-    everything = np.s_[:, :]
-    assert not same_lines(patch(texture(60, 60), everything), patch(texture(60, 60))).any()
+    found = lines(patch(texture(60, 60), hidden))
+    assert found.any() and not found[hidden].any()
+    assert not lines(patch(texture(60, 60), np.s_[:, :])).any()
 
 
 def test_windows_are_the_same_where_one_thing_is_drawn_into_both() -> None:

@@ -21,8 +21,9 @@ from .matcher import FloatArray
 # Chips agree with each other, or with the model, within this distance.
 SAME_PX = 2.0
 
-# Farther from where the model has them, they lie elsewhere.
-ELSEWHERE_PX = 2 * SAME_PX
+# Farther from where the model has them, they lie elsewhere; still farther they are no part, but as
+# canopies are displaced: of 30 m, in pixels of 1 m.
+ELSEWHERE_PX, _FARTHEST_PX = 2 * SAME_PX, 20.0
 
 # How much higher a part is elsewhere than where the model has it, in standard deviations of noise.
 # Measured by the suite margins: 7.9 at most where a transform is right, 8.1 of poses (suite
@@ -117,7 +118,7 @@ def highest_part(
     radius = surfaces.shape[-1] // 2
     shifts = np.stack(np.meshgrid(*2 * [np.arange(-radius, radius + 1)]), axis=-1).reshape(-1, 2)
     distance = np.hypot(*shifts.T)
-    is_far = distance > ELSEWHERE_PX
+    is_far = (distance > ELSEWHERE_PX) & (distance <= _FARTHEST_PX)
     highest = np.maximum(surfaces[which].max(axis=(1, 2), keepdims=True), _MOST_OF_ONE)
     shown = (surfaces[which] * (_MOST_OF_ONE / highest)).reshape(len(which), (2 * radius + 1) ** 2)
     best: Part | None = None

@@ -53,7 +53,7 @@ def survey_rest(
     """
     pair = matcher.pair
     locked = find_locked_content(pair, transform, survey_places(pair.grid), context.quiet())
-    if locked is None:
+    if locked is None or not locked.sameness.is_evident:
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())

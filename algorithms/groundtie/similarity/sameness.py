@@ -1,4 +1,4 @@
-"""What two arrays have the same: windows that vary alike, and lines.
+"""What two arrays have the same: gradients, lines, and windows that vary alike.
 
 Independent views of one ground are similar, but hardly ever the same: noise, light, physics and
 the phase of the pixels differ. What is drawn into both arrays is the same.
@@ -6,13 +6,16 @@ the phase of the pixels differ. What is drawn into both arrays is the same.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask
+
+# Two gradients are the same if they differ by no more than this share of the larger one.
+_SAME_SHARE = 0.25
 
 # Where one thing is drawn into both, their difference varies less than this share of what both
 # vary, in windows of this side; independent content would have it vary as much as both.
@@ -29,6 +32,52 @@ _THIN_PERCENT = 90.0
 _LEAST_VALID = 0.25
 
 
+@dataclass(frozen=True)
+class Gradients:
+    """Differences along columns and rows, and where they are known, each shape (h, w)."""
+
+    x: FloatImage
+    y: FloatImage
+    valid: Mask
+
+    @classmethod
+    def of(cls, patch: Patch) -> Gradients:
+        """Return the central differences of a patch."""
+        x, y = (
+            np.asarray(cv2.Sobel(patch.values, cv2.CV_32F, *order, ksize=1), np.float32)
+            for order in ((1, 0), (0, 1))
+        )
+        valid = cv2.erode(patch.valid.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        return cls(x, y, np.asarray(valid))
+
+    def part(self, col: int, row: int, shape: tuple[int, ...]) -> Gradients:
+        """Return a part of a shape from a column and row on."""
+        window = np.s_[row : row + shape[0], col : col + shape[1]]
+        return Gradients(self.x[window], self.y[window], self.valid[window])
+
+    @property
+    def length(self) -> FloatImage:
+        """Their lengths."""
+        return np.asarray(np.hypot(self.x, self.y), np.float32)
+
+
+def count_same(one: Gradients, other: Gradients, strong: tuple[float, float]) -> tuple[int, int]:
+    """Return how many gradients are the same, and how many there are, of those that are strong.
+
+    Parameters
+    ----------
+    one, other
+        Of the same shape.
+    strong
+        The length from which a gradient is strong in the one and in the other.
+    """
+    lengths = one.length, other.length
+    is_strong = one.valid & other.valid & ((lengths[0] > strong[0]) | (lengths[1] > strong[1]))
+    apart = np.hypot(one.x - other.x, one.y - other.y)
+    is_same = apart <= _SAME_SHARE * np.maximum(*lengths)
+    return int((is_strong & is_same).sum()), int(is_strong.sum())
+
+
 def same_windows(one: Patch, other: Patch) -> Mask:
     """Return around which pixels two patches vary alike, shape (h, w)."""
     valid = one.valid & other.valid
@@ -37,18 +86,16 @@ def same_windows(one: Patch, other: Patch) -> Mask:
     return valid & (differing <= _DIFFERING_SHARE * both)
 
 
-def same_lines(one: Patch, other: Patch) -> Mask:
-    """Return where two patches have a thin line or dot at the same place, shape (h, w).
+def lines(patch: Patch) -> Mask:
+    """Return where a patch has a thin line or dot, shape (h, w).
 
     Dark or bright, as the same may be drawn in other colours, and as faint as they are among what
     is around them.
     """
-    both = one.valid & other.valid
-    if not both.any():
-        return both
-    thin = [_thinness(patch) for patch in (one, other)]
-    strong = [of >= np.percentile(of[both], _THIN_PERCENT) for of in thin]
-    return np.asarray(both & strong[0] & strong[1])
+    if not patch.valid.any():
+        return patch.valid
+    thin = _thinness(patch)
+    return np.asarray(patch.valid & (thin >= np.percentile(thin[patch.valid], _THIN_PERCENT)))
 
 
 def _thinness(patch: Patch) -> FloatImage:

@@ -106,8 +106,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "pixel-locked content",
         SURVEY,
-        "the transform only moves the array, and without what is the same at the same columns and "
-        "rows, such as labels or clouds, a part lies elsewhere, a second place matches about as "
+        "both images have the same content at the same columns and rows, such as labels or clouds, "
+        "and without it a part lies elsewhere, a second place matches about as "
         f"well, or the mean similarity is below {WEAK_REST_HEIGHT:g} standard deviations",
         "suites margins and attacks",
         WITHOUT,
