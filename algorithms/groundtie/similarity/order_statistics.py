@@ -5,48 +5,25 @@ They have the digits of `numpy.median` and `numpy.quantile`, which take several 
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-# Of so many values and more, a sample of so many shows where the median lies.
-_LARGE, _SAMPLE = 4096, 512
-
 
 def upper_median(values: NDArray[Any]) -> Any:
     """Return medians along the last axis; of an even number the upper of the middle two."""
-    size = values.shape[-1]
-    if size < _LARGE:
-        return np.partition(values, size // 2, axis=-1)[..., size // 2]
-    found = [ordered[k] for ordered, k in map(_middle, values.reshape(-1, size))]
-    return np.array(found, values.dtype).reshape(values.shape[:-1])
+    middle = values.shape[-1] // 2
+    return np.partition(values, middle, axis=-1)[..., middle]
 
 
 def median(values: NDArray[Any]) -> Any:
     """Return the median of values of any shape; of an even number the mean of the middle two."""
-    ordered, middle = _middle(values.ravel())
+    middle = values.size // 2
+    ordered = np.partition(values, middle, axis=None)
     if values.size % 2:
         return ordered[middle]
     return np.mean([ordered[:middle].max(), ordered[middle]], dtype=values.dtype)
-
-
-def _middle(values: NDArray[Any]) -> tuple[NDArray[Any], int]:
-    """Return values, (n,), parted by the upper median, and where it is; of many only the nearest.
-
-    A sample shows between which two values it lies, which leaves few to order [Floyd1975].
-    """
-    middle = len(values) // 2
-    if len(values) >= _LARGE:
-        sample = np.sort(values[:: len(values) // _SAMPLE])
-        apart = 2 * math.isqrt(len(sample))
-        low, high = sample[len(sample) // 2 - apart], sample[len(sample) // 2 + apart]
-        place = middle - int(np.count_nonzero(values < low))
-        near = values[(values >= low) & (values <= high)]
-        if 0 < place < len(near):
-            return np.partition(near, place), place
-    return np.partition(values, middle), middle
 
 
 def quantiles(values: NDArray[Any], shares: NDArray[np.float64]) -> NDArray[np.float64]:
