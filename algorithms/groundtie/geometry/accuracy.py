@@ -164,9 +164,10 @@ def predict_accuracy(
         return UNKNOWN
 
     blocks = _block_variance_px2(fold_models, check)
+    factor, deviations = _factor(blocks, check), _deviations(fold_models, places_px)
     random = np.random.default_rng(0)
-    parts = random.standard_normal((_DRAWS, count)) * _factor(blocks, check)
-    moved = np.einsum("dk,kmx->dmx", parts, _deviations(fold_models, places_px))
+    parts = random.standard_normal((_DRAWS, count)) * factor
+    moved = np.einsum("dk,kmx->dmx", parts, deviations)
     common = random.uniform(-1, 1, (_DRAWS, 1, 1)) * displacement_px
 
     def radii(scale: FloatArray | float, shares: Sequence[float]) -> list[float]:
@@ -181,9 +182,8 @@ def predict_accuracy(
         radii(math.sqrt(freedom / (2 * float(gammaincinv(freedom / 2, share)))), (0.9,))[0]
         for share in ((1 + _CONFIDENCE) / 2, (1 - _CONFIDENCE) / 2)
     )
-    deviations = _deviations(fold_models, places_px) * _factor(blocks, check)
     # Heights displace evenly between both limits.
-    covariance = np.einsum("kmx,kmy->xy", deviations, deviations) / len(places_px)
+    covariance = factor**2 * np.einsum("kmx,kmy->xy", deviations, deviations) / len(places_px)
     covariance += np.outer(displacement_px, displacement_px) / 3
     return Accuracy(
         ce50,
