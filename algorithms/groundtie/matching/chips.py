@@ -75,8 +75,6 @@ class ChipMatcher:
     held_out: MaskOf | None = None
     least_valid: float | None = None
 
-    rematches = 1
-
     def seeing_all(self) -> ChipMatcher:
         """Return this matcher for check chips, which may see what is held out of the fit."""
         return replace(self, held_out=None)

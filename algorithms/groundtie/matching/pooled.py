@@ -65,9 +65,6 @@ class PooledHistogramMatcher:
     # What the coarse shift is searched for by.
     settings = SimilaritySettings("nmi")
 
-    # The joint histogram gets the better the nearer chips lie: they are always matched again.
-    rematches = 2
-
     @classmethod
     def of(cls, pair: ImagePair, pooled_chip_px: int, held_out: MaskOf) -> PooledHistogramMatcher:
         """Return the matcher of a masked pair, by colours where the other image has some."""
@@ -137,7 +134,10 @@ class PooledHistogramMatcher:
         return _AUTO_KIND if kind == "auto" else kind
 
     def is_settled(self, expected_px: FloatArray) -> bool:
-        """Whether matching again is in vain: never."""
+        """Whether matching again is in vain: never.
+
+        The joint histogram gets the better the nearer chips lie.
+        """
         return False
 
     def for_check(self, surfaces: ChipSurfaces, layout: ChipLayout) -> ChipSurfaces:

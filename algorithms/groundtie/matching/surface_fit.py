@@ -44,9 +44,6 @@ class SurfaceMatcher(Protocol):
     @property
     def pair(self) -> ImagePair: ...
 
-    @property
-    def rematches(self) -> int: ...
-
     def match(
         self, model: Model, places: Places, radius_px: int, context: Context
     ) -> ChipSurfaces: ...
@@ -110,9 +107,8 @@ class SurfaceFit:
         """
         pair = self.matcher.pair
         surfaces, aligned, expected = self._align(coarse, kind, context)
-        for _ in range(self.matcher.rematches):
-            if DEGREE.get(aligned.model.kind, 1) > 1 or self.matcher.is_settled(expected):
-                break
+        is_flexible = DEGREE.get(aligned.model.kind, 1) > 1
+        if not is_flexible and not self.matcher.is_settled(expected):
             coarse = on_map(aligned.model, pair.grid)
             if aligned.model.kind == TERRAIN:
                 # Chips that were displaced by heights have lost them: they justify no more.

@@ -170,7 +170,8 @@ def _add_weighted(
 
 def _is_for_remap(image: NDArray[Any], px: NDArray[Any]) -> bool:
     single = image.dtype == np.float32 and px.dtype == np.float32
-    return _REMAP_IS_EXACT and single and image.size > 0 and max(image.shape) < _REMAP_SIDE
+    longest = max(*image.shape, *px.shape)
+    return _REMAP_IS_EXACT and single and image.size > 0 and longest < _REMAP_SIDE
 
 
 def _split(x: NDArray[Any], size: int) -> tuple[NDArray[np.intp], NDArray[Any]]:

@@ -14,7 +14,7 @@ from .colours import Colours
 from .grid import FloatArray, Grid, reproject
 from .patch import Patch
 from .reading import FloatImage, Mask, RasterSource, Window
-from .warping import sample
+from .warping import sample, sample_bands
 
 ToPixel = Callable[[FloatArray], FloatArray]
 
@@ -72,11 +72,8 @@ class Image:
         """Return grey values, or classes of colour, on a grid, and where they are valid."""
         if self.colours is None:
             return sample(self.source, grid, to_px, "cubic", self.band)
-        bands = [
-            sample(self.source, grid, to_px, "cubic", band) for band in self.source.image_bands
-        ]
-        valid = np.logical_and.reduce([known for _, known in bands])
-        return self.colours.classes(np.stack([values for values, _ in bands])), valid
+        bands, valid = sample_bands(self.source, grid, to_px)
+        return self.colours.classes(bands), valid
 
     def read_onto(self, grid: Grid, to_px: ToPixel, hidden: Mask | None = None) -> Patch:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
@@ -101,8 +98,7 @@ class Image:
 
     def bands_onto(self, grid: Grid, to_px: ToPixel) -> FloatImage:
         """Return all bands but alpha on a grid, shape (bands, h, w), 0 where one is invalid."""
-        bands = self.source.image_bands
-        return np.stack([sample(self.source, grid, to_px, "cubic", band)[0] for band in bands])
+        return sample_bands(self.source, grid, to_px)[0]
 
 
 @dataclass(frozen=True)

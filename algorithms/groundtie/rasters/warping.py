@@ -32,6 +32,9 @@ _SPARSE = 61
 _SINGLE_PX = 2000
 _ROUNDING = 1.5 * 2.0**39
 
+# Reads a window, reduced to a shape if one is given: values, ([bands,] h, w), and validity, (h, w).
+_Read = Callable[[Window, tuple[int, int] | None], tuple[FloatImage, Mask]]
+
 # Stands for positions that are not finite: outside of every image.
 NOWHERE = -1e9
 
@@ -114,7 +117,7 @@ def resample(
     image
         Shape (h, w) or (bands, h, w), any dtype; finite everywhere.
     valid
-        Its shape.
+        Its shape, or (h, w) where all bands are valid at the same pixels.
     px
         Columns and rows of the positions, shape (2, m, n).
     method
@@ -127,47 +130,60 @@ def resample(
     values
         Shape (m, n) or (bands, m, n), rounded and clipped for integers; 0 where invalid.
     valid
-        Its shape.
+        Shape (m, n) or (bands, m, n), as `valid` has bands.
     """
     px = np.asarray(px)
     dtype = image.dtype if dtype is None else dtype
     # A few suffice mostly to find that they do not lie on pixels.
     if _on_pixels(px[:, ::_SPARSE, ::_SPARSE]) and _on_pixels(px):
         method = "nearest"  # every kernel gives the pixel itself
-    if method != "nearest" and valid.all() and _touches_no_border(px, image.shape[-2:], method):
-        values = interpolate(image.astype(working_dtype(image.dtype), copy=False), px, method)
-        return _rounded(values, dtype), np.ones(values.shape, bool)
-    if image.ndim > 2:
-        bands = [_resample(*band, px, method, dtype) for band in zip(image, valid, strict=True)]
-        return np.stack([values for values, _ in bands]), np.stack([known for _, known in bands])
-    return _resample(image, valid, px, method, dtype)
+    if valid.ndim == 2:
+        return _resample(image, valid, px, method, dtype)
+    if bool((valid == valid[:1]).all()):
+        values, known = _resample(image, valid[0], px, method, dtype)
+        return values, np.repeat(known[None], len(image), axis=0)
+    bands = [_resample(*band, px, method, dtype) for band in zip(image, valid, strict=True)]
+    return np.stack([values for values, _ in bands]), np.stack([known for _, known in bands])
 
 
 def _resample(
     image: NDArray[Any], valid: Mask, px: NDArray[Any], method: str, dtype: np.dtype[Any]
 ) -> tuple[NDArray[Any], Mask]:
-    """Return `resample` of an image of one band, of which not all that is needed may be valid."""
-    cols, rows = np.rint(px[0]).astype(np.int64), np.rint(px[1]).astype(np.int64)
-    inside = (cols >= 0) & (rows >= 0) & (cols < image.shape[1]) & (rows < image.shape[0])
-    cols[~inside], rows[~inside] = 0, 0
-    known = inside & valid[rows, cols]
+    """Return `resample` of an image, whose bands are valid at the same pixels."""
+    nearest = np.rint(px)
+    known, whole = _validity(valid, nearest, REACH[method])
     if method == "nearest":
-        return _rounded(np.where(known, image[rows, cols], image.dtype.type(0)), dtype), known
-    whole = cv2.erode(
-        valid.astype(np.uint8),
-        np.ones((2 * REACH[method] + 1,) * 2, np.uint8),
-        borderType=cv2.BORDER_CONSTANT,
-        borderValue=0,
-    )
-    partly = known & (whole[rows, cols] == 0)
+        cols, rows = np.where(known, nearest, 0).astype(np.intp)
+        values = np.where(known, image[..., rows, cols], image.dtype.type(0))
+        return _rounded(values, dtype), known
     filled = np.where(valid, image, image.dtype.type(0)).astype(working_dtype(image.dtype))
     values = interpolate(filled, px, method)
+    partly = known & ~whole
     if partly.any():
-        weight = interpolate(valid.astype(filled.real.dtype), px, "bilinear")
-        bilinear = interpolate(filled, px, "bilinear")
-        values[partly] = bilinear[partly] / weight[partly]
-    values[~known] = 0
+        there = px[:, None, partly]
+        weight = interpolate(valid.astype(filled.real.dtype), there, "bilinear")
+        values[..., partly] = (interpolate(filled, there, "bilinear") / weight)[..., 0, :]
+    values[..., ~known] = 0
     return _rounded(values, dtype), known
+
+
+def _validity(valid: Mask, nearest: NDArray[Any], reach: int) -> tuple[Mask, Mask]:
+    """Return which pixels, columns and rows in `nearest`, are valid, and which are all around."""
+    height, width = valid.shape
+    inside = _lies_inside(nearest, width, height, 0)
+    if valid.all():
+        return inside, _lies_inside(nearest, width, height, reach)
+    cols, rows = np.where(inside, nearest, 0).astype(np.intp)
+    side = np.ones((2 * reach + 1,) * 2, np.uint8)
+    whole = cv2.erode(valid.astype(np.uint8), side, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    return inside & valid[rows, cols], inside & (whole[rows, cols] != 0)
+
+
+def _lies_inside(px: NDArray[Any], width: int, height: int, margin: int) -> Mask:
+    low, high = np.array([[margin, margin], [width - 1 - margin, height - 1 - margin]], px.dtype)
+    cols, rows = px
+    inside: Mask = (cols >= low[0]) & (cols <= high[0]) & (rows >= low[1]) & (rows <= high[1])
+    return inside
 
 
 def reduction(grid: Grid, to_input_px: ToInputPx, size: tuple[int, int]) -> tuple[int, int]:
@@ -241,21 +257,51 @@ def sample(
     values, valid
         Shape (height, width) of the grid; float32, 0 where invalid, and bool.
     """
+    return _sample(
+        source, grid, to_input_px, method, lambda part, out: source.read(part, band, out)
+    )
+
+
+def sample_bands(
+    source: RasterSource, grid: Grid, to_input_px: ToInputPx, method: str = "cubic"
+) -> tuple[FloatImage, Mask]:
+    """Resample all bands but alpha as `sample` does one; pixels are valid if they are in all.
+
+    Returns
+    -------
+    values, valid
+        Shape (bands, height, width), float32, and (height, width).
+    """
+
+    def read(part: Window, out_shape: tuple[int, int] | None) -> tuple[FloatImage, Mask]:
+        values, valid = source.read_bands(part, source.image_bands, out_shape)
+        everywhere: Mask = np.asarray(valid.all(axis=0))
+        values = np.abs(values) if source.is_complex else values
+        return np.where(everywhere, values, 0).astype(np.float32), everywhere
+
+    return _sample(source, grid, to_input_px, method, read)
+
+
+def _sample(
+    source: RasterSource, grid: Grid, to_input_px: ToInputPx, method: str, read: _Read
+) -> tuple[FloatImage, Mask]:
+    """Return `sample` of what `read` reads of a window, shape ([bands,] height, width)."""
     if isinstance(to_input_px, DenseMap):
         px = to_input_px.coordinates(grid)
     else:
         nodes = lattice(grid, to_input_px)
         window = _window_of(nodes)
         if window is not None:  # every kernel gives the pixels themselves
-            return source.read(window, band)
+            return read(window, None)
         px = _between_nodes(nodes)
     size = (source.grid.width, source.grid.height)
     factor = (1, 1) if method == "nearest" else reduction(grid, to_input_px, size)
     window = source_window(px, size, method, factor)
     if not window.width or not window.height:
+        nothing = read(window, None)[0]
         shape = (grid.height, grid.width)
-        return np.zeros(shape, np.float32), np.zeros(shape, bool)
-    image, valid = source.read(window, band, reduced_shape(window, factor))
+        return np.zeros((*nothing.shape[:-2], *shape), np.float32), np.zeros(shape, bool)
+    image, valid = read(window, reduced_shape(window, factor))
     return resample(image, valid, inside_window(px, window, factor), method)
 
 
@@ -298,14 +344,6 @@ def inside_window(px: FloatArray, window: Window, factor: tuple[int, int]) -> ND
 
 def _on_pixels(px: NDArray[Any]) -> bool:
     return bool(np.abs(px - np.rint(px)).max(initial=0) < _ON_PIXELS)
-
-
-def _touches_no_border(px: NDArray[Any], shape: tuple[int, ...], method: str) -> bool:
-    reach = REACH[method]
-    return all(
-        axis.min() >= reach and axis.max() <= size - 1 - reach
-        for axis, size in zip(px, shape[::-1], strict=True)
-    )
 
 
 def _rounded(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
