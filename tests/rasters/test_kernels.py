@@ -102,3 +102,16 @@ def test_slopes_of_bsplines_are_differences_of_their_weights(order: int) -> None
     fraction = np.linspace(0.1, 0.9, 9)
     near, far = (bspline_weights(order, fraction + step) for step in (-1e-6, 1e-6))
     np.testing.assert_allclose(bspline_slopes(order, fraction), (far - near) / 2e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("method", KERNELS)
+@pytest.mark.parametrize("corner", [(3.25, 7.75), (-9.5, 31.125), (45.5, -4.25), (90.5, 3.5)])
+def test_positions_side_by_side_have_the_values_that_they_have_alone(
+    method: str, corner: tuple[float, float]
+) -> None:
+    image = np.random.default_rng(0).normal(size=(2, 50, 60)).astype(np.float32)
+    rows, cols = np.mgrid[:40, :30].astype(np.float32)
+    px = np.stack([cols + corner[0], rows + corner[1]]).astype(np.float32)
+    # Transposed, they are no lattice whose rows are the image's.
+    alone = interpolate(image, px.transpose(0, 2, 1), method).transpose(0, 2, 1)
+    np.testing.assert_allclose(interpolate(image, px, method), alone, atol=2e-6)

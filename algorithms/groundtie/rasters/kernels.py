@@ -7,6 +7,7 @@ reproduce a ramp, which moves the image by up to 0.05 px.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -116,9 +117,57 @@ def interpolate(image: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[A
     bands = image.reshape(-1, *image.shape[-2:])
     if method == "bilinear" and _is_for_remap(bands[0], px):
         found = np.stack([cv2.remap(band, px[0], px[1], cv2.INTER_LINEAR) for band in bands])
+    elif (first := _first_of_lattice(px)) is not None and not np.iscomplexobj(image):
+        found = _by_filter(bands, first, px.shape[1:], _KERNELS[method], REACH[method])
     else:
         found = _by_kernel(bands, px, _KERNELS[method], REACH[method])
     return np.asarray(found.reshape(*image.shape[:-2], *px.shape[1:]))
+
+
+def _first_of_lattice(px: NDArray[Any]) -> tuple[float, float] | None:
+    """Return the first of positions that lie side by side as pixels do, (col, row); None: no."""
+    if px.size == 0 or np.abs(px).max() > _REMAP_SIDE:
+        return None
+    (x, y), (rows, cols) = px, px.shape[1:]
+    first = x[0, 0], y[0, 0]
+    corners = x[-1, -1] - first[0], y[-1, -1] - first[1]
+    # The last position settles it mostly.
+    if corners != (cols - 1, rows - 1):
+        return None
+    along_x, along_y = (np.arange(n, dtype=px.dtype) for n in (cols, rows))
+    same = np.array_equal(x, np.broadcast_to(first[0] + along_x, x.shape)) and np.array_equal(
+        y, np.broadcast_to(first[1] + along_y[:, None], y.shape)
+    )
+    return (float(first[0]), float(first[1])) if same else None
+
+
+def _by_filter(
+    bands: NDArray[Any],
+    first: tuple[float, float],
+    size: tuple[int, ...],
+    kernel: Weights,
+    reach: int,
+) -> NDArray[Any]:
+    """Return `_by_kernel` of positions, as many as `size`, that lie side by side from `first` on.
+
+    All have the same weights, so that the kernel is a filter of the image.
+    """
+    col, row = (math.floor(position) - reach + 1 for position in first)
+    across, down = (kernel(np.array([position % 1])) for position in first)
+    high, wide = (n + 2 * reach - 1 for n in size)
+    needed = np.zeros((len(bands), high, wide), bands.dtype)
+    rows, cols = (
+        slice(max(start, 0), max(min(start + n, most), 0))
+        for start, n, most in zip((row, col), (high, wide), bands.shape[1:], strict=True)
+    )
+    inside = bands[:, rows, cols]
+    top, left = rows.start - row, cols.start - col
+    needed[:, top : top + inside.shape[1], left : left + inside.shape[2]] = inside
+    found = [
+        cv2.sepFilter2D(band, -1, np.concatenate(across), np.concatenate(down), anchor=(0, 0))
+        for band in needed
+    ]
+    return np.stack(found)[:, : size[0], : size[1]]
 
 
 def _by_kernel(bands: NDArray[Any], px: NDArray[Any], kernel: Weights, reach: int) -> NDArray[Any]:
