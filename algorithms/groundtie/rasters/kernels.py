@@ -167,7 +167,12 @@ def _by_filter(
         cv2.sepFilter2D(band, -1, np.concatenate(across), np.concatenate(down), anchor=(0, 0))
         for band in needed
     ]
-    return np.stack(found)[:, : size[0], : size[1]]
+    filtered = np.stack(found)[:, : size[0], : size[1]]
+    # As elsewhere, what lies a pixel outside is 0, though the kernel reaches farther.
+    x, y = (start + np.arange(n) for start, n in zip(first, size[::-1], strict=True))
+    filtered[:, (y < -1) | (y > bands.shape[1])] = 0
+    filtered[:, :, (x < -1) | (x > bands.shape[2])] = 0
+    return filtered
 
 
 def _by_kernel(bands: NDArray[Any], px: NDArray[Any], kernel: Weights, reach: int) -> NDArray[Any]:
