@@ -34,7 +34,7 @@ ORDER = 4
 
 # Seconds to count a pixel at a shift; to call OpenCV; for each element and halving of an FFT:
 # `benchmarks/run.py --only kernels`.
-_PIXEL_COST, _CALL_COST, _SPECTRAL_COST = 0.8e-9, 3.5e-6, 0.25e-9
+_PIXEL_COST, _CALL_COST, _SPECTRAL_COST = 0.8e-9, 3.5e-6, 0.15e-9
 
 # Rounding of a correlation by FFT stays below four times the product of both arrays' norms and of
 # half a unit in the last place. Whole numbers are told apart up to a half.
