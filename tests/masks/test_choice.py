@@ -9,6 +9,7 @@ from raster_files import utm_grid, write_raster
 from groundtie.masks.choice import MaskUsed, choose, is_reliable, share_of_strong_scatterers
 from groundtie.masks.regions import GroundRegions
 from groundtie.masks.scene import Scene
+from groundtie.rasters.kernels import interpolate
 from groundtie.rasters.reading import open_raster
 
 
@@ -27,6 +28,23 @@ def test_the_share_of_strong_scatterers_is_that_of_what_was_drawn(
     assert share_of_strong_scatterers(scene_of(tmp_path / "a.tif", image)) == pytest.approx(
         share, abs=0.005
     )
+
+
+def test_a_kernel_that_undershoots_makes_no_decibels(tmp_path: Path) -> None:
+    """A radar image that was resampled has as many strong scatterers, decibels have none."""
+    random = np.random.default_rng(0)
+    town = np.full((200, 200), 50.0)
+    town[:, :60] = 2000.0
+    town *= np.sqrt(random.gamma(1, 1, town.shape))
+    rows, cols = np.mgrid[:199, :199]
+    places = np.stack([cols + 0.5, rows + 0.5]).astype(np.float32)
+    resampled = interpolate(town.astype(np.float32), places, "cubic")
+    assert resampled.reshape(-1).min() < 0
+    resampled[:4, 64:68] = -1.0
+    share = share_of_strong_scatterers(scene_of(tmp_path / "a.tif", resampled))
+    assert share == pytest.approx(0.3, abs=0.02)
+    decibels = 20 * np.log10(town / town.max())
+    assert share_of_strong_scatterers(scene_of(tmp_path / "b.tif", decibels)) == 0
 
 
 def test_fields_need_no_mask(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..rasters.patch import is_logarithmic
 from . import threshold
 from .regions import GroundRegions
 from .scene import Scene
@@ -114,11 +115,11 @@ def is_perhaps_dense(strong_share: float) -> bool:
 def share_of_strong_scatterers(scene: Scene) -> float:
     """Return the share of an image, 0 to 1, that is brighter than usual by 6 dB or more.
 
-    Grey values are amplitudes; means over 4 × 4 pixels are compared with their median. Negative
-    ones, as decibels have, are none: such an image has no share.
+    Grey values are amplitudes; means over 4 × 4 pixels are compared with their median. Decibels
+    are none: such an image has no share.
     """
     amplitude = scene.sample(threshold.BLOCK_PX)
-    if amplitude.size == 0 or amplitude.min() < 0:
+    if amplitude.size == 0 or is_logarithmic(amplitude):
         return 0.0
     power = amplitude**2
     return float(np.mean(power > _STRONG * np.median(power)))

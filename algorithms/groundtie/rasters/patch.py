@@ -16,6 +16,9 @@ from .windows import Window
 # A mean over a block is valid if the weights of all its pixels sum up to this.
 _ALL_VALID = 0.999
 
+# More negative values than this do not come from resampling, whose kernels undershoot at edges.
+_NEGATIVE_SHARE = 0.02
+
 
 @dataclass(frozen=True)
 class Patch:
@@ -71,6 +74,11 @@ def reduced_patch(window: Patch, factor: int) -> Patch:
         return window
     valid = reduced(window.valid.astype(np.float32), factor) > _ALL_VALID
     return Patch(reduced(np.where(window.valid, window.values, 0), factor), valid)
+
+
+def is_logarithmic(known: NDArray[np.float32]) -> bool:
+    """Return whether valid grey values, of any shape, are in decibels: many are negative."""
+    return bool(np.count_nonzero(known < 0) > _NEGATIVE_SHARE * known.size)
 
 
 def middle_window(grid: Grid, side_px: int = 2048) -> Window:

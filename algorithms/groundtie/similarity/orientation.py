@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.patch import Patch
+from ..rasters.patch import Patch, is_logarithmic
 from .order_statistics import median, upper_median
 from .stacks import each, flat
 
@@ -34,9 +34,6 @@ _LOG_OFFSET = 0.1
 # all point the same way.
 _ROUNDING = 1e-5
 
-# More negative values than this do not come from resampling.
-_NEGATIVE_SHARE = 0.02
-
 
 def compress(window: Patch) -> NDArray[np.float32]:
     """Return grey values on a logarithmic scale, on which speckle is additive, shape (…, h, w).
@@ -51,21 +48,12 @@ def _compressed(values: NDArray[np.float32], valid: NDArray[np.bool_]) -> NDArra
     known = values[valid]
     if known.size == 0:
         return np.zeros_like(values)
-    if _is_logarithmic(known):
+    if is_logarithmic(known):
         return np.where(valid, values, median(known))
     positive = known[known > 0]
     middle = median(positive) if positive.size else np.float32(1)
     filled = np.where(valid, values, middle)
     return np.log(np.maximum(filled, 0) / middle + np.float32(_LOG_OFFSET))
-
-
-def is_logarithmic(window: Patch) -> bool:
-    """Return whether grey values are in decibels already: many are negative."""
-    return _is_logarithmic(window.values[window.valid])
-
-
-def _is_logarithmic(known: NDArray[np.float32]) -> bool:
-    return bool(np.count_nonzero(known < 0) > _NEGATIVE_SHARE * known.size)
 
 
 def orientation_fields(window: Patch) -> NDArray[np.complex64]:

@@ -12,8 +12,8 @@ from ..features.detectors import SiftDetector, SiftOctDetector
 from ..features.gradients import FloatImage
 from ..features.keypoints import Keypoints
 from ..features.scale_space import describe_at_scales
-from ..rasters.patch import Patch
-from ..similarity.orientation import compress, is_logarithmic
+from ..rasters.patch import Patch, is_logarithmic
+from ..similarity.orientation import compress
 from ..speckle.isef import isef
 from .gradients import GRADIENTS, gradient_operator, needs_positive
 from .orientation import oriented
@@ -71,7 +71,8 @@ class SiftVariantDescriptor:
         """Return m keypoints, m ≥ n unless upright, and their descriptors, shape (m, 128)."""
         image = compress(window)
         if needs_positive(self.gradient):
-            image = np.exp(image * np.float32(_NEPER_PER_DB) if is_logarithmic(window) else image)
+            is_decibel = is_logarithmic(window.values[window.valid])
+            image = np.exp(image * np.float32(_NEPER_PER_DB) if is_decibel else image)
         return self.describe_image(image, window.valid, found)
 
     def describe_image(
