@@ -64,6 +64,9 @@ class Overlay(QgsMapCanvasItem):
     def take_away(self) -> None:
         """Take this from the map for good."""
         self.show_layers([])
+        if self._job is not None:
+            # One that outlives QGIS crashes it.
+            self._job.cancel()
         self._canvas.mapCanvasRefreshed.disconnect(self.render)
         self._canvas.scene().removeItem(self)
 
