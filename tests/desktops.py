@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import MagicMock
 
+from noise_pairs import write_pair
+
 
 class Desktop:
     """A window with a map and the dock beside it."""
@@ -85,3 +87,37 @@ class Desktop:
         start.register.click()
         self.wait(lambda: start._run is None)
         return start.outcome
+
+
+def pair(folder: Path, desktop: Desktop) -> list[Any]:
+    write_pair(folder, 0)
+    return desktop.load(folder, "reference", "input")
+
+
+def open_registered(folder: Path, desktop: Desktop, files: dict[str, Path]) -> Any:
+    """Open the dock as it is after a registration."""
+    from groundtie_qgis.run import Outcome
+    from qgis.core import QgsProject
+
+    reference, input = pair(folder, desktop)
+    dock = desktop.open()
+    desktop.load(files["OUTPUT"].parent, "registered")
+    dock._registered(Outcome(True, files=files), reference, input)
+    assert len(QgsProject.instance().mapLayers()) == 3
+    return dock
+
+
+def drag(tool: Any, start: Any, by: tuple[int, int]) -> None:
+    """Press on a place of the map, move the mouse, and let go."""
+    from qgis.PyQt.QtCore import QPoint
+
+    pressed = QPoint(round(start.x()), round(start.y()))
+    for name, place in (
+        ("canvasPressEvent", pressed),
+        ("canvasMoveEvent", pressed + QPoint(*by) / 2),
+        ("canvasMoveEvent", pressed + QPoint(*by)),
+        ("canvasReleaseEvent", pressed + QPoint(*by)),
+    ):
+        event = MagicMock()
+        event.pos.return_value = place
+        getattr(tool, name)(event)

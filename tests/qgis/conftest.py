@@ -15,6 +15,8 @@ from typing import Any
 from unittest.mock import MagicMock
 
 import pytest
+from desktops import Desktop
+from noise_pairs import write_pair
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
@@ -175,3 +177,41 @@ def iface(provider: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     monkeypatch.setattr(qgis.utils, "iface", iface)
     yield iface
     QgsProject.instance().clear()
+
+
+@pytest.fixture
+def desktop(provider: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desktop]:
+    import qgis.utils
+    from qgis.core import QgsProject
+    from qgis.PyQt import sip
+
+    made = Desktop(Path(os.environ.get("GROUNDTIE_PICTURES") or tmp_path / "pictures"))
+    monkeypatch.setattr(qgis.utils, "iface", made.iface)
+    yield made
+    if made.dock is not None:
+        made.dock.take_away()
+    made.canvas.setLayers([])
+    QgsProject.instance().clear()
+    # What outlives QGIS crashes it.
+    sip.delete(made.window)
+    vars(made).clear()
+    gc.collect()
+
+
+@pytest.fixture(scope="session")
+def registered_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """What a registration of the pair leaves, made once."""
+    import groundtie
+
+    folder = tmp_path_factory.mktemp("registered")
+    write_pair(folder, 0)
+    files = {"OUTPUT": folder / "registered.tif", "TIE_POINTS": folder / "tie_points.gpkg"}
+    groundtie.coregister(
+        folder / "reference.tif",
+        folder / "input.tif",
+        files["OUTPUT"],
+        search_radius=12.0,
+        model="affine",
+        tie_points=files["TIE_POINTS"],
+    )
+    return files

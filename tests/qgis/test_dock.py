@@ -5,82 +5,20 @@ Pictures of every step are left in the folder that GROUNDTIE_PICTURES names.
 
 from __future__ import annotations
 
-import gc
 import json
-import os
-import time
-from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 import rasterio
 import rasterio.transform
-from desktops import Desktop
-from noise_pairs import ORIGIN, SHIFT, write_pair, write_raster
+from desktops import Desktop, drag, open_registered, pair
+from noise_pairs import ORIGIN, write_pair, write_raster
 from rpc_scenes import SIZE, Scene, make_scene
 
 from groundtie.sensor.bias import Bias
 from groundtie.sensor.rpc_files import read_rpc, write_rpc
-
-
-@pytest.fixture
-def desktop(provider: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desktop]:
-    import qgis.utils
-    from qgis.core import QgsProject
-    from qgis.PyQt import sip
-
-    made = Desktop(Path(os.environ.get("GROUNDTIE_PICTURES") or tmp_path / "pictures"))
-    monkeypatch.setattr(qgis.utils, "iface", made.iface)
-    yield made
-    if made.dock is not None:
-        made.dock.take_away()
-    made.canvas.setLayers([])
-    QgsProject.instance().clear()
-    # What outlives QGIS crashes it.
-    sip.delete(made.window)
-    vars(made).clear()
-    gc.collect()
-
-
-@pytest.fixture(scope="module")
-def registered_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """What a registration of the pair leaves, made once."""
-    import groundtie
-
-    folder = tmp_path_factory.mktemp("registered")
-    write_pair(folder, 0)
-    files = {"OUTPUT": folder / "registered.tif", "TIE_POINTS": folder / "tie_points.gpkg"}
-    groundtie.coregister(
-        folder / "reference.tif",
-        folder / "input.tif",
-        files["OUTPUT"],
-        search_radius=12.0,
-        model="affine",
-        tie_points=files["TIE_POINTS"],
-    )
-    return files
-
-
-def pair(folder: Path, desktop: Desktop) -> list[Any]:
-    write_pair(folder, 0)
-    return desktop.load(folder, "reference", "input")
-
-
-def open_registered(folder: Path, desktop: Desktop, files: dict[str, Path]) -> Any:
-    """Open the dock as it is after a registration."""
-    from groundtie_qgis.run import Outcome
-    from qgis.core import QgsProject
-
-    reference, input = pair(folder, desktop)
-    dock = desktop.open()
-    desktop.load(files["OUTPUT"].parent, "registered")
-    dock._registered(Outcome(True, files=files), reference, input)
-    assert len(QgsProject.instance().mapLayers()) == 3
-    return dock
 
 
 def test_the_boxes_never_hold_one_layer(desktop: Desktop, tmp_path: Path) -> None:
@@ -153,159 +91,6 @@ def test_looking_goes_from_place_to_place(
     desktop.wait(lambda: shares.add(dock.overlay.share) or shares >= {0.0, 1.0})  # type: ignore[func-returns-value]
     dock.look.flicker.click()
     assert not dock.overlay.isVisible()
-
-
-def drag(desktop: Desktop, tool: Any, start: Any, by: tuple[int, int]) -> None:
-    """Press on a place of the map, move the mouse, and let go."""
-    from qgis.PyQt.QtCore import QPoint
-
-    pressed = QPoint(round(start.x()), round(start.y()))
-    for name, place in (
-        ("canvasPressEvent", pressed),
-        ("canvasMoveEvent", pressed + QPoint(*by) / 2),
-        ("canvasMoveEvent", pressed + QPoint(*by)),
-        ("canvasReleaseEvent", pressed + QPoint(*by)),
-    ):
-        event = MagicMock()
-        event.pos.return_value = place
-        getattr(tool, name)(event)
-
-
-def test_repair_moves_switches_and_writes(
-    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
-) -> None:
-    from qgis.core import QgsProject
-    from qgis.PyQt.QtCore import Qt
-
-    dock = open_registered(tmp_path, desktop, registered_files)
-    repair = dock.repair
-    dock.tabs.setCurrentWidget(repair)
-    count = len(repair.review.points)
-    assert repair.table.rowCount() == count >= 10
-    assert "left-out error" in repair.model.currentText()
-    assert {"translation", "affine"} <= set(repair.fits)
-    desktop.picture("4_repair")
-    # No column is cut off, in a dock as wide as its pages ask for.
-    assert repair.view.horizontalHeader().length() <= repair.view.viewport().width()
-
-    # A point that is dragged: its residual and the fit change, its row tells who did it.
-    index = int(np.flatnonzero(repair.review.points.used & ~repair.review.points.is_check)[0])
-    before = repair.fits["affine"]
-    repair.drag.click()
-    start = repair.points.toCanvasCoordinates(repair.points.rows[index][1])
-    drag(desktop, repair._drag, start, (30, 20))
-    after = repair.fits["affine"]
-    assert after.residuals_px[index] > before.residuals_px[index] + 5
-    assert after.left_out_px > before.left_out_px
-    assert repair.review.edited[index]
-    assert "1 set by hand" in repair.text.text()
-    assert "9 of 9 check points agree within 2 px" in repair.text.text()
-    desktop.picture("5_dragged")
-
-    # The worst stands first in the sorted table; switched off, it takes no part.
-    table = repair.table
-    assert table.point_at(0) == index
-    assert table.setData(table.index(0, 0), Qt.CheckState.Unchecked, Qt.ItemDataRole.CheckStateRole)
-    assert not repair.review.points.used[index]
-    assert repair.fits["affine"].rmse_px < after.rmse_px
-
-    repair.model.setCurrentIndex(repair.model.findData("translation"))
-    repair.write.click()
-    desktop.wait(lambda: repair.writer.run is None)
-    assert repair.text.text().startswith("Written: "), repair.text.text()
-    layer = dock.look._registered
-    assert layer.id() in QgsProject.instance().mapLayers()
-    with rasterio.open(layer.source()) as written, rasterio.open(tmp_path / "reference.tif") as ref:
-        assert written.transform == ref.transform
-        one, other = (r.read(1).astype(float)[50:-50, 50:-50] for r in (written, ref))
-    # The input is the reference's negative: where it lies right they are opposite.
-    assert np.corrcoef(one.ravel(), other.ravel())[0, 1] < -0.9
-    desktop.picture("6_written")
-
-
-def test_the_table_is_sorted_by_its_headings_and_the_choice_goes_with_its_point(
-    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
-) -> None:
-    from qgis.PyQt.QtCore import Qt
-
-    dock = open_registered(tmp_path, desktop, registered_files)
-    repair = dock.repair
-    dock.tabs.setCurrentWidget(repair)
-    points, table = repair.review.points, repair.table
-    residuals = repair.fits[repair.kind()].residuals_px
-    repair._choose(7)
-    keys = {1: np.arange(len(points)), 2: residuals, 3: points.score, 4: points.is_check}
-    for column, values in keys.items():
-        for order in (Qt.SortOrder.AscendingOrder, Qt.SortOrder.DescendingOrder):
-            repair.view.sortByColumn(column, order)
-            shown = [values[table.point_at(row)] for row in range(len(points))]
-            assert shown == sorted(values, reverse=order == Qt.SortOrder.DescendingOrder)
-            (selected,) = repair.view.selectionModel().selectedRows()
-            assert table.point_at(selected.row()) == 7
-            assert table.data(table.index(selected.row(), 1)) == 8
-    # What is switched off has no say, stays in the table, and is the one that was meant.
-    row = table.row_of(3)
-    off = Qt.CheckState.Unchecked
-    table.setData(table.index(row, 0), off, Qt.ItemDataRole.CheckStateRole)
-    assert np.flatnonzero(~repair.review.points.used).tolist() == [3]
-
-
-def test_two_thousand_points_answer_a_drag_within_a_fifth_of_a_second(
-    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
-) -> None:
-    """From the mouse's release to all models, the table and the map; in time of the processor."""
-    from qgis.core import QgsApplication
-
-    dock = open_registered(tmp_path, desktop, registered_files)
-    repair = dock.repair
-    dock.tabs.setCurrentWidget(repair)
-    random = np.random.Generator(np.random.PCG64(0))
-    count, few = 2000, repair.review.points
-    many = few.take(random.integers(0, len(few), count))
-    # All at different places, as the registration has them.
-    off = random.uniform(-20, 20, (count, 2))
-    places = {"reference_xy": many.reference_xy + off * [1, -1], "input_px": many.input_px + off}
-    repair.change(replace(repair.review, points=replace(many, **places)))
-    assert repair.table.rowCount() == count
-    repair.drag.click()
-    desktop.refresh()
-    seconds = []
-    for index in range(3):
-        start = repair.points.toCanvasCoordinates(repair.points.rows[index][1])
-        began = time.process_time()
-        drag(desktop, repair._drag, start, (9, 5))
-        QgsApplication.processEvents()
-        seconds.append(time.process_time() - began)
-    assert repair.review.edited.sum() == 3
-    assert min(seconds) < 0.2, seconds
-
-
-def test_a_point_is_added_by_a_click_in_each_image(
-    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
-) -> None:
-    from qgis.core import QgsPointXY
-
-    dock = open_registered(tmp_path, desktop, registered_files)
-    repair = dock.repair
-    dock.tabs.setCurrentWidget(repair)
-    count = len(repair.review.points)
-    repair.add.click()
-    place = QgsPointXY(ORIGIN[0] + 200, ORIGIN[1] - 180)
-    repair._clicked_on_map(place)
-    assert [layer.source() for layer in dock.overlay._layers] == [repair._input.source()]
-    desktop.picture("7_second_click")
-    # Where the input's georeferencing has the place, and 3 px off.
-    repair._clicked_on_map(QgsPointXY(place.x() + SHIFT[0] + 3, place.y() + SHIFT[1] - 2))
-    assert len(repair.review.points) == count + 1
-    assert repair.review.edited[-1]
-    assert repair.review.points.score[-1] > 5
-    expected = repair.review.input_px((place.x() + SHIFT[0], place.y() + SHIFT[1]))
-    np.testing.assert_allclose(repair.review.points.input_px[-1], expected, atol=0.5)
-    repair.match.setChecked(False)
-    repair._clicked_on_map(place)
-    repair._clicked_on_map(QgsPointXY(place.x() + 9, place.y()))
-    clicked = repair.review.input_px((place.x() + 9, place.y()))
-    np.testing.assert_allclose(repair.review.points.input_px[-1], clicked, atol=1e-6)
 
 
 def test_a_refusal_says_why_and_what_to_try(desktop: Desktop, tmp_path: Path) -> None:
@@ -565,7 +350,7 @@ def test_an_image_with_rpcs_from_start_to_points_set_by_hand(
     assert repair.fits["translation"].residuals_px[index] < 0.1
     repair.drag.click()
     place = repair.points.toCanvasCoordinates(repair.points.rows[index][1])
-    drag(desktop, repair._drag, place, (25, 0))
+    drag(repair._drag, place, (25, 0))
     assert repair.review.edited[index]
     assert repair.fits["translation"].residuals_px[index] > 2
     repair.write.click()
