@@ -43,7 +43,7 @@ class Settings:
     ----------
     model
         "auto", "translation", "similarity" or "affine".
-    max_error_px, search_radius_m, matching_pixel_size_m
+    max_error_px, search_radius_m, matching_pixel_size_m, surveys
         See `Specification`.
     """
 
@@ -51,6 +51,11 @@ class Settings:
     max_error_px: float
     search_radius_m: float | None
     matching_pixel_size_m: float | None
+    surveys: bool = True
+
+    def of_loops(self) -> Settings:
+        """Return how a pair is registered that places no date, but closes a loop."""
+        return replace(self, surveys=False)
 
     def specification(self, first: Date, second: Date) -> Specification:
         """Return how a pair is registered: the preset of what the two images are."""
@@ -66,6 +71,7 @@ class Settings:
             max_error_px=self.max_error_px,
             search_radius_m=self.search_radius_m,
             matching_pixel_size_m=self.matching_pixel_size_m,
+            surveys=self.surveys,
         )
 
 
@@ -87,6 +93,8 @@ class PairResult:
         See `network.Link`; None if it was refused.
     seconds
         How long it took.
+    is_surveyed
+        Whether the rules on the survey were asked, too.
     """
 
     first: str
@@ -99,6 +107,7 @@ class PairResult:
     displacement: tuple[float, ...] | None = None
     covariance: tuple[tuple[float, ...], ...] | None = None
     seconds: float = 0.0
+    is_surveyed: bool = True
 
     def link(self, first: int, second: int) -> Link:
         """Return an accepted registration as a link of two dates by their numbers."""
@@ -186,7 +195,13 @@ def register_pair(task: PairTask, context: Context) -> PairResult:
     first, second, settings, frame = task.first, task.second, task.settings, task.frame
     started = time.perf_counter()
     refused = PairResult(
-        first.name, second.name, pair_key(first, second, settings, frame), False, "", ""
+        first.name,
+        second.name,
+        pair_key(first, second, settings, frame),
+        False,
+        "",
+        "",
+        is_surveyed=settings.surveys,
     )
     spec = settings.specification(first, second)
     grids = [
