@@ -18,7 +18,6 @@ from groundtie.matching.alignment import (
     LINEAR_CANDIDATES,
     TERRAIN_CANDIDATES,
     Prior,
-    _cubic,
     _fields,
     align,
     choose_alignment,
@@ -200,16 +199,6 @@ def test_the_spline_looks_up_the_surface_itself() -> None:
     values, slopes = field.scores(field.px + [RADIUS + 3, 0])
     assert not values.any()
     assert not slopes.any()
-
-
-def test_cubic_sum_to_one_and_their_slopes_to_nothing() -> None:
-    t = np.linspace(0, 0.999, 50)
-    weights, slopes = _cubic(t)
-    np.testing.assert_allclose(weights.sum(axis=1), 1)
-    np.testing.assert_allclose(slopes.sum(axis=1), 0, atol=1e-12)
-    np.testing.assert_allclose(weights @ [-1, 0, 1, 2], t, atol=1e-12)
-    numeric = np.gradient(weights, t, axis=0, edge_order=2)
-    np.testing.assert_allclose(slopes[1:-1], numeric[1:-1], atol=1e-3)
 
 
 class TestHeights:

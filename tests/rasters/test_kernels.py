@@ -115,3 +115,13 @@ def test_positions_side_by_side_have_the_values_that_they_have_alone(
     # Transposed, they are no lattice whose rows are the image's.
     alone = interpolate(image, px.transpose(0, 2, 1), method).transpose(0, 2, 1)
     np.testing.assert_allclose(interpolate(image, px, method), alone, atol=2e-6)
+
+
+def test_cubic_b_splines_sum_to_one_and_their_slopes_to_nothing() -> None:
+    t = np.linspace(0, 0.999, 50)
+    weights, slopes = bspline_weights(4, t), bspline_slopes(4, t)
+    np.testing.assert_allclose(weights.sum(axis=0), 1)
+    np.testing.assert_allclose(slopes.sum(axis=0), 0, atol=1e-12)
+    np.testing.assert_allclose([-1, 0, 1, 2] @ weights, t, atol=1e-12)
+    numeric = np.gradient(weights, t, axis=1, edge_order=2)
+    np.testing.assert_allclose(slopes[:, 1:-1], numeric[:, 1:-1], atol=1e-3)

@@ -69,6 +69,10 @@ class Alignment:
     left_out_score: dict[str, float]
 
 
+# The weights of a B-spline, and their derivatives.
+_SPLINE = bspline_weights, bspline_slopes
+
+
 @dataclass(frozen=True)
 class _Field:
     """Surfaces that can be looked up anywhere: B-spline coefficients of blurred surfaces.
@@ -99,7 +103,8 @@ class _Field:
         place = np.clip(shift + radius, 1.0, 2 * radius - 1.001)
         inside = np.all(place == shift + radius, axis=1)
         whole = np.floor(place).astype(int)
-        (wx, dx), (wy, dy) = (_cubic(place[:, k] - whole[:, k]) for k in (0, 1))
+        offset = (place - whole).T
+        (wx, wy), (dx, dy) = (np.moveaxis(of(4, offset), 0, 2) for of in _SPLINE)
         taps = np.arange(-1, 3)
         rows, cols = whole[:, 1, None] + taps, whole[:, 0, None] + taps
         patch = self.coefficients[
@@ -237,11 +242,6 @@ def _spline_coefficients(values: FloatArray) -> FloatArray:
     splines[0, 1] = splines[-1, -2] = 2 * side
     inverse = np.linalg.inv(splines)
     return np.asarray(inverse @ values @ inverse.T)
-
-
-def _cubic(t: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the cubic B-spline's four weights and their derivatives at offsets `t`, (n, 4)."""
-    return bspline_weights(4, t).T, bspline_slopes(4, t).T
 
 
 def _maximise(family: Family, field: _Field, start: FloatArray) -> FloatArray:

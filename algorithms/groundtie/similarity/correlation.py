@@ -34,13 +34,9 @@ def correlate(template: NDArray[Any], search: NDArray[Any]) -> NDArray[np.float3
     Array of shape (…, ny, nx), float32.
     """
     shape, (rows, cols) = fast_shape(search), spans(template, search)
-    if np.iscomplexobj(template):
-        product = scipy.fft.fft2(template, shape).conj() * scipy.fft.fft2(search, shape)
-        found = scipy.fft.ifft2(product, overwrite_x=True)[..., :rows, :cols].real
-    else:
-        product = spectrum(template, shape).conj() * spectrum(search, shape)
-        found = from_spectrum(product, shape, (rows, cols))
-    return np.asarray(found, np.float32)
+    product = spectrum(template, shape).conj() * spectrum(search, shape)
+    found = from_spectrum(product, shape, (rows, cols))
+    return np.asarray(found.real, np.float32)
 
 
 def fast_shape(search: NDArray[Any]) -> tuple[int, int]:
@@ -56,24 +52,27 @@ def spans(template: NDArray[Any], search: NDArray[Any]) -> tuple[int, int]:
 
 
 def spectrum(images: NDArray[Any], shape: tuple[int, int], workers: int = 1) -> NDArray[Any]:
-    """Return the half spectra of real images, (…, h, w), filled up with 0 to a shape."""
+    """Return spectra of images, (…, h, w), filled up with 0 to a shape; half if images are real."""
     # Rows that hold nothing are not transformed.
-    along_rows = scipy.fft.rfft(images, shape[1], workers=workers)
+    transform = scipy.fft.fft if np.iscomplexobj(images) else scipy.fft.rfft
+    along_rows = transform(images, shape[1], workers=workers)
     return scipy.fft.fft(along_rows, shape[0], axis=-2, overwrite_x=True, workers=workers)
 
 
 def from_spectrum(
     spectra: NDArray[Any], shape: tuple[int, int], spans: tuple[int, int], workers: int = 1
 ) -> NDArray[Any]:
-    """Return the upper left parts, (…, ny, nx), of the images of a shape that have half spectra.
+    """Return the upper left parts, (…, ny, nx), of the images of a shape that have spectra.
 
-    The spectra may be overwritten.
+    They are real where spectra are half. Spectra may be overwritten.
     """
     # Rows that are not asked for are not transformed.
     lines = scipy.fft.ifft(spectra, axis=-2, norm="forward", overwrite_x=True, workers=workers)[
         ..., : spans[0], :
     ]
-    found = scipy.fft.irfft(lines, shape[1], norm="forward", workers=workers)[..., : spans[1]]
+    is_half = spectra.shape[-1] != shape[1]
+    inverse = scipy.fft.irfft if is_half else scipy.fft.ifft
+    found = inverse(lines, shape[1], norm="forward", workers=workers)[..., : spans[1]]
     return found * found.dtype.type(1 / math.prod(shape))
 
 
