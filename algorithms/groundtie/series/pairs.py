@@ -211,9 +211,14 @@ def register_pair(task: PairTask, context: Context) -> PairResult:
     images = [date.image(grid) for date, grid in zip((first, second), grids, strict=True)]
     try:
         with ExitStack() as stack, bounded_cache():
-            masks = first.listed.mask, second.listed.mask
+            masks = first.pair_mask, second.pair_mask
             opened = pair_images(images[0], images[1], spec, context.quiet(), masks, stack, started)
-            found = run(opened, spec, context)
+            pair = replace(
+                opened.pair,
+                reference=first.masked(opened.pair.reference),
+                input=second.masked(opened.pair.input),
+            )
+            found = run(replace(opened, pair=pair), spec, context)
     except CancelledError:
         raise
     except GroundTieError as error:
