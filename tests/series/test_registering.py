@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import CancelledError as FutureCancelledError
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,9 +13,10 @@ from series_dates import FRAME
 from shapely.geometry import box
 
 from groundtie.context import Context
+from groundtie.errors import SchedulerError, WorkerLostError
 from groundtie.series import registering
 from groundtie.series.dates import Footprints
-from groundtie.series.pairs import PairResult, Settings, pair_key
+from groundtie.series.pairs import PairResult, PairTask, Settings, pair_key
 from groundtie.series.registering import Matching
 
 SETTINGS = Settings("auto", 3.0, None, None)
@@ -114,6 +117,48 @@ def test_a_link_without_a_survey_places_no_date_later(matching: Make) -> None:
     unchanged = matching(3, known=known)
     unchanged.from_hub(0)
     assert (unchanged.done, unchanged.reused) == (0, 3)
+
+
+class Losing(Executor):
+    """Runs tasks here, but is lost with those of some pairs."""
+
+    def __init__(self, lost: set[tuple[str, str]], error: Exception) -> None:
+        self._lost, self._error = lost, error
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        result = fn(*args, **kwargs)
+        if (result.first, result.second) in self._lost:
+            future.set_exception(self._error)
+        else:
+            future.set_result(result)
+        return future
+
+
+def test_a_worker_that_is_lost_costs_its_pair_alone(
+    matching: Make, one_thread: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def elsewhere(task: PairTask) -> Callable[[], PairResult]:
+        return lambda: registering.register_pair(task, one_thread)
+
+    monkeypatch.setattr(PairTask, "elsewhere", elsewhere)
+    found = matching(5)
+    found.executor = Losing({("0", "2")}, WorkerLostError("its process was ended"))
+    found.from_hub(0)
+    lost = found.results[0, 2]
+    assert (lost.accepted, lost.reason, lost.key) == (False, "its process was ended", "")
+    # Others reach its date by two ways, and all other pairs are there.
+    assert sorted(found.placed(0)) == list(range(5))
+    assert sum(2 in ends and one.accepted for ends, one in found.results.items()) >= 2
+    # It alone is done again.
+    again = matching(5, known={one.key: one for one in found.results.values()})
+    again.from_hub(0)
+    assert again.results[0, 2].accepted and again.done == 1
+    # Without a scheduler there is nobody left who could reach them.
+    gone = matching(5)
+    gone.executor = Losing({("0", "2")}, FutureCancelledError())
+    with pytest.raises(SchedulerError, match="the scheduler was lost"):
+        gone.from_hub(0)
 
 
 def test_a_bad_date_is_skipped_in_the_chain(matching: Make) -> None:

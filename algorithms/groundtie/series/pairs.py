@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..context import Context, threads
-from ..errors import CancelledError, GroundTieError
+from ..errors import CancelledError, GroundTieError, WorkerLostError
 from ..geometry.estimation import jackknife_deviations
 from ..geometry.models import Model
 from ..masks.choice import AUTO
@@ -84,7 +84,8 @@ class PairResult:
     first, second
         Names of the dates: reference and input.
     key
-        Stands for the files, the settings and the version.
+        Stands for the files, the settings and the version; empty: whoever did it was lost, so that
+        it is done again in the next run.
     accepted, rule, reason
         The verdict.
     check_rmse_px
@@ -168,6 +169,10 @@ class PairTask:
     placed: tuple[FloatArray | None, FloatArray | None]
     settings: Settings
     frame: SeriesFrame
+
+    def lost(self, error: WorkerLostError) -> PairResult:
+        """Return what became of it if the worker that did it was lost."""
+        return PairResult(self.first.name, self.second.name, "", False, "", error.one_line())
 
     def elsewhere(self) -> Callable[[], PairResult]:
         """Return the task for another process: with files, not pixels."""

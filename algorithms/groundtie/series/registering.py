@@ -10,6 +10,7 @@ from itertools import permutations
 import numpy as np
 
 from ..context import Context
+from ..errors import WorkerLostError
 from ..executors import POLL_SECONDS, result_of
 from .closure import triplet_closures
 from .dates import Date, Footprints
@@ -185,7 +186,10 @@ class Matching:
                 part = self._next_part(f"registering {len(tasks)} pairs")
                 while wait([future], timeout=POLL_SECONDS).not_done:
                     part.progress.check()
-                self._add(ends, result_of(future))
+                try:
+                    self._add(ends, result_of(future))
+                except WorkerLostError as error:
+                    self._add(ends, tasks[ends].lost(error))
         finally:
             for future in futures.values():
                 future.cancel()
