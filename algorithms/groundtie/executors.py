@@ -163,12 +163,14 @@ def result_of(future: Future[T]) -> T:
     Raises
     ------
     WorkerLostError
-        The worker that ran it, or the scheduler, was lost. What the task raised is raised, too.
+        The worker that ran it was lost. What the task raised is raised, too.
+    SchedulerError
+        The scheduler was lost.
     """
     try:
         return future.result()
     except FutureCancelledError as error:
-        raise WorkerLostError("the scheduler was lost") from error
+        raise SchedulerError("the scheduler was lost") from error
     except Exception as error:
         if type(error).__module__.partition(".")[0] not in ("concurrent", "distributed"):
             raise

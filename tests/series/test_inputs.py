@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from groundtie.errors import ParameterError
+from groundtie.registration.user_masks import UserMask
 from groundtie.series.inputs import list_dates, time_of
 
 DAY = datetime.datetime(2020, 3, 4)
@@ -59,8 +60,43 @@ def test_a_table_names_its_files_from_where_it_lies(tmp_path: Path) -> None:
     table.write_text("file,name,time,mask\nx/a.tif,first,2020-03-04,m.tif\n/b.tif,,,\n")
     first, second = list_dates([table], None)
     assert (first.name, first.raster, first.time) == ("first", tmp_path / "x/a.tif", DAY)
-    assert first.mask == tmp_path / "m.tif"
+    assert first.mask == UserMask(tmp_path / "m.tif")
     assert (second.name, second.raster, second.mask) == ("b", Path("/b.tif"), None)
+
+
+def test_masks_beside_images_are_theirs_and_no_dates(tmp_path: Path) -> None:
+    names = [
+        f"T32TQM_202{year}0704T101031_{kind}.jp2"
+        for year in (0, 1)
+        for kind in ("B08_10m", "SCL_20m")
+    ]
+    paths = touched(tmp_path / "dates", *names)
+    found = list_dates([tmp_path / "dates"], None)
+    assert [date.raster for date in found] == paths[::2]
+    assert [date.mask.mask for date in found if date.mask is not None] == paths[1::2]
+    assert all(date.mask is not None and date.mask.values == "scl" for date in found)
+
+
+def test_a_table_states_the_values_of_its_masks(tmp_path: Path) -> None:
+    image, scl = touched(
+        tmp_path, "T32TQM_20200704T101031_B08_10m.jp2", "T32TQM_20200704T101031_SCL_20m.jp2"
+    )
+    table = tmp_path / "dates.csv"
+    rows = [f"{image.name},a,,none", f'b.tif,b,{scl.name},"3,8-10"', "c.tif,c,clouds.gpkg,inside"]
+    table.write_text("file,name,mask,mask_values\n" + "\n".join(rows) + "\n")
+    assert [date.mask for date in list_dates([table], None)] == [
+        None,
+        UserMask(scl, "3,8-10"),
+        UserMask(tmp_path / "clouds.gpkg", "inside"),
+    ]
+
+
+@pytest.mark.parametrize(("mask", "values"), [("m.tif", "clouds"), ("", "scl"), ("m.gpkg", "3")])
+def test_values_that_no_mask_has_name_their_row(tmp_path: Path, mask: str, values: str) -> None:
+    table = tmp_path / "dates.csv"
+    table.write_text(f"file,mask,mask_values\na.tif,,\nb.tif,{mask},{values}\n")
+    with pytest.raises(ParameterError, match=r"dates\.csv, row 2: .*value"):
+        list_dates([table], None)
 
 
 def item(number: int, **assets: Any) -> dict[str, Any]:

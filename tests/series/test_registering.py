@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import CancelledError as FutureCancelledError
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,9 +13,10 @@ from series_dates import FRAME
 from shapely.geometry import box
 
 from groundtie.context import Context
+from groundtie.errors import SchedulerError, WorkerLostError
 from groundtie.series import registering
 from groundtie.series.dates import Footprints
-from groundtie.series.pairs import PairResult, Settings, pair_key
+from groundtie.series.pairs import PairResult, PairTask, Settings, pair_key
 from groundtie.series.registering import Matching
 
 SETTINGS = Settings("auto", 3.0, None, None)
@@ -45,6 +48,7 @@ def matching(monkeypatch: pytest.MonkeyPatch, one_thread: Context) -> Make:
         unlike: tuple[tuple[int, int], ...] = (),
         boxes: dict[int, tuple[int, ...]] | None = None,
         known: dict[str, PairResult] | None = None,
+        off_px: dict[tuple[int, int], float] | None = None,
     ) -> Matching:
         dates: list[Any] = [FakeDate(str(k)) for k in range(count)]
 
@@ -52,10 +56,14 @@ def matching(monkeypatch: pytest.MonkeyPatch, one_thread: Context) -> Make:
             first, second = task.first, task.second
             ends = int(first.name), int(second.name)
             accepted = not set(bad) & set(ends) and not {ends, ends[::-1]} & set(unlike)
-            key = pair_key(first, second, SETTINGS, FRAME)
+            key = pair_key(first, second, task.settings, FRAME)
+            names, surveyed = (first.name, second.name), task.settings.surveys
             if not accepted:
-                return PairResult(first.name, second.name, key, False, "a rule", "no")
-            return PairResult(first.name, second.name, key, True, "", "yes", 0.3, ZERO, COVARIANCE)
+                return PairResult(*names, key, False, "a rule", "no", is_surveyed=surveyed)
+            moved = ((off_px or {}).get(ends, 0.0), *ZERO[1:])
+            return PairResult(
+                *names, key, True, "", "yes", 0.3, moved, COVARIANCE, is_surveyed=surveyed
+            )
 
         monkeypatch.setattr(registering, "register_pair", register)
         polygons = [box(*(boxes or {}).get(k, WHOLE)) for k in range(count)]
@@ -65,13 +73,92 @@ def matching(monkeypatch: pytest.MonkeyPatch, one_thread: Context) -> Make:
     return make
 
 
-def test_every_date_with_the_hub_and_with_the_next(matching: Make) -> None:
-    found = matching(5)
+def test_every_date_with_the_hub_and_in_a_loop(matching: Make) -> None:
+    found = matching(6)
     found.from_hub(0)
+    # Of five dates two pairs, and the last with its neighbour.
     assert set(found.results) == {
-        (0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4)
+        (0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (1, 2), (3, 4), (4, 5)
     }  # fmt: skip
-    assert found.done == 7
+    assert found.done == 8
+
+
+def test_only_links_that_close_loops_of_accepted_ones_go_without_a_survey(matching: Make) -> None:
+    found = matching(6, unlike=((0, 3),))
+    found.from_hub(0)
+    # 3 is reached by 2 and then confirmed by 1, which both place it; 4 and 5 are placed by 0.
+    assert {ends for ends, one in found.results.items() if not one.is_surveyed} == {(4, 5)}
+    assert {(2, 3), (1, 3)} <= found.results.keys()
+
+
+@pytest.mark.parametrize("wrong", [(0, 2), (1, 2)])
+def test_a_loop_that_does_not_close_gets_further_links(
+    matching: Make, wrong: tuple[int, int]
+) -> None:
+    sound = matching(7)
+    sound.from_hub(0)
+    found = matching(7, off_px={wrong: 5.0})
+    found.from_hub(0)
+    further = set(found.results) - set(sound.results)
+    # With every date that one of the loop was not yet linked with, but no more than are near.
+    assert further and all({1, 2} & set(ends) for ends in further)
+    assert all(found.results[ends].is_surveyed == (0 in ends) for ends in further)
+
+
+def test_a_link_without_a_survey_places_no_date_later(matching: Make) -> None:
+    first = matching(3)
+    first.from_hub(0)
+    assert not first.results[1, 2].is_surveyed
+    known = {one.key: one for one in first.results.values()}
+    again = matching(3, unlike=((0, 2),), known={first.results[1, 2].key: first.results[1, 2]})
+    again.from_hub(0)
+    assert again.results[1, 2].is_surveyed and (2, 1) not in again.results
+    # As another's loop it is still good for nothing to be done again.
+    unchanged = matching(3, known=known)
+    unchanged.from_hub(0)
+    assert (unchanged.done, unchanged.reused) == (0, 3)
+
+
+class Losing(Executor):
+    """Runs tasks here, but is lost with those of some pairs."""
+
+    def __init__(self, lost: set[tuple[str, str]], error: Exception) -> None:
+        self._lost, self._error = lost, error
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        result = fn(*args, **kwargs)
+        if (result.first, result.second) in self._lost:
+            future.set_exception(self._error)
+        else:
+            future.set_result(result)
+        return future
+
+
+def test_a_worker_that_is_lost_costs_its_pair_alone(
+    matching: Make, one_thread: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def elsewhere(task: PairTask) -> Callable[[], PairResult]:
+        return lambda: registering.register_pair(task, one_thread)
+
+    monkeypatch.setattr(PairTask, "elsewhere", elsewhere)
+    found = matching(5)
+    found.executor = Losing({("0", "2")}, WorkerLostError("its process was ended"))
+    found.from_hub(0)
+    lost = found.results[0, 2]
+    assert (lost.accepted, lost.reason, lost.key) == (False, "its process was ended", "")
+    # Others reach its date by two ways, and all other pairs are there.
+    assert sorted(found.placed(0)) == list(range(5))
+    assert sum(2 in ends and one.accepted for ends, one in found.results.items()) >= 2
+    # It alone is done again.
+    again = matching(5, known={one.key: one for one in found.results.values()})
+    again.from_hub(0)
+    assert again.results[0, 2].accepted and again.done == 1
+    # Without a scheduler there is nobody left who could reach them.
+    gone = matching(5)
+    gone.executor = Losing({("0", "2")}, FutureCancelledError())
+    with pytest.raises(SchedulerError, match="the scheduler was lost"):
+        gone.from_hub(0)
 
 
 def test_a_bad_date_is_skipped_in_the_chain(matching: Make) -> None:

@@ -356,3 +356,35 @@ def test_another_band_is_registered_anew(tmp_path: Path) -> None:
     coregister_series(tmp_path / "out", [dates.folder], **options)
     again = coregister_series(tmp_path / "out", [dates.folder], band=1, **options)
     assert (again.registered_pairs, again.reused_pairs) == (1, 0)
+
+
+@pytest.mark.slow
+def test_what_a_missions_mask_hides_takes_no_part(tmp_path: Path) -> None:
+    """A deck that lies still over a third of all dates, and masks of it with larger pixels."""
+    dates = write_dates(tmp_path / "dates", 3, SIZE)
+    deck = np.random.default_rng(5).normal(3000, 300, (SIZE, SIZE // 3))
+    scl = np.full((SIZE // 2, SIZE // 2), 4, np.uint8)
+    scl[:, : SIZE // 6 + 1] = 9
+    rows = ["file,mask,mask_values"]
+    for path in dates.files:
+        with rasterio.open(path, "r+") as raster:
+            values = raster.read(1)
+            values[:, : SIZE // 3] = deck
+            raster.write(values, 1)
+        mask = write_raster(path.with_suffix(".scl.tif"), scl, utm_grid(80, 80, 20.0))
+        rows.append(f"{path.name},{mask.name},scl")
+    table = dates.folder / "dates.csv"
+    table.write_text("\n".join(rows))
+    options = {**OPTIONS, "reference": dates.files[0]}
+    found = coregister_series(tmp_path / "out", [table], **options)
+    assert [one.name for one in found.registered] == dates.names[1:]
+    transforms = found.transforms()
+    for date in (1, 2):
+        assert error_px(transforms[dates.names[date]], dates, date, 0) < 0.3
+    assert "masks: of 3 dates, 0 of them found beside the image" in found.lines()
+    stored = json.loads((tmp_path / "out" / "series.json").read_text())
+    assert [one["mask"]["values"] for one in stored["dates"]] == ["scl"] * 3
+    with ThreadPoolExecutor(1) as pool:
+        elsewhere = coregister_series(tmp_path / "other", [table], executor=pool, **options)
+    for name, one in elsewhere.transforms().items():
+        assert one.to_json() == transforms[name].to_json()

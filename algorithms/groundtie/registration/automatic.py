@@ -20,7 +20,7 @@ from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster
 from ..rasters.rendered import Light
 from ..sensor.rpc_files import rpc_of
-from .asked import asked_lights, asked_terrain
+from .asked import USUAL, asked_lights, asked_terrain
 from .delivery import Call
 from .evidence import SCENE, SURVEY
 from .orthorectification import Orthorectification
@@ -191,12 +191,15 @@ def _needs_rpcs(raster: Any) -> bool:
 
 def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> OrthorectifiedRpc:
     """Refine the RPCs of the input on the reference, and orthorectify it."""
-    given = {**_RPC_DEFAULTS, **parameters}
+    given = {**USUAL, **_RPC_DEFAULTS, **parameters}
     for name in ("input_dem", "views"):
         if given[name] is not None:
             raise ParameterError(f"{name} is for orthoimages, not for an image with RPCs")
-    if given["transform"] is not None:
-        raise ParameterError("an image with RPCs is orthorectified: there is no transform to write")
+    for name in ("transform", "displacement"):
+        if given[name] is not None:
+            raise ParameterError(
+                f"an image with RPCs is orthorectified: there is no {name} to write"
+            )
     if given["output"] is None:
         raise ParameterError("an image with RPCs is orthorectified: give an output")
     given |= {

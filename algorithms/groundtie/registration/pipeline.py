@@ -167,12 +167,14 @@ class Stages:
         model = estimate.transform.model
         return check_model(self.checker, self.held_out.layout, model, context)
 
-    def survey(self, estimate: Estimate, context: Context) -> tuple[Survey, Rest | None]:
+    def survey(self, estimate: Estimate, context: Context) -> tuple[Survey | None, Rest | None]:
         """Match chips all over the pair, with what its masks leave, around what was estimated.
 
         Returns what they show, and what they show without content that is the same in both arrays;
-        None: there is none.
+        None: there is none, or it is not asked for.
         """
+        if not self.spec.surveys:
+            return None, None
         pair, transform = self.masked.pair, estimate.transform
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
         places = survey_places(pair.grid)
@@ -185,7 +187,7 @@ class Stages:
         self,
         estimate: Estimate,
         check: Check,
-        surveys: tuple[Survey, Rest | None],
+        surveys: tuple[Survey | None, Rest | None],
         scene: SceneInfo,
     ) -> RegistrationEvidence:
         """Return what the rules look at."""

@@ -112,6 +112,8 @@ class Specification:
         `models.TERRAIN`; chips alone know it.
     light
         The reference is a terrain model: it is rendered in this light. None: it is an image.
+    surveys
+        Whether chips all over the pair are matched, too, which rules ask for.
     """
 
     matcher: str = CHIPS
@@ -132,6 +134,7 @@ class Specification:
     dem: Any = None
     input_dem: Any = None
     light: Light | None = None
+    surveys: bool = True
 
     def with_surface(self, surface: StatedSurface) -> Specification:
         """Return the same with elevated objects, and whose images show them."""

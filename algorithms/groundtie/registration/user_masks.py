@@ -107,6 +107,10 @@ class UserMask:
         named = isinstance(self.mask, (str, Path))
         return file_name(self.mask) if named else str(getattr(self.mask, "name", "the mask"))
 
+    def summary(self) -> dict[str, Any]:
+        """Return it as values that JSON can carry."""
+        return {"name": self.name, "values": self.values, "found_beside": bool(self.origin)}
+
 
 def _check_values(mask: Any, values: str) -> None:
     given = UserMask(mask)

@@ -19,6 +19,7 @@ from ..raster_names import identity
 from ..rasters.reading import bounded_cache
 from ..registration.registered_output import model_for_grid
 from ..registration.series_evidence import DateEvidence
+from ..registration.user_masks import UserMask
 from .dates import Date, Footprints, OpenDates, open_dates
 from .delivery import SERIES_JSON, SeriesFiles
 from .frame import SeriesFrame
@@ -180,9 +181,11 @@ def _listed(given: Mapping[str, Any]) -> tuple[tuple[Listed, ...], str | None]:
         others = [date for date in dates if not _is_same(date, reference)]
         if any(date.name == reference.name for date in others):
             reference = replace(reference, name=f"{reference.name} (reference)")
-        reference = replace(reference, mask=given["reference_mask"])
+        values, mask = given["reference_mask_values"], given["reference_mask"]
+        if mask is not None or values is not None:
+            reference = replace(reference, mask=UserMask.of(reference.raster, mask, values))
         dates, name = (*others[:same], reference, *others[same:]), reference.name
-    elif given["reference_mask"] is not None:
+    elif given["reference_mask"] is not None or given["reference_mask_values"] is not None:
         raise ParameterError("a mask of the reference needs a reference")
     if len(dates) < 2:
         raise ParameterError("a series needs two dates at least, or one and a reference")

@@ -27,6 +27,8 @@ from ..rasters.held import held_grey
 from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import RasterSource, open_raster
+from ..registration.user_masks import UserMask
+from .date_masks import DateMask, draw_mask, is_drawn
 from .inputs import Listed
 
 # Dates are held in memory as long as all of them have no more pixels: 400 MB as float32.
@@ -50,12 +52,15 @@ class Date:
         What is matched: the same, or its grey image in memory.
     band
         Which band of the file is matched; None: the mean of all.
+    mask
+        Its mask, on its own pixels; None: it has none, or one that each pair makes.
     """
 
     listed: Listed
     source: RasterSource
     matched: RasterSource
     band: int | None
+    mask: DateMask | None = None
 
     @property
     def name(self) -> str:
@@ -72,6 +77,15 @@ class Date:
         matched = self.matched if grid is None else replace(self.matched, grid=grid)
         return Image(matched, self._matched_band)
 
+    def masked(self, image: Image) -> Image:
+        """Return its image in a pair with its mask."""
+        return image if self.mask is None else self.mask.on(image)
+
+    @property
+    def pair_mask(self) -> UserMask | None:
+        """The mask that each pair makes; None: there is none."""
+        return None if self.mask is not None else self.listed.mask
+
     @cached_property
     def is_radar(self) -> bool:
         """Whether its metadata or its speckle are those of a radar image."""
@@ -82,7 +96,9 @@ class Date:
     @cached_property
     def key(self) -> str:
         """Stands for the file by name, size and time of its last change, and for the mask's."""
-        facts = [file_facts(self.listed.raster), file_facts(self.listed.mask)]
+        mask = self.listed.mask
+        facts: list[Any] = [file_facts(self.listed.raster)]
+        facts += [file_facts(None)] if mask is None else [file_facts(mask.mask), mask.values]
         return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
 
     def footprint(self, crs: CRS | None) -> Any:
@@ -144,7 +160,11 @@ def open_dates(
         try:
             source = stack.enter_context(open_raster(one.raster))
             held += source.grid.width * source.grid.height
-            date = Date(one, source, source, band)
+            mask = None
+            if one.mask is not None and is_drawn(one.mask):
+                mask = draw_mask(source, one.mask, stack, context.quiet().progress)
+                context.update(number / len(listed), mask.note)
+            date = Date(one, source, source, band, mask)
             if held <= _MOST_HELD_PX:
                 date = replace(date, matched=held_grey(source, band))
             dates.append(date)

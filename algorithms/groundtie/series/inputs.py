@@ -10,12 +10,13 @@ from pathlib import Path
 
 from ..errors import ParameterError
 from ..raster_names import file_name, identity, located
+from ..registration.user_masks import UserMask
 from ..stac_items import RASTER_SUFFIXES, StacItem, is_item, raster_of_item, read_items, time_of
 from ..tables import read_rows
 
 _TABLE = (".csv",)
 
-_COLUMNS = ("file", "name", "time", "mask")
+_COLUMNS = ("file", "name", "time", "mask", "mask_values")
 
 
 @dataclass(frozen=True)
@@ -31,22 +32,24 @@ class Listed:
     time
         When it was taken; None: unknown.
     mask
-        A raster or vector layer that states what of it takes part; None: all.
+        What of it takes part; None: all.
     """
 
     name: str
     raster: Path | str
     time: datetime.datetime | None
-    mask: Path | str | None = None
+    mask: UserMask | None = None
 
     def anywhere(self) -> Listed:
         """Return the same for a process in another folder."""
-        raster, mask = (
-            Path(os.path.abspath(path)) if isinstance(path, Path) else path
-            for path in (self.raster, self.mask)
-        )
-        assert raster is not None
-        return replace(self, raster=raster, mask=mask)
+        mask = self.mask
+        if mask is not None:
+            mask = replace(mask, mask=_absolute(mask.mask))
+        return replace(self, raster=_absolute(self.raster), mask=mask)
+
+
+def _absolute(path: Path | str) -> Path | str:
+    return Path(os.path.abspath(path)) if isinstance(path, Path) else path
 
 
 def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed, ...]:
@@ -56,7 +59,7 @@ def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed,
     ----------
     inputs
         Files, URLs, folders of rasters, patterns, CSV tables with a column `file` (and `name`,
-        `time`, `mask`), and STAC items or item collections as JSON.
+        `time`, `mask`, `mask_values`), and STAC items or item collections as JSON.
     asset
         Which asset of STAC items is meant where a name states none (`item.json#asset`); None: the
         only one that is a raster.
@@ -71,6 +74,10 @@ def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed,
     for given in inputs:
         for date in _listed(given, asset):
             found.setdefault(identity(date.raster), date)
+    # What lies beside an image as its mask is no date, though its folder names it.
+    for mask in [date.mask for date in found.values() if date.mask is not None]:
+        if mask.origin:
+            found.pop(identity(mask.mask), None)
     names: dict[str, Listed] = {}
     for date in found.values():
         other = names.setdefault(date.name, date)
@@ -108,7 +115,7 @@ def _listed(given: Path | str, asset: str | None) -> Iterable[Listed]:
 
 def _file(raster: Path | str) -> Listed:
     stem = Path(file_name(raster)).stem
-    return Listed(stem, raster, time_of(stem))
+    return Listed(stem, raster, time_of(stem), UserMask.of(raster, None, None))
 
 
 def _of_table(path: Path) -> list[Listed]:
@@ -122,7 +129,11 @@ def _of_row(path: Path, number: int, row: Mapping[str, str]) -> Listed:
     time = time_of(row["time"]) if "time" in row else date.time
     if "time" in row and time is None:
         raise ParameterError(f"{path}, row {number}: {row['time']!r} is no time (ISO 8601)")
-    mask = located(row["mask"], path) if "mask" in row else None
+    given = located(row["mask"], path) if "mask" in row else None
+    try:
+        mask = UserMask.of(date.raster, given, row.get("mask_values"))
+    except ParameterError as error:
+        raise ParameterError(f"{path}, row {number}: {error}") from error
     return Listed(row.get("name", date.name), date.raster, time, mask)
 
 
@@ -133,4 +144,5 @@ def _of_stac(given: Path | str, asset: str | None) -> list[Listed]:
 
 def _of_item(item: StacItem, asset: str | None) -> Listed:
     time = None if item.time is None else time_of(item.time)
-    return Listed(item.id, item.raster(asset), time)
+    raster = item.raster(asset)
+    return Listed(item.id, raster, time, UserMask.of(raster, None, None))

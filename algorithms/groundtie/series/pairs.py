@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..context import Context, threads
-from ..errors import CancelledError, GroundTieError
+from ..errors import CancelledError, GroundTieError, WorkerLostError
 from ..geometry.estimation import jackknife_deviations
 from ..geometry.models import Model
 from ..masks.choice import AUTO
@@ -43,7 +43,7 @@ class Settings:
     ----------
     model
         "auto", "translation", "similarity" or "affine".
-    max_error_px, search_radius_m, matching_pixel_size_m
+    max_error_px, search_radius_m, matching_pixel_size_m, surveys
         See `Specification`.
     """
 
@@ -51,6 +51,11 @@ class Settings:
     max_error_px: float
     search_radius_m: float | None
     matching_pixel_size_m: float | None
+    surveys: bool = True
+
+    def of_loops(self) -> Settings:
+        """Return how a pair is registered that places no date, but closes a loop."""
+        return replace(self, surveys=False)
 
     def specification(self, first: Date, second: Date) -> Specification:
         """Return how a pair is registered: the preset of what the two images are."""
@@ -66,6 +71,7 @@ class Settings:
             max_error_px=self.max_error_px,
             search_radius_m=self.search_radius_m,
             matching_pixel_size_m=self.matching_pixel_size_m,
+            surveys=self.surveys,
         )
 
 
@@ -78,7 +84,8 @@ class PairResult:
     first, second
         Names of the dates: reference and input.
     key
-        Stands for the files, the settings and the version.
+        Stands for the files, the settings and the version; empty: whoever did it was lost, so that
+        it is done again in the next run.
     accepted, rule, reason
         The verdict.
     check_rmse_px
@@ -87,6 +94,8 @@ class PairResult:
         See `network.Link`; None if it was refused.
     seconds
         How long it took.
+    is_surveyed
+        Whether the rules on the survey were asked, too.
     """
 
     first: str
@@ -99,6 +108,7 @@ class PairResult:
     displacement: tuple[float, ...] | None = None
     covariance: tuple[tuple[float, ...], ...] | None = None
     seconds: float = 0.0
+    is_surveyed: bool = True
 
     def link(self, first: int, second: int) -> Link:
         """Return an accepted registration as a link of two dates by their numbers."""
@@ -160,6 +170,10 @@ class PairTask:
     settings: Settings
     frame: SeriesFrame
 
+    def lost(self, error: WorkerLostError) -> PairResult:
+        """Return what became of it if the worker that did it was lost."""
+        return PairResult(self.first.name, self.second.name, "", False, "", error.one_line())
+
     def elsewhere(self) -> Callable[[], PairResult]:
         """Return the task for another process: with files, not pixels."""
         dates = self.first, self.second
@@ -186,7 +200,13 @@ def register_pair(task: PairTask, context: Context) -> PairResult:
     first, second, settings, frame = task.first, task.second, task.settings, task.frame
     started = time.perf_counter()
     refused = PairResult(
-        first.name, second.name, pair_key(first, second, settings, frame), False, "", ""
+        first.name,
+        second.name,
+        pair_key(first, second, settings, frame),
+        False,
+        "",
+        "",
+        is_surveyed=settings.surveys,
     )
     spec = settings.specification(first, second)
     grids = [
@@ -196,9 +216,14 @@ def register_pair(task: PairTask, context: Context) -> PairResult:
     images = [date.image(grid) for date, grid in zip((first, second), grids, strict=True)]
     try:
         with ExitStack() as stack, bounded_cache():
-            masks = first.listed.mask, second.listed.mask
+            masks = first.pair_mask, second.pair_mask
             opened = pair_images(images[0], images[1], spec, context.quiet(), masks, stack, started)
-            found = run(opened, spec, context)
+            pair = replace(
+                opened.pair,
+                reference=first.masked(opened.pair.reference),
+                input=second.masked(opened.pair.input),
+            )
+            found = run(replace(opened, pair=pair), spec, context)
     except CancelledError:
         raise
     except GroundTieError as error:

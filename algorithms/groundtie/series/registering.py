@@ -5,25 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor, wait
 from dataclasses import dataclass, field
+from itertools import permutations
 
 import numpy as np
 
 from ..context import Context
+from ..errors import WorkerLostError
 from ..executors import POLL_SECONDS, result_of
+from .closure import triplet_closures
 from .dates import Date, Footprints
 from .frame import FloatArray, SeriesFrame
-from .network import Link
+from .network import Link, adjust
 from .pairs import PairResult, PairTask, Settings, pair_key, register_pair
 
 # Footprints that have less in common are not worth matching: as many chips as a small scene has do
 # not fit in.
 _LEAST_SHARE = 0.1
 
-# A date that the next one in time overlaps less than another by this is matched with that, too.
-_MUCH_MORE = 0.2
-
-# How many dates are tried until one reaches a date that the hub does not, and how many links each
-# date should have: two make a loop.
+# How many dates are tried until one reaches a date that the hub does not, or confirms one in doubt;
+# and how many links each date should have: two make a loop.
 _MOST_TRIES = 3
 _WANTED_LINKS = 2
 
@@ -63,13 +63,13 @@ class Matching:
     reused: int = 0
 
     def __post_init__(self) -> None:
-        count = len(self.dates)
-        for i in range(count):
-            for j in range(count):
-                key = pair_key(self.dates[i], self.dates[j], self.settings, self.frame)
-                if i != j and key in self.known:
+        for i, j in permutations(range(len(self.dates)), 2):
+            for settings in (self.settings, self.settings.of_loops()):
+                key = pair_key(self.dates[i], self.dates[j], settings, self.frame)
+                if key in self.known:
                     self.results[i, j] = self.known[key]
                     self.reused += 1
+                    break
 
     @property
     def links(self) -> list[Link]:
@@ -81,14 +81,15 @@ class Matching:
         others = [date for date in range(len(self.dates)) if date != hub]
         self._attempt_all([(hub, date) for date in others], hub)
         self._reach(others, hub)
-        placed = self.placed(hub)
-        chain = [date for date in range(len(self.dates)) if date in placed]
-        self._attempt_all(self._neighbours(chain), hub)
-        for date in chain:
-            for other in self._nearest(date, self.placed(hub)):
-                if self._degree(date) >= _WANTED_LINKS or date == hub:
+        reached = self.placed(hub)
+        linked = [date for date in others if date in reached]
+        self._attempt_all(self._partners(linked), hub)
+        for date in linked:
+            for other in self._nearest(date, reached):
+                if self._degree(date) >= _WANTED_LINKS:
                     break
                 self._attempt(other, date, hub)
+        self._attempt_all(self._further(linked, hub), hub)
 
     def freely(self) -> int:
         """Register as `from_hub` from the best of several dates, and return it."""
@@ -157,10 +158,10 @@ class Matching:
 
         What becomes of one does not depend on the others: they may run at once.
         """
-        new = {
+        asked = {
             frozenset(ends): ends
             for ends in pairs
-            if self._known(*ends) is None and self.footprints.share(*ends) >= _LEAST_SHARE
+            if self.footprints.share(*ends) >= _LEAST_SHARE and not self._is_done(ends, hub)
         }
         placed = self.placed(hub)
         tasks = {
@@ -168,10 +169,10 @@ class Matching:
                 self.dates[first],
                 self.dates[second],
                 (placed.get(first), placed.get(second)),
-                self.settings,
+                self._settings((first, second), hub),
                 self.frame,
             )
-            for first, second in new.values()
+            for first, second in asked.values()
         }
         if self.executor is None:
             for ends, task in tasks.items():
@@ -185,10 +186,32 @@ class Matching:
                 part = self._next_part(f"registering {len(tasks)} pairs")
                 while wait([future], timeout=POLL_SECONDS).not_done:
                     part.progress.check()
-                self._add(ends, result_of(future))
+                try:
+                    self._add(ends, result_of(future))
+                except WorkerLostError as error:
+                    self._add(ends, tasks[ends].lost(error))
         finally:
             for future in futures.values():
                 future.cancel()
+
+    def _settings(self, ends: tuple[int, int], hub: int) -> Settings:
+        """Return how a pair is registered.
+
+        Where the hub accepted both dates by all rules, the pair places neither of them: it closes
+        the loop, which is what it is checked by.
+        """
+        links = [self._known(hub, date) for date in ends]
+        if all(one is not None and one.accepted and one.is_surveyed for one in links):
+            return self.settings.of_loops()
+        return self.settings
+
+    def _is_done(self, ends: tuple[int, int], hub: int) -> bool:
+        found = self._known(*ends)
+        if found is None:
+            return False
+        # Who was refused without a survey is refused with one, too.
+        is_enough = found.is_surveyed or not found.accepted
+        return is_enough or not self._settings(ends, hub).surveys
 
     def _next_part(self, message: str) -> Context:
         expected = max(2 * len(self.dates) - 2, self.done + 1)
@@ -196,20 +219,41 @@ class Matching:
         return self.context.part(self.done / expected, (self.done + 1) / expected)
 
     def _add(self, ends: tuple[int, int], result: PairResult) -> None:
+        self.results.pop(ends[::-1], None)
         self.results[ends] = result
         self.done += 1
 
-    def _neighbours(self, chain: Sequence[int]) -> list[tuple[int, int]]:
-        """Return for each date the next in time, and another one if they overlap much more."""
+    def _partners(self, dates: Sequence[int]) -> list[tuple[int, int]]:
+        """Return pairs of dates that lack links, each with the best of those that are left."""
+        lacking = [date for date in dates if self._degree(date) < _WANTED_LINKS]
         pairs = []
-        for number, date in enumerate(chain[:-1]):
-            following = chain[number + 1]
-            pairs.append((date, following))
-            share = self.footprints.share(date, following)
-            best = max(chain[number + 1 :], key=lambda other: self.footprints.share(date, other))
-            if self.footprints.share(date, best) > share + _MUCH_MORE:
-                pairs.append((date, best))
+        while lacking:
+            date = lacking.pop(0)
+            best = [
+                other
+                for other in self._nearest(date, lacking)
+                if self._known(date, other) is None
+                and self.footprints.share(date, other) >= _LEAST_SHARE
+            ]
+            if best:
+                lacking.remove(best[0])
+                pairs.append((date, best[0]))
         return pairs
+
+    def _further(self, dates: Sequence[int], hub: int) -> list[tuple[int, int]]:
+        """Return further pairs of dates whose links contradict others: they show which is wrong."""
+        links = self.links
+        found = adjust(self.frame, links, len(self.dates), hub, is_free=False)
+        closures = triplet_closures(self.frame, links, found.scatter_px)
+        doubtful = {date for one in closures if not one.is_closed for date in one.dates}
+        for link, is_kept in zip(links, found.kept, strict=True):
+            doubtful |= set() if is_kept else {link.first, link.second}
+        return [
+            (other, date)
+            for date in dates
+            if date in doubtful
+            for other in self._nearest(date, dates)[:_MOST_TRIES]
+        ]
 
     def _nearest(self, date: int, among: Iterable[int]) -> list[int]:
         """Return dates, those of the best overlap and nearest in time first."""

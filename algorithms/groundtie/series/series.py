@@ -235,6 +235,7 @@ class Series:
             transform = date.transform
             row["transform"] = None if transform is None else transform.to_json()
             row["written"] = self.written.get(date.name)
+            row["mask"] = None if date.listed.mask is None else date.listed.mask.summary()
             covariance = date.verdict.covariance
             row["covariance_px2"] = None if covariance is None else covariance.tolist()
         return {
@@ -255,6 +256,10 @@ class Series:
             f"registered: {len(self.registered)} of {count} dates, {self.datum}",
             *(f"left out: {date.name}: {date.verdict.reason}" for date in self.left_out),
         ]
+        masks = [date.listed.mask for date in self.dates if date.listed.mask is not None]
+        if masks:
+            beside = sum(bool(mask.origin) for mask in masks)
+            lines.append(f"masks: of {len(masks)} dates, {beside} of them found beside the image")
         if loops["count"]:
             lines.append(
                 f"loops that close: {loops['closed']} of {loops['count']}; error "

@@ -87,6 +87,7 @@ def coregister_series(
         Path | None,
         MaskIn(label="Mask of the reference", help=registration.MASK_HELP, advanced=True),
     ] = None,
+    reference_mask_values: registration.ReferenceMaskValues = None,
     matching_pixel_size: general.MatchingPixelSize = None,
     output_grid: registration.OutputGrid = "reference",
     resampling: general.Resampling = "cubic",

@@ -26,6 +26,7 @@ def register(
     tie_points: registration.TiePointsOut = None,
     transform: general.TransformOut = None,
     report: registration.ReportOut = None,
+    displacement: registration.DisplacementOut = None,
     reference_band: general.ReferenceBand = None,
     input_band: general.InputBand = None,
     reference_mask: registration.ReferenceMask = None,

@@ -1,0 +1,90 @@
+"""Masks of dates: drawn once a date on its own pixels, so that they move with these."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+
+from ..masks.layer import read_layer
+from ..masks.regions import WIDTH_M
+from ..masks.scene import Scene, Selection, write_mask
+from ..masks.values import RasterMask, mask_values
+from ..progress import Progress
+from ..rasters.atomic import scratch_folder
+from ..rasters.pair import Image
+from ..rasters.reading import RasterSource, Window, open_raster
+from ..registration.user_masks import UserMask
+
+
+@dataclass(frozen=True)
+class DateMask:
+    """A mask on the pixels of a date.
+
+    Parameters
+    ----------
+    raster
+        1 where pixels take part, else 0; on the date's own grid.
+    hides
+        See `Image.mask_hides`.
+    note
+        What a user should know of it.
+    """
+
+    raster: RasterSource
+    hides: bool
+    note: str
+
+    def on(self, image: Image) -> Image:
+        """Return the date's image with this mask, wherever its pixels were moved."""
+        moved = replace(self.raster, grid=image.source.grid)
+        return replace(image, mask=moved, mask_hides=self.hides, mask_note=self.note)
+
+
+def draw_mask(
+    source: RasterSource, mask: UserMask, stack: ExitStack, progress: Progress
+) -> DateMask:
+    """Draw a raster, or a layer of what takes no part, on the pixels of a date.
+
+    Parameters
+    ----------
+    source
+        The date.
+    mask
+        Its mask; `is_drawn` states which are drawn.
+    stack
+        Keeps the drawn mask until it is closed.
+    progress
+        Receives every tile.
+    """
+    scene = Scene.of(source)
+    folder = stack.enter_context(scratch_folder())
+    with ExitStack() as own:
+        select = _selection(scene, source, mask, own)
+        share = write_mask(scene, folder / "mask.tif", select, progress)
+    raster = stack.enter_context(open_raster(folder / "mask.tif"))
+    note = f"{mask.name}{mask.origin} keeps {share:.0%} of {source.path}"
+    return DateMask(raster, mask.values is not None, note)
+
+
+def is_drawn(mask: UserMask) -> bool:
+    """Whether a mask is a raster or what takes no part: others depend on the pair."""
+    return mask.is_raster or (mask.is_layer and mask.values is not None)
+
+
+def _selection(
+    scene: Scene, source: RasterSource, mask: UserMask, stack: ExitStack
+) -> Callable[[Window], Selection]:
+    if mask.is_layer:
+        return replace(read_layer(mask.mask, scene, WIDTH_M), is_outside=True).select
+    raster = stack.enter_context(open_raster(mask.mask))
+    if mask.values is not None:
+        return RasterMask(scene, raster, mask_values(mask.values)).select
+    image, grid = Image(source, mask=raster), source.grid
+
+    def select(window: Window) -> Selection:
+        valid = scene.read(window).valid
+        shown = image.shown_on(grid.window(*window), grid.map_to_pixel)
+        return Selection(valid & shown, valid)
+
+    return select
