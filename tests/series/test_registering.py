@@ -86,9 +86,9 @@ def test_every_date_with_the_hub_and_in_a_loop(matching: Make) -> None:
 def test_only_links_that_close_loops_of_accepted_ones_go_without_a_survey(matching: Make) -> None:
     found = matching(6, unlike=((0, 3),))
     found.from_hub(0)
-    # 3 is reached by 2 and then confirmed by 1, which both place it; 4 and 5 are placed by 0.
-    assert {ends for ends, one in found.results.items() if not one.is_surveyed} == {(4, 5)}
-    assert {(2, 3), (1, 3)} <= found.results.keys()
+    # 3, which 0 refused, is placed by its neighbours; the others are placed by 0.
+    assert {ends for ends, one in found.results.items() if not one.is_surveyed} == {(1, 2), (4, 5)}
+    assert {(2, 3), (3, 4)} <= found.results.keys()
 
 
 @pytest.mark.parametrize("wrong", [(0, 2), (1, 2)])
@@ -175,6 +175,14 @@ def test_a_date_that_the_hub_refuses_is_reached_by_two_others(matching: Make) ->
     found.from_hub(0)
     own = {ends for ends, one in found.results.items() if 3 in ends and one.accepted}
     assert len(own) >= 2
+
+
+def test_all_neighbours_are_linked_where_the_hub_refuses_a_date(matching: Make) -> None:
+    found = matching(7, unlike=((0, 4), (0, 5)))
+    found.from_hub(0)
+    assert {(date, date + 1) for date in range(1, 6)} <= set(found.results) | {
+        ends[::-1] for ends in found.results
+    }
 
 
 def test_a_chain_of_dates_that_the_hub_refuses_is_followed(matching: Make) -> None:

@@ -22,6 +22,9 @@ from .pairs import PairResult, PairTask, Settings, pair_key, register_pair
 # not fit in.
 _LEAST_SHARE = 0.1
 
+# A date that the next one in time overlaps less than another by this is matched with that, too.
+_MUCH_MORE = 0.2
+
 # How many dates are tried until one reaches a date that the hub does not, or confirms one in doubt;
 # and how many links each date should have: two make a loop.
 _MOST_TRIES = 3
@@ -83,7 +86,11 @@ class Matching:
         self._reach(others, hub)
         reached = self.placed(hub)
         linked = [date for date in others if date in reached]
-        self._attempt_all(self._partners(linked), hub)
+        if all(self._is_linked(hub, date) for date in linked):
+            self._attempt_all(self._partners(linked), hub)
+        else:
+            # Two links may be one way on through a date that others are reached by.
+            self._attempt_all(self._neighbours(sorted(reached)), hub)
         for date in linked:
             for other in self._nearest(date, reached):
                 if self._degree(date) >= _WANTED_LINKS:
@@ -147,6 +154,9 @@ class Matching:
     def _attempt(self, first: int, second: int, hub: int) -> bool:
         """Register a pair unless that was done; return whether it is linked."""
         self._attempt_all([(first, second)], hub)
+        return self._is_linked(first, second)
+
+    def _is_linked(self, first: int, second: int) -> bool:
         found = self._known(first, second)
         return found is not None and found.accepted
 
@@ -222,6 +232,18 @@ class Matching:
         self.results.pop(ends[::-1], None)
         self.results[ends] = result
         self.done += 1
+
+    def _neighbours(self, chain: Sequence[int]) -> list[tuple[int, int]]:
+        """Return for each date the next in time, and another one if they overlap much more."""
+        pairs = []
+        for number, date in enumerate(chain[:-1]):
+            following = chain[number + 1]
+            pairs.append((date, following))
+            share = self.footprints.share(date, following)
+            best = max(chain[number + 1 :], key=lambda other: self.footprints.share(date, other))
+            if self.footprints.share(date, best) > share + _MUCH_MORE:
+                pairs.append((date, best))
+        return pairs
 
     def _partners(self, dates: Sequence[int]) -> list[tuple[int, int]]:
         """Return pairs of dates that lack links, each with the best of those that are left."""
