@@ -83,6 +83,13 @@ class Survey:
         return float(self.mean[self._distance_px > self.elsewhere_px].max())
 
     @property
+    def rival_deviations(self) -> float:
+        """How high it is there, in robust standard deviations of what it is elsewhere."""
+        far = self.mean[self._distance_px > self.elsewhere_px]
+        spread = 1.4826 * float(np.median(np.abs(far - np.median(far))))
+        return self.rival_height / max(spread, 1e-9)
+
+    @property
     def _distance_px(self) -> FloatArray:
         shift = np.arange(-SURVEY_RADIUS_PX, SURVEY_RADIUS_PX + 1)
         return np.hypot(*np.meshgrid(shift, shift))
