@@ -156,7 +156,30 @@ def test_a_second_place_beneath_a_copy(height: float, expected: list[str]) -> No
 def test_what_copies_leave_may_contradict(part: int, expected: list[str]) -> None:
     """It need not confirm the transform, as a cloud deck looks like a copy, but not another."""
     left = survey(3, part, height=6.0)
-    found = evidence(GOOD, survey=survey(), rest=Rest(left, is_explained=True))
+    found = evidence(GOOD, survey=survey(), rest=Rest(left, True, survey()))
+    assert refusing(found) == expected
+
+
+@pytest.mark.parametrize(
+    ("height", "rival", "noise", "expected"),
+    [
+        (1.2, 1.5, 0.1, ["pixel-locked content"]),
+        (1.2, 0.9, 0.1, []),
+        (2.7, 2.7, 0.1, []),
+        (1.2, 1.5, 4.0, []),
+    ],
+)
+@pytest.mark.parametrize("is_beyond", [False, True])
+def test_copies_must_not_leave_ground_elsewhere(
+    height: float, rival: float, noise: float, expected: list[str], is_beyond: bool
+) -> None:
+    """A weak rest is no evidence, unless a second place stands out of its noise."""
+    plain, left = survey(height=6.0), survey(height=height, rival=rival)
+    drawn = noise * np.random.default_rng(3).normal(size=left.surfaces.shape)
+    is_flat = left.surfaces == 0
+    left = replace(left, surfaces=np.where(is_flat, drawn, left.surfaces).astype(np.float32))
+    pair = (plain, left) if is_beyond else (left, plain)
+    found = evidence(GOOD, survey=survey(), rest=Rest(pair[0], True, pair[1]))
     assert refusing(found) == expected
 
 
