@@ -78,7 +78,7 @@ def _elsewhere(evidence: RegistrationEvidence) -> float:
     rest = evidence.rest
     if rest is None or rest.beyond is None:
         return math.nan
-    return max(deviations_elsewhere(left) for left in (rest.survey, rest.beyond))
+    return deviations_elsewhere(rest)
 
 
 STATISTICS = (

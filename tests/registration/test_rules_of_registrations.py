@@ -161,17 +161,16 @@ def test_what_copies_leave_may_contradict(part: int, expected: list[str]) -> Non
 
 
 @pytest.mark.parametrize(
-    ("height", "rival", "noise", "expected"),
+    ("height", "rival", "noise", "is_refused"),
     [
-        (1.2, 1.5, 0.1, ["pixel-locked content"]),
-        (1.2, 0.9, 0.1, []),
-        (2.7, 2.7, 0.1, []),
-        (1.2, 1.5, 4.0, []),
+        (1.2, 2.0, 0.1, True),
+        (2.6, 2.6, 0.1, False),
+        (1.2, 2.0, 6.0, False),
     ],
 )
 @pytest.mark.parametrize("is_beyond", [False, True])
 def test_copies_must_not_leave_ground_elsewhere(
-    height: float, rival: float, noise: float, expected: list[str], is_beyond: bool
+    height: float, rival: float, noise: float, is_refused: bool, is_beyond: bool
 ) -> None:
     """A weak rest is no evidence, unless a second place stands out of its noise."""
     plain, left = survey(height=6.0), survey(height=height, rival=rival)
@@ -180,7 +179,20 @@ def test_copies_must_not_leave_ground_elsewhere(
     left = replace(left, surfaces=np.where(is_flat, drawn, left.surfaces).astype(np.float32))
     pair = (plain, left) if is_beyond else (left, plain)
     found = evidence(GOOD, survey=survey(), rest=Rest(pair[0], True, pair[1]))
-    assert refusing(found) == expected
+    assert refusing(found) == ["pixel-locked content"] * is_refused
+
+
+@pytest.mark.parametrize(
+    ("masked_rival", "beyond_rival", "is_refused"),
+    [(1.7, 0.9, False), (1.9, 0.9, True), (1.1, 1.0, True)],
+)
+def test_what_is_not_explained_needs_no_higher_place_elsewhere(
+    masked_rival: float, beyond_rival: float, is_refused: bool
+) -> None:
+    """Of a mask's rest, repetition alone leaves places about as high."""
+    left, beyond = (survey(height=1.2, rival=of) for of in (masked_rival, beyond_rival))
+    found = evidence(GOOD, survey=survey(), rest=Rest(left, True, beyond))
+    assert refusing(found) == ["pixel-locked content"] * is_refused
 
 
 @pytest.mark.parametrize(
