@@ -74,6 +74,10 @@ def _rest_height(evidence: RegistrationEvidence) -> float:
     return math.nan if rest is None or rest.is_explained else rest.survey.height
 
 
+def _in_bands(evidence: RegistrationEvidence) -> float:
+    return max((one.survey.excess for one in evidence.bands), default=math.nan)
+
+
 def _elsewhere(evidence: RegistrationEvidence) -> float:
     rest = evidence.rest
     if rest is None or rest.beyond is None:
@@ -88,6 +92,7 @@ STATISTICS = (
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),
     Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),
     Statistic("pixel-locked content: copies", BEYOND_DEVIATIONS, _elsewhere),
+    Statistic("band elsewhere: excess", LEAST_EXCESS, _in_bands),
 )
 
 

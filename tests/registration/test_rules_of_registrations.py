@@ -17,6 +17,7 @@ from evidences import (
     evidence,
     facts,
     fit_points,
+    in_band,
     masked,
     refusing,
     scatter,
@@ -150,6 +151,15 @@ def test_without_locked_content_no_part_must_match_elsewhere() -> None:
 def test_a_second_place_beneath_a_copy(height: float, expected: list[str]) -> None:
     found = replace(survey(), ghost_height=height)
     assert refusing(evidence(GOOD, survey=found)) == expected
+
+
+@pytest.mark.parametrize(("chips", "expected"), [(2, []), (14, ["band elsewhere"])])
+def test_few_chips_of_a_band_are_no_ground(chips: int, expected: list[str]) -> None:
+    """Masks are flat but for a few rims, which match anything: hundreds of deviations high."""
+    alone = replace(survey(), surfaces=np.zeros_like(survey().surfaces))
+    alone.surfaces[:chips, 0, 0] = 300.0
+    found = evidence(GOOD, survey=survey(), bands=in_band(alone))
+    assert refusing(found) == expected
 
 
 @pytest.mark.parametrize(("part", "expected"), [(7, ["pixel-locked content"]), (2, [])])

@@ -102,6 +102,13 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
     )
 
 
+def _other_ground_in_a_band(evidence: RegistrationEvidence) -> str | None:
+    for one in evidence.bands:
+        if one.survey.is_elsewhere:
+            return f"band {one.band} of the {one.image} alone matches elsewhere"
+    return None
+
+
 SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "part elsewhere",
@@ -144,5 +151,14 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suites margins and attacks",
         WITHOUT,
         _locked,
+    ),
+    Rule(
+        "band elsewhere",
+        SURVEY,
+        "bands of an image do not coincide, and in one alone chips all over together match "
+        f"elsewhere {LEAST_EXCESS:g} standard deviations of noise better",
+        "[Kulldorff1997]; suite margins",
+        "give the band that shows the ground, alone in a file",
+        _other_ground_in_a_band,
     ),
 )
