@@ -20,10 +20,12 @@ from groundtie.matching.parts import LEAST_EXCESS
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
+    BEYOND_DEVIATIONS,
     GHOST_HEIGHT,
     RIVAL_HEIGHT,
     WEAK_HEIGHT,
     WEAK_REST_HEIGHT,
+    deviations_elsewhere,
 )
 from groundtie.registration.specification import COREGISTER
 
@@ -72,12 +74,25 @@ def _rest_height(evidence: RegistrationEvidence) -> float:
     return math.nan if rest is None or rest.is_explained else rest.survey.height
 
 
+def _in_bands(evidence: RegistrationEvidence) -> float:
+    return max((one.survey.excess for one in evidence.bands), default=math.nan)
+
+
+def _elsewhere(evidence: RegistrationEvidence) -> float:
+    rest = evidence.rest
+    if rest is None or rest.beyond is None:
+        return math.nan
+    return deviations_elsewhere(rest)
+
+
 STATISTICS = (
     Statistic("part elsewhere: excess", LEAST_EXCESS, _excess),
     Statistic("second place: share of the height", RIVAL_HEIGHT, _rival),
     Statistic("second place: ghost", GHOST_HEIGHT, _of_survey("ghost_height")),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),
     Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),
+    Statistic("pixel-locked content: copies", BEYOND_DEVIATIONS, _elsewhere),
+    Statistic("band elsewhere: excess", LEAST_EXCESS, _in_bands),
 )
 
 

@@ -13,6 +13,7 @@ from groundtie.geometry.model_choice import block_folds
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.masks.choice import MaskUsed
+from groundtie.matching.bands import BandSurvey
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
@@ -117,6 +118,11 @@ def survey(confirming: int = 49, part: int = 0, height: float = 8.0, rival: floa
     surfaces[part:, SURVEY_RADIUS_PX + 9, SURVEY_RADIUS_PX] = rival
     surfaces[:part, SURVEY_RADIUS_PX - 5, SURVEY_RADIUS_PX + 9] = height
     return Survey(GRID, centres, shifts, surfaces)
+
+
+def in_band(found: Survey) -> tuple[BandSurvey, ...]:
+    """Return what the input's second band shows alone."""
+    return (BandSurvey("input", 2, found),)
 
 
 def facts(

@@ -23,6 +23,7 @@ from evidences import (
     fallen,
     fit_points,
     fit_with,
+    in_band,
     points,
     refinement,
     refusing,
@@ -206,6 +207,11 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "pixel-locked content": (
         evidence(GOOD, survey=survey(), rest=Rest(survey(height=2.4, rival=1.0))),
         evidence(GOOD, survey=survey(), rest=Rest(survey(height=2.6, rival=1.0))),
+    ),
+    # Of 49 chips' mean surfaces, standard deviations are a seventh.
+    "band elsewhere": (
+        evidence(GOOD, survey=survey(), bands=in_band(survey(height=1.0, rival=2.3))),
+        evidence(GOOD, survey=survey(), bands=in_band(survey(height=1.0, rival=2.1))),
     ),
     "narrow control": (
         refinement(control((20, -9), corner=0.2), kind="shift"),

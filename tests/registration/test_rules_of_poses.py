@@ -8,6 +8,7 @@ from evidences import (
     displaced,
     estimated,
     fit_points,
+    in_band,
     refusing,
     scatter,
     survey,
@@ -40,6 +41,15 @@ def test_rules_of_registrations_judge_poses(
     residuals = np.column_stack([errors, np.zeros(21)])
     moved = estimated(fit_points()).transform
     assert refusing(PoseSurveyEvidence(PoseSurvey(residuals, found, rest, moved))) == expected
+
+
+@pytest.mark.parametrize(("rival", "expected"), [(8.0, ["band elsewhere"]), (1.0, [])])
+def test_a_band_of_other_ground_refuses_a_pose(rival: float, expected: list[str]) -> None:
+    residuals, moved = np.zeros((21, 2)), estimated(fit_points()).transform
+    alone = in_band(survey(height=2.0, rival=rival))
+    assert refusing(PoseSurveyEvidence(PoseSurvey(residuals, survey(), None, moved, alone))) == (
+        expected
+    )
 
 
 @pytest.mark.parametrize(

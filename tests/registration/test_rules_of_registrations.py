@@ -17,6 +17,7 @@ from evidences import (
     evidence,
     facts,
     fit_points,
+    in_band,
     masked,
     refusing,
     scatter,
@@ -152,12 +153,56 @@ def test_a_second_place_beneath_a_copy(height: float, expected: list[str]) -> No
     assert refusing(evidence(GOOD, survey=found)) == expected
 
 
+@pytest.mark.parametrize(("chips", "expected"), [(2, []), (14, ["band elsewhere"])])
+def test_few_chips_of_a_band_are_no_ground(chips: int, expected: list[str]) -> None:
+    """Masks are flat but for a few rims, which match anything: hundreds of deviations high."""
+    alone = replace(survey(), surfaces=np.zeros_like(survey().surfaces))
+    alone.surfaces[:chips, 0, 0] = 300.0
+    found = evidence(GOOD, survey=survey(), bands=in_band(alone))
+    assert refusing(found) == expected
+
+
 @pytest.mark.parametrize(("part", "expected"), [(7, ["pixel-locked content"]), (2, [])])
 def test_what_copies_leave_may_contradict(part: int, expected: list[str]) -> None:
     """It need not confirm the transform, as a cloud deck looks like a copy, but not another."""
     left = survey(3, part, height=6.0)
-    found = evidence(GOOD, survey=survey(), rest=Rest(left, is_explained=True))
+    found = evidence(GOOD, survey=survey(), rest=Rest(left, True, survey()))
     assert refusing(found) == expected
+
+
+@pytest.mark.parametrize(
+    ("height", "rival", "noise", "is_refused"),
+    [
+        (1.2, 2.0, 0.1, True),
+        (2.6, 2.6, 0.1, False),
+        (1.2, 2.0, 6.0, False),
+    ],
+)
+@pytest.mark.parametrize("is_beyond", [False, True])
+def test_copies_must_not_leave_ground_elsewhere(
+    height: float, rival: float, noise: float, is_refused: bool, is_beyond: bool
+) -> None:
+    """A weak rest is no evidence, unless a second place stands out of its noise."""
+    plain, left = survey(height=6.0), survey(height=height, rival=rival)
+    drawn = noise * np.random.default_rng(3).normal(size=left.surfaces.shape)
+    is_flat = left.surfaces == 0
+    left = replace(left, surfaces=np.where(is_flat, drawn, left.surfaces).astype(np.float32))
+    pair = (plain, left) if is_beyond else (left, plain)
+    found = evidence(GOOD, survey=survey(), rest=Rest(pair[0], True, pair[1]))
+    assert refusing(found) == ["pixel-locked content"] * is_refused
+
+
+@pytest.mark.parametrize(
+    ("masked_rival", "beyond_rival", "is_refused"),
+    [(1.7, 0.9, False), (1.9, 0.9, True), (1.1, 1.0, True)],
+)
+def test_what_is_not_explained_needs_no_higher_place_elsewhere(
+    masked_rival: float, beyond_rival: float, is_refused: bool
+) -> None:
+    """Of a mask's rest, repetition alone leaves places about as high."""
+    left, beyond = (survey(height=1.2, rival=of) for of in (masked_rival, beyond_rival))
+    found = evidence(GOOD, survey=survey(), rest=Rest(left, True, beyond))
+    assert refusing(found) == ["pixel-locked content"] * is_refused
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,9 @@ _log = logging.getLogger(__name__)
 # Makes surfaces of the reference's and the input's windows.
 _Way = Callable[[Description, Description, int, SimilaritySettings], Surface]
 
+# Returns stacks of the input's windows, given stacks of the reference's and the input's.
+LeftOf = Callable[[Patch, Patch], Patch]
+
 # Chips with less valid area than this in either image are not matched. A mask leaves what was
 # chosen to be matched: a little of it may be enough.
 _LEAST_VALID, LEAST_VALID_MASKED = 0.4, 0.1
@@ -68,12 +71,15 @@ class ChipMatcher:
     least_valid
         Chips with less valid area than this share in either image are not matched; None: as images
         with or without a mask.
+    left_of
+        Returns what of the input's windows is matched, given both images'; None: all is.
     """
 
     pair: ImagePair
     settings: SimilaritySettings
     held_out: MaskOf | None = None
     least_valid: float | None = None
+    left_of: LeftOf | None = None
 
     def seeing_all(self) -> ChipMatcher:
         """Return this matcher for check chips, which may see what is held out of the fit."""
@@ -157,6 +163,8 @@ class ChipMatcher:
         windows = ChipWindows(images, places, reach, self.held_out)
 
         def surfaces(reference: Patch, input: Patch) -> Surfaces:
+            if self.left_of is not None:
+                input = self.left_of(reference, input)
             of_reference, of_input = (
                 describe(windows, places.chip_px**2, self.settings)
                 for windows in (reference, input)

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
+from ..geometry.models import Model, shift_model
 from ..geometry.transform import Transform
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, reproject
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask
@@ -156,6 +157,17 @@ class LockedContent:
             drawn = lines(patches[0]) & lines(patches[1])
             same = covered(same, WINDOW_PX) | covered(drawn, _LINE_SURROUNDINGS_PX)
         return same[reach:-reach, reach:-reach]
+
+    @property
+    def model(self) -> Model:
+        """The misregistration on the map that moves the input's array by the offset."""
+        pair = self.pair
+        middle = np.array([pair.grid.centre_px])
+        xy = pair.grid.pixel_to_map(middle)
+        own = pair.input.source.grid
+        at = own.pixel_to_map(pair.reference.source.grid.map_to_pixel(xy) + self.offset_px)
+        shift = (reproject(at, own.crs, pair.grid.crs) - xy)[0]
+        return shift_model(float(shift[0]), float(shift[1]))
 
 
 def find_locked_content(

@@ -119,8 +119,8 @@ def highest_part(
     shifts = np.stack(np.meshgrid(*2 * [np.arange(-radius, radius + 1)]), axis=-1).reshape(-1, 2)
     distance = np.hypot(*shifts.T)
     is_far = (distance > ELSEWHERE_PX) & (distance <= _FARTHEST_PX)
-    highest = np.maximum(surfaces[which].max(axis=(1, 2), keepdims=True), _MOST_OF_ONE)
-    shown = (surfaces[which] * (_MOST_OF_ONE / highest)).reshape(len(which), (2 * radius + 1) ** 2)
+    span = (2 * radius + 1) ** 2
+    shown = limited(surfaces[which]).astype(float).reshape(len(which), span)
     best: Part | None = None
     if len(which) < _FEWEST_CHIPS:
         return best
@@ -141,6 +141,12 @@ def highest_part(
                 tuple(int(chip) for chip in chips),
             )
     return best
+
+
+def limited(surfaces: Surfaces) -> Surfaces:
+    """Return surfaces, shape (n, h, w), of which none is higher than one chip counts."""
+    highest = np.maximum(surfaces.max(axis=(1, 2), keepdims=True, initial=0.0), _MOST_OF_ONE)
+    return np.asarray(surfaces * (_MOST_OF_ONE / highest))
 
 
 def _rectangles(

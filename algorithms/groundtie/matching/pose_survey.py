@@ -20,6 +20,7 @@ from ..rasters.pair import ImagePair
 from ..similarity.peak import find_peak
 from ..similarity.surface import SimilaritySettings
 from .alignment import IDENTITY, align
+from .bands import BandSurvey, survey_bands
 from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .coarse_shift import level_factor
@@ -54,12 +55,15 @@ class PoseSurvey:
         The same without content that is the same in both arrays; None: there is none.
     transform
         The pose that was moved by all of them.
+    bands
+        What bands show each, of images whose bands do not coincide.
     """
 
     residuals_px: FloatArray
     survey: Survey
     rest: Rest | None
     transform: Transform
+    bands: tuple[BandSurvey, ...] = ()
 
     @property
     def agrees(self) -> NDArray[np.bool_]:
@@ -96,7 +100,8 @@ def survey_pose(
     survey = survey_model(matcher, model, quiet, None, places, elsewhere_px)
     moved = Transform(model, transform.crs, transform.input_grid)
     rest = survey_rest(matcher, moved, places, elsewhere_px, quiet)
-    return PoseSurvey(residuals, survey, rest, moved)
+    bands = survey_bands(matcher, model, places, elsewhere_px, quiet)
+    return PoseSurvey(residuals, survey, rest, moved, bands)
 
 
 def _covered(grid: Grid, transform: Transform) -> Grid:

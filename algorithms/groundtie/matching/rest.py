@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from ..context import Context
 from ..geometry.transform import Transform
 from ..similarity.surface import SimilaritySettings
+from ..similarity.unexplained import unexplained
 from .chips import ChipMatcher
 from .locked import find_locked_content
 from .matcher import Places
@@ -23,10 +24,14 @@ class Rest:
         What they show.
     is_explained
         Whether such content needs no confirmation (see `Sameness.is_explained`).
+    beyond
+        What they show beyond what the reference explains of the input, where it is explained; None:
+        it is not.
     """
 
     survey: Survey
     is_explained: bool = False
+    beyond: Survey | None = None
 
 
 def survey_rest(
@@ -58,4 +63,11 @@ def survey_rest(
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())
     survey = survey_model(fused, transform.model, context, locked, places, elsewhere_px)
-    return Rest(survey, locked.sameness.is_explained)
+    if not locked.sameness.is_explained:
+        return Rest(survey)
+    # A copy may be blended into other ground, of which the same windows are no part.
+    left = replace(fused, left_of=unexplained)
+    beyond = survey_model(
+        left, locked.model, context, None, places, elsewhere_px, seeks_ghost=False
+    )
+    return Rest(survey, is_explained=True, beyond=beyond)

@@ -18,7 +18,7 @@ from .belief_propagation import Surfaces
 from .chips import LEAST_VALID_MASKED, ChipMatcher
 from .ghost import ghost_height
 from .matcher import FloatArray, MaskOf, Places
-from .parts import ELSEWHERE_PX, SAME_PX, Part, find_parts, highest_part
+from .parts import ELSEWHERE_PX, LEAST_EXCESS, SAME_PX, Part, find_parts, highest_part, limited
 
 # Chips lie side by side: so many along the shorter side of the grid if their sides allow it, and no
 # more than so many along any.
@@ -83,6 +83,13 @@ class Survey:
         return float(self.mean[self._distance_px > self.elsewhere_px].max())
 
     @property
+    def rival_deviations(self) -> float:
+        """How high it is there, in robust standard deviations of what it is elsewhere."""
+        far = self.mean[self._distance_px > self.elsewhere_px]
+        spread = 1.4826 * float(np.median(np.abs(far - np.median(far))))
+        return self.rival_height / max(spread, 1e-9)
+
+    @property
     def _distance_px(self) -> FloatArray:
         shift = np.arange(-SURVEY_RADIUS_PX, SURVEY_RADIUS_PX + 1)
         return np.hypot(*np.meshgrid(shift, shift))
@@ -91,6 +98,17 @@ class Survey:
     def parts(self) -> Sequence[Part]:
         """Neighbouring chips that together match elsewhere, the most evident first."""
         return find_parts(self.grid, self.centres, self.surfaces)
+
+    @property
+    def excess(self) -> float:
+        """How much higher all chips together are elsewhere, as `Part.excess`."""
+        alike = replace(self, surfaces=limited(self.surfaces))
+        return float(np.sqrt(len(self.surfaces)) * (alike.rival_height - alike.height))
+
+    @property
+    def is_elsewhere(self) -> bool:
+        """Whether all chips together evidently match elsewhere."""
+        return self.excess >= LEAST_EXCESS
 
     @property
     def highest_part(self) -> Part | None:

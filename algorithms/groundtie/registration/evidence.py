@@ -29,6 +29,7 @@ from ..geometry.judging import (
 from ..geometry.robust import Mixture, fit_mixture
 from ..geometry.tie_points import TiePoints
 from ..masks.choice import NONE, MaskUsed
+from ..matching.bands import BandSurvey
 from ..matching.rest import Rest
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..rasters.grid import FloatArray, Grid
@@ -136,6 +137,8 @@ class RegistrationEvidence:
         Where chips all over the overlap match; None: not looked at, as in tests of other rules.
     rest
         The same without content that is the same in both arrays; None: there is none.
+    bands
+        What bands show each, of images whose bands do not coincide.
     input_fit
         How well a surface model fits the registered input; None: nothing is expected of it.
     """
@@ -154,6 +157,7 @@ class RegistrationEvidence:
     mask: MaskUsed = field(default_factory=lambda: MaskUsed(NONE, None, 1.0, ""))
     survey: Survey | None = None
     rest: Rest | None = None
+    bands: tuple[BandSurvey, ...] = ()
     input_fit: ModelFit | None = None
 
     stages: ClassVar = (AGREEMENT, ERROR, SCENE, LAYOVER, SURVEY)

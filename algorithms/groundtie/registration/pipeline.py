@@ -16,6 +16,7 @@ from ..geometry.estimation import Estimate
 from ..geometry.judging import LARGEST_LOG10_CHANCE, LOG10_CHANCE_ON_GROUND
 from ..geometry.models import TERRAIN, Model
 from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
+from ..matching.bands import BandSurvey, survey_bands
 from ..matching.check import CHECK_RADIUS_PX, Check, check_model
 from ..matching.chips import ChipMatcher
 from ..matching.guided_fit import GuidedFit
@@ -41,6 +42,9 @@ from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
 from .surface_masks import ModelFit, fit_of, with_surface_mask
 from .verdict import judge, judge_search
+
+# What chips all over show; without what the arrays share, if anything; and in bands alone.
+Surveys = tuple[Survey | None, Rest | None, tuple[BandSurvey, ...]]
 
 
 class Fit(Protocol):
@@ -167,27 +171,30 @@ class Stages:
         model = estimate.transform.model
         return check_model(self.checker, self.held_out.layout, model, context)
 
-    def survey(self, estimate: Estimate, context: Context) -> tuple[Survey | None, Rest | None]:
+    def survey(self, estimate: Estimate, context: Context) -> Surveys:
         """Match chips all over the pair, with what its masks leave, around what was estimated.
 
-        Returns what they show, and what they show without content that is the same in both arrays;
-        None: there is none, or it is not asked for.
+        Returns what they show (None: it is not asked for), what they show without content that is
+        the same in both arrays (None: there is none), and what bands show each where they do not
+        coincide.
         """
         if not self.spec.surveys:
-            return None, None
+            return None, None, ()
         pair, transform = self.masked.pair, estimate.transform
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
         places = survey_places(pair.grid)
         # No rule asks for ghosts where a mask leaves nothing but ground.
         ghosts, first = not self.masked.used.is_ground, context.part(0.0, 0.5)
         survey = survey_model(chips, transform.model, first, seeks_ghost=ghosts)
-        return survey, survey_rest(chips, transform, places, ELSEWHERE_PX, context.part(0.5, 1.0))
+        rest = survey_rest(chips, transform, places, ELSEWHERE_PX, context.part(0.5, 0.9))
+        last = context.part(0.9, 1.0)
+        return survey, rest, survey_bands(chips, transform.model, places, ELSEWHERE_PX, last)
 
     def evidence(
         self,
         estimate: Estimate,
         check: Check,
-        surveys: tuple[Survey | None, Rest | None],
+        surveys: Surveys,
         scene: SceneInfo,
     ) -> RegistrationEvidence:
         """Return what the rules look at."""

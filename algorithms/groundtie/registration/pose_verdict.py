@@ -14,6 +14,7 @@ from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.judging import LARGEST_LOG10_CHANCE
 from ..geometry.limits import SearchLimits
 from ..masks.choice import NONE, MaskUsed
+from ..matching.bands import BandSurvey
 from ..matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey, survey_pose
 from ..matching.rest import Rest
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
@@ -141,6 +142,11 @@ class PoseSurveyEvidence:
     def rest(self) -> Rest | None:
         """The same without content that is the same in both arrays."""
         return self.found.rest
+
+    @property
+    def bands(self) -> tuple[BandSurvey, ...]:
+        """What bands show each, of images whose bands do not coincide."""
+        return self.found.bands
 
     @property
     def check_residuals_px(self) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...matching.parts import LEAST_EXCESS
+from ...matching.rest import Rest
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
 from ..evidence import SURVEY, RegistrationEvidence
 from .rule import WITHOUT, Rule
@@ -18,6 +19,14 @@ WEAK_HEIGHT = 2.0
 # the suite margins (--seeds 2 --sample 120): from 2.8 on, on shared pairs; of 27 wrong transforms
 # one is higher than 1.5 by far, at 3.4.
 WEAK_REST_HEIGHT = 2.5
+
+# Copies and one sensor's views leave little, which may be weak; but a second place may not stand
+# out by so many robust standard deviations of its surfaces, and be so many times as high in what a
+# mask leaves. Measured by the suites margins and attacks: right transforms with more than the
+# former are up to 1.3 times as high; beneath clouds and labels over ground that lies elsewhere,
+# from 1.7 times and 6.1 on; ground that shows through copies stands out by 8.4 and more.
+BEYOND_DEVIATIONS = 5.0
+_MASKED_RIVAL = 1.5
 
 # A second place that the reference's own repetition does not explain, in robust standard deviations
 # of such surfaces. Measured on 18 shared pairs at their places: up to 5.5, at poses of the rotated
@@ -59,19 +68,45 @@ def _weak(evidence: RegistrationEvidence) -> str | None:
     )
 
 
+def deviations_elsewhere(rest: Rest) -> float:
+    """Return how far ground elsewhere stands out of what copies leave, in robust deviations.
+
+    0: nowhere beside where the transform has it.
+    """
+    if rest.beyond is None:
+        return 0.0
+    shares = ((rest.survey, _MASKED_RIVAL), (rest.beyond, RIVAL_HEIGHT))
+    return max(
+        left.rival_deviations
+        if left.height < WEAK_REST_HEIGHT and left.rival_height >= share * left.height
+        else 0.0
+        for left, share in shares
+    )
+
+
 def _locked(evidence: RegistrationEvidence) -> str | None:
     """Ask of the rest what is asked of all; where one sensor shows one ground, little is left."""
     rest = evidence.rest
     if rest is None:
         return None
     survey = rest.survey
-    is_weak = survey.height < WEAK_REST_HEIGHT or _has_rival(survey)
-    if not survey.parts and (rest.is_explained or not is_weak):
+    if rest.beyond is not None:
+        is_unconfirmed = deviations_elsewhere(rest) >= BEYOND_DEVIATIONS
+    else:
+        is_unconfirmed = survey.height < WEAK_REST_HEIGHT or _has_rival(survey)
+    if not (survey.parts or is_unconfirmed):
         return None
     return (
         "without what both images show at the same columns and rows, only "
         f"{survey.confirming} of {len(survey.centres)} chips match where the transform has them"
     )
+
+
+def _other_ground_in_a_band(evidence: RegistrationEvidence) -> str | None:
+    for one in evidence.bands:
+        if one.survey.is_elsewhere:
+            return f"band {one.band} of the {one.image} alone matches elsewhere"
+    return None
 
 
 SURVEY_RULES: tuple[Rule, ...] = (
@@ -109,9 +144,21 @@ SURVEY_RULES: tuple[Rule, ...] = (
         SURVEY,
         "both images have the same content at the same columns and rows, such as labels or clouds, "
         "and without it a part lies elsewhere, a second place matches about as "
-        f"well, or the mean similarity is below {WEAK_REST_HEIGHT:g} standard deviations",
+        f"well, or the mean similarity is below {WEAK_REST_HEIGHT:g} standard deviations; of a "
+        "copy, or one sensor's views, where that is weak and a second place stands out by "
+        f"{BEYOND_DEVIATIONS:g}: {_MASKED_RIVAL:g} times as high in what is left, or "
+        f"{RIVAL_HEIGHT:g} times in what the reference does not explain",
         "suites margins and attacks",
         WITHOUT,
         _locked,
+    ),
+    Rule(
+        "band elsewhere",
+        SURVEY,
+        "bands of an image do not coincide, and in one alone chips all over together match "
+        f"elsewhere {LEAST_EXCESS:g} standard deviations of noise better",
+        "[Kulldorff1997]; suite margins",
+        "give the band that shows the ground, alone in a file",
+        _other_ground_in_a_band,
     ),
 )

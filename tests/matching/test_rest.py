@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from raster_files import utm_grid, write_raster
+from textured_pairs import shift_on_map, texture
+
+from groundtie.context import Context
+from groundtie.geometry.transform import Transform
+from groundtie.matching.chips import ChipMatcher
+from groundtie.matching.parts import ELSEWHERE_PX
+from groundtie.matching.rest import Rest, survey_rest
+from groundtie.matching.survey import SURVEY_RADIUS_PX, survey_places
+from groundtie.rasters.pair import Image, make_pair
+from groundtie.rasters.reading import open_raster
+from groundtie.registration.rules.survey import BEYOND_DEVIATIONS, deviations_elsewhere
+from groundtie.similarity.surface import SimilaritySettings
+
+SIDE, MARGIN = 340, 30
+
+
+def place(shift: tuple[int, int] = (0, 0)) -> np.ndarray:
+    """Return a place that is moved by a shift (x, y)."""
+    canvas = texture(SIDE + 2 * MARGIN, SIDE + 2 * MARGIN, 4)
+    top, left = MARGIN - shift[1], MARGIN - shift[0]
+    return canvas[top : top + SIDE, left : left + SIDE]
+
+
+def noisy(values: np.ndarray, seed: int) -> np.ndarray:
+    return values + 0.2 * np.random.default_rng(seed).normal(size=values.shape)
+
+
+def rest_of(
+    folder: Path,
+    reference: np.ndarray,
+    input: np.ndarray,
+    context: Context,
+    offset: tuple[int, int] = (0, 0),
+) -> Rest | None:
+    """Return what two arrays leave whose rows and columns are an offset apart."""
+    paths = [
+        write_raster(
+            folder / f"{name}.tif", (2000 + 200 * values).astype(np.uint16), utm_grid(SIDE, SIDE)
+        )
+        for name, values in (("reference", reference), ("input", input))
+    ]
+    with open_raster(paths[0]) as one, open_raster(paths[1]) as other:
+        pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
+        # The grid has rows from north to south and pixels of 10 m.
+        found = shift_on_map(10.0 * offset[0], -10.0 * offset[1])
+        transform = Transform(found, pair.grid.crs, other.grid)
+        matcher = ChipMatcher(pair, SimilaritySettings())
+        return survey_rest(matcher, transform, survey_places(pair.grid), ELSEWHERE_PX, context)
+
+
+@pytest.mark.parametrize("share", [0.35, 0.6])
+@pytest.mark.parametrize("offset", [(0, 0), (6, -4)])
+def test_ground_shows_that_a_copy_was_blended_into(
+    share: float, offset: tuple[int, int], tmp_path: Path, context: Context
+) -> None:
+    reference = noisy(place(), 1)
+    copied = np.roll(reference, offset[::-1], (0, 1))
+    blended = share * copied + (1 - share) * noisy(place((11 + offset[0], -7 + offset[1])), 2)
+    rest = rest_of(tmp_path, reference, blended, context, offset)
+    assert rest is not None and rest.is_explained and rest.beyond is not None
+    top = np.unravel_index(np.argmax(rest.beyond.mean), rest.beyond.mean.shape)
+    assert np.subtract(top, SURVEY_RADIUS_PX)[::-1] == pytest.approx((11, -7), abs=1)
+    assert deviations_elsewhere(rest) > BEYOND_DEVIATIONS
+
+
+def test_a_view_of_one_sensor_and_a_copy_show_nothing_elsewhere(
+    tmp_path: Path, context: Context
+) -> None:
+    reference = noisy(place(), 1)
+    for input in (noisy(place(), 2), 0.7 * reference):
+        rest = rest_of(tmp_path, reference, input, context)
+        assert rest is not None and rest.is_explained and rest.beyond is not None
+        assert deviations_elsewhere(rest) < BEYOND_DEVIATIONS
