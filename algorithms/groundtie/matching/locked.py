@@ -35,6 +35,9 @@ from .matcher import FloatArray, Places
 # A transform that moves all of the overlap by whole pixels, but for this, may be content's.
 _LARGEST_BEND_PX = 1.5
 
+# Copies of pixels are found within this of whole pixels; a quarter of what others lie within.
+_WHOLE_PX = 0.125
+
 # Gradients above this percentile of their image are strong.
 _STRONG_PERCENT = 70.0
 
@@ -44,16 +47,16 @@ _FIRST_TURN_PX, _GOLDEN_ANGLE = 7.0, np.pi * (3 - np.sqrt(5))
 
 # So many times as many as by chance, and of gradients this share of the strong ones, are more than
 # two sensors show of one ground; what else they show is asked then. Gradients were measured on the
-# shared pairs at their true places: 0.7 to 2.2 % of different sensors and physics, up to twice as
-# many as by chance; 3.5 to 28 % of one sensor's. With content drawn into both: 3 to 43 %. Lines and
+# shared pairs at their true places: 0.7 to 2.9 % of different sensors and physics, up to 3.4 times
+# as many as by chance; 3.5 to 28 % of one sensor's. With content drawn into both: 3 to 43 %. Lines and
 # dots on simulated pairs at their places: up to 1.5 times as many as by chance; with graticules,
 # tiles and contour lines in both: from 2.7 times on.
-_LEAST_RATIO, _LEAST_SHARE = 2.0, 0.02
+_LEAST_RATIO, _LEAST_SHARE = 2.0, 0.03
 _LEAST_LINES_RATIO = 2.5
 
 # The same of the area that varies alike: where holes or waters of one shape are cut into noise,
-# few gradients are the same. Different sensors' views: up to 12 %.
-_LEAST_AREA = 0.15
+# few gradients are the same. Different sensors' views: up to 17 %.
+_LEAST_AREA = 0.2
 
 # One sensor's views of one ground vary alike where nothing is drawn, too, on images that are so
 # much smaller. Measured as above: 25 % of what is left and more; of different ground 0 to 21 %, of
@@ -136,11 +139,15 @@ class LockedContent:
         Input (col, row) − reference (col, row).
     sameness
         How much they have the same.
+    is_whole
+        Whether the transform moves the array by whole pixels: what was resampled is no copy of
+        pixels.
     """
 
     pair: ImagePair
     offset_px: tuple[int, int]
     sameness: Sameness
+    is_whole: bool
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
@@ -205,7 +212,9 @@ def find_locked_content(
         piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
         return _Look.of(*_patches(pair, piece, found))
 
-    return LockedContent(pair, found, _sameness(list(context.map(look, list(places.centres)))))
+    sameness = _sameness(list(context.map(look, list(places.centres))))
+    is_whole = bool(np.abs(np.median(moved, axis=0) - offset).max() <= _WHOLE_PX)
+    return LockedContent(pair, found, sameness, is_whole)
 
 
 def _sameness(looks: list[_Look]) -> Sameness:

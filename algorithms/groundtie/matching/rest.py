@@ -25,13 +25,16 @@ class Rest:
     is_explained
         Whether such content needs no confirmation (see `Sameness.is_explained`).
     beyond
-        What they show beyond what the reference explains of the input, where it is explained; None:
-        it is not.
+        What they show beyond what the reference explains of the input, where it is explained and
+        the transform moves the array by whole pixels; None elsewhere.
+    chips
+        How many chips there are; of some too little may be left.
     """
 
     survey: Survey
     is_explained: bool = False
     beyond: Survey | None = None
+    chips: int = 0
 
 
 def survey_rest(
@@ -65,9 +68,11 @@ def survey_rest(
     survey = survey_model(fused, transform.model, context, locked, places, elsewhere_px)
     if not locked.sameness.is_explained:
         return Rest(survey)
+    if not locked.is_whole:
+        return Rest(survey, is_explained=True)
     # A copy may be blended into other ground, of which the same windows are no part.
     left = replace(fused, left_of=unexplained)
     beyond = survey_model(
         left, locked.model, context, None, places, elsewhere_px, seeks_ghost=False
     )
-    return Rest(survey, is_explained=True, beyond=beyond)
+    return Rest(survey, is_explained=True, beyond=beyond, chips=len(places.centres))

@@ -84,10 +84,14 @@ class Survey:
 
     @property
     def rival_deviations(self) -> float:
-        """How high it is there, in robust standard deviations of what it is elsewhere."""
+        """How high it is there, in robust standard deviations of what it is elsewhere.
+
+        These are no less than those of a mean of as many independent chips: where little overlaps,
+        most of it is 0.
+        """
         far = self.mean[self._distance_px > self.elsewhere_px]
         spread = 1.4826 * float(np.median(np.abs(far - np.median(far))))
-        return self.rival_height / max(spread, 1e-9)
+        return self.rival_height / max(spread, max(len(self.surfaces), 1) ** -0.5)
 
     @property
     def _distance_px(self) -> FloatArray:

@@ -17,6 +17,9 @@ _WINDOW_PX = 15
 # Windows that vary less than this share of their image explain nothing.
 _LEAST_SHARE = 1e-6
 
+# What is left of less than this share of the variance is rounding or noise, and shows no ground.
+_LEAST_LEFT = 0.01
+
 
 def unexplained(reference: Patch, input: Patch) -> Patch:
     """Return stacks of windows of an input without what those of the reference explain of it.
@@ -38,7 +41,10 @@ def unexplained(reference: Patch, input: Patch) -> Patch:
     common = mean(one * other) - means[0] * means[1]
     least = _LEAST_SHARE * float(variance.max(initial=0.0)) + np.finfo(np.float32).tiny
     left = one - means[0] - common / np.maximum(variance, least) * (other - means[1])
-    return Patch(np.where(valid, left, 0).astype(np.float32), valid)
+    left = np.where(valid, left, 0).astype(np.float32)
+    own = np.maximum(mean(one * one) - means[0] ** 2, 0)
+    shown = valid & (mean(left * left) > _LEAST_LEFT * own)
+    return Patch(np.where(shown, left, 0), shown)
 
 
 def _mean(stack: FloatImage) -> FloatImage:

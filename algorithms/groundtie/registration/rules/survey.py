@@ -25,8 +25,10 @@ WEAK_REST_HEIGHT = 2.5
 # mask leaves. Measured by the suites margins and attacks: right transforms with more than the
 # former are up to 1.3 times as high; beneath clouds and labels over ground that lies elsewhere,
 # from 1.7 times and 6.1 on; ground that shows through copies stands out by 8.4 and more.
+# Of plain copies, a few chips at most have anything left.
 BEYOND_DEVIATIONS = 5.0
 _MASKED_RIVAL = 1.5
+_LEAST_CHIPS = 0.5
 
 # A second place that the reference's own repetition does not explain, in robust standard deviations
 # of such surfaces. Measured on 18 shared pairs at their places: up to 5.5, at poses of the rotated
@@ -78,7 +80,9 @@ def deviations_elsewhere(rest: Rest) -> float:
     shares = ((rest.survey, _MASKED_RIVAL), (rest.beyond, RIVAL_HEIGHT))
     return max(
         left.rival_deviations
-        if left.height < WEAK_REST_HEIGHT and left.rival_height >= share * left.height
+        if len(left.surfaces) >= _LEAST_CHIPS * rest.chips
+        and left.height < WEAK_REST_HEIGHT
+        and left.rival_height >= share * left.height
         else 0.0
         for left, share in shares
     )
@@ -90,7 +94,7 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
     if rest is None:
         return None
     survey = rest.survey
-    if rest.beyond is not None:
+    if rest.is_explained:
         is_unconfirmed = deviations_elsewhere(rest) >= BEYOND_DEVIATIONS
     else:
         is_unconfirmed = survey.height < WEAK_REST_HEIGHT or _has_rival(survey)
