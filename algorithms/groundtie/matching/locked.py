@@ -48,9 +48,9 @@ _FIRST_TURN_PX, _GOLDEN_ANGLE = 7.0, np.pi * (3 - np.sqrt(5))
 # So many times as many as by chance, and of gradients this share of the strong ones, are more than
 # two sensors show of one ground; what else they show is asked then. Gradients were measured on the
 # shared pairs at their true places: 0.7 to 2.9 % of different sensors and physics, up to 3.4 times
-# as many as by chance; 3.5 to 28 % of one sensor's. With content drawn into both: 3 to 43 %. Lines and
-# dots on simulated pairs at their places: up to 1.5 times as many as by chance; with graticules,
-# tiles and contour lines in both: from 2.7 times on.
+# as many as by chance; 3.5 to 28 % of one sensor's. With content drawn into both: 3 to 43 %. Lines
+# and dots on simulated pairs at their places: up to 1.5 times as many as by chance; with
+# graticules, tiles and contour lines in both: from 2.7 times on.
 _LEAST_RATIO, _LEAST_SHARE = 2.0, 0.03
 _LEAST_LINES_RATIO = 2.5
 
