@@ -268,6 +268,52 @@ def test_cancelling_leaves_nothing(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+def cancelled_after(pairs: int) -> Progress:
+    """Return progress that is cancelled when one more registration begins."""
+    begun = 0
+
+    def report(fraction: float, message: str) -> None:
+        nonlocal begun
+        begun += message.startswith("registering")
+
+    return Progress(report, is_cancelled=lambda: begun > pairs)
+
+
+@pytest.mark.slow
+def test_a_cancelled_series_goes_on_where_it_was(tmp_path: Path) -> None:
+    dates = write_dates(tmp_path / "dates", 4, SIZE)
+    options = {**OPTIONS, "reference": dates.files[0]}
+    whole = coregister_series(tmp_path / "whole", [dates.folder], **options)
+    out = tmp_path / "out"
+    unfinished = out / "series.unfinished.jsonl"
+    for pairs in (2, 1):
+        with pytest.raises(groundtie.errors.CancelledError, match="goes on with what was"):
+            coregister_series(out, [dates.folder], progress=cancelled_after(pairs), **options)
+        assert [path.name for path in out.iterdir()] == [unfinished.name]
+    with unfinished.open("a") as file:
+        file.write('\n{"reference_key": "a line that was cut off')
+    again = coregister_series(out, [dates.folder], **options)
+    assert again.reused_pairs == 3
+    assert again.registered_pairs == whole.registered_pairs - 3 > 0
+    assert again.rows() == whole.rows()
+    assert set(listing(out)) == set(listing(tmp_path / "whole"))
+    for path in sorted(out.glob("*.tif")):
+        np.testing.assert_array_equal(pixels(path), pixels(tmp_path / "whole" / path.name))
+
+
+@pytest.mark.slow
+def test_a_refused_series_keeps_no_registrations(tmp_path: Path) -> None:
+    dates = write_dates(tmp_path / "dates", 3, 130, elsewhere=[1, 2])
+    for folder in ("new", "there"):
+        out = tmp_path / folder
+        if folder == "there":
+            out.mkdir()
+        with pytest.raises(NotRegisteredError):
+            coregister_series(out, [dates.folder], reference=dates.files[0], **OPTIONS)
+        assert out.exists() == (folder == "there")
+        assert not out.exists() or not [*out.iterdir()]
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

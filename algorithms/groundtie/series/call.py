@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..context import Context, threads
-from ..errors import ParameterError, SameFileError
+from ..errors import CancelledError, ParameterError, SameFileError
 from ..executors import open_executor
 from ..geometry.transform import Transform
 from ..progress import Progress
@@ -21,14 +21,14 @@ from ..registration.registered_output import model_for_grid
 from ..registration.series_evidence import DateEvidence
 from ..registration.user_masks import UserMask
 from .dates import Date, Footprints, OpenDates, open_dates
-from .delivery import SERIES_JSON, SeriesFiles
+from .delivery import SeriesFiles
 from .frame import SeriesFrame
 from .inputs import Listed, list_dates
 from .pairs import Settings
 from .registering import Matching
 from .series import Series, SeriesDate
 from .settling import DateVerdict, settle
-from .stored import StoredSeries, read_series
+from .stored import SERIES_JSON, UNFINISHED, StoredSeries, Unfinished, read_series
 
 
 @dataclass(frozen=True)
@@ -111,15 +111,22 @@ class SeriesCall:
             No date was registered; the report is written.
         """
         started = time.perf_counter()
-        stored = read_series(self.files.folder / SERIES_JSON)
+        stored = read_series(self.files.folder)
         with threads(self.workers, progress) as context, ExitStack() as stack:
             if executor is None and self.scheduler is not None:
                 executor = stack.enter_context(open_executor(1, self.scheduler))
             stack.enter_context(bounded_cache())
             opened = open_dates(self.listed, self.band, stack, context.part(0.0, 0.05))
-            series = self._registered(opened, stored, context.part(0.05, 0.8), executor)
-            series = replace(series, seconds=time.perf_counter() - started)
-            return self.files.write(series, stored, context.part(0.8, 1.0))
+            try:
+                series = self._registered(opened, stored, context.part(0.05, 0.8), executor)
+                series = replace(series, seconds=time.perf_counter() - started)
+                return self.files.write(series, stored, context.part(0.8, 1.0))
+            except CancelledError as error:
+                if (self.files.folder / UNFINISHED).exists():
+                    raise CancelledError(
+                        "cancelled; the next run in this folder goes on with what was registered"
+                    ) from error
+                raise
 
     def _registered(
         self,
@@ -132,12 +139,19 @@ class SeriesCall:
         hub = next((k for k, date in enumerate(dates) if date.name == self.reference), None)
         home = dates[hub or 0]
         key = None if hub is None else home.key
-        frame = SeriesFrame.around(home.source.grid, [date.source.grid for date in dates])
-        if stored.frame is not None and stored.reference == key:
-            frame = stored.frame  # that of the registrations which need not be done again
+        frame = stored.frames.get(key)  # that of the registrations which need not be done again
+        if frame is None:
+            frame = SeriesFrame.around(home.source.grid, [date.source.grid for date in dates])
         footprints = Footprints.of(dates, frame.grid.crs)
         matching = Matching(
-            dates, footprints, frame, self.settings, stored.pairs, context, executor
+            dates,
+            footprints,
+            frame,
+            self.settings,
+            stored.pairs,
+            context,
+            executor,
+            Unfinished(self.files.folder, key, frame).keep,
         )
         if hub is None:
             hub, datum = matching.freely(), "to each other (mean displacement zero)"

@@ -25,9 +25,9 @@ from ..version import __version__
 from .dates import file_facts
 from .frame import FloatArray, sigma_px
 from .series import TABLE_COLUMNS, Series, SeriesDate
-from .stored import StoredSeries
+from .stored import SERIES_JSON, StoredSeries, forget_unfinished
 
-SERIES_JSON, TABLE_CSV, TABLE_GPKG = "series.json", "series.csv", "series.gpkg"
+TABLE_CSV, TABLE_GPKG = "series.csv", "series.gpkg"
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,7 @@ class SeriesFiles:
         """
         if not series.registered:
             self._write_refusal(series)
+            forget_unfinished(self.folder, had_folder=stored.had_folder)
             raise _refusal(series)
         _make_folder(self.folder)
         with Outputs() as outputs:
@@ -69,6 +70,7 @@ class SeriesFiles:
             # Last: who finds it finds all that it is about.
             self._write_report(series, outputs)
         self._remove_stale(series, stored)
+        forget_unfinished(self.folder, had_folder=stored.had_folder)
         return series
 
     def raster_key(self, date: SeriesDate, series: Series) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, wait
 from dataclasses import dataclass, field
 from itertools import permutations
@@ -34,6 +34,10 @@ _WANTED_LINKS = 2
 _MOST_HUBS = 3
 
 
+def _forget(_: PairResult) -> None:
+    """Keep nothing."""
+
+
 @dataclass
 class Matching:
     """The registrations of a series, done as they are needed.
@@ -52,6 +56,8 @@ class Matching:
         Threads and progress.
     executor
         Runs pairs, each as a task of files, instead of these threads; None: they do.
+    keep
+        Receives each registration as soon as it is done.
     """
 
     dates: Sequence[Date]
@@ -61,6 +67,7 @@ class Matching:
     known: Mapping[str, PairResult]
     context: Context
     executor: Executor | None = None
+    keep: Callable[[PairResult], None] = _forget
     results: dict[tuple[int, int], PairResult] = field(default_factory=dict)
     done: int = 0
     reused: int = 0
@@ -232,6 +239,8 @@ class Matching:
         self.results.pop(ends[::-1], None)
         self.results[ends] = result
         self.done += 1
+        if result.key:  # none: whoever did it was lost
+            self.keep(result)
 
     def _neighbours(self, chain: Sequence[int]) -> list[tuple[int, int]]:
         """Return for each date the next in time, and another one if they overlap much more."""

@@ -1,7 +1,13 @@
-"""What `series.json` holds of an earlier run: nothing that is in it is done again."""
+"""What earlier runs left of their registrations: nothing that is known is done again.
+
+A run that ends has all in `series.json`. One that was cancelled or killed has left a line for each
+registration in `series.unfinished.jsonl`.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,13 +17,15 @@ from rasterio.errors import CRSError
 
 from ..errors import GroundTieError, ParameterError, RasterOpenError
 from ..geometry.transform import Transform
+from ..rasters.atomic import writing
 from ..rasters.reading import open_raster
 from ..runs import RUN_TAG
-from ..strict_json import read_json
+from ..strict_json import parse_json, read_json
 from .frame import SeriesFrame
 from .pairs import PairResult
 
 FORMAT = "groundtie-series/1"
+SERIES_JSON, UNFINISHED = "series.json", "series.unfinished.jsonl"
 
 
 @dataclass(frozen=True)
@@ -53,45 +61,96 @@ class StoredDate:
 
 @dataclass(frozen=True)
 class StoredSeries:
-    """An earlier run in the same folder.
+    """What earlier runs left in a folder.
 
     Parameters
     ----------
-    reference
-        Key of the reference's file; None: there was none.
-    frame
-        Its frame; None: there was no earlier run.
+    frames
+        Their frames, by the keys of the references' files; None: there was none.
     pairs
-        Its registrations, by their keys.
+        Their registrations, by their keys.
     dates
-        The rasters that it wrote, by the names of the dates.
+        The rasters that were written, by the names of the dates.
+    had_folder
+        Whether the folder was there.
     """
 
-    reference: str | None = None
-    frame: SeriesFrame | None = None
+    frames: Mapping[str | None, SeriesFrame] = field(default_factory=dict)
     pairs: Mapping[str, PairResult] = field(default_factory=dict)
     dates: Mapping[str, StoredDate] = field(default_factory=dict)
+    had_folder: bool = True
 
 
-def read_series(path: Path) -> StoredSeries:
-    """Return what a `series.json` holds; nothing, if there is no such file.
+@dataclass(frozen=True)
+class Unfinished:
+    """Keeps each registration as soon as it is done, until the series is written.
+
+    Parameters
+    ----------
+    folder
+        Of the series; it is made for the first registration.
+    reference
+        Key of the reference's file; None: there is none.
+    frame
+        The series' frame.
+    """
+
+    folder: Path
+    reference: str | None
+    frame: SeriesFrame
+
+    def keep(self, pair: PairResult) -> None:
+        """Write a registration.
+
+        Raises
+        ------
+        OutputError
+            The file cannot be written.
+        """
+        values = {
+            "reference_key": self.reference,
+            "frame": self.frame.to_json(),
+            "pair": pair.to_json(),
+        }
+        path = self.folder / UNFINISHED
+        with writing(path):
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with path.open("a", encoding="utf-8") as file:
+                # The newline first: the line before may have been cut off with its run.
+                file.write("\n" + json.dumps(values))
+
+
+def forget_unfinished(folder: Path, *, had_folder: bool) -> None:
+    """Remove what `Unfinished` wrote, and a folder that was made for nothing else."""
+    path = folder / UNFINISHED
+    if path.exists():
+        with writing(path):
+            path.unlink()
+            if not had_folder and not any(folder.iterdir()):
+                folder.rmdir()
+
+
+def read_series(folder: Path) -> StoredSeries:
+    """Return what earlier runs left in a folder; nothing, if there were none.
 
     Raises
     ------
     ParameterError
-        There is such a file, but it is no series'.
+        There is a `series.json`, but it is no series'.
     """
+    started = _read_unfinished(folder / UNFINISHED)
+    path = folder / SERIES_JSON
     if not path.exists():
-        return StoredSeries()
+        return started
     try:
         values = read_json(path)
         if values["format"] != FORMAT:
             raise ParameterError(f"not a {FORMAT} file but {values['format']!r:.60}")
         pairs = [PairResult.from_json(one) for one in values["pairs"]]
+        frame = SeriesFrame.from_json(values["frame"])
         return StoredSeries(
-            values["reference_key"],
-            SeriesFrame.from_json(values["frame"]),
-            {pair.key: pair for pair in pairs},
+            {**started.frames, values["reference_key"]: frame},
+            {**started.pairs, **{pair.key: pair for pair in pairs}},
             {one["name"]: _stored_date(one) for one in values["dates"] if one["written"]},
         )
     except (GroundTieError, OSError, KeyError, TypeError, ValueError, CRSError) as error:
@@ -99,6 +158,20 @@ def read_series(path: Path) -> StoredSeries:
             f"{path} is no series that can be continued ({error!s:.80}): give another folder, or "
             "remove it"
         ) from error
+
+
+def _read_unfinished(path: Path) -> StoredSeries:
+    """Return the registrations of runs that did not end; of lines that are none, nothing."""
+    frames: dict[str | None, SeriesFrame] = {}
+    pairs: dict[str, PairResult] = {}
+    lines = path.read_bytes().splitlines() if path.exists() else []
+    for line in lines:
+        with contextlib.suppress(GroundTieError, KeyError, TypeError, ValueError, CRSError):
+            values = parse_json(line)
+            pair = PairResult.from_json(values["pair"])
+            frames[values["reference_key"]] = SeriesFrame.from_json(values["frame"])
+            pairs[pair.key] = pair
+    return StoredSeries(frames, pairs, had_folder=path.parent.exists())
 
 
 def _stored_date(values: dict[str, Any]) -> StoredDate:
