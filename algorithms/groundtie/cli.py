@@ -23,6 +23,7 @@ from click.shell_completion import CompletionItem
 from .declaration import Parameter, Tool
 from .errors import CancelledError, GroundTieError, NotRegisteredError
 from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind, RastersIn
+from .memory import DEFAULT_MB, VARIABLE, budget_bytes, share_heaps
 from .progress import Progress
 from .version import __version__
 
@@ -43,6 +44,7 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
         The exit code.
     """
     _silence_libraries()
+    share_heaps()
     with _signals() as received:
         try:
             group = _all_tools() if tools is None else _these_tools(tools)
@@ -134,7 +136,13 @@ class ToolGroup(click.Group):
                     ["-v", "--verbose"],
                     is_flag=True,
                     help="Write what is decided, and why, to standard error.",
-                )
+                ),
+                click.Option(
+                    ["--memory"],
+                    metavar="MB",
+                    help="Memory that a process is to take, as far as it can do with less; "
+                    f"results do not depend on it.  [default: {DEFAULT_MB}]",
+                ),
             ],
             context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
         )
@@ -171,11 +179,28 @@ def _command_name(tool: str) -> str:
 
 
 @click.pass_context
-def _before_command(context: click.Context, verbose: bool) -> None:
+def _before_command(context: click.Context, verbose: bool, memory: str | None) -> None:
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
     if verbose:
         context.with_resource(_log_to(sys.stderr))
+    if memory is not None:
+        context.with_resource(_budget(memory))
+
+
+@contextmanager
+def _budget(megabytes: str) -> Iterator[None]:
+    """Set the budget of this process, and of those that it starts."""
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = megabytes
+    try:
+        budget_bytes()
+        yield
+    finally:
+        if before is None:
+            del os.environ[VARIABLE]
+        else:
+            os.environ[VARIABLE] = before
 
 
 @contextmanager

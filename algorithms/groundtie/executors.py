@@ -18,6 +18,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any, ParamSpec, TypeVar
 
 from .errors import ParameterError, SchedulerError, WorkerLostError
+from .memory import share_heaps
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -191,6 +192,7 @@ def _start_worker(stop: Any) -> None:
         os.environ.setdefault(name, "1")
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _heed(stop.is_set)
+    share_heaps()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     import cv2
 

@@ -1,4 +1,4 @@
-"""Memory does not grow with the scene, but for GDAL's cache, which is bounded."""
+"""Memory does not grow with the scene, but for what the budget allows, which changes no result."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from groundtie.geometry.transform import Transform
 from groundtie.rasters.reading import open_raster
 
 TILE_PX = 1000
-CACHE_BYTES = 16_000_000
+BUDGET_MB, CACHE_BYTES = 100, 20_000_000
 
 # What the allocator keeps differs from run to run.
 SCATTER_BYTES = 48_000_000
@@ -30,8 +30,7 @@ CALL = f"""
 import os
 os.environ["GDAL_CACHEMAX"] = "4000"
 import groundtie, sys
-from groundtie.rasters import reading
-reading._READING_CACHE_BYTES = {CACHE_BYTES}
+os.environ["GROUNDTIE_MEMORY"] = "{BUDGET_MB}"
 tool, *files = sys.argv[1:]
 """
 WARP = CALL + "groundtie.warp(*files[:2], transform=files[2], resampling='nearest', workers=2)"
@@ -56,16 +55,22 @@ def peak_bytes(code: str, *files: Path) -> int:
     return found.peak_bytes
 
 
+def moved_image(tile: Pair, size: int, folder: Path) -> tuple[Path, Path]:
+    """Return an image of a size and a transform that moves it."""
+    image, transform = folder / f"{size}.tif", folder / f"{size}.json"
+    repeat(tile.input, image, size, Affine.identity())
+    with open_raster(image) as source:
+        moved = Transform(shift_model(20.0, 30.0), source.grid.crs, source.grid)
+    transform.write_text(json.dumps(moved.to_json()))
+    return image, transform
+
+
 @pytest.mark.slow
 def test_of_warp(tile: Pair, tmp_path: Path) -> None:
     """A scene of 128 MB takes no more than one of 8 MB and the cache."""
     peaks = []
     for size in (1000, 4000):
-        image, transform = tmp_path / f"{size}.tif", tmp_path / f"{size}.json"
-        repeat(tile.input, image, size, Affine.identity())
-        with open_raster(image) as source:
-            moved = Transform(shift_model(20.0, 30.0), source.grid.crs, source.grid)
-        transform.write_text(json.dumps(moved.to_json()))
+        image, transform = moved_image(tile, size, tmp_path)
         peaks.append(peak_bytes(WARP, image, tmp_path / f"{size}_out.tif", transform))
     assert peaks[1] - peaks[0] < CACHE_BYTES + SCATTER_BYTES
 
@@ -78,3 +83,34 @@ def test_of_a_registration(tile: Pair, tmp_path: Path) -> None:
         pair = large_pair(Pair(tile.reference, tile.reference), size, tmp_path)
         peaks.append(peak_bytes(COREGISTER, pair.reference, pair.input, tmp_path / "out.tif"))
     assert peaks[1] - peaks[0] < CACHE_BYTES + SCATTER_BYTES
+
+
+def budget_of(folder: Path, megabytes: int | None, *words: str | Path) -> tuple[int, bytes]:
+    """Return the peak memory of a command with a budget, and the raster that it wrote."""
+    option = [] if megabytes is None else ["--memory", str(megabytes)]
+    output = folder / "out.tif"
+    found = measure(
+        [sys.executable, "-m", "groundtie", *option, *map(str, words), "--workers", "2"]
+    )
+    assert found.exit_code == 0
+    return found.peak_bytes, output.read_bytes()
+
+
+@pytest.mark.slow
+def test_a_small_budget_is_kept_and_changes_no_byte(tile: Pair, tmp_path: Path) -> None:
+    """A scene of 128 MB fits into GDAL's cache by default, and a fifth of 100 MB is 20 MB."""
+    image, transform = moved_image(tile, 4000, tmp_path)
+    words = ["warp", image, tmp_path / "out.tif", "--transform", transform]
+    usual, raster = budget_of(tmp_path, None, *words)
+    small, same = budget_of(tmp_path, BUDGET_MB, *words)
+    assert same == raster
+    assert small < usual - (128_000_000 - CACHE_BYTES) + SCATTER_BYTES
+    assert small < 300_000_000
+
+
+@pytest.mark.slow
+def test_a_registration_is_the_same_with_any_budget(tile: Pair, tmp_path: Path) -> None:
+    pair = large_pair(tile, 3000, tmp_path)
+    words = ["coregister", pair.reference, pair.input, tmp_path / "out.tif"]
+    (_, raster), (_, same) = (budget_of(tmp_path, one, *words) for one in (None, BUDGET_MB))
+    assert same == raster

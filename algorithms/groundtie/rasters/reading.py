@@ -18,6 +18,7 @@ from rasterio.errors import NotGeoreferencedWarning
 
 from ..arrays import Raster, in_memory
 from ..errors import BandError, RasterOpenError
+from ..memory import cache_bytes
 from ..raster_names import is_remote, raster_name
 from .bands import MOST_BANDS, BandInfo, colormap, stated, tags_of, working_dtype
 from .georeferencing import grid_of
@@ -28,12 +29,6 @@ from .windows import Mask, Window, read_window
 
 # Images without georeferencing are a supported case, see `Grid.is_georeferenced`.
 warnings.filterwarnings("ignore", category=NotGeoreferencedWarning)
-
-# GDAL keeps what it has read up to a twentieth of the machine's memory, unless it is set to less.
-# Scenes are read in strips lower than their blocks: a row of blocks of both images must fit in, or
-# is decompressed again for every strip. 154 MB are those of 30 000 pixels of one and of four bands
-# of 16 bits, 512 lines high; more saves nothing (suite large).
-_READING_CACHE_BYTES = 200_000_000
 
 FloatImage = NDArray[np.float32]
 
@@ -300,5 +295,8 @@ def _source_of_array(raster: Raster) -> RasterSource:
 
 
 def bounded_cache() -> Any:
-    """Return the environment in which GDAL keeps a bounded amount of what it has read."""
-    return rasterio.Env(GDAL_CACHEMAX=_READING_CACHE_BYTES)
+    """Return the environment in which GDAL keeps a bounded amount of what it has read.
+
+    Of itself it is a twentieth of the machine's memory.
+    """
+    return rasterio.Env(GDAL_CACHEMAX=cache_bytes())

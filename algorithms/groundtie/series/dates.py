@@ -22,6 +22,7 @@ from shapely.strtree import STRtree
 from ..context import Context
 from ..errors import CancelledError, GroundTieError
 from ..masks.radar import LEAST_VARIATION2, variation2_of
+from ..memory import dates_bytes
 from ..rasters.grid import Grid, reproject
 from ..rasters.held import held_grey
 from ..rasters.pair import Image
@@ -30,9 +31,6 @@ from ..rasters.reading import RasterSource, open_raster
 from ..registration.user_masks import UserMask
 from .date_masks import DateMask, draw_mask, is_drawn
 from .inputs import Listed
-
-# Dates are held in memory as long as all of them have no more pixels: 400 MB as float32.
-_MOST_HELD_PX = 100_000_000
 
 # Footprints are drawn on images reduced to this, on their longer side.
 _FOOTPRINT_PX = 256
@@ -154,18 +152,18 @@ def open_dates(
     """
     dates: list[Date] = []
     failures: dict[str, str] = {}
-    held = 0
+    held_bytes, most_bytes = 0, dates_bytes()
     for number, one in enumerate(listed):
         context.update(number / len(listed), f"opening {one.name}")
         try:
             source = stack.enter_context(open_raster(one.raster))
-            held += source.grid.width * source.grid.height
+            held_bytes += source.grid.width * source.grid.height * np.dtype(np.float32).itemsize
             mask = None
             if one.mask is not None and is_drawn(one.mask):
                 mask = draw_mask(source, one.mask, stack, context.quiet().progress)
                 context.update(number / len(listed), mask.note)
             date = Date(one, source, source, band, mask)
-            if held <= _MOST_HELD_PX:
+            if held_bytes <= most_bytes:
                 date = replace(date, matched=held_grey(source, band))
             dates.append(date)
         except CancelledError:

@@ -1,0 +1,101 @@
+"""The budget of memory: what states it, and what is given of it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import rasterio.env
+from toys import TOY
+
+from groundtie import memory
+from groundtie.cli import main
+from groundtie.errors import ParameterError
+from groundtie.rasters.reading import bounded_cache
+
+GOOD = ["toy", "a.tif", "b.tif", "c.tif", "--size", "3"]
+
+
+@pytest.fixture(autouse=True)
+def inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.tif", "b.tif"):
+        Path(name).touch()
+
+
+def test_gdal_and_the_dates_of_a_series_get_shares_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(memory.VARIABLE, raising=False)
+    assert (memory.cache_bytes(), memory.dates_bytes()) == (200_000_000, 300_000_000)
+    monkeypatch.setenv(memory.VARIABLE, "250")
+    assert (memory.cache_bytes(), memory.dates_bytes()) == (50_000_000, 75_000_000)
+    with bounded_cache():
+        assert rasterio.env.getenv()["GDAL_CACHEMAX"] == 50_000_000
+
+
+@pytest.mark.parametrize("text", ["", "much", "99", "-1", "nan", "inf", "1e9"])
+def test_no_amount_is_an_error(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setenv(memory.VARIABLE, text)
+    with pytest.raises(ParameterError, match="memory must be 100 to 1000000 megabytes, not"):
+        memory.budget_bytes()
+
+
+@pytest.mark.parametrize("before", [None, "300"])
+def test_the_command_line_sets_it_for_one_command(
+    monkeypatch: pytest.MonkeyPatch, before: str | None
+) -> None:
+    monkeypatch.delenv(memory.VARIABLE, raising=False)
+    if before is not None:
+        monkeypatch.setenv(memory.VARIABLE, before)
+    seen = []
+
+    def run(**values: object) -> object:
+        seen.append(memory.budget_bytes())
+        raise ParameterError("seen")
+
+    tool = replace(TOY, run=run)
+    assert main(["--memory", "400", *GOOD], tools=[tool]) == 2
+    assert seen == [400_000_000]
+    assert os.environ.get(memory.VARIABLE) == before
+
+
+def test_a_bad_amount_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--memory", "0.5", *GOOD], tools=[TOY]) == 2
+    error = capsys.readouterr().err
+    assert "memory must be 100 to" in error and len(error.splitlines()) == 1
+
+
+HEAPS = """
+import ctypes, threading
+from groundtie.memory import share_heaps
+if {shared}:
+    share_heaps()
+libc = ctypes.CDLL(None)
+libc.malloc.restype = ctypes.c_void_p
+wait = threading.Barrier(9)
+def hold():
+    libc.malloc(ctypes.c_size_t(1000))
+    wait.wait()
+    wait.wait()
+for _ in range(8):
+    threading.Thread(target=hold).start()
+wait.wait()
+libc.malloc_stats()
+wait.wait()
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc's heaps")
+@pytest.mark.parametrize("shared", [False, True])
+def test_threads_share_heaps(shared: bool) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", HEAPS.format(shared=shared)],
+        text=True,
+        capture_output=True,
+        check=True,
+    )
+    heaps = done.stderr.count("Arena ")
+    assert heaps == 2 if shared else heaps > 2
