@@ -194,8 +194,8 @@ def _kept_regions(
     """Return the long regions on the ground, and the large ones wider than the window."""
     intensity = power(patch)
     looks = estimate_looks(intensity, patch.valid)
-    level = _decibels(SpeckleFilter("enhanced-frost", _FILTER_PX, looks)(intensity, patch.valid))
     variation2 = local_statistics(intensity, patch.valid, _SEED_PX).variation2
+    level = _decibels(SpeckleFilter("enhanced-frost", _FILTER_PX, looks)(intensity, patch.valid))
     brightest = np.percentile(level[patch.valid], _BRIGHTEST_PERCENT)
     progress.update(0.5)
     smallest = max(int(_SMALLEST_M2 / pixel_m**2), 1)

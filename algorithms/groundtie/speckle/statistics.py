@@ -54,19 +54,23 @@ def local_statistics(intensity: FloatImage, valid: Mask, window_px: int) -> Loca
     """
     size = (window_px, window_px)
     outside = cv2.BORDER_CONSTANT
-    total: FloatImage = np.asarray(
+    # In place as far as may be: masks are made of whole scenes.
+    mean: FloatImage = np.asarray(
         cv2.boxFilter(intensity, cv2.CV_32F, size, normalize=False, borderType=outside), np.float32
     )
     squares: FloatImage = np.asarray(
         cv2.sqrBoxFilter(intensity, cv2.CV_32F, size, normalize=False, borderType=outside),
         np.float32,
     )
-    weight = 1 / np.maximum(window_counts(valid, window_px), np.float32(1))
-    mean: FloatImage = np.asarray(total * weight, np.float32)
+    weight = window_counts(valid, window_px)
+    np.maximum(weight, np.float32(1), out=weight)
+    np.divide(np.float32(1), weight, out=weight)
+    mean *= weight
     squares *= weight
-    power = mean * mean
-    variation2: FloatImage = np.ones_like(mean)
-    np.divide(squares, power, out=variation2, where=power > _NO_POWER)
+    power = np.multiply(mean, mean, out=weight)
+    nothing = ~(power > _NO_POWER)
+    variation2 = np.divide(squares, power, out=squares, where=~nothing)
+    variation2[nothing] = 1
     variation2 -= 1
     return LocalStatistics(mean, np.maximum(variation2, np.float32(0), out=variation2))
 
