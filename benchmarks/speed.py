@@ -87,8 +87,6 @@ def run(settings: Settings) -> SuiteResult:
     affine = time_affine(settings, times)
     radar = time_radar(times)
     timings = rpc_speed.time_points(settings, times, peer_python("orthority"))
-    if not settings.quick:
-        timings += rpc_speed.time_ortho(settings, times)
     records = [*surfaces, *affine, *radar]
     records += [Record(what, name, seconds, note=note) for what, name, seconds, note in timings]
     goals = [surface_goal(surfaces), *affine_goals(affine), *radar_goals(radar)]

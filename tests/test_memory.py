@@ -29,9 +29,9 @@ def inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_gdal_and_the_dates_of_a_series_get_shares_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(memory.VARIABLE, raising=False)
-    assert (memory.cache_bytes(), memory.dates_bytes()) == (200_000_000, 300_000_000)
+    assert (memory.cache_bytes(), memory.dates_bytes()) == (200_000_000, 400_000_000)
     monkeypatch.setenv(memory.VARIABLE, "250")
-    assert (memory.cache_bytes(), memory.dates_bytes()) == (50_000_000, 75_000_000)
+    assert (memory.cache_bytes(), memory.dates_bytes()) == (50_000_000, 100_000_000)
     with bounded_cache():
         assert rasterio.env.getenv()["GDAL_CACHEMAX"] == 50_000_000
 

@@ -24,7 +24,7 @@ DEFAULT_MB, LEAST_MB, MOST_MB = 1000, 100, 1_000_000
 _CACHE_SHARE = 0.2
 
 # For the dates of a series, which are matched again and again.
-_DATES_SHARE = 0.3
+_DATES_SHARE = 0.4
 
 # Of glibc: how many heaps threads share, and what means that limit in its `mallopt`. By default it
 # is eight for each processor, of which each keeps what its threads have given back: 180 MB in the

@@ -1,16 +1,20 @@
 from __future__ import annotations
 
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
-from raster_files import write_raster
+import rasterio
+from raster_files import utm_grid, write_raster
 
-from benchmarks import rpc, rpc_speed
+from benchmarks import ortho, rpc, rpc_speed
 from benchmarks.accuracy import CORRECT, REFUSED
 from benchmarks.attempt import unregistered
 from benchmarks.cases import RealCase
 from benchmarks.half_real import BIASES, LARGEST_SHIFT_PX, SENSORS, bias_of, make_scene, sensor_rpc
+from benchmarks.processes import Measured
 from groundtie.rasters.grid import LON_LAT, Grid, reproject
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor.orientation import orient
@@ -84,11 +88,27 @@ def test_speed_goals_compare_with_what_is_there() -> None:
         (rpc_speed.INVERSE, rpc_speed.RASTERIO, 0.3, ""),
     ]
     assert [goal.reached for goal in rpc_speed.goals(timings)] == [True, False, True]
-    more = [
-        (rpc_speed.ORTHO, rpc_speed.OWN, 5.0, ""),
-        (rpc_speed.ORTHO, rpc_speed.GDALWARP_FAST, 6.0, ""),
-    ]
-    assert [goal.reached for goal in rpc_speed.goals(timings + more)][3:] == [True]
+
+
+@pytest.mark.parametrize(("seconds", "reached"), [(2.0, True), (2.6, False)])
+def test_the_orthoimage_is_compared_with_the_same_file(seconds: float, reached: bool) -> None:
+    found = {
+        name: Measured(time, 2 * time, 1, 0, "")
+        for name, time in ((ortho.OWN, seconds), (ortho.GDALWARP_FAST, 1.0), (ortho.SAME_FILE, 2.5))
+    }
+    assert [goal.reached for goal in ortho.goals(found)] == [reached]
+    del found[ortho.SAME_FILE]
+    assert ortho.goals(found) == []
+
+
+@pytest.mark.skipif(shutil.which("gdaladdo") is None, reason="GDAL's programs are not installed")
+def test_overviews_are_added_to_what_a_command_writes(tmp_path: Path) -> None:
+    image = write_raster(tmp_path / "a.tif", np.ones((600, 600), np.uint8), utm_grid(600, 600))
+    words = ortho.with_overviews(["gdal_translate", "-q", str(image), ortho.OUTPUT])
+    output = tmp_path / "b.tif"
+    subprocess.run([str(output) if word == ortho.OUTPUT else word for word in words], check=True)
+    with rasterio.open(output) as raster:
+        assert raster.overviews(1) == [2, 4, 8, 16]
 
 
 def test_gdalwarp_gets_the_same_grid(tmp_path: Path) -> None:
@@ -97,7 +117,7 @@ def test_gdalwarp_gets_the_same_grid(tmp_path: Path) -> None:
 
     grid = Grid(Affine(0.001, 0, place[0], 0, -0.001, place[1]), LON_LAT, 20, 10)
     like = write_raster(tmp_path / "like.tif", np.ones((10, 20), np.uint8), grid)
-    words = rpc_speed.gdalwarp(Path("i.tif"), Path("d.tif"), like, "0.125")
+    words = ortho.gdalwarp(Path("i.tif"), Path("d.tif"), like, "0.125")
     at = words.index("-te")
     np.testing.assert_allclose([float(w) for w in words[at + 1 : at + 5]], [9.0, 44.99, 9.02, 45.0])
     assert words[words.index("-ts") + 1 : words.index("-ts") + 3] == ["20", "10"]

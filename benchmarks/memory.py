@@ -1,0 +1,97 @@
+"""Peak memory of tools on 10 000² pixels with the usual budget and with a small one."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from groundtie.geometry.models import shift_model
+from groundtie.geometry.transform import Transform
+from groundtie.memory import DEFAULT_MB
+from groundtie.rasters.reading import open_raster
+
+from .attempt import Pair
+from .large_pairs import large_pair, tile_pair
+from .processes import OUTPUT, measure
+from .suites import Goal, Settings, SuiteResult, Table
+
+SIZE_PX, QUICK_SIZE_PX = 10_000, 1000
+BUDGETS_MB = (DEFAULT_MB, 300)
+_THREADS = ("--workers", "2")
+
+
+@dataclass(frozen=True)
+class Run:
+    """A call of a tool with a budget: what it took of memory and of the processor."""
+
+    tool: str
+    budget_mb: int
+    peak_bytes: int
+    processor_seconds: float
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite."""
+    size = QUICK_SIZE_PX if settings.quick else SIZE_PX
+    tile, runs = tile_pair(settings.cache), []
+    with tempfile.TemporaryDirectory() as folder:
+        pair = large_pair(tile, size, Path(folder))
+        for tool, words in calls(pair, Path(folder)).items():
+            for budget_mb in BUDGETS_MB:
+                option = ("--memory", str(budget_mb))
+                found = measure([sys.executable, "-m", "groundtie", *option, tool, *words])
+                runs.append(Run(tool, budget_mb, found.peak_bytes, found.processor_seconds))
+                print(runs[-1], flush=True)
+    return SuiteResult(
+        "Memory",
+        goals(runs, is_complete=not settings.quick),
+        (table(runs),),
+        [asdict(one) for one in runs],
+        (f"{size}² px, 16 bit: radar of one band, a camera's image of four; two threads.",),
+    )
+
+
+def calls(pair: Pair, folder: Path) -> dict[str, list[str]]:
+    """Return the words of each tool's call."""
+    transform = folder / "transform.json"
+    with open_raster(pair.input) as source:
+        moved = Transform(shift_model(20.3, 30.4), source.grid.crs, source.grid)
+    transform.write_text(json.dumps(moved.to_json()))
+    reference, input = str(pair.reference), str(pair.input)
+    return {
+        "coregister": [reference, input, OUTPUT, *_THREADS],
+        "warp": [input, OUTPUT, "--transform", str(transform), *_THREADS],
+        "filter-speckle": [reference, OUTPUT, *_THREADS],
+        "mask-threshold": [reference, OUTPUT],
+        "mask-regions": [reference, OUTPUT],
+    }
+
+
+def goals(runs: Sequence[Run], *, is_complete: bool) -> list[Goal]:
+    """Return whether the usual budget is kept."""
+    usual = [one for one in runs if one.budget_mb == DEFAULT_MB]
+    largest = max(usual, key=lambda one: one.peak_bytes)
+    found = f"{largest.peak_bytes / 1e6:.0f} MB ({largest.tool})"
+    is_kept = largest.peak_bytes <= DEFAULT_MB * 1e6
+    wanted = f"≤ {DEFAULT_MB} MB"
+    return [Goal("Largest peak, usual budget", wanted, found, is_kept if is_complete else None)]
+
+
+def table(runs: Sequence[Run]) -> Table:
+    """Return what was measured."""
+    head = ["tool"]
+    head += [f"{what}, --memory {mb}" for mb in BUDGETS_MB for what in ("peak MB", "s")]
+    rows = []
+    for tool in dict.fromkeys(one.tool for one in runs):
+        own = {one.budget_mb: one for one in runs if one.tool == tool}
+        cells = [
+            text
+            for mb in BUDGETS_MB
+            for text in (f"{own[mb].peak_bytes / 1e6:.0f}", f"{own[mb].processor_seconds:.1f}")
+        ]
+        rows.append([tool, *cells])
+    return Table("Peak memory and processor time", head, rows)
