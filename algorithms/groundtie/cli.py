@@ -23,7 +23,7 @@ from click.shell_completion import CompletionItem
 from .declaration import Parameter, Tool
 from .errors import CancelledError, GroundTieError, NotRegisteredError
 from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind, RastersIn
-from .memory import DEFAULT_MB, VARIABLE, budget_bytes, share_heaps
+from .memory import DEFAULT_MB, VARIABLE, budget_bytes, set_heaps
 from .progress import Progress
 from .version import __version__
 
@@ -44,7 +44,7 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
         The exit code.
     """
     _silence_libraries()
-    share_heaps()
+    set_heaps()
     with _signals() as received:
         try:
             group = _all_tools() if tools is None else _these_tools(tools)

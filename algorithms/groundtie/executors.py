@@ -18,7 +18,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any, ParamSpec, TypeVar
 
 from .errors import ParameterError, SchedulerError, WorkerLostError
-from .memory import share_heaps
+from .memory import set_heaps
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -178,6 +178,12 @@ def result_of(future: Future[T]) -> T:
         raise WorkerLostError(f"its worker was lost: {error}") from error
 
 
+def enter_worker() -> None:
+    """Prepare the process of a task that may run anywhere: that of a Dask worker."""
+    if "distributed" in sys.modules:
+        set_heaps()
+
+
 def _heed(stopped: Callable[[], bool]) -> None:
     _here.stopped = stopped
 
@@ -192,7 +198,7 @@ def _start_worker(stop: Any) -> None:
         os.environ.setdefault(name, "1")
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _heed(stop.is_set)
-    share_heaps()
+    set_heaps()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     import cv2
 

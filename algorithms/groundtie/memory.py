@@ -26,10 +26,13 @@ _CACHE_SHARE = 0.2
 # For the dates of a series, which are matched again and again.
 _DATES_SHARE = 0.4
 
-# Of glibc: how many heaps threads share, and what means that limit in its `mallopt`. By default it
-# is eight for each processor, of which each keeps what its threads have given back: 180 MB in the
-# registration of 10 000² pixels by two threads, and no time is saved by it (suite large).
-_HEAPS, _M_ARENA_MAX = 2, -8
+# What glibc's `mallopt` calls its options, and what they are set to. Threads share two heaps: there
+# are eight for each processor else, of which each keeps what its threads have given back, 110 MB
+# in the registration of 10 000² pixels by two threads, and no time is saved by it. Arrays come from
+# heaps up to 32 MB, and 64 MB stay at their ends, as glibc adapts to by itself; but Dask has its
+# workers give back each array at once, which doubles the time of a registration (suite batch).
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8
+_HEAPS = {_M_ARENA_MAX: 2, _M_MMAP_THRESHOLD: 32 << 20, _M_TRIM_THRESHOLD: 64 << 20}
 
 
 def budget_bytes() -> int:
@@ -62,11 +65,13 @@ def dates_bytes() -> int:
     return round(_DATES_SHARE * budget_bytes())
 
 
-def share_heaps() -> None:
-    """Have the threads of this process share few heaps, where its C library is glibc.
+def set_heaps() -> None:
+    """Set how memory is allocated in this process, where its C library is glibc.
 
-    For processes of this package's own, before they have threads.
+    For processes that do this package's work alone: the command line, and workers.
     """
     if sys.platform == "linux":
         with contextlib.suppress(OSError, AttributeError):  # another C library has no `mallopt`
-            ctypes.CDLL(None).mallopt(_M_ARENA_MAX, _HEAPS)
+            library = ctypes.CDLL(None)
+            for option, value in _HEAPS.items():
+                library.mallopt(option, value)

@@ -13,7 +13,7 @@ from typing import Any
 
 from ..declaration import Tool
 from ..errors import CancelledError, GroundTieError, NotRegisteredError
-from ..executors import stop_requested
+from ..executors import enter_worker, stop_requested
 from ..progress import Progress
 from ..version import __version__
 
@@ -83,6 +83,7 @@ class Task:
 
     def run(self) -> Outcome:
         """Run the call; whatever is wrong with it is an outcome, too."""
+        enter_worker()
         started = time.perf_counter()
         result: Mapping[str, Any] = {}
         status, message, trace = FAILED, "", ""

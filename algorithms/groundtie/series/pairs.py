@@ -14,6 +14,7 @@ import numpy as np
 
 from ..context import Context, threads
 from ..errors import CancelledError, GroundTieError, WorkerLostError
+from ..executors import enter_worker
 from ..geometry.estimation import jackknife_deviations
 from ..geometry.models import Model
 from ..masks.choice import AUTO
@@ -186,6 +187,7 @@ class PairTask:
 def _register_files(
     listed: Sequence[Listed], band: int | None, key: str, bare: tuple[Any, Settings, SeriesFrame]
 ) -> PairResult:
+    enter_worker()
     with threads(1) as context, ExitStack() as stack:
         opened = open_dates(listed, band, stack, context)
         if opened.failures:
