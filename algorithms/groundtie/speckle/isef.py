@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from scipy.optimize import brentq
 
 from ..rasters.reading import FloatImage
 
@@ -60,6 +59,7 @@ def decay_for_window(window_px: float) -> float:
     window_px
         Side of the window, above 1.
     """
+    from scipy.optimize import brentq  # takes 0.2 s to import; every tool imports the filters
 
     def excess(decay: float) -> float:
         # Sum of the squared weights of a line, against that of a mean.
