@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from ..errors import TooFewPointsError
 from ..geometry.model_choice import (
@@ -245,6 +244,8 @@ def _spline_coefficients(values: FloatArray) -> FloatArray:
 
 
 def _maximise(family: Family, field: _Field, start: FloatArray) -> FloatArray:
+    from scipy.optimize import minimize  # takes 0.2 s to import; all tools import this module
+
     design, scale = family.design, family.frame.to_map.a
 
     def cost(parameters: FloatArray) -> tuple[float, FloatArray]:
