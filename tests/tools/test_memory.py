@@ -30,6 +30,8 @@ CALL = f"""
 import os
 os.environ["GDAL_CACHEMAX"] = "4000"
 import groundtie, sys
+from groundtie.memory import set_heaps
+set_heaps()
 os.environ["GROUNDTIE_MEMORY"] = "{BUDGET_MB}"
 tool, *files = sys.argv[1:]
 """
