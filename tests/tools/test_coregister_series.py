@@ -6,6 +6,10 @@ import csv
 import json
 import pickle
 import shutil
+import signal
+import subprocess
+import sys
+import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -299,6 +303,25 @@ def test_a_cancelled_series_goes_on_where_it_was(tmp_path: Path) -> None:
     assert set(listing(out)) == set(listing(tmp_path / "whole"))
     for path in sorted(out.glob("*.tif")):
         np.testing.assert_array_equal(pixels(path), pixels(tmp_path / "whole" / path.name))
+
+
+@pytest.mark.slow
+def test_a_killed_series_goes_on_where_it_was(tmp_path: Path) -> None:
+    dates = write_dates(tmp_path / "dates", 5, SIZE)
+    out = tmp_path / "out"
+    unfinished = out / "series.unfinished.jsonl"
+    words = ["coregister-series", str(out), str(dates.folder), "--search-radius", "120"]
+    words += ["--reference", str(dates.files[0]), "--workers", "2"]
+    with subprocess.Popen([sys.executable, "-m", "groundtie", *words]) as process:
+        while process.poll() is None:
+            if unfinished.exists() and unfinished.stat().st_size:
+                break
+            time.sleep(0.01)
+        process.kill()
+    assert process.returncode == -signal.SIGKILL
+    again = coregister_series(out, [dates.folder], reference=dates.files[0], **OPTIONS)
+    assert again.reused_pairs > 0 and len(again.registered) == 4
+    assert not unfinished.exists()
 
 
 @pytest.mark.slow
