@@ -255,4 +255,3 @@ def test_each_side_of_the_line_is_named(page: Page) -> None:
     style = page.all("style")[0].text
     assert ".side.reference { clip-path: inset(0 calc(100% - var(--at) * 1%) 0 0); }" in style
     assert '[data-mode="swipe"] .input { clip-path: inset(0 0 0 calc(var(--at) * 1%)); }' in style
-
