@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from groundtie.geometry import vector_layers
+
 ROOT = Path(__file__).resolve().parents[2]
 OLDEST = "3.10"
 
@@ -79,6 +81,17 @@ def test_it_can_read_library_and_plugin(oldest: str) -> None:
     paths = [*(ROOT / "algorithms").rglob("*.py"), *(ROOT / "plugin").rglob("*.py")]
     assert len(paths) > 300
     assert faults(oldest, paths) == []
+
+
+def test_vector_layers_are_read_by_it(
+    oldest: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a process of its own, whose options it must know; fiona is a stand-in."""
+    stand_in = "def open(path):\n    raise ValueError(f'asked for {path}')\n"
+    (tmp_path / "fiona.py").write_text(stand_in, encoding="utf-8")
+    monkeypatch.setattr(vector_layers, "_python", lambda: Path(oldest))
+    monkeypatch.setattr("sys.path", [str(tmp_path)])
+    assert vector_layers._read_apart("a.gpkg") == {"error": "asked for a.gpkg"}
 
 
 @pytest.mark.parametrize(
