@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -53,11 +54,15 @@ json.dump(faults, sys.stdout)
 
 @pytest.fixture(scope="module")
 def oldest() -> str:
-    """Return a Python of the oldest version, not one that pyenv knows but does not run."""
+    """Return a Python of the oldest version: one on PATH, or pyenv's."""
     found = shutil.which(f"python{OLDEST}")
-    if found is None or subprocess.run([found, "-V"], check=False, capture_output=True).returncode:
-        pytest.skip(f"there is no Python {OLDEST} here")
-    return found
+    if found is not None:
+        asked = [found, "-c", "import sys; print(sys.executable)"]
+        env = {**os.environ, "PYENV_VERSION": OLDEST}
+        called = subprocess.run(asked, env=env, capture_output=True, text=True, check=False)
+        if called.returncode == 0:
+            return called.stdout.strip()
+    pytest.skip(f"there is no Python {OLDEST} here")
 
 
 def faults(python: str, paths: list[Path]) -> list[str]:
