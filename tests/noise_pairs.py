@@ -16,12 +16,12 @@ SHIFT = (4.0, -3.0)
 ORIGIN = (500_000.0, 5_000_000.0)
 
 
-def write_pair(folder: Path, seed: int) -> None:
+def write_pair(folder: Path, seed: int, size: int = SIZE) -> None:
     """Write reference.tif and input.tif: smooth noise, and its noisy negative, moved."""
     random = np.random.Generator(np.random.PCG64(seed))
-    ground = gaussian_filter(random.normal(size=(SIZE, SIZE)), 3)
+    ground = gaussian_filter(random.normal(size=(size, size)), 3)
     ground = np.clip(128 + 40 * ground / ground.std(), 1, 254)
-    noise = random.normal(0, 5, (2, SIZE, SIZE))
+    noise = random.normal(0, 5, (2, size, size))
     right = rasterio.transform.from_origin(*ORIGIN, 1, 1)
     write_raster(folder / "reference.tif", ground[None], right)
     moved = rasterio.transform.from_origin(ORIGIN[0] + SHIFT[0], ORIGIN[1] + SHIFT[1], 1, 1)

@@ -218,7 +218,8 @@ def help_html(tool: Any) -> str:
         f"<p><b>{_escaped(tr(p.kind.label))}</b>: {worded(p.kind.help)}</p>"
         for p in tool.parameters
     ]
-    return "\n".join([*parts, f"<h3>{tr('Parameters')}</h3>", *rows])
+    heading = [f"<h3>{tr('Parameters')}</h3>"] if rows else []
+    return "\n".join([*parts, *heading, *rows])
 
 
 def _escaped(text: str) -> str:

@@ -43,9 +43,11 @@ class Overlay(QgsMapCanvasItem):
     ----------
     canvas
         The map.
+    height
+        Where it lies among what is drawn over the map.
     """
 
-    def __init__(self, canvas: QgsMapCanvas) -> None:
+    def __init__(self, canvas: QgsMapCanvas, height: float = 10) -> None:
         super().__init__(canvas)
         self._canvas = canvas
         self._layers: list[Any] = []
@@ -53,7 +55,7 @@ class Overlay(QgsMapCanvasItem):
         self._extent = QgsRectangle()
         self._job: QgsMapRendererParallelJob | None = None
         self.share = 1.0
-        self.setZValue(10)
+        self.setZValue(height)
         canvas.mapCanvasRefreshed.connect(self.render)
 
     def show_layers(self, layers: list[Any], share: float = 1.0) -> None:
@@ -97,7 +99,8 @@ class Overlay(QgsMapCanvasItem):
     def paint(self, painter: Any, option: Any = None, widget: Any = None) -> None:
         if self._image.isNull() or not self._layers:
             return
-        size = self._canvas.size()
+        # Without the frame around the map, which would stretch the image by two pixels.
+        size = self._canvas.viewport().size()
         width = size.width() * self.share
         painter.save()
         painter.setClipRect(QRectF(0, 0, width, size.height()))

@@ -87,7 +87,10 @@ def _vector_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDe
 
 
 class LayerOrFile(QgsProcessingParameterMapLayer):
-    """A raster or vector layer, or any file, also one that is no layer."""
+    """A raster or vector layer, or any file, also one that is no layer.
+
+    Of `TypeVector` the box of QGIS 3.22 offers nothing, and alone it offers rasters, too.
+    """
 
     def checkValueIsAcceptable(
         self, value: Any, context: QgsProcessingContext | None = None
@@ -107,7 +110,7 @@ def _mask_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefi
         name,
         tr(kind.label),
         optional=not parameter.required,
-        types=[compat.RASTER, compat.ANY_VECTOR],
+        types=[compat.RASTER, compat.GEOMETRY],
     )
 
 
@@ -120,7 +123,7 @@ def takes_layers(kind: Any) -> bool:
 def _file_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
     if takes_layers(kind):
         return LayerOrFile(
-            name, tr(kind.label), optional=not parameter.required, types=[compat.ANY_VECTOR]
+            name, tr(kind.label), optional=not parameter.required, types=[compat.GEOMETRY]
         )
     return QgsProcessingParameterFile(
         name,

@@ -78,11 +78,11 @@ class GroundTieDock(QDockWidget):
         self.look.show_pair(reference, layer)
 
     def _forget(self, ids: list[str]) -> None:
-        """Show nothing of layers that are taken out of the project."""
-        self.look.stop()
-        self.overlay.show_layers([])
-        self.look.show_pair(None, None)
-        self.repair.close_points()
+        """Show nothing of layers that are taken out of the project; the others stay."""
+        if self.look.shows(ids):
+            self.look.show_pair(None, None)
+        if self.repair.shows(ids):
+            self.repair.close_points()
 
     def closeEvent(self, event: Any) -> None:
         """Leave the map as it is."""
@@ -101,6 +101,6 @@ class GroundTieDock(QDockWidget):
     def take_away(self) -> None:
         """Remove what was drawn on the map, and the connections (for unloading)."""
         QgsProject.instance().layersWillBeRemoved.disconnect(self._forget)
-        self.look.stop()
+        self.look.take_away()
         self.overlay.take_away()
         self._canvas.scene().removeItem(self.repair.points)

@@ -19,7 +19,7 @@ from qgis.PyQt.QtWidgets import (
 
 from .canvas_items import Overlay, clearly
 from .map_tools import SwipeTool
-from .reference_export import between
+from .reference_export import any_of, between
 from .translation import mark, tr
 
 _FLICKER_MS = 600
@@ -42,6 +42,8 @@ class LookPage(QWidget):
     def __init__(self, canvas: Any, overlay: Overlay) -> None:
         super().__init__()
         self._canvas, self._overlay = canvas, overlay
+        # The map itself may show anything above the registered image.
+        self._beneath = Overlay(canvas, 9)
         self._reference: Any = None
         self._registered: Any = None
         self._worst: list[QgsPointXY] = []
@@ -90,6 +92,10 @@ class LookPage(QWidget):
         self._reference, self._registered = reference, registered
         self._enable()
 
+    def shows(self, ids: list[str]) -> bool:
+        """Return whether one of the layers with these ids is looked at."""
+        return any_of(ids, self._reference, self._registered)
+
     def show_worst(self, places: list[QgsPointXY]) -> None:
         """Take the places to go to, on the map, the worst first."""
         self._worst, self._at = places, -1
@@ -112,26 +118,31 @@ class LookPage(QWidget):
         self.swipe.setChecked(False)
         self.flicker.setChecked(False)
 
+    def take_away(self) -> None:
+        """Take what this draws from the map for good."""
+        self.stop()
+        self._beneath.take_away()
+
+    def _show_both(self, on: bool, share: float) -> None:
+        """Draw the registered image, and over its left `share` the reference; or neither."""
+        self._beneath.show_layers([clearly(self._registered)] if on else [])
+        self._overlay.show_layers([clearly(self._reference)] if on else [], share)
+
     def _swipe(self, on: bool) -> None:
         if on:
             self.flicker.setChecked(False)
-            self._show_registered()
-            self._overlay.show_layers([clearly(self._reference)], 0.5)
-            self._canvas.setMapTool(self._tool)
-        else:
-            self._overlay.show_layers([])
-            self._canvas.unsetMapTool(self._tool)
+        self._show_both(on, 0.5)
+        self._canvas.setMapTool(self._tool) if on else self._canvas.unsetMapTool(self._tool)
 
     def _flicker(self, on: bool) -> None:
         if on:
             self.swipe.setChecked(False)
-            self._show_registered()
-            self._overlay.show_layers([clearly(self._reference)])
+        self._show_both(on, 1.0)
+        if on:
             self._name_what_is_shown()
             self._timer.start(_FLICKER_MS)
         else:
             self._timer.stop()
-            self._overlay.show_layers([])
             self._enable()
 
     def _flick(self) -> None:
@@ -141,13 +152,6 @@ class LookPage(QWidget):
     def _name_what_is_shown(self) -> None:
         reference, registered = tr("Shown is the reference."), tr("Shown is the registered image.")
         self.hint.setText(reference if self._overlay.share else registered)
-
-    def _show_registered(self) -> None:
-        from qgis.core import QgsProject
-
-        node = QgsProject.instance().layerTreeRoot().findLayer(self._registered.id())
-        if node is not None:
-            node.setItemVisibilityCheckedParentRecursive(True)
 
     def go(self, step: int) -> None:
         """Go to the next, or the one before, of the worst points."""

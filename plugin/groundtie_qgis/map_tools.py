@@ -25,7 +25,7 @@ class SwipeTool(QgsMapTool):
         self.setCursor(Qt.CursorShape.SplitHCursor)
 
     def canvasMoveEvent(self, event: Any) -> None:
-        self._overlay.set_share(event.pos().x() / max(self.canvas().width(), 1))
+        self._overlay.set_share(event.pos().x() / max(self.canvas().viewport().width(), 1))
 
 
 class DragTool(QgsMapTool):

@@ -74,7 +74,7 @@ class GroundTiePlugin:
     def toggle_dock(self) -> None:
         """Open the dock, or close it."""
         if self.dock is not None and self.dock.isVisible():
-            self.dock.hide()
+            self.dock.close()
         else:
             self.open_dock()
 

@@ -47,8 +47,9 @@ class PointTable(QAbstractTableModel):
         self._order = np.zeros(0, int)
 
     def show_review(self, review: Any, residuals: Any) -> None:
-        """Show another state of the points."""
-        same = self._review is not None and len(review.points) == len(self._review.points)
+        """Show another state of the points; None: no points."""
+        known = review is not None and self._review is not None
+        same = known and len(review.points) == len(self._review.points)
         self.layoutAboutToBeChanged.emit() if same else self.beginResetModel()
         self._review, self._residuals = review, residuals
         self._arrange()

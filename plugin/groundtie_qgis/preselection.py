@@ -1,15 +1,15 @@
-"""Which raster layers of the project are proposed as reference and as input: never one as both."""
+"""Which layers of the project a dialog begins with: never one as reference and as input."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import qgis.utils
-from qgis.core import QgsProject, QgsRasterLayer, QgsUnitTypes
+from qgis.core import QgsProject, QgsRasterLayer, QgsUnitTypes, QgsVectorLayer
 from qgis.PyQt.QtCore import QCoreApplication, QThread
 
 from .compat import METRES
-from .definitions import qgis_name
+from .definitions import qgis_name, takes_layers
 from .library import kinds
 from .start_files import has_rpcs
 
@@ -18,18 +18,33 @@ NOTHING = " "
 
 
 def preselect(algorithm: Any, tool: Any) -> None:
-    """Have the dialog of a tool that needs two rasters begin with two different ones.
+    """Have the dialog of a tool begin with different layers in the boxes that must be filled.
 
-    QGIS by itself begins with the active layer in both boxes.
+    QGIS by itself begins with the active layer in all of them, also where points are asked for.
     """
-    names = [p.name for p in tool.parameters if p.required and isinstance(p.kind, kinds.RasterIn)]
-    if len(names) != 2 or "reference" not in names or not _in_desktop():
+    if not _in_desktop():
         return
-    reference, input = proposed_pair(raster_files(), qgis.utils.iface.activeLayer())
-    proposed = {name: reference if name == "reference" else input for name in names}
+    required = [p for p in tool.parameters if p.required]
+    proposed: dict[str, Any] = {
+        p.name: tie_points() if takes_layers(p.kind) else None
+        for p in required
+        if takes_layers(p.kind) or isinstance(p.kind, kinds.MaskIn)
+    }
+    names = [p.name for p in required if isinstance(p.kind, kinds.RasterIn)]
+    if len(names) == 2 and "reference" in names:
+        reference, input = proposed_pair(raster_files(), qgis.utils.iface.activeLayer())
+        proposed |= {name: reference if name == "reference" else input for name in names}
     for name, layer in proposed.items():
         definition = algorithm.parameterDefinition(qgis_name(name))
         definition.setGuiDefaultValueOverride(NOTHING if layer is None else layer.id())
+
+
+def tie_points() -> Any:
+    """Return the topmost layer of the project that has the columns of tie points, or None."""
+    for layer in QgsProject.instance().layerTreeRoot().layerOrder():
+        if isinstance(layer, QgsVectorLayer) and layer.fields().indexOf("input_col") >= 0:
+            return layer
+    return None
 
 
 def raster_files() -> list[Any]:

@@ -113,3 +113,8 @@ def layer_of(path: Any) -> Any:
         if isinstance(layer, QgsRasterLayer) and path is not None and layer.source() == str(path)
     ]
     return found[0] if found else None
+
+
+def any_of(ids: list[str], *layers: Any) -> bool:
+    """Return whether one of the layers, some of which may be None, has one of the ids."""
+    return any(layer is not None and layer.id() in ids for layer in layers)

@@ -21,16 +21,13 @@ from qgis.PyQt.QtWidgets import (
 from .canvas_items import Overlay, PointsItem, clearly
 from .library import errors, library_module
 from .map_tools import ClickTool, DragTool
-from .model_list import BIASES, FIRST_POINTS, model_text
+from .model_list import BIASES, FIRST_POINTS, model_text, points_text
 from .point_table import PointTable, PointView
-from .reference_export import between, layer_of
+from .reference_export import any_of, between, layer_of
 from .run import Outcome
 from .sensor_run import SensorImage
 from .translation import tr
 from .writer import Writer
-
-# As the verdict counts them.
-TOLERANCE_PX = library_module("geometry.judging").TOLERANCE_PX
 
 
 class RepairPage(QWidget):
@@ -138,9 +135,20 @@ class RepairPage(QWidget):
 
     def close_points(self) -> None:
         """Forget the points."""
+        self.stop()
         self.review, self.fits = None, {}
+        self._reference = self._input = self._sensor = None
+        self.model.clear()
+        self.table.show_review(None, np.zeros(0))
         self.points.show_points([])
+        self._changed([])
+        self.text.setText(tr("Register two images first."))
         self._enable()
+
+    def shows(self, ids: list[str]) -> bool:
+        """Return whether the points belong to one of the layers with these ids."""
+        image = () if self._sensor is None else (self._sensor.layer, self._sensor.dem)
+        return any_of(ids, self._reference, self._input, *image)
 
     def stop(self) -> None:
         """Leave the map to others."""
@@ -183,19 +191,7 @@ class RepairPage(QWidget):
         self.text.setText(self._summary())
 
     def _summary(self) -> str:
-        points = self.review.points
-        edited = int(self.review.edited.sum())
-        used = tr("{used} of {all} points take part")
-        parts = [used.format(used=int(points.used.sum()), all=len(points))]
-        parts += [tr("{} set by hand").format(edited)] if edited else []
-        fit = self.fits.get(self.kind())
-        check = points.is_check & points.used
-        if fit is not None and check.any():
-            agree = int((fit.residuals_px[check] <= TOLERANCE_PX).sum())
-            agreeing = tr("{agree} of {all} check points agree within {limit} px")
-            limit = f"{TOLERANCE_PX:g}"
-            parts.append(agreeing.format(agree=agree, all=check.sum(), limit=limit))
-        return ", ".join(parts) + "."
+        return points_text(self.review, self.fits.get(self.kind()))
 
     def _switch(self, row: int, on: bool) -> None:
         self.change(self.review.switch([row], on))
@@ -280,6 +276,8 @@ class RepairPage(QWidget):
         self.write.setEnabled(False)
 
     def _end_writing(self, outcome: Outcome) -> None:
+        if self.review is None:
+            return  # One of the layers was taken out of the project meanwhile.
         self.write.setEnabled(True)
         if not outcome.succeeded:
             self.text.setText(tr("Not written: {}.").format(outcome.reason.rstrip(".")))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from qgis.gui import QgsMapLayerComboBox
+from qgis.PyQt import sip
 from qgis.PyQt.QtCore import QTimer, QUrl
 from qgis.PyQt.QtGui import QDesktopServices
 from qgis.PyQt.QtWidgets import (
@@ -228,6 +229,8 @@ class StartPage(QWidget):
 
     def _end(self, outcome: Outcome) -> None:
         self._run, self.outcome = None, outcome
+        if any(layer is not None and sip.isdeleted(layer) for layer in self._layers):
+            self._layers = ()  # Taken out of the project meanwhile.
         self.register.setText(tr("Register"))
         self.progress.hide()
         report = outcome.files.get("REPORT")
@@ -238,7 +241,8 @@ class StartPage(QWidget):
             self._state(True, "\n".join(first_lines(outcome.lines)))
         else:
             self._state(False, outcome.reason)
-        self._finished(outcome, *self._layers)
+        if self._layers:
+            self._finished(outcome, *self._layers)
 
     def _state(self, good: bool, text: str) -> None:
         self.verdict.state(good, text, tuple(layer for layer in self._layers if layer is not None))

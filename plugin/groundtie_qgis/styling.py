@@ -68,7 +68,8 @@ class LoadedLayers:
             return
         parent = node.parent()
         if self._group is None or sip.isdeleted(self._group):
-            self._group = parent.insertGroup(0, self._title)
+            # QGIS adds layers above the selected one, which may lie below others.
+            self._group = project.layerTreeRoot().insertGroup(0, self._title)
         top = isinstance(layer, QgsVectorLayer)
         self._group.insertChildNode(0 if top else len(self._group.children()), node.clone())
         parent.removeChildNode(node)

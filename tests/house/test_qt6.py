@@ -1,17 +1,24 @@
 """The plugin's Qt is Qt 6's, too: scoped enumerations, no names that Qt 6 has no more.
 
-QGIS 4 cannot be had here: its `qgis.PyQt` hands PyQt6's modules on, which PyQt6's own stubs tell.
+QGIS 4 cannot be had here: its `qgis.PyQt` hands PyQt6's modules on. Their own stubs tell which
+names there are, and the dock runs in them with stand-ins for QGIS's classes.
 """
 
 from __future__ import annotations
 
 import ast
 import importlib.util
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
 import pytest
+from noise_pairs import write_pair
+
+import groundtie
 
 PLUGIN = Path(__file__).resolve().parents[2] / "plugin" / "groundtie_qgis"
 MODULES = sorted(PLUGIN.glob("*.py"))
@@ -135,3 +142,29 @@ def test_pyqt6_has_every_name(path: Path) -> None:
         scope = members(classes[first]).get(enumeration)
         assert isinstance(scope, ast.ClassDef), f"{first}.{enumeration}"
         assert member in members(scope), f"{first}.{enumeration}.{member}"
+
+
+def test_the_dock_runs_in_qt_6(tmp_path: Path) -> None:
+    """Pages, table and points that are drawn, points switched off, the dialog that installs."""
+    pytest.importorskip("PyQt6.QtWidgets", reason="PyQt6 or its libraries are missing")
+    write_pair(tmp_path, 0)
+    images, points = [str(tmp_path / f"{name}.tif") for name in ("reference", "input")], "tp.gpkg"
+    groundtie.coregister(
+        *images, tmp_path / "o.tif", search_radius=12.0, tie_points=tmp_path / points
+    )
+    program = Path(__file__).resolve().parents[1] / "qt6_desktop.py"
+    pictures = Path(os.environ.get("GROUNDTIE_PICTURES") or tmp_path)
+    called = subprocess.run(
+        [sys.executable, str(program), *images, str(tmp_path / points), str(pictures)],
+        env={
+            **os.environ,
+            "QT_QPA_PLATFORM": "offscreen",
+            "PYTHONPATH": os.pathsep.join([str(PLUGIN.parent), *sys.path]),
+        },
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert (called.returncode, called.stdout) == (0, "done\n"), called.stderr
+    assert (pictures / "qt6_repair.png").is_file()

@@ -82,7 +82,7 @@ def test_the_dockerfile_is_read_line_by_line() -> None:
     assert {name for name, _ in instructions()} <= INSTRUCTIONS
     assert instructions()[0][0] == "FROM"
     assert ("ENTRYPOINT", '["groundtie"]') in instructions()
-    assert ("USER", "nobody") in instructions()
+    assert ("USER", "65534") in instructions()
 
 
 def test_the_image_has_a_python_that_will_do() -> None:

@@ -106,7 +106,7 @@ def test_a_mask_is_a_raster_or_a_vector_layer_or_a_file(
     from qgis.core import QgsProcessingContext
 
     mask = definitions["MASK"]
-    assert set(mask.dataTypes()) == {compat.RASTER, compat.ANY_VECTOR}
+    assert set(mask.dataTypes()) == {compat.RASTER, compat.GEOMETRY}
     classifier = tmp_path / "classifier.json"
     context = QgsProcessingContext()
     for one in (mask, mask.clone()):

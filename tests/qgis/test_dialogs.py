@@ -1,7 +1,11 @@
-"""The dialogs of the tools as a person sees them: what is preselected, and in which words."""
+"""The dialogs of the tools as a person sees them: what is preselected, and in which words.
+
+A picture of each is left in the folder that GROUNDTIE_PICTURES names.
+"""
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -77,11 +81,66 @@ def test_one_raster_alone_leaves_the_other_box_empty(iface: Any, tmp_path: Path)
     dialog.close()
 
 
+def add_lines(columns: str = "") -> Any:
+    from qgis.core import QgsProject, QgsVectorLayer
+
+    layer = QgsVectorLayer(f"LineString?crs=EPSG:32633{columns}", "lines", "memory")
+    assert layer.isValid()
+    QgsProject.instance().addMapLayer(layer)
+    return layer
+
+
+def offered(dialog: Any, name: str) -> set[str]:
+    """Return the names of the layers that a box offers."""
+    from qgis.PyQt.QtWidgets import QComboBox
+
+    (box,) = dialog.mainWidget().wrappers[name].wrappedWidget().findChildren(QComboBox)
+    return {box.itemText(index).partition(" [")[0] for index in range(box.count())} - {"", " "}
+
+
+@pytest.mark.parametrize(
+    ("tool", "raster", "points"),
+    [("warp", "INPUT", "TRANSFORM"), ("assess_sensor", "IMAGE", "CHECK_POINTS")],
+)
+def test_a_raster_is_never_proposed_as_points(
+    iface: Any, tmp_path: Path, tool: str, raster: str, points: str
+) -> None:
+    write_pair(tmp_path, 0)
+    iface.activeLayer.return_value = add(tmp_path / "input.tif")
+    add_lines()
+    dialog = open_dialog(iface, tool)
+    first, second = chosen(dialog, raster, points)
+    assert (first, second.strip()) == (iface.activeLayer().id(), "")
+    assert offered(dialog, points) == {"lines"}
+    dialog.close()
+    tie_points = add_lines("&field=input_col:double&field=input_row:double")
+    dialog = open_dialog(iface, tool)
+    assert chosen(dialog, points) == [tie_points.id()]
+    dialog.close()
+
+
+def test_a_mask_may_be_picked_among_rasters_and_vector_layers(iface: Any, tmp_path: Path) -> None:
+    write_pair(tmp_path, 0)
+    iface.activeLayer.return_value = add(tmp_path / "input.tif")
+    add_lines()
+    dialog = open_dialog(iface, "mask_surface")
+    assert offered(dialog, "SURFACE_MODEL") == {"input", "lines"}
+    reference, surface = chosen(dialog, "REFERENCE", "SURFACE_MODEL")
+    assert (reference, surface.strip()) == (iface.activeLayer().id(), "")
+    dialog.close()
+
+
 @pytest.mark.parametrize("name", NAMES)
-def test_no_dialog_shows_the_words_of_the_command_line(iface: Any, name: str) -> None:
+def test_no_dialog_shows_the_words_of_the_command_line(
+    iface: Any, tmp_path: Path, name: str
+) -> None:
     from qgis.PyQt.QtWidgets import QComboBox, QLabel
 
+    write_pair(tmp_path, 0)
+    for image in ("reference", "input"):
+        add(tmp_path / f"{image}.tif")
     dialog = open_dialog(iface, name)
+    keep_picture(dialog, name, tmp_path)
     algorithm = dialog.algorithm()
     shown = [label.text() for label in dialog.findChildren(QLabel)]
     for box in dialog.findChildren(QComboBox):
@@ -96,6 +155,14 @@ def test_no_dialog_shows_the_words_of_the_command_line(iface: Any, name: str) ->
     assert not re.search(r"thesis|the same for|`", " ".join(shown))
     assert not [text for text in shown if text.islower() and text.isidentifier()]
     dialog.close()
+
+
+def keep_picture(dialog: Any, name: str, folder: Path) -> None:
+    pictures = Path(os.environ.get("GROUNDTIE_PICTURES") or folder)
+    pictures.mkdir(parents=True, exist_ok=True)
+    dialog.resize(1000, 700)
+    dialog.show()
+    assert dialog.grab().save(str(pictures / f"dialog_{name}.png"))
 
 
 def parameter_names() -> set[str]:

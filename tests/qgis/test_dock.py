@@ -197,6 +197,31 @@ def test_wrong_values_are_told_at_once(desktop: Desktop) -> None:
     assert "Choose two raster layers" in start.verdict.text()
 
 
+def test_swipe_shows_the_registered_image_whatever_lies_above_it(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    dock = open_registered(tmp_path, desktop, registered_files)
+    dock.tabs.setCurrentWidget(dock.look)
+    # The input lies above: its corner, where it is not registered to, is what the map shows.
+    desktop.canvas.setLayers([dock.repair._input])
+    dock.look.swipe.click()
+    both = (dock.overlay, dock.look._beneath)
+    desktop.wait(lambda: not any(item._image.isNull() for item in both), 0.5)
+    dock.overlay.set_share(0.5)
+    shown = desktop.canvas.viewport().grab().toImage()
+    places = [(x, y) for x in range(20, shown.width(), 40) for y in range(20, shown.height(), 40)]
+    for x, y in places:
+        if abs(x - shown.width() / 2) > 3:
+            item = both[int(x > shown.width() / 2)]
+            assert shown.pixelColor(x, y) == item._image.pixelColor(x, y)
+    assert [item._layers[0].source() for item in both] == [
+        str(tmp_path / "reference.tif"),
+        str(registered_files["OUTPUT"]),
+    ]
+    dock.look.swipe.click()
+    assert not any(item.isVisible() for item in both)
+
+
 def test_layers_that_go_leave_nothing_behind(
     desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
 ) -> None:
@@ -204,10 +229,52 @@ def test_layers_that_go_leave_nothing_behind(
 
     dock = open_registered(tmp_path, desktop, registered_files)
     dock.look.swipe.click()
+    assert dock.repair.table.rowCount() > 0
     QgsProject.instance().clear()
     assert not dock.overlay.isVisible()
+    assert not dock.look._beneath.isVisible()
     assert dock.repair.review is None
+    assert dock.repair.table.rowCount() == 0
+    assert dock.repair.model.count() == 0
     assert not dock.look.swipe.isEnabled()
+    assert not dock.look.next.isEnabled()
+
+
+def test_layers_of_others_that_go_take_nothing_with_them(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    """A person's edits are not lost with a layer that has no part in them."""
+    from qgis.core import QgsProject, QgsVectorLayer
+
+    dock = open_registered(tmp_path, desktop, registered_files)
+    repair, project = dock.repair, QgsProject.instance()
+    repair.change(repair.review.switch([0], False))
+    other = QgsVectorLayer("Point?crs=EPSG:32633", "other", "memory")
+    project.addMapLayer(other)
+    project.removeMapLayer(other.id())
+    assert not repair.review.points.used[0]
+    assert dock.look.swipe.isEnabled()
+    # Without the registered image there is nothing to look at; the points can be written anew.
+    project.removeMapLayer(dock.look._registered.id())
+    assert not dock.look.swipe.isEnabled()
+    assert not repair.review.points.used[0]
+    assert repair.write.isEnabled()
+    project.removeMapLayer(repair._input.id())
+    assert repair.review is None
+    assert not repair.write.isEnabled()
+
+
+def test_layers_that_go_during_a_run_do_no_harm(desktop: Desktop, tmp_path: Path) -> None:
+    from qgis.core import QgsProject
+
+    pair(tmp_path, desktop)
+    start = desktop.open().start
+    start.register.click()
+    QgsProject.instance().clear()
+    start.register.click()  # it is Cancel now
+    desktop.wait(lambda: start._run is None)
+    assert "Not registered" in start.verdict.text()
+    assert not desktop.dock.look.swipe.isEnabled()
 
 
 def test_the_map_as_it_is_drawn_may_be_the_reference(desktop: Desktop, tmp_path: Path) -> None:
@@ -396,8 +463,10 @@ def test_plugin_menu_opens_and_closes_the_dock(desktop: Desktop, tmp_path: Path)
     desktop.window.show()
     plugin.actions[0].trigger()
     assert plugin.dock.isVisible()
+    assert plugin.dock.repair.points.isVisible()
     plugin.actions[0].trigger()
     assert not plugin.dock.isVisible()
+    assert not plugin.dock.repair.points.isVisible()
     plugin.unload()
     assert plugin.dock is None
     iface.removeToolBarIcon.assert_called_once()

@@ -105,4 +105,4 @@ def test_the_dialog_offers_layers_for_points(provider: Any) -> None:
 
     definition = provider.algorithm("warp").parameterDefinition("TRANSFORM")
     assert definition.type() == "layer"
-    assert compat.ANY_VECTOR in definition.dataTypes()
+    assert definition.dataTypes() == [compat.GEOMETRY]

@@ -159,7 +159,7 @@ def test_refused_without_a_transform(pair: ImagePair, tmp_path: Path) -> None:
     assert page.all("title")[0].text.startswith("Refused: ")
     assert "Nothing in common was found." in page.text
     assert "No registered image was written: there is no transform." in page.text
-    assert set(page.numbers.values()) == {"–", "0 of 0"}
+    assert page.numbers == {}  # Nothing was matched: there is nothing to count.
     headings = [e.text for e in page.all("h2")]
     assert headings == ["Refused", "The images at their nominal positions", "How it was made"]
     assert not [e for e in page.all("input") if e.attributes.get("name") == "state"]

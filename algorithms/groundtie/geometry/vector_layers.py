@@ -111,7 +111,7 @@ def _read_apart(name: str) -> dict[str, Any] | None:
     folders = os.pathsep.join(folder for folder in sys.path if folder)
     try:
         done = subprocess.run(
-            [python, "-P", layer_reader.__file__, name],
+            [python, layer_reader.__file__, name],
             env={**os.environ, "PYTHONPATH": folders},
             check=False,
             stdin=subprocess.DEVNULL,

@@ -67,9 +67,11 @@ class Correction:
         if abs(self.rotation_deg) >= 0.005:
             sense = "anticlockwise" if self.rotation_deg > 0 else "clockwise"
             rotated = f"rotated by {abs(self.rotation_deg):.2f}° {sense}"
+        least, most = f"{self.least_px:.1f}", f"{self.most_px:.1f}"
+        over = "the same" if least == most else f"by {least} to {most} px"
         return (
-            f"{size}{in_metres} at the centre{direction}; by {self.least_px:.1f} to "
-            f"{self.most_px:.1f} px over the grid; {rotated}, scaled by {self.scale:.4f}"
+            f"{size}{in_metres} at the centre{direction}; {over} over the grid; "
+            f"{rotated}, scaled by {self.scale:.4f}"
         )
 
     def summary(self) -> dict[str, Any]:
