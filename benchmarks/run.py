@@ -22,6 +22,7 @@ SUITES = (
     "towns",
     "layover",
     "radar_likeness",
+    "sharpness",
     "masks",
     "large_shift",
     "rotated_pairs",

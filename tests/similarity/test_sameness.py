@@ -1,14 +1,17 @@
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
+from scipy.special import erf
 from textured_pairs import texture
 
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.sameness import (
+    Edges,
     Gradients,
     count_same,
-    lines,
+    edges_apart_px,
     reduced,
     same_windows,
     without,
@@ -47,25 +50,62 @@ def test_gradients_beside_invalid_pixels_do_not_count() -> None:
     assert counts[0] - counts[1] == 12 * 12
 
 
-def test_lines_and_dots_are_found_in_any_colour_and_over_faint_ground() -> None:
-    ground = np.random.default_rng(3).normal(size=(90, 90))
-    ground[:, :45] *= 0.01
-    for colour in (8.0, -8.0):
-        values = ground.copy()
-        values[40, 45:] = values[10, 45::9] = colour
-        values[40, :45] = values[10, :45:9] = colour / 100
-        found = lines(patch(values))
-        # Where both kinds of ground are near, the faint line is.
-        assert found[40, :30].all() and found[40, 60:].all()
-        assert found[10, 0:30:9].all() and found[10, 63::9].all()
-        assert found.mean() == pytest.approx(0.1, abs=0.01)
+@pytest.mark.parametrize(("along", "contrast"), [(0.3, 1.0), (-0.45, -0.01)])
+def test_edges_are_found_to_a_fraction_of_a_pixel(along: float, contrast: float) -> None:
+    """The blurred step of a straight edge: the error function, whose gradient is a Gaussian's."""
+    rows, cols = np.indices((61, 61))
+    normal = np.array([np.cos(0.4), np.sin(0.4)])
+    from_edge = (cols - 30) * normal[0] + (rows - 30) * normal[1] - along
+    edges = Edges.of(patch(contrast * erf(from_edge)))
+    assert edges.strong[30, 30] or edges.strong[30, 31] or edges.strong[30, 29]
+    near = edges.strong.copy()
+    near[:12], near[-12:], near[:, :12], near[:, -12:] = False, False, False, False
+    assert near.sum() > 30
+    at = np.stack([cols + edges.offset * edges.x, rows + edges.offset * edges.y], axis=-1)
+    off = (at - 30) @ normal - along
+    np.testing.assert_allclose(off[near], 0, atol=0.08)
 
 
-def test_invalid_pixels_hold_no_lines() -> None:
+@pytest.mark.parametrize("shift", [0.0, 0.2, 0.4])
+def test_parallel_edges_are_as_far_apart_as_they_are(shift: float) -> None:
+    rows, cols = np.indices((80, 80))
+
+    def rings(radius: float) -> Edges:
+        distance = np.hypot(cols - 40.0, rows - 40.0)
+        return Edges.of(patch(erf(distance - radius)))
+
+    apart = edges_apart_px(rings(25.0), rings(25.0 + shift))
+    found = apart[np.isfinite(apart)]
+    assert len(found) > 100
+    # Parabolas through three points of each place it to 0.08 px (see the test above).
+    assert np.median(found) == pytest.approx(shift, abs=0.08)
+
+
+def test_edges_at_right_angles_are_no_pair() -> None:
+    rows, cols = np.indices((60, 60))
+    one, other = (Edges.of(patch(erf(along - 30.0))) for along in (rows, cols))
+    assert one.found.any() and other.found.any()
+    assert not np.isfinite(edges_apart_px(one, other)).any()
+
+
+def test_weak_edges_pair_with_strong_ones_alone_and_only_if_asked_for() -> None:
+    """A copy: each edge lies on itself, if it is a strong one, though beside weaker ones."""
+    values = texture(90, 90) + 0.1 * np.random.default_rng(5).normal(size=(90, 90))
+    edges = Edges.of(patch(values))
+    assert 0 < edges.strong.sum() < edges.found.sum()
+    both, one = (np.isfinite(edges_apart_px(edges, edges, which)) for which in (True, False))
+    np.testing.assert_array_equal(both, edges.strong)
+    beside_weaker = one & ~edges.strong
+    assert one[edges.strong].all() and not one[~edges.found].any()
+    near_strong = cv2.dilate(edges.strong.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    assert near_strong[beside_weaker].all()
+
+
+def test_invalid_pixels_hold_no_edges() -> None:
     hidden = np.s_[20:30, 20:30]
-    found = lines(patch(texture(60, 60), hidden))
+    found = Edges.of(patch(texture(60, 60), hidden)).found
     assert found.any() and not found[hidden].any()
-    assert not lines(patch(texture(60, 60), np.s_[:, :])).any()
+    assert not Edges.of(patch(texture(60, 60), np.s_[:, :])).found.any()
 
 
 def test_windows_are_the_same_where_one_thing_is_drawn_into_both() -> None:

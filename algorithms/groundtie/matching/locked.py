@@ -18,14 +18,14 @@ from ..geometry.transform import Transform
 from ..rasters.grid import Grid, reproject
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
-from ..rasters.reading import Mask
 from ..similarity.sameness import (
     REACH_PX,
     WINDOW_PX,
+    Edges,
     Gradients,
     count_same,
     covered,
-    lines,
+    edges_apart_px,
     reduced,
     same_windows,
     without,
@@ -48,11 +48,14 @@ _FIRST_TURN_PX, _GOLDEN_ANGLE = 7.0, np.pi * (3 - np.sqrt(5))
 # So many times as many as by chance, and of gradients this share of the strong ones, are more than
 # two sensors show of one ground; what else they show is asked then. Gradients were measured on the
 # shared pairs at their true places: 0.7 to 2.9 % of different sensors and physics, up to 3.4 times
-# as many as by chance; 3.5 to 28 % of one sensor's. With content drawn into both: 3 to 43 %. Lines
-# and dots on simulated pairs at their places: up to 1.5 times as many as by chance; with
-# graticules, tiles and contour lines in both: from 2.7 times on.
+# as many as by chance; 3.5 to 28 % of one sensor's. With content drawn into both: 3 to 43 %.
 _LEAST_RATIO, _LEAST_SHARE = 2.0, 0.03
-_LEAST_LINES_RATIO = 2.5
+
+# What is drawn has its edges at one fraction of a pixel, in whatever colours: within the first of
+# the other's are so many times as many as from there to the second. Edges of one ground are blurred
+# by noise, light and physics. Suite sharpness.
+_SHARP_PX, _BLURRED_PX = 0.25, 0.5
+LEAST_SHARPNESS = 2.5
 
 # The same of the area that varies alike: where holes or waters of one shape are cut into noise,
 # few gradients are the same. Different sensors' views: up to 17 %.
@@ -74,8 +77,8 @@ _COPY_SHARE = 0.75
 
 _LATTICE = 9
 
-# Around a line, chips see it this far off.
-_LINE_SURROUNDINGS_PX = 5
+# Around an edge, chips see it this far off.
+_EDGE_SURROUNDINGS_PX = 7
 
 
 @dataclass(frozen=True)
@@ -86,8 +89,9 @@ class Sameness:
     ----------
     gradients, chance
         Share of the strong gradients that are the same there, and at other offsets.
-    lines
-        How many times as many lines and dots coincide there as at other offsets.
+    sharpness
+        How many times as many edges coincide there within a quarter of a pixel as between a
+        quarter and a half, at least, but by chance with 5 %.
     area, reduced_area
         Share of the area that varies alike, in the images and in reduced ones.
     ground
@@ -98,7 +102,7 @@ class Sameness:
 
     gradients: float
     chance: float
-    lines: float
+    sharpness: float
     area: float
     reduced_area: float
     ground: float
@@ -108,7 +112,7 @@ class Sameness:
     def is_evident(self) -> bool:
         """Whether more is the same than two views show of one ground."""
         is_more = self.gradients >= max(_LEAST_RATIO * self.chance, _LEAST_SHARE)
-        return is_more or self.lines >= _LEAST_LINES_RATIO or self.area >= _LEAST_AREA
+        return is_more or self.sharpness >= LEAST_SHARPNESS or self.area >= _LEAST_AREA
 
     @property
     def is_explained(self) -> bool:
@@ -153,7 +157,7 @@ class LockedContent:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
 
         What is drawn ends somewhere in the windows that vary alike: all of them is taken, and what
-        is around lines, unless the surroundings are one sensor's views of the ground.
+        is around edges, unless the surroundings are one sensor's views of the ground.
         """
         reach = 2 * REACH_PX
         size = piece.width + 2 * reach, piece.height + 2 * reach
@@ -161,8 +165,9 @@ class LockedContent:
         patches = _patches(self.pair, around, self.offset_px)
         same = same_windows(*patches)
         if not self.sameness.is_explained:
-            drawn = lines(patches[0]) & lines(patches[1])
-            same = covered(same, WINDOW_PX) | covered(drawn, _LINE_SURROUNDINGS_PX)
+            one, other = (Edges.of(patch) for patch in patches)
+            drawn = edges_apart_px(one, other, both_strong=False) <= _BLURRED_PX
+            same = covered(same, WINDOW_PX) | covered(drawn, _EDGE_SURROUNDINGS_PX)
         return same[reach:-reach, reach:-reach]
 
     @property
@@ -225,11 +230,10 @@ def _sameness(looks: list[_Look]) -> Sameness:
     every = sum(one.counts[1][1] for one in looks)
     ground = _share([one.counts[2] for one in looks], int(_LEAST_LEFT * every))
     chance = float(np.median(same[1:]))
-    coinciding = [sum(one.coinciding(shift) for one in looks) for shift in _offsets()]
-    by_chance = max(float(np.median(coinciding[1:])), 1.0)
-    return Sameness(
-        same[0], chance, coinciding[0] / by_chance, area, reduced_area, ground, every / WINDOW_PX**2
-    )
+    sharp, blurred = np.sum([one.edges for one in looks], axis=0) if looks else (0, 0)
+    sharpness = float(sharp / (blurred + _STANDARD_ERRORS * np.sqrt(blurred + 1)))
+    windows = every / WINDOW_PX**2
+    return Sameness(same[0], chance, sharpness, area, reduced_area, ground, windows)
 
 
 _Count = tuple[int, int]
@@ -237,13 +241,13 @@ _Count = tuple[int, int]
 
 @dataclass(frozen=True)
 class _Look:
-    """What one window shows: gradients, lines, and (same, all) pixels as `LockedContent` has them.
+    """What one window shows: gradients, edges, and (same, all) pixels as `LockedContent` has them.
 
     Of the input also what is around it.
     """
 
     gradients: tuple[Gradients, Gradients]
-    lines: tuple[Mask, Mask]
+    edges: _Count
     counts: tuple[_Count, _Count, _Count]
 
     @classmethod
@@ -257,18 +261,21 @@ class _Look:
         )
         inner = reference.inner(_REACH_PX)
         gradients = Gradients.of(inner), Gradients.of(input)
-        return cls(gradients, (lines(inner), lines(input)), counts)
-
-    def coinciding(self, shift: NDArray[np.int_]) -> int:
-        """Return how many lines and dots coincide at a shift of the input."""
-        (rows, cols), (col, row) = self.lines[0].shape, (int(_REACH_PX + by) for by in shift)
-        return int((self.lines[0] & self.lines[1][row : row + rows, col : col + cols]).sum())
+        return cls(gradients, _count_edges(reference, input), counts)
 
     def same(self, shift: NDArray[np.int_], strong: tuple[float, float]) -> _Count:
         """Return how many strong gradients are the same at a shift of the input, and all."""
         reference, input = self.gradients
         col, row = (int(_REACH_PX + by) for by in shift)
         return count_same(reference, input.part(col, row, reference.x.shape), strong)
+
+
+def _count_edges(reference: Patch, input: Patch) -> _Count:
+    """Return how many edges coincide sharply, and how many less so."""
+    apart = edges_apart_px(Edges.of(reference), Edges.of(input))[_REACH_PX:-_REACH_PX]
+    apart = apart[:, _REACH_PX:-_REACH_PX]
+    sharp = int((apart < _SHARP_PX).sum())
+    return sharp, int((apart < _BLURRED_PX).sum()) - sharp
 
 
 def _count_reduced(reference: Patch, input: Patch) -> _Count:

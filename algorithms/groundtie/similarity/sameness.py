@@ -1,4 +1,4 @@
-"""What two arrays have the same: gradients, lines, and windows that vary alike.
+"""What two arrays have the same: gradients, edges, and windows that vary alike.
 
 Independent views of one ground are similar, but hardly ever the same: noise, light, physics and
 the phase of the pixels differ. What is drawn into both arrays is the same.
@@ -7,9 +7,11 @@ the phase of the pixels differ. What is drawn into both arrays is the same.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask
@@ -23,10 +25,15 @@ _DIFFERING_SHARE = 0.5
 WINDOW_PX = 9
 REACH_PX = WINDOW_PX // 2
 
-# Lines and dots are narrower than half of the first, and stand out from so many per cent of the
-# pixels, each against those around it.
-_LINE_PX, _AROUND_PX = 5, 31
-_THIN_PERCENT = 90.0
+# Edges are maxima of the gradient along itself, after a Gaussian of this scale, against gradients
+# around, above so many per cent of them: strong ones, and weak ones. Nodata is kept so far away.
+_EDGE_SCALE_PX, _AROUND_PX = 0.8, 31
+_STRONG_EDGE_PERCENT, _WEAK_EDGE_PERCENT = 85.0, 60.0
+_EDGE_RIM_PX = 9
+
+# Edges are parallel within 20°, and side by side within this.
+_PARALLEL_COSINE = float(np.cos(np.deg2rad(20)))
+_ALONG_PX = 0.5
 
 # Means of a reduced image need this share of their pixels.
 _LEAST_VALID = 0.25
@@ -86,24 +93,86 @@ def same_windows(one: Patch, other: Patch) -> Mask:
     return valid & (differing <= _DIFFERING_SHARE * both)
 
 
-def lines(patch: Patch) -> Mask:
-    """Return where a patch has a thin line or dot, shape (h, w).
+@dataclass(frozen=True)
+class Edges:
+    """Edges of an image, found to a fraction of a pixel.
 
-    Dark or bright, as the same may be drawn in other colours, and as faint as they are among what
-    is around them.
+    Parameters
+    ----------
+    found, strong
+        Which pixels hold one, and which a strong one, shape (h, w).
+    x, y
+        Unit normals, shape (h, w) each.
+    offset
+        How far along its normal each is from the middle of its pixel, in pixels, shape (h, w).
     """
-    if not patch.valid.any():
-        return patch.valid
-    thin = _thinness(patch)
-    return np.asarray(patch.valid & (thin >= np.percentile(thin[patch.valid], _THIN_PERCENT)))
+
+    found: Mask
+    strong: Mask
+    x: FloatImage
+    y: FloatImage
+    offset: FloatImage
+
+    @classmethod
+    def of(cls, patch: Patch) -> Edges:
+        """Return the edges of a patch, as faint as they are among what is around them [Canny1986].
+
+        Bright or dark, as the same may be drawn in other colours.
+        """
+        values = np.where(patch.valid, patch.values, 0).astype(np.float32)
+        smooth = cv2.GaussianBlur(values, (0, 0), _EDGE_SCALE_PX)
+        tiny = np.finfo(np.float32).tiny
+        along = [cv2.Sobel(smooth, cv2.CV_32F, *order) for order in ((1, 0), (0, 1))]
+        length = np.asarray(np.hypot(*along), np.float32)
+        x, y = (np.asarray(one / np.maximum(length, tiny), np.float32) for one in along)
+        height = length / np.maximum(cv2.blur(length, (_AROUND_PX, _AROUND_PX)), tiny)
+        rows, cols = np.indices(height.shape, np.float32)
+        before, after = (
+            cv2.remap(height, cols + by * x, rows + by * y, cv2.INTER_LINEAR) for by in (-1, 1)
+        )
+        valid = cv2.erode(patch.valid.astype(np.uint8), np.ones((_EDGE_RIM_PX,) * 2, np.uint8)) > 0
+        found = valid & (height > after) & (height >= before)
+        levels = (_WEAK_EDGE_PERCENT, _STRONG_EDGE_PERCENT)
+        weak, strong = np.percentile(height[valid], levels) if valid.any() else (0.0, 0.0)
+        found &= height > weak
+        bend = np.where(found, 2 * height - before - after, 1)
+        offset = np.where(found, (after - before) / (2 * bend), 0)
+        is_strong = found & (height > strong)
+        return cls(np.asarray(found), np.asarray(is_strong), x, y, np.asarray(offset, np.float32))
+
+    def moved(self, col: int, row: int) -> Edges:
+        """Return what lies so many columns and rows further; what leaves comes in at the rim."""
+
+        def rolled(of: NDArray[Any]) -> NDArray[Any]:
+            return np.roll(of, (-row, -col), (0, 1))
+
+        return Edges(
+            rolled(self.found),
+            rolled(self.strong),
+            rolled(self.x),
+            rolled(self.y),
+            rolled(self.offset),
+        )
 
 
-def _thinness(patch: Patch) -> FloatImage:
-    """Return how far pixels are from the median around them, against others there."""
-    values = np.where(patch.valid, patch.values, 0).astype(np.float32)
-    apart = np.abs(values - cv2.medianBlur(values, _LINE_PX))
-    usual = cv2.blur(apart, (_AROUND_PX, _AROUND_PX))
-    return np.asarray(apart / np.maximum(usual, np.finfo(np.float32).tiny), np.float32)
+def edges_apart_px(one: Edges, other: Edges, both_strong: bool = True) -> FloatImage:
+    """Return how far each edge is from the nearest parallel one of another image, shape (h, w).
+
+    Infinite where there is no edge, or none within a pixel or so. Both are strong ones, or one is.
+    """
+    apart = np.full(one.found.shape, np.inf, np.float32)
+    for row in (-1, 0, 1):
+        for col in (-1, 0, 1):
+            near = other.moved(col, row)
+            x = col + near.offset * near.x - one.offset * one.x
+            y = row + near.offset * near.y - one.offset * one.y
+            is_parallel = np.abs(one.x * near.x + one.y * near.y) >= _PARALLEL_COSINE
+            is_beside = np.abs(x * one.y - y * one.x) <= _ALONG_PX
+            are_strong = one.strong & near.strong if both_strong else one.strong | near.strong
+            is_pair = one.found & near.found & are_strong & is_parallel & is_beside
+            across = np.abs(x * one.x + y * one.y)
+            apart = np.where(is_pair, np.minimum(apart, across), apart)
+    return np.asarray(apart, np.float32)
 
 
 def covered(middles: Mask, side_px: int) -> Mask:
