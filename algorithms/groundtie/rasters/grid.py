@@ -234,6 +234,12 @@ def require_map(crs: CRS | None) -> CRS | None:
     )
 
 
+def require_both_or_none(one: CRS | None, other: CRS | None, names: str) -> None:
+    """Raise `GeoreferencingError` if only one of two maps, of these names, has a CRS."""
+    if (one is None) != (other is None):
+        raise GeoreferencingError(f"only one of {names} has a CRS")
+
+
 # The product is `*` in affine 2; affine 3 has `@` and warns of `*`.
 _product = operator.matmul if hasattr(Affine, "__matmul__") else operator.mul
 

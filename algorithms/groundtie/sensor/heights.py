@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 
@@ -27,35 +27,6 @@ _TOLERANCE_M = 1e-3
 
 # Grids of the whole Earth leave this much open where they meet themselves.
 _WHOLE_PX = 1.0
-
-
-class Heights(Protocol):
-    """Heights above the ellipsoid over a region."""
-
-    @property
-    def typical_m(self) -> float:
-        """A height of the region."""
-
-    def at(self, lon_lat: FloatArray) -> FloatArray:
-        """Return heights in metres, shape (n,), at longitudes and latitudes; NaN if unknown."""
-
-    def on_grid(self, on_nodes: OnNodes) -> HeightsOnGrid | None:
-        """Return the heights at all pixels of a grid; None if none is known."""
-
-
-class HeightsOnGrid(Protocol):
-    """Heights above the ellipsoid at all pixels of a grid."""
-
-    @property
-    def side_px(self) -> float:
-        """How many pixels of a terrain model lie along the grid."""
-
-    @property
-    def bounds_m(self) -> tuple[float, float]:
-        """Bounds that no height exceeds."""
-
-    def lines(self, rows: slice) -> FloatImage:
-        """Return heights in metres at the pixels of some rows; NaN if unknown."""
 
 
 @dataclass(frozen=True)
@@ -187,6 +158,10 @@ class _TerrainOnGrid:
 
 def _range(values: FloatArray) -> tuple[float, float]:
     return float(np.nanmin(values)), float(np.nanmax(values))
+
+
+Heights = ConstantHeight | TerrainHeights
+HeightsOnGrid = _ConstantOnGrid | _TerrainOnGrid
 
 
 def terrain_heights(
