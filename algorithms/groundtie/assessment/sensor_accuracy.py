@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 from affine import Affine
 
-from ..rasters.atomic import writing
+from ..rasters.atomic import write_csv, writing
 from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject
 from ..report.figures import CHECK_COLOUR, FIT_COLOUR, round_length
 from ..sensor.control_points import ControlPoints
@@ -84,10 +83,8 @@ def write_table(path: Path, points: ControlPoints, errors: dict[str, SensorError
     for name, each in errors.items():
         names += [f"{name}_{axis}" for axis in ("x_m", "y_m", "col_px", "row_px")]
         columns += [each.error_m, each.error_px]
-    with writing(path), path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(names)
-        table.writerows(np.hstack(columns).tolist())
+    rows = np.hstack(columns).tolist()
+    write_csv(path, names, (dict(zip(names, row, strict=True)) for row in rows))
 
 
 def draw_vectors(

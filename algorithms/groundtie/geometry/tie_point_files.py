@@ -15,7 +15,7 @@ from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
 from ..errors import OutputError, TransformFileError
-from ..rasters.atomic import write_json, writing
+from ..rasters.atomic import write_csv, write_json, writing
 from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject, require_map
 from ..runs import run_tags
 from ..strict_json import read_json
@@ -72,9 +72,11 @@ def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform:
         if suffix == ".gpkg":
             _write_gpkg(path, rows, numbers, transform.crs)
         elif suffix == ".geojson":
-            _write_geojson(path, rows, transform.crs)
+            features = _features(rows, transform.crs, LON_LAT)
+            collection = {"type": "FeatureCollection", "name": _LAYER, "features": features}
+            write_json(path, collection)
         else:
-            _write_csv(path, rows, numbers)
+            write_csv(path, (*numbers, *_TEXTS, *run_tags()), rows)
 
 
 def read_tie_points(
@@ -169,19 +171,6 @@ def _write_gpkg(path: Path, rows: list[Row], numbers: Sequence[str], crs: CRS | 
 
     properties = dict.fromkeys(numbers, "float") | dict.fromkeys((*_TEXTS, *run_tags()), "str")
     write_layer(path, _LAYER, _features(rows, crs, crs), properties, crs)
-
-
-def _write_geojson(path: Path, rows: list[Row], crs: CRS | None) -> None:
-    features = _features(rows, crs, LON_LAT)
-    collection = {"type": "FeatureCollection", "name": _LAYER, "features": features}
-    write_json(path, collection)
-
-
-def _write_csv(path: Path, rows: list[Row], numbers: Sequence[str]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.DictWriter(file, (*numbers, *_TEXTS, *run_tags()), lineterminator="\n")
-        table.writeheader()
-        table.writerows(rows)
 
 
 def _read_rows(path: Path, suffix: str) -> tuple[list[Row], FloatArray, CRS | None]:

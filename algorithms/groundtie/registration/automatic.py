@@ -23,7 +23,7 @@ from ..sensor.rpc_files import rpc_of
 from .asked import USUAL, asked_lights, asked_terrain
 from .delivery import Call
 from .evidence import SCENE, SURVEY
-from .orthorectification import Orthorectification
+from .orthorectification import write_orthoimage
 from .pipeline import run
 from .registration import Registration
 from .rules import RULES
@@ -228,22 +228,14 @@ def _orthorectify(
         source, rpc = open_sensor_image(given["input"], rpc_file, stack)
         crs = stack.enter_context(open_raster(given["reference"])).grid.crs
         orientation = ground.orientation(source, rpc, crs, stack)
-        outputs = stack.enter_context(Outputs())
-        Orthorectification(source, orientation).write(output, outputs, context)
+        staged = stack.enter_context(Outputs()).stage(output)
+        write_orthoimage(source, orientation, staged, context)
 
 
 # What `refine` takes and the tool `register` does not ask for.
 _RPC_DEFAULTS: Mapping[str, Any] = {
-    "gcps": None,
-    "input_dem": None,
-    "views": None,
-    "geoid": None,
+    **dict.fromkeys(("gcps", "geoid", "height", "rpc", "search_radius", "matching_pixel_size")),
     "dem_cover": 0.0,
-    "height": None,
-    "rpc": None,
     "model": AUTO,
-    "search_radius": None,
     "mask": AUTO,
-    "matching_pixel_size": None,
-    "surface_model": None,
 }

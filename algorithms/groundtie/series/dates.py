@@ -28,7 +28,7 @@ from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import RasterSource, open_raster
 from ..registration.user_masks import UserMask
-from .date_masks import DateMask, draw_mask, is_drawn
+from .date_masks import DateMask, draw_mask
 from .inputs import Listed
 
 # Dates are held in memory as long as all of them have no more pixels: 400 MB as float32.
@@ -161,7 +161,7 @@ def open_dates(
             source = stack.enter_context(open_raster(one.raster))
             held += source.grid.width * source.grid.height
             mask = None
-            if one.mask is not None and is_drawn(one.mask):
+            if one.mask is not None and one.mask.is_drawn:
                 mask = draw_mask(source, one.mask, stack, context.quiet().progress)
                 context.update(number / len(listed), mask.note)
             date = Date(one, source, source, band, mask)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -14,7 +13,7 @@ from shapely.geometry import LineString, mapping
 
 from ..context import Context
 from ..errors import NotRegisteredError
-from ..rasters.atomic import Outputs, write_json, writing
+from ..rasters.atomic import Outputs, write_csv, write_json, writing
 from ..rasters.grid import Grid
 from ..rasters.reading import open_raster
 from ..registration.registered_output import UNTOUCHED_TOLERANCE_PX, RegisteredOutput
@@ -63,7 +62,7 @@ class SeriesFiles:
         _make_folder(self.folder)
         with Outputs() as outputs:
             series = self._with_rasters(series, stored, outputs, context)
-            _write_csv(outputs.stage(self.folder / TABLE_CSV), series)
+            write_csv(outputs.stage(self.folder / TABLE_CSV), TABLE_COLUMNS, series.rows())
             _write_layer(outputs.stage(self.folder / TABLE_GPKG), series)
             write_json(outputs.stage(self.folder / SERIES_JSON), series.to_json())
             # Last: who finds it finds all that it is about.
@@ -153,13 +152,6 @@ class SeriesFiles:
 def _make_folder(folder: Path) -> None:
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-
-
-def _write_csv(path: Path, series: Series) -> None:
-    with writing(path), path.open("w", newline="", encoding="utf-8") as stream:
-        table = csv.DictWriter(stream, TABLE_COLUMNS)
-        table.writeheader()
-        table.writerows(series.rows())
 
 
 def _write_layer(path: Path, series: Series) -> None:
