@@ -189,6 +189,12 @@ def write_json(path: Path, values: Mapping[str, Any], indent: int | None = 1) ->
         path.write_text(text, encoding="utf-8")
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those that it lies in, if it is not there; errors as `writing`."""
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+
+
 def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> None:
     """Write rows, by the names of their columns, as a CSV table.
 

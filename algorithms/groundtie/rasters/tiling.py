@@ -22,8 +22,9 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-def tiles(grid: Grid, side: int = _TILE) -> Iterator[Window]:
+def tiles(grid: Grid, side: int | None = None) -> Iterator[Window]:
     """Return the tiles that cover a grid, row by row; by default whole blocks of the file."""
+    side = side or _TILE
     for row in range(0, grid.height, side):
         for col in range(0, grid.width, side):
             yield Window(col, row, min(side, grid.width - col), min(side, grid.height - row))

@@ -21,8 +21,7 @@ from .smooth_map import Positions, smooth_map
 # its values for all pixels of a grid.
 OnNodes = Callable[[Positions, float], Lattice]
 
-# Interpolation between nodes may be wrong by this: pixels of the terrain model, and metres.
-_TOLERANCE_PX = 1e-3
+# Interpolation between nodes may be wrong by this, in metres.
 _TOLERANCE_M = 1e-3
 
 # Grids of the whole Earth leave this much open where they meet themselves.
@@ -96,7 +95,7 @@ class TerrainHeights:
 
     def on_grid(self, on_nodes: OnNodes) -> HeightsOnGrid | None:
         """Return the heights at all pixels of a grid; None if none is known."""
-        place = on_nodes(self.terrain.to_px, _TOLERANCE_PX)
+        place = on_nodes(self.terrain.to_px, TOLERANCE_PX)
         geoid = None
         if self.geoid is not None:
             surface = self.geoid

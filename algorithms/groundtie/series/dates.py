@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import warnings
 from collections.abc import Sequence
@@ -28,6 +27,7 @@ from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import RasterSource, open_raster
 from ..registration.user_masks import UserMask
+from ..runs import digest
 from .date_masks import DateMask, draw_mask
 from .inputs import Listed
 
@@ -99,7 +99,7 @@ class Date:
         mask = self.listed.mask
         facts: list[Any] = [file_facts(self.listed.raster)]
         facts += [file_facts(None)] if mask is None else [file_facts(mask.mask), mask.values]
-        return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
+        return digest(*facts)
 
     def footprint(self, crs: CRS | None) -> Any:
         """Return the outline of its valid pixels as a shapely polygon on a map."""
