@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from affine import Affine
 
 from ..rasters.atomic import write_csv, writing
-from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject
+from ..rasters.grid import LON_LAT, FloatArray, metres_per_unit_at, reproject
 from ..report.figures import CHECK_COLOUR, FIT_COLOUR, round_length
 from ..sensor.control_points import ControlPoints
 from ..sensor.rpc import RPC
@@ -39,10 +38,9 @@ class SensorErrors:
         table = points.points
         seen = rpc.localise(table.input_px, points.height_m)
         moved = reproject(seen, LON_LAT, points.crs) - table.reference_xy
-        middle = Affine.translation(*table.reference_xy.mean(axis=0).tolist())
-        around = Grid(middle, points.crs, 1, 1)
+        per_unit = metres_per_unit_at(table.reference_xy.mean(axis=0), points.crs)
         error_px = table.input_px - rpc.project(points.lon_lat, points.height_m)
-        return cls(error_px, moved * around.metres_per_unit)
+        return cls(error_px, moved * per_unit)
 
     def summary(self) -> dict[str, Any]:
         """Return the statistics as values that JSON can carry."""
