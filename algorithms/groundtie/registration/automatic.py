@@ -162,13 +162,14 @@ def _first_accepted(
             part = context.part((number - 1) / len(ways), number / len(ways))
             spec = replace(way.spec, **asked, tries=number)
             found.append(run(call.with_limits(opened, spec, part), spec, part, scene))
-            tried.append(_line(way.name, way.because, found[-1].verdict))
-            if found[-1].verdict.accepted or found[-1].verdict.rule in _FINAL:
+            verdict = found[-1].verdict
+            tried.append(_line(way.name, way.because, verdict))
+            is_final = verdict.accepted or verdict.rule in _FINAL
+            if is_final:
                 break
-        chosen = found[-1] if found[-1].verdict.accepted else found[0]
-        if found[-1].verdict.rule in _FINAL:
-            chosen = found[-1]
-        chosen = replace(chosen, tried=tuple(tried), parameters=call.parameters or {})
+        chosen = replace(
+            found[-1 if is_final else 0], tried=tuple(tried), parameters=call.parameters or {}
+        )
         return chosen, stack.pop_all()
 
 
