@@ -219,9 +219,7 @@ class Review:
         needed = -(-PARAMETERS[kind] // 2)
         errors = np.full(len(taken), np.nan)
         for block in left_out_blocks(self.points.reference_xy[taken]):
-            if (~block).sum() < max(needed, 3) or (
-                kind == "tps" and len(taken) > MOST_SPLINE_POINTS
-            ):
+            if (~block).sum() < max(needed, 3):
                 return None
             seen = TiePointEvidence(self.points.take(taken[~block]), kind, self.input_grid)
             left = self.points.take(taken[block])

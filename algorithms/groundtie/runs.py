@@ -46,7 +46,12 @@ def run_of_call(tool: str, inputs: Mapping[str, Any]) -> str:
         raster in memory no other call has the same id.
     """
     facts = {name: _facts(value) for name, value in sorted(inputs.items())}
-    return hashlib.sha256(repr((tool, __version__, facts)).encode()).hexdigest()[:16]
+    return digest(tool, __version__, facts)
+
+
+def digest(*facts: Any) -> str:
+    """Return what stands for facts, by what `repr` shows of them."""
+    return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
 
 
 def run_tags(name: str = RUN) -> dict[str, str]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ..errors import GeoreferencingError, NoOverlapError
+from ..errors import NoOverlapError
 from ..geometry.transform import Transform
 from ..raster_names import file_name
-from ..rasters.grid import FloatArray, reproject
+from ..rasters.grid import FloatArray, reproject, require_both_or_none
 from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import RasterSource
@@ -100,8 +100,7 @@ def compare(reference: RasterSource, input: RasterSource, transform: Transform) 
         The registered input does not lie on the reference.
     """
     grid = reference.grid
-    if (grid.crs is None) != (transform.crs is None):
-        raise GeoreferencingError(f"only one of {reference.path} and the transform has a CRS")
+    require_both_or_none(grid.crs, transform.crs, f"{reference.path} and the transform")
 
     def to_input_px(xy: FloatArray) -> FloatArray:
         return transform(reproject(xy, grid.crs, transform.crs))

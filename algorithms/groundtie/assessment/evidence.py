@@ -20,7 +20,7 @@ from ..geometry.tie_point_files import read_tie_points
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform, load_transform
 from ..kinds import check_different
-from ..rasters.grid import reproject
+from ..rasters.grid import reproject, require_both_or_none
 from ..rasters.reading import RasterSource
 from ..registration.stored_transform import load_stored, transform_of
 from .accuracy import Assessment
@@ -87,8 +87,7 @@ class AssessmentFiles:
         if self.tie_points is not None:
             return load_stored(self.tie_points, model, input)[0]
         crs = input.grid.crs if reference is None else reference.grid.crs
-        if (crs is None) != (input.grid.crs is None):
-            raise GeoreferencingError(f"only one of {input.path} and the reference has a CRS")
+        require_both_or_none(crs, input.grid.crs, f"{input.path} and the reference")
         return Transform.nominal(crs, input.grid)
 
     def measure(self, found: Transform, max_error_px: float | None) -> Assessment:
@@ -161,8 +160,7 @@ def read_points(path: Path, transform: Transform) -> TiePoints:
         raise TooFewPointsError(f"{path} holds no points that are used")
     if not np.isfinite([*points.reference_xy, *points.input_px]).all():
         raise TransformFileError(f"{path} holds positions that are not finite")
-    if (points.crs is None) != (transform.crs is None):
-        raise GeoreferencingError(f"only one of {path} and the transform has a CRS")
+    require_both_or_none(points.crs, transform.crs, f"{path} and the transform")
     xy = reproject(points.reference_xy, points.crs, transform.crs)
     if not np.isfinite(xy).all():
         raise GeoreferencingError(f"{path} holds positions outside of a map's projection")

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from affine import Affine
 from numpy.typing import ArrayLike
 
 from ..geometry.judging import TOLERANCE_PX, USUAL_MAX_ERROR_PX, sigma_range_px
 from ..geometry.robust import fit_mixture
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
-from ..rasters.grid import FloatArray, Grid
+from ..rasters.grid import FloatArray, Grid, metres_per_unit_at
 from ..rasters.reading import Mask
 from .statistics import Statistics
 
@@ -162,4 +161,4 @@ def _metres_per_unit(transform: Transform, xy: FloatArray) -> FloatArray:
     """Return how long the reference map's units are at the middle of some positions, (2,)."""
     finite = xy[np.isfinite(xy).all(axis=1)]
     centre = finite.mean(axis=0) if len(finite) else np.zeros(2)
-    return np.array(Grid(Affine.translation(*(centre - 0.5)), transform.crs, 1, 1).metres_per_unit)
+    return np.array(metres_per_unit_at(centre, transform.crs))

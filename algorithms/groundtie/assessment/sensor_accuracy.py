@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from affine import Affine
 
-from ..rasters.atomic import writing
-from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject
+from ..rasters.atomic import write_csv, writing
+from ..rasters.grid import LON_LAT, FloatArray, metres_per_unit_at, reproject
 from ..report.figures import CHECK_COLOUR, FIT_COLOUR, round_length
 from ..sensor.control_points import ControlPoints
 from ..sensor.rpc import RPC
@@ -40,10 +38,9 @@ class SensorErrors:
         table = points.points
         seen = rpc.localise(table.input_px, points.height_m)
         moved = reproject(seen, LON_LAT, points.crs) - table.reference_xy
-        middle = Affine.translation(*table.reference_xy.mean(axis=0).tolist())
-        around = Grid(middle, points.crs, 1, 1)
+        per_unit = metres_per_unit_at(table.reference_xy.mean(axis=0), points.crs)
         error_px = table.input_px - rpc.project(points.lon_lat, points.height_m)
-        return cls(error_px, moved * around.metres_per_unit)
+        return cls(error_px, moved * per_unit)
 
     def summary(self) -> dict[str, Any]:
         """Return the statistics as values that JSON can carry."""
@@ -84,10 +81,8 @@ def write_table(path: Path, points: ControlPoints, errors: dict[str, SensorError
     for name, each in errors.items():
         names += [f"{name}_{axis}" for axis in ("x_m", "y_m", "col_px", "row_px")]
         columns += [each.error_m, each.error_px]
-    with writing(path), path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(names)
-        table.writerows(np.hstack(columns).tolist())
+    rows = np.hstack(columns).tolist()
+    write_csv(path, names, (dict(zip(names, row, strict=True)) for row in rows))
 
 
 def draw_vectors(

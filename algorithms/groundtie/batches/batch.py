@@ -14,7 +14,7 @@ from ..declaration import Tool
 from ..errors import CancelledError
 from ..executors import open_executor
 from ..progress import Progress
-from ..rasters.atomic import writing
+from ..rasters.atomic import make_folder
 from ..tables import read_rows
 from ..version import __version__
 from .calls import Call, make_calls
@@ -80,8 +80,7 @@ class Batch:
         started = time.monotonic()
         rows = read_rows(self.table)
         tool = self.load(self.tool)
-        with writing(self.folder):
-            self.folder.mkdir(parents=True, exist_ok=True)
+        make_folder(self.folder)
         local = executor is None and self.scheduler is None
         processors = os.cpu_count() or 1
         workers = min(self.workers or processors, len(rows))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +12,7 @@ from ..errors import GroundTieError, OutputError, ParameterError, SameFileError
 from ..kinds import Flag, FolderOut, InputKind, OutputKind, RastersIn, Text
 from ..raster_names import raster_name
 from ..rasters.atomic import writing
+from ..runs import digest
 
 # The column that is no parameter.
 NAME = "name"
@@ -105,7 +105,7 @@ def _call(
     written = {p.name: checked[p.name] for p in tool.parameters if _is_output(p)}
     written = {key: path for key, path in written.items() if path is not None}
     places = sorted((key, str(path)) for key, path in written.items())
-    key = hashlib.sha256(repr((tool.run_of_call(checked), places)).encode()).hexdigest()[:16]
+    key = digest(tool.run_of_call(checked), places)
     return Call(number, name, checked, written, key)
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..declaration import Tool
-from ..rasters.atomic import Outputs, write_json, writing
+from ..rasters.atomic import Outputs, write_csv, write_json
 from ..runs import run_tags
 from ..version import __version__
 from .calls import Call
@@ -120,21 +118,17 @@ class BatchResult:
             They cannot be written.
         """
         with Outputs() as outputs:
-            table = outputs.stage(self.table)
-            with writing(table):
-                table.write_text(self._csv(), encoding="utf-8", newline="")
+            self._write_table(outputs.stage(self.table))
             write_json(outputs.stage(self.details), self.summary())
 
-    def _csv(self) -> str:
+    def _write_table(self, path: Path) -> None:
         numbers = [output.name.lower() for output in self.tool.outputs]
         paths = list(dict.fromkeys(name for row in self.rows for name in row.outputs()))
-        text = io.StringIO()
         head = ["row", "name", "status", "message", "seconds", "resumed"]
-        writer = csv.DictWriter(text, [*head, *numbers, *paths, *run_tags()])
-        writer.writeheader()
+        rows = []
         for row in self.rows:
             summary = row.summary()
-            writer.writerow(
+            rows.append(
                 {
                     **{name: summary[name] for name in head},
                     "resumed": "yes" if row.resumed else "no",
@@ -144,7 +138,7 @@ class BatchResult:
                     **run_tags(),
                 }
             )
-        return text.getvalue()
+        write_csv(path, [*head, *numbers, *paths, *run_tags()], rows)
 
     def _numbers(self, outcome: Outcome) -> dict[str, Any]:
         found = {}

@@ -27,6 +27,8 @@ OFFSET = 1.0
 _FORMAT = "groundtie feature classifier"
 _VERSION = 1
 
+_SCALING = ("mean", "spread", "low", "high")
+
 # So many values of kernels are held in memory at a time.
 _BLOCK = 4_000_000
 
@@ -106,23 +108,8 @@ class FeatureClassifier:
 
     def write(self, path: Path) -> None:
         """Write the classifier as JSON."""
-        values = {
-            "format": _FORMAT,
-            "version": _VERSION,
-            "statistics": self.statistics,
-            "kernel": self.kernel,
-            "gamma": self.gamma,
-            "mean": self.mean.tolist(),
-            "spread": self.spread.tolist(),
-            "low": self.low.tolist(),
-            "high": self.high.tolist(),
-            "intercept": self.intercept,
-            "pixel_size_m": self.pixel_size_m,
-            "bands": self.bands,
-            "weights": self.weights.tolist(),
-            "vectors": self.vectors.tolist(),
-        }
-        write_json(path, values, indent=None)
+        values = {name: np.asarray(value).tolist() for name, value in vars(self).items()}
+        write_json(path, {"format": _FORMAT, "version": _VERSION, **values}, indent=None)
 
 
 def read_classifier(path: Path) -> FeatureClassifier:
@@ -146,19 +133,18 @@ def _from_json(values: dict[str, Any]) -> FeatureClassifier:
         raise ValueError(f"format {values['format']!r} of version {values['version']!r}")
     if values["statistics"] not in STATISTICS or values["kernel"] not in KERNELS:
         raise ValueError(f"statistics {values['statistics']!r}, kernel {values['kernel']!r}")
+    numbers: dict[str, Any] = {
+        name: float(values[name]) for name in ("gamma", "intercept", "pixel_size_m")
+    }
+    arrays: dict[str, Any] = {
+        name: np.array(values[name], float) for name in (*_SCALING, "vectors", "weights")
+    }
     found = FeatureClassifier(
         statistics=values["statistics"],
         kernel=values["kernel"],
-        gamma=float(values["gamma"]),
-        mean=np.array(values["mean"], float),
-        spread=np.array(values["spread"], float),
-        low=np.array(values["low"], float),
-        high=np.array(values["high"], float),
-        vectors=np.array(values["vectors"], float),
-        weights=np.array(values["weights"], float),
-        intercept=float(values["intercept"]),
-        pixel_size_m=float(values["pixel_size_m"]),
         bands=int(values["bands"]),
+        **numbers,
+        **arrays,
     )
     if (found.bands > 0) != (found.statistics == BAND_RATIOS):
         raise ValueError(f"statistics {found.statistics!r} of {found.bands} bands")
@@ -166,12 +152,9 @@ def _from_json(values: dict[str, Any]) -> FeatureClassifier:
     count = len(patch_statistics(found.statistics, _NOTHING, np.zeros((1, 2)), bands)[0])
     if found.vectors.shape != (len(found.weights), count) or len(found.vectors) == 0:
         raise ValueError("support vectors of the wrong shape")
-    scaling = found.mean, found.spread, found.low, found.high
-    if any(each.shape != (count,) for each in scaling):
+    if any(arrays[name].shape != (count,) for name in _SCALING):
         raise ValueError("scaling of the wrong shape")
-    numbers = found.gamma, found.intercept, found.pixel_size_m
-    arrays = *scaling, found.vectors, found.weights, np.array(numbers)
-    if not all(np.isfinite(each).all() for each in arrays):
+    if not all(np.isfinite(each).all() for each in (*numbers.values(), *arrays.values())):
         raise ValueError("a number is not finite")
     return found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
@@ -34,33 +34,29 @@ KEPT, LEFT_OUT, UNKNOWN = 1, 0, -1
 _LARGEST_SHARE = 0.25
 
 
-class LabelSource(Protocol):
-    """Labels of pixels, or labelled points."""
-
-    @property
-    def chosen(self) -> bool:
-        """Whether points were chosen: the sizes of the classes mean nothing then."""
-
-    def label(self, piece: Grid) -> Labels:
-        """Return the labels of a grid's pixels, shape (h, w)."""
-
-    def points(self, piece: Grid) -> tuple[FloatArray, Labels]:
-        """Return points of its own as positions on a grid, shape (m, 2), and their labels."""
-
-
 @dataclass(frozen=True)
 class RasterLabels:
-    """Labels of a raster's first band: pixels of some values are to be left out, others kept."""
+    """Labels of a raster's first band: pixels of some values are to be left out, others kept.
+
+    Parameters
+    ----------
+    source
+        The raster.
+    crs
+        CRS of the image's map.
+    left_out
+        The values.
+    chosen
+        Whether points were chosen: the sizes of the classes mean nothing then.
+    """
 
     source: RasterSource
     crs: CRS | None
     left_out: frozenset[str]
-
-    @property
-    def chosen(self) -> bool:
-        return False
+    chosen: ClassVar = False
 
     def label(self, piece: Grid) -> Labels:
+        """Return the labels of a grid's pixels, shape (h, w)."""
         own = self.source.grid
 
         def to_px(xy: FloatArray) -> FloatArray:
@@ -72,6 +68,7 @@ class RasterLabels:
         return np.where(known, labels, UNKNOWN).astype(np.int8)
 
     def points(self, piece: Grid) -> tuple[FloatArray, Labels]:
+        """Return points of its own as positions on a grid, shape (m, 2), and their labels."""
         return np.zeros((0, 2)), np.zeros(0, np.int8)
 
 
@@ -93,9 +90,11 @@ class LayerLabels:
 
     @property
     def chosen(self) -> bool:
+        """As `RasterLabels` has it: points are chosen, and polygons are not."""
         return len(self.xy) > 0
 
     def label(self, piece: Grid) -> Labels:
+        """Return the labels of a grid's pixels, shape (h, w)."""
         if not self.areas:
             return np.full((piece.height, piece.width), UNKNOWN, np.int8)
         from rasterio.features import rasterize
@@ -109,7 +108,11 @@ class LayerLabels:
         return np.asarray(drawn.astype(np.int8) - 1)
 
     def points(self, piece: Grid) -> tuple[FloatArray, Labels]:
+        """Return points of its own as positions on a grid, shape (m, 2), and their labels."""
         return piece.map_to_pixel(self.xy), self.labels
+
+
+LabelSource = RasterLabels | LayerLabels
 
 
 def patch_labels(labels: Labels, px: FloatArray) -> Labels:

@@ -11,10 +11,9 @@ import numpy as np
 from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage
+from .hog import PATCH_PX
 
 Means = Callable[[FloatArray], FloatArray]
-
-PATCH_PX = 41
 
 # What is finer than a mean over so many pixels a side is texture.
 _FINE_PX = 5

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ..rasters import tiling
 from ..rasters.grid import FloatArray, Grid
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
@@ -46,8 +47,5 @@ def inside(px: FloatArray, window: Window) -> Mask:
 
 
 def tiles(grid: Grid) -> Iterator[Window]:
-    """Return tiles that cover a grid."""
-    for row in range(0, grid.height, _TILE_PX):
-        for col in range(0, grid.width, _TILE_PX):
-            width, height = min(_TILE_PX, grid.width - col), min(_TILE_PX, grid.height - row)
-            yield Window(col, row, width, height)
+    """Return the tiles in which a grid is searched for keypoints."""
+    return tiling.tiles(grid, _TILE_PX)

@@ -119,9 +119,13 @@ def _same(one: FloatArray, other: FloatArray) -> NDArray[np.bool_]:
 
 def columns(rows: list[Row], x: str, y: str) -> FloatArray:
     """Return the positions in two columns, shape (n, 2); NaN where there is none."""
-    values = [[row.get(x), row.get(y)] for row in rows]
-    numbers = [[np.nan if v in (None, "") else float(v) for v in pair] for pair in values]
-    return np.array(numbers, float).reshape(-1, 2)
+    return np.column_stack([numbers(rows, x), numbers(rows, y)])
+
+
+def numbers(rows: list[Row], name: str) -> FloatArray:
+    """Return a column of numbers, shape (n,); NaN where there is none."""
+    values = [row.get(name) for row in rows]
+    return np.array([np.nan if value in (None, "") else float(value) for value in values], float)
 
 
 def _projected(places: FloatArray, source: CRS | None, target: CRS | None) -> FloatArray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from affine import Affine
@@ -98,13 +98,17 @@ class Model(ABC):
     kind: str
     frame: Frame
 
+    # Arrays that make the model.
+    _NUMBERS: ClassVar[tuple[str, ...]] = ("coefficients",)
+
     @abstractmethod
     def displacement(self, uv: FloatArray) -> FloatArray:
         """Return the displacement, in the frame, of positions in the frame, both (n, 2)."""
 
-    @abstractmethod
     def to_json(self) -> dict[str, Any]:
         """Return the model as values that JSON can carry."""
+        numbers = {name: getattr(self, name).tolist() for name in self._NUMBERS}
+        return {"kind": self.kind, "frame": list(self.frame.to_map)[:6], **numbers}
 
     def __call__(self, xy: ArrayLike) -> FloatArray:
         """Return the nominal positions, shape (n, 2), of reference map positions `xy`."""
@@ -171,14 +175,6 @@ class PolynomialModel(Model):
         """Return the displacement, in the frame, of positions in the frame, both (n, 2)."""
         return monomials(uv, DEGREE[self.kind]) @ self.coefficients
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the model as values that JSON can carry."""
-        return {
-            "kind": self.kind,
-            "frame": list(self.frame.to_map)[:6],
-            "coefficients": self.coefficients.tolist(),
-        }
-
 
 @dataclass(frozen=True)
 class ThinPlateSpline(Model):
@@ -198,20 +194,12 @@ class ThinPlateSpline(Model):
     weights: FloatArray
     affine: FloatArray
 
+    _NUMBERS = ("knots", "weights", "affine")
+
     def displacement(self, uv: FloatArray) -> FloatArray:
         """Return the displacement, in the frame, of positions in the frame, both (n, 2)."""
         bending = thin_plate_kernel(uv, self.knots) @ self.weights
         return np.asarray(bending + monomials(uv, 1) @ self.affine)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the model as values that JSON can carry."""
-        return {
-            "kind": self.kind,
-            "frame": list(self.frame.to_map)[:6],
-            "knots": self.knots.tolist(),
-            "weights": self.weights.tolist(),
-            "affine": self.affine.tolist(),
-        }
 
 
 def thin_plate_kernel(uv: FloatArray, knots: FloatArray) -> FloatArray:

@@ -14,11 +14,15 @@ import numpy as np
 from affine import Affine
 from rasterio.crs import CRS
 
-from ..errors import (
-    GeoreferencingError,
-    NoOverlapError,
+from ..errors import NoOverlapError
+from ..rasters.grid import (
+    Grid,
+    apply_affine,
+    compose,
+    mesh,
+    reproject,
+    require_both_or_none,
 )
-from ..rasters.grid import Grid, apply_affine, compose, mesh, reproject
 from ..rasters.reading import open_raster
 from ..rasters.surfaces import RasterSurface, surface_around
 from .models import FloatArray
@@ -127,9 +131,7 @@ def _surface(
     # Not closed: whoever has the transform may ask for heights at any time.
     source = open_raster(raster)
     grid = source.grid
-    if (grid.crs is None) != (crs is None):
-        raise GeoreferencingError(f"only one of {source.path} and the reference has a CRS")
-
+    require_both_or_none(grid.crs, crs, f"{source.path} and the reference")
     left, bottom, right, top = region
     last = np.array([grid.width, grid.height]) - 1
 

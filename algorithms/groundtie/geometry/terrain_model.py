@@ -98,9 +98,7 @@ class TerrainModel(Model):
     def to_json(self) -> dict[str, Any]:
         """Return the model as values that JSON can carry."""
         return {
-            "kind": self.kind,
-            "frame": list(self.frame.to_map)[:6],
-            "coefficients": self.coefficients.tolist(),
+            **super().to_json(),
             "origin_m": self.origin_m,
             **self.terrain.to_json(),
             "heights_m": [

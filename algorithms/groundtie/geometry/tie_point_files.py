@@ -15,11 +15,11 @@ from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
 from ..errors import OutputError, TransformFileError
-from ..rasters.atomic import write_json, writing
+from ..rasters.atomic import write_csv, write_json, writing
 from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject, require_map
 from ..runs import run_tags
 from ..strict_json import read_json
-from .drawn_points import INPUT, NOMINAL, PIXEL, Row, columns, follow_lines, line_ends
+from .drawn_points import INPUT, NOMINAL, PIXEL, Row, columns, follow_lines, line_ends, numbers
 from .georeferencer import (
     positions,
     read_georeferencer,
@@ -68,13 +68,15 @@ def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform:
         if suffix == ".points":
             write_georeferencer(path, points, transform)
             return
-        rows, numbers = _rows(points, transform), (*NUMBERS, *points.more)
+        rows, names = _rows(points, transform), (*NUMBERS, *points.more)
         if suffix == ".gpkg":
-            _write_gpkg(path, rows, numbers, transform.crs)
+            _write_gpkg(path, rows, names, transform.crs)
         elif suffix == ".geojson":
-            _write_geojson(path, rows, transform.crs)
+            features = _features(rows, transform.crs, LON_LAT)
+            collection = {"type": "FeatureCollection", "name": _LAYER, "features": features}
+            write_json(path, collection)
         else:
-            _write_csv(path, rows, numbers)
+            write_csv(path, (*names, *_TEXTS, *run_tags()), rows)
 
 
 def read_tie_points(
@@ -126,7 +128,7 @@ def read_tie_points(
         if edited.any():
             _LOG.info("%s: %d of %d lines were moved or drawn", path, edited.sum(), len(rows))
         points = _from_rows(rows, input_grid, crs, more)
-        edited |= _numbers(rows, EDITED) > 0
+        edited |= numbers(rows, EDITED) > 0
         return replace(points, more={**points.more, EDITED: edited.astype(float)})
     except (OSError, ValueError, KeyError, TypeError, OverflowError, CRSError, csv.Error) as error:
         reason = f"column {error} is missing" if isinstance(error, KeyError) else error
@@ -164,24 +166,11 @@ def _features(rows: list[Row], crs: CRS | None, target: CRS | None) -> list[dict
     ]
 
 
-def _write_gpkg(path: Path, rows: list[Row], numbers: Sequence[str], crs: CRS | None) -> None:
+def _write_gpkg(path: Path, rows: list[Row], names: Sequence[str], crs: CRS | None) -> None:
     from .geopackage import write_layer  # heavy
 
-    properties = dict.fromkeys(numbers, "float") | dict.fromkeys((*_TEXTS, *run_tags()), "str")
+    properties = dict.fromkeys(names, "float") | dict.fromkeys((*_TEXTS, *run_tags()), "str")
     write_layer(path, _LAYER, _features(rows, crs, crs), properties, crs)
-
-
-def _write_geojson(path: Path, rows: list[Row], crs: CRS | None) -> None:
-    features = _features(rows, crs, LON_LAT)
-    collection = {"type": "FeatureCollection", "name": _LAYER, "features": features}
-    write_json(path, collection)
-
-
-def _write_csv(path: Path, rows: list[Row], numbers: Sequence[str]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.DictWriter(file, (*numbers, *_TEXTS, *run_tags()), lineterminator="\n")
-        table.writeheader()
-        table.writerows(rows)
 
 
 def _read_rows(path: Path, suffix: str) -> tuple[list[Row], FloatArray, CRS | None]:
@@ -225,7 +214,7 @@ def _from_rows(
     """Return the points of a table."""
     # A drawn line has empty columns.
     states = [str(row.get("state") or USED) for row in rows]
-    sigma = np.column_stack([_numbers(rows, f"sigma_{axis}_px") for axis in "xy"])
+    sigma = np.column_stack([numbers(rows, f"sigma_{axis}_px") for axis in "xy"])
     points = unmeasured(
         require_places(positions(rows, "reference_x", "reference_y")),
         require_places(_input_px(rows, input_grid, crs)),
@@ -234,11 +223,11 @@ def _from_rows(
     )
     return replace(
         points,
-        score=_numbers(rows, "score"),
+        score=numbers(rows, "score"),
         covariance_px2=sigma[:, :, None] ** 2 * np.eye(2),
-        forward_backward_error_px=_numbers(rows, "forward_backward_error_px"),
+        forward_backward_error_px=numbers(rows, "forward_backward_error_px"),
         is_check=np.array([row.get("role") == "check" for row in rows], bool),
-        more={name: _numbers(rows, name) for name in more},
+        more={name: numbers(rows, name) for name in more},
     )
 
 
@@ -254,12 +243,6 @@ def _input_px(rows: list[Row], input_grid: Grid, crs: CRS | None) -> FloatArray:
     missing = [row for row, known in zip(rows, np.isfinite(px).all(1), strict=True) if not known]
     px[~np.isfinite(px).all(1)] = positions(missing, *PIXEL)
     return px
-
-
-def _numbers(rows: list[Row], name: str) -> FloatArray:
-    """Return a column of numbers, shape (n,); NaN where there is none."""
-    values = [row.get(name) for row in rows]
-    return np.array([np.nan if value in (None, "") else float(value) for value in values], float)
 
 
 def _or_null(value: Any) -> Any:

@@ -22,7 +22,7 @@ from rasterio.errors import CRSError
 from rasterio.warp import transform_geom
 
 from ..errors import GeoreferencingError, VectorLayerError, raised_by
-from ..rasters.grid import require_map
+from ..rasters.grid import require_both_or_none, require_map
 from . import layer_reader
 
 # The layers that masks and tie points come from are read in seconds.
@@ -61,8 +61,7 @@ class VectorLayer:
         VectorLayerError
             A geometry cannot be taken to the map.
         """
-        if (self.crs is None) != (crs is None):
-            raise GeoreferencingError(f"only one of {self.path} and the image has a CRS")
+        require_both_or_none(self.crs, crs, f"{self.path} and the image")
         located = [feature for feature in self.features if feature["geometry"] is not None]
         if self.crs is not None and self.crs != crs:
             try:

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from affine import Affine
 
-from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
+from ..errors import NoOverlapError, RasterContentError
 from ..geometry.fitting import fit_model
 from ..geometry.limits import SearchLimits
 from ..geometry.models import Frame, PolynomialModel
 from ..geometry.transform import Transform
 from ..matching.chips import MaskOf
 from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid, apply_affine, compose
-from ..rasters.pair import Image
+from ..rasters.pair import Image, require_georeferenced_alike
 from ..rasters.patch import Patch
 from .pose import Pose
 
@@ -158,11 +158,7 @@ def read_windows(
 
 def _nominal(reference: Image, input: Image) -> Transform:
     ref, inp = reference.source, input.source
-    for one, other in ((ref, inp), (inp, ref)):
-        if one.grid.is_georeferenced and not other.grid.is_georeferenced:
-            raise GeoreferencingError(f"{other.path} has no georeferencing, but {one.path} has")
-        if one.grid.crs is not None and other.grid.crs is None:
-            raise GeoreferencingError(f"{other.path} has no CRS, but {one.path} has")
+    require_georeferenced_alike(ref, inp)
     if ref.grid.is_georeferenced:
         return Transform.nominal(ref.grid.crs, inp.grid)
     apart = np.subtract(inp.grid.centre_px, ref.grid.centre_px)

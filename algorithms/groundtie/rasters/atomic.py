@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 import errno
 import itertools
 import json
@@ -11,7 +12,7 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -186,6 +187,26 @@ def write_json(path: Path, values: Mapping[str, Any], indent: int | None = 1) ->
     text = json.dumps({**values, **run_tags()}, indent=indent, allow_nan=False, ensure_ascii=False)
     with writing(path):
         path.write_text(text, encoding="utf-8")
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those that it lies in, if it is not there; errors as `writing`."""
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+
+
+def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> None:
+    """Write rows, by the names of their columns, as a CSV table.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with writing(path), path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, list(columns), lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
 
 
 @contextlib.contextmanager

@@ -234,6 +234,18 @@ def require_map(crs: CRS | None) -> CRS | None:
     )
 
 
+def metres_per_unit_at(xy: ArrayLike, crs: CRS | None) -> tuple[float, float]:
+    """Return the metres per map unit along x and y at a position (1 without a CRS)."""
+    # The only pixel of a grid lies around it.
+    return Grid(Affine.translation(*(np.asarray(xy) - 0.5)), crs, 1, 1).metres_per_unit
+
+
+def require_both_or_none(one: CRS | None, other: CRS | None, names: str) -> None:
+    """Raise `GeoreferencingError` if only one of two maps, of these names, has a CRS."""
+    if (one is None) != (other is None):
+        raise GeoreferencingError(f"only one of {names} has a CRS")
+
+
 # The product is `*` in affine 2; affine 3 has `@` and warns of `*`.
 _product = operator.matmul if hasattr(Affine, "__matmul__") else operator.mul
 

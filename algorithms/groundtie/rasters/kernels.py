@@ -21,7 +21,7 @@ _REMAP_IS_EXACT = int(cv2.__version__.split(".")[0]) >= 5
 _REMAP_SIDE = 1 << 15
 
 # Pixels that are worked at a time: what they need stays in the processor's cache.
-_BLOCK_PIXELS = 1 << 14
+CACHED_PIXELS = 1 << 14
 
 
 def _bilinear(s: NDArray[Any]) -> list[NDArray[Any]]:
@@ -184,8 +184,8 @@ def _by_kernel(bands: NDArray[Any], px: NDArray[Any], kernel: Weights, reach: in
     images, stride = padded.reshape(count, -1), padded.shape[2]
     x, y = (np.asarray(axis).ravel() for axis in px)
     out = np.empty((count, len(x)), bands.dtype)
-    for start in range(0, len(x), _BLOCK_PIXELS):
-        part = slice(start, start + _BLOCK_PIXELS)
+    for start in range(0, len(x), CACHED_PIXELS):
+        part = slice(start, start + CACHED_PIXELS)
         left, right_share = _split(x[part], width)
         top, lower_share = _split(y[part], height)
         across = kernel(right_share.astype(bands.real.dtype, copy=False))

@@ -11,14 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .grid import FloatArray, Grid, mesh
+from .kernels import CACHED_PIXELS
 
 # Takes map positions, (n, 2), to values, (n, k).
 MapFunction = Callable[[FloatArray], FloatArray]
 
 _FIRST_STEP = 64
-
-# Pixels that are worked at a time: what they need stays in the processor's cache.
-_PIXELS = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,7 @@ class Lattice:
 
 def row_strips(height: int, width: int) -> Iterator[slice]:
     """Return the rows of an array in parts that are worked in the processor's cache."""
-    lines = max(_PIXELS // width, 1)
+    lines = max(CACHED_PIXELS // width, 1)
     for first in range(0, height, lines):
         yield slice(first, min(first + lines, height))
 

@@ -205,11 +205,7 @@ def make_pair(
     ref, inp = reference.source, input.source
     if ref.is_same_as(inp):
         raise SameFileError(f"reference and input are the same raster: {ref.path}")
-    for one, other in ((ref, inp), (inp, ref)):
-        if one.grid.is_georeferenced and not other.grid.is_georeferenced:
-            raise GeoreferencingError(f"{other.path} has no georeferencing, but {one.path} has")
-        if one.grid.crs is not None and other.grid.crs is None:
-            raise GeoreferencingError(f"{other.path} has no CRS, but {one.path} has")
+    require_georeferenced_alike(ref, inp)
     wanted = matching_pixel_size_m or _coarser_m(ref.grid, inp.grid)
     factor = wanted / ref.grid.pixel_size_m
     grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
@@ -232,6 +228,15 @@ def make_pair(
     matching, overlap_px = grid.window(*reach), (overlap.width, overlap.height)
     around = _surroundings(reach, radius / grid.pixel_size_m, None if is_shift else nominal)
     return ImagePair(reference, input, matching, overlap_px, grid.window(*around), limits)
+
+
+def require_georeferenced_alike(reference: RasterSource, input: RasterSource) -> None:
+    """Raise `GeoreferencingError` if only one of two rasters is georeferenced, or has a CRS."""
+    for one, other in ((reference, input), (input, reference)):
+        if one.grid.is_georeferenced and not other.grid.is_georeferenced:
+            raise GeoreferencingError(f"{other.path} has no georeferencing, but {one.path} has")
+        if one.grid.crs is not None and other.grid.crs is None:
+            raise GeoreferencingError(f"{other.path} has no CRS, but {one.path} has")
 
 
 def _farthest_px(grid: Grid, outline_px: FloatArray) -> float:

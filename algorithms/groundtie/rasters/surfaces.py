@@ -23,6 +23,9 @@ _BLOCK = 1024
 # Voids are filled from the region reduced to at most so many pixels a side.
 _FILL_SIDE = 512
 
+# So far around a region its raster is read for filling voids, in pixels.
+_AROUND_PX = 2
+
 # Steps by which voids are relaxed at each size.
 _RELAXATIONS = 300
 
@@ -50,8 +53,6 @@ class RasterSurface:
         The pixels that are asked for.
     filled
         The region, reduced, without voids, for those of the raster.
-    void_share
-        Share of the region that holds no value.
     margin_px
         How far beyond the outer pixels' centres their values hold.
     """
@@ -60,7 +61,6 @@ class RasterSurface:
     to_px: Positions
     region: Window
     filled: FloatImage
-    void_share: float
     margin_px: float = _HALF_PX
 
     def at(self, positions: FloatArray) -> FloatArray:
@@ -149,9 +149,7 @@ def read_heights(
     return values, valid & (values > _LOWEST_M) & (values < _HIGHEST_M)
 
 
-def surface_around(
-    source: RasterSource, to_px: Positions, region: FloatArray, margin_px: int = 2
-) -> RasterSurface:
+def surface_around(source: RasterSource, to_px: Positions, region: FloatArray) -> RasterSurface:
     """Return the surface of a raster over a region.
 
     Parameters
@@ -162,8 +160,6 @@ def surface_around(
         From positions to its pixels, shapes (n, 2); NaN where they have none.
     region
         Positions of the region, (n, 2): those in between are asked for, too.
-    margin_px
-        How far around the region is read for filling voids.
 
     Raises
     ------
@@ -178,9 +174,9 @@ def surface_around(
     if not len(px):
         raise NoOverlapError(f"{source.path} does not cover the image")
     # Where the image sees nothing of the raster, its pixels may be any number.
-    px = np.clip(px, -margin_px - 1, size + margin_px)
-    low = np.clip(np.floor(px.min(axis=0)).astype(int) - margin_px, 0, size)
-    high = np.clip(np.ceil(px.max(axis=0)).astype(int) + margin_px + 1, 0, size)
+    px = np.clip(px, -_AROUND_PX - 1, size + _AROUND_PX)
+    low = np.clip(np.floor(px.min(axis=0)).astype(int) - _AROUND_PX, 0, size)
+    high = np.clip(np.ceil(px.max(axis=0)).astype(int) + _AROUND_PX + 1, 0, size)
     if (high <= low).any():
         raise NoOverlapError(f"{source.path} does not cover the image")
     window = Window(int(low[0]), int(low[1]), *(high - low).tolist())
@@ -189,7 +185,7 @@ def surface_around(
     values, valid = read_heights(source, window, None if reduce == 1 else shape)
     if not valid.any():
         raise RasterContentError(f"{source.path} holds no heights in the area of the image")
-    return RasterSurface(source, to_px, window, fill_voids(values, valid), 1 - float(valid.mean()))
+    return RasterSurface(source, to_px, window, fill_voids(values, valid))
 
 
 def fill_voids(values: FloatImage, valid: Mask) -> FloatImage:

@@ -9,7 +9,14 @@ from affine import Affine
 from rasterio.crs import CRS
 
 from ..errors import GridSizeError, NoOverlapError
-from .grid import MOST_PX, FloatArray, Grid, is_invertible, require_workable
+from .grid import (
+    MOST_PX,
+    FloatArray,
+    Grid,
+    is_invertible,
+    metres_per_unit_at,
+    require_workable,
+)
 
 # A footprint that reaches into a further row or column by less than this does not need it.
 _TOLERANCE_PX = 1e-3
@@ -114,9 +121,7 @@ def _registered_grid(
     centre = corners.mean(axis=0)
     if not np.isfinite(centre).all():
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")
-    # Its only pixel lies around the centre.
-    here = Grid(Affine.translation(*(centre - 0.5)), crs, 1, 1)
-    metres = np.array(here.metres_per_unit)
+    metres = np.array(metres_per_unit_at(centre, crs))
     if pixel_size_m is None:
         along, across = corners[2] - corners[0], corners[3] - corners[1]
         area = abs(along[0] * across[1] - along[1] * across[0]) / 2

@@ -227,8 +227,8 @@ class TiledFile:
         """Add pixels, shape (h, w, …), to the blocks in which they lie."""
         for row, col, whole in image.blocks(window):
             place = (plane, row, col)
-            part = _common(window, whole)
-            rows, cols = _slices(part, window)
+            part = window.common(whole)
+            rows, cols = part.slices_in(window)
             block = self._completed(image, place, values[rows, cols], part, whole)
             if block is not None:
                 raw_bytes = block.size // 8 if encode is encoded_mask else block.nbytes
@@ -253,7 +253,7 @@ class TiledFile:
             shape = (whole.height, whole.width, *values.shape[2:])
             block = _Open(np.zeros(shape, values.dtype), whole.width * whole.height)
             self._open[key] = block
-        block.values[_slices(part, whole)] = values
+        block.values[part.slices_in(whole)] = values
         block.missing -= part.width * part.height
         return None if block.missing else self._open.pop(key).values
 
@@ -279,16 +279,3 @@ def _write(file: IO[bytes], content: bytes) -> None:
     left = memoryview(content)
     while left:
         left = left[file.write(left) :]
-
-
-def _common(one: Window, other: Window) -> Window:
-    left, top = max(one.col, other.col), max(one.row, other.row)
-    right = min(one.col + one.width, other.col + other.width)
-    bottom = min(one.row + one.height, other.row + other.height)
-    return Window(left, top, right - left, bottom - top)
-
-
-def _slices(part: Window, whole: Window) -> tuple[slice, slice]:
-    """Return the rows and columns of a window within another."""
-    inside = part._replace(col=part.col - whole.col, row=part.row - whole.row)
-    return inside.slices

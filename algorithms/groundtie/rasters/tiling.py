@@ -22,11 +22,12 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-def tiles(grid: Grid) -> Iterator[Window]:
-    """Return the tiles that cover a grid, row by row, each made of whole blocks of the file."""
-    for row in range(0, grid.height, _TILE):
-        for col in range(0, grid.width, _TILE):
-            yield Window(col, row, min(_TILE, grid.width - col), min(_TILE, grid.height - row))
+def tiles(grid: Grid, side: int | None = None) -> Iterator[Window]:
+    """Return the tiles that cover a grid, row by row; by default whole blocks of the file."""
+    side = side or _TILE
+    for row in range(0, grid.height, side):
+        for col in range(0, grid.width, side):
+            yield Window(col, row, min(side, grid.width - col), min(side, grid.height - row))
 
 
 def tile_count(grid: Grid) -> int:

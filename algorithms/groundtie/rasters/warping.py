@@ -263,9 +263,9 @@ def sample(
 
 
 def sample_bands(
-    source: RasterSource, grid: Grid, to_input_px: ToInputPx, method: str = "cubic"
+    source: RasterSource, grid: Grid, to_input_px: ToInputPx
 ) -> tuple[FloatImage, Mask]:
-    """Resample all bands but alpha as `sample` does one; pixels are valid if they are in all.
+    """Resample all bands but alpha as `sample` does one by "cubic"; pixels must be valid in all.
 
     Returns
     -------
@@ -279,7 +279,7 @@ def sample_bands(
         values = np.abs(values) if source.is_complex else values
         return np.where(everywhere, values, 0).astype(np.float32), everywhere
 
-    return _sample(source, grid, to_input_px, method, read)
+    return _sample(source, grid, to_input_px, "cubic", read)
 
 
 def _sample(

@@ -30,6 +30,17 @@ class Window(NamedTuple):
         """Its rows and columns in an array."""
         return slice(self.row, self.row + self.height), slice(self.col, self.col + self.width)
 
+    def common(self, other: Window) -> Window:
+        """Return what it has in common with another one; nothing: a side is not positive."""
+        left, top = max(self.col, other.col), max(self.row, other.row)
+        right = min(self.col + self.width, other.col + other.width)
+        bottom = min(self.row + self.height, other.row + other.height)
+        return Window(left, top, right - left, bottom - top)
+
+    def slices_in(self, whole: Window) -> tuple[slice, slice]:
+        """Return its rows and columns in the array of a window that holds it."""
+        return self._replace(col=self.col - whole.col, row=self.row - whole.row).slices
+
 
 def read_window(
     dataset: Any, source: RasterSource, window: Window, bands: Sequence[int]
@@ -48,10 +59,7 @@ def read_window(
         Numbers of the bands, from 1.
     """
     shape = (len(bands), window.height, window.width)
-    left, top = max(window.col, 0), max(window.row, 0)
-    right = min(window.col + window.width, source.grid.width)
-    bottom = min(window.row + window.height, source.grid.height)
-    inside = Window(left, top, right - left, bottom - top)
+    inside = window.common(source.window)
     if inside.width <= 0 or inside.height <= 0:
         return np.zeros(shape, source.dtype), np.zeros(shape, bool)
     place = rasterio.windows.Window(*inside)
@@ -60,8 +68,7 @@ def read_window(
     if inside == window:
         return values, valid
     padded, padded_valid = np.zeros(shape, source.dtype), np.zeros(shape, bool)
-    rows = slice(top - window.row, bottom - window.row)
-    cols = slice(left - window.col, right - window.col)
+    rows, cols = inside.slices_in(window)
     padded[:, rows, cols], padded_valid[:, rows, cols] = values, valid
     return padded, padded_valid
 

@@ -23,7 +23,7 @@ from ..sensor.rpc_files import rpc_of
 from .asked import USUAL, asked_lights, asked_terrain
 from .delivery import Call
 from .evidence import SCENE, SURVEY
-from .orthorectification import Orthorectification
+from .orthorectification import write_orthoimage
 from .pipeline import run
 from .registration import Registration
 from .rules import RULES
@@ -162,13 +162,14 @@ def _first_accepted(
             part = context.part((number - 1) / len(ways), number / len(ways))
             spec = replace(way.spec, **asked, tries=number)
             found.append(run(call.with_limits(opened, spec, part), spec, part, scene))
-            tried.append(_line(way.name, way.because, found[-1].verdict))
-            if found[-1].verdict.accepted or found[-1].verdict.rule in _FINAL:
+            verdict = found[-1].verdict
+            tried.append(_line(way.name, way.because, verdict))
+            is_final = verdict.accepted or verdict.rule in _FINAL
+            if is_final:
                 break
-        chosen = found[-1] if found[-1].verdict.accepted else found[0]
-        if found[-1].verdict.rule in _FINAL:
-            chosen = found[-1]
-        chosen = replace(chosen, tried=tuple(tried), parameters=call.parameters or {})
+        chosen = replace(
+            found[-1 if is_final else 0], tried=tuple(tried), parameters=call.parameters or {}
+        )
         return chosen, stack.pop_all()
 
 
@@ -228,22 +229,14 @@ def _orthorectify(
         source, rpc = open_sensor_image(given["input"], rpc_file, stack)
         crs = stack.enter_context(open_raster(given["reference"])).grid.crs
         orientation = ground.orientation(source, rpc, crs, stack)
-        outputs = stack.enter_context(Outputs())
-        Orthorectification(source, orientation).write(output, outputs, context)
+        staged = stack.enter_context(Outputs()).stage(output)
+        write_orthoimage(source, orientation, staged, context)
 
 
 # What `refine` takes and the tool `register` does not ask for.
 _RPC_DEFAULTS: Mapping[str, Any] = {
-    "gcps": None,
-    "input_dem": None,
-    "views": None,
-    "geoid": None,
+    **dict.fromkeys(("gcps", "geoid", "height", "rpc", "search_radius", "matching_pixel_size")),
     "dem_cover": 0.0,
-    "height": None,
-    "rpc": None,
     "model": AUTO,
-    "search_radius": None,
     "mask": AUTO,
-    "matching_pixel_size": None,
-    "surface_model": None,
 }

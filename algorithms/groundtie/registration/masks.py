@@ -94,17 +94,16 @@ def with_ground_mask(
     reason = "as asked for"
     if kind == AUTO:
         kind, reason = choose(scene.radar.strong_share)
-    if kind == NONE:
-        ground = town.ground() if scene.is_dense_town else None
-        return Masked(pair, MaskUsed(NONE, None, 1.0, reason), ground)
     if kind == REGIONS:
         regions = town.regions()
         masked, share = town.masked(regions.select)
         used = MaskUsed(REGIONS, scene.radar_name, share, reason, is_reliable(regions))
         return Masked(masked, used)
+    ground = town.ground() if scene.is_dense_town else None
+    if kind == NONE:
+        return Masked(pair, MaskUsed(NONE, None, 1.0, reason), ground)
     by_level = Threshold(threshold.HIGH_PERCENT, 0.0, 0).on(town.scene, context.progress)
     masked, share = town.masked(by_level.select)
-    ground = town.ground() if scene.is_dense_town else None
     return Masked(masked, MaskUsed(kind, scene.radar_name, share, reason), ground)
 
 

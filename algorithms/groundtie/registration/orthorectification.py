@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from ..context import Context
-from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster
 from ..rasters.grid import Grid
 from ..rasters.reading import RasterSource
@@ -15,70 +13,43 @@ from ..sensor.dense import DenseOrientation
 from ..sensor.orientation import Orientation
 
 
-@dataclass(frozen=True)
-class Orthorectification:
-    """How an image is orthorectified.
+def write_orthoimage(
+    source: RasterSource,
+    by: Orientation,
+    path: Path,
+    context: Context,
+    grid: Grid | None = None,
+    pixel_size: float | None = None,
+    resampling: str = "cubic",
+) -> Grid:
+    """Write an orthoimage, and return its grid.
 
     Parameters
     ----------
     source
         The image, open.
-    orientation
+    by
         How it sees the ground.
+    path
+        The GeoTIFF; see `atomic.Outputs.stage`.
+    context
+        Threads and progress.
     grid
         The grid of the result; None: one that covers the image, in the orientation's CRS.
     pixel_size
         Of that grid, in its unit; None: that of the image on the ground.
+    resampling
+        One of `warping.METHODS`.
+
+    Raises
+    ------
+    NoOverlapError
+        The image shows nothing of the grid that was given.
     """
-
-    source: RasterSource
-    orientation: Orientation
-    grid: Grid | None = None
-    pixel_size: float | None = None
-
-    @property
-    def target(self) -> Grid:
-        """The grid of the result.
-
-        Raises
-        ------
-        NoOverlapError
-            The image shows nothing of the grid that was given.
-        """
-        image, by = self.source.grid, self.orientation
-        if self.grid is None:
-            return registered_grid(image, by.to_nominal_map, by.crs, self.pixel_size)
-        covering_grid(self.grid, by.to_nominal_map(image.outline()), within=True)
-        return self.grid
-
-    def write(
-        self,
-        output: Path,
-        outputs: Outputs,
-        context: Context,
-        resampling: str = "cubic",
-    ) -> Grid:
-        """Write the orthoimage, and return its grid.
-
-        Parameters
-        ----------
-        output
-            The GeoTIFF.
-        outputs
-            Where it is staged.
-        context
-            Threads and progress.
-        resampling
-            One of `warping.METHODS`.
-        """
-        target = self.target
-        warp_raster(
-            self.source,
-            DenseOrientation(self.orientation),
-            target,
-            outputs.stage(output),
-            resampling,
-            workers=context.workers,
-            progress=context.progress,
-        )
-        return target
+    if grid is None:
+        grid = registered_grid(source.grid, by.to_nominal_map, by.crs, pixel_size)
+    else:
+        covering_grid(grid, by.to_nominal_map(source.grid.outline()), within=True)
+    dense, workers, progress = DenseOrientation(by), context.workers, context.progress
+    warp_raster(source, dense, grid, path, resampling, workers=workers, progress=progress)
+    return grid

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -100,7 +100,7 @@ class Refinement:
         evidence = RefinementEvidence.of(
             control, adjustment, check, pixel_m, max_error_px, fit.largest_residual_px, needs_spread
         )
-        kept = points.with_points(table.reject(blunders, "blunder"))
+        kept = replace(points, points=table.reject(blunders, "blunder"))
         verdict = judge_refinement(evidence)
         return cls(image, kept, control, check, adjustment, fit, evidence, verdict)
 

@@ -105,20 +105,12 @@ class RefinementFiles:
     def _page(
         self, refinement: Refinement, heights: HeightCheck, found: GroundControl | None
     ) -> RefinementReport:
-        image = refinement.image
         return RefinementReport(
-            title=f"RPCs of {Path(image.source.path).name}, refined",
-            verdict=refinement.verdict,
-            evidence=refinement.evidence,
-            bias=refinement.adjustment.bias,
-            residuals=refinement.residuals(),
-            grid=refinement.grid,
-            pixel_m=sensor_grid(image.source, image.orientation).pixel_size_m,
-            heights=image.heights,
-            by_hand=refinement.points.by_hand,
-            warnings=tuple(heights.warnings()),
-            comparison=None if found is None else _compared(refinement, found),
-            mask=None if found is None else found.registration.mask,
+            refinement,
+            heights,
+            None if found is None else _compared(refinement, found),
+            None if found is None else found.registration.mask,
+            title=f"RPCs of {Path(refinement.image.source.path).name}, refined",
             parameters={k: v for k, v in self.parameters.items() if v is not None},
             seconds=time.perf_counter() - self.started,
         )

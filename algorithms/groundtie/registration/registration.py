@@ -188,7 +188,7 @@ class Registration:
             points=self.tie_points,
             transform=self.transform,
             surfaces=self.extreme_surfaces() if with_surfaces else (),
-            parts=None if self.survey is None else Parts.of(self.survey),
+            parts=None if self.survey is None else Parts(self.survey),
             parameters={k: v for k, v in self.parameters.items() if v is not None},
             seconds=time.perf_counter() - self.started,
         )

@@ -14,7 +14,7 @@ from ..errors import (
 )
 from ..geometry.tie_point_files import read_tie_points
 from ..geometry.transform import Transform, load_transform
-from ..rasters.grid import FloatArray, Grid, reproject
+from ..rasters.grid import FloatArray, Grid, reproject, require_both_or_none
 from ..rasters.reading import RasterSource
 from .tie_point_evidence import TiePointEvidence, TiePointFit
 from .verdict import decide
@@ -86,8 +86,7 @@ def transform_of(found: Transform, source: RasterSource, name: object) -> Transf
             "raster that it was made with, or one without georeferencing"
         )
     if own.is_georeferenced and registered.is_georeferenced:
-        if (own.crs is None) != (registered.crs is None):
-            raise GeoreferencingError(f"only one of {source.path} and {name} has a CRS")
+        require_both_or_none(own.crs, registered.crs, f"{source.path} and {name}")
         seen = registered.map_to_pixel(
             reproject(own.pixel_to_map(own.outline()), own.crs, registered.crs)
         )

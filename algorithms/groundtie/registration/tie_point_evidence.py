@@ -18,7 +18,7 @@ from ..geometry.models import DEGREE, PARAMETERS, Frame, monomials
 from ..geometry.tie_point_files import EDITED
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
-from ..rasters.grid import FloatArray, Grid, apply_affine
+from ..rasters.grid import FloatArray, Grid, apply_affine, metres_per_unit_at
 from .evidence import TIE_POINTS
 
 # Singular values below this share of the largest are rounding errors.
@@ -207,8 +207,7 @@ class TiePointEvidence:
         """Fit a model in metres, so that rigid ones preserve shapes also on maps in degrees."""
         reference_xy = self.points.reference_xy[self.taken]
         centre = reference_xy.mean(axis=0)
-        here = Grid(Affine.translation(*(centre - 0.5)), self.points.crs, 1, 1)
-        width, height = here.metres_per_unit
+        width, height = metres_per_unit_at(centre, self.points.crs)
         metres = Affine(1 / width, 0, centre[0], 0, 1 / height, centre[1])
         xy, nominal_xy = (
             apply_affine(~metres, places) for places in (reference_xy, self._nominal_xy[self.taken])

@@ -98,6 +98,11 @@ class UserMask:
         return not self.is_raster and self._suffix in _VECTOR_SUFFIXES
 
     @property
+    def is_drawn(self) -> bool:
+        """Whether it is a raster, or a layer of what takes no part: others depend on the pair."""
+        return self.is_raster or (self.is_layer and self.values is not None)
+
+    @property
     def _suffix(self) -> str:
         return Path(file_name(self.mask)).suffix.lower()
 
@@ -176,14 +181,22 @@ def _selection(
 ) -> Callable[[Window], Selection]:
     """Return what tells which pixels of a window of an image a mask keeps."""
     scene = scene_of(pair, name)
-    if mask.is_raster:
-        assert mask.values is not None
-        source = stack.enter_context(open_raster(mask.mask))
-        return RasterMask(scene, source, mask_values(mask.values)).select
-    if not mask.is_layer:
-        return _scene_classifier(pair, name, scene, Path(mask.mask)).select
-    layer = read_layer(mask.mask, scene, WIDTH_M)
-    return layer.select if mask.values is None else replace(layer, is_outside=True).select
+    if mask.values is not None:
+        return select_by_values(scene, mask, stack)
+    if mask.is_layer:
+        return read_layer(mask.mask, scene, WIDTH_M).select
+    return _scene_classifier(pair, name, scene, Path(mask.mask)).select
+
+
+def select_by_values(
+    scene: Scene, mask: UserMask, stack: ExitStack
+) -> Callable[[Window], Selection]:
+    """Return what tells which pixels of a window of a scene a mask's values keep."""
+    assert mask.values is not None
+    if mask.is_layer:
+        return replace(read_layer(mask.mask, scene, WIDTH_M), is_outside=True).select
+    source = stack.enter_context(open_raster(mask.mask))
+    return RasterMask(scene, source, mask_values(mask.values)).select
 
 
 def _scene_classifier(pair: ImagePair, name: str, scene: Scene, path: Path) -> ClassifiedScene:

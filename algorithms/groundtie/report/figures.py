@@ -167,7 +167,7 @@ def error_histogram(errors: PointErrors, verdict: Verdict, metres_per_px: float 
         scale = metres_per_px
         top = axes.secondary_xaxis("top", functions=(lambda x: x * scale, lambda x: x / scale))
         top.set_xlabel("error (m)")
-    _without_frame(axes)
+    without_frame(axes)
     return axes.figure
 
 
@@ -188,7 +188,7 @@ def error_scatter(errors: PointErrors, verdict: Verdict) -> Figure:
     # Rows run downwards, as on the map.
     axes.set(xlim=(-reach, reach), ylim=(reach, -reach), aspect="equal")
     axes.set(xlabel="to the right (px)", ylabel="downwards (px)")
-    _without_frame(axes)
+    without_frame(axes)
     return axes.figure
 
 
@@ -248,7 +248,8 @@ def draw_scale(axes: Any, arrows: Arrows, grid: Grid) -> None:
     axes.text(left + 1.5 * unit + length / 2, low - 3 * unit, text, ha="center", fontsize=10)
 
 
-def _without_frame(axes: Any) -> None:
+def without_frame(axes: Any) -> None:
+    """Leave the lines at the top and at the right of a plot away."""
     axes.spines[["top", "right"]].set_visible(False)
 
 

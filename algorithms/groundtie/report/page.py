@@ -79,7 +79,8 @@ class Page:
         summary = self.summary()
         shared = {name: summary[name] for name in ("parameters", "versions", "seconds")}
         run = run_tags().get(RUN)
-        page = _rendered(self.template, title=self.title, run=run, **shared, **self.values())
+        template = _environment().get_template(self.template)
+        page = template.render(title=self.title, run=run, **shared, **self.values())
         beside = path.with_suffix(".json")
         is_free = taken is None or taken.resolve() != beside.resolve()
         numbers = beside if is_free else path.with_suffix(".report.json")
@@ -113,10 +114,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value if value is None or isinstance(value, (bool, int, str)) else str(plainly(value))
-
-
-def _rendered(template: str, **values: Any) -> str:
-    return str(_environment().get_template(template).render(**values))
 
 
 @cache

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -27,17 +26,9 @@ class Parts:
     ----------
     survey
         Where the chips match.
-    parts
-        Those parts, the most evident first.
     """
 
     survey: Survey
-    parts: Sequence[Part]
-
-    @classmethod
-    def of(cls, survey: Survey) -> Parts:
-        """Take the parts that a survey found."""
-        return cls(survey, survey.parts)
 
     def summary(self) -> list[dict[str, Any]]:
         """Return the parts as values that JSON can carry."""
@@ -51,41 +42,42 @@ class Parts:
                 "height": part.height,
                 "model_height": part.model_height,
             }
-            for part in self.parts
+            for part in self.survey.parts
         ]
 
     def lines(self) -> list[str]:
         """Return each part in words: where it lies, and how far off."""
-        return [_in_words(part, self.survey) for part in self.parts]
+        return [_in_words(part, self.survey) for part in self.survey.parts]
 
     def shown(self) -> dict[str, Any] | None:
         """Return what a page shows of the parts; None: there are none."""
-        if not self.parts:
+        parts = self.survey.parts
+        if not parts:
             return None
-        colours = [COLOURS[k % len(COLOURS)] for k in range(len(self.parts))]
+        colours = [COLOURS[k % len(COLOURS)] for k in range(len(parts))]
         return {
-            "map": figures.svg_uri(parts_map(self)),
-            "rows": list(zip(colours, self.lines(), self.parts, strict=True)),
+            "map": figures.svg_uri(parts_map(self.survey)),
+            "rows": list(zip(colours, self.lines(), parts, strict=True)),
             "chips": len(self.survey.centres),
             "confirming": self.survey.confirming,
         }
 
 
-def parts_map(parts: Parts) -> Figure:
+def parts_map(survey: Survey) -> Figure:
     """Draw where the chips match: each part in its colour, the figure's edges are the grid's."""
-    survey, grid = parts.survey, parts.survey.grid
+    grid, parts = survey.grid, survey.parts
     axes = figures.map_axes(grid)
     confirming = survey.is_confirming_chip
     other = ~confirming
-    for part in parts.parts:
+    for part in parts:
         other[list(part.members)] = False
     px = survey.centres.astype(float)
     arrows = figures.scaled_arrows(
-        px, survey.shifts_px, max(part.distance_px for part in parts.parts), grid
+        px, survey.shifts_px, max(part.distance_px for part in parts), grid
     )
     axes.plot(*px[confirming].T, "o", color=figures.FIT_COLOUR, ms=6)
     axes.plot(*px[other].T, "x", color=figures.REJECTED_COLOUR, ms=6)
-    for k, part in enumerate(parts.parts):
+    for k, part in enumerate(parts):
         members, colour = np.array(part.members, int), COLOURS[k % len(COLOURS)]
         axes.plot(*px[members].T, "o", color=colour, ms=8)
         figures.draw_arrows(axes, px[members], arrows.vector_px[members], colour)

@@ -6,12 +6,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..assessment.comparison import Comparison
-from ..assessment.point_errors import PointErrors
 from ..masks.choice import MaskUsed
-from ..rasters.grid import Grid
-from ..registration.refinement_evidence import RefinementEvidence
-from ..registration.verdict import Verdict
-from ..sensor.bias import Bias
+from ..registration.refinement import Refinement
+from ..sensor.height_check import HeightCheck
 from . import figures
 from .page import Page
 
@@ -22,23 +19,9 @@ class RefinementReport(Page):
 
     Parameters
     ----------
-    verdict
-        Whether they can be trusted.
-    evidence
-        What that rests on, with the errors before and after.
-    bias
-        What was, or would have been, taken out.
-    residuals
-        By how much the refined RPCs miss the points, in image pixels.
-    grid
-        The image's pixels.
-    pixel_m
-        Side of one on the ground.
+    refinement
+        The RPCs and the verdict on them.
     heights
-        Which heights were used, in words.
-    by_hand
-        How many of the points a person moved or added.
-    warnings
         What makes the heights doubtful.
     comparison
         Reference and image on the map; None: there is no reference.
@@ -46,45 +29,44 @@ class RefinementReport(Page):
         What of the reference took part; None without one.
     """
 
-    verdict: Verdict
-    evidence: RefinementEvidence
-    bias: Bias
-    residuals: PointErrors
-    grid: Grid
-    pixel_m: float
-    heights: str
-    by_hand: int
-    warnings: tuple[str, ...]
+    refinement: Refinement
+    heights: HeightCheck
     comparison: Comparison | None
     mask: MaskUsed | None
     template: ClassVar[str] = "refinement.html.j2"
 
     def numbers(self) -> dict[str, Any]:
         """Return what was measured, by name."""
+        found = self.refinement
         return {
-            "verdict": self.verdict.summary() | self.evidence.summary(),
-            "bias": self.bias.to_json(),
-            "points_by_hand": self.by_hand,
-            "heights": {"used": self.heights, "warnings": self.warnings},
+            "verdict": found.verdict.summary() | found.evidence.summary(),
+            "bias": found.adjustment.bias.to_json(),
+            "points_by_hand": found.points.by_hand,
+            "heights": {"used": found.image.heights, "warnings": self.heights.warnings()},
             "mask": None if self.mask is None else self.mask.summary(),
         }
 
     def values(self) -> dict[str, Any]:
         """Return what the template shows."""
-        verdict, residuals, grid = self.verdict, self.residuals, self.grid
-        measured = {"before": self.evidence.before, "after": self.evidence.after}
-        histogram = figures.error_histogram(residuals, verdict, self.pixel_m)
+        found, verdict, evidence = (
+            self.refinement,
+            self.refinement.verdict,
+            self.refinement.evidence,
+        )
+        residuals, grid, bias = found.residuals(), found.grid, found.adjustment.bias
+        measured = {"before": evidence.before, "after": evidence.after}
+        histogram = figures.error_histogram(residuals, verdict, evidence.pixel_m)
         return {
             "verdict": verdict,
-            "held_out": self.evidence.held_out.name,
+            "held_out": evidence.held_out.name,
             "errors": {
-                name: {"px": each, "m": each.scaled(self.pixel_m)}
+                name: {"px": each, "m": each.scaled(evidence.pixel_m)}
                 for name, each in measured.items()
             },
-            "bias": self.bias,
-            "shift": list(zip(("column", "row"), *self.bias.shift_px(), strict=True)),
+            "bias": bias,
+            "shift": list(zip(("column", "row"), *bias.shift_px(), strict=True)),
             "facts": self._facts(),
-            "warnings": self.warnings,
+            "warnings": self.heights.warnings(),
             "map": figures.svg_uri(figures.residual_map(residuals, grid)),
             "histogram": figures.svg_uri(histogram),
             "scatter": figures.svg_uri(figures.error_scatter(residuals, verdict)),
@@ -94,5 +76,6 @@ class RefinementReport(Page):
         }
 
     def _facts(self) -> list[str]:
-        by_hand = [f"points set by hand: {self.by_hand}"] if self.by_hand else []
-        return [self.heights, *by_hand, *([] if self.mask is None else [self.mask.line()])]
+        found, count = self.refinement, self.refinement.points.by_hand
+        by_hand = [f"points set by hand: {count}"] if count else []
+        return [found.image.heights, *by_hand, *([] if self.mask is None else [self.mask.line()])]

@@ -61,10 +61,6 @@ class ControlPoints:
         """Return the rows that the index or mask `which` selects."""
         return replace(self, points=self.points.take(which), height_m=self.height_m[which])
 
-    def with_points(self, points: TiePoints) -> ControlPoints:
-        """Return the same places with other states."""
-        return replace(self, points=points)
-
     @property
     def by_hand(self) -> int:
         """How many of the points a person moved or added."""
@@ -146,7 +142,9 @@ def read_control_points(
     names = (HEIGHT, CORRELATION, *_SIGMAS)
     places = read_places(path, image)
     if places is None:
-        stored = read_tie_points(path, _own_pixels(replace(grid, crs=None)), names)
+        # Map positions are the image's pixels, wherever the image nominally is.
+        own_pixels = replace(grid, crs=None, transform=PIXEL_COORDINATES)
+        stored = read_tie_points(path, own_pixels, names)
     else:
         stored = _points_of(places, names)
     if len(stored.reference_xy) == 0:
@@ -175,11 +173,6 @@ def _points_of(places: Places, names: Sequence[str]) -> TiePoints:
     unknown = np.full(len(places.xy), np.nan)
     points = unmeasured(places.xy, places.px, [USED] * len(unknown), places.crs)
     return replace(points, more={**dict.fromkeys(names, unknown), HEIGHT: places.height_m})
-
-
-def _own_pixels(grid: Grid) -> Grid:
-    """Return a grid whose map positions are an image's pixels, wherever the image nominally is."""
-    return replace(grid, transform=PIXEL_COORDINATES)
 
 
 def _covariances(x: FloatArray, y: FloatArray, correlation: FloatArray) -> FloatArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 
@@ -21,41 +21,11 @@ from .smooth_map import Positions, smooth_map
 # its values for all pixels of a grid.
 OnNodes = Callable[[Positions, float], Lattice]
 
-# Interpolation between nodes may be wrong by this: pixels of the terrain model, and metres.
-_TOLERANCE_PX = 1e-3
+# Interpolation between nodes may be wrong by this, in metres.
 _TOLERANCE_M = 1e-3
 
 # Grids of the whole Earth leave this much open where they meet themselves.
 _WHOLE_PX = 1.0
-
-
-class Heights(Protocol):
-    """Heights above the ellipsoid over a region."""
-
-    @property
-    def typical_m(self) -> float:
-        """A height of the region."""
-
-    def at(self, lon_lat: FloatArray) -> FloatArray:
-        """Return heights in metres, shape (n,), at longitudes and latitudes; NaN if unknown."""
-
-    def on_grid(self, on_nodes: OnNodes) -> HeightsOnGrid | None:
-        """Return the heights at all pixels of a grid; None if none is known."""
-
-
-class HeightsOnGrid(Protocol):
-    """Heights above the ellipsoid at all pixels of a grid."""
-
-    @property
-    def side_px(self) -> float:
-        """How many pixels of a terrain model lie along the grid."""
-
-    @property
-    def bounds_m(self) -> tuple[float, float]:
-        """Bounds that no height exceeds."""
-
-    def lines(self, rows: slice) -> FloatImage:
-        """Return heights in metres at the pixels of some rows; NaN if unknown."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +95,7 @@ class TerrainHeights:
 
     def on_grid(self, on_nodes: OnNodes) -> HeightsOnGrid | None:
         """Return the heights at all pixels of a grid; None if none is known."""
-        place = on_nodes(self.terrain.to_px, _TOLERANCE_PX)
+        place = on_nodes(self.terrain.to_px, TOLERANCE_PX)
         geoid = None
         if self.geoid is not None:
             surface = self.geoid
@@ -187,6 +157,10 @@ class _TerrainOnGrid:
 
 def _range(values: FloatArray) -> tuple[float, float]:
     return float(np.nanmin(values)), float(np.nanmax(values))
+
+
+Heights = ConstantHeight | TerrainHeights
+HeightsOnGrid = _ConstantOnGrid | _TerrainOnGrid
 
 
 def terrain_heights(

@@ -41,28 +41,19 @@ class SeriesCall:
         All dates, the reference among them.
     reference
         The reference's name; None: there is none.
-    band
-        Number of the band that is matched, from 1; None: the mean of all.
     settings
         How each pair is registered.
     files
         What is written, and where.
-    workers
-        Number of threads; None: one per processor.
     parameters
-        All parameters of the tool, for the report.
-    scheduler
-        Address of a Dask scheduler whose workers register; None: threads do.
+        All parameters of the tool.
     """
 
     listed: tuple[Listed, ...]
     reference: str | None
-    band: int | None
     settings: Settings
     files: SeriesFiles
-    workers: int | None
     parameters: Mapping[str, Any]
-    scheduler: str | None = None
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> SeriesCall:
@@ -84,16 +75,7 @@ class SeriesCall:
             given["search_radius"],
             given["matching_pixel_size"],
         )
-        return cls(
-            listed,
-            reference,
-            given["band"],
-            settings,
-            files,
-            given["workers"],
-            given,
-            given["scheduler"],
-        )
+        return cls(listed, reference, settings, files, given)
 
     def run(self, progress: Progress, executor: Executor | None = None) -> Series:
         """Register the series, and write its files.
@@ -112,11 +94,12 @@ class SeriesCall:
         """
         started = time.perf_counter()
         stored = read_series(self.files.folder)
-        with threads(self.workers, progress) as context, ExitStack() as stack:
-            if executor is None and self.scheduler is not None:
-                executor = stack.enter_context(open_executor(1, self.scheduler))
+        given = self.parameters
+        with threads(given["workers"], progress) as context, ExitStack() as stack:
+            if executor is None and given["scheduler"] is not None:
+                executor = stack.enter_context(open_executor(1, given["scheduler"]))
             stack.enter_context(bounded_cache())
-            opened = open_dates(self.listed, self.band, stack, context.part(0.0, 0.05))
+            opened = open_dates(self.listed, given["band"], stack, context.part(0.0, 0.05))
             try:
                 series = self._registered(opened, stored, context.part(0.05, 0.8), executor)
                 series = replace(series, seconds=time.perf_counter() - started)

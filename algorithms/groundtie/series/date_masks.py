@@ -6,15 +6,12 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
-from ..masks.layer import read_layer
-from ..masks.regions import WIDTH_M
 from ..masks.scene import Scene, Selection, write_mask
-from ..masks.values import RasterMask, mask_values
 from ..progress import Progress
 from ..rasters.atomic import scratch_folder
 from ..rasters.pair import Image
 from ..rasters.reading import RasterSource, Window, open_raster
-from ..registration.user_masks import UserMask
+from ..registration.user_masks import UserMask, select_by_values
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,7 @@ def draw_mask(
     source
         The date.
     mask
-        Its mask; `is_drawn` states which are drawn.
+        Its mask; `UserMask.is_drawn` states which are drawn.
     stack
         Keeps the drawn mask until it is closed.
     progress
@@ -67,19 +64,12 @@ def draw_mask(
     return DateMask(raster, mask.values is not None, note)
 
 
-def is_drawn(mask: UserMask) -> bool:
-    """Whether a mask is a raster or what takes no part: others depend on the pair."""
-    return mask.is_raster or (mask.is_layer and mask.values is not None)
-
-
 def _selection(
     scene: Scene, source: RasterSource, mask: UserMask, stack: ExitStack
 ) -> Callable[[Window], Selection]:
-    if mask.is_layer:
-        return replace(read_layer(mask.mask, scene, WIDTH_M), is_outside=True).select
-    raster = stack.enter_context(open_raster(mask.mask))
     if mask.values is not None:
-        return RasterMask(scene, raster, mask_values(mask.values)).select
+        return select_by_values(scene, mask, stack)
+    raster = stack.enter_context(open_raster(mask.mask))
     image, grid = Image(source, mask=raster), source.grid
 
     def select(window: Window) -> Selection:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import warnings
 from collections.abc import Sequence
@@ -29,7 +28,8 @@ from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import RasterSource, open_raster
 from ..registration.user_masks import UserMask
-from .date_masks import DateMask, draw_mask, is_drawn
+from ..runs import digest
+from .date_masks import DateMask, draw_mask
 from .inputs import Listed
 
 # Footprints are drawn on images reduced to this, on their longer side.
@@ -97,7 +97,7 @@ class Date:
         mask = self.listed.mask
         facts: list[Any] = [file_facts(self.listed.raster)]
         facts += [file_facts(None)] if mask is None else [file_facts(mask.mask), mask.values]
-        return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
+        return digest(*facts)
 
     def footprint(self, crs: CRS | None) -> Any:
         """Return the outline of its valid pixels as a shapely polygon on a map."""
@@ -159,7 +159,7 @@ def open_dates(
             source = stack.enter_context(open_raster(one.raster))
             held_bytes += source.grid.width * source.grid.height * np.dtype(np.float32).itemsize
             mask = None
-            if one.mask is not None and is_drawn(one.mask):
+            if one.mask is not None and one.mask.is_drawn:
                 mask = draw_mask(source, one.mask, stack, context.quiet().progress)
                 context.update(number / len(listed), mask.note)
             date = Date(one, source, source, band, mask)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,13 +12,13 @@ from shapely.geometry import LineString, mapping
 
 from ..context import Context
 from ..errors import NotRegisteredError
-from ..rasters.atomic import Outputs, write_json, writing
+from ..rasters.atomic import Outputs, make_folder, write_csv, write_json, writing
 from ..rasters.grid import Grid
 from ..rasters.reading import open_raster
 from ..registration.registered_output import UNTOUCHED_TOLERANCE_PX, RegisteredOutput
 from ..registration.verdict import Verdict
 from ..report.stac import stac_item
-from ..runs import RUN, run_tags
+from ..runs import RUN, digest, run_tags
 from ..version import __version__
 from .dates import file_facts
 from .frame import FloatArray, sigma_px
@@ -61,10 +59,10 @@ class SeriesFiles:
             self._write_refusal(series)
             forget_unfinished(self.folder, had_folder=stored.had_folder)
             raise _refusal(series)
-        _make_folder(self.folder)
+        make_folder(self.folder)
         with Outputs() as outputs:
             series = self._with_rasters(series, stored, outputs, context)
-            _write_csv(outputs.stage(self.folder / TABLE_CSV), series)
+            write_csv(outputs.stage(self.folder / TABLE_CSV), TABLE_COLUMNS, series.rows())
             _write_layer(outputs.stage(self.folder / TABLE_GPKG), series)
             write_json(outputs.stage(self.folder / SERIES_JSON), series.to_json())
             # Last: who finds it finds all that it is about.
@@ -76,7 +74,7 @@ class SeriesFiles:
     def raster_key(self, date: SeriesDate, series: Series) -> str:
         """Return what stands for all that a date's raster is made of but its transform."""
         facts = file_facts(date.listed.raster), series.map_grid, self.output_grid, self.resampling
-        return hashlib.sha256(repr((facts, __version__)).encode()).hexdigest()[:16]
+        return digest(facts, __version__)
 
     def _with_rasters(
         self, series: Series, stored: StoredSeries, outputs: Outputs, context: Context
@@ -134,7 +132,7 @@ class SeriesFiles:
 
     def _write_refusal(self, series: Series) -> None:
         if self.report is not None:
-            _make_folder(self.report.parent)
+            make_folder(self.report.parent)
             with Outputs() as outputs:
                 self._write_report(series, outputs)
 
@@ -150,18 +148,6 @@ class SeriesFiles:
         for one in stored.dates.values():
             if one.file not in current and one.is_there(self.folder):
                 (self.folder / one.file).unlink()
-
-
-def _make_folder(folder: Path) -> None:
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-
-
-def _write_csv(path: Path, series: Series) -> None:
-    with writing(path), path.open("w", newline="", encoding="utf-8") as stream:
-        table = csv.DictWriter(stream, TABLE_COLUMNS)
-        table.writeheader()
-        table.writerows(series.rows())
 
 
 def _write_layer(path: Path, series: Series) -> None:

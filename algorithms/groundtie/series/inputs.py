@@ -110,16 +110,14 @@ def _listed(given: Path | str, asset: str | None) -> Iterable[Listed]:
         return _of_stac(given, asset)
     if not given.is_file():
         raise ParameterError(f"there is no file {given}")
-    return _of_table(given) if given.suffix.lower() in _TABLE else [_file(given)]
+    if given.suffix.lower() in _TABLE:
+        return [_of_row(given, number, row) for number, row in enumerate(read_rows(given), start=1)]
+    return [_file(given)]
 
 
 def _file(raster: Path | str) -> Listed:
     stem = Path(file_name(raster)).stem
     return Listed(stem, raster, time_of(stem), UserMask.of(raster, None, None))
-
-
-def _of_table(path: Path) -> list[Listed]:
-    return [_of_row(path, number, row) for number, row in enumerate(read_rows(path), start=1)]
 
 
 def _of_row(path: Path, number: int, row: Mapping[str, str]) -> Listed:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -25,6 +24,7 @@ from ..registration.opening import pair_images
 from ..registration.pipeline import run
 from ..registration.registration import Registration
 from ..registration.specification import COREGISTER, SAR_SAR, Specification
+from ..runs import digest
 from ..version import __version__
 from .dates import Date, open_dates
 from .frame import PARAMETERS, FloatArray, SeriesFrame
@@ -145,8 +145,7 @@ def pair_key(first: Date, second: Date, settings: Settings, frame: SeriesFrame) 
     """Return what stands for a registration: it need not be done again as long as this is same."""
     grid = frame.grid
     place = grid.transform, str(grid.crs), frame.centre_px, frame.half_px
-    facts = first.key, second.key, first.band, settings, place, __version__
-    return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
+    return digest(first.key, second.key, first.band, settings, place, __version__)
 
 
 @dataclass(frozen=True)

@@ -131,7 +131,7 @@ def shift_figure(series: Series) -> Figure:
         axes.set_xlabel("date, in the order of the inputs")
         axes.set_xticks(at)
     axes.legend(fontsize=8, edgecolor="white")
-    axes.spines[["top", "right"]].set_visible(False)
+    figures.without_frame(axes)
     return figure
 
 
@@ -154,5 +154,5 @@ def closure_figure(series: Series) -> Figure:
     axes.plot([0, reach], [0, reach], color="#bbbbbb", lw=0.8, zorder=0)
     axes.set(xlim=(0, reach), ylim=(0, None), xlabel="expected (px)", ylabel="error of loop (px)")
     axes.legend(fontsize=8, edgecolor="white")
-    axes.spines[["top", "right"]].set_visible(False)
+    figures.without_frame(axes)
     return figure

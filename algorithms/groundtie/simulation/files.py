@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy.typing as npt
 from rasterio.io import MemoryFile
 
 from ..geometry.models import DEGREE, TERRAIN
-from ..rasters.atomic import Outputs, write_json, writing
+from ..rasters.atomic import Outputs, make_folder, write_csv, write_json, writing
 from ..rasters.grid import Grid
 from ..runs import RUN_TAG, run_tags
 from ..sensor.rpc import RPC
@@ -65,8 +64,7 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
     paths = {key: Path(folder) / name for key, name in NAMES.items()}
     if not pair.options.terrain_error_m:
         del paths["input_dem"]
-    with writing(folder):
-        Path(folder).mkdir(parents=True, exist_ok=True)
+    make_folder(Path(folder))
     optical, sar = [band.capitalize() for band in pair.options.optical.bands], ["Amplitude"]
     reference, input = (optical, sar) if pair.options.input == SAR else (sar, optical)
     with Outputs() as outputs, writing(folder):
@@ -175,7 +173,5 @@ def _roof_points(pair: SimulatedPair) -> FloatArray:
 
 def write_table(path: Path, columns: Sequence[str], table: FloatArray) -> None:
     """Write a table as CSV, with six decimals."""
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(columns)
-        writer.writerows([[f"{value:.6f}" for value in row] for row in table])
+    texts = ([f"{value:.6f}" for value in row] for row in table)
+    write_csv(path, columns, (dict(zip(columns, row, strict=True)) for row in texts))

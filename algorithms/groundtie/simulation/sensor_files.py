@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..rasters.atomic import Outputs, write_json, writing
+from ..rasters.atomic import Outputs, make_folder, write_json, writing
 from ..rasters.grid import PIXEL_COORDINATES, Grid
 from ..sensor.rpc_files import write_rpc
 from .files import write_raster, write_table
@@ -51,8 +51,7 @@ def write_sensor_image(made: SensorImage, folder: str | Path) -> dict[str, Path]
         A file cannot be written.
     """
     paths = {key: Path(folder) / name for key, name in NAMES.items()}
-    with writing(folder):
-        Path(folder).mkdir(parents=True, exist_ok=True)
+    make_folder(Path(folder))
     bands = [band.capitalize() for band in made.options.optical.bands]
     own = Grid(PIXEL_COORDINATES, None, made.image.shape[2], made.image.shape[1])
     with Outputs() as outputs, writing(folder):

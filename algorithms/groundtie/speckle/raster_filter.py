@@ -99,12 +99,9 @@ class RasterFilter:
         if source.is_complex:
             return filtered
         # Without a nodata value, an invalid pixel keeps its value.
-        fill = values if source.bands[band - 1].nodata is None else _fill(source, band)
+        nodata = source.bands[band - 1].nodata
+        fill = values if nodata is None else fill_value(source, nodata, band)
         return np.where(valid, filtered.astype(dtype), fill)
-
-
-def _fill(source: RasterSource, band: int) -> Any:
-    return fill_value(source, source.bands[band - 1].nodata, band)
 
 
 def _as_amplitudes(source: RasterSource) -> RasterSource:

@@ -10,6 +10,7 @@ from ..geometry.models import PARAMETERS
 
 FloatArray = NDArray[np.float64]
 
+# Largest residual in standard deviations of all residuals.
 _SIGMAS = 2.0
 
 # Smaller residuals are rounding.
@@ -17,7 +18,7 @@ _ROUNDING_PX = 1e-6
 
 
 def filter_matches(
-    px: FloatArray, partner_px: FloatArray, kind: str = "affine", sigmas: float = _SIGMAS
+    px: FloatArray, partner_px: FloatArray, kind: str = "affine"
 ) -> NDArray[np.bool_]:
     """Return which matches remain when the worst is dropped until none is far off.
 
@@ -31,8 +32,6 @@ def filter_matches(
         Positions that belong together, shape (n, 2).
     kind
         One of `models.KINDS`.
-    sigmas
-        Largest residual in standard deviations of all residuals.
 
     Returns
     -------
@@ -45,7 +44,7 @@ def filter_matches(
         residuals = np.hypot(*(partner_px - model(px)).T)
         spread = np.sqrt(np.mean(residuals[kept] ** 2))
         worst = int(np.argmax(np.where(kept, residuals, -1.0)))
-        if residuals[worst] <= max(sigmas * spread, _ROUNDING_PX):
+        if residuals[worst] <= max(_SIGMAS * spread, _ROUNDING_PX):
             return kept
         kept[worst] = False
     return np.zeros(len(px), bool)

@@ -26,8 +26,11 @@ from ..similarity.surface import SimilaritySettings, Surface, normalise
 from .phase_correlation import gaussian_peak, remaining_shift, shifts_at, whitened
 from .polar import ANGLE_STEP_DEG, ANGLES, evened, half_turns, log_power
 from .spectral_windows import (
+    CORRECTIONS,
+    RETURNED,
     SAME_DEG,
     SAME_LOG_SCALE,
+    WORTH_ALIGNING,
     Image,
     Shared,
     aligned,
@@ -62,13 +65,7 @@ _SAME = np.ones(
     [2 * round(n) + 1 for n in (SAME_DEG / ANGLE_STEP_DEG, SAME_LOG_SCALE / _LOG_STEP)], bool
 )
 
-# How many candidates are aligned and returned at most, and which share of the best one's height
-# they have at least.
-RETURNED = 2
-WORTH_ALIGNING = 0.5
-
-# How often, and how far, rotation and scale are corrected on what both windows show.
-_CORRECTIONS = 2
+# How far rotation and scale are corrected on what both windows show.
 _CORRECTION = SearchLimits(0.0, 2.0, (0.95, 1.05))
 
 
@@ -206,7 +203,7 @@ def fourier_mellin(
     found = try_poses(reference, input, tried, limits, settings)[:RETURNED]
 
     def align(one: PoseFound) -> PoseFound:
-        steps = [partial(remaining_pose, settings=settings)] * _CORRECTIONS
+        steps = [partial(remaining_pose, settings=settings)] * CORRECTIONS
         shift = partial(remaining_shift, settings=settings)
         return aligned(reference, input, one, limits, *steps, shift)
 

@@ -28,7 +28,10 @@ from ..similarity.surface import SimilaritySettings, normalise
 from .phase_correlation import CORRECTION_PX, gaussian_peak, whitened
 from .polar import ANGLE_STEP_DEG, ANGLES, evened, half_turns, log_power
 from .spectral_windows import (
+    CORRECTIONS,
+    RETURNED,
     SAME_DEG,
+    WORTH_ALIGNING,
     Field,
     Image,
     Shared,
@@ -57,13 +60,7 @@ _SHIFT_BAND = 0.2
 CANDIDATES = 5
 _SAME = np.ones(2 * round(SAME_DEG / ANGLE_STEP_DEG) + 1, bool)
 
-# How many candidates are aligned and returned at most, and which share of the best one's height
-# they have at least.
-RETURNED = 2
-WORTH_ALIGNING = 0.5
-
-# How often, and how far, the rotation is corrected on what both windows show.
-_CORRECTIONS = 2
+# How far the rotation is corrected on what both windows show.
 _CORRECTION = SearchLimits(0.0, 2.0)
 
 
@@ -215,7 +212,7 @@ def radon(
     ]
 
     def align(one: PoseFound) -> PoseFound:
-        steps = [partial(remaining_pose, settings=settings)] * _CORRECTIONS
+        steps = [partial(remaining_pose, settings=settings)] * CORRECTIONS
         shift = partial(remaining_shift, settings=settings)
         one = aligned(reference, input, one, own, *steps, shift)
         right, down = (scale * shift for shift in one.pose.shift_px)

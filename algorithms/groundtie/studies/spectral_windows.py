@@ -33,6 +33,14 @@ SAME_DEG = 3.0
 SAME_LOG_SCALE = 0.05
 SAME_PX = 6.0
 
+# How many candidates are aligned and returned at most, and which share of the best one's height
+# they have at least.
+RETURNED = 2
+WORTH_ALIGNING = 0.5
+
+# How often rotation and scale are corrected on what both windows show.
+CORRECTIONS = 2
+
 # A resampled pixel counts if the weights of all pixels it is made of sum up to this.
 _ALL_VALID = 0.999
 

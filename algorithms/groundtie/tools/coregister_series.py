@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Annotated, Any
 
 from ..declaration import Output, tool
-from ..kinds import Choice, FolderOut, MaskIn, Number, RasterIn, RastersIn, Text
+from ..kinds import Choice, FolderOut, Number, RasterIn, RastersIn, Text
 from ..matching.alignment import LINEAR_CANDIDATES
 from ..matching.surface_fit import AUTO
 from ..progress import SILENT, Progress
@@ -83,10 +83,7 @@ def coregister_series(
             advanced=True,
         ),
     ] = None,
-    reference_mask: Annotated[
-        Path | None,
-        MaskIn(label="Mask of the reference", help=registration.MASK_HELP, advanced=True),
-    ] = None,
+    reference_mask: registration.ReferenceMask = None,
     reference_mask_values: registration.ReferenceMaskValues = None,
     matching_pixel_size: general.MatchingPixelSize = None,
     output_grid: registration.OutputGrid = "reference",

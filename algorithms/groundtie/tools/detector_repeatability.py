@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from ..errors import ParameterError
 from ..geometry.transform import Transform, load_transform
 from ..kinds import Choice, FileIn, FileOut, Number, Text
 from ..progress import SILENT, Progress
-from ..rasters.atomic import Outputs, write_json, writing
+from ..rasters.atomic import Outputs, write_csv, write_json
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import bounded_cache
@@ -188,8 +187,9 @@ def detector_repeatability(
         tuple(evaluations), {name: str(path) for name, path in files.items() if path is not None}
     )
     progress.update(0.9, "writing")
+    rows = [_row(one) for one in evaluations]
     with Outputs() as outputs:
-        write_table(outputs.stage(output), evaluations)
+        write_csv(outputs.stage(output), rows[0], rows)
         if picture is not None:
             draw_evaluations(outputs.stage(picture), evaluations)
         if numbers is not None:
@@ -211,15 +211,6 @@ def _both_valid(reference: Patch, input: Patch) -> tuple[Patch, Patch]:
     """Return two patches without what one shows alone: features there cannot repeat."""
     both = reference.valid & input.valid
     return Patch(reference.values, both), Patch(input.values, both)
-
-
-def write_table(path: Path, evaluations: Sequence[Evaluation]) -> None:
-    """Write evaluations as a CSV file, a row each."""
-    with writing(path), path.open("w", newline="", encoding="utf-8") as file:
-        rows = [_row(one) for one in evaluations]
-        table = csv.DictWriter(file, rows[0])
-        table.writeheader()
-        table.writerows(rows)
 
 
 def _row(one: Evaluation) -> dict[str, Any]:

@@ -226,7 +226,8 @@ def estimate_rotation(
         if verdict.accepted and pose is not None:
             files = {"transform": transform, "picture": picture}
             result = _result(windows, pose, (verdict, evidence), search, files)
-            _write_transform(outputs, transform, result.transform)
+            if transform is not None:
+                write_json(outputs.stage(transform), result.transform.to_json())
             return result
     raise NotRegisteredError(
         f"no rotation of {input} against {reference} was found: {verdict.sentence()}", verdict
@@ -259,8 +260,3 @@ def _result(
         search,
         {name: str(path) for name, path in files.items() if path is not None},
     )
-
-
-def _write_transform(outputs: Outputs, path: Path | None, transform: Transform) -> None:
-    if path is not None:
-        write_json(outputs.stage(path), transform.to_json())

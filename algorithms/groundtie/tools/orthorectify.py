@@ -18,7 +18,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.grid import require_map
 from ..rasters.reading import bounded_cache, open_raster
-from ..registration.orthorectification import Orthorectification
+from ..registration.orthorectification import write_orthoimage
 from ..registration.sensor_input import Ground, open_sensor_image, utm_of
 from .parameters import general, sensor
 from .written_raster import SIZE_OUTPUTS, WrittenRaster, like_reference, pixel_size_of_result
@@ -98,9 +98,10 @@ def orthorectify(
         orientation = ground.orientation(source, model, map_crs, stack)
         heights = ground.note(model, orientation.known_share)
         context.update(0.0, heights)
-        ortho = Orthorectification(source, orientation, grid, pixel_size)
-        outputs = stack.enter_context(Outputs())
-        target = ortho.write(output, outputs, context, resampling)
+        staged = stack.enter_context(Outputs()).stage(output)
+        target = write_orthoimage(
+            source, orientation, staged, context, grid, pixel_size, resampling
+        )
     return OrthoResult(output, target, heights)
 
 

@@ -8,14 +8,14 @@ from typing import Annotated, Any
 
 from ..context import threads
 from ..declaration import tool
-from ..errors import GeoreferencingError, ParameterError
+from ..errors import ParameterError
 from ..geometry.models import KINDS
 from ..geometry.transform import Transform
 from ..kinds import Choice, FileIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import Grid, reproject, require_both_or_none
 from ..rasters.reading import bounded_cache, open_raster
 from ..rasters.target_grids import covering_grid, registered_grid
 from ..rasters.vrt import SUFFIX as VRT
@@ -119,8 +119,7 @@ def _target_grid(found: Transform, reference: Path | None, pixel_size: float | N
         return registered_grid(found.input_grid, found.inverse, found.crs, pixel_size)
     with open_raster(reference) as source:
         grid = source.grid
-    if (grid.crs is None) != (found.crs is None):
-        raise GeoreferencingError(f"only one of {reference} and the transform has a CRS")
+    require_both_or_none(grid.crs, found.crs, f"{reference} and the transform")
     footprint = reproject(found.inverse(found.input_grid.outline()), found.crs, grid.crs)
     covering_grid(grid, footprint, within=True)
     return grid
