@@ -55,7 +55,7 @@ _LEAST_RATIO, _LEAST_SHARE = 2.0, 0.03
 # the other's are so many times as many as from there to the second. Edges of one ground are blurred
 # by noise, light and physics. Suite sharpness.
 _SHARP_PX, _BLURRED_PX = 0.25, 0.5
-LEAST_SHARPNESS = 2.5
+LEAST_SHARPNESS = 2.0
 
 # The same of the area that varies alike: where holes or waters of one shape are cut into noise,
 # few gradients are the same. Different sensors' views: up to 17 %.
@@ -78,7 +78,7 @@ _COPY_SHARE = 0.75
 _LATTICE = 9
 
 # Around an edge, chips see it this far off.
-_EDGE_SURROUNDINGS_PX = 7
+_EDGE_SURROUNDINGS_PX = 9
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,12 @@ class Sameness:
     def is_evident(self) -> bool:
         """Whether more is the same than two views show of one ground."""
         is_more = self.gradients >= max(_LEAST_RATIO * self.chance, _LEAST_SHARE)
-        return is_more or self.sharpness >= LEAST_SHARPNESS or self.area >= _LEAST_AREA
+        return is_more or self.has_sharp_edges or self.area >= _LEAST_AREA
+
+    @property
+    def has_sharp_edges(self) -> bool:
+        """Whether edges coincide more sharply than those of one ground."""
+        return self.sharpness >= LEAST_SHARPNESS
 
     @property
     def is_explained(self) -> bool:
@@ -156,8 +161,9 @@ class LockedContent:
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
 
-        What is drawn ends somewhere in the windows that vary alike: all of them is taken, and what
-        is around edges, unless the surroundings are one sensor's views of the ground.
+        What is drawn ends somewhere in the windows that vary alike: all of them is taken, unless
+        the surroundings are one sensor's views of the ground, and what is around edges if they
+        are evident.
         """
         reach = 2 * REACH_PX
         size = piece.width + 2 * reach, piece.height + 2 * reach
@@ -165,9 +171,11 @@ class LockedContent:
         patches = _patches(self.pair, around, self.offset_px)
         same = same_windows(*patches)
         if not self.sameness.is_explained:
-            one, other = (Edges.of(patch) for patch in patches)
-            drawn = edges_apart_px(one, other, both_strong=False) <= _BLURRED_PX
-            same = covered(same, WINDOW_PX) | covered(drawn, _EDGE_SURROUNDINGS_PX)
+            same = covered(same, WINDOW_PX)
+            if self.sameness.has_sharp_edges:
+                one, other = (Edges.of(patch) for patch in patches)
+                drawn = edges_apart_px(one, other, both_strong=False) <= _BLURRED_PX
+                same |= covered(drawn, _EDGE_SURROUNDINGS_PX)
         return same[reach:-reach, reach:-reach]
 
     @property
