@@ -55,7 +55,7 @@ _LEAST_RATIO, _LEAST_SHARE = 2.0, 0.03
 # the other's are so many times as many as from there to the second. Edges of one ground are blurred
 # by noise, light and physics. Suite sharpness.
 _SHARP_PX, _BLURRED_PX = 0.25, 0.5
-LEAST_SHARPNESS = 2.0
+LEAST_SHARPNESS = 2.2
 
 # The same of the area that varies alike: where holes or waters of one shape are cut into noise,
 # few gradients are the same. Different sensors' views: up to 17 %.
