@@ -17,6 +17,9 @@ from groundtie.cli import main
 from groundtie.errors import ParameterError
 from groundtie.rasters.reading import bounded_cache
 
+PACKAGE = Path(__file__).resolve().parents[1] / "algorithms"
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(PACKAGE)}
+
 GOOD = ["toy", "a.tif", "b.tif", "c.tif", "--size", "3"]
 
 
@@ -93,6 +96,7 @@ wait.wait()
 def test_threads_set_heaps(shared: bool) -> None:
     done = subprocess.run(
         [sys.executable, "-c", HEAPS.format(shared=shared)],
+        env=ENVIRONMENT,
         text=True,
         capture_output=True,
         check=True,
@@ -122,7 +126,7 @@ def test_a_dask_worker_does_not_give_back_each_array(is_worker: bool) -> None:
     """Dask's own setting costs a page fault for each 4 kB of each array of 1 MB."""
     done = subprocess.run(
         [sys.executable, "-c", FAULTS.format(is_worker=is_worker)],
-        env={**os.environ, "MALLOC_TRIM_THRESHOLD_": "65536"},
+        env={**ENVIRONMENT, "MALLOC_TRIM_THRESHOLD_": "65536"},
         text=True,
         capture_output=True,
         check=True,
