@@ -20,13 +20,16 @@ MARGIN = 20
 SHIFT = np.array([4, -3])
 
 
-def pair(seed: int = 0) -> tuple[Any, Any]:
-    """Return a texture and its noisy negative, which lies SHIFT further on, as arrays."""
+def pair(seed: int = 0, noise: float = 0.2) -> tuple[Any, Any]:
+    """Return a texture and its noisy negative, which lies SHIFT further on, as arrays.
+
+    With little noise, its edges coincide as sharply as those of what is drawn into both.
+    """
     scene = texture(SIZE + 2 * MARGIN, SIZE + 2 * MARGIN, seed)
     left, top = MARGIN - SHIFT
-    noise = np.random.default_rng(seed + 9).normal(0, 0.2, (SIZE, SIZE))
+    noisy = np.random.default_rng(seed + 9).normal(0, noise, (SIZE, SIZE))
     reference = scene[MARGIN : MARGIN + SIZE, MARGIN : MARGIN + SIZE]
-    return reference, -scene[top : top + SIZE, left : left + SIZE] + noise
+    return reference, -scene[top : top + SIZE, left : left + SIZE] + noisy
 
 
 class TestSurface:
@@ -101,7 +104,7 @@ class TestFromImagesToVerdict:
 
     @pytest.mark.slow
     def test_arrays_in_pixel_coordinates(self) -> None:
-        reference, input = pair()
+        reference, input = pair(noise=0.8)
         points = steps.match_chips(reference, input)
         assert not points.is_check.any()
         fit = steps.fit_model("affine", points.reference_xy, points.input_px)
@@ -134,7 +137,7 @@ class TestFromImagesToVerdict:
     @pytest.mark.slow
     def test_rasters_on_the_map(self) -> None:
         grid = utm_grid(SIZE, SIZE)
-        reference, input = (Raster(image, grid.transform, UTM) for image in pair())
+        reference, input = (Raster(image, grid.transform, UTM) for image in pair(noise=0.8))
         points = steps.match_chips(reference, input)
         nominal = Transform.nominal(UTM, grid)
         nominal_xy = nominal.nominal_xy(points.input_px)
