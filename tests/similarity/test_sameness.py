@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import pytest
 from scipy.special import erf
@@ -88,17 +87,27 @@ def test_edges_at_right_angles_are_no_pair() -> None:
     assert not np.isfinite(edges_apart_px(one, other)).any()
 
 
-def test_weak_edges_pair_with_strong_ones_alone_and_only_if_asked_for() -> None:
-    """A copy: each edge lies on itself, if it is a strong one, though beside weaker ones."""
-    values = texture(90, 90) + 0.1 * np.random.default_rng(5).normal(size=(90, 90))
-    edges = Edges.of(patch(values))
-    assert 0 < edges.strong.sum() < edges.found.sum()
-    both, one = (np.isfinite(edges_apart_px(edges, edges, which)) for which in (True, False))
-    np.testing.assert_array_equal(both, edges.strong)
-    beside_weaker = one & ~edges.strong
-    assert one[edges.strong].all() and not one[~edges.found].any()
-    near_strong = cv2.dilate(edges.strong.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    assert near_strong[beside_weaker].all()
+@pytest.mark.parametrize("shift", [(0, 0), (7, 0), (-4, 9)])
+def test_a_copy_moved_by_whole_pixels_coincides_at_that_shift_alone(
+    shift: tuple[int, int],
+) -> None:
+    values = texture(120, 120)
+    one = Edges.of(patch(values)).inner(25)
+    other = Edges.of(patch(np.roll(values, (shift[1], shift[0]), (0, 1))))
+    apart = edges_apart_px(one, other, np.array([shift, (shift[0] + 5, shift[1] - 3)]))
+    assert apart.shape == (2, one.found.sum())
+    # What comes in at the rim changes which of the faintest are edges.
+    assert (apart[0] < 1e-3).mean() > 0.95
+    assert (apart[1] < 0.25).mean() < 0.2
+
+
+def test_the_strongest_edges_are_some_of_all_and_inner_ones_far_from_the_rim() -> None:
+    edges = Edges.of(patch(texture(90, 90)))
+    strongest = edges.strongest
+    assert 0 < strongest.found.sum() < edges.found.sum()
+    np.testing.assert_array_equal(strongest.found, edges.strong)
+    rows, cols = np.nonzero(edges.inner(20).found)
+    assert min(rows.min(), cols.min()) == 20 and max(rows.max(), cols.max()) == 69
 
 
 def test_invalid_pixels_hold_no_edges() -> None:

@@ -18,6 +18,7 @@ from ..geometry.transform import Transform
 from ..rasters.grid import Grid, reproject
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
+from ..rasters.reading import Mask
 from ..similarity.sameness import (
     REACH_PX,
     WINDOW_PX,
@@ -51,9 +52,9 @@ _FIRST_TURN_PX, _GOLDEN_ANGLE = 7.0, np.pi * (3 - np.sqrt(5))
 # as many as by chance; 3.5 to 28 % of one sensor's. With content drawn into both: 3 to 43 %.
 _LEAST_RATIO, _LEAST_SHARE = 2.0, 0.03
 
-# What is drawn has its edges at one fraction of a pixel, in whatever colours: within the first of
-# the other's are so many times as many as from there to the second. Edges of one ground are blurred
-# by noise, light and physics. Suite sharpness.
+# What is drawn has its edges at one fraction of a pixel, in whatever colours: beyond chance, within
+# the first of the other's are so many times as many as from there to the second. Edges of one
+# ground are blurred by noise, light and physics. Suite sharpness.
 _SHARP_PX, _BLURRED_PX = 0.25, 0.5
 LEAST_SHARPNESS = 2.2
 
@@ -91,7 +92,8 @@ class Sameness:
         Share of the strong gradients that are the same there, and at other offsets.
     sharpness
         How many times as many edges coincide there within a quarter of a pixel as between a
-        quarter and a half, at least, but by chance with 5 %.
+        quarter and a half, each beyond those at other offsets; at least, as far as the latter are
+        known, but by chance with 5 %.
     area, reduced_area
         Share of the area that varies alike, in the images and in reduced ones.
     ground
@@ -173,9 +175,7 @@ class LockedContent:
         if not self.sameness.is_explained:
             same = covered(same, WINDOW_PX)
             if self.sameness.has_sharp_edges:
-                one, other = (Edges.of(patch) for patch in patches)
-                drawn = edges_apart_px(one, other, both_strong=False) <= _BLURRED_PX
-                same |= covered(drawn, _EDGE_SURROUNDINGS_PX)
+                same |= covered(_drawn(*patches), _EDGE_SURROUNDINGS_PX)
         return same[reach:-reach, reach:-reach]
 
     @property
@@ -238,10 +238,18 @@ def _sameness(looks: list[_Look]) -> Sameness:
     every = sum(one.counts[1][1] for one in looks)
     ground = _share([one.counts[2] for one in looks], int(_LEAST_LEFT * every))
     chance = float(np.median(same[1:]))
-    sharp, blurred = np.sum([one.edges for one in looks], axis=0) if looks else (0, 0)
-    sharpness = float(sharp / (blurred + _STANDARD_ERRORS * np.sqrt(blurred + 1)))
+    sharpness = _sharpness(np.sum([one.edges for one in looks], axis=0)) if looks else 0.0
     windows = every / WINDOW_PX**2
     return Sameness(same[0], chance, sharpness, area, reduced_area, ground, windows)
+
+
+def _sharpness(counts: FloatArray) -> float:
+    """Return `Sameness.sharpness` of counts of edges, (sharp, less so) at each of `_offsets`."""
+    chance = counts[1:].mean(axis=0)
+    sharp, blurred = counts[0] - chance
+    # Of counts, which vary as much as they are many.
+    error = np.sqrt(counts[0, 1] + chance[1] / _CHANCE_OFFSETS + 1)
+    return float(sharp / (max(blurred, 0.0) + _STANDARD_ERRORS * error))
 
 
 _Count = tuple[int, int]
@@ -251,11 +259,11 @@ _Count = tuple[int, int]
 class _Look:
     """What one window shows: gradients, edges, and (same, all) pixels as `LockedContent` has them.
 
-    Of the input also what is around it.
+    Of the input also what is around it. Edges are counted at each of `_offsets`, shape (k, 2).
     """
 
     gradients: tuple[Gradients, Gradients]
-    edges: _Count
+    edges: NDArray[np.int_]
     counts: tuple[_Count, _Count, _Count]
 
     @classmethod
@@ -278,12 +286,21 @@ class _Look:
         return count_same(reference, input.part(col, row, reference.x.shape), strong)
 
 
-def _count_edges(reference: Patch, input: Patch) -> _Count:
-    """Return how many edges coincide sharply, and how many less so."""
-    apart = edges_apart_px(Edges.of(reference), Edges.of(input))[_REACH_PX:-_REACH_PX]
-    apart = apart[:, _REACH_PX:-_REACH_PX]
-    sharp = int((apart < _SHARP_PX).sum())
-    return sharp, int((apart < _BLURRED_PX).sum()) - sharp
+def _count_edges(reference: Patch, input: Patch) -> NDArray[np.int_]:
+    """Return how many strong edges coincide sharply, and less so, at each of `_offsets`, (k, 2)."""
+    one, other = (Edges.of(patch).strongest for patch in (reference, input))
+    apart = edges_apart_px(one.inner(_REACH_PX), other, _offsets())
+    sharp = (apart < _SHARP_PX).sum(axis=1)
+    return np.column_stack([sharp, (apart < _BLURRED_PX).sum(axis=1) - sharp])
+
+
+def _drawn(reference: Patch, input: Patch) -> Mask:
+    """Return where edges coincide of which one at least is strong, shape (h, w)."""
+    one, other = Edges.of(reference), Edges.of(input)
+    drawn = np.zeros_like(one.found)
+    for edges, others in ((one, other.strongest), (one.strongest, other)):
+        drawn[edges.found] |= edges_apart_px(edges, others)[0] <= _BLURRED_PX
+    return drawn
 
 
 def _count_reduced(reference: Patch, input: Patch) -> _Count:

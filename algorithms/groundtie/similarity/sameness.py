@@ -7,7 +7,6 @@ the phase of the pixels differ. What is drawn into both arrays is the same.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import cv2
 import numpy as np
@@ -34,6 +33,10 @@ _EDGE_RIM_PX = 9
 # Edges are parallel within 20°, and side by side within this.
 _PARALLEL_COSINE = float(np.cos(np.deg2rad(20)))
 _ALONG_PX = 0.5
+
+# Where the nearest edge may be, and no shift, (x, y).
+_NEIGHBOURS = np.array([(x, y) for y in (-1, 0, 1) for x in (-1, 0, 1)])
+_NONE = np.zeros((1, 2), int)
 
 # Means of a reduced image need this share of their pixels.
 _LEAST_VALID = 0.25
@@ -140,39 +143,50 @@ class Edges:
         is_strong = found & (height > strong)
         return cls(np.asarray(found), np.asarray(is_strong), x, y, np.asarray(offset, np.float32))
 
-    def moved(self, col: int, row: int) -> Edges:
-        """Return what lies so many columns and rows further; what leaves comes in at the rim."""
+    @property
+    def strongest(self) -> Edges:
+        """The strong ones alone."""
+        return replace(self, found=self.strong)
 
-        def rolled(of: NDArray[Any]) -> NDArray[Any]:
-            return np.roll(of, (-row, -col), (0, 1))
-
-        return Edges(
-            rolled(self.found),
-            rolled(self.strong),
-            rolled(self.x),
-            rolled(self.y),
-            rolled(self.offset),
-        )
+    def inner(self, rim_px: int) -> Edges:
+        """Return those that are farther from the rim of the patch."""
+        kept = np.zeros_like(self.found)
+        kept[rim_px:-rim_px, rim_px:-rim_px] = self.found[rim_px:-rim_px, rim_px:-rim_px]
+        return replace(self, found=kept, strong=self.strong & kept)
 
 
-def edges_apart_px(one: Edges, other: Edges, both_strong: bool = True) -> FloatImage:
-    """Return how far each edge is from the nearest parallel one of another image, shape (h, w).
+def edges_apart_px(one: Edges, other: Edges, shifts: NDArray[np.int_] = _NONE) -> FloatImage:
+    """Return how far edges are from the nearest parallel ones of another image.
 
-    Infinite where there is no edge, or none within a pixel or so. Both are strong ones, or one is.
+    Parameters
+    ----------
+    one
+        The edges, n of them.
+    other
+        Those of the other image, of the same shape.
+    shifts
+        How many columns and rows (x, y) further on the other image is looked at, shape (k, 2).
+
+    Returns
+    -------
+    Shape (k, n), in the order of `np.nonzero(one.found)`, in pixels across the edges; infinite
+    where there is none within a pixel or so.
     """
-    apart = np.full(one.found.shape, np.inf, np.float32)
-    for row in (-1, 0, 1):
-        for col in (-1, 0, 1):
-            near = other.moved(col, row)
-            x = col + near.offset * near.x - one.offset * one.x
-            y = row + near.offset * near.y - one.offset * one.y
-            is_parallel = np.abs(one.x * near.x + one.y * near.y) >= _PARALLEL_COSINE
-            is_beside = np.abs(x * one.y - y * one.x) <= _ALONG_PX
-            are_strong = one.strong & near.strong if both_strong else one.strong | near.strong
-            is_pair = one.found & near.found & are_strong & is_parallel & is_beside
-            across = np.abs(x * one.x + y * one.y)
-            apart = np.where(is_pair, np.minimum(apart, across), apart)
-    return np.asarray(apart, np.float32)
+    rows, cols = np.nonzero(one.found)
+    # All shifts, neighbours and edges at once, (k, 9, n).
+    neighbours = _NEIGHBOURS[None, :, :, None]
+    at = neighbours + shifts[:, None, :, None]
+    height, width = one.found.shape
+    near = np.clip(rows + at[:, :, 1], 0, height - 1), np.clip(cols + at[:, :, 0], 0, width - 1)
+    x, y, offset = one.x[rows, cols], one.y[rows, cols], one.offset[rows, cols]
+    other_x, other_y, other_offset = other.x[near], other.y[near], other.offset[near]
+    right = neighbours[:, :, 0] + other_offset * other_x - offset * x
+    down = neighbours[:, :, 1] + other_offset * other_y - offset * y
+    is_parallel = np.abs(x * other_x + y * other_y) >= _PARALLEL_COSINE
+    is_beside = np.abs(right * y - down * x) <= _ALONG_PX
+    is_pair = other.found[near] & is_parallel & is_beside
+    across = np.where(is_pair, np.abs(right * x + down * y), np.inf)
+    return np.asarray(across.min(axis=1), np.float32)
 
 
 def covered(middles: Mask, side_px: int) -> Mask:
