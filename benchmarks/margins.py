@@ -23,9 +23,11 @@ from groundtie.registration.rules.survey import (
     BEYOND_DEVIATIONS,
     GHOST_HEIGHT,
     RIVAL_HEIGHT,
+    WEAK_COPY_HEIGHT,
     WEAK_HEIGHT,
     WEAK_REST_HEIGHT,
     deviations_elsewhere,
+    is_enough,
 )
 from groundtie.registration.specification import COREGISTER
 
@@ -74,6 +76,13 @@ def _rest_height(evidence: RegistrationEvidence) -> float:
     return math.nan if rest is None or rest.is_explained else rest.survey.height
 
 
+def _copy_height(evidence: RegistrationEvidence) -> float:
+    rest = evidence.rest
+    if rest is None or not rest.is_explained or not is_enough(rest.survey, rest):
+        return math.nan
+    return rest.survey.height
+
+
 def _in_bands(evidence: RegistrationEvidence) -> float:
     return max((one.survey.excess for one in evidence.bands), default=math.nan)
 
@@ -91,6 +100,7 @@ STATISTICS = (
     Statistic("second place: ghost", GHOST_HEIGHT, _of_survey("ghost_height")),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),
     Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),
+    Statistic("pixel-locked content: height of copies", WEAK_COPY_HEIGHT, _copy_height, False),
     Statistic("pixel-locked content: copies", BEYOND_DEVIATIONS, _elsewhere),
     Statistic("band elsewhere: excess", LEAST_EXCESS, _in_bands),
 )

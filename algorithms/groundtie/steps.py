@@ -235,7 +235,7 @@ def judge(
             without_blocks = fit_without_blocks(model.kind, px, nominal_px, np.ones(len(px)))
             estimate = Estimate(transform, points, without_blocks)
             check = stages.check(estimate, running)
-            surveys = stages.survey(estimate, running)
+            surveys = stages.survey(estimate, scene, running)
         except TooFewPointsError as error:
             return judge_search(SearchEvidence(error))
         return judge_evidence(stages.evidence(estimate, check, surveys, scene))

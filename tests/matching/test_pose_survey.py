@@ -29,7 +29,7 @@ def surveyed(folder: Path, pose: Pose, context: Context, **more: int) -> PoseSur
             images.append(Image(stack.enter_context(open_raster(path))))
         windows = read_windows(*images, (0.8, 1.25))
         pair = make_pair(*images, None, windows.radius_m, 180.0, 1.25)
-        return survey_pose(pair, windows.transform(pose), 0.02, context)
+        return survey_pose(pair, windows.transform(pose), 0.02, True, context)
 
 
 # How accurate a pose is to be, and what it may be wrong by.

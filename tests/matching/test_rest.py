@@ -38,6 +38,7 @@ def rest_of(
     input: np.ndarray,
     context: Context,
     offset: tuple[int, int] = (0, 0),
+    of_one_kind: bool = True,
 ) -> Rest | None:
     """Return what two arrays leave whose rows and columns are an offset apart."""
     paths = [
@@ -52,7 +53,8 @@ def rest_of(
         found = shift_on_map(10.0 * offset[0], -10.0 * offset[1])
         transform = Transform(found, pair.grid.crs, other.grid)
         matcher = ChipMatcher(pair, SimilaritySettings())
-        return survey_rest(matcher, transform, survey_places(pair.grid), ELSEWHERE_PX, context)
+        places = survey_places(pair.grid)
+        return survey_rest(matcher, transform, places, ELSEWHERE_PX, of_one_kind, context)
 
 
 @pytest.mark.parametrize("share", [0.35, 0.6])
@@ -78,3 +80,11 @@ def test_a_view_of_one_sensor_and_a_copy_show_nothing_elsewhere(
         rest = rest_of(tmp_path, reference, input, context)
         assert rest is not None and rest.is_explained and rest.beyond is not None
         assert deviations_elsewhere(rest) < BEYOND_DEVIATIONS
+
+
+def test_what_a_radar_and_a_camera_show_alike_is_no_view_of_one_sensor(
+    tmp_path: Path, context: Context
+) -> None:
+    views = noisy(place(), 1), noisy(place(), 2)
+    rest = rest_of(tmp_path, *views, context, of_one_kind=False)
+    assert rest is not None and not rest.is_explained and rest.beyond is None

@@ -171,11 +171,23 @@ def test_what_copies_leave_may_contradict(part: int, expected: list[str]) -> Non
 
 
 @pytest.mark.parametrize(
+    ("chips", "height", "is_refused"), [(49, 1.2, True), (49, 1.4, False), (120, 1.2, False)]
+)
+def test_many_chips_that_copies_leave_must_show_something(
+    chips: int, height: float, is_refused: bool
+) -> None:
+    """Beneath one cloud deck over two grounds they match nowhere; a plain copy leaves few."""
+    rest = Rest(survey(height=height, rival=0.2), True, None, chips)
+    found = evidence(GOOD, survey=survey(), rest=rest)
+    assert refusing(found) == ["pixel-locked content"] * is_refused
+
+
+@pytest.mark.parametrize(
     ("height", "rival", "noise", "is_refused"),
     [
-        (1.2, 2.0, 0.1, True),
+        (1.4, 2.2, 0.1, True),
         (2.6, 2.6, 0.1, False),
-        (1.2, 2.0, 6.0, False),
+        (1.4, 2.2, 6.0, False),
     ],
 )
 @pytest.mark.parametrize("is_beyond", [False, True])
@@ -194,13 +206,13 @@ def test_copies_must_not_leave_ground_elsewhere(
 
 @pytest.mark.parametrize(
     ("masked_rival", "beyond_rival", "is_refused"),
-    [(1.7, 0.9, False), (1.9, 0.9, True), (1.1, 1.0, True)],
+    [(2.0, 1.0, False), (2.2, 1.0, True), (1.2, 1.2, True)],
 )
 def test_what_is_not_explained_needs_no_higher_place_elsewhere(
     masked_rival: float, beyond_rival: float, is_refused: bool
 ) -> None:
     """Of a mask's rest, repetition alone leaves places about as high."""
-    left, beyond = (survey(height=1.2, rival=of) for of in (masked_rival, beyond_rival))
+    left, beyond = (survey(height=1.4, rival=of) for of in (masked_rival, beyond_rival))
     found = evidence(GOOD, survey=survey(), rest=Rest(left, True, beyond))
     assert refusing(found) == ["pixel-locked content"] * is_refused
 

@@ -153,12 +153,20 @@ class LockedContent:
     is_whole
         Whether the transform moves the array by whole pixels: what was resampled is no copy of
         pixels.
+    of_one_kind
+        Whether the images may be one sensor's: not a radar's and a camera's.
     """
 
     pair: ImagePair
     offset_px: tuple[int, int]
     sameness: Sameness
     is_whole: bool
+    of_one_kind: bool = True
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether the images are copies, or one sensor's views of one ground."""
+        return self.of_one_kind and self.sameness.is_explained
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
@@ -172,7 +180,7 @@ class LockedContent:
         around = piece.window(-reach, -reach, *size)
         patches = _patches(self.pair, around, self.offset_px)
         same = same_windows(*patches)
-        if not self.sameness.is_explained:
+        if not self.is_explained:
             same = covered(same, WINDOW_PX)
             if self.sameness.has_sharp_edges:
                 same |= covered(_drawn(*patches), _EDGE_SURROUNDINGS_PX)
@@ -191,7 +199,11 @@ class LockedContent:
 
 
 def find_locked_content(
-    pair: ImagePair, transform: Transform, places: Places, context: Context
+    pair: ImagePair,
+    transform: Transform,
+    places: Places,
+    context: Context,
+    of_one_kind: bool = True,
 ) -> LockedContent | None:
     """Return what the images repeat where a transform puts the input's array.
 
@@ -205,6 +217,8 @@ def find_locked_content(
         Where it is looked for.
     context
         Threads.
+    of_one_kind
+        See `LockedContent`.
 
     Returns
     -------
@@ -227,7 +241,7 @@ def find_locked_content(
 
     sameness = _sameness(list(context.map(look, list(places.centres))))
     is_whole = bool(np.abs(np.median(moved, axis=0) - offset).max() <= _WHOLE_PX)
-    return LockedContent(pair, found, sameness, is_whole)
+    return LockedContent(pair, found, sameness, is_whole, of_one_kind)
 
 
 def _sameness(looks: list[_Look]) -> Sameness:

@@ -72,7 +72,11 @@ class PoseSurvey:
 
 
 def survey_pose(
-    pair: ImagePair, transform: Transform, accuracy_share: float, context: Context
+    pair: ImagePair,
+    transform: Transform,
+    accuracy_share: float,
+    of_one_kind: bool,
+    context: Context,
 ) -> PoseSurvey:
     """Match chips all over a pair around a pose.
 
@@ -84,6 +88,8 @@ def survey_pose(
         The pose, as a transform between them.
     accuracy_share
         Its accuracy, as a share of the reference's longer side.
+    of_one_kind
+        See `LockedContent`.
     context
         Threads and progress.
     """
@@ -99,7 +105,7 @@ def survey_pose(
     elsewhere_px = max(accuracy_share * max(level.width, level.height), POSE_TOLERANCE_PX)
     survey = survey_model(matcher, model, quiet, None, places, elsewhere_px)
     moved = Transform(model, transform.crs, transform.input_grid)
-    rest = survey_rest(matcher, moved, places, elsewhere_px, quiet)
+    rest = survey_rest(matcher, moved, places, elsewhere_px, of_one_kind, quiet)
     bands = survey_bands(matcher, model, places, elsewhere_px, quiet)
     return PoseSurvey(residuals, survey, rest, moved, bands)
 

@@ -42,6 +42,7 @@ def survey_rest(
     transform: Transform,
     places: Places,
     elsewhere_px: float,
+    of_one_kind: bool,
     context: Context,
 ) -> Rest | None:
     """Return what chips show without content that is the same in both arrays; None: there is none.
@@ -56,23 +57,24 @@ def survey_rest(
         The chips.
     elsewhere_px
         See `Survey`.
+    of_one_kind
+        See `LockedContent`.
     context
         Threads and progress.
     """
-    pair = matcher.pair
-    locked = find_locked_content(pair, transform, survey_places(pair.grid), context.quiet())
+    pair, asked = matcher.pair, survey_places(matcher.pair.grid)
+    locked = find_locked_content(pair, transform, asked, context.quiet(), of_one_kind)
     if locked is None or not locked.sameness.is_evident:
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())
     survey = survey_model(fused, transform.model, context, locked, places, elsewhere_px)
-    if not locked.sameness.is_explained:
-        return Rest(survey)
-    if not locked.is_whole:
-        return Rest(survey, is_explained=True)
+    chips = len(places.centres)
+    if not (locked.is_explained and locked.is_whole):
+        return Rest(survey, locked.is_explained, None, chips)
     # A copy may be blended into other ground, of which the same windows are no part.
     left = replace(fused, left_of=unexplained)
     beyond = survey_model(
         left, locked.model, context, None, places, elsewhere_px, seeks_ghost=False
     )
-    return Rest(survey, is_explained=True, beyond=beyond, chips=len(places.centres))
+    return Rest(survey, True, beyond, chips)

@@ -99,7 +99,7 @@ def register(
         estimate = stages.fit.estimate(coarse, spec.model, context.part(0.4, 0.8))
         context.update(0.8, "checking with points that took no part")
         check = stages.check(estimate, context.part(0.8, 0.9))
-        surveys = stages.survey(estimate, context.part(0.9, 1.0))
+        surveys = stages.survey(estimate, scene, context.part(0.9, 1.0))
     except (NothingFoundError, TooFewPointsError) as error:
         return replace(result, verdict=judge_search(SearchEvidence(error)))
     evidence = stages.evidence(estimate, check, surveys, scene)
@@ -171,7 +171,7 @@ class Stages:
         model = estimate.transform.model
         return check_model(self.checker, self.held_out.layout, model, context)
 
-    def survey(self, estimate: Estimate, context: Context) -> Surveys:
+    def survey(self, estimate: Estimate, scene: SceneInfo, context: Context) -> Surveys:
         """Match chips all over the pair, with what its masks leave, around what was estimated.
 
         Returns what they show (None: it is not asked for), what they show without content that is
@@ -182,11 +182,11 @@ class Stages:
             return None, None, ()
         pair, transform = self.masked.pair, estimate.transform
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
-        places = survey_places(pair.grid)
+        places, kind = survey_places(pair.grid), scene.of_one_kind
         # No rule asks for ghosts where a mask leaves nothing but ground.
         ghosts, first = not self.masked.used.is_ground, context.part(0.0, 0.5)
         survey = survey_model(chips, transform.model, first, seeks_ghost=ghosts)
-        rest = survey_rest(chips, transform, places, ELSEWHERE_PX, context.part(0.5, 0.9))
+        rest = survey_rest(chips, transform, places, ELSEWHERE_PX, kind, context.part(0.5, 0.9))
         last = context.part(0.9, 1.0)
         return survey, rest, survey_bands(chips, transform.model, places, ELSEWHERE_PX, last)
 

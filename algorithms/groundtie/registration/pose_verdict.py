@@ -195,8 +195,10 @@ def confirm_pose(
     """
     scale = max(pose.scale, 1 / pose.scale)
     pair = make_pair(*images, None, windows.radius_m, 180.0, scale)
-    found = survey_pose(pair, windows.transform(pose), SAME_SHARE, context)
-    factor = CHIPS_MEAN_OVER_SCATTER if SceneInfo.of(pair).are_both_radar else None
+    scene = SceneInfo.of(pair)
+    transform = windows.transform(pose)
+    found = survey_pose(pair, transform, SAME_SHARE, scene.of_one_kind, context)
+    factor = CHIPS_MEAN_OVER_SCATTER if scene.are_both_radar else None
     evidence = PoseSurveyEvidence(found, factor)
     points = evidence.held_out
     verdict = replace(

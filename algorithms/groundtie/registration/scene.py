@@ -20,7 +20,7 @@ from ..rasters.patch import Patch
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import Window
 from ..sensor.orientation import SensorGrid
-from .specification import AUTO, NEITHER
+from .specification import AUTO, BOTH, NEITHER
 
 
 @dataclass(frozen=True)
@@ -141,6 +141,11 @@ class SceneInfo:
     def are_both_radar(self) -> bool:
         """Whether both images have the speckle of a radar's, or metadata that name one."""
         return all(one.is_known_radar or one.has_speckle for one in (self.reference, self.input))
+
+    @property
+    def of_one_kind(self) -> bool:
+        """Whether the images may be one sensor's: not a radar's and a camera's."""
+        return self.declared in (BOTH, NEITHER) or not self.is_radar_and_camera
 
     @property
     def is_dense_town(self) -> bool:

@@ -25,10 +25,12 @@ WEAK_REST_HEIGHT = 2.5
 # mask leaves. Measured by the suites margins and attacks: right transforms with more than the
 # former are up to 1.3 times as high; beneath clouds and labels over ground that lies elsewhere,
 # from 1.7 times and 6.1 on; ground that shows through copies stands out by 8.4 and more.
-# Of plain copies, a few chips at most have anything left.
+# Nor may it show nothing where the transform has it: from 1.7 on where it is right, up to 0.9
+# beneath clouds and snow. Of plain copies, a few chips at most have anything left.
 BEYOND_DEVIATIONS = 5.0
 _MASKED_RIVAL = 1.5
 _LEAST_CHIPS = 0.5
+WEAK_COPY_HEIGHT = 1.3
 
 # A second place that the reference's own repetition does not explain, in robust standard deviations
 # of such surfaces. Measured on 18 shared pairs at their places: up to 5.5, at poses of the rotated
@@ -70,6 +72,11 @@ def _weak(evidence: RegistrationEvidence) -> str | None:
     )
 
 
+def is_enough(left: Survey, rest: Rest) -> bool:
+    """Return whether what is left is that of many chips."""
+    return len(left.surfaces) >= _LEAST_CHIPS * rest.chips
+
+
 def deviations_elsewhere(rest: Rest) -> float:
     """Return how far ground elsewhere stands out of what copies leave, in robust deviations.
 
@@ -80,7 +87,7 @@ def deviations_elsewhere(rest: Rest) -> float:
     shares = ((rest.survey, _MASKED_RIVAL), (rest.beyond, RIVAL_HEIGHT))
     return max(
         left.rival_deviations
-        if len(left.surfaces) >= _LEAST_CHIPS * rest.chips
+        if is_enough(left, rest)
         and left.height < WEAK_REST_HEIGHT
         and left.rival_height >= share * left.height
         else 0.0
@@ -95,7 +102,8 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
         return None
     survey = rest.survey
     if rest.is_explained:
-        is_unconfirmed = deviations_elsewhere(rest) >= BEYOND_DEVIATIONS
+        is_nothing = is_enough(survey, rest) and survey.height < WEAK_COPY_HEIGHT
+        is_unconfirmed = is_nothing or deviations_elsewhere(rest) >= BEYOND_DEVIATIONS
     else:
         is_unconfirmed = survey.height < WEAK_REST_HEIGHT or _has_rival(survey)
     if not (survey.parts or is_unconfirmed):
@@ -149,7 +157,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "both images have the same content at the same columns and rows, such as labels or clouds, "
         "and without it a part lies elsewhere, a second place matches about as "
         f"well, or the mean similarity is below {WEAK_REST_HEIGHT:g} standard deviations; of a "
-        "copy, or one sensor's views, where that is weak and a second place stands out by "
+        f"copy, or one sensor's views, below {WEAK_COPY_HEIGHT:g} if half of the chips have "
+        "anything left, or where that is weak and a second place stands out by "
         f"{BEYOND_DEVIATIONS:g}: {_MASKED_RIVAL:g} times as high in what is left, or "
         f"{RIVAL_HEIGHT:g} times in what the reference does not explain",
         "suites margins and attacks",
