@@ -1,11 +1,17 @@
-"""How sharply edges coincide: of ground at its place, and of what is drawn over other ground."""
+"""How sharply edges coincide: of ground at its place, and of what is drawn over other ground.
+
+Ground at its place is that of all scenes of the red team, and different bands of the shared series,
+of one date and of neighbouring ones: what cameras show of one ground in other colours.
+"""
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +20,12 @@ import numpy as np
 from groundtie.context import threads
 from groundtie.geometry.models import shift_model
 from groundtie.geometry.transform import Transform
-from groundtie.matching.locked import LEAST_SHARPNESS, Sameness, find_locked_content
+from groundtie.matching.locked import (
+    DRAWN_SHARPNESS,
+    LEAST_SHARPNESS,
+    Sameness,
+    find_locked_content,
+)
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
@@ -27,6 +38,7 @@ from .attacks.suite import sample
 from .suites import Goal, Settings, SuiteResult, Table, run_cases
 
 _QUICK, _SAMPLE = 4, 60
+BANDS_OF_ONE = "bands of one exposure"
 
 
 @dataclass(frozen=True)
@@ -72,16 +84,43 @@ class Case:
         """Make the pair and measure."""
         with tempfile.TemporaryDirectory() as folder:
             self.make().save(Path(folder))
-            return Measured(self.name, self.group, self.is_drawn, _sameness(Path(folder), workers))
+            images = Path(folder) / "r.tif", Path(folder) / "i.tif"
+            return Measured(self.name, self.group, self.is_drawn, _sameness(*images, workers))
 
 
-def _sameness(folder: Path, workers: int | None) -> Sameness:
+@dataclass(frozen=True)
+class Bands:
+    """Two bands of rasters on one grid, the first and the last one's."""
+
+    reference: Path
+    input: Path
+    band: int
+    other_band: int
+
+    def run(self, workers: int | None) -> Measured:
+        """Measure."""
+        group = BANDS_OF_ONE if self.reference == self.input else "bands, years apart"
+        name = f"{self.reference.stem} {self.band}, {self.input.stem} {self.other_band}"
+        with tempfile.TemporaryDirectory() as folder:
+            # A raster is not compared with itself.
+            images = self.reference, Path(shutil.copy(self.input, folder))
+            bands = self.band, self.other_band
+            return Measured(name, group, False, _sameness(*images, workers, *bands))
+
+
+def _sameness(
+    reference: Path,
+    input: Path,
+    workers: int | None,
+    band: int | None = None,
+    other_band: int | None = None,
+) -> Sameness:
     with (
-        open_raster(folder / "r.tif") as one,
-        open_raster(folder / "i.tif") as other,
+        open_raster(reference) as one,
+        open_raster(input) as other,
         threads(workers) as context,
     ):
-        pair = make_pair(Image(one), Image(other))
+        pair = make_pair(Image(one, band), Image(other, other_band))
         nowhere = Transform(shift_model(0.0, 0.0), pair.grid.crs, other.grid)
         locked = find_locked_content(pair, nowhere, survey_places(pair.grid), context)
     if locked is None:
@@ -89,14 +128,30 @@ def _sameness(folder: Path, workers: int | None) -> Sameness:
     return locked.sameness
 
 
+def bands_of_series(folder: Path) -> list[Bands]:
+    """Return bands of one exposure, and of neighbouring dates that lie on one grid."""
+    found = []
+    for dates in ("fields", "river"):
+        files = sorted((folder / "series" / dates).glob("*.tif"))
+        found += [Bands(file, file, band, 4) for file in files for band in (1, 3)]
+        if dates == "river":
+            neighbours = list(pairwise(files))
+            found += [Bands(one, other, band, 4) for one, other in neighbours for band in (1, 3)]
+    return found
+
+
 def run(settings: Settings) -> SuiteResult:
-    """Measure all scenes of the red team at their places, and `--sample` drawn ones."""
+    """Measure all ground at its place, and `--sample` drawn pairs."""
     seeds = range(settings.first_seed, settings.first_seed + settings.seeds)
-    scenes = [
-        Case(f"{name} {seed}", scene.kind, False, partial(scene.pair, seed, settings.cache))
-        for name, scene in all_scenes(settings.data).items()
-        if not is_example(scene)
-        for seed in seeds
+    bands = bands_of_series(settings.data)
+    scenes: list[Case | Bands] = [
+        *(bands[:1] if settings.quick else bands),
+        *(
+            Case(f"{name} {seed}", scene.kind, False, partial(scene.pair, seed, settings.cache))
+            for name, scene in all_scenes(settings.data).items()
+            if not is_example(scene)
+            for seed in seeds
+        ),
     ]
     drawn = [
         case
@@ -115,7 +170,10 @@ def run(settings: Settings) -> SuiteResult:
     every += run_cases(attacked, settings.jobs)
     found = [one for one in every if one.is_drawn]
     ground = [one for one in every if not one.is_drawn and not one.sameness.is_explained]
-    most = max((one.sameness.sharpness for one in ground), default=0.0)
+    apart = [one for one in ground if one.group != BANDS_OF_ONE]
+    most, most_of_one = (
+        max((one.sameness.sharpness for one in some), default=0.0) for some in (apart, ground)
+    )
     return SuiteResult(
         "How sharply edges coincide",
         (
@@ -124,6 +182,12 @@ def run(settings: Settings) -> SuiteResult:
                 f"below {LEAST_SHARPNESS:g}",
                 f"at most {most:.2f}",
                 most < LEAST_SHARPNESS,
+            ),
+            Goal(
+                "The same with bands of one exposure",
+                f"below {DRAWN_SHARPNESS:g}",
+                f"at most {most_of_one:.2f}",
+                most_of_one < DRAWN_SHARPNESS,
             ),
         ),
         (_table("Ground at its place", ground), _table("Drawn over other ground", found)),

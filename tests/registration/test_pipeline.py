@@ -185,7 +185,7 @@ def test_tries_count_against_agreement_by_chance(
         stages = Stages.of(pair.images, masked, spec)
         found = run(pair, spec, context)
         assert found.estimate is not None and found.check is not None
-        surveys = stages.survey(found.estimate, context)
+        surveys = stages.survey(found.estimate, found.scene, context)
         evidence = stages.evidence(found.estimate, found.check, surveys, scene)
         once = replace(evidence, tries=1).held_out.log10_chance
         assert evidence.held_out.log10_chance == pytest.approx(once + more)

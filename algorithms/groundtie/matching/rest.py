@@ -23,18 +23,21 @@ class Rest:
     survey
         What they show.
     is_explained
-        Whether such content needs no confirmation (see `Sameness.is_explained`).
+        Whether such content needs no confirmation (see `LockedContent`).
     beyond
         What they show beyond what the reference explains of the input, where it is explained and
         the transform moves the array by whole pixels; None elsewhere.
     chips
         How many chips there are; of some too little may be left.
+    is_drawn
+        Whether such content is drawn over the images (see `LockedContent`).
     """
 
     survey: Survey
     is_explained: bool = False
     beyond: Survey | None = None
     chips: int = 0
+    is_drawn: bool = False
 
 
 def survey_rest(
@@ -71,7 +74,7 @@ def survey_rest(
     survey = survey_model(fused, transform.model, context, locked, places, elsewhere_px)
     chips = len(places.centres)
     if not (locked.is_explained and locked.is_whole):
-        return Rest(survey, locked.is_explained, None, chips)
+        return Rest(survey, locked.is_explained, None, chips, locked.is_drawn)
     # A copy may be blended into other ground, of which the same windows are no part.
     left = replace(fused, left_of=unexplained)
     beyond = survey_model(

@@ -20,6 +20,11 @@ WEAK_HEIGHT = 2.0
 # one is higher than 1.5 by far, at 3.4.
 WEAK_REST_HEIGHT = 2.5
 
+# Of what is drawn over the images, soft rims and pieces in faint colours remain, too: over ground
+# that lies elsewhere, up to 5.2; with the ground of different sensors in place, 0.3 to 2.4 in 30
+# pairs (suite attacks); one ground in other colours leaves 10 to 23.
+DRAWN_REST_HEIGHT = 8.0
+
 # Copies and one sensor's views leave little, which may be weak; but a second place may not stand
 # out by so many robust standard deviations of its surfaces, and be so many times as high in what a
 # mask leaves. Measured by the suites margins and attacks: right transforms with more than the
@@ -105,7 +110,8 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
         is_nothing = is_enough(survey, rest) and survey.height < WEAK_COPY_HEIGHT
         is_unconfirmed = is_nothing or deviations_elsewhere(rest) >= BEYOND_DEVIATIONS
     else:
-        is_unconfirmed = survey.height < WEAK_REST_HEIGHT or _has_rival(survey)
+        least = DRAWN_REST_HEIGHT if rest.is_drawn else WEAK_REST_HEIGHT
+        is_unconfirmed = survey.height < least or _has_rival(survey)
     if not (survey.parts or is_unconfirmed):
         return None
     return (
@@ -156,7 +162,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         SURVEY,
         "both images have the same content at the same columns and rows, such as labels or clouds, "
         "and without it a part lies elsewhere, a second place matches about as "
-        f"well, or the mean similarity is below {WEAK_REST_HEIGHT:g} standard deviations; of a "
+        f"well, or the mean similarity is below {WEAK_REST_HEIGHT:g} standard deviations, "
+        f"or {DRAWN_REST_HEIGHT:g} where edges coincide as sharply as what is drawn; of a "
         f"copy, or one sensor's views, below {WEAK_COPY_HEIGHT:g} if half of the chips have "
         "anything left, or where that is weak and a second place stands out by "
         f"{BEYOND_DEVIATIONS:g}: {_MASKED_RIVAL:g} times as high in what is left, or "
