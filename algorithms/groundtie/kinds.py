@@ -15,6 +15,9 @@ from .errors import GroundTieError, OutputError, ParameterError, SameFileError
 from .raster_names import identity, raster_name
 from .stac_items import raster_of_item
 
+# Endings of a GeoTIFF.
+GEOTIFF = (".tif", ".tiff")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Kind:
@@ -147,7 +150,7 @@ class FileIn(InputKind):
 class RasterOut(OutputKind):
     """A raster that is written; its values mean what those of the raster parameter `like` mean."""
 
-    suffixes: tuple[str, ...] = (".tif", ".tiff")
+    suffixes: tuple[str, ...] = GEOTIFF
     like: str = ""
 
 

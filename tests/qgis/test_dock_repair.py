@@ -8,25 +8,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import rasterio
 from desktops import Desktop, drag, open_registered
 from noise_pairs import ORIGIN, SHIFT
 
 
-def open_repair(folder: Path, desktop: Desktop, files: dict[str, Path]) -> Any:
-    """Open the dock as it is after a registration, at its third page."""
-    dock = open_registered(folder, desktop, files)
-    dock.tabs.setCurrentWidget(dock.repair)
-    return dock
+@pytest.fixture
+def dock(desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]) -> Any:
+    """Return the dock as it is after a registration, at its third page."""
+    opened = open_registered(tmp_path, desktop, registered_files)
+    opened.tabs.setCurrentWidget(opened.repair)
+    return opened
 
 
-def test_repair_moves_switches_and_writes(
-    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
-) -> None:
+def test_repair_moves_switches_and_writes(desktop: Desktop, dock: Any, tmp_path: Path) -> None:
     from qgis.core import QgsProject
     from qgis.PyQt.QtCore import Qt
 
-    dock = open_repair(tmp_path, desktop, registered_files)
     repair = dock.repair
     count = len(repair.review.points)
     assert repair.table.rowCount() == count >= 10
@@ -71,12 +70,9 @@ def test_repair_moves_switches_and_writes(
     desktop.picture("6_written")
 
 
-def test_the_table_is_sorted_by_its_headings_and_the_choice_goes_with_its_point(
-    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
-) -> None:
+def test_the_table_is_sorted_by_its_headings_and_the_choice_goes_with_its_point(dock: Any) -> None:
     from qgis.PyQt.QtCore import Qt
 
-    dock = open_repair(tmp_path, desktop, registered_files)
     repair = dock.repair
     points, table = repair.review.points, repair.table
     residuals = repair.fits[repair.kind()].residuals_px
@@ -98,12 +94,11 @@ def test_the_table_is_sorted_by_its_headings_and_the_choice_goes_with_its_point(
 
 
 def test_two_thousand_points_answer_a_drag_within_a_fifth_of_a_second(
-    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+    desktop: Desktop, dock: Any
 ) -> None:
     """From the mouse's release to all models, the table and the map; in time of the processor."""
     from qgis.core import QgsApplication
 
-    dock = open_repair(tmp_path, desktop, registered_files)
     repair = dock.repair
     random = np.random.Generator(np.random.PCG64(0))
     count, few = 2000, repair.review.points
@@ -126,12 +121,9 @@ def test_two_thousand_points_answer_a_drag_within_a_fifth_of_a_second(
     assert min(seconds) < 0.2, seconds
 
 
-def test_a_point_is_added_by_a_click_in_each_image(
-    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
-) -> None:
+def test_a_point_is_added_by_a_click_in_each_image(desktop: Desktop, dock: Any) -> None:
     from qgis.core import QgsPointXY
 
-    dock = open_repair(tmp_path, desktop, registered_files)
     repair = dock.repair
     count = len(repair.review.points)
     repair.add.click()

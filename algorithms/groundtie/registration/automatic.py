@@ -30,14 +30,11 @@ from .rules import RULES
 from .scene import SceneInfo
 from .sensor_input import Ground, open_sensor_image
 from .sensor_jobs import RefinedRpc, refine
-from .specification import CHIPS, COREGISTER, OPTICAL, SAR_SAR, FreeSearch, Specification
+from .specification import ANYWHERE, CHIPS, COREGISTER, OPTICAL, SAR_SAR, Specification
 from .verdict import Verdict
 
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
 _DOUBTED_DEG, _DOUBTED_SCALE = 10.0, 1.1
-
-# Without georeferencing: a quarter of the side, any rotation, half to twice the size.
-_ANYWHERE = FreeSearch(0.25, 180.0, 2.0)
 
 # Rules of the scene refuse what matches well, but not the ground: no other matcher may try again.
 _FINAL = {rule.name for rule in RULES if rule.stage in (SCENE, SURVEY)}
@@ -88,11 +85,11 @@ def plan(scene: SceneInfo, is_georeferenced: bool) -> tuple[Try, ...]:
         wider = replace(first.spec, rotation_deg=_DOUBTED_DEG, scale=_DOUBTED_SCALE)
         because = f"rotated by up to {_DOUBTED_DEG:g}°, scaled by up to {_DOUBTED_SCALE:g}"
     else:
-        wider = replace(first.spec, free=_ANYWHERE)
+        wider = replace(first.spec, free=ANYWHERE)
         because = "with any rotation and scale"
     tries.append(Try(first.name, wider, because))
     if not is_georeferenced and first.name != chips.name:
-        tries.append(replace(chips, spec=replace(chips.spec, free=_ANYWHERE), because=because))
+        tries.append(replace(chips, spec=replace(chips.spec, free=ANYWHERE), because=because))
     return tuple(tries)
 
 

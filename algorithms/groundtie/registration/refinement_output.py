@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..assessment.comparison import Comparison
+from ..kinds import GEOTIFF
 from ..progress import Progress
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import write_with_geotransform
@@ -23,9 +24,6 @@ from ..sensor.rpc_tags import rpc_to_tags
 from .ground_control import GroundControl
 from .refinement import Refinement
 from .sensor_input import OrientedImage
-
-# Outputs that are copies of the image.
-IMAGES = (".tif", ".tiff")
 
 
 @dataclass(frozen=True)
@@ -118,7 +116,7 @@ class RefinementFiles:
 
 def _write_rpcs(image: OrientedImage, fit: RPCFit, path: Path, progress: Progress) -> None:
     source = image.source
-    if path.suffix.lower() in IMAGES:
+    if path.suffix.lower() in GEOTIFF:
         tags = rpc_to_tags(fit.rpc)
         write_with_geotransform(source, source.grid, path, rpc_tags=tags, progress=progress)
         return

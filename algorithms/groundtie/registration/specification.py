@@ -40,6 +40,10 @@ class FreeSearch:
     scale: float = 1.0
 
 
+# A quarter of the side, any rotation, half to twice the size.
+ANYWHERE = FreeSearch(0.25, 180.0, 2.0)
+
+
 @dataclass(frozen=True)
 class StatedSurface:
     """The elevated objects of a scene, and from where both images were taken.
@@ -145,7 +149,5 @@ class Specification:
 # What the three tools are made for (see `tools`). Without georeferencing, SAR images may have any
 # rotation, optical ones another scale besides, and lie a quarter of their side off.
 COREGISTER = Specification()
-SAR_SAR = Specification(
-    KEYPOINTS, refinement="nmi", radar=BOTH, free=FreeSearch(0.25, rotation_deg=180.0)
-)
-OPTICAL = Specification(GUIDED_CHIPS, radar=NEITHER, free=FreeSearch(0.25, 180.0, scale=2.0))
+SAR_SAR = Specification(KEYPOINTS, refinement="nmi", radar=BOTH, free=replace(ANYWHERE, scale=1.0))
+OPTICAL = Specification(GUIDED_CHIPS, radar=NEITHER, free=ANYWHERE)

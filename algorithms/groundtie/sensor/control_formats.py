@@ -12,12 +12,13 @@ from rasterio.crs import CRS
 
 from ..errors import GroundTieError, TransformFileError
 from ..geometry.georeferencer import require_places
+from ..kinds import GEOTIFF
 from ..rasters.grid import LON_LAT, FloatArray
 from ..rasters.handles import FileHandles
 from ..strict_json import read_json
 
 # Of GDAL, in a raster's tags.
-RASTERS = (".tif", ".tiff", ".vrt")
+RASTERS = (*GEOTIFF, ".vrt")
 ENVI = ".pts"
 SUFFIXES = (*RASTERS, ENVI)
 

@@ -11,7 +11,7 @@ from ..assessment.sensor_accuracy import SensorErrors, draw_vectors, table_lines
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import TooFewPointsError
-from ..kinds import FileIn, FileOut
+from ..kinds import GEOTIFF, FileIn, FileOut
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache
@@ -80,7 +80,7 @@ def assess_sensor(
         FileIn(
             label="Refined RPCs",
             help="RPCs of refine_rpc: _RPC.TXT, .RPB, or an image (.tif) that has them.",
-            suffixes=(".txt", ".rpb", ".xml", ".tif", ".tiff"),
+            suffixes=(".txt", ".rpb", ".xml", *GEOTIFF),
         ),
     ] = None,
     dem: sensor.Dem = None,
@@ -130,6 +130,6 @@ def assess_sensor(
 
 
 def _refined(path: Path, stack: ExitStack) -> RPC:
-    if path.suffix.lower() in (".tif", ".tiff"):
+    if path.suffix.lower() in GEOTIFF:
         return open_sensor_image(path, None, stack)[1]
     return read_rpc(path)

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ..declaration import tool
+from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..matching.surface_fit import AUTO
 from ..progress import SILENT, Progress
 from ..registration.delivery import register_as
@@ -23,7 +24,7 @@ def coregister(
     search_radius: registration.SearchRadius = None,
     search_rotation: registration.SearchRotation = None,
     model: registration.Model = AUTO,
-    max_error: registration.MaxError = 3.0,
+    max_error: registration.MaxError = USUAL_MAX_ERROR_PX,
     tie_points: registration.TiePointsOut = None,
     transform: general.TransformOut = None,
     report: registration.ReportOut = None,

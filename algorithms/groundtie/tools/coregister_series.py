@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Annotated, Any
 
 from ..declaration import Output, tool
+from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..kinds import Choice, FolderOut, Number, RasterIn, RastersIn, Text
 from ..matching.alignment import LINEAR_CANDIDATES
 from ..matching.surface_fit import AUTO
@@ -62,7 +63,7 @@ def coregister_series(
             choices=(AUTO, *LINEAR_CANDIDATES),
         ),
     ] = AUTO,
-    max_error: registration.MaxError = 3.0,
+    max_error: registration.MaxError = USUAL_MAX_ERROR_PX,
     report: registration.ReportOut = None,
     band: Annotated[
         int | None,

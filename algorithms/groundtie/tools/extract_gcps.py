@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
+from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..kinds import VectorOut
 from ..masks.choice import AUTO
 from ..progress import SILENT, Progress
@@ -41,7 +42,7 @@ def extract_gcps(
     dem: sensor.Dem = None,
     dem_datum: sensor.DemDatum = None,
     search_radius: sensor.RpcSearchRadius = None,
-    max_error: registration.MaxError = 3.0,
+    max_error: registration.MaxError = USUAL_MAX_ERROR_PX,
     height: sensor.Height = None,
     geoid: sensor.Geoid = None,
     dem_cover: sensor.DemCover = 0.0,

@@ -9,10 +9,10 @@ from typing import Annotated, Any
 
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
-from ..kinds import Choice, FileIn, FileOut, RasterIn, VectorOut
+from ..geometry.judging import USUAL_MAX_ERROR_PX
+from ..kinds import GEOTIFF, Choice, FileIn, FileOut, RasterIn, VectorOut
 from ..masks.choice import AUTO as AUTO_MASK
 from ..progress import SILENT, Progress
-from ..registration.refinement_output import IMAGES
 from ..registration.sensor_jobs import RefinedRpc, refine
 from ..sensor.adjustment import AUTO
 from ..sensor.bias import KINDS
@@ -37,7 +37,7 @@ def refine_rpc(
         FileOut(
             label="Refined RPCs",
             help="The RPCs alone, as _RPC.TXT or .RPB, or a copy of the image (.tif) with them.",
-            suffixes=(".txt", ".rpb", *IMAGES),
+            suffixes=(".txt", ".rpb", *GEOTIFF),
         ),
     ],
     reference: Annotated[
@@ -69,7 +69,7 @@ def refine_rpc(
         ),
     ] = AUTO,
     search_radius: sensor.RpcSearchRadius = None,
-    max_error: registration.MaxError = 3.0,
+    max_error: registration.MaxError = USUAL_MAX_ERROR_PX,
     residuals: Annotated[
         Path | None,
         VectorOut(

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ..declaration import tool
+from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..progress import SILENT, Progress
 from ..registration.automatic import OrthorectifiedRpc, register_anything
 from ..registration.registration import Registration
@@ -18,7 +19,7 @@ def register(
     reference: general.Reference,
     input: general.Input,
     output: general.OptionalGeoTiff = None,
-    max_error: registration.MaxError = 3.0,
+    max_error: registration.MaxError = USUAL_MAX_ERROR_PX,
     dem: sensor.Dem = None,
     dem_datum: sensor.DemDatum = None,
     input_dem: registration.InputDem = None,
