@@ -34,7 +34,7 @@ from .transform import Transform
 from .vector_layers import read_vector_layer
 
 _LOG = logging.getLogger(__name__)
-_SUFFIXES = (".gpkg", ".geojson", ".csv", ".points")
+SUFFIXES = (".gpkg", ".geojson", ".csv", ".points")
 _LAYER = "tie_points"
 EDITED = "edited"
 _TEXTS = (*TEXTS, "reference_crs")
@@ -137,8 +137,8 @@ def read_tie_points(
 
 def _suffix(path: Path, verb: str, error: type[OutputError | TransformFileError]) -> str:
     suffix = path.suffix.lower()
-    if suffix not in _SUFFIXES:
-        raise error(f"tie points are {verb} {', '.join(_SUFFIXES)}: {path}")
+    if suffix not in SUFFIXES:
+        raise error(f"tie points are {verb} {', '.join(SUFFIXES)}: {path}")
     return suffix
 
 

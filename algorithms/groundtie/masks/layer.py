@@ -14,7 +14,7 @@ from ..rasters.reading import Mask, Window
 from .scene import Scene, Selection
 from .threshold import grown
 
-_AREAS = ("Polygon", "MultiPolygon")
+AREAS = ("Polygon", "MultiPolygon")
 _LINES = ("LineString", "MultiLineString")
 
 
@@ -87,10 +87,10 @@ def read_layer(path: str | os.PathLike[str], scene: Scene, width_m: float) -> La
     """
     layer = read_vector_layer(path).on_map(scene.grid.crs)
     every = [feature["geometry"] for feature in layer.features]
-    found = [geometry for geometry in every if geometry["type"] in _AREAS + _LINES]
+    found = [geometry for geometry in every if geometry["type"] in AREAS + _LINES]
     areas, lines = (
         tuple(geometry for geometry in found if geometry["type"] in kinds)
-        for kinds in (_AREAS, _LINES)
+        for kinds in (AREAS, _LINES)
     )
     if not areas and not lines:
         raise VectorLayerError(f"the vector layer {path} has neither polygons nor lines")

@@ -17,6 +17,7 @@ from ..geometry.vector_layers import read_vector_layer
 from ..rasters.grid import Grid, reproject
 from ..rasters.reading import FloatImage, Mask, RasterSource
 from ..rasters.warping import sample
+from .layer import AREAS
 from .ray_casting import Heights
 
 # What is wider is taken for ground: halls and blocks are up to so wide, or have courtyards.
@@ -25,7 +26,6 @@ WIDEST_M = 100.0
 # Pixels within which the lowest height counts as ground, in metres: courtyards are wider.
 _GROUND_CELL_M = 4.0
 
-_AREAS = ("Polygon", "MultiPolygon")
 _HEIGHT_FIELDS = ("height", "height_m", "hoehe", "z_height", "measuredheight")
 _NUMBER = re.compile(r"\s*(\d+(?:\.\d+)?)\s*m?\s*")
 
@@ -104,7 +104,7 @@ def read_footprints(path: str | os.PathLike[str], grid: Grid) -> FootprintModel:
     found = [
         (feature["geometry"], _metres(feature["properties"].get(field)))
         for feature in layer.features
-        if feature["geometry"]["type"] in _AREAS
+        if feature["geometry"]["type"] in AREAS
     ]
     buildings = sorted(((area, m) for area, m in found if m is not None), key=lambda one: one[1])
     if not buildings:

@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from ..errors import ParameterError
+from ..rasters.grid import FloatArray
 from .noise import Stream, random_stream
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

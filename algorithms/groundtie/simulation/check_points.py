@@ -10,14 +10,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import map_coordinates
 
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from .cover import OPEN_GROUND, Cover
 from .noise import Stream, random_stream
 from .optical import OpticalOptions, direction
 from .sar import SarOptions
 from .scene import Scene
 
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
 
 _PER_SIDE = 12

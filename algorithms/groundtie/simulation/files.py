@@ -13,14 +13,12 @@ from rasterio.io import MemoryFile
 
 from ..geometry.models import DEGREE, TERRAIN
 from ..rasters.atomic import Outputs, make_folder, write_csv, write_json, writing
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from ..runs import RUN_TAG, run_tags
 from ..sensor.rpc import RPC
 from ..sensor.rpc_tags import rpc_to_tags
 from .metadata import optical_item, sar_item
 from .pair import SAR, SimulatedPair, scene_grid
-
-FloatArray = npt.NDArray[np.float64]
 
 NAMES = {
     "reference": "reference.tif",

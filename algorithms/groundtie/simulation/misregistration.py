@@ -15,9 +15,8 @@ from ..errors import ParameterError
 from ..geometry.models import DEGREE, Frame, Model, PolynomialModel, monomials
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid
+from ..rasters.reading import FloatImage
 from .noise import Stream, random_stream, strips
-
-FloatImage = npt.NDArray[np.float32]
 
 # Kind of distortion -> kind of model that describes it exactly.
 DISTORTIONS = {

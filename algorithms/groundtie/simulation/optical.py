@@ -15,11 +15,10 @@ import numpy.typing as npt
 from scipy.ndimage import gaussian_filter
 
 from ..errors import ParameterError
+from ..rasters.reading import FloatImage
 from .cover import BANDS, Cover
 from .noise import SmoothNoise, Stream, random_stream, strips
 from .scene import Scene
-
-FloatImage = npt.NDArray[np.float32]
 
 MAX_DN = 2047
 

@@ -11,7 +11,7 @@ from scipy.ndimage import map_coordinates
 
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
-from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, Grid, reproject
+from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, FloatArray, Grid, reproject
 from ..sensor.rpc_fit import RPCFit, fit_rpc
 from .attitude import AttitudeError, AttitudeOptions
 from .camera import PushBroom
@@ -22,8 +22,6 @@ from .optical import OpticalOptions, blur, quantise, render_radiance
 from .pair import in_steps, map_grid, object_reach_px, scene_grid
 from .sar import SarOptions, render_sar
 from .scene import SceneOptions, generate_scenes
-
-FloatArray = npt.NDArray[np.float64]
 
 # Height above the ellipsoid that the scene's terrain counts from.
 GROUND_M = 450.0

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
+from ..rasters.reading import FloatImage
 
-FloatImage = NDArray[np.float32]
 IntegralImage = NDArray[np.float64]
 
 # Standard deviation of the Gaussian that a filter of so many pixels a side stands for.

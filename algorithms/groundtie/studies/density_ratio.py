@@ -18,12 +18,11 @@ from scipy.optimize import nnls
 from scipy.stats import norm, rankdata
 
 from ..context import Context
+from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..similarity.binning import to_bins
 from ..similarity.joint_histogram import count_joint_histograms
 from .measures import mutual_information
-
-FloatArray = NDArray[np.float64]
 
 # Kernel widths to choose from, in standard deviations of the grey values' normal scores.
 WIDTHS = (0.15, 0.22, 0.32, 0.47, 0.68, 1.0, 1.5)

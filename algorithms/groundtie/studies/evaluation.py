@@ -23,8 +23,6 @@ from .matching import match
 from .repeatability import CLASS_NAMES, Repeatability, classes, overlap_error, repeatability
 from .sift_variants import DETECTORS, SiftVariantDescriptor, sift_detector
 
-FloatArray = NDArray[np.float64]
-
 _TURNING = "oriented"
 
 # Matches are fitted by this.

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from ..geometry.fitting import fit_model
 from ..geometry.models import PARAMETERS
-
-FloatArray = NDArray[np.float64]
+from ..rasters.grid import FloatArray
 
 # Largest residual in standard deviations of all residuals.
 _SIGMAS = 2.0

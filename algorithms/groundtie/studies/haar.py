@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from ..context import Context
 from ..features.keypoints import Keypoints
 from ..features.sampling import lattice_around, unit_rows
+from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .box_hessian import FloatImage, IntegralImage, integral_image
-
-FloatArray = NDArray[np.float64]
 
 CELLS = 4
 LENGTH = 4 * CELLS * CELLS

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..errors import ParameterError
+from ..rasters.grid import FloatArray
 from ..rasters.kernels import bspline_weights
 from ..rasters.patch import Patch
 from ..rasters.warping import resample
@@ -31,7 +32,6 @@ from ..similarity.binning import MASKED, bin_edges
 from ..similarity.joint_histogram import ORDER, count_joint_histograms, reach
 from ..similarity.measures import HistogramMeasure
 
-FloatArray = NDArray[np.float64]
 Bins = NDArray[np.uint8] | NDArray[np.uint16]
 
 # Value of masked pixels among grey levels of 16 bits, as `binning.MASKED` among those of 8.

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..features.keypoints import Keypoints
-
-FloatArray = NDArray[np.float64]
+from ..rasters.grid import FloatArray
 
 # Overlap errors up to these limits make the classes; the last one is all above.
 CLASS_LIMITS = (0.1, 0.2, 0.3, 0.4)

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from ..geometry.limits import SearchLimits
 from ..pose.pose import Pose, PoseFound
+from ..rasters.grid import FloatArray
 from ..rasters.kernels import interpolate
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress, squared_gradients
 from ..similarity.surface import SimilaritySettings
 
-FloatArray = NDArray[np.float64]
 Image = NDArray[np.float32]
 Field = NDArray[np.complex64]
 AnyImage = TypeVar("AnyImage", Image, Field)

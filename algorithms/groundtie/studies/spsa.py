@@ -13,11 +13,10 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..rasters.grid import FloatArray
 from .climbing import ClimbingSearch, Counted, Effort, Place, PoseSpace
 
-FloatArray = NDArray[np.float64]
 Measure = Callable[[FloatArray], float]
 
 # Spall's exponents: the least that still converge.

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from ..context import Context
 from ..features.detectors import seen_whole, to_grey
 from ..features.keypoints import Keypoints
+from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .box_hessian import FloatImage, determinants, integral_image, sigma_of
-
-FloatArray = NDArray[np.float64]
 
 # Sides of an octave's four filters. Features lie between the first and the last; octaves overlap.
 _LAYERS = 4

@@ -18,6 +18,7 @@ from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..errors import NotRegisteredError
 from ..geometry.models import KINDS
+from ..geometry.tie_point_files import SUFFIXES
 from ..geometry.transform import Transform
 from ..kinds import Choice, FileIn, FileOut, Number, RasterIn
 from ..progress import SILENT, Progress
@@ -25,8 +26,6 @@ from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.verdict import Verdict
 from ..report.assessment_report import PART_LABELS, AssessmentReport
-
-_TABLES = (".gpkg", ".geojson", ".csv", ".points")
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,7 @@ def assess(
             label="Tie points",
             help="The points of the registration: those with the role fit are control points, "
             "those with the role check are test points.",
-            suffixes=_TABLES,
+            suffixes=SUFFIXES,
         ),
     ] = None,
     check_points: Annotated[
@@ -124,7 +123,7 @@ def assess(
             help="Points that are independent of the registration: tie points, or a CSV table "
             "with the columns reference_x, reference_y and input_col, input_row (or input_x, "
             "input_y).",
-            suffixes=_TABLES,
+            suffixes=SUFFIXES,
         ),
     ] = None,
     back_transform: Annotated[

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from ...declaration import Output
 from ...geometry.models import KINDS
+from ...geometry.tie_point_files import SUFFIXES
 from ...kinds import (
     Choice,
     Distance,
@@ -47,7 +48,7 @@ TiePointsOut = Annotated[
     VectorOut(
         label="Tie points",
         help="Lines from where a point of the input nominally lies to where it is.",
-        suffixes=(".gpkg", ".geojson", ".csv", ".points"),
+        suffixes=SUFFIXES,
         shown=True,
         style="tie_points",
     ),
