@@ -164,7 +164,7 @@ class Review:
         """
         evidence = TiePointEvidence.of(self.points, kind, self.input_grid)
         residuals = evidence.residuals_px(evidence.transform)
-        check = self.points.used & self.points.is_check
+        check = self.points.check
         return ModelFit(
             kind,
             evidence.transform,
@@ -188,7 +188,7 @@ class Review:
         """Return the models that can be fitted at once, by their kinds."""
         found = {}
         for kind in kinds:
-            if kind == "tps" and self._taken.sum() > MOST_SPLINE_POINTS:
+            if kind == "tps" and self.points.fit.sum() > MOST_SPLINE_POINTS:
                 continue
             try:
                 found[kind] = self.fit(kind)
@@ -207,13 +207,9 @@ class Review:
         with Outputs() as outputs:
             write_tie_points(outputs.stage(path), replace(self.points, more=more), transform)
 
-    @property
-    def _taken(self) -> NDArray[np.bool_]:
-        return self.points.used & ~self.points.is_check
-
     def _left_out_px(self, kind: str) -> float | None:
         """Return the error at points that a model has not seen, block by block of neighbours."""
-        taken = np.flatnonzero(self._taken)
+        taken = np.flatnonzero(self.points.fit)
         if kind == "tps" and len(taken) > MOST_SPLINE_POINTS:
             return None
         needed = -(-PARAMETERS[kind] // 2)

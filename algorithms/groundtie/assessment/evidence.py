@@ -120,8 +120,8 @@ def measure_tie_points(
     Control points have the role "fit", test points the role "check". Raises as `read_points`.
     """
     points = read_points(path, transform)
-    test = _errors(transform, points, points.used & points.is_check)
-    control = _errors(transform, points, points.used & ~points.is_check)
+    test = _errors(transform, points, points.check)
+    control = _errors(transform, points, points.fit)
     return control, test.of_inliers(max_error_px)
 
 
@@ -131,7 +131,7 @@ def measure_check_points(path: Path, transform: Transform) -> PointErrors:
     Where some points have the role "check", those without it do not take part.
     """
     points = read_points(path, transform)
-    which = points.used & points.is_check
+    which = points.check
     return _errors(transform, points, which if which.any() else points.used)
 
 

@@ -31,7 +31,7 @@ def write_georeferencer(path: Path, points: TiePoints, transform: Transform) -> 
     lines = [] if transform.crs is None else [f"#CRS: {transform.crs.to_wkt()}"]
     lines.append("mapX,mapY,sourceX,sourceY,enable,dX,dY,residual")
     # It has no check points: it would fit to every point that is enabled.
-    fitted = points.used & ~points.is_check
+    fitted = points.fit
     # Its rows are negative: so are its residuals along them.
     numbers = [points.reference_xy, source_xy, fitted, residual * [1, -1], np.hypot(*residual.T)]
     for row in np.column_stack(numbers):

@@ -60,6 +60,16 @@ class TiePoints:
         return np.asarray(self.state == USED)
 
     @property
+    def fit(self) -> NDArray[np.bool_]:
+        """Which points a model is fitted to, shape (n,)."""
+        return self.used & ~self.is_check
+
+    @property
+    def check(self) -> NDArray[np.bool_]:
+        """Which points, held out of every fit, are measured, shape (n,)."""
+        return self.used & self.is_check
+
+    @property
     def role(self) -> NDArray[np.str_]:
         """The points' role, "fit" or "check", shape (n,)."""
         return np.where(self.is_check, "check", "fit")

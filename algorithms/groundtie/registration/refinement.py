@@ -83,7 +83,7 @@ class Refinement:
             There are too few.
         """
         table = points.points
-        fitted, checked = table.used & ~table.is_check, table.used & table.is_check
+        fitted, checked = table.fit, table.check
         seen = points.seen_by(image.rpc, image.size)
         control = seen.take(fitted)
         check = seen.take(checked) if checked.any() else None

@@ -68,8 +68,8 @@ class GcpResult:
         table, verdict = self.points.points, self.verdict
         return [
             f"accepted: {verdict.reason}",
-            f"{int((table.used & ~table.is_check).sum())} of {int((~table.is_check).sum())} "
-            f"points, and {int((table.used & table.is_check).sum())} check points",
+            f"{int(table.fit.sum())} of {int((~table.is_check).sum())} "
+            f"points, and {int(table.check.sum())} check points",
             f"error at check points: RMSE {verdict.check_rmse_px:.2f} px "
             f"({verdict.check_rmse_m:.2f} m)",
             self.heights,

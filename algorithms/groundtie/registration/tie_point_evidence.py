@@ -116,7 +116,7 @@ class TiePointEvidence:
     @cached_property
     def taken(self) -> NDArray[np.bool_]:
         """Which points the model is fitted to, shape (n,)."""
-        return self.points.used & ~self.points.is_check
+        return self.points.fit
 
     @property
     def count(self) -> int:
@@ -187,7 +187,7 @@ class TiePointEvidence:
     def fit(self) -> TiePointFit:
         """Return how the transform fits the points."""
         squared = self.residuals_px(self.transform) ** 2
-        check = self.points.used & self.points.is_check
+        check = self.points.check
         return TiePointFit(
             points=self.count,
             rmse_px=float(np.sqrt(squared[self.taken].mean())),

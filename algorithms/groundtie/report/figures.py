@@ -138,8 +138,8 @@ def point_map(points: TiePoints, grid: Grid) -> Figure:
     axes = map_axes(grid)
     px = grid.map_to_pixel(points.reference_xy)
     axes.plot(*px[~points.used].T, ".", color=REJECTED_COLOUR, ms=3.5)
-    axes.plot(*px[points.used & ~points.is_check].T, ".", color=FIT_COLOUR, ms=4)
-    axes.plot(*px[points.used & points.is_check].T, "o", color=CHECK_COLOUR, mfc="none", ms=7)
+    axes.plot(*px[points.fit].T, ".", color=FIT_COLOUR, ms=4)
+    axes.plot(*px[points.check].T, "o", color=CHECK_COLOUR, mfc="none", ms=7)
     return axes.figure
 
 

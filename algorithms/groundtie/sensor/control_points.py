@@ -106,7 +106,7 @@ class ControlPoints:
 
     def _gdal_options(self) -> str:
         """Return the used points of the fit as options of gdal_translate."""
-        kept = self.take(self.points.used & ~self.points.is_check)
+        kept = self.take(self.points.fit)
         lines = [f"-a_srs {self.crs.to_string()}"]
         for (col, row), (x, y), height in zip(
             kept.points.input_px, kept.points.reference_xy, kept.height_m, strict=True
