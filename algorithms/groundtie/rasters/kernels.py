@@ -21,7 +21,7 @@ _REMAP_IS_EXACT = int(cv2.__version__.split(".")[0]) >= 5
 _REMAP_SIDE = 1 << 15
 
 # Pixels that are worked at a time: what they need stays in the processor's cache.
-CACHED_PIXELS = 1 << 14
+CACHED_PIXELS = 1 << 15
 
 
 def _bilinear(s: NDArray[Any]) -> list[NDArray[Any]]:
