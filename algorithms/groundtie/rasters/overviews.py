@@ -108,23 +108,31 @@ class Reduced:
     def _means(
         self, dataset: Any, bands: list[int], window: Window
     ) -> tuple[NDArray[Any], Mask | None] | None:
-        """Return the same where all pixels are valid, in a tenth of the time; None: not all are."""
+        """Return the same of usual pixels, in a tenth of the time; None: they are not."""
         if dataset.dtypes[0] not in _MEANS:
             return None
         before, made = self.before.image, self.level.image
         down = _Halves.of(before.height, made.height, window.row, window.height)
         across = _Halves.of(before.width, made.width, window.col, window.width)
         place = rasterio.windows.Window(across.first, down.first, across.count, down.count)
-        if not _all_valid(dataset, bands, place):
+        masks = _masks(dataset, bands, place)
+        if masks is None:
             return None
-        around = ((0, 0), down.beyond, across.beyond)
-        values = np.pad(dataset.read(bands, window=place), around)
+        around = (down.beyond, across.beyond)
+        fill = 0 if dataset.nodata is None else dataset.nodata
+        values = dataset.read(bands, window=place)
         means = np.empty((len(bands), window.height, window.width), values.dtype)
-        for band, into in zip(values, means, strict=True):
-            _average(band, down, across, into)
-        if dataset.nodata is not None and (means == dataset.nodata).any():
-            return None
-        return means, np.ones(means.shape[1:], bool) if self._has_mask(bands) else None
+        known = np.ones(means.shape, bool)
+        for band, mask, into, valid in zip(values, masks, means, known, strict=True):
+            shown = None
+            if mask is not None:
+                band[~mask] = 0
+                shown = np.pad(mask, around)
+            _average(np.pad(band, around), shown, down, across, (into, valid))
+            if dataset.nodata is not None and (into[valid] == fill).any():
+                return None
+            into[~valid] = fill
+        return means, known[0] if self._has_mask(bands) else None
 
 
 @dataclass(frozen=True)
@@ -177,24 +185,47 @@ class _Halves:
         return np.asarray(total)
 
 
-def _average(values: NDArray[Any], down: _Halves, across: _Halves, into: NDArray[Any]) -> None:
-    """Put the means of an image's pixels into another one."""
+def _average(
+    values: NDArray[Any],
+    shown: Mask | None,
+    down: _Halves,
+    across: _Halves,
+    into: tuple[NDArray[Any], Mask],
+) -> None:
+    """Put the means of an image's pixels, 0 where they are not shown, and validity into arrays."""
+    means, known = into
     precision = np.result_type(values, np.float32)
-    height, width = into.shape
+    height, width = means.shape
     lines = max(CACHED_PIXELS // width, 1)
-    area = down.size * across.size
+    area: Any = down.size * across.size
     for first in range(0, height, lines):
         some = slice(first, min(first + lines, height))
-        shared = down.shares is not None
-        part = values[2 * some.start : 2 * some.stop + shared].astype(precision)
-        means = across.sums(down.part(some).sums(part).T).T
-        means *= 1 / area
-        into[some] = means if precision == values.dtype else np.floor(means + 0.5)
+        rows = slice(2 * some.start, 2 * some.stop + (down.shares is not None))
+        halves = down.part(some)
+
+        def sums(part: NDArray[Any], halves: _Halves = halves) -> NDArray[Any]:
+            return across.sums(halves.sums(part.astype(precision)).T).T
+
+        total = sums(values[rows])
+        if shown is not None:
+            area = sums(shown[rows])
+            known[some] = area > 0
+            area = np.where(known[some], area, 1)
+        total /= area
+        means[some] = total if precision == values.dtype else np.floor(total + 0.5)
 
 
-def _all_valid(dataset: Any, bands: list[int], place: Any) -> bool:
-    """Return whether all pixels of some bands are valid."""
-    flags = {number: dataset.mask_flag_enums[number - 1] for number in bands}
-    shared = [number for number in bands if MaskFlags.per_dataset in flags[number]][:1]
-    own = [n for n in bands if not {MaskFlags.per_dataset, MaskFlags.all_valid} & {*flags[n]}]
-    return all((dataset.read_masks(n, window=place) == 255).all() for n in shared + own)
+def _masks(dataset: Any, bands: list[int], place: Any) -> list[Mask | None] | None:
+    """Return which pixels of each band are valid, None for all; None: some are transparent."""
+    masks: dict[int, Mask | None] = {}
+    keys = []
+    for number in bands:
+        flags = dataset.mask_flag_enums[number - 1]
+        keys.append(0 if {MaskFlags.per_dataset, MaskFlags.all_valid} & {*flags} else number)
+        if keys[-1] in masks or MaskFlags.all_valid in flags:
+            continue
+        mask = dataset.read_masks(number, window=place) == 255
+        masks[keys[-1]] = None if mask.all() else mask
+        if MaskFlags.alpha in flags and not mask.all():
+            return None
+    return [masks.get(key) for key in keys]
