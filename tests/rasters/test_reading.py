@@ -344,3 +344,10 @@ def test_an_old_message_of_gdal_is_no_failure() -> None:
         return "grey"
 
     assert stated(read) == "grey"
+
+
+def test_a_file_that_is_missing_is_named_once(tmp_path: Path) -> None:
+    path = tmp_path / "none.tif"
+    with pytest.raises(RasterOpenError) as raised, open_raster(path):
+        pass
+    assert str(raised.value) == f"cannot read {path}: No such file or directory"

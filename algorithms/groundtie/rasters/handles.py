@@ -146,7 +146,7 @@ def _reading(name: str) -> Iterator[None]:
     except Exception as error:
         if not raised_by(error, "rasterio"):
             raise
-        reason = str(error.__cause__ or error)
+        reason = str(error.__cause__ or error).removeprefix(f"{name}: ")
         if is_remote(name):
             reason = reason_of_server(reason)
         raise RasterOpenError(f"cannot read {name}: {reason}") from error

@@ -21,7 +21,7 @@ _REMAP_IS_EXACT = int(cv2.__version__.split(".")[0]) >= 5
 _REMAP_SIDE = 1 << 15
 
 # Pixels that are worked at a time: what they need stays in the processor's cache.
-CACHED_PIXELS = 1 << 14
+CACHED_PIXELS = 1 << 15
 
 
 def _bilinear(s: NDArray[Any]) -> list[NDArray[Any]]:
@@ -116,7 +116,9 @@ def interpolate(image: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[A
     """
     bands = image.reshape(-1, *image.shape[-2:])
     if method == "bilinear" and _is_for_remap(bands[0], px):
-        found = np.stack([cv2.remap(band, px[0], px[1], cv2.INTER_LINEAR) for band in bands])
+        found = np.empty((len(bands), *px.shape[1:]), bands.dtype)
+        for band, values in zip(bands, found, strict=True):
+            cv2.remap(band, px[0], px[1], cv2.INTER_LINEAR, dst=values)
     elif (first := _first_of_lattice(px)) is not None and not np.iscomplexobj(image):
         found = _by_filter(bands, first, px.shape[1:], _KERNELS[method], REACH[method])
     else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import cv2
@@ -56,12 +57,17 @@ class Lattice:
 
     def lines(self, rows: slice) -> NDArray[Any]:
         """Return the values at all pixels of some rows, shape (k, rows, width)."""
-        nodes = self._between(self.values, np.arange(self.grid.height)[rows])
+        nodes = self._lines[:, rows]
         count, height, width = nodes.shape
         # Resizing takes nodes for centres of cells, as they are.
         whole = cv2.resize(nodes.reshape(-1, width), (width * self.step, count * height))
         within = slice(self.step, self.step + self.grid.width)
         return np.asarray(whole.reshape(count, height, -1)[..., within])
+
+    @cached_property
+    def _lines(self) -> NDArray[Any]:
+        """The values at the columns of nodes in all rows of pixels, shape (k, height, cols)."""
+        return self._between(self.values, np.arange(self.grid.height))
 
     def _between(self, values: NDArray[Any], places: NDArray[Any]) -> NDArray[Any]:
         """Interpolate values, (k, nodes, m), to rows of pixels: (k, places, m)."""

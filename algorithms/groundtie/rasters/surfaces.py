@@ -69,7 +69,7 @@ class RasterSurface:
         values = np.full(len(px), np.nan)
         for part in _parts(px):
             piece = self.piece(px[part])
-            values[part] = piece.at(*(px[part] - piece.corner).T)
+            values[part] = piece.at((px[part] - piece.corner).T)
         return values
 
     def piece(self, px: FloatArray) -> SurfacePiece:
@@ -110,16 +110,16 @@ class SurfacePiece:
     corner: FloatArray
     margin_px: float = _HALF_PX
 
-    def at(self, cols: NDArray[Any], rows: NDArray[Any]) -> FloatImage:
-        """Return the values at columns and rows of the piece, any shape; NaN beyond it."""
-        height, width = self.image.shape
+    def at(self, place: NDArray[Any]) -> FloatImage:
+        """Return the values at columns and rows of the piece, shape (2, …); NaN beyond it."""
+        (cols, rows), (height, width) = place, self.image.shape
         inside = (
             cols.min() >= 0
             and rows.min() >= 0
             and cols.max() <= width - 1
             and rows.max() <= height - 1
         )
-        px = np.stack([np.atleast_2d(cols), np.atleast_2d(rows)])
+        px = place.reshape(2, -1, place.shape[-1])
         if inside:
             return interpolate(self.image, px, "bilinear").reshape(cols.shape)
         # So that NaN is outside, too.

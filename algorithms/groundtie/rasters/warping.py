@@ -150,6 +150,9 @@ def _resample(
     image: NDArray[Any], valid: Mask, px: NDArray[Any], method: str, dtype: np.dtype[Any]
 ) -> tuple[NDArray[Any], Mask]:
     """Return `resample` of an image, whose bands are valid at the same pixels."""
+    if method != "nearest" and valid.all() and _are_inside(px, valid.shape, REACH[method]):
+        values = interpolate(image.astype(working_dtype(image.dtype)), px, method)
+        return _rounded(values, dtype), np.ones(px.shape[1:], bool)
     nearest = np.rint(px)
     known, whole = _validity(valid, nearest, REACH[method])
     if method == "nearest":
@@ -184,6 +187,14 @@ def _lies_inside(px: NDArray[Any], width: int, height: int, margin: int) -> Mask
     cols, rows = px
     inside: Mask = (cols >= low[0]) & (cols <= high[0]) & (rows >= low[1]) & (rows <= high[1])
     return inside
+
+
+def _are_inside(px: NDArray[Any], shape: tuple[int, ...], margin: int) -> bool:
+    """Return whether all positions, shape (2, m, n), lie in an image, so far from its borders."""
+    return all(
+        axis.size and axis.min() >= margin and axis.max() <= side - 1 - margin
+        for axis, side in zip(px, shape[::-1], strict=True)
+    )
 
 
 def reduction(grid: Grid, to_input_px: ToInputPx, size: tuple[int, int]) -> tuple[int, int]:

@@ -22,7 +22,7 @@ from .atomic import final_name, scratch_file, scratch_folder, writing
 from .bands import BandInfo, fits
 from .blocks import PixelType
 from .grid import PIXEL_COORDINATES, Grid
-from .overviews import Reduced
+from .overviews import Reduced, before_level
 from .reading import RasterSource
 from .tiff import BLOCK, base_image
 from .tiled_file import Level, TiledFile, require_space
@@ -215,18 +215,17 @@ def _write_overviews(file: TiledFile, *, nearest: bool, progress: Progress) -> N
     count = len(file.levels)
     for number in range(1, count):
         file.finish(number)
-        reduced = Reduced(
-            file.path, file.levels[number - 1], file.levels[number], nearest, number - 1
-        )
-        tasks = reduced.tasks(file.bands)
         part = progress.part((number - 1) / (count - 1), number / (count - 1))
-        for i, found in enumerate(in_order(file.executor, reduced.read, tasks, file.ahead)):
-            values, valid = found
-            bands, window = tasks[i]
-            file.write(values, bands, window=window, level=number)
-            if valid is not None:
-                file.write_mask(valid, window=window, level=number)
-            part.update((i + 1) / len(tasks))
+        with before_level(file.path, number) as handles:
+            reduced = Reduced(handles, file.levels[number - 1], file.levels[number], nearest)
+            tasks = reduced.tasks(file.bands)
+            for i, found in enumerate(in_order(file.executor, reduced.read, tasks, file.ahead)):
+                values, valid = found
+                bands, window = tasks[i]
+                file.write(values, bands, window=window, level=number)
+                if valid is not None:
+                    file.write_mask(valid, window=window, level=number)
+                part.update((i + 1) / len(tasks))
 
 
 def require_fit(nodata: float, dtype: np.dtype[Any]) -> None:

@@ -73,12 +73,12 @@ class DenseOrientation:
         for rows in row_strips(grid.height, grid.width):
             height = heights.lines(rows)
             seen = parabolas.at((height - np.float32(middle)) * np.float32(1 / reach), rows)
+            np.add(seen, parabolas.origin[:, None, None], out=px[:, rows])
             lost = ~np.asarray(np.isfinite(seen[0] + seen[1]))
             if not everywhere:
                 lost |= self._lost(grid, height, rows)
             if lost.any():
-                seen[:, lost] = NOWHERE
-            px[:, rows] = seen
+                px[:, rows][:, lost] = NOWHERE
         return px
 
     def _holds_everywhere(self, grid: Grid, bounds_m: tuple[float, float]) -> bool:
@@ -120,11 +120,11 @@ class _Parabolas:
         kept = replace(nodes, values=nodes.values[: 6 if bent else 4])
         return cls(origin, kept.minus(np.append(origin, np.zeros(len(kept.values) - 2))))
 
-    def at(self, t: FloatImage, rows: slice) -> FloatArray:
-        """Return the positions, shape (2, rows, width), at heights t of some rows."""
+    def at(self, t: FloatImage, rows: slice) -> FloatImage:
+        """Return the positions from the origin, (2, rows, width), at heights t of some rows."""
         coefficients = self.terms.lines(rows).reshape(-1, 2, *t.shape)
         value = coefficients[-1]
         for lower in coefficients[-2::-1]:
             value = value * t
             value += lower
-        return np.asarray(value + self.origin[:, None, None])
+        return np.asarray(value)

@@ -149,7 +149,7 @@ class _TerrainOnGrid:
 
     def lines(self, rows: slice) -> FloatImage:
         """Return heights in metres at the pixels of some rows; NaN if unknown."""
-        height = self._piece.at(*self._local.lines(rows))
+        height = self._piece.at(self._local.lines(rows))
         if self.geoid is not None:
             height += self.geoid.lines(rows)[0]
         return height

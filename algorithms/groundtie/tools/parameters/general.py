@@ -14,6 +14,10 @@ Reference = Annotated[
 ]
 Input = Annotated[Path, RasterIn(label="Input image", help="The image to be registered.")]
 COG_HELP = "A name that ends in .cog.tif makes it a Cloud Optimized GeoTIFF."
+MASK_HELP = (
+    "A raster whose zeros take no part, a vector layer of what takes part (polygons, and "
+    "lines as 11 m wide), or a classifier of train_feature_classifier (.json)."
+)
 _GEOTIFF = RasterOut(
     label="Registered image",
     help="GeoTIFF with the input's bands, data type, nodata value, colours and metadata. "

@@ -22,6 +22,7 @@ from ...kinds import (
 from ...masks.choice import MASKS
 from ...matching.surface_fit import AUTO
 from ...registration.registered_output import OUTPUT_GRIDS
+from .general import MASK_HELP
 
 Model = Annotated[
     str,
@@ -94,10 +95,6 @@ SearchRotation = Annotated[
         maximum=180,
     ),
 ]
-MASK_HELP = (
-    "A raster whose zeros take no part, a vector layer of what takes part (polygons, and "
-    "lines as 11 m wide), or a classifier of train_feature_classifier (.json)."
-)
 ReferenceMask = Annotated[
     Path | None, MaskIn(label="Mask of the reference", help=MASK_HELP, advanced=True)
 ]

@@ -8,8 +8,7 @@ from typing import Annotated
 
 from ...kinds import Choice, Distance, FileIn, MaskIn, Number, RasterIn
 from ...sensor.geoids import DATUMS
-from .general import MATCHED_BAND
-from .registration import MASK_HELP
+from .general import MASK_HELP, MATCHED_BAND
 
 SensorImage = Annotated[
     Path,

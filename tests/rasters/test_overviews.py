@@ -1,0 +1,103 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rasterio
+from numpy.typing import NDArray
+from raster_files import utm_grid, write_raster
+
+from groundtie.rasters.atomic import Outputs
+from groundtie.rasters.reading import open_raster
+from groundtie.rasters.tiling import tiles
+from groundtie.rasters.writing import create_like
+
+RNG = np.random.default_rng(0)
+ODD, EVEN = (1101, 1337), (1536, 1040)
+
+
+@pytest.mark.parametrize("shape", [ODD, EVEN])
+@pytest.mark.parametrize("dtype", ["uint8", "int16", "uint16", "int32", "float32", "float64"])
+def test_pixels_of_an_overview_are_means_over_their_area(
+    tmp_path: Path, dtype: str, shape: tuple[int, int]
+) -> None:
+    image = RNG.integers(0, 200, (2, *shape)).astype(dtype)
+    found, _ = _overview(tmp_path, image, np.ones(shape, bool), nodata=None)
+    expected, _ = _means(image, np.ones(image.shape, bool))
+    _assert_near(found, expected, dtype)
+
+
+@pytest.mark.parametrize("shape", [ODD, EVEN])
+@pytest.mark.parametrize("nodata", [None, 7])
+def test_what_is_invalid_has_no_weight(
+    tmp_path: Path, shape: tuple[int, int], nodata: int | None
+) -> None:
+    """By a mask, or a value of nodata, which differs from band to band; nothing has that mean."""
+    image = RNG.integers(100, 60_000, (2, *shape)).astype(np.uint16)
+    valid = np.repeat((RNG.random(shape) < 0.3)[None], 2, axis=0)
+    if nodata is not None:
+        valid[1] = RNG.random(shape) < 0.6
+        image[~valid] = nodata
+    found, shown = _overview(tmp_path, image, valid[0], nodata)
+    expected, known = _means(image, valid)
+    np.testing.assert_array_equal(shown, known)
+    _assert_near(np.where(known, found, 0), np.where(known, expected, 0), "uint16")
+
+
+def test_one_pixel_that_is_not_a_number_spoils_no_other(tmp_path: Path) -> None:
+    image = RNG.normal(size=(1, *ODD)).astype(np.float32)
+    image[0, 600, 700] = np.nan
+    valid = np.isfinite(image)
+    found, shown = _overview(tmp_path, image, valid[0], nodata=np.nan)
+    expected, known = _means(np.where(valid, image, 0), valid)
+    assert known.all()
+    np.testing.assert_array_equal(shown, known)
+    _assert_near(found, expected, "float32")
+
+
+def _overview(
+    folder: Path, image: NDArray[Any], mask: NDArray[np.bool_], nodata: float | None
+) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return the first overview of a file with an image, and what is valid in it."""
+    grid = utm_grid(*image.shape[:0:-1])
+    source_file = write_raster(folder / "a.tif", image, grid, nodata=nodata)
+    masked = nodata is None and not mask.all()
+    with open_raster(source_file) as source, Outputs() as outputs:
+        staged = outputs.stage(folder / "b.tif")
+        with create_like(source, grid, staged, nodata=nodata, masked=masked) as file:
+            for tile in tiles(grid):
+                rows, cols = tile.slices
+                file.write(image[:, rows, cols], window=tile)
+                if masked:
+                    file.write_mask(mask[rows, cols], window=tile)
+    with rasterio.open(folder / "b.tif", overview_level=0) as overview:
+        return overview.read(), overview.read_masks() > 0
+
+
+def _means(image: NDArray[Any], valid: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return means over the areas of the pixels of half the size, and which have any."""
+    total, weight = _shared(np.where(valid, image, 0).astype(float)), _shared(valid.astype(float))
+    known = weight > 1e-6  # none has less of a valid pixel
+    return total / np.where(known, weight, 1), known
+
+
+def _shared(image: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return sums over areas, by what lies before their borders."""
+    for axis in (1, 2):
+        size = image.shape[axis]
+        before = np.cumsum(np.insert(image, 0, 0, axis=axis), axis=axis)
+        borders = np.arange(-(-size // 2) + 1) * size / -(-size // 2)
+        low = np.minimum(borders.astype(int), size - 1)
+        share = np.expand_dims(borders - low, [k for k in range(3) if k != axis])
+        at = before.take(low, axis) * (1 - share) + before.take(low + 1, axis) * share
+        image = np.diff(at, axis=axis)
+    return image
+
+
+def _assert_near(found: NDArray[Any], expected: NDArray[Any], dtype: str) -> None:
+    """Sums are in single precision, and whole numbers within a half."""
+    rounded = 0.0 if dtype.startswith("float") else 0.5
+    limit = rounded + 8 * float(np.finfo(np.float32).eps) * float(np.abs(expected).max())
+    assert np.abs(found - expected).max() <= limit
