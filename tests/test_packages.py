@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from pathlib import Path
 
 import pytest
 
-from groundtie.packages import PACKAGES, missing, needed_by_all, needed_for
+from groundtie.packages import PACKAGES, missing, needed_by_all, needed_for, use_one_thread
 from groundtie.tools import NAMES
 
 PYPROJECT = Path(__file__).resolve().parents[1] / "pyproject.toml"
@@ -46,3 +47,13 @@ def test_what_is_not_here_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert missing(needed_by_all()) == []
     monkeypatch.setitem(sys.modules, "cv2", None)
     assert missing(needed_by_all()) == ["opencv-python-headless"]
+
+
+def test_linear_algebra_works_in_the_calling_thread_unless_stated(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    monkeypatch.setenv("MKL_NUM_THREADS", "3")
+    use_one_thread()
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
+    assert os.environ["MKL_NUM_THREADS"] == "3"

@@ -24,6 +24,7 @@ from .declaration import Parameter, Tool
 from .errors import CancelledError, GroundTieError, NotRegisteredError
 from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind, RastersIn
 from .memory import DEFAULT_MB, VARIABLE, budget_bytes, set_heaps
+from .packages import use_one_thread
 from .progress import Progress
 from .version import __version__
 
@@ -44,6 +45,7 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
         The exit code.
     """
     _silence_libraries()
+    use_one_thread()
     set_heaps()
     with _signals() as received:
         try:

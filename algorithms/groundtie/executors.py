@@ -19,6 +19,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from .errors import ParameterError, SchedulerError, WorkerLostError
 from .memory import set_heaps
+from .packages import use_one_thread
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -193,9 +194,7 @@ def _start_worker(stop: Any) -> None:
 
     A terminal's Ctrl-C reaches all processes: the parent alone decides what comes of it.
     """
-    # The processes are the parallel part. Before numpy is imported: it reads these once.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
+    use_one_thread()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _heed(stop.is_set)
     set_heaps()

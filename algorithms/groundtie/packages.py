@@ -6,6 +6,7 @@ Nothing is imported from them, so that what is missing can be named.
 from __future__ import annotations
 
 import importlib.util
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import PurePath
@@ -101,3 +102,14 @@ def needed_for(tool: str, paths: Iterable[PurePath]) -> list[Package]:
     """Return what a call of a tool needs besides: for itself, and for its files."""
     endings = {path.suffix.lower() for path in paths}
     return [p for p in PACKAGES if tool in p.tools or endings.intersection(p.files)]
+
+
+def use_one_thread() -> None:
+    """Let linear algebra work in the calling thread, unless the environment states how many.
+
+    For processes that do this package's work alone, before they import numpy, which reads this
+    once. Their own threads are the parallel part: those of OpenBLAS would wait for work in a
+    busy loop.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")

@@ -7,10 +7,7 @@ Plain JSON is read, of any version of STAC: what is needed has not changed since
 from __future__ import annotations
 
 import datetime
-import http.client
 import re
-import urllib.error
-import urllib.request
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -105,7 +102,7 @@ def read_items(name: Path | str) -> tuple[list[StacItem], str | None]:
     place, asset = _split(name)
     try:
         content = parse_json(_read(place))
-    except (OSError, ValueError, http.client.HTTPException) as error:
+    except (OSError, ValueError) as error:
         raise ParameterError(f"cannot read the STAC file {place}: {error}") from error
     stated = content if isinstance(content, dict) else {}
     items = [stated] if stated.get("type") == "Feature" else stated.get("features")
@@ -137,12 +134,30 @@ def _read(place: Path | str) -> bytes:
     url = place.removeprefix("/vsicurl/")
     if not url.startswith(("http://", "https://")):
         raise ValueError("STAC items are read from disk and by http only")
+    return _download(url)
+
+
+def _download(url: str) -> bytes:
+    """Return what lies at a URL.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    """
+    # They take longer to import than a file to read, and all tools import this module.
+    import http.client
+    import urllib.error
+    import urllib.request
+
     try:
         with urllib.request.urlopen(url, timeout=SILENT_SECONDS) as answer:
             return bytes(answer.read())
     except urllib.error.HTTPError as error:
         error.close()
         raise
+    except http.client.HTTPException as error:
+        raise OSError(error) from error
 
 
 def _is_raster(asset: Mapping[str, Any]) -> bool:

@@ -26,7 +26,7 @@ from ..geometry.model_choice import (
 from ..geometry.models import PARAMETERS, TERRAIN, Model
 from ..geometry.terrain import Terrain
 from ..rasters.grid import apply_affine
-from ..rasters.kernels import bspline_slopes, bspline_weights
+from ..rasters.kernels import bspline_weights
 from .belief_propagation import Surfaces
 from .families import Family, Positions, coefficients_of
 
@@ -68,8 +68,11 @@ class Alignment:
     left_out_score: dict[str, float]
 
 
-# The weights of a B-spline, and their derivatives.
-_SPLINE = bspline_weights, bspline_slopes
+# The four weights of a cubic B-spline, and their derivatives, are polynomials of the way between
+# two pixels; these are their coefficients, from the constant on, shape (2, 4, 4).
+_WEIGHTS = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6
+_SPLINE = np.stack([_WEIGHTS, np.diag([1.0, 2.0, 3.0], k=1) @ _WEIGHTS])
+_POWERS, _TAPS = np.arange(4), np.arange(-1, 3)
 
 
 @dataclass(frozen=True)
@@ -95,25 +98,20 @@ class _Field:
 
     def scores(self, nominal: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return similarity, (n,), at nominal positions, and its gradient to these, (n, 2)."""
-        linear = self.to_shift
+        linear, side = self.to_shift, self.coefficients.shape[1]
         shift = (nominal - self.predicted) @ linear.T
-        radius = self.coefficients.shape[1] // 2
         # Beyond the window a surface is zero, and so is its gradient.
-        place = np.clip(shift + radius, 1.0, 2 * radius - 1.001)
-        inside = np.all(place == shift + radius, axis=1)
-        whole = np.floor(place).astype(int)
-        offset = (place - whole).T
-        (wx, wy), (dx, dy) = (np.moveaxis(of(4, offset), 0, 2) for of in _SPLINE)
-        taps = np.arange(-1, 3)
-        rows, cols = whole[:, 1, None] + taps, whole[:, 0, None] + taps
-        patch = self.coefficients[
-            np.arange(len(place))[:, None, None], rows[:, :, None], cols[:, None, :]
-        ]
-        value = np.einsum("nij,ni,nj->n", patch, wy, wx)
-        along_x = np.einsum("nij,ni,nj->n", patch, wy, dx)
-        along_y = np.einsum("nij,ni,nj->n", patch, dy, wx)
-        slope = np.where(inside[:, None], np.column_stack([along_x, along_y]), 0.0)
-        return np.where(inside, value, 0.0), slope @ linear
+        place = np.clip(shift + side // 2, 1.0, side - 2.001)
+        inside = np.all(place == shift + side // 2, axis=1)
+        whole = place.astype(int)
+        powers = (place - whole)[..., None] ** _POWERS
+        across, down = (powers @ _SPLINE[:, None]).transpose(2, 1, 0, 3)
+        chips = np.arange(len(place))[:, None, None]
+        rows, cols = (whole[:, axis, None] + _TAPS for axis in (1, 0))
+        patch = self.coefficients[chips, rows[..., None], cols[:, None]]
+        # Value and derivative along rows and along columns, shape (n, 2, 2).
+        found = np.where(inside[:, None, None], down @ patch @ across.swapaxes(1, 2), 0.0)
+        return found[:, 0, 0], np.stack([found[:, 0, 1], found[:, 1, 0]], axis=1) @ linear
 
 
 @dataclass(frozen=True)

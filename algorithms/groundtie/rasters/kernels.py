@@ -93,11 +93,6 @@ def bspline_weights(order: int, fraction: NDArray[Any] | float) -> NDArray[np.fl
     return weights
 
 
-def bspline_slopes(order: int, fraction: NDArray[Any] | float) -> NDArray[np.float64]:
-    """Return the derivatives of `bspline_weights` by the position, shape (order, …)."""
-    return -np.diff(bspline_weights(order - 1, fraction), axis=0, prepend=0, append=0)
-
-
 def interpolate(image: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[Any]:
     """Interpolate an image; beyond its borders it is 0.
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from shapely.geometry import Polygon, mapping
 
 from ..geometry.transform import Transform
 from ..raster_names import file_name
@@ -65,12 +64,13 @@ def stac_item(
     places = reproject(corners, grid.crs, LON_LAT)
     if not np.isfinite(places).all() or np.ptp(places[:, 0]) > _MOST_DEGREES:
         return {}
+    ring = places.tolist()
     return {
         "type": "Feature",
         "stac_version": VERSION,
         "stac_extensions": list(EXTENSIONS),
         "id": output.name.partition(".")[0],
-        "geometry": mapping(Polygon(places)),
+        "geometry": {"type": "Polygon", "coordinates": [[*ring, ring[0]]]},
         "bbox": [*places.min(axis=0).tolist(), *places.max(axis=0).tolist()],
         "properties": {
             "datetime": f"{time.isoformat()}Z",

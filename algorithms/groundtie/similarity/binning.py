@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..rasters.colours import levels
 from .order_statistics import quantiles
 from .stacks import each
 
 MASKED = np.uint8(255)
 BINNINGS = ("equal-frequency", "linear")
-
-# Comparing pixels with so many edges, one after the other, is faster than to search among them.
-_FEW_EDGES = 63
 
 # Quantiles are taken from at most this many pixels; their error is then far below a bin.
 _SAMPLE = 65_536
@@ -35,16 +33,6 @@ def bin_edges(
         return quantiles(sample, inner).astype(np.float32)
     low, high = sample.min(), sample.max()
     return (low + inner * (high - low)).astype(np.float32)
-
-
-def levels(values: NDArray[np.float32], edges: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return how many of up to 254 rising edges lie at or below each value, same shape."""
-    if len(edges) > _FEW_EDGES:
-        return np.searchsorted(edges, values, side="right").astype(np.uint8)
-    found = np.zeros(values.shape, np.uint8)
-    for edge in edges:
-        found += values >= edge
-    return found
 
 
 def to_bins(

@@ -118,10 +118,10 @@ class JointHistogramVolume:
 
 def _convolve(planes: FloatArray, weights: FloatArray, span: int, axis: int) -> FloatArray:
     """Correlate along an axis with a short kernel; the axis loses the kernel's ends."""
-    ahead = np.moveaxis(planes, axis, 0)
-    parts = (ahead[k : k + span] for k in range(len(weights)))
+    along = planes.swapaxes(axis, -1)
+    parts = (along[..., k : k + span] for k in range(len(weights)))
     found: FloatArray = functools.reduce(operator.iadd, map(np.multiply, parts, weights))
-    return np.moveaxis(found, 0, axis)
+    return found.swapaxes(axis, -1)
 
 
 def count_joint_histograms(

@@ -17,8 +17,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..rasters.colours import levels
 from ..rasters.patch import Patch
-from .binning import bin_edges, levels
+from .binning import bin_edges
 from .correlation import fast_shape, from_spectrum, spans, spectrum
 from .stacks import each
 from .surface import Surface
