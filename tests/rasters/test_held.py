@@ -9,8 +9,8 @@ import pytest
 from raster_files import utm_grid, write_raster
 
 from groundtie.context import threads
-from groundtie.rasters.held import held_grey, held_onto
-from groundtie.rasters.pair import Image
+from groundtie.rasters.held import held_grey, held_on_level, held_onto
+from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 
 GRID = utm_grid(700, 640)
@@ -66,3 +66,41 @@ def test_a_raster_reads_the_same_from_memory(tmp_path: Path) -> None:
     for one, other in zip(held.read(held.window), source.read(source.window), strict=True):
         np.testing.assert_array_equal(one, other)
     assert held.grid == source.grid
+
+
+@pytest.mark.parametrize("nodata", [0.0, None])
+@pytest.mark.parametrize("factor", [4.0, 5.3])
+def test_pieces_of_a_level_are_those_of_the_pair(
+    tmp_path: Path, nodata: float | None, factor: float
+) -> None:
+    """Also beyond the border, of whose means a part is missing, and by another model."""
+    (tmp_path / "other").mkdir()
+    first, second = image(tmp_path, nodata), image(tmp_path / "other", nodata)
+    pair = make_pair(first, second)
+    level = pair.grid.scaled(factor)
+    with threads(2) as context:
+        held = held_on_level(pair, level, context)
+    for one in (held.reference, held.input):
+        assert one.source.grid.width == -(-GRID.width // round(factor))
+    for col, row in ((-10, -10), (30, 40), (90, 80)):
+        piece = level.window(col, row, 60, 50)
+        for found, expected in (
+            (held.reference_patch(piece), pair.reference_patch(piece)),
+            (held.input_patch(piece, held.nominal_px), pair.input_patch(piece, pair.nominal_px)),
+            (
+                held.input_patch(piece, lambda xy: held.nominal_px(xy + SHIFT_M)),
+                pair.input_patch(piece, lambda xy: pair.nominal_px(xy + SHIFT_M)),
+            ),
+        ):
+            np.testing.assert_array_equal(found.valid, expected.valid)
+            assert found.valid.any() and not found.valid.all()
+            np.testing.assert_allclose(found.values, expected.values, rtol=1e-5, atol=1e-3)
+
+
+def test_of_an_image_that_a_level_shows_little_of_no_means_are_held(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    pair = make_pair(image(tmp_path, 0.0), image(tmp_path / "other", 0.0))
+    level = pair.grid.window(0, 0, 200, 200).scaled(4)
+    with threads(1) as context:
+        held = held_on_level(pair, level, context)
+    assert held.reference is pair.reference and held.input is pair.input

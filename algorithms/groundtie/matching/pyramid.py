@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..context import Context
@@ -9,6 +11,7 @@ from ..errors import AmbiguousPlaceError, NothingFoundError
 from ..geometry.limits import SearchLimits
 from ..geometry.models import Model
 from ..rasters.grid import Grid
+from ..rasters.held import held_on_level
 from .chips import ChipMatcher
 from .coarse_shift import Candidate, coarse_candidates, level_factor
 from .level_fit import CoarseModel, fit_level, fit_level_pooled
@@ -69,17 +72,24 @@ def find_coarse_model(
     grid = matcher.pair.grid
     factor = level_factor(grid)
     level = grid if factor == 1 else grid.scaled(factor)
-    candidates = coarse_candidates(matcher.pair, level, limits, matcher.settings, held_out, context)
+    pair = matcher.pair
+    if limits.is_shift:  # others look at larger and smaller pixels, too
+        pair = held_on_level(pair, level, context.quiet())
+    candidates = coarse_candidates(pair, level, limits, matcher.settings, held_out, context)
     context.update(0.3)
     if isinstance(matcher, PooledHistogramMatcher):
         return _descend_pooled(matcher, candidates, factor, context)
-    return _descend(matcher, candidates, factor, context)
+    return _descend(matcher, replace(matcher, pair=pair), candidates, factor, context)
 
 
 def _descend(
-    matcher: ChipMatcher, candidates: list[Candidate], factor: float, context: Context
+    matcher: ChipMatcher,
+    coarsest: ChipMatcher,
+    candidates: list[Candidate],
+    factor: float,
+    context: Context,
 ) -> Model:
-    """Return the model that chips agree on, level by level."""
+    """Return the model that chips agree on, level by level; the coarsest has its own matcher."""
     grid, quiet = matcher.pair.grid, context.quiet()
     level = grid if factor == 1 else grid.scaled(factor)
     tried: list[CoarseModel] = []
@@ -87,7 +97,7 @@ def _descend(
         certain = tried and min(_alarms(model) for model in tried) < _CERTAIN
         if certain and candidate.height < _RIVAL_HEIGHT * candidates[0].height:
             break
-        tried.append(fit_level(matcher, level, candidate.model, _RADIUS_PX, quiet))
+        tried.append(fit_level(coarsest, level, candidate.model, _RADIUS_PX, quiet))
     if not tried or min(map(_alarms, tried)) > _HOPELESS:
         raise NothingFoundError("nothing in common was found")
     best = min(tried, key=_alarms)

@@ -35,6 +35,10 @@ class Handles(Protocol):
 class FileHandles:
     """GDAL's handles of one file: each is used by one thread at a time, as GDAL demands.
 
+    Each handle decompresses blocks for itself, so that threads whose windows have blocks in common
+    take turns with one: two of them take 1.6 times the processor time, and are no faster. Servers
+    are asked by all threads at once.
+
     Parameters
     ----------
     path
@@ -47,6 +51,9 @@ class FileHandles:
         self._path = path
         self._options = {} if overview is None else {"overview_level": overview}
         self._lock = threading.Lock()
+        self._turn: contextlib.AbstractContextManager[Any] = (
+            contextlib.nullcontext() if is_remote(path) else threading.RLock()
+        )
         self._free: list[Any] = []
 
     @property
@@ -56,15 +63,16 @@ class FileHandles:
 
     @contextlib.contextmanager
     def borrow(self) -> Iterator[Any]:
-        """Lend a handle of its own to each thread."""
-        with _reading(self._path), environment(self._path):
+        """Lend a handle to one thread at a time."""
+        with self._turn:
+            with _reading(self._path), environment(self._path):
+                with self._lock:
+                    dataset = self._free.pop() if self._free else None
+                dataset = dataset or rasterio.open(self._path, sharing=False, **self._options)
+                with env_ctx_if_needed():  # GDAL's messages in this thread go to rasterio's logger
+                    yield dataset
             with self._lock:
-                dataset = self._free.pop() if self._free else None
-            dataset = dataset or rasterio.open(self._path, sharing=False, **self._options)
-            with env_ctx_if_needed():  # GDAL's messages in this thread go to rasterio's logger
-                yield dataset
-        with self._lock:
-            self._free.append(dataset)
+                self._free.append(dataset)
 
     def close(self) -> None:
         """Close the file; reading opens it again."""

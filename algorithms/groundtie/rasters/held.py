@@ -5,16 +5,25 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from affine import Affine
 
 from ..arrays import Raster
 from ..context import Context
 from .bands import BandInfo
-from .grid import Grid
+from .grid import Grid, compose
 from .handles import ArrayHandles
-from .pair import Image, ToPixel
+from .pair import Image, ImagePair, ToPixel
 from .reading import FloatImage, Mask, RasterSource
 from .tiling import tiles
+from .warping import reduction
 from .windows import Window
+
+# Means are made of windows of so many pixels a side: few enough to be held, and many blocks of a
+# file, of which those at the border are read twice.
+_MEANS_PX = 2048
+
+# Of an image of which a level shows less than this share, parts are read as they are needed.
+_SHOWN_SHARE = 0.5
 
 
 def held_grey(source: RasterSource, band: int | None = None) -> RasterSource:
@@ -70,6 +79,49 @@ def held_onto(image: Image, grid: Grid, to_px: ToPixel, context: Context) -> Ima
     return replace(image, source=source, band=1, mask=mask, colours=None)
 
 
+def held_on_level(pair: ImagePair, level: Grid, context: Context) -> ImagePair:
+    """Return a pair that reads the same onto parts of a coarse level, from means held in memory.
+
+    Parameters
+    ----------
+    pair
+        The images, which are read once.
+    level
+        A grid with larger pixels. The input may be read as far off as it may be shifted.
+    context
+        Threads and progress.
+    """
+    to_reference = pair.reference.source.grid.map_to_pixel
+    return replace(
+        pair,
+        reference=_means(pair.reference, level, to_reference, context),
+        input=_means(pair.input, level, pair.nominal_px, context),
+    )
+
+
+def _means(image: Image, level: Grid, to_px: ToPixel, context: Context) -> Image:
+    """Return an image of the means that `sample` takes first: it starts at multiples of them."""
+    source = image.source
+    x, y = reduction(level, to_px, (source.grid.width, source.grid.height))
+    width, height = -(-source.grid.width // x), -(-source.grid.height // y)
+    is_shown = width * height * _SHOWN_SHARE <= level.width * level.height
+    # Sensor models count in their own pixels.
+    if (x, y) == (1, 1) or not is_shown or type(source.grid) is not Grid:
+        return image
+    larger = compose(source.grid.transform, Affine.scale(x, y))
+    grid = replace(source.grid, transform=larger, width=width, height=height)
+    values, valid = np.empty((height, width), np.float32), np.empty((height, width), bool)
+
+    def average(tile: Window) -> None:
+        window = Window(tile.col * x, tile.row * y, tile.width * x, tile.height * y)
+        shape = tile.height, tile.width
+        values[tile.slices], valid[tile.slices] = source.read(window, image.band, shape)
+
+    for _ in context.map(average, list(tiles(grid, max(_MEANS_PX // max(x, y), 1)))):
+        pass
+    return replace(image, source=_held(source, grid, values, valid), band=1)
+
+
 def _held(source: RasterSource, grid: Grid, values: FloatImage, valid: Mask) -> RasterSource:
     """Return a raster of values in memory, which are lost where they are not valid."""
     values[~valid] = np.nan
@@ -82,4 +134,5 @@ def _held(source: RasterSource, grid: Grid, values: FloatImage, valid: Mask) -> 
         has_mask_band=False,
         colormap=None,
         _handles=ArrayHandles(Raster(values)),
+        _levels=None,
     )
