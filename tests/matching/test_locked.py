@@ -132,7 +132,8 @@ def test_one_sensors_views_of_one_ground_are_explained(tmp_path: Path, context: 
 def test_a_copy_is_explained(tmp_path: Path, context: Context) -> None:
     locked = looked_at(tmp_path, sensed(1), sensed(1), context)
     assert locked is not None and locked.sameness.gradients > 0.9
-    assert locked.is_explained and not locked.is_drawn
+    assert locked.is_explained
+    assert not (locked.sameness.is_finer_than_ground or locked.is_drawn)
 
 
 def test_one_pattern_of_noise_over_different_ground_is_found(
@@ -142,7 +143,7 @@ def test_one_pattern_of_noise_over_different_ground_is_found(
     reference, input = sensed(1, 0.1) + pattern, sensed(2, 0.1, place=9) + pattern
     locked = looked_at(tmp_path, reference, input, context)
     assert locked is not None and locked.sameness.is_evident
-    assert not locked.sameness.is_explained
+    assert locked.sameness.is_finer_than_ground and locked.is_drawn
 
 
 def test_a_pattern_of_rows_and_columns_is_no_ground(tmp_path: Path, context: Context) -> None:

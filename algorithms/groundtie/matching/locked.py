@@ -123,15 +123,22 @@ class Sameness:
         return self.sharpness >= LEAST_SHARPNESS
 
     @property
+    def is_finer_than_ground(self) -> bool:
+        """Whether less is the same on reduced images, but by chance with 5 %.
+
+        Ground is no less alike there, where noise has averaged out; noise that both have is.
+        """
+        error = np.sqrt(self.area * (1 - self.area) / max(self.windows, 1.0))
+        return bool(self.reduced_area < self.area - _STANDARD_ERRORS * error)
+
+    @property
     def is_explained(self) -> bool:
         """Whether one image is a copy of the other, or both are one sensor's views of one ground.
 
         What is left of them need not confirm the transform, as copies leave nothing, and what one
-        sensor shows alike is most of what it shows. Ground is no less alike in reduced images,
-        where noise has averaged out; noise that is the same in both is.
+        sensor shows alike is most of what it shows.
         """
-        error = np.sqrt(self.area * (1 - self.area) / max(self.windows, 1.0))
-        if self.reduced_area < self.area - _STANDARD_ERRORS * error:
+        if self.is_finer_than_ground:
             return False
         is_copy = min(self.area, self.reduced_area) >= _COPY_SHARE
         return is_copy or self.ground >= _GROUND_SHARE
@@ -171,8 +178,9 @@ class LockedContent:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether edges coincide more sharply than those of ground in other colours."""
-        return self.sameness.sharpness >= DRAWN_SHARPNESS and not self.is_explained
+        """Whether it is sharper than ground in other colours, or finer than any."""
+        is_sharper = self.sameness.sharpness >= DRAWN_SHARPNESS
+        return (is_sharper or self.sameness.is_finer_than_ground) and not self.is_explained
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
