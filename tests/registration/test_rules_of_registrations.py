@@ -178,7 +178,7 @@ def test_what_copies_leave_may_contradict(part: int, expected: list[str]) -> Non
 
 
 @pytest.mark.parametrize(
-    ("chips", "height", "is_refused"), [(49, 1.2, True), (49, 1.4, False), (120, 1.2, False)]
+    ("chips", "height", "is_refused"), [(49, 1.5, True), (49, 1.7, False), (120, 1.5, False)]
 )
 def test_many_chips_that_copies_leave_must_show_something(
     chips: int, height: float, is_refused: bool
@@ -192,9 +192,9 @@ def test_many_chips_that_copies_leave_must_show_something(
 @pytest.mark.parametrize(
     ("height", "rival", "noise", "is_refused"),
     [
-        (1.4, 2.2, 0.1, True),
+        (1.7, 2.7, 0.1, True),
         (2.6, 2.6, 0.1, False),
-        (1.4, 2.2, 6.0, False),
+        (1.7, 2.7, 6.0, False),
     ],
 )
 @pytest.mark.parametrize("is_beyond", [False, True])
@@ -213,13 +213,13 @@ def test_copies_must_not_leave_ground_elsewhere(
 
 @pytest.mark.parametrize(
     ("masked_rival", "beyond_rival", "is_refused"),
-    [(2.0, 1.0, False), (2.2, 1.0, True), (1.2, 1.2, True)],
+    [(2.5, 1.3, False), (2.7, 1.3, True), (1.3, 1.5, True)],
 )
 def test_what_is_not_explained_needs_no_higher_place_elsewhere(
     masked_rival: float, beyond_rival: float, is_refused: bool
 ) -> None:
     """Of a mask's rest, repetition alone leaves places about as high."""
-    left, beyond = (survey(height=1.4, rival=of) for of in (masked_rival, beyond_rival))
+    left, beyond = (survey(height=1.7, rival=of) for of in (masked_rival, beyond_rival))
     found = evidence(GOOD, survey=survey(), rest=Rest(left, True, beyond))
     assert refusing(found) == ["pixel-locked content"] * is_refused
 
