@@ -357,13 +357,3 @@ def test_a_batch_tells_its_failed_rows_and_goes_on(provider: Any, tmp_path: Path
     assert (results["DONE"], results["FAILED"]) == (1, 1)
     assert results["TABLE_OF_RESULTS"] == str(tmp_path / "out/t.results.csv")
     assert "row 2 (2) failed: cannot read" in feedback.textLog()
-
-
-def test_a_displacement_is_shown_on_maps_and_a_transform_is_not(plugin: Any) -> None:
-    from groundtie_qgis.adapter import _rasters
-    from groundtie_qgis.library import all_tools
-
-    kind = next(t for t in all_tools() if t.name == "register").parameter("transform").kind
-    moved = Path("moved.tif")
-    assert _rasters(kind, moved) == [moved]
-    assert _rasters(kind, Path("t.json")) == _rasters(kind, None) == []

@@ -16,6 +16,7 @@ from raster_files import utm_grid, wave_image, write_raster
 
 from groundtie.errors import RasterOpenError
 from groundtie.rasters.reading import Window, open_raster
+from groundtie.rasters.remote import reason_of_server
 
 SIDE = 2048
 
@@ -123,6 +124,18 @@ def test_a_server_that_goes_away_while_pixels_are_read(
         remote = open_raster(server.of(path))
     with remote, pytest.raises(RasterOpenError, match="sends its pixels no more"):
         remote.read(Window(1500, 1500, 200, 200))
+
+
+@pytest.mark.parametrize(
+    ("answer", "expected"),
+    [
+        ("band 1: IReadBlock failed", "sends its pixels no more"),
+        ("HTTP response code: 404", "no such file"),
+    ],
+)
+def test_numbers_in_names_are_no_answers(answer: str, expected: str) -> None:
+    name = "/vsicurl/http://127.0.0.1:40449/tile_403.tif"
+    assert expected in reason_of_server(f"{name}, {answer}", name)
 
 
 def test_what_is_no_raster(server: Loopback) -> None:

@@ -156,5 +156,5 @@ def _reading(name: str) -> Iterator[None]:
             raise
         reason = str(error.__cause__ or error).removeprefix(f"{name}: ")
         if is_remote(name):
-            reason = reason_of_server(reason)
+            reason = reason_of_server(reason, name)
         raise RasterOpenError(f"cannot read {name}: {reason}") from error

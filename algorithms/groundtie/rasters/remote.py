@@ -48,8 +48,12 @@ def environment(name: str) -> Any:
     return rasterio.Env(**{key: value for key, value in _SETTINGS.items() if key not in own})
 
 
-def reason_of_server(reason: str) -> str:
-    """Return GDAL's reason why a remote raster cannot be read in words of this package."""
+def reason_of_server(reason: str, name: str) -> str:
+    """Return GDAL's reason why a remote raster cannot be read in words of this package.
+
+    The numbers in the raster's own name, such as a server's port, are no answers.
+    """
+    stated = reason.replace(name.removeprefix("/vsicurl/"), "")
     if reason.startswith("CURL error: "):
         return f"the server does not answer ({reason.removeprefix('CURL error: ')})"
-    return next((words for text, words in _ANSWERS.items() if text in reason), reason)
+    return next((words for text, words in _ANSWERS.items() if text in stated), reason)
