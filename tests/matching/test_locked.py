@@ -136,6 +136,17 @@ def test_a_copy_is_explained(tmp_path: Path, context: Context) -> None:
     assert not (locked.sameness.is_finer_than_ground or locked.is_drawn)
 
 
+def test_a_copy_in_other_colours_is_not_drawn(tmp_path: Path, context: Context) -> None:
+    """Its edges are as sharp as a drawing's, but everywhere."""
+    copy = looked_at(tmp_path, sensed(1, 0.1), -1.5 * sensed(2, 0.1), context)
+    assert copy is not None and copy.sameness.sharpness > 5
+    assert not copy.is_drawn
+    drawn = drawn_into(sensed(1)), -drawn_into(sensed(2, place=9))
+    locked = looked_at(tmp_path, *drawn, context)
+    assert locked is not None and locked.sameness.sharpness > 5
+    assert locked.is_drawn
+
+
 def test_one_pattern_of_noise_over_different_ground_is_found(
     tmp_path: Path, context: Context
 ) -> None:

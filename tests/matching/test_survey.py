@@ -161,3 +161,11 @@ def test_shifts_without_overlap_make_no_peak_higher() -> None:
     np.testing.assert_allclose(made[0], whole[0], rtol=0.1)
     assert made[1].max() == pytest.approx(8.0, rel=0.1)
     assert few[1].max() == 800.0
+
+
+def test_chips_without_overlap_where_the_model_has_them_are_not_compared() -> None:
+    surfaces = np.ones((3, 2 * SURVEY_RADIUS_PX + 1, 2 * SURVEY_RADIUS_PX + 1), np.float32)
+    surfaces[0, :, SURVEY_RADIUS_PX - 5 :] = 0
+    grid = utm_grid(SIDE, SIDE)
+    centres = np.array([[50, 50], [150, 50], [250, 50]])
+    assert Survey(grid, centres, np.zeros((3, 2)), surfaces).comparable == 2

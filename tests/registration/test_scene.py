@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -94,6 +95,9 @@ def test_speckle_shows_which_is_the_radars(tmp_path: Path, looks: int) -> None:
             assert info.is_radar_and_camera == (looks < 20)
             assert not info.are_both_radar
         assert twice.are_both_radar == (looks < 20)
+        # What a mask is made of is declared of one image, whatever the other is.
+        assert replace(twice, declared=REFERENCE).of_one_kind == (looks < 20)
+        assert not replace(one_way, declared=REFERENCE).of_one_kind
 
 
 def test_metadata_count_before_speckle(tmp_path: Path) -> None:

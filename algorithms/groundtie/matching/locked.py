@@ -28,6 +28,7 @@ from ..similarity.sameness import (
     covered,
     edges_apart_px,
     reduced,
+    related_windows,
     same_windows,
     without,
 )
@@ -101,6 +102,9 @@ class Sameness:
         The latter, of what does not vary alike in the images.
     windows
         How many windows of the reduced images do not overlap.
+    related, reduced_related
+        Share of the area where one is half a linear function of the other, in the images and in
+        reduced ones.
     """
 
     gradients: float
@@ -110,6 +114,8 @@ class Sameness:
     reduced_area: float
     ground: float
     windows: float
+    related: float = 0.0
+    reduced_related: float = 0.0
 
     @property
     def is_evident(self) -> bool:
@@ -130,6 +136,11 @@ class Sameness:
         """
         error = np.sqrt(self.area * (1 - self.area) / max(self.windows, 1.0))
         return bool(self.reduced_area < self.area - _STANDARD_ERRORS * error)
+
+    @property
+    def is_copy_in_other_colours(self) -> bool:
+        """Whether one image follows from the other nearly everywhere, as from its negative."""
+        return min(self.related, self.reduced_related) >= _COPY_SHARE
 
     @property
     def is_explained(self) -> bool:
@@ -179,8 +190,9 @@ class LockedContent:
     @property
     def is_drawn(self) -> bool:
         """Whether it is sharper than ground in other colours, or finer than any."""
-        is_sharper = self.sameness.sharpness >= DRAWN_SHARPNESS
-        return (is_sharper or self.sameness.is_finer_than_ground) and not self.is_explained
+        same = self.sameness
+        is_finer = same.is_finer_than_ground or same.sharpness >= DRAWN_SHARPNESS
+        return is_finer and not (self.is_explained or same.is_copy_in_other_colours)
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
@@ -262,13 +274,16 @@ def _sameness(looks: list[_Look]) -> Sameness:
     own, others = ([look.gradients[k] for look in looks] for k in (0, 1))
     strong = _strong(own), _strong(others)
     same = [_share([one.same(shift, strong) for one in looks]) for shift in _offsets()]
-    area, reduced_area = (_share([one.counts[k] for one in looks]) for k in (0, 1))
+    area, reduced_area, related, reduced_related = (
+        _share([one.counts[k] for one in looks]) for k in (0, 1, 3, 4)
+    )
     every = sum(one.counts[1][1] for one in looks)
     ground = _share([one.counts[2] for one in looks], int(_LEAST_LEFT * every))
     chance = float(np.median(same[1:]))
     sharpness = _sharpness(np.sum([one.edges for one in looks], axis=0)) if looks else 0.0
     windows = every / WINDOW_PX**2
-    return Sameness(same[0], chance, sharpness, area, reduced_area, ground, windows)
+    shares = area, reduced_area, ground, windows, related, reduced_related
+    return Sameness(same[0], chance, sharpness, *shares)
 
 
 def _sharpness(counts: FloatArray) -> float:
@@ -292,7 +307,7 @@ class _Look:
 
     gradients: tuple[Gradients, Gradients]
     edges: NDArray[np.int_]
-    counts: tuple[_Count, _Count, _Count]
+    counts: tuple[_Count, ...]
 
     @classmethod
     def of(cls, reference: Patch, input: Patch) -> _Look:
@@ -302,6 +317,8 @@ class _Look:
             (int(same.sum()), int((reference.valid & input.valid).sum())),
             _count_reduced(reference, input),
             _count_reduced(*rest),
+            _count_related(reference, input),
+            _count_related(reduced(reference, _REDUCTION), reduced(input, _REDUCTION)),
         )
         inner = reference.inner(_REACH_PX)
         gradients = Gradients.of(inner), Gradients.of(input)
@@ -334,6 +351,11 @@ def _drawn(reference: Patch, input: Patch) -> Mask:
 def _count_reduced(reference: Patch, input: Patch) -> _Count:
     smaller = reduced(reference, _REDUCTION), reduced(input, _REDUCTION)
     return int(same_windows(*smaller).sum()), int((smaller[0].valid & smaller[1].valid).sum())
+
+
+def _count_related(reference: Patch, input: Patch) -> _Count:
+    related = related_windows(reference, input)
+    return int(related.sum()), int((reference.valid & input.valid).sum())
 
 
 def _share(counts: list[_Count], least: int = 1) -> float:

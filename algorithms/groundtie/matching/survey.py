@@ -73,6 +73,12 @@ class Survey:
         return int(self.is_confirming_chip.sum())
 
     @property
+    def comparable(self) -> int:
+        """How many chips overlap with the input where the model has them: surfaces are 0 else."""
+        near = self.surfaces[:, self._distance_px <= SAME_PX]
+        return int((near != 0).any(axis=1).sum())
+
+    @property
     def height(self) -> float:
         """How high the chips' similarity is on average where the model has them."""
         return float(self.mean[self._distance_px <= SAME_PX].max())

@@ -145,7 +145,8 @@ class SceneInfo:
     @property
     def of_one_kind(self) -> bool:
         """Whether the images may be one sensor's: not a radar's and a camera's."""
-        return self.declared in (BOTH, NEITHER) or not self.is_radar_and_camera
+        is_one = self.declared in (BOTH, NEITHER) or self.are_both_radar
+        return is_one or not self.is_radar_and_camera
 
     @property
     def is_dense_town(self) -> bool:

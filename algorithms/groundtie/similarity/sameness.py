@@ -96,6 +96,18 @@ def same_windows(one: Patch, other: Patch) -> Mask:
     return valid & (differing <= _DIFFERING_SHARE * both)
 
 
+def related_windows(one: Patch, other: Patch) -> Mask:
+    """Return around which pixels a linear function of one patch is half of the other, (h, w).
+
+    As in copies, also those in other colours.
+    """
+    valid = one.valid & other.valid
+    own, others = _variance(one.values, valid), _variance(other.values, valid)
+    # cov(a, b) = (var(a + b) - var(a - b)) / 4
+    both = _variance(one.values + other.values, valid) - _variance(one.values - other.values, valid)
+    return valid & ((both / 4) ** 2 >= (1 - _DIFFERING_SHARE) * own * others)
+
+
 @dataclass(frozen=True)
 class Edges:
     """Edges of an image, found to a fraction of a pixel.

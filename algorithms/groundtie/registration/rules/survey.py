@@ -78,8 +78,8 @@ def _weak(evidence: RegistrationEvidence) -> str | None:
 
 
 def is_enough(left: Survey, rest: Rest) -> bool:
-    """Return whether what is left is that of many chips."""
-    return len(left.surfaces) >= _LEAST_CHIPS * rest.chips
+    """Return whether what is left is that of many chips, where the transform has them."""
+    return left.comparable >= _LEAST_CHIPS * rest.chips
 
 
 def deviations_elsewhere(rest: Rest) -> float:
