@@ -154,7 +154,7 @@ def test_one_pattern_of_noise_over_different_ground_is_found(
     reference, input = sensed(1, 0.1) + pattern, sensed(2, 0.1, place=9) + pattern
     locked = looked_at(tmp_path, reference, input, context)
     assert locked is not None and locked.sameness.is_evident
-    assert locked.sameness.is_finer_than_ground and locked.is_drawn
+    assert locked.sameness.is_finer_than_ground and not locked.is_explained
 
 
 def test_a_pattern_of_rows_and_columns_is_no_ground(tmp_path: Path, context: Context) -> None:

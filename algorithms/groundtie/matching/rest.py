@@ -67,7 +67,7 @@ def survey_rest(
     """
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
     locked = find_locked_content(pair, transform, asked, context.quiet(), of_one_kind)
-    if locked is None or not locked.sameness.is_evident:
+    if locked is None or not locked.is_evident:
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())

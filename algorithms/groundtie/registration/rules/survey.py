@@ -163,7 +163,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "both images have the same content at the same columns and rows, such as labels or clouds, "
         "and without it a part lies elsewhere, a second place matches about as "
         f"well, or the mean similarity is below {WEAK_REST_HEIGHT:g} standard deviations, "
-        f"or {DRAWN_REST_HEIGHT:g} of what is sharper or finer than ground; of a "
+        f"or {DRAWN_REST_HEIGHT:g} of what is sharper than ground in other colours; of a "
         f"copy, or one sensor's views, below {WEAK_COPY_HEIGHT:g} if half of the chips have "
         "anything left, or where that is weak and a second place stands out by "
         f"{BEYOND_DEVIATIONS:g}: {_MASKED_RIVAL:g} times as high in what is left, or "
