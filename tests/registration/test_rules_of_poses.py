@@ -72,3 +72,16 @@ def test_poses_of_elevated_objects_are_refused(
     moved = estimated(fit_points()).transform
     found = PoseSurvey(residuals, survey(), None, moved)
     assert refusing(PoseSurveyEvidence(found, factor)) == expected
+
+
+@pytest.mark.parametrize(
+    ("agreeing", "is_shift", "expected"),
+    [(12, True, ["small share of check points"]), (13, True, []), (12, False, [])],
+)
+def test_half_of_the_chips_agree_on_a_pose_that_only_shifts(
+    agreeing: int, is_shift: bool, expected: list[str]
+) -> None:
+    """Labels that are drawn into both arrays move no array otherwise."""
+    residuals = np.concatenate([scatter(agreeing, 0.5), np.full((25 - agreeing, 2), np.inf)])
+    found = PoseSurvey(residuals, survey(), None, estimated(fit_points()).transform)
+    assert refusing(PoseSurveyEvidence(found, None, is_shift)) == expected

@@ -23,6 +23,7 @@ from ..geometry.estimation import Estimate
 from ..geometry.judging import (
     CE90_FACTOR,
     LARGEST_LOG10_CHANCE,
+    SMALLEST_INLIER_SHARE,
     TOLERANCE_PX,
     sigma_range_px,
 )
@@ -85,6 +86,8 @@ class HeldOut:
         What the predictions are for, such as "the overlap".
     accuracy
         The error of the transform at a random place of the area.
+    least_share
+        The smallest share that must agree.
     """
 
     name: str
@@ -97,6 +100,7 @@ class HeldOut:
     spread_px: float
     area: str
     accuracy: Accuracy = UNKNOWN
+    least_share: float = SMALLEST_INLIER_SHARE
 
     @property
     def largest_ce90_px(self) -> float:

@@ -11,7 +11,11 @@ import numpy as np
 
 from ..context import Context
 from ..geometry.chance import agreement_probability, log10_chance
-from ..geometry.judging import LARGEST_LOG10_CHANCE
+from ..geometry.judging import (
+    LARGEST_LOG10_CHANCE,
+    SMALLEST_INLIER_SHARE,
+    SMALLEST_SHARE_UNROTATED,
+)
 from ..geometry.limits import SearchLimits
 from ..masks.choice import NONE, MaskUsed
 from ..matching.bands import BandSurvey
@@ -123,10 +127,13 @@ class PoseSurveyEvidence:
         What they show.
     layover_factor
         See `RegistrationEvidence`.
+    is_shift
+        Whether the pose neither rotates nor scales, as far as chips show.
     """
 
     found: PoseSurvey
     layover_factor: float | None = None
+    is_shift: bool = False
 
     stages: ClassVar = (AGREEMENT, LAYOVER, SURVEY)
     mask: ClassVar = MaskUsed(NONE, None, 1.0, "a pose is searched for without a mask")
@@ -174,6 +181,7 @@ class PoseSurveyEvidence:
             POSE_TOLERANCE_PX,
             math.nan,
             "the overlap",
+            least_share=SMALLEST_SHARE_UNROTATED if self.is_shift else SMALLEST_INLIER_SHARE,
         )
 
 
@@ -199,7 +207,10 @@ def confirm_pose(
     transform = windows.transform(pose)
     found = survey_pose(pair, transform, SAME_SHARE, scene.of_one_kind, context)
     factor = CHIPS_MEAN_OVER_SCATTER if scene.are_both_radar else None
-    evidence = PoseSurveyEvidence(found, factor)
+    moved = windows.pose(found.transform)
+    grid, shift = windows.reference_grid, Pose(shift_px=moved.shift_px)
+    is_shift = moved_px(moved, shift, (grid.height, grid.width)) <= POSE_TOLERANCE_PX
+    evidence = PoseSurveyEvidence(found, factor, is_shift)
     points = evidence.held_out
     verdict = replace(
         decide(evidence, "chips all over confirm it, and no other pose matches nearly as well"),
@@ -208,4 +219,4 @@ def confirm_pose(
         log10_chance=points.log10_chance,
     )
     # What the chips confirm is where they have moved it.
-    return verdict, windows.pose(found.transform) if verdict.accepted else pose
+    return verdict, moved if verdict.accepted else pose

@@ -9,6 +9,7 @@ from ...geometry.judging import (
     LARGEST_LOG10_CHANCE,
     LOG10_CHANCE_ON_GROUND,
     SMALLEST_INLIER_SHARE,
+    SMALLEST_SHARE_UNROTATED,
 )
 from ...geometry.robust import distances, find_consensus
 from ..evidence import AGREEMENT, RegistrationEvidence
@@ -33,7 +34,7 @@ def _by_chance(evidence: RegistrationEvidence | RefinementEvidence) -> str | Non
 
 def _few_agree(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
     points = evidence.held_out
-    if points.agreeing >= SMALLEST_INLIER_SHARE * points.total:
+    if points.agreeing >= points.least_share * points.total:
         return None
     return f"only {points.agreeing} of {points.total} {points.name} agree"
 
@@ -67,8 +68,9 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
     Rule(
         "small share of check points",
         AGREEMENT,
-        f"less than {SMALLEST_INLIER_SHARE:.0%} of the held-out points agree",
-        "suites simulated and real",
+        f"less than {SMALLEST_INLIER_SHARE:.0%} of the held-out points agree, or of a pose that "
+        f"neither rotates nor scales less than {SMALLEST_SHARE_UNROTATED:.0%}",
+        "suites simulated, real and attacks",
         "mask clouds and changes; give bands that show the same",
         _few_agree,
     ),
