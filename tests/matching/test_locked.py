@@ -122,6 +122,20 @@ def test_views_without_anything_drawn_have_none(
     assert locked is not None and not locked.sameness.is_evident
 
 
+@pytest.mark.parametrize(("off_m", "is_evident"), [(0.3, True), (0.6, False)])
+def test_a_transform_to_whole_pixels_is_evidence_itself(
+    tmp_path: Path, context: Context, off_m: float, is_evident: bool
+) -> None:
+    """By 0.03 pixels of 10 m, or 0.06: no two sensors' views match so exactly."""
+    images = sensed(1, 0.8), -sensed(2, 0.8, 9)
+    locked = looked_at(tmp_path, *images, context, shift_on_map(70.0 + off_m, -30.0))
+    assert locked is not None and locked.offset_px == (7, 3)
+    assert not locked.sameness.is_evident
+    assert locked.is_evident == is_evident
+    # What is masked then is around edges, whatever they look like.
+    assert (masked(tmp_path, locked).mean() > 0.1) == is_evident
+
+
 def test_one_sensors_views_of_one_ground_are_explained(tmp_path: Path, context: Context) -> None:
     """Most gradients are the same; so are reduced images where single pixels are not."""
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
