@@ -20,15 +20,11 @@ import numpy as np
 from groundtie.context import threads
 from groundtie.geometry.models import shift_model
 from groundtie.geometry.transform import Transform
-from groundtie.matching.locked import (
-    DRAWN_SHARPNESS,
-    LEAST_SHARPNESS,
-    Sameness,
-    find_locked_content,
-)
+from groundtie.matching.locked import find_locked_content
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
+from groundtie.similarity.in_common import DRAWN_SHARPNESS, LEAST_SHARPNESS, Sameness
 
 from .attacks.cases import AttackCase, all_scenes, cases
 from .attacks.catalogue import LOCKED

@@ -21,7 +21,7 @@ from groundtie.rasters.pair import Image as PairImage
 from groundtie.rasters.pair import make_pair
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import open_raster
-from groundtie.similarity.sameness import same_windows
+from groundtie.similarity.sameness import Windows
 from groundtie.similarity.surface import SimilaritySettings
 from scripts.drawing import (
     BLUE,
@@ -168,7 +168,7 @@ def survey(scenes: Scenes) -> Figure:
             cv2.putText(place, "ROAD", (at - 40, at + 30), cv2.FONT_HERSHEY_PLAIN, 1.6, 255.0, 2)
     patches = [Patch(place.astype(np.float32), np.ones(place.shape, bool)) for place in places]
     axes[1].imshow(np.hstack(places), cmap="gray")
-    same = np.hstack([same_windows(patches[0], patches[1])] * 2)
+    same = np.hstack([Windows.of(patches[0], patches[1]).same] * 2)
     axes[1].imshow(np.where(same, 1.0, np.nan), cmap="autumn", alpha=0.5)
     axes[1].set_title("two places, the same drawing", fontsize=9)
     return figure

@@ -9,11 +9,10 @@ from groundtie.rasters.patch import Patch
 from groundtie.similarity.sameness import (
     Edges,
     Gradients,
+    Windows,
     count_same,
     edges_apart_px,
     reduced,
-    related_windows,
-    same_windows,
     without,
 )
 
@@ -123,7 +122,7 @@ def test_windows_are_the_same_where_one_thing_is_drawn_into_both() -> None:
     drawn = 5 * texture(120, 120, 3)
     where = np.s_[40:80, 40:80]
     one[where], other[where] = drawn[where], drawn[where]
-    same = same_windows(patch(one), patch(other))
+    same = Windows.of(patch(one), patch(other)).same
     assert same[46:74, 46:74].all()
     outside = np.ones(same.shape, bool)
     outside[34:86, 34:86] = False
@@ -135,7 +134,7 @@ def test_noise_within_a_fifth_of_what_varies_leaves_windows_the_same() -> None:
     one = texture(120, 120)
     # The difference varies by 2 · 0.2² = 0.08 of what one varies, a 25th of both.
     other = one + 0.2 * rng.normal(size=one.shape)
-    assert same_windows(patch(one), patch(other)).mean() > 0.95
+    assert Windows.of(patch(one), patch(other)).same.mean() > 0.95
 
 
 @pytest.mark.parametrize(("gain", "noise", "least", "most"), [(-1.5, 0.3, 0.9, 1), (1, 2, 0, 0.1)])
@@ -146,11 +145,11 @@ def test_windows_are_related_as_far_as_one_explains_the_other(
     rng = np.random.default_rng(4)
     one = texture(120, 120)
     other = 50 + gain * one + noise * rng.normal(size=one.shape)
-    assert least <= related_windows(patch(one), patch(other)).mean() <= most
+    assert least <= Windows.of(patch(one), patch(other)).related.mean() <= most
 
 
 def test_windows_of_two_places_are_rarely_related() -> None:
-    related = related_windows(*(patch(texture(200, 200, seed)) for seed in (1, 2)))
+    related = Windows.of(*(patch(texture(200, 200, seed)) for seed in (1, 2))).related
     assert 0 < related.mean() < 0.25
 
 
@@ -159,7 +158,7 @@ def test_invalid_pixels_are_no_part_of_windows() -> None:
     spoilt = one.copy()
     hidden = np.s_[20:40, 20:40]
     spoilt[hidden] = 1e6
-    same = same_windows(patch(one), patch(spoilt, hidden))
+    same = Windows.of(patch(one), patch(spoilt, hidden)).same
     assert not same[hidden].any()
     assert same[:20].all()
 

@@ -88,24 +88,48 @@ def count_same(one: Gradients, other: Gradients, strong: tuple[float, float]) ->
     return int((is_strong & is_same).sum()), int(is_strong.sum())
 
 
-def same_windows(one: Patch, other: Patch) -> Mask:
-    """Return around which pixels two patches vary alike, shape (h, w)."""
-    valid = one.valid & other.valid
-    differing = _variance(one.values - other.values, valid)
-    both = _variance(one.values, valid) + _variance(other.values, valid)
-    return valid & (differing <= _DIFFERING_SHARE * both)
+@dataclass(frozen=True)
+class Windows:
+    """How two patches vary in windows around their pixels, each shape (h, w).
 
-
-def related_windows(one: Patch, other: Patch) -> Mask:
-    """Return around which pixels a linear function of one patch is half of the other, (h, w).
-
-    As in copies, also those in other colours.
+    Parameters
+    ----------
+    valid
+        Where both are.
+    one, other, differing
+        Variances of both, and of their difference.
     """
-    valid = one.valid & other.valid
-    own, others = _variance(one.values, valid), _variance(other.values, valid)
-    # cov(a, b) = (var(a + b) - var(a - b)) / 4
-    both = _variance(one.values + other.values, valid) - _variance(one.values - other.values, valid)
-    return valid & ((both / 4) ** 2 >= (1 - _DIFFERING_SHARE) * own * others)
+
+    valid: Mask
+    one: FloatImage
+    other: FloatImage
+    differing: FloatImage
+
+    @classmethod
+    def of(cls, one: Patch, other: Patch) -> Windows:
+        """Return the windows of two patches."""
+        valid = one.valid & other.valid
+        images = one.values, other.values, one.values - other.values
+        return cls(valid, *(_variance(image, valid) for image in images))
+
+    @property
+    def same(self) -> Mask:
+        """Around which pixels they vary alike."""
+        return self.valid & (self.differing <= _DIFFERING_SHARE * (self.one + self.other))
+
+    @property
+    def related(self) -> Mask:
+        """Around which pixels a linear function of one is half of the other.
+
+        As in copies, also those in other colours.
+        """
+        covariance = (self.one + self.other - self.differing) / 2
+        return self.valid & (covariance**2 >= (1 - _DIFFERING_SHARE) * self.one * self.other)
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """How many pixels are the same, related, and valid."""
+        return int(self.same.sum()), int(self.related.sum()), int(self.valid.sum())
 
 
 @dataclass(frozen=True)

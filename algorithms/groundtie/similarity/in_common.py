@@ -1,0 +1,250 @@
+"""How much two arrays have the same at an offset, by counts over all windows, and what it shows.
+
+What is counted in a window is in `sameness`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rasters.patch import Patch
+from ..rasters.reading import Mask
+from .sameness import (
+    WINDOW_PX,
+    Edges,
+    Gradients,
+    Windows,
+    count_same,
+    edges_apart_px,
+    reduced,
+    without,
+)
+
+FloatArray = NDArray[np.float64]
+
+# Gradients above this percentile of their image are strong.
+_STRONG_PERCENT = 70.0
+
+# Offsets at which gradients are the same by chance: so many, on a spiral around the found one.
+_CHANCE_OFFSETS = 8
+_FIRST_TURN_PX, _GOLDEN_ANGLE = 7.0, np.pi * (3 - np.sqrt(5))
+
+# So many times as many as by chance, and of gradients this share of the strong ones, are more than
+# two sensors show of one ground; what else they show is asked then. Gradients were measured on the
+# shared pairs at their true places: 0.7 to 2.9 % of different sensors and physics, up to 3.4 times
+# as many as by chance; 3.5 to 28 % of one sensor's. With content drawn into both: 3 to 43 %.
+_LEAST_RATIO, _LEAST_SHARE = 2.0, 0.03
+
+# What is drawn has its edges at one fraction of a pixel, in whatever colours: beyond chance, within
+# the first of the other's are so many times as many as from there to the second. Edges of one
+# ground are blurred by noise, light and physics. Suite sharpness: of different sensors and dates up
+# to 2.1, of different bands on one grid up to 2.45 (years apart) and 4.2 (one exposure).
+_SHARP_PX, _BLURRED_PX = 0.25, 0.5
+LEAST_SHARPNESS, DRAWN_SHARPNESS = 2.5, 5.0
+
+# The same of the area that varies alike: where holes or waters of one shape are cut into noise,
+# few gradients are the same. Different sensors' views: up to 17 %.
+_LEAST_AREA = 0.2
+
+# One sensor's views of one ground vary alike where nothing is drawn, too, on images that are so
+# much smaller. Measured as above: 25 % of what is left and more; of different ground 0 to 21 %, of
+# ground that was displaced up to 43 %, which is left to the rules on a second place. Less than a
+# tenth of the area shows nothing.
+_REDUCTION = 4
+_GROUND_SHARE = 0.23
+_LEAST_LEFT = 0.1
+
+# Shares differ, but by chance with 5 %, if they are so many standard errors apart.
+_STANDARD_ERRORS = 1.645
+
+# Nothing is left to be judged of copies: this share is the same, in the images and reduced ones.
+_COPY_SHARE = 0.75
+
+
+@dataclass(frozen=True)
+class Sameness:
+    """How much two arrays have the same at an offset of whole columns and rows.
+
+    Parameters
+    ----------
+    gradients, chance
+        Share of the strong gradients that are the same there, and at other offsets.
+    sharpness
+        How many times as many edges coincide there within a quarter of a pixel as between a
+        quarter and a half, each beyond those at other offsets; at least, as far as the latter are
+        known, but by chance with 5 %.
+    area, reduced_area
+        Share of the area that varies alike, in the images and in reduced ones.
+    ground
+        The latter, of what does not vary alike in the images.
+    windows
+        How many windows of the reduced images do not overlap.
+    related
+        Share of the area where one is half a linear function of the other, in the images or in
+        reduced ones, whichever is smaller.
+    """
+
+    gradients: float
+    chance: float
+    sharpness: float
+    area: float
+    reduced_area: float
+    ground: float
+    windows: float
+    related: float = 0.0
+
+    @property
+    def is_evident(self) -> bool:
+        """Whether more is the same than two views show of one ground."""
+        is_more = self.gradients >= max(_LEAST_RATIO * self.chance, _LEAST_SHARE)
+        return is_more or self.has_sharp_edges or self.area >= _LEAST_AREA
+
+    @property
+    def has_sharp_edges(self) -> bool:
+        """Whether edges coincide more sharply than those of one ground."""
+        return self.sharpness >= LEAST_SHARPNESS
+
+    @property
+    def is_finer_than_ground(self) -> bool:
+        """Whether less is the same on reduced images, but by chance with 5 %.
+
+        Ground is no less alike there, where noise has averaged out; noise that both have is.
+        """
+        error = np.sqrt(self.area * (1 - self.area) / max(self.windows, 1.0))
+        return bool(self.reduced_area < self.area - _STANDARD_ERRORS * error)
+
+    @property
+    def is_copy_in_other_colours(self) -> bool:
+        """Whether one image follows from the other nearly everywhere, as from its negative."""
+        return self.related >= _COPY_SHARE
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether one image is a copy of the other, or both are one sensor's views of one ground.
+
+        What is left of them need not confirm the transform, as copies leave nothing, and what one
+        sensor shows alike is most of what it shows.
+        """
+        if self.is_finer_than_ground:
+            return False
+        is_copy = min(self.area, self.reduced_area) >= _COPY_SHARE
+        return is_copy or self.ground >= _GROUND_SHARE
+
+
+_NO_WINDOWS = np.zeros((3, 3), int)
+
+
+@dataclass(frozen=True)
+class Look:
+    """What one window shows.
+
+    Parameters
+    ----------
+    gradients
+        Of the reference; of the input also what is around it.
+    edges
+        How many coincide, at each of `_offsets`, shape (k, 2).
+    windows
+        How many pixels are the same, related, and valid (see `Windows`): of the images, of reduced
+        ones, and of these without what is the same in the images, shape (3, 3).
+    """
+
+    gradients: tuple[Gradients, Gradients]
+    edges: NDArray[np.int_]
+    windows: NDArray[np.int_]
+
+    @classmethod
+    def of(cls, reference: Patch, input: Patch) -> Look:
+        whole = Windows.of(reference, input)
+        left = without(reference, whole.same), without(input, whole.same)
+        smaller, rest = _reduced(reference, input), _reduced(*left)
+        counts = np.array([windows.counts for windows in (whole, smaller, rest)])
+        inner = reference.inner(LOOK_REACH_PX)
+        gradients = Gradients.of(inner), Gradients.of(input)
+        return cls(gradients, _count_edges(reference, input), counts)
+
+    def same(self, shift: NDArray[np.int_], strong: tuple[float, float]) -> tuple[int, int]:
+        """Return how many strong gradients are the same at a shift of the input, and all."""
+        reference, input = self.gradients
+        col, row = (int(LOOK_REACH_PX + by) for by in shift)
+        return count_same(reference, input.part(col, row, reference.x.shape), strong)
+
+
+def sameness_of(looks: Sequence[Look]) -> Sameness:
+    """Return how much arrays have the same in windows all over them."""
+    own, others = ([look.gradients[k] for look in looks] for k in (0, 1))
+    strong = _strong(own), _strong(others)
+    same = [_share([one.same(shift, strong) for one in looks]) for shift in _offsets()]
+    chance = float(np.median(same[1:]))
+    counts = np.sum([one.edges for one in looks], axis=0)
+    sharpness = _sharpness(counts) if looks else 0.0
+    whole, smaller, left = np.sum([one.windows for one in looks], axis=0) if looks else _NO_WINDOWS
+    every = max(float(smaller[2]), 1.0)
+    area, related = (float(count / max(whole[2], 1)) for count in whole[:2])
+    return Sameness(
+        same[0],
+        chance,
+        sharpness,
+        area,
+        reduced_area=float(smaller[0] / every),
+        ground=float(left[0] / max(left[2], _LEAST_LEFT * every)),
+        windows=every / WINDOW_PX**2,
+        related=min(related, float(smaller[1] / every)),
+    )
+
+
+def _sharpness(counts: FloatArray) -> float:
+    """Return `Sameness.sharpness` of counts of edges, (sharp, less so) at each of `_offsets`."""
+    chance = counts[1:].mean(axis=0)
+    sharp, blurred = counts[0] - chance
+    # Of counts, which vary as much as they are many.
+    error = np.sqrt(counts[0, 1] + chance[1] / _CHANCE_OFFSETS + 1)
+    return float(sharp / (max(blurred, 0.0) + _STANDARD_ERRORS * error))
+
+
+def _count_edges(reference: Patch, input: Patch) -> NDArray[np.int_]:
+    """Return how many strong edges coincide sharply, and less so, at each of `_offsets`, (k, 2)."""
+    one, other = (Edges.of(patch).strongest for patch in (reference, input))
+    apart = edges_apart_px(one.inner(LOOK_REACH_PX), other, _offsets())
+    sharp = (apart < _SHARP_PX).sum(axis=1)
+    return np.column_stack([sharp, (apart < _BLURRED_PX).sum(axis=1) - sharp])
+
+
+def drawn_edges(reference: Patch, input: Patch) -> Mask:
+    """Return where edges coincide of which one at least is strong, shape (h, w)."""
+    one, other = Edges.of(reference), Edges.of(input)
+    drawn = np.zeros_like(one.found)
+    for edges, others in ((one, other.strongest), (one.strongest, other)):
+        drawn[edges.found] |= edges_apart_px(edges, others)[0] <= _BLURRED_PX
+    return drawn
+
+
+def _reduced(reference: Patch, input: Patch) -> Windows:
+    return Windows.of(reduced(reference, _REDUCTION), reduced(input, _REDUCTION))
+
+
+def _share(counts: list[tuple[int, int]]) -> float:
+    """Return the share of what is the same of all."""
+    same, every = np.sum(counts, axis=0) if counts else (0, 0)
+    return float(same / max(every, 1))
+
+
+def _strong(gradients: list[Gradients]) -> float:
+    """Return the length from which gradients of an image are strong."""
+    lengths = [one.length[one.valid] for one in gradients if one.valid.any()]
+    return float(np.percentile(np.concatenate(lengths), _STRONG_PERCENT)) if lengths else 0.0
+
+
+def _offsets() -> NDArray[np.int_]:
+    """Return none, and offsets (x, y) on a spiral around it, shape (n, 2)."""
+    steps = np.arange(_CHANCE_OFFSETS)
+    angle, length = steps * _GOLDEN_ANGLE, _FIRST_TURN_PX + 2 * steps
+    spiral = np.rint(np.column_stack([length * np.cos(angle), length * np.sin(angle)]))
+    return np.vstack([[0, 0], spiral]).astype(int)
+
+
+LOOK_REACH_PX = int(np.abs(_offsets()).max())
