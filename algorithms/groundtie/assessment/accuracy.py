@@ -122,4 +122,4 @@ class AssessmentEvidence:
         """How the points agree; nothing is known of chance and of the model's spread."""
         used, count = int(self.points.used.sum()), len(self.points)
         rmse = self.points.in_pixels.rmse
-        return HeldOut(self.name, used, count, math.nan, math.nan, rmse, self.max_error_px, 0.0, "")
+        return HeldOut(self.name, used, count, math.nan, rmse, self.max_error_px, 0.0, "")

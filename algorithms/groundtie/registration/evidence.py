@@ -22,7 +22,6 @@ from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.estimation import Estimate
 from ..geometry.judging import (
     CE90_FACTOR,
-    LARGEST_LOG10_CHANCE,
     SMALLEST_INLIER_SHARE,
     TOLERANCE_PX,
     sigma_range_px,
@@ -74,8 +73,6 @@ class HeldOut:
         How many agree with the model, and how many there are.
     log10_chance
         log10 of the probability that random matches would agree as well.
-    largest_log10_chance
-        The largest that is accepted.
     rmse_px
         Root mean square error of inliers.
     max_error_px
@@ -94,7 +91,6 @@ class HeldOut:
     agreeing: int
     total: int
     log10_chance: float
-    largest_log10_chance: float
     rmse_px: float
     max_error_px: float
     spread_px: float
@@ -124,8 +120,6 @@ class RegistrationEvidence:
         Largest root mean square error at check points, in matching pixels.
     radius_px
         Radius of the search for check points.
-    largest_log10_chance
-        Largest log10 of the probability that random matches would agree as well.
     ground_shift_px
         How far off the ground alone matches better, where it did not take part alone in the fit.
     is_ground_checked
@@ -152,7 +146,6 @@ class RegistrationEvidence:
     grid: Grid
     max_error_px: float
     radius_px: int
-    largest_log10_chance: float = LARGEST_LOG10_CHANCE
     tries: int = 1
     ground_shift_px: float = 0.0
     is_ground_checked: bool = False
@@ -202,7 +195,6 @@ class RegistrationEvidence:
             agreeing,
             len(self.check),
             min(log10_chance(agreeing, len(self.check), probability) + math.log10(self.tries), 0.0),
-            self.largest_log10_chance,
             mixture.sigma * math.sqrt(2),
             self.max_error_px,
             float(np.sqrt(np.mean(self.estimate.spread_px(lattice) ** 2))),

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from ..geometry.chance import log10_false_alarms
-from ..geometry.judging import LARGEST_LOG10_CHANCE, TOLERANCE_PX
+from ..geometry.judging import LOG10_SIGNIFICANCE, TOLERANCE_PX
 from ..rasters.grid import FloatArray
 
 # Points lie on a line if they are no further from it, in matching pixels.
@@ -53,7 +53,7 @@ def count_on_line(residuals_px: FloatArray, radius_px: int) -> int:
     # The longest such strip runs from corner to corner of the search window.
     probability = min(math.sqrt(2) * 2 * _LINE_PX / (2 * radius_px + 1), 1.0)
     alarms = log10_false_alarms(most, len(far), probability, 1)
-    return most if alarms <= LARGEST_LOG10_CHANCE else 0
+    return most if alarms <= LOG10_SIGNIFICANCE else 0
 
 
 def scatter_along_line_px(residuals_px: FloatArray) -> float:
@@ -64,7 +64,7 @@ def scatter_along_line_px(residuals_px: FloatArray) -> float:
 def scatter_along_line(
     residuals_px: FloatArray,
     weights: FloatArray | None = None,
-    largest_log10_chance: float = LARGEST_LOG10_CHANCE,
+    log10_significance: float = LOG10_SIGNIFICANCE,
 ) -> FloatArray:
     """Return what residuals scatter by along a line beyond what they do across it.
 
@@ -77,7 +77,7 @@ def scatter_along_line(
         Shape (n, 2).
     weights
         Their probabilities to be inliers, shape (n,); None: they are.
-    largest_log10_chance
+    log10_significance
         log10 of the largest probability that residuals without a direction would scatter so.
 
     Returns
@@ -91,6 +91,6 @@ def scatter_along_line(
         return np.zeros(2)
     (across, along), axes = np.linalg.eigh(np.cov(residuals_px.T, aweights=each))
     sphericity = across * along / max(((across + along) / 2) ** 2, 1e-12)
-    if (count - 2) / 2 * math.log10(max(sphericity, 1e-12)) > largest_log10_chance:
+    if (count - 2) / 2 * math.log10(max(sphericity, 1e-12)) > log10_significance:
         return np.zeros(2)
     return np.asarray(math.sqrt(along - across) * axes[:, 1])

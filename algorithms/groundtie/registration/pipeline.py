@@ -13,7 +13,6 @@ from ..context import Context
 from ..errors import NothingFoundError, TooFewPointsError
 from ..features.presets import optical_keypoints, sar_keypoints
 from ..geometry.estimation import Estimate
-from ..geometry.judging import LARGEST_LOG10_CHANCE, LOG10_CHANCE_ON_GROUND
 from ..geometry.models import TERRAIN, Model
 from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
 from ..matching.bands import BandSurvey, survey_bands
@@ -198,9 +197,7 @@ class Stages:
         scene: SceneInfo,
     ) -> RegistrationEvidence:
         """Return what the rules look at."""
-        is_pooled = isinstance(self.checker, PooledHistogramMatcher)
         is_apart = self.checker is not self.matcher
-        chance = LOG10_CHANCE_ON_GROUND if is_pooled else LARGEST_LOG10_CHANCE
         is_radar = self.spec.radar == BOTH or scene.are_both_radar
         factor = (
             KEYPOINTS_MEAN_OVER_SCATTER
@@ -213,7 +210,6 @@ class Stages:
             self.masked.pair.grid,
             self.spec.max_error_px,
             CHECK_RADIUS_PX,
-            chance,
             self.spec.tries,
             check.common_shift_px if is_apart else 0.0,
             is_apart,

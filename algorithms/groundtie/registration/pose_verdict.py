@@ -12,7 +12,6 @@ import numpy as np
 from ..context import Context
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.judging import (
-    LARGEST_LOG10_CHANCE,
     SMALLEST_INLIER_SHARE,
     SMALLEST_SHARE_UNROTATED,
 )
@@ -176,7 +175,6 @@ class PoseSurveyEvidence:
             agreeing,
             total,
             min(log10_chance(agreeing, total, probability), 0.0),
-            LARGEST_LOG10_CHANCE,
             float(np.sqrt(np.mean(errors**2))) if agreeing else math.nan,
             POSE_TOLERANCE_PX,
             math.nan,

@@ -13,7 +13,6 @@ from ..geometry.accuracy import CheckResiduals, predict_accuracy
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.judging import (
     FEWEST_CHECK_POINTS,
-    LARGEST_LOG10_CHANCE,
     TOLERANCE_PX,
     sigma_range_px,
 )
@@ -135,7 +134,6 @@ class RefinementEvidence:
             agreeing,
             len(after),
             log10_chance(agreeing, len(after), agreement_probability(tolerance, reach)),
-            LARGEST_LOG10_CHANCE,
             mixture.sigma * math.sqrt(2),
             max_error_px,
             _spread_px(adjustment, nodes_px),

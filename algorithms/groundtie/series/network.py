@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 from scipy.special import chdtri  # scipy.stats takes 0.4 s to import
 
-from ..geometry.judging import LARGEST_LOG10_CHANCE
+from ..geometry.judging import LOG10_SIGNIFICANCE
 from ..rasters.reading import Mask
 from .frame import PARAMETERS, SHIFT_PX, FloatArray, SeriesFrame
 
@@ -61,7 +61,7 @@ def degrees_of_freedom(links: Sequence[Link]) -> int:
 
 def largest_statistic(links: Sequence[Link]) -> float:
     """Return the squared normalised length that links exceed by chance once in a thousand times."""
-    return float(chdtri(degrees_of_freedom(links), 10**LARGEST_LOG10_CHANCE))
+    return float(chdtri(degrees_of_freedom(links), 10**LOG10_SIGNIFICANCE))
 
 
 @dataclass(frozen=True)

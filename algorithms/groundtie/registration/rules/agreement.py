@@ -7,7 +7,6 @@ import numpy as np
 from ...geometry.judging import (
     FEWEST_CHECK_POINTS,
     LARGEST_LOG10_CHANCE,
-    LOG10_CHANCE_ON_GROUND,
     SMALLEST_INLIER_SHARE,
     SMALLEST_SHARE_UNROTATED,
 )
@@ -26,7 +25,7 @@ _RIVAL_SHARE = 1.25
 
 def _by_chance(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
     points = evidence.held_out
-    is_chance = points.log10_chance > points.largest_log10_chance
+    is_chance = points.log10_chance > LARGEST_LOG10_CHANCE
     if not is_chance and points.agreeing >= FEWEST_CHECK_POINTS:
         return None
     return f"{points.agreeing} of {points.total} {points.name} agree, as they may by chance"
@@ -59,9 +58,8 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
         "chance agreement",
         AGREEMENT,
         f"fewer than {FEWEST_CHECK_POINTS} held-out points agree, or as many as agree would by "
-        f"chance with a probability above 10^{LARGEST_LOG10_CHANCE:.0f} "
-        f"(10^{LOG10_CHANCE_ON_GROUND:.0f} where the ground of a dense town was matched)",
-        "[Moisan2004]; suites crossings and city",
+        f"chance with a probability above 10^{LARGEST_LOG10_CHANCE:.0f}",
+        "[Moisan2004]; suites crossings, city and attacks",
         "give a larger part of the scene: more check points then confirm it",
         _by_chance,
     ),
