@@ -19,7 +19,7 @@ from raster_files import utm_grid, write_raster
 
 import groundtie
 from groundtie.cli import main
-from groundtie.errors import ParameterError
+from groundtie.errors import ParameterError, SameFileError
 
 # Of Debian 12's tornado, by Dask's own client.
 pytestmark = pytest.mark.filterwarnings("ignore:make_current is deprecated:DeprecationWarning")
@@ -145,6 +145,13 @@ def test_a_scheduler_that_is_not_there_is_one_line(
         "groundtie: error: no Dask scheduler answers at tcp://127.0.0.1:9\n",
     )
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_table_that_is_refused_leaves_no_folder(images: Path, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"input,output\n{images}/0.tif,a/x.tif\n{images}/1.tif,a/x.tif")
+    with pytest.raises(SameFileError, match="both write"):
+        groundtie.batch("filter_speckle", tmp_path / "t.csv", tmp_path / "new" / "out")
+    assert [path.name for path in tmp_path.iterdir()] == ["t.csv"]
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from ..declaration import Parameter, Tool
 from ..errors import GroundTieError, OutputError, ParameterError, SameFileError
 from ..kinds import Flag, FolderOut, InputKind, OutputKind, RastersIn, Text
 from ..raster_names import raster_name
-from ..rasters.atomic import writing
+from ..rasters.atomic import make_folder
 from ..runs import digest
 
 # The column that is no parameter.
@@ -98,9 +98,9 @@ def _call(
     values = {p.name: _value(p, row.get(p.name), name, inputs, outputs) for p in tool.parameters}
     for parameter in tool.parameters:
         path = values[parameter.name]
-        if path is not None and isinstance(parameter.kind, OutputKind):
-            with writing(path):
-                Path(path).parent.mkdir(parents=True, exist_ok=True)
+        # Not by the rows: one that fails must not remove what another one is about to use.
+        if path is not None and _is_output(parameter):
+            make_folder(Path(path).parent)
     checked = tool.check(values)
     written = {p.name: checked[p.name] for p in tool.parameters if _is_output(p)}
     written = {key: path for key, path in written.items() if path is not None}

@@ -57,7 +57,7 @@ class SeriesFiles:
         """
         if not series.registered:
             self._write_refusal(series)
-            forget_unfinished(self.folder, had_folder=stored.had_folder)
+            forget_unfinished(self.folder)
             raise _refusal(series)
         make_folder(self.folder)
         with Outputs() as outputs:
@@ -68,7 +68,7 @@ class SeriesFiles:
             # Last: who finds it finds all that it is about.
             self._write_report(series, outputs)
         self._remove_stale(series, stored)
-        forget_unfinished(self.folder, had_folder=stored.had_folder)
+        forget_unfinished(self.folder)
         return series
 
     def raster_key(self, date: SeriesDate, series: Series) -> str:
