@@ -355,5 +355,5 @@ def test_a_batch_tells_its_failed_rows_and_goes_on(provider: Any, tmp_path: Path
     results, finished = run(provider.algorithm("batch").create(), values, feedback)
     assert finished
     assert (results["DONE"], results["FAILED"]) == (1, 1)
-    assert results["TABLE_OF_RESULTS"] == str(tmp_path / "out/t.results.csv")
+    assert results["TABLE_OF_RESULTS"] == str(tmp_path / "out/t.csv.results.csv")
     assert "row 2 (2) failed: cannot read" in feedback.textLog()

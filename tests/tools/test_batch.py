@@ -9,6 +9,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -115,7 +116,7 @@ def test_a_worker_that_is_killed_loses_nothing(
 ) -> None:
     pytest.importorskip("distributed", reason="the extra cluster is not installed")
     with cluster() as found:
-        log = tmp_path / "t.log.jsonl"
+        log = tmp_path / "t.csv.log.jsonl"
 
         def kill() -> None:
             while not log.exists():
@@ -147,6 +148,27 @@ def test_a_scheduler_that_is_not_there_is_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_tables_that_differ_by_their_endings_have_results_of_their_own(
+    images: Path, tmp_path: Path
+) -> None:
+    values = {"input": str(images / "0.tif"), "window": 5}
+    (tmp_path / "b.csv").write_text(",".join(values) + "\n" + ",".join(map(str, values.values())))
+    (tmp_path / "b.json").write_text(json.dumps([{**values, "output": "of_json.tif"}]))
+    for resume in (False, True):
+        for table, output in (("b.csv", "1.tif"), ("b.json", "of_json.tif")):
+            with ThreadPoolExecutor(1) as executor:
+                result = groundtie.batch(
+                    "filter_speckle", tmp_path / table, resume=resume, executor=executor
+                )
+            assert [row.resumed for row in result.rows] == [resume]
+            assert result.rows[0].outputs() == {"output": str(tmp_path / output)}
+    for table, output in (("b.csv", "1.tif"), ("b.json", "of_json.tif")):
+        written = json.loads((tmp_path / f"{table}.results.json").read_text())
+        assert written["rows"][0]["outputs"] == {"output": str(tmp_path / output)}
+        with (tmp_path / f"{table}.results.csv").open(newline="") as file:
+            assert [row["output"] for row in csv.DictReader(file)] == [str(tmp_path / output)]
+
+
 def test_a_table_that_is_refused_leaves_no_folder(images: Path, tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text(f"input,output\n{images}/0.tif,a/x.tif\n{images}/1.tif,a/x.tif")
     with pytest.raises(SameFileError, match="both write"):
@@ -158,14 +180,14 @@ def test_a_table_that_is_refused_leaves_no_folder(images: Path, tmp_path: Path) 
 def test_the_summary_lies_beside_the_table_by_default(images: Path, tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("input\nnone.tif\n")
     assert main(["batch", "filter-speckle", str(tmp_path / "t.csv"), "--workers", "1"]) == 2
-    with (tmp_path / "t.results.csv").open(newline="") as file:
+    with (tmp_path / "t.csv.results.csv").open(newline="") as file:
         (row,) = csv.DictReader(file)
     assert row["status"] == "failed" and str(tmp_path / "none.tif") in row["message"]
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "t.csv",
-        "t.log.jsonl",
-        "t.results.csv",
-        "t.results.json",
+        "t.csv.log.jsonl",
+        "t.csv.results.csv",
+        "t.csv.results.json",
     ]
 
 

@@ -97,8 +97,8 @@ class Batch:
                 tool,
                 [BatchRow(call, ended[call.row], call.row in resumed) for call in calls],
                 time.monotonic() - started,
-                folder / f"{self.table.stem}.results.csv",
-                folder / f"{self.table.stem}.results.json",
+                folder / f"{self.table.name}.results.csv",
+                folder / f"{self.table.name}.results.json",
                 Path(os.path.abspath(self.log)),
             )
             counts = {status: result.count(status) for status in ("done", "refused", "failed")}
