@@ -1,4 +1,4 @@
-"""The call of a tool that is running: the id that all its files carry, and the folders it made.
+"""The call of a tool that is running: the id that all its files carry, and what it has made.
 
 The id stands for what decides what they hold: tool, version, parameters, and name, size and time of
 the files that are read. The same call on the same files has the same id, with any number of
@@ -24,27 +24,41 @@ RUN = "run"
 
 
 @dataclass(frozen=True)
-class _Call:
+class RunningCall:
+    """A call that is running.
+
+    Parameters
+    ----------
+    run
+        Its id.
+    folders
+        Those that it made, each after that which it lies in.
+    files
+        Those that it wrote, and those of an earlier call that it left as they are.
+    """
+
     run: str
     folders: list[Path] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
 
 
-_current: ContextVar[_Call | None] = ContextVar("groundtie_call", default=None)
+_current: ContextVar[RunningCall | None] = ContextVar("groundtie_call", default=None)
 
 
 @contextmanager
-def running(run: str) -> Iterator[None]:
+def running(run: str) -> Iterator[RunningCall]:
     """Let what is written carry an id, and no folder stay that was made and is empty at the end.
 
     A step of a call that has an id is a part of that call.
     """
-    if _current.get() is not None:
-        yield
+    outer = _current.get()
+    if outer is not None:
+        yield outer
         return
-    call = _Call(run)
+    call = RunningCall(run)
     token = _current.set(call)
     try:
-        yield
+        yield call
     finally:
         _current.reset(token)
         for folder in reversed(call.folders):
@@ -58,6 +72,13 @@ def will_make(folder: Path) -> None:
     if call is not None:
         above = [Path(folder), *Path(folder).absolute().parents]
         call.folders.extend(reversed([one for one in above if not one.exists()]))
+
+
+def has_written(*files: Path) -> None:
+    """Note that the running call has written files, or takes them over from an earlier one."""
+    call = _current.get()
+    if call is not None:
+        call.files.extend(files)
 
 
 def run_of_call(tool: str, inputs: Mapping[str, Any]) -> str:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from assessed_files import written_files
 from loopback_cluster import Cluster, cluster
 from noise_pairs import write_pair
 from raster_files import utm_grid, write_raster
@@ -167,6 +168,40 @@ def test_tables_that_differ_by_their_endings_have_results_of_their_own(
         assert written["rows"][0]["outputs"] == {"output": str(tmp_path / output)}
         with (tmp_path / f"{table}.results.csv").open(newline="") as file:
             assert [row["output"] for row in csv.DictReader(file)] == [str(tmp_path / output)]
+
+
+def resumed(table: Path) -> tuple[list[str], list[bool]]:
+    """Resume a batch; return how its rows ended, and which of them did not run."""
+    tool = "assess" if table.stem == "assess" else "simulate"
+    with ThreadPoolExecutor(1) as executor:
+        found = groundtie.batch(tool, table, resume=True, executor=executor)
+    return [row.outcome.status for row in found.rows], [row.resumed for row in found.rows]
+
+
+@pytest.mark.parametrize("gone", ["in/2.json", "in/2.html"])
+def test_a_report_without_its_numbers_is_written_again(tmp_path: Path, gone: str) -> None:
+    files = written_files(tmp_path)
+    table = files.path("assess.csv")
+    rows = ["max_error", "5", "0.1"]  # of which the points are 0.5 px off
+    columns = ["transform,check_points,report", *["t.json,check.csv,{name}.html"] * 2]
+    lines = [",".join(cells) for cells in zip(columns, rows, strict=True)]
+    table.write_text("\n".join(lines))
+    assert resumed(table) == (["done", "refused"], [False, False])
+    assert resumed(table) == (["done", "refused"], [True, True])
+    (tmp_path / gone).unlink()
+    assert resumed(table) == (["done", "refused"], [True, False])
+    assert (tmp_path / gone).is_file()
+
+
+def test_a_folder_from_which_a_file_is_gone_is_written_again(tmp_path: Path) -> None:
+    table = tmp_path / "pairs.csv"
+    table.write_text("size,seed\n80,1\n80,2")
+    assert resumed(table)[1] == [False, False]
+    assert resumed(table)[1] == [True, True]
+    (tmp_path / "2" / "dsm.tif").unlink()
+    (tmp_path / "1" / "notes.txt").touch()  # which no row wrote
+    assert resumed(table) == (["done", "done"], [True, False])
+    assert (tmp_path / "2" / "dsm.tif").is_file()
 
 
 def test_a_table_that_is_refused_leaves_no_folder(images: Path, tmp_path: Path) -> None:

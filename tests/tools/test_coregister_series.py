@@ -29,6 +29,7 @@ from groundtie.cli import main
 from groundtie.errors import NotRegisteredError
 from groundtie.geometry.transform import Transform
 from groundtie.progress import Progress
+from groundtie.runs import running
 from groundtie.series.series import Series
 from groundtie.stac_items import read_items
 from groundtie.tools.coregister_series import coregister_series
@@ -187,9 +188,14 @@ def test_a_further_date_is_registered_alone(run: Run, tmp_path: Path) -> None:
 def test_the_same_call_does_nothing_again(run: Run, tmp_path: Path) -> None:
     folder = tmp_path / "out"
     shutil.copytree(run.folder, folder)
-    result = coregister_series(folder, [run.dates.folder], reference=run.dates.files[0], **OPTIONS)
+    with running("a batch's row") as call:
+        result = coregister_series(
+            folder, [run.dates.folder], reference=run.dates.files[0], **OPTIONS
+        )
     assert result.registered_pairs == 0
     assert result.rows() == run.result.rows()
+    # A batch resumes by these, whichever call wrote them.
+    assert {path.name for path in call.files} == set(listing(folder))
 
 
 @pytest.mark.slow

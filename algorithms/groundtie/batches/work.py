@@ -15,6 +15,7 @@ from ..declaration import Tool
 from ..errors import CancelledError, GroundTieError, NotRegisteredError
 from ..executors import enter_worker, stop_requested
 from ..progress import Progress
+from ..runs import running
 from ..version import __version__
 
 DONE, REFUSED, FAILED = "done", "refused", "failed"
@@ -86,11 +87,12 @@ class Task:
         enter_worker()
         started = time.perf_counter()
         result: Mapping[str, Any] = {}
+        written: list[Path] = []
         status, message, trace = FAILED, "", ""
         try:
             if self.version != __version__:
                 raise GroundTieError(f"the worker has GroundTie {__version__}, not {self.version}")
-            result = self._call()
+            result = self._call(written)
             status = DONE
         except CancelledError:
             raise
@@ -103,13 +105,23 @@ class Task:
             message = bug(error)
             trace = traceback.format_exc()
         seconds = time.perf_counter() - started
-        return Outcome(status, message, seconds, result, files_of(self.outputs), trace)
+        files = files_of((*self.outputs, *written))
+        return Outcome(status, message, seconds, result, files, trace)
 
-    def _call(self) -> dict[str, Any]:
-        progress = Progress(is_cancelled=stop_requested)
-        run = self.load(self.tool).run
+    def _call(self, written: list[Path]) -> dict[str, Any]:
+        """Run the tool, return its summary, and add what it writes to a list."""
+        tool = self.load(self.tool)
+
+        def run() -> dict[str, Any]:
+            with running(tool.run_of_call(self.values)) as call:
+                try:
+                    progress = Progress(is_cancelled=stop_requested)
+                    return tool.run(**self.values, progress=progress).summary()
+                finally:
+                    written.extend(call.files)
+
         # A context of its own: files carry the id of this call (see `runs`), on any executor.
-        return Context().run(lambda: run(**self.values, progress=progress).summary())
+        return Context().run(run)
 
 
 def bug(error: Exception) -> str:

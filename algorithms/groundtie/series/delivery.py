@@ -18,7 +18,7 @@ from ..rasters.reading import open_raster
 from ..registration.registered_output import UNTOUCHED_TOLERANCE_PX, RegisteredOutput
 from ..registration.verdict import Verdict
 from ..report.stac import stac_item
-from ..runs import RUN, digest, run_tags
+from ..runs import RUN, digest, has_written, run_tags
 from ..version import __version__
 from .dates import file_facts
 from .frame import FloatArray, sigma_px
@@ -108,6 +108,7 @@ class SeriesFiles:
             moved = one.transform(before.transform.inverse(corners)) - corners
             # What untouched pixels may be wrong by, too.
             if np.hypot(*moved.T).max() < UNTOUCHED_TOLERANCE_PX:
+                has_written(self.folder / before.file)
                 known = {"file": before.file, "key": key, "run": before.run}
                 with open_raster(self.folder / before.file) as source:
                     return replace(one, transform=before.transform), known, source.grid
