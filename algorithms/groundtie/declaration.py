@@ -15,8 +15,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
+from .call_paths import check_different, check_paths
 from .errors import MemoryLimitError, ParameterError
-from .kinds import FolderOut, Kind, OutputKind, RasterIn, check_different, check_paths
+from .kinds import FolderOut, Kind, OutputKind, RasterIn
 from .runs import run_of_call, running
 
 

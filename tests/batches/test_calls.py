@@ -112,6 +112,19 @@ def test_the_key_stands_for_files_parameters_and_outputs(folders: tuple[Path, Pa
     assert key() != first
 
 
+def test_what_lies_beside_an_output_is_no_other_rows(folders: tuple[Path, Path]) -> None:
+    pair = {"reference": "a.tif", "input": "b.tif"}
+    rows = [{**pair, "report": "r.html"}, {**pair, "transform": "r.json"}]
+    with pytest.raises(SameFileError, match="rows 1 and 2 both write"):
+        make_calls(load_tool("coregister"), rows, *folders, 1)
+
+
+def test_what_a_series_writes_is_no_input_of_another(folders: tuple[Path, Path]) -> None:
+    rows = [{"inputs": "a.tif;b.tif"}, {"inputs": [str(folders[1] / "1/series.json")]}]
+    with pytest.raises(OutputError, match="row 1 would write what row 2 reads"):
+        make_calls(load_tool("coregister_series"), rows, *folders, 1)
+
+
 def test_several_inputs_are_a_list_or_one_cell(folders: tuple[Path, Path]) -> None:
     series = load_tool("coregister_series")
     rows = [{"inputs": "a.tif;b.tif"}, {"inputs": ["a.tif", "b.tif"], "name": "again"}]

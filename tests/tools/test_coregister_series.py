@@ -352,7 +352,7 @@ def test_a_refused_series_keeps_no_registrations(tmp_path: Path) -> None:
         (["{out}", "{dates}", "--reference", "{dates}/none.tif"], "there is no file"),
         (["{out}", "{dates}", "--reference-mask", "{one}"], "needs a reference"),
         (["{out}", "{dates}", "--model", "affine", "--output-grid", "untouched"], "translation"),
-        (["{out}", "{dates}", "--report", "{out}/series.html"], "would be written over"),
+        (["{out}", "{dates}", "--report", "{out}/series.html"], "--report would also write"),
         (["{out}", "{dates}", "--report", "{dates}/none/a.html"], "folder of"),
         (["{other}", "{dates}"], "is no series that can be continued"),
         (["{out}"], "Missing argument"),

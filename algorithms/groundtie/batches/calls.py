@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from ..call_paths import inputs_of
 from ..declaration import Parameter, Tool
 from ..errors import GroundTieError, OutputError, ParameterError, SameFileError
 from ..kinds import Flag, FolderOut, InputKind, OutputKind, RastersIn, Text
@@ -152,17 +154,25 @@ def _output(parameter: Parameter, value: Any, name: str, folder: Path) -> Path |
     return folder / value.replace("{name}", name)
 
 
+def _files(tool: Tool, call: Call) -> Iterator[Path]:
+    """Yield all that a call writes, also what lies beside its outputs."""
+    for name, path in call.outputs.items():
+        kind = tool.parameter(name).kind
+        assert isinstance(kind, (OutputKind, FolderOut))
+        yield from (path, *kind.also_written(path))
+
+
 def _check_apart(tool: Tool, calls: Sequence[Call]) -> None:
     """Raise if what a row writes is read or written by another: rows run in any order."""
     writers: dict[Path, Call] = {}
     for call in calls:
-        for path in call.outputs.values():
+        for path in _files(tool, call):
             other = writers.setdefault(path.resolve(), call)
             if other is not call:
                 raise SameFileError(f"rows {other.row} and {call.row} both write {path}")
-    inputs = [p.name for p in tool.parameters if isinstance(p.kind, InputKind)]
     for call in calls:
-        for value in (call.values.get(name) for name in inputs):
+        read = [inputs_of(p.kind, call.values.get(p.name)) for p in tool.parameters]
+        for value in chain.from_iterable(read):
             if isinstance(value, Path) and (writer := writers.get(value.resolve())) is not None:
                 raise OutputError(
                     f"row {writer.row} would write what row {call.row} reads: {value}"
