@@ -28,7 +28,9 @@ class Kind:
     `advanced` parameters are folded away in dialogs; `option` makes a required parameter an
     option with a name on the command line instead of a positional argument. One that is
     `optional_in_python` is required by the command line and QGIS, which can only write files;
-    Python's callers may leave it out (its default is None) and go on with what is returned.
+    Python's callers may leave it out (its default is None) and go on with what is returned. What
+    is `common` means the same for all tools and decides no result: it is none of a tool's own
+    parameters; the command line takes it before the tool's name, too, and QGIS has a setting.
     """
 
     label: str
@@ -36,6 +38,7 @@ class Kind:
     advanced: bool = False
     option: bool = False
     optional_in_python: bool = False
+    common: bool = False
 
     def check(self, name: str, value: Any) -> Any:
         """Return `value` in the type that tools work with, or raise `ParameterError`."""

@@ -55,6 +55,11 @@ def test_flags_are_words(folders: tuple[Path, Path], word: Any, value: bool) -> 
     assert call.values["careful"] is value
 
 
+def test_workers_are_those_of_the_row(folders: tuple[Path, Path]) -> None:
+    first, second = make_calls(TOY, [ROW, {**ROW, "workers": 2}], *folders, 5)
+    assert (first.values["workers"], second.values["workers"]) == (5, 2)
+
+
 def test_a_number_may_stand_for_a_text(folders: tuple[Path, Path]) -> None:
     (call,) = calls_of(folders, {**ROW, "title": 7})
     assert call.values["title"] == "7"

@@ -95,6 +95,24 @@ class TestRun:
         assert "accepted" in log
         assert "size 3.0" in log
 
+    @pytest.mark.parametrize(("most", "workers"), [(-1, None), (1, 1), (400, 9)])
+    def test_threads_are_those_of_the_settings(
+        self,
+        algorithm: Any,
+        values: dict[str, Any],
+        monkeypatch: pytest.MonkeyPatch,
+        most: int,
+        workers: int | None,
+    ) -> None:
+        from qgis.core import QgsApplication
+
+        before = QgsApplication.maxThreads()
+        try:
+            QgsApplication.setMaxThreads(most)
+            assert called_with(algorithm, values, monkeypatch)["workers"] == workers
+        finally:
+            QgsApplication.setMaxThreads(before)
+
     def test_all_values_arrive(
         self,
         algorithm: Any,

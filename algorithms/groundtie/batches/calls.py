@@ -77,7 +77,7 @@ def make_calls(
     SameFileError
         A row writes what another one reads or writes.
     """
-    known = {parameter.name for parameter in tool.parameters}
+    known = {parameter.name for parameter in tool.all_parameters}
     for name in {name: None for row in rows for name in row}:
         if name not in known and name != NAME:
             raise ParameterError(f"the table has a column {name}, which {tool.name} does not know")
@@ -97,7 +97,9 @@ def make_calls(
 def _call(
     tool: Tool, number: int, name: str, row: Mapping[str, Any], inputs: Path, outputs: Path
 ) -> Call:
-    values = {p.name: _value(p, row.get(p.name), name, inputs, outputs) for p in tool.parameters}
+    values = {
+        p.name: _value(p, row.get(p.name), name, inputs, outputs) for p in tool.all_parameters
+    }
     for parameter in tool.parameters:
         path = values[parameter.name]
         # Not by the rows: one that fails must not remove what another one is about to use.
