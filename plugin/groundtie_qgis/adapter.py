@@ -198,7 +198,7 @@ def _setting(parameter: Any) -> int | None:
     if parameter.name != "workers":
         return None
     most = QgsApplication.maxThreads()
-    return min(most, parameter.kind.maximum) if most > 0 else None
+    return most if most > 0 else None
 
 
 def _progress(feedback: QgsProcessingFeedback) -> Any:
