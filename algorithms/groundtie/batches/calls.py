@@ -104,7 +104,7 @@ def _call(
         path = values[parameter.name]
         # Not by the rows: one that fails must not remove what another one is about to use.
         if path is not None and _is_output(parameter):
-            make_folder(Path(path).parent)
+            make_folder(path.parent)
     checked = tool.check(values)
     written = {p.name: checked[p.name] for p in tool.parameters if _is_output(p)}
     written = {key: path for key, path in written.items() if path is not None}

@@ -20,6 +20,9 @@ from ..version import __version__
 
 DONE, REFUSED, FAILED = "done", "refused", "failed"
 
+# What the command line of a single call ends with, the worst last.
+EXIT_CODES = {DONE: 0, REFUSED: NotRegisteredError.exit_code, FAILED: GroundTieError.exit_code}
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -51,9 +54,7 @@ class Outcome:
     @property
     def exit_code(self) -> int:
         """What the command line of this one call would have ended with."""
-        return {DONE: 0, REFUSED: NotRegisteredError.exit_code}.get(
-            self.status, GroundTieError.exit_code
-        )
+        return EXIT_CODES[self.status]
 
     def summary(self) -> dict[str, Any]:
         """Return it as values that JSON can carry."""

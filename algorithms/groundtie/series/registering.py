@@ -14,7 +14,7 @@ from ..errors import WorkerLostError
 from ..executors import POLL_SECONDS, result_of
 from .closure import triplet_closures
 from .dates import Date, Footprints
-from .frame import FloatArray, SeriesFrame
+from .frame import PARAMETERS, FloatArray, SeriesFrame
 from .network import Link, adjust
 from .pairs import PairResult, PairTask, Settings, pair_key, register_pair
 
@@ -128,7 +128,7 @@ class Matching:
 
     def placed(self, hub: int) -> dict[int, FloatArray]:
         """Return the displacements of the dates that links reach from a hub, by the first way."""
-        found: dict[int, FloatArray] = {hub: np.zeros(6)}
+        found: dict[int, FloatArray] = {hub: np.zeros(PARAMETERS)}
         links, frame = self.links, self.frame
         grew = True
         while grew:
