@@ -73,6 +73,8 @@ class Matching:
     reused: int = 0
 
     def __post_init__(self) -> None:
+        if not self.known:
+            return
         for i, j in permutations(range(len(self.dates)), 2):
             for settings in (self.settings, self.settings.of_loops()):
                 key = pair_key(self.dates[i], self.dates[j], settings, self.frame)
