@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import logging
 import os
@@ -289,6 +290,38 @@ def test_verbose_writes_the_log_and_no_progress(capsys: pytest.CaptureFixture[st
     Path("c.tif").unlink()
     assert run(GOOD) == 0
     assert capsys.readouterr() == ("accepted\nsize 3.0\n", "")
+
+
+@pytest.mark.parametrize(
+    ("words", "workers"),
+    [
+        (GOOD, None),
+        (f"--workers 3 {GOOD}", 3),
+        (f"{GOOD} --workers 3", 3),
+        (f"--workers 3 {GOOD} --workers 4", 4),
+    ],
+)
+def test_workers_stand_before_or_after_the_tools_name(words: str, workers: int | None) -> None:
+    seen: list[Any] = []
+
+    def noting(**values: Any) -> Any:
+        seen.append(values["workers"])
+        return TOY.run(**values)
+
+    assert main(words.split(), tools=[dataclasses.replace(TOY, run=noting)]) == 0
+    assert seen == [workers]
+
+
+@pytest.mark.parametrize("words", [f"--workers 10 {GOOD}", f"{GOOD} --workers 10"])
+def test_workers_that_cannot_be_are_one_line(
+    words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(words) == 2
+    assert capsys.readouterr().err == "groundtie: error: --workers must be 1 to 9, not 10\n"
+
+
+def test_a_tool_without_workers_ignores_those_before_its_name() -> None:
+    assert main(["--workers", "2", "doctor", "--json"]) == 0
 
 
 NOISY = f"""

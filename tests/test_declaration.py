@@ -40,8 +40,9 @@ def test_the_declaration_is_read_from_the_function() -> None:
 
 def test_parameters_follow_the_signature_without_progress() -> None:
     signature = inspect.signature(toy).parameters
-    assert [p.name for p in TOY.parameters] == [name for name in signature if name != "progress"]
-    for parameter in TOY.parameters:
+    names = [name for name in signature if name != "progress"]
+    assert [p.name for p in TOY.all_parameters] == names
+    for parameter in TOY.all_parameters:
         default = signature[parameter.name].default
         assert parameter.required == (default is inspect.Parameter.empty)
         assert parameter.default == (None if parameter.required else default)
@@ -57,6 +58,11 @@ def test_what_does_not_fit_into_memory_is_an_error_in_one_line() -> None:
         large(10**6)
 
 
+def test_what_is_common_to_all_tools_is_no_parameter_of_one() -> None:
+    assert [parameter.name for parameter in TOY.common] == ["workers"]
+    assert "workers" not in {parameter.name for parameter in TOY.parameters}
+
+
 def test_required_parameters_are_positional_unless_they_are_options() -> None:
     assert [p.name for p in TOY.parameters if p.positional] == ["reference", "input", "output"]
     assert TOY.parameter("size").required
@@ -64,7 +70,7 @@ def test_required_parameters_are_positional_unless_they_are_options() -> None:
 
 def test_values_are_completed_and_typed(needed: dict[str, Any]) -> None:
     values = TOY.check({**needed, "search_radius": "12"})
-    assert list(values) == [parameter.name for parameter in TOY.parameters]
+    assert list(values) == [*(parameter.name for parameter in TOY.parameters), "workers"]
     assert values["reference"] == Path(needed["reference"])
     assert values["size"] == 3.0
     assert values["search_radius"] == 12.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundtie.errors import OutputError, ParameterError, SameFileError
+from groundtie.errors import ParameterError
 from groundtie.kinds import (
     Band,
     Choice,
@@ -28,8 +27,6 @@ from groundtie.kinds import (
     Text,
     VectorIn,
     VectorOut,
-    check_different,
-    check_paths,
 )
 
 TEXTS: dict[str, Any] = {"label": "Label", "help": "Help."}
@@ -141,73 +138,6 @@ def test_a_file_whose_name_looks_like_a_driver_is_a_path(
     monkeypatch.chdir(tmp_path)
     Path("scene:1.tif").touch()
     assert RASTER.check("input", "scene:1.tif") == Path("scene:1.tif")
-
-
-class TestPaths:
-    """How the paths of one call stand to one another and to the disk."""
-
-    def test_an_output_may_lie_beside_its_inputs(self, tmp_path: Path) -> None:
-        check_paths(
-            [
-                ("input", RASTER, tmp_path / "a.tif"),
-                ("output", RASTER_OUT, tmp_path / "b.tif"),
-                ("report", HTML_OUT, None),
-                ("mask", RASTER, "/vsizip/a.zip/b.tif"),
-            ]
-        )
-
-    def test_an_output_is_not_an_input_even_by_another_name(self, tmp_path: Path) -> None:
-        (tmp_path / "a.tif").touch()
-        (tmp_path / "link.tif").symlink_to(tmp_path / "a.tif")
-        with pytest.raises(SameFileError, match="output is the same file as input"):
-            check_paths(
-                [
-                    ("output", RASTER_OUT, tmp_path / "link.tif"),
-                    ("input", RASTER, tmp_path / "a.tif"),
-                ]
-            )
-
-    def test_two_outputs_are_two_files(self, tmp_path: Path) -> None:
-        with pytest.raises(SameFileError, match="second is the same file as first"):
-            check_paths(
-                [
-                    ("first", RASTER_OUT, tmp_path / "a.tif"),
-                    ("second", RASTER_OUT, tmp_path / "." / "a.tif"),
-                ]
-            )
-
-    def test_a_folder_is_not_a_file(self, tmp_path: Path) -> None:
-        (tmp_path / "a.tif").mkdir()
-        with pytest.raises(OutputError, match="output is a folder"):
-            check_paths([("output", RASTER_OUT, tmp_path / "a.tif")])
-
-    def test_a_file_is_not_a_folder(self, tmp_path: Path) -> None:
-        (tmp_path / "a").touch()
-        folder = FolderOut(**TEXTS)
-        check_paths([("folder", folder, tmp_path / "new" / "folder"), ("other", folder, tmp_path)])
-        with pytest.raises(OutputError, match="folder is a file"):
-            check_paths([("folder", folder, tmp_path / "a")])
-
-    def test_the_folder_of_an_output_exists(self, tmp_path: Path) -> None:
-        with pytest.raises(OutputError, match="the folder of output does not exist"):
-            check_paths([("output", RASTER_OUT, tmp_path / "new" / "a.tif")])
-
-    def test_the_folder_of_an_output_can_be_written_to(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        # root may write anywhere: the answer of the system is set here
-        monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
-        with pytest.raises(OutputError, match="cannot be written to"):
-            check_paths([("output", RASTER_OUT, tmp_path / "a.tif")])
-
-    def test_rasters_that_must_differ(self, tmp_path: Path) -> None:
-        (tmp_path / "a.tif").touch()
-        (tmp_path / "link.tif").symlink_to(tmp_path / "a.tif")
-        check_different({"reference": tmp_path / "a.tif", "input": tmp_path / "b.tif"})
-        with pytest.raises(SameFileError, match="input is the same raster as reference"):
-            check_different({"reference": tmp_path / "a.tif", "input": tmp_path / "link.tif"})
-        with pytest.raises(SameFileError, match="/vsimem/a"):
-            check_different({"reference": "/vsimem/a", "input": "/vsimem/a"})
 
 
 def test_a_choice_of_names_may_have_hyphens() -> None:

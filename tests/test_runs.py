@@ -1,4 +1,4 @@
-"""The id of a call, and the files that carry it."""
+"""The id of a call, the files that carry it, and the folders that it made."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from raster_files import utm_grid, write_raster
 
 from benchmarks.failures import run_of
 from groundtie.declaration import tool_of
+from groundtie.errors import OutputError
 from groundtie.geometry.tie_point_files import read_tie_points, write_tie_points
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform, load_transform
-from groundtie.rasters.atomic import Outputs, write_json
+from groundtie.rasters.atomic import Outputs, make_folder, write_json
 from groundtie.rasters.delivery import warp_raster
 from groundtie.rasters.reading import open_raster
 from groundtie.runs import run_of_call, run_tags, running
@@ -119,3 +120,33 @@ def test_without_a_call_there_is_no_id(call: Path) -> None:
     assert "run" not in json.loads((call / "t.json").read_text())
     with rasterio.open(call / "out.tif") as dataset:
         assert "GROUNDTIE_RUN" not in dataset.tags()
+
+
+class TestFolders:
+    def test_what_a_call_made_goes_if_nothing_came_into_it(self, tmp_path: Path) -> None:
+        (tmp_path / "there").mkdir()
+        with pytest.raises(OutputError), running("a"):
+            for name in ("there", "there/new", "a/b", "filled/c"):
+                make_folder(tmp_path / name)
+            (tmp_path / "filled" / "file").touch()
+            raise OutputError("no space")
+        left = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*")}
+        assert left == {"there", "filled", "filled/file"}
+
+    def test_a_step_leaves_them_to_the_call_it_is_part_of(self, tmp_path: Path) -> None:
+        with running("a"):
+            with running("b"):
+                make_folder(tmp_path / "new")
+            assert (tmp_path / "new").is_dir()
+        assert not (tmp_path / "new").exists()
+
+    def test_outside_of_a_call_they_stay(self, tmp_path: Path) -> None:
+        make_folder(tmp_path / "new")
+        with running("a"):
+            make_folder(tmp_path / "new")
+        assert (tmp_path / "new").is_dir()
+
+    def test_a_folder_that_cannot_be_made_leaves_none_above_it(self, tmp_path: Path) -> None:
+        with pytest.raises(OutputError, match="too long"), running("a"):
+            make_folder(tmp_path / "new" / ("n" * 300))
+        assert not (tmp_path / "new").exists()

@@ -109,6 +109,10 @@ def toy(
     seed: Annotated[
         int, Number(label="Seed", help="For chance.", integer=True, minimum=0, advanced=True)
     ] = 7,
+    workers: Annotated[
+        int | None,
+        Number(label="Workers", help="How many.", integer=True, minimum=1, maximum=9, common=True),
+    ] = None,
     progress: Progress = SILENT,
 ) -> ToyResult:
     """Do what a tool does, without images.
@@ -121,7 +125,7 @@ def toy(
     ToyResult
         What it was called with.
     """
-    values = {k: v for k, v in locals().items() if k not in ("progress", "mode")}
+    values = {k: v for k, v in locals().items() if k not in ("progress", "workers", "mode")}
     progress.update(0.5, "half of it")
     if mode == "refuse":
         raise NotRegisteredError("refused: too few\npoints agree", ToyVerdict("too few"))  # type: ignore[arg-type]

@@ -145,6 +145,12 @@ class ToolGroup(click.Group):
                     help="Memory that a process is to take, as far as it can do with less; "
                     f"results do not depend on it.  [default: {DEFAULT_MB}]",
                 ),
+                click.Option(
+                    ["--workers"],
+                    metavar="INTEGER",
+                    help="Number of threads, or of rows of a batch that run at the same time; it "
+                    "may stand behind the tool's name, too.  [default: one per processor]",
+                ),
             ],
             context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
         )
@@ -181,13 +187,18 @@ def _command_name(tool: str) -> str:
 
 
 @click.pass_context
-def _before_command(context: click.Context, verbose: bool, memory: str | None) -> None:
+def _before_command(
+    context: click.Context, verbose: bool, memory: str | None, workers: str | None
+) -> None:
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
     if verbose:
         context.with_resource(_log_to(sys.stderr))
     if memory is not None:
         context.with_resource(_budget(memory))
+    if workers is not None and context.invoked_subcommand is not None:
+        # As if it stood behind the name; of a tool that has no workers it is not asked.
+        context.default_map = {context.invoked_subcommand: {"workers": workers}}
 
 
 @contextmanager
@@ -229,7 +240,7 @@ class ToolCommand(click.Command):
         super().__init__(
             _command_name(tool.name),
             help=f"{tool.summary}\n\n{tool.description}",
-            params=[_click_parameter(parameter) for parameter in tool.parameters],
+            params=[_click_parameter(parameter) for parameter in tool.all_parameters],
             callback=self._run,
         )
         self.params += [
@@ -262,9 +273,10 @@ class ToolCommand(click.Command):
         arguments = [p for p in declared if p.positional]
         plain = [p for p in declared if not p.positional and not p.kind.advanced]
         advanced = [p for p in declared if not p.positional and p.kind.advanced]
-        common = [
+        common = [(_synopsis(p), _describe(p)) for p in self.tool.common]
+        common += [
             record
-            for option in self.get_params(ctx)[len(declared) :]
+            for option in self.get_params(ctx)[len(self.tool.all_parameters) :]
             if (record := option.get_help_record(ctx))
         ]
         for title, parameters, more in (

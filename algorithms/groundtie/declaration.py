@@ -15,8 +15,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
+from .call_paths import check_different, check_paths
 from .errors import MemoryLimitError, ParameterError
-from .kinds import FolderOut, Kind, OutputKind, RasterIn, check_different, check_paths
+from .kinds import FolderOut, Kind, OutputKind, RasterIn
 from .runs import run_of_call, running
 
 
@@ -97,7 +98,10 @@ class Output:
 
 @dataclass(frozen=True)
 class Tool:
-    """A tool: everything that the command line, Python and QGIS need of it."""
+    """A tool: everything that the command line, Python and QGIS need of it.
+
+    Its `common` parameters are those of a kind that is common to all tools (see `Kind`).
+    """
 
     name: str
     title: str
@@ -107,6 +111,12 @@ class Tool:
     parameters: tuple[Parameter, ...]
     outputs: tuple[Output, ...]
     run: Callable[..., ToolResult]
+    common: tuple[Parameter, ...] = ()
+
+    @property
+    def all_parameters(self) -> tuple[Parameter, ...]:
+        """Its own parameters, and the common ones."""
+        return (*self.parameters, *self.common)
 
     def parameter(self, name: str) -> Parameter:
         """Return the parameter called `name`."""
@@ -149,12 +159,12 @@ class Tool:
         OutputError
             An output cannot be written.
         """
-        unknown = set(values) - {parameter.name for parameter in self.parameters}
+        unknown = set(values) - {parameter.name for parameter in self.all_parameters}
         if unknown:
             raise ParameterError(f"{self.name} has no parameter {sorted(unknown)[0]}")
         checked = {
             p.name: p.check(_value(p, values), spell(p), in_python=in_python)
-            for p in self.parameters
+            for p in self.all_parameters
         }
         check_different(
             {
@@ -220,6 +230,7 @@ def _declare(
     group: str,
     outputs: tuple[Output, ...],
 ) -> Tool:
+    parameters = _parameters(function, signature)
     summary, _, rest = (inspect.getdoc(function) or "").partition("\n")
     description = rest.strip().partition("\nReturns\n")[0].strip()
     return Tool(
@@ -228,9 +239,10 @@ def _declare(
         group=group,
         summary=summary,
         description=description,
-        parameters=tuple(_parameters(function, signature)),
+        parameters=tuple(p for p in parameters if not p.kind.common),
         outputs=outputs,
         run=run,
+        common=tuple(p for p in parameters if p.kind.common),
     )
 
 

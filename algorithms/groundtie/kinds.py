@@ -6,17 +6,19 @@ import errno
 import math
 import os
 import stat
-from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .errors import GroundTieError, OutputError, ParameterError, SameFileError
-from .raster_names import identity, raster_name
+from .errors import GroundTieError, ParameterError
+from .raster_names import raster_name
 from .stac_items import raster_of_item
 
 # Endings of a GeoTIFF.
 GEOTIFF = (".tif", ".tiff")
+
+# Format of a report's numbers.
+REPORT_FORMAT = "groundtie-report/1"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +28,9 @@ class Kind:
     `advanced` parameters are folded away in dialogs; `option` makes a required parameter an
     option with a name on the command line instead of a positional argument. One that is
     `optional_in_python` is required by the command line and QGIS, which can only write files;
-    Python's callers may leave it out (its default is None) and go on with what is returned.
+    Python's callers may leave it out (its default is None) and go on with what is returned. What
+    is `common` means the same for all tools and decides no result: it is none of a tool's own
+    parameters; the command line takes it before the tool's name, too, and QGIS has a setting.
     """
 
     label: str
@@ -34,6 +38,7 @@ class Kind:
     advanced: bool = False
     option: bool = False
     optional_in_python: bool = False
+    common: bool = False
 
     def check(self, name: str, value: Any) -> Any:
         """Return `value` in the type that tools work with, or raise `ParameterError`."""
@@ -49,6 +54,10 @@ class PathKind(Kind):
         path = Path(value)
         _mode(name, path)  # so that whatever cannot be a name is found here
         return path
+
+    def also_written(self, path: Path) -> tuple[Path, ...]:
+        """Return the files that are written because of an output `path` besides this itself."""
+        return ()
 
 
 class InputKind(PathKind):
@@ -162,18 +171,31 @@ class VectorOut(OutputKind):
     style: str = ""
 
 
+@dataclass(frozen=True, kw_only=True)
 class FileOut(OutputKind):
-    """Any other file that is written."""
+    """Any other file that is written; `numbers` is the format of JSON that is put beside it."""
+
+    numbers: str = ""
+
+    def also_written(self, path: Path) -> tuple[Path, ...]:
+        """Return the JSON beside the file."""
+        return (path.with_suffix(".json"),) if self.numbers else ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class FolderOut(PathKind):
     """A folder that is written into, made if it is missing.
 
-    Of what comes into it, rasters of the names `shows` can be looked at: the first on top.
+    Of what comes into it, rasters of the names `shows` can be looked at: the first on top. A tool
+    that reads files, too, states the names that it `writes`.
     """
 
     shows: tuple[str, ...] = ()
+    writes: tuple[str, ...] = ()
+
+    def also_written(self, path: Path) -> tuple[Path, ...]:
+        """Return the files in the folder."""
+        return tuple(path / name for name in self.writes)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -316,62 +338,3 @@ def plainly(value: Any) -> Any:
     """Return a checked value as reports show it: rasters in memory by what they are called."""
     in_memory = not isinstance(value, (str, os.PathLike)) and hasattr(value, "crs")
     return value.name if in_memory else value
-
-
-def _identity(raster: Any) -> Hashable:
-    """Return what is the same for two rasters that are one."""
-    if isinstance(raster, (str, Path)):
-        return identity(raster)
-    # An open dataset is where its file is.
-    return getattr(raster, "identity", None) or Path(raster.name).resolve()
-
-
-def check_different(rasters: Mapping[str, Any]) -> None:
-    """Raise `SameFileError` if two of these checked rasters, by name, are one and the same."""
-    taken: dict[Hashable, str] = {}
-    for name, raster in rasters.items():
-        other = taken.setdefault(_identity(raster), name)
-        if other != name:
-            raise SameFileError(f"{name} is the same raster as {other}: {plainly(raster)}")
-
-
-def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
-    """Check the paths of one call against each other and against the disk.
-
-    Parameters
-    ----------
-    values
-        Name, kind and checked value of every parameter.
-
-    Raises
-    ------
-    SameFileError
-        An output is also an input, or is named twice.
-    OutputError
-        An output's folder is missing or cannot be written to, or a folder is a file.
-    """
-    taken: dict[Hashable, str] = {}
-    outputs: list[tuple[str, Path]] = []
-    made: set[Path] = set()
-    for name, kind, value in values:
-        if isinstance(kind, InputKind) and value is not None:
-            taken[_identity(value)] = name
-        elif isinstance(kind, OutputKind) and value is not None:
-            outputs.append((name, value))
-        elif isinstance(kind, FolderOut) and value is not None:
-            if value.is_file():
-                raise OutputError(f"{name} is a file, not a folder: {value}")
-            made.add(value.resolve())
-    for name, path in outputs:
-        other = taken.setdefault(path.resolve(), name)
-        if other != name:
-            raise SameFileError(f"{name} is the same file as {other}: {path}")
-        folder = path.resolve().parent
-        if path.is_dir():
-            raise OutputError(f"{name} is a folder, not a file: {path}")
-        if folder in made and not folder.exists():
-            continue
-        if not folder.is_dir():
-            raise OutputError(f"the folder of {name} does not exist: {folder}")
-        if not os.access(folder, os.W_OK):
-            raise OutputError(f"the folder of {name} cannot be written to: {folder}")

@@ -110,6 +110,11 @@ class Review:
         return np.asarray(self.points.more.get(EDITED, np.zeros(len(self.points))) > 0)
 
     @property
+    def _columns(self) -> dict[str, FloatArray]:
+        """The points' further columns, with a new one of what was edited."""
+        return {**self.points.more, EDITED: self.edited.astype(float)}
+
+    @property
     def nominal(self) -> Transform:
         """The transform by the input's own georeferencing."""
         return Transform.nominal(self.points.crs, self.input_grid)
@@ -138,7 +143,7 @@ class Review:
         for name, place in columns.items():
             if place is not None:
                 moved[name][index] = place
-        more = {**self.points.more, EDITED: self.edited.astype(float)}
+        more = self._columns
         more[EDITED][index] = 1.0
         if HEIGHT in more and reference_xy is not None:  # the ground has another one there
             more[HEIGHT] = more[HEIGHT].copy()
@@ -151,7 +156,7 @@ class Review:
         point = unmeasured(xy, px, [USED], self.points.crs)
         more = {name: np.full(1, np.nan) for name in self.points.more} | {EDITED: np.ones(1)}
         point = replace(point, score=np.array([score]), more=more)
-        mine = replace(self.points, more={**self.points.more, EDITED: self.edited.astype(float)})
+        mine = replace(self.points, more=self._columns)
         return replace(self, points=TiePoints.concatenate([mine, point]))
 
     def fit(self, kind: str) -> ModelFit:
@@ -203,9 +208,9 @@ class Review:
 
     def write(self, path: Path, transform: Transform) -> None:
         """Write the points, for `warp` or to go on with later."""
-        more = {**self.points.more, EDITED: self.edited.astype(float)}
+        points = replace(self.points, more=self._columns)
         with Outputs() as outputs:
-            write_tie_points(outputs.stage(path), replace(self.points, more=more), transform)
+            write_tie_points(outputs.stage(path), points, transform)
 
     def _left_out_px(self, kind: str) -> float | None:
         """Return the error at points that a model has not seen, block by block of neighbours."""

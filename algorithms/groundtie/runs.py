@@ -1,8 +1,8 @@
-"""Which call of a tool a file belongs to: all files of one call carry the same id.
+"""The call of a tool that is running: the id that all its files carry, and what it has made.
 
-It stands for what decides what they hold: tool, version, parameters, and name, size and time of the
-files that are read. The same call on the same files has the same id, with any number of workers, so
-that its files are the same, too.
+The id stands for what decides what they hold: tool, version, parameters, and name, size and time of
+the files that are read. The same call on the same files has the same id, with any number of
+workers, so that its files are the same, too.
 """
 
 from __future__ import annotations
@@ -10,8 +10,9 @@ from __future__ import annotations
 import hashlib
 import secrets
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -21,17 +22,63 @@ from .version import __version__
 RUN_TAG = "GROUNDTIE_RUN"
 RUN = "run"
 
-_current: ContextVar[str | None] = ContextVar("groundtie_run", default=None)
+
+@dataclass(frozen=True)
+class RunningCall:
+    """A call that is running.
+
+    Parameters
+    ----------
+    run
+        Its id.
+    folders
+        Those that it made, each after that which it lies in.
+    files
+        Those that it wrote, and those of an earlier call that it left as they are.
+    """
+
+    run: str
+    folders: list[Path] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+
+
+_current: ContextVar[RunningCall | None] = ContextVar("groundtie_call", default=None)
 
 
 @contextmanager
-def running(run: str) -> Iterator[None]:
-    """Let what is written carry an id, unless this is a step of a call that has one."""
-    token = _current.set(_current.get() or run)
+def running(run: str) -> Iterator[RunningCall]:
+    """Let what is written carry an id, and no folder stay that was made and is empty at the end.
+
+    A step of a call that has an id is a part of that call.
+    """
+    outer = _current.get()
+    if outer is not None:
+        yield outer
+        return
+    call = RunningCall(run)
+    token = _current.set(call)
     try:
-        yield
+        yield call
     finally:
         _current.reset(token)
+        for folder in reversed(call.folders):
+            with suppress(OSError):  # it has something in it, or could not be made
+                folder.rmdir()
+
+
+def will_make(folder: Path) -> None:
+    """Note which of a folder, and of those that it lies in, the running call is about to make."""
+    call = _current.get()
+    if call is not None:
+        above = [Path(folder), *Path(folder).absolute().parents]
+        call.folders.extend(reversed([one for one in above if not one.exists()]))
+
+
+def has_written(*files: Path) -> None:
+    """Note that the running call has written files, or takes them over from an earlier one."""
+    call = _current.get()
+    if call is not None:
+        call.files.extend(files)
 
 
 def run_of_call(tool: str, inputs: Mapping[str, Any]) -> str:
@@ -56,8 +103,8 @@ def digest(*facts: Any) -> str:
 
 def run_tags(name: str = RUN) -> dict[str, str]:
     """Return the id of the call that is running, by a name; empty outside of a tool's call."""
-    run = _current.get()
-    return {} if run is None else {name: run}
+    call = _current.get()
+    return {} if call is None else {name: call.run}
 
 
 def _facts(value: Any) -> Any:

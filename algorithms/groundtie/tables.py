@@ -32,7 +32,7 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
         raise ParameterError(f"cannot read the table {path}: {reason}") from error
     if not rows:
         raise ParameterError(f"the table {path} has no rows")
-    return [_filled(row) for row in rows]
+    return rows
 
 
 def _read_csv(path: Path) -> list[dict[str, Any]]:
@@ -48,7 +48,7 @@ def _read_csv(path: Path) -> list[dict[str, Any]]:
     for number, row in enumerate(rows, 1):
         if None in row:
             raise ValueError(f"row {number} has more cells than the first line")
-    return [dict(row) for row in rows]
+    return [_filled(row) for row in rows]
 
 
 def _read_nested(path: Path) -> list[dict[str, Any]]:

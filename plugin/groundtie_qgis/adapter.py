@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from qgis.core import (
+    QgsApplication,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingException,
@@ -153,6 +154,7 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
 
     def _check(self, reader: Reader) -> dict[str, Any]:
         read = {parameter.name: reader.read(parameter) for parameter in self._tool.parameters}
+        read |= {parameter.name: _setting(parameter) for parameter in self._tool.common}
         values = dict(self._tool.check(read, spell=lambda parameter: tr(parameter.kind.label)))
         paths = [value for value in values.values() if isinstance(value, Path)]
         if missing := missing_for(self._tool.name, paths):
@@ -189,6 +191,14 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         }
         given = {qgis_name(output.name): output.value(summary) for output in self._tool.outputs}
         return written | {name: value for name, value in given.items() if value is not None}
+
+
+def _setting(parameter: Any) -> int | None:
+    """Return what QGIS's settings state of a common parameter; None: nothing."""
+    if parameter.name != "workers":
+        return None
+    most = QgsApplication.maxThreads()
+    return most if most > 0 else None
 
 
 def _progress(feedback: QgsProcessingFeedback) -> Any:

@@ -23,6 +23,7 @@ from groundtie.assessment.point_errors import PointErrors
 from groundtie.errors import GeoreferencingError, NoOverlapError, OutputError
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.transform import Transform
+from groundtie.kinds import REPORT_FORMAT
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, make_pair
@@ -342,6 +343,7 @@ class TestNumbers:
 
         text = (tmp_path / "a.json").read_text(encoding="utf-8")
         numbers = json.loads(text, parse_constant=refuse)
+        assert numbers.pop("format") == REPORT_FORMAT
         assert numbers == report.summary()
         assert list(numbers) == [
             *("verdict", "control_points", "test_points", "check_points", "two_way", "three_way"),
@@ -362,3 +364,12 @@ class TestNumbers:
     def test_a_page_that_cannot_be_written(self, tmp_path: Path) -> None:
         with pytest.raises(OutputError, match=r"does not exist: .*/no$"), Outputs() as outputs:
             report_of().write(outputs, tmp_path / "no" / "a.html")
+
+    def test_numbers_replace_nothing_but_numbers(self, tmp_path: Path) -> None:
+        (tmp_path / "a.json").write_text('{"type": "Feature"}', encoding="utf-8")
+        with pytest.raises(OutputError, match=r"a\.html would also write .*a\.json, which is som"):
+            written(report_of(), tmp_path)
+        assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
+        (tmp_path / "a.json").unlink()
+        written(report_of(), tmp_path)
+        written(report_of(), tmp_path)

@@ -55,6 +55,11 @@ def test_flags_are_words(folders: tuple[Path, Path], word: Any, value: bool) -> 
     assert call.values["careful"] is value
 
 
+def test_workers_are_those_of_the_row(folders: tuple[Path, Path]) -> None:
+    first, second = make_calls(TOY, [ROW, {**ROW, "workers": 2}], *folders, 5)
+    assert (first.values["workers"], second.values["workers"]) == (5, 2)
+
+
 def test_a_number_may_stand_for_a_text(folders: tuple[Path, Path]) -> None:
     (call,) = calls_of(folders, {**ROW, "title": 7})
     assert call.values["title"] == "7"
@@ -110,6 +115,19 @@ def test_the_key_stands_for_files_parameters_and_outputs(folders: tuple[Path, Pa
     assert len({first, key(seed=8), key(output="d.tif"), key(report="r.html")}) == 4
     os.utime(folders[0] / "b.tif", (1e9, 1e9))
     assert key() != first
+
+
+def test_what_lies_beside_an_output_is_no_other_rows(folders: tuple[Path, Path]) -> None:
+    pair = {"reference": "a.tif", "input": "b.tif"}
+    rows = [{**pair, "report": "r.html"}, {**pair, "transform": "r.json"}]
+    with pytest.raises(SameFileError, match="rows 1 and 2 both write"):
+        make_calls(load_tool("coregister"), rows, *folders, 1)
+
+
+def test_what_a_series_writes_is_no_input_of_another(folders: tuple[Path, Path]) -> None:
+    rows = [{"inputs": "a.tif;b.tif"}, {"inputs": [str(folders[1] / "1/series.json")]}]
+    with pytest.raises(OutputError, match="row 1 would write what row 2 reads"):
+        make_calls(load_tool("coregister_series"), rows, *folders, 1)
 
 
 def test_several_inputs_are_a_list_or_one_cell(folders: tuple[Path, Path]) -> None:

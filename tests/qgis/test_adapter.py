@@ -95,6 +95,24 @@ class TestRun:
         assert "accepted" in log
         assert "size 3.0" in log
 
+    @pytest.mark.parametrize(("most", "workers"), [(-1, None), (1, 1)])
+    def test_threads_are_those_of_the_settings(
+        self,
+        algorithm: Any,
+        values: dict[str, Any],
+        monkeypatch: pytest.MonkeyPatch,
+        most: int,
+        workers: int | None,
+    ) -> None:
+        from qgis.core import QgsApplication
+
+        before = QgsApplication.maxThreads()
+        try:
+            QgsApplication.setMaxThreads(most)
+            assert called_with(algorithm, values, monkeypatch)["workers"] == workers
+        finally:
+            QgsApplication.setMaxThreads(before)
+
     def test_all_values_arrive(
         self,
         algorithm: Any,
@@ -120,7 +138,7 @@ class TestRun:
         }
         seen = called_with(algorithm, {**values, **given}, monkeypatch)
         seen.pop("progress")
-        assert seen.pop("others") is None
+        assert (seen.pop("others"), seen.pop("workers")) == (None, None)
         assert {name.upper(): _text(value) for name, value in seen.items()} == {**values, **given}
 
     def test_what_is_not_given_takes_the_default(
@@ -355,5 +373,5 @@ def test_a_batch_tells_its_failed_rows_and_goes_on(provider: Any, tmp_path: Path
     results, finished = run(provider.algorithm("batch").create(), values, feedback)
     assert finished
     assert (results["DONE"], results["FAILED"]) == (1, 1)
-    assert results["TABLE_OF_RESULTS"] == str(tmp_path / "out/t.results.csv")
+    assert results["TABLE_OF_RESULTS"] == str(tmp_path / "out/t.csv.results.csv")
     assert "row 2 (2) failed: cannot read" in feedback.textLog()

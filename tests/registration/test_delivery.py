@@ -14,7 +14,7 @@ from textured_pairs import TexturedPair, listing
 
 from groundtie.context import Context
 from groundtie.errors import NothingFoundError, NotRegisteredError, OutputError
-from groundtie.geometry.transform import FORMAT, load_transform
+from groundtie.geometry.transform import load_transform
 from groundtie.registration import delivery
 from groundtie.registration.asked import specified
 from groundtie.registration.delivery import (
@@ -99,18 +99,6 @@ def test_what_fails_later_leaves_no_report_either(
     with pytest.raises(OutputError):
         files_in(tmp_path).write(registration, context)
     assert listing(tmp_path) == {}
-
-
-@pytest.mark.slow
-def test_the_reports_numbers_leave_the_transform_its_name(
-    registration: Registration, context: Context, tmp_path: Path
-) -> None:
-    """`--report r.html --transform r.json`: the numbers are put beside them under another name."""
-    files = RegistrationFiles(None, None, tmp_path / "r.json", tmp_path / "r.html")
-    files.write(registration, context)
-    assert set(listing(tmp_path)) == {"r.html", "r.json", "r.report.json"}
-    assert json.loads((tmp_path / "r.json").read_text())["format"] == FORMAT
-    assert "verdict" in json.loads((tmp_path / "r.report.json").read_text())
 
 
 def test_rasters_stay_open_as_long_as_a_delivered_registration(

@@ -31,6 +31,7 @@ from raster_files import full_disk, utm_grid, wave_image, write_raster
 
 from groundtie.errors import OutputError
 from groundtie.geometry.transform import Transform
+from groundtie.kinds import REPORT_FORMAT
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
@@ -114,9 +115,11 @@ def test_versions() -> None:
 
 def test_the_json_is_the_summary(variants: list[Variant]) -> None:
     for variant in variants:
-        assert variant.numbers == variant.report.summary()
-        keys = ["verdict", "correction", "transform", "mask", "parameters", "versions", "seconds"]
-        assert list(variant.numbers) == keys
+        assert variant.numbers == {"format": REPORT_FORMAT, **variant.report.summary()}
+        assert list(variant.numbers) == [
+            *("format", "verdict", "correction", "transform", "mask"),
+            *("parameters", "versions", "seconds"),
+        ]
         assert variant.numbers["verdict"] == variant.report.verdict.summary()
 
 

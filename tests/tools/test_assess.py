@@ -34,6 +34,7 @@ from groundtie.errors import (
     TooFewPointsError,
 )
 from groundtie.geometry.transform import Transform
+from groundtie.kinds import REPORT_FORMAT
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.tools.assess import assess
 from groundtie.tools.coregister import coregister
@@ -219,6 +220,7 @@ class TestReport:
         assert likeness[0] < 0.9 < 0.99 < likeness[1]
         numbers = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
         assert len(numbers.pop("run")) == 16
+        assert numbers.pop("format") == REPORT_FORMAT
         assert {**numbers, "files": result.files} == result.summary()
         assert numbers["check_points"]["rmse_px"] == pytest.approx(0.5)
         assert numbers["parameters"]["check_points"] == str(files.path("check.csv"))

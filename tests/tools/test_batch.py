@@ -9,17 +9,19 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
+from assessed_files import written_files
 from loopback_cluster import Cluster, cluster
 from noise_pairs import write_pair
 from raster_files import utm_grid, write_raster
 
 import groundtie
 from groundtie.cli import main
-from groundtie.errors import ParameterError
+from groundtie.errors import ParameterError, SameFileError
 
 # Of Debian 12's tornado, by Dask's own client.
 pytestmark = pytest.mark.filterwarnings("ignore:make_current is deprecated:DeprecationWarning")
@@ -115,7 +117,7 @@ def test_a_worker_that_is_killed_loses_nothing(
 ) -> None:
     pytest.importorskip("distributed", reason="the extra cluster is not installed")
     with cluster() as found:
-        log = tmp_path / "t.log.jsonl"
+        log = tmp_path / "t.csv.log.jsonl"
 
         def kill() -> None:
             while not log.exists():
@@ -147,18 +149,80 @@ def test_a_scheduler_that_is_not_there_is_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_tables_that_differ_by_their_endings_have_results_of_their_own(
+    images: Path, tmp_path: Path
+) -> None:
+    values = {"input": str(images / "0.tif"), "window": 5}
+    (tmp_path / "b.csv").write_text(",".join(values) + "\n" + ",".join(map(str, values.values())))
+    (tmp_path / "b.json").write_text(json.dumps([{**values, "output": "of_json.tif"}]))
+    for resume in (False, True):
+        for table, output in (("b.csv", "1.tif"), ("b.json", "of_json.tif")):
+            with ThreadPoolExecutor(1) as executor:
+                result = groundtie.batch(
+                    "filter_speckle", tmp_path / table, resume=resume, executor=executor
+                )
+            assert [row.resumed for row in result.rows] == [resume]
+            assert result.rows[0].outputs() == {"output": str(tmp_path / output)}
+    for table, output in (("b.csv", "1.tif"), ("b.json", "of_json.tif")):
+        written = json.loads((tmp_path / f"{table}.results.json").read_text())
+        assert written["rows"][0]["outputs"] == {"output": str(tmp_path / output)}
+        with (tmp_path / f"{table}.results.csv").open(newline="") as file:
+            assert [row["output"] for row in csv.DictReader(file)] == [str(tmp_path / output)]
+
+
+def resumed(table: Path) -> tuple[list[str], list[bool]]:
+    """Resume a batch; return how its rows ended, and which of them did not run."""
+    tool = "assess" if table.stem == "assess" else "simulate"
+    with ThreadPoolExecutor(1) as executor:
+        found = groundtie.batch(tool, table, resume=True, executor=executor)
+    return [row.outcome.status for row in found.rows], [row.resumed for row in found.rows]
+
+
+@pytest.mark.parametrize("gone", ["in/2.json", "in/2.html"])
+def test_a_report_without_its_numbers_is_written_again(tmp_path: Path, gone: str) -> None:
+    files = written_files(tmp_path)
+    table = files.path("assess.csv")
+    rows = ["max_error", "5", "0.1"]  # of which the points are 0.5 px off
+    columns = ["transform,check_points,report", *["t.json,check.csv,{name}.html"] * 2]
+    lines = [",".join(cells) for cells in zip(columns, rows, strict=True)]
+    table.write_text("\n".join(lines))
+    assert resumed(table) == (["done", "refused"], [False, False])
+    assert resumed(table) == (["done", "refused"], [True, True])
+    (tmp_path / gone).unlink()
+    assert resumed(table) == (["done", "refused"], [True, False])
+    assert (tmp_path / gone).is_file()
+
+
+def test_a_folder_from_which_a_file_is_gone_is_written_again(tmp_path: Path) -> None:
+    table = tmp_path / "pairs.csv"
+    table.write_text("size,seed\n80,1\n80,2")
+    assert resumed(table)[1] == [False, False]
+    assert resumed(table)[1] == [True, True]
+    (tmp_path / "2" / "dsm.tif").unlink()
+    (tmp_path / "1" / "notes.txt").touch()  # which no row wrote
+    assert resumed(table) == (["done", "done"], [True, False])
+    assert (tmp_path / "2" / "dsm.tif").is_file()
+
+
+def test_a_table_that_is_refused_leaves_no_folder(images: Path, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"input,output\n{images}/0.tif,a/x.tif\n{images}/1.tif,a/x.tif")
+    with pytest.raises(SameFileError, match="both write"):
+        groundtie.batch("filter_speckle", tmp_path / "t.csv", tmp_path / "new" / "out")
+    assert [path.name for path in tmp_path.iterdir()] == ["t.csv"]
+
+
 @pytest.mark.slow
 def test_the_summary_lies_beside_the_table_by_default(images: Path, tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("input\nnone.tif\n")
     assert main(["batch", "filter-speckle", str(tmp_path / "t.csv"), "--workers", "1"]) == 2
-    with (tmp_path / "t.results.csv").open(newline="") as file:
+    with (tmp_path / "t.csv.results.csv").open(newline="") as file:
         (row,) = csv.DictReader(file)
     assert row["status"] == "failed" and str(tmp_path / "none.tif") in row["message"]
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "t.csv",
-        "t.log.jsonl",
-        "t.results.csv",
-        "t.results.json",
+        "t.csv.log.jsonl",
+        "t.csv.results.csv",
+        "t.csv.results.json",
     ]
 
 

@@ -29,6 +29,7 @@ from groundtie.cli import main
 from groundtie.errors import NotRegisteredError
 from groundtie.geometry.transform import Transform
 from groundtie.progress import Progress
+from groundtie.runs import running
 from groundtie.series.series import Series
 from groundtie.stac_items import read_items
 from groundtie.tools.coregister_series import coregister_series
@@ -187,9 +188,14 @@ def test_a_further_date_is_registered_alone(run: Run, tmp_path: Path) -> None:
 def test_the_same_call_does_nothing_again(run: Run, tmp_path: Path) -> None:
     folder = tmp_path / "out"
     shutil.copytree(run.folder, folder)
-    result = coregister_series(folder, [run.dates.folder], reference=run.dates.files[0], **OPTIONS)
+    with running("a batch's row") as call:
+        result = coregister_series(
+            folder, [run.dates.folder], reference=run.dates.files[0], **OPTIONS
+        )
     assert result.registered_pairs == 0
     assert result.rows() == run.result.rows()
+    # A batch resumes by these, whichever call wrote them.
+    assert {path.name for path in call.files} == set(listing(folder))
 
 
 @pytest.mark.slow
@@ -346,7 +352,7 @@ def test_a_refused_series_keeps_no_registrations(tmp_path: Path) -> None:
         (["{out}", "{dates}", "--reference", "{dates}/none.tif"], "there is no file"),
         (["{out}", "{dates}", "--reference-mask", "{one}"], "needs a reference"),
         (["{out}", "{dates}", "--model", "affine", "--output-grid", "untouched"], "translation"),
-        (["{out}", "{dates}", "--report", "{out}/series.html"], "would be written over"),
+        (["{out}", "{dates}", "--report", "{out}/series.html"], "--report would also write"),
         (["{out}", "{dates}", "--report", "{dates}/none/a.html"], "folder of"),
         (["{other}", "{dates}"], "is no series that can be continued"),
         (["{out}"], "Missing argument"),

@@ -2,17 +2,20 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rasterio
+from raster_files import full_disk
 
 from groundtie import load_transform
 from groundtie.cli import main
 from groundtie.errors import CancelledError, GroundTieError, OutputError, ParameterError
 from groundtie.progress import Progress
 from groundtie.tools.simulate import simulate
+from groundtie.tools.simulate_sensor import simulate_sensor
 
 NAMES = [
     "check_points.csv",
@@ -148,6 +151,19 @@ def test_cancelling_writes_nothing(tmp_path: Path) -> None:
     with pytest.raises(CancelledError):
         simulate(tmp_path / "made", 96, progress=progress)
     assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize("is_there", [False, True])
+@pytest.mark.parametrize(("make", "free_bytes"), [(simulate, 4000), (simulate_sensor, 0)])
+def test_a_full_disk_leaves_nothing(
+    tmp_path: Path, make: Callable[[Path, int], object], free_bytes: int, is_there: bool
+) -> None:
+    folder = tmp_path / "above" / "made"
+    if is_there:
+        folder.mkdir(parents=True)
+    with pytest.raises(OutputError, match=r"cannot write|no space"), full_disk(free_bytes):
+        make(folder, 80)
+    assert [*tmp_path.rglob("*")] == ([tmp_path / "above", folder] if is_there else [])
 
 
 def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

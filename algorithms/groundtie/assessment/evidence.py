@@ -9,17 +9,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..call_paths import check_different
 from ..errors import (
     GeoreferencingError,
     ParameterError,
-    SameFileError,
     TooFewPointsError,
     TransformFileError,
 )
 from ..geometry.tie_point_files import read_tie_points
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform, load_transform
-from ..kinds import check_different
 from ..rasters.grid import reproject, require_both_or_none
 from ..rasters.reading import RasterSource
 from ..registration.stored_transform import load_stored, transform_of
@@ -46,7 +45,7 @@ class AssessmentFiles:
         return self.transform is None and self.tie_points is None
 
     def check(
-        self, images: Mapping[str, Path | None], max_error_px: float | None, report: Path | None
+        self, images: Mapping[str, Path | None], max_error_px: float | None, has_report: bool
     ) -> None:
         """Raise if the parameters do not go together; `images` are reference and input."""
         closing = self.closing_transform, self.direct_transform
@@ -59,7 +58,7 @@ class AssessmentFiles:
         if self.is_nominal and by_consistency:
             raise ParameterError("consistency needs a transform or tie points")
         by_points = self.tie_points is not None or self.check_points is not None
-        by_eye = report is not None and None not in images.values()
+        by_eye = has_report and None not in images.values()
         if not (by_points or by_eye or by_consistency):
             raise ParameterError(
                 "there is nothing to judge by: give check_points, tie_points, back_transform, or "
@@ -68,10 +67,6 @@ class AssessmentFiles:
         if max_error_px is not None and not by_points:
             raise ParameterError("max_error needs points: give check_points or tie_points")
         check_different({name: path for name, path in images.items() if path is not None})
-        numbers = None if report is None else report.with_suffix(".json").resolve()
-        for name, path in {**vars(self), **images}.items():
-            if path is not None and path.resolve() == numbers:
-                raise SameFileError(f"{name} would be overwritten by the report's JSON: {path}")
 
     def registration(
         self, model: str, reference: RasterSource | None, input: RasterSource | None

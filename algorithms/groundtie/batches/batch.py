@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -90,19 +90,21 @@ class Batch:
         ended = self._known(calls, resume)
         resumed = {number for number, outcome in ended.items() if outcome.status != FAILED}
         # Connected to before the log begins: a scheduler that is not there costs no old log.
-        with self._executor(executor, workers) as pool, open_log(self.log, resume) as log:
+        opened = (
+            open_executor(workers, self.scheduler) if executor is None else nullcontext(executor)
+        )
+        with opened as pool, open_log(self.log, resume) as log:
             log.write("batch", tool=tool.name, version=__version__, rows=len(calls))
             self._run(calls, ended, pool, log, progress)
             result = BatchResult(
                 tool,
                 [BatchRow(call, ended[call.row], call.row in resumed) for call in calls],
                 time.monotonic() - started,
-                folder / f"{self.table.stem}.results.csv",
-                folder / f"{self.table.stem}.results.json",
+                folder / f"{self.table.name}.results.csv",
+                folder / f"{self.table.name}.results.json",
                 Path(os.path.abspath(self.log)),
             )
-            counts = {status: result.count(status) for status in ("done", "refused", "failed")}
-            log.write("end", **counts, seconds=result.seconds)
+            log.write("end", **result.counts, seconds=result.seconds)
         result.write()
         return result
 
@@ -117,14 +119,6 @@ class Batch:
             elif earlier is not None and still_there(earlier):
                 known[call.row] = earlier
         return known
-
-    @contextlib.contextmanager
-    def _executor(self, executor: Executor | None, workers: int) -> Iterator[Executor]:
-        if executor is not None:
-            yield executor
-            return
-        with open_executor(workers, self.scheduler) as opened:
-            yield opened
 
     def _run(
         self,
@@ -148,5 +142,6 @@ class Batch:
                 reporter.ended(outcome)
         except CancelledError as error:
             log.write("cancelled")
-            said = f"cancelled after {len(ended)} of {len(calls)} rows; resume runs the others"
-            raise CancelledError(said) from error
+            raise CancelledError(
+                f"cancelled after {len(ended)} of {len(calls)} rows; resume runs the others"
+            ) from error

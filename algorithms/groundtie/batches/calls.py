@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from ..call_paths import inputs_of
 from ..declaration import Parameter, Tool
 from ..errors import GroundTieError, OutputError, ParameterError, SameFileError
 from ..kinds import Flag, FolderOut, InputKind, OutputKind, RastersIn, Text
 from ..raster_names import raster_name
-from ..rasters.atomic import writing
+from ..rasters.atomic import make_folder
 from ..runs import digest
 
 # The column that is no parameter.
@@ -75,7 +77,7 @@ def make_calls(
     SameFileError
         A row writes what another one reads or writes.
     """
-    known = {parameter.name for parameter in tool.parameters}
+    known = {parameter.name for parameter in tool.all_parameters}
     for name in {name: None for row in rows for name in row}:
         if name not in known and name != NAME:
             raise ParameterError(f"the table has a column {name}, which {tool.name} does not know")
@@ -95,12 +97,14 @@ def make_calls(
 def _call(
     tool: Tool, number: int, name: str, row: Mapping[str, Any], inputs: Path, outputs: Path
 ) -> Call:
-    values = {p.name: _value(p, row.get(p.name), name, inputs, outputs) for p in tool.parameters}
+    values = {
+        p.name: _value(p, row.get(p.name), name, inputs, outputs) for p in tool.all_parameters
+    }
     for parameter in tool.parameters:
         path = values[parameter.name]
-        if path is not None and isinstance(parameter.kind, OutputKind):
-            with writing(path):
-                Path(path).parent.mkdir(parents=True, exist_ok=True)
+        # Not by the rows: one that fails must not remove what another one is about to use.
+        if path is not None and _is_output(parameter):
+            make_folder(path.parent)
     checked = tool.check(values)
     written = {p.name: checked[p.name] for p in tool.parameters if _is_output(p)}
     written = {key: path for key, path in written.items() if path is not None}
@@ -152,17 +156,25 @@ def _output(parameter: Parameter, value: Any, name: str, folder: Path) -> Path |
     return folder / value.replace("{name}", name)
 
 
+def _files(tool: Tool, call: Call) -> Iterator[Path]:
+    """Yield all that a call writes, also what lies beside its outputs."""
+    for name, path in call.outputs.items():
+        kind = tool.parameter(name).kind
+        assert isinstance(kind, (OutputKind, FolderOut))
+        yield from (path, *kind.also_written(path))
+
+
 def _check_apart(tool: Tool, calls: Sequence[Call]) -> None:
     """Raise if what a row writes is read or written by another: rows run in any order."""
     writers: dict[Path, Call] = {}
     for call in calls:
-        for path in call.outputs.values():
+        for path in _files(tool, call):
             other = writers.setdefault(path.resolve(), call)
             if other is not call:
                 raise SameFileError(f"rows {other.row} and {call.row} both write {path}")
-    inputs = [p.name for p in tool.parameters if isinstance(p.kind, InputKind)]
     for call in calls:
-        for value in (call.values.get(name) for name in inputs):
+        read = [inputs_of(p.kind, call.values.get(p.name)) for p in tool.parameters]
+        for value in chain.from_iterable(read):
             if isinstance(value, Path) and (writer := writers.get(value.resolve())) is not None:
                 raise OutputError(
                     f"row {writer.row} would write what row {call.row} reads: {value}"

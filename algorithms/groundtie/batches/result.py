@@ -12,7 +12,7 @@ from ..rasters.atomic import Outputs, write_csv, write_json
 from ..runs import run_tags
 from ..version import __version__
 from .calls import Call
-from .work import DONE, FAILED, REFUSED, Outcome
+from .work import DONE, EXIT_CODES, Outcome
 
 _FORMAT = "groundtie-batch/1"
 
@@ -71,15 +71,22 @@ class BatchResult:
     details: Path
     log: Path
 
-    def count(self, status: str) -> int:
-        """Return how many rows ended so: `done`, `refused` or `failed`."""
-        return sum(row.outcome.status == status for row in self.rows)
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many rows are `done`, `refused` and `failed`."""
+        ended = [row.outcome.status for row in self.rows]
+        return {status: ended.count(status) for status in EXIT_CODES}
+
+    @property
+    def resumed(self) -> int:
+        """How many rows ended in an earlier run."""
+        return sum(row.resumed for row in self.rows)
 
     @property
     def exit_code(self) -> int:
         """Of the worst row: 2 if any failed, else 3 if any was refused, else 0."""
-        worst = next((s for s in (FAILED, REFUSED) if self.count(s)), DONE)
-        return Outcome(worst).exit_code
+        # `EXIT_CODES` has the worst status last.
+        return [EXIT_CODES[status] for status, count in self.counts.items() if count][-1]
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
@@ -88,8 +95,8 @@ class BatchResult:
             "tool": self.tool.name,
             "version": __version__,
             "seconds": self.seconds,
-            **{status: self.count(status) for status in (DONE, REFUSED, FAILED)},
-            "resumed": sum(row.resumed for row in self.rows),
+            **self.counts,
+            "resumed": self.resumed,
             "table": str(self.table),
             "log": str(self.log),
             "rows": [row.summary() for row in self.rows],
@@ -97,9 +104,8 @@ class BatchResult:
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
-        counts = [f"{self.count(status)} {status}" for status in (DONE, REFUSED, FAILED)]
-        resumed = sum(row.resumed for row in self.rows)
-        counts += [f"{resumed} of them in an earlier run"] if resumed else []
+        counts = [f"{count} {status}" for status, count in self.counts.items()]
+        counts += [f"{self.resumed} of them in an earlier run"] if self.resumed else []
         bad = [row for row in self.rows if row.outcome.status != DONE]
         lines = [f"{len(self.rows)} rows: {', '.join(counts)}"]
         lines += [

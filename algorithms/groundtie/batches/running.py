@@ -14,7 +14,7 @@ from ..errors import GroundTieError
 from ..executors import POLL_SECONDS, result_of
 from ..progress import Progress
 from .calls import Call
-from .work import FAILED, Outcome, Task, bug
+from .work import DONE, FAILED, Outcome, Task, bug
 
 
 def run_calls(
@@ -105,9 +105,7 @@ class Reporter:
 
     def line(self) -> str:
         """Return how far the batch is, for people."""
-        troubles = [
-            f"{count} {status}" for status, count in self._counts.items() if status != "done"
-        ]
+        troubles = [f"{count} {status}" for status, count in self._counts.items() if status != DONE]
         left = f"{duration(self.remaining_seconds())} left"
         return ", ".join([f"{self._ended} of {self._rows} rows", *troubles, left])
 

@@ -15,9 +15,13 @@ from ..declaration import Tool
 from ..errors import CancelledError, GroundTieError, NotRegisteredError
 from ..executors import enter_worker, stop_requested
 from ..progress import Progress
+from ..runs import running
 from ..version import __version__
 
 DONE, REFUSED, FAILED = "done", "refused", "failed"
+
+# What the command line of a single call ends with, the worst last.
+EXIT_CODES = {DONE: 0, REFUSED: NotRegisteredError.exit_code, FAILED: GroundTieError.exit_code}
 
 
 @dataclass(frozen=True)
@@ -50,9 +54,7 @@ class Outcome:
     @property
     def exit_code(self) -> int:
         """What the command line of this one call would have ended with."""
-        return {DONE: 0, REFUSED: NotRegisteredError.exit_code}.get(
-            self.status, GroundTieError.exit_code
-        )
+        return EXIT_CODES[self.status]
 
     def summary(self) -> dict[str, Any]:
         """Return it as values that JSON can carry."""
@@ -86,11 +88,12 @@ class Task:
         enter_worker()
         started = time.perf_counter()
         result: Mapping[str, Any] = {}
+        written: list[Path] = []
         status, message, trace = FAILED, "", ""
         try:
             if self.version != __version__:
                 raise GroundTieError(f"the worker has GroundTie {__version__}, not {self.version}")
-            result = self._call()
+            result = self._call(written)
             status = DONE
         except CancelledError:
             raise
@@ -103,13 +106,23 @@ class Task:
             message = bug(error)
             trace = traceback.format_exc()
         seconds = time.perf_counter() - started
-        return Outcome(status, message, seconds, result, files_of(self.outputs), trace)
+        files = files_of((*self.outputs, *written))
+        return Outcome(status, message, seconds, result, files, trace)
 
-    def _call(self) -> dict[str, Any]:
-        progress = Progress(is_cancelled=stop_requested)
-        run = self.load(self.tool).run
+    def _call(self, written: list[Path]) -> dict[str, Any]:
+        """Run the tool, return its summary, and add what it writes to a list."""
+        tool = self.load(self.tool)
+
+        def run() -> dict[str, Any]:
+            with running(tool.run_of_call(self.values)) as call:
+                try:
+                    progress = Progress(is_cancelled=stop_requested)
+                    return tool.run(**self.values, progress=progress).summary()
+                finally:
+                    written.extend(call.files)
+
         # A context of its own: files carry the id of this call (see `runs`), on any executor.
-        return Context().run(lambda: run(**self.values, progress=progress).summary())
+        return Context().run(run)
 
 
 def bug(error: Exception) -> str:

@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import Any
 
 from ..errors import GroundTieError, OutputError, raised_by
-from ..runs import run_tags
+from ..runs import has_written, run_tags, will_make
 from .leftovers import Claim, hidden_name, new_token, remove
 
 # What GDAL and SQLite put beside a file, appended to its whole name.
@@ -126,6 +126,7 @@ class Outputs:
                     is_new = not os.path.lexists(place) and place not in self._aside
                     os.replace(path, place)
                     made += [place] if is_new else []
+                    has_written(place)
         except BaseException as error:
             self._undo(made)
             if isinstance(error, OSError):
@@ -190,7 +191,11 @@ def write_json(path: Path, values: Mapping[str, Any], indent: int | None = 1) ->
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, and those that it lies in, if it is not there; errors as `writing`."""
+    """Make a folder, and those that it lies in, if it is not there; errors as `writing`.
+
+    If it is still empty when the call of the tool ends, it is removed (see `runs`).
+    """
+    will_make(folder)
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
 

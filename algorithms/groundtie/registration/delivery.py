@@ -57,7 +57,7 @@ class RegistrationFiles:
             # Last: who finds it finds all that it is about.
             if self.report is not None:
                 item = self._item(registration, grid, self.report)
-                registration.page().write(outputs, self.report, self.transform, item)
+                registration.page().write(outputs, self.report, item)
 
     def _item(
         self, registration: Registration, grid: Grid | None, report: Path

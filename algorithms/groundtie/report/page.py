@@ -16,8 +16,9 @@ import numpy as np
 import rasterio
 import scipy
 
+from ..call_paths import check_numbers
 from ..geometry.judging import TOLERANCE_PX
-from ..kinds import plainly
+from ..kinds import REPORT_FORMAT, plainly
 from ..rasters.atomic import Outputs, write_json, writing
 from ..runs import RUN, run_tags
 from ..version import __version__
@@ -63,13 +64,11 @@ class Page:
         self,
         outputs: Outputs,
         path: Path,
-        taken: Path | None = None,
         item: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         """Write the page, an HTML file, and before it its numbers, the JSON file beside it.
 
-        Where another output is to be `taken` for that file, they are NAME.report.json. With the
-        members of a STAC `item` that file is one (see `stac`).
+        With the members of a STAC `item` that file is one (see `stac`).
 
         Raises
         ------
@@ -82,9 +81,9 @@ class Page:
         template = _environment().get_template(self.template)
         page = template.render(title=self.title, run=run, **shared, **self.values())
         beside = path.with_suffix(".json")
-        is_free = taken is None or taken.resolve() != beside.resolve()
-        numbers = beside if is_free else path.with_suffix(".report.json")
-        write_json(outputs.stage(numbers), {**plain(dict(item)), **summary})
+        check_numbers(path.name, beside, REPORT_FORMAT)
+        numbers = {"format": REPORT_FORMAT, **plain(dict(item)), **summary}
+        write_json(outputs.stage(beside), numbers)
         staged = outputs.stage(path)
         with writing(staged):
             staged.write_text(page, encoding="utf-8")

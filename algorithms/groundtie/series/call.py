@@ -28,7 +28,7 @@ from .pairs import Settings
 from .registering import Matching
 from .series import Series, SeriesDate
 from .settling import DateVerdict, settle
-from .stored import SERIES_JSON, UNFINISHED, StoredSeries, Unfinished, read_series
+from .stored import UNFINISHED, StoredSeries, Unfinished, read_series
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class SeriesCall:
         files = SeriesFiles(
             given["output_folder"], given["output_grid"], given["resampling"], given["report"]
         )
-        _require_apart(listed, files)
+        _require_apart(listed, files.folder)
         settings = Settings(
             model_for_grid(given["model"], given["output_grid"]),
             given["max_error"],
@@ -193,17 +193,12 @@ def _is_same(date: Listed, other: Listed) -> bool:
     return identity(date.raster) == identity(other.raster)
 
 
-def _require_apart(listed: tuple[Listed, ...], files: SeriesFiles) -> None:
-    """Raise an error where outputs would be written over, or among, the inputs."""
-    folder = files.folder.resolve()
+def _require_apart(listed: tuple[Listed, ...], folder: Path) -> None:
+    """Raise an error where outputs would be written among the inputs."""
+    folder = folder.resolve()
     for date in listed:
         if isinstance(date.raster, Path) and date.raster.resolve().parent == folder:
             raise SameFileError(f"the output folder holds an input: {date.raster}")
-    if files.report is None:
-        return
-    beside = files.report.resolve().with_suffix(".json")
-    if beside == folder / SERIES_JSON:
-        raise SameFileError(f"the report's numbers would be written over {beside}")
 
 
 def _on_one_map(

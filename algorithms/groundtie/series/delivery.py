@@ -18,7 +18,7 @@ from ..rasters.reading import open_raster
 from ..registration.registered_output import UNTOUCHED_TOLERANCE_PX, RegisteredOutput
 from ..registration.verdict import Verdict
 from ..report.stac import stac_item
-from ..runs import RUN, digest, run_tags
+from ..runs import RUN, digest, has_written, run_tags
 from ..version import __version__
 from .dates import file_facts
 from .frame import FloatArray, sigma_px
@@ -57,7 +57,7 @@ class SeriesFiles:
         """
         if not series.registered:
             self._write_refusal(series)
-            forget_unfinished(self.folder, had_folder=stored.had_folder)
+            forget_unfinished(self.folder)
             raise _refusal(series)
         make_folder(self.folder)
         with Outputs() as outputs:
@@ -68,7 +68,7 @@ class SeriesFiles:
             # Last: who finds it finds all that it is about.
             self._write_report(series, outputs)
         self._remove_stale(series, stored)
-        forget_unfinished(self.folder, had_folder=stored.had_folder)
+        forget_unfinished(self.folder)
         return series
 
     def raster_key(self, date: SeriesDate, series: Series) -> str:
@@ -108,6 +108,7 @@ class SeriesFiles:
             moved = one.transform(before.transform.inverse(corners)) - corners
             # What untouched pixels may be wrong by, too.
             if np.hypot(*moved.T).max() < UNTOUCHED_TOLERANCE_PX:
+                has_written(self.folder / before.file)
                 known = {"file": before.file, "key": key, "run": before.run}
                 with open_raster(self.folder / before.file) as source:
                     return replace(one, transform=before.transform), known, source.grid

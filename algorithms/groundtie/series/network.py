@@ -255,12 +255,11 @@ class _Network:
     def confirmed(self) -> Mask:
         """Return which dates no single link alone connects with the hub, shape (n,)."""
         edges = [(link.first, link.second) for link in self.links]
-        inner = [
-            edge
-            for k, edge in enumerate(edges)
-            if _parts(edges[:k] + edges[k + 1 :], self.count)[edge[0]]
-            == _parts(edges[:k] + edges[k + 1 :], self.count)[edge[1]]
-        ]
+        inner = []
+        for k, (first, second) in enumerate(edges):
+            part = _parts(edges[:k] + edges[k + 1 :], self.count)
+            if part[first] == part[second]:
+                inner.append((first, second))
         part = _parts(inner, self.count)
         return np.asarray(part == part[self.hub])
 

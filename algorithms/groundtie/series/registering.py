@@ -14,7 +14,7 @@ from ..errors import WorkerLostError
 from ..executors import POLL_SECONDS, result_of
 from .closure import triplet_closures
 from .dates import Date, Footprints
-from .frame import FloatArray, SeriesFrame
+from .frame import PARAMETERS, FloatArray, SeriesFrame
 from .network import Link, adjust
 from .pairs import PairResult, PairTask, Settings, pair_key, register_pair
 
@@ -73,6 +73,8 @@ class Matching:
     reused: int = 0
 
     def __post_init__(self) -> None:
+        if not self.known:
+            return
         for i, j in permutations(range(len(self.dates)), 2):
             for settings in (self.settings, self.settings.of_loops()):
                 key = pair_key(self.dates[i], self.dates[j], settings, self.frame)
@@ -128,7 +130,7 @@ class Matching:
 
     def placed(self, hub: int) -> dict[int, FloatArray]:
         """Return the displacements of the dates that links reach from a hub, by the first way."""
-        found: dict[int, FloatArray] = {hub: np.zeros(6)}
+        found: dict[int, FloatArray] = {hub: np.zeros(PARAMETERS)}
         links, frame = self.links, self.frame
         grew = True
         while grew:

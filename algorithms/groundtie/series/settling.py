@@ -93,7 +93,7 @@ def settle(frame: SeriesFrame, results: Results, count: int, hub: int, *, is_fre
         ]
         found = adjust(frame, links, count, hub, is_free=is_free)
         closures = triplet_closures(frame, links, found.scatter_px)
-        network = _Network(results, links, found, closures, hub)
+        network = _AdjustedNetwork(results, links, found, closures, hub)
         open_closures.update({one.dates: one for one in closures if not one.is_closed})
         rejected |= network.rejected
         verdicts = [refused.get(date) or network.verdict(date) for date in range(count)]
@@ -119,7 +119,7 @@ def settle(frame: SeriesFrame, results: Results, count: int, hub: int, *, is_fre
 
 
 @dataclass(frozen=True)
-class _Network:
+class _AdjustedNetwork:
     results: Results
     links: Sequence[Link]
     found: Adjustment

@@ -15,9 +15,10 @@ from typing import Any
 
 from rasterio.errors import CRSError
 
-from ..errors import GroundTieError, ParameterError, RasterOpenError
+from ..errors import GroundTieError, OutputError, ParameterError, RasterOpenError
 from ..geometry.transform import Transform
-from ..rasters.atomic import writing
+from ..rasters.atomic import make_folder, writing
+from ..rasters.leftovers import remove
 from ..rasters.reading import open_raster
 from ..runs import RUN_TAG
 from ..strict_json import parse_json, read_json
@@ -71,14 +72,11 @@ class StoredSeries:
         Their registrations, by their keys.
     dates
         The rasters that were written, by the names of the dates.
-    had_folder
-        Whether the folder was there.
     """
 
     frames: Mapping[str | None, SeriesFrame] = field(default_factory=dict)
     pairs: Mapping[str, PairResult] = field(default_factory=dict)
     dates: Mapping[str, StoredDate] = field(default_factory=dict)
-    had_folder: bool = True
 
 
 @dataclass(frozen=True)
@@ -113,21 +111,24 @@ class Unfinished:
             "pair": pair.to_json(),
         }
         path = self.folder / UNFINISHED
-        with writing(path):
-            self.folder.mkdir(parents=True, exist_ok=True)
-            with path.open("a", encoding="utf-8") as file:
+        make_folder(self.folder)
+        is_first = not path.exists()
+        try:
+            with writing(path), path.open("a", encoding="utf-8") as file:
                 # The newline first: the line before may have been cut off with its run.
                 file.write("\n" + json.dumps(values))
+        except OutputError:
+            if is_first:
+                remove(path)
+            raise
 
 
-def forget_unfinished(folder: Path, *, had_folder: bool) -> None:
-    """Remove what `Unfinished` wrote, and a folder that was made for nothing else."""
+def forget_unfinished(folder: Path) -> None:
+    """Remove what `Unfinished` wrote."""
     path = folder / UNFINISHED
     if path.exists():
         with writing(path):
             path.unlink()
-            if not had_folder and not any(folder.iterdir()):
-                folder.rmdir()
 
 
 def read_series(folder: Path) -> StoredSeries:
@@ -171,7 +172,7 @@ def _read_unfinished(path: Path) -> StoredSeries:
             pair = PairResult.from_json(values["pair"])
             frames[values["reference_key"]] = SeriesFrame.from_json(values["frame"])
             pairs[pair.key] = pair
-    return StoredSeries(frames, pairs, had_folder=path.parent.exists())
+    return StoredSeries(frames, pairs)
 
 
 def _stored_date(values: dict[str, Any]) -> StoredDate:

@@ -20,7 +20,7 @@ from ..errors import NotRegisteredError
 from ..geometry.models import KINDS
 from ..geometry.tie_point_files import SUFFIXES
 from ..geometry.transform import Transform
-from ..kinds import Choice, FileIn, FileOut, Number, RasterIn
+from ..kinds import REPORT_FORMAT, Choice, FileIn, FileOut, Number, RasterIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
@@ -168,6 +168,7 @@ def assess(
             help="A page with the errors and, if both images are given, swipe and checkerboard; "
             "its numbers are put beside it as JSON. It is written for a refusal, too.",
             suffixes=(".html",),
+            numbers=REPORT_FORMAT,
             shown=True,
         ),
     ] = None,
@@ -220,7 +221,7 @@ def assess(
         onward_transform, closing_transform, direct_transform,
     )  # fmt: skip
     images = {"reference": reference, "input": input}
-    files.check(images, max_error, report)
+    files.check(images, max_error, report is not None)
     comparison: Comparison | None = None
     with ExitStack() as stack:
         stack.enter_context(bounded_cache())

@@ -91,6 +91,6 @@ def batch(
     the worst row: 2 if one failed, else 3 if one was refused, else 0.
     """
     folder = table.parent if output_folder is None else output_folder
-    log = folder / f"{table.stem}.log.jsonl" if json_log is None else json_log
+    log = folder / f"{table.name}.log.jsonl" if json_log is None else json_log
     job = Batch(load_tool, tool, table, folder, log, workers, scheduler)
     return job.run(resume, progress, executor)

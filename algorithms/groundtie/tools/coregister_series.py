@@ -15,7 +15,9 @@ from ..matching.alignment import LINEAR_CANDIDATES
 from ..matching.surface_fit import AUTO
 from ..progress import SILENT, Progress
 from ..series.call import SeriesCall
+from ..series.delivery import TABLE_CSV, TABLE_GPKG
 from ..series.series import Series
+from ..series.stored import SERIES_JSON
 from .parameters import general, registration
 
 
@@ -35,6 +37,7 @@ def coregister_series(
             label="Output folder",
             help="Registered dates, series.csv, series.gpkg and series.json; what it holds of an "
             "earlier run with the same files and parameters is not done again.",
+            writes=(SERIES_JSON, TABLE_CSV, TABLE_GPKG),
         ),
     ],
     inputs: Annotated[

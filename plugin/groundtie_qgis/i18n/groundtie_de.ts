@@ -1088,10 +1088,6 @@
       <translation>Zahl der fehlenden Dinge</translation>
     </message>
     <message>
-      <source>Number of threads; by default one per processor.</source>
-      <translation>Zahl der Threads; ohne Angabe einer je Prozessor.</translation>
-    </message>
-    <message>
       <source>Number of tie points</source>
       <translation>Zahl der Verknüpfungspunkte</translation>
     </message>

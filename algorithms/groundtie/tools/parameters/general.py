@@ -52,7 +52,7 @@ Workers = Annotated[
         integer=True,
         minimum=1,
         maximum=256,
-        advanced=True,
+        common=True,
     ),
 ]
 Scheduler = Annotated[

@@ -9,6 +9,7 @@ from ...declaration import Output
 from ...geometry.models import KINDS
 from ...geometry.tie_point_files import SUFFIXES
 from ...kinds import (
+    REPORT_FORMAT,
     Choice,
     Distance,
     FileOut,
@@ -71,6 +72,7 @@ ReportOut = Annotated[
         help="A page that shows the result and how far to trust it; its numbers are put "
         "beside it as JSON. It is written for a refused registration, too.",
         suffixes=(".html",),
+        numbers=REPORT_FORMAT,
         shown=True,
     ),
 ]

@@ -1,0 +1,116 @@
+"""The paths of one call: nothing that it reads or writes is written over by something else."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Hashable, Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from .errors import OutputError, SameFileError
+from .kinds import FileOut, FolderOut, InputKind, Kind, OutputKind, PathKind, RastersIn, plainly
+from .raster_names import identity
+from .strict_json import read_json
+
+
+def check_different(rasters: Mapping[str, Any]) -> None:
+    """Raise `SameFileError` if two of these checked rasters, by name, are one and the same."""
+    taken: dict[Hashable, str] = {}
+    for name, raster in rasters.items():
+        other = taken.setdefault(_identity(raster), name)
+        if other != name:
+            raise SameFileError(f"{name} is the same raster as {other}: {plainly(raster)}")
+
+
+def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
+    """Check the paths of one call against each other and against the disk.
+
+    Parameters
+    ----------
+    values
+        Name, kind and checked value of every parameter.
+
+    Raises
+    ------
+    SameFileError
+        An output, or a file that is written because of it, is an input or another one.
+    OutputError
+        An output's folder is missing or cannot be written to, a folder is a file, or a file is in
+        the place of the numbers of a report.
+    """
+    taken: dict[Hashable, str] = {}
+    outputs: list[tuple[str, PathKind, Path]] = []
+    for name, kind, value in values:
+        if value is None:
+            continue
+        if isinstance(kind, (InputKind, RastersIn)):
+            taken |= dict.fromkeys(map(_identity, inputs_of(kind, value)), name)
+        elif isinstance(kind, (OutputKind, FolderOut)):
+            outputs.append((name, kind, value))
+    made = {path.resolve() for _, kind, path in outputs if isinstance(kind, FolderOut)}
+    for name, kind, path in outputs:
+        if isinstance(kind, FolderOut):
+            if path.is_file():
+                raise OutputError(f"{name} is a file, not a folder: {path}")
+            continue
+        other = taken.setdefault(path.resolve(), name)
+        if other != name:
+            raise SameFileError(f"{name} is the same file as {other}: {path}")
+        _check_place(name, path, made)
+    for name, kind, path in outputs:
+        for more in kind.also_written(path):
+            own = f"a file of {name}"
+            other = taken.setdefault(more.resolve(), own)
+            if other != own:
+                raise SameFileError(f"{name} would also write {more}, which is {other}")
+            if isinstance(kind, FileOut):
+                check_numbers(name, more, kind.numbers)
+
+
+def check_numbers(name: str, path: Path, wanted: str) -> None:
+    """Raise `OutputError` if the numbers of the output `name` would replace something else.
+
+    That may be a file that is read without being named, as the STAC item of an image.
+    """
+    if path.exists() and _format(path) != wanted:
+        raise OutputError(
+            f"{name} would also write {path}, which is something else: remove it, or give {name} "
+            "another name"
+        )
+
+
+def inputs_of(kind: Kind, value: Any) -> tuple[Any, ...]:
+    """Return the inputs that the checked value of a parameter names."""
+    if value is None or not isinstance(kind, (InputKind, RastersIn)):
+        return ()
+    return value if isinstance(kind, RastersIn) else (value,)
+
+
+def _check_place(name: str, path: Path, made: set[Path]) -> None:
+    """Raise `OutputError` if there can be no such file; some folders are `made` by the call."""
+    folder = path.resolve().parent
+    if path.is_dir():
+        raise OutputError(f"{name} is a folder, not a file: {path}")
+    if folder in made and not folder.exists():
+        return
+    if not folder.is_dir():
+        raise OutputError(f"the folder of {name} does not exist: {folder}")
+    if not os.access(folder, os.W_OK):
+        raise OutputError(f"the folder of {name} cannot be written to: {folder}")
+
+
+def _identity(raster: Any) -> Hashable:
+    """Return what is the same for two rasters that are one."""
+    if isinstance(raster, (str, Path)):
+        return identity(raster)
+    # An open dataset is where its file is.
+    return getattr(raster, "identity", None) or Path(raster.name).resolve()
+
+
+def _format(path: Path) -> Any:
+    """Return the format that a JSON file states; None if it states none."""
+    with suppress(OSError, ValueError):
+        held = read_json(path)
+        return held.get("format") if isinstance(held, dict) else None
+    return None
