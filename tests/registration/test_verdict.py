@@ -150,9 +150,7 @@ def test_three_exact_points_are_enough() -> None:
 @pytest.mark.parametrize(
     ("right", "wrong", "accepted"), [(3, 6, False), (4, 5, True), (3, 0, True)]
 )
-def test_three_of_nine_check_points_are_not_enough(
-    right: int, wrong: int, accepted: bool
-) -> None:
+def test_three_of_nine_check_points_are_not_enough(right: int, wrong: int, accepted: bool) -> None:
     away = 9.0 * np.array([[1, 0], [0, -1], [-1, 1], [1, 1], [-1, 0], [0, 1]])
     check = check_points(np.concatenate([np.zeros((right, 2)), away[:wrong]]))
     assert judged(check).accepted == accepted
