@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
-from ..rasters.reading import Mask
+from ..rasters.reading import Mask, Window
 from .cast_shadow import shadow_azimuth_deg
 from .growing import Region
 
@@ -75,29 +75,41 @@ class RangeOrder:
         return cls((level_db < shadow_db) & valid, (level_db > brightest) & valid, behind)
 
     def evidence_of_ground(self, region: Region) -> float:
-        """Return by how much a region looks like ground: −2, a roof, to 2, ground."""
+        """Return by how much a region looks like ground: −2, a roof, to 2, ground.
+
+        Shares of shadow before and layover behind it speak for ground; shadow behind and layover
+        before, for a roof.
+        """
         reach, box = len(self.behind) // 2, region.box
         mask = np.pad(region.mask.astype(np.uint8), reach)
-        holes = np.ones((_HOLE_PX, _HOLE_PX), np.uint8)
-        whole = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, holes)
-        # `dilate` looks for the region in the window: what lies behind has it before.
+        whole = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((_HOLE_PX, _HOLE_PX), np.uint8))
+        # A pixel lies behind the region if the window finds it on the other side of the pixel.
         behind, before = (
             (cv2.dilate(whole, window) > 0) & (whole == 0)
-            for window in (self.behind[::-1, ::-1], self.behind)
+            for window in (np.ascontiguousarray(self.behind[::-1, ::-1]), self.behind)
         )
-        inside = [
-            slice(max(at - reach, 0), at + n + reach)
-            for at, n in ((box.row, box.height), (box.col, box.width))
-        ]
-        dark, bright = self.dark[inside[0], inside[1]], self.bright[inside[0], inside[1]]
-        top, left = max(reach - box.row, 0), max(reach - box.col, 0)
-        only = [
-            side[top:, left:][: dark.shape[0], : dark.shape[1]]
-            for side in (before & ~behind, behind & ~before)
-        ]
-        shares = [[_share(what, side) for side in only] for what in (dark, bright)]
-        return shares[0][0] - shares[0][1] + shares[1][1] - shares[1][0]
+        around = Window(
+            box.col - reach, box.row - reach, box.width + 2 * reach, box.height + 2 * reach
+        )
+        dark, bright = _cut(self.dark, around), _cut(self.bright, around)
+        before, behind = before & ~behind, behind & ~before
+        return (
+            _share(dark, before)
+            - _share(dark, behind)
+            + _share(bright, behind)
+            - _share(bright, before)
+        )
 
 
-def _share(what: Mask, of: Mask) -> float:
-    return float(what[of].mean()) if of.any() else 0.0
+def _cut(mask: Mask, window: Window) -> Mask:
+    """Return a mask in a window; nothing lies beyond its image."""
+    found = np.zeros((window.height, window.width), bool)
+    top, left = max(-window.row, 0), max(-window.col, 0)
+    inside = mask[max(window.row, 0) : window.row + window.height]
+    inside = inside[:, max(window.col, 0) : window.col + window.width]
+    found[top:, left:][: inside.shape[0], : inside.shape[1]] = inside
+    return found
+
+
+def _share(of: Mask, side: Mask) -> float:
+    return float(of[side].mean()) if side.any() else 0.0
