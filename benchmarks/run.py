@@ -23,6 +23,7 @@ SUITES = (
     "layover",
     "radar_likeness",
     "sharpness",
+    "ground",
     "masks",
     "large_shift",
     "rotated_pairs",

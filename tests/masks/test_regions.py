@@ -127,3 +127,27 @@ def test_without_any_ground_nothing_takes_part(tmp_path: Path) -> None:
     noise = np.random.default_rng(0).lognormal(5, 1.5, (200, 200)).astype(np.float32)
     found = find_ground(scene_of(tmp_path / "a.tif", noise))
     assert found.part.mean() < 0.02 and found.skeleton_m < 50
+
+
+@pytest.mark.parametrize("is_roof", [False, True])
+def test_bright_and_large_is_ground_where_shadow_lies_before_it(
+    tmp_path: Path, is_roof: bool
+) -> None:
+    # The radar looks to the right: rows of buildings, of which it shows layover, then shadow.
+    level_db = np.full((480, 480), 50.0)
+    for col in range(0, 480, 60):
+        level_db[:, col : col + 12] = 60
+        level_db[:, col + 12 : col + 24] = 35
+    level_db[::60] = 50
+    large = np.zeros(level_db.shape, bool)
+    large[185:295, 252:288] = True
+    if is_roof:
+        level_db[185:295, 288:300] = 35
+    else:
+        level_db[185:295, 240:252] = 35
+        level_db[185:295, 288:300] = 60
+    level_db[large] = 54.5
+    speckle = np.random.default_rng(1).gamma(4, 1 / 4, level_db.shape)
+    amplitude = np.sqrt(10 ** (level_db / 10) * speckle).astype(np.float32)
+    found = find_ground(scene_of(tmp_path / "a.tif", amplitude)).regions[large].mean()
+    assert found < 0.02 if is_roof else found > 0.9

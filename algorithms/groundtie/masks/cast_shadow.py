@@ -26,24 +26,31 @@ _NEAR_PX, _FAR_PX = 2, 14
 SHADOW_M = 12.0
 
 
-def shadow_azimuth_deg(patch: Patch) -> float:
-    """Return the direction in which cast shadows fall, clockwise from the top of the image.
+def shadow_azimuth_deg(
+    patch: Patch, outer_percent: float = _OUTER_PERCENT, far_px: int = _FAR_PX
+) -> float:
+    """Return the direction in which shadows fall, clockwise from the top of the image.
 
     Parameters
     ----------
     patch
-        An optical image with tall objects.
+        An image with tall objects: a camera's, or a radar's without speckle, whose shadows fall
+        away from the sensor.
+    outer_percent
+        So many of the pixels are dark, and so many bright.
+    far_px
+        Largest distance of dark pixels from bright ones.
     """
     level = cv2.GaussianBlur(patch.values, (0, 0), 1.0)
-    low, high = np.percentile(level[patch.valid], [_OUTER_PERCENT, 100 - _OUTER_PERCENT])
+    low, high = np.percentile(level[patch.valid], [outer_percent, 100 - outer_percent])
     dark, bright = (level <= low) & patch.valid, (level >= high) & patch.valid
-    size = [scipy.fft.next_fast_len(n + _FAR_PX, real=True) for n in level.shape]
+    size = [scipy.fft.next_fast_len(n + far_px, real=True) for n in level.shape]
     spectra = [scipy.fft.rfft2(m.astype(np.float32), size, workers=2) for m in (bright, dark)]
     # How many dark pixels lie at an offset from bright ones.
     counts = scipy.fft.irfft2(np.conj(spectra[0]) * spectra[1], size, workers=2)
-    y, x = np.mgrid[-_FAR_PX : _FAR_PX + 1, -_FAR_PX : _FAR_PX + 1]
+    y, x = np.mgrid[-far_px : far_px + 1, -far_px : far_px + 1]
     distance = np.hypot(x, y)
-    near = (distance > _NEAR_PX) & (distance <= _FAR_PX)
+    near = (distance > _NEAR_PX) & (distance <= far_px)
     weight = counts[y[near], x[near]] / distance[near]
     right, up = (weight * x[near]).sum(), -(weight * y[near]).sum()
     return float(np.degrees(np.arctan2(right, up)) % 360)

@@ -21,6 +21,7 @@ from ..speckle.statistics import estimate_looks, local_statistics
 from .cast_shadow import out_of_shadow
 from .growing import Region, grow_regions
 from .radar import power
+from .range_order import RangeOrder
 from .scene import Scene, Selection
 from .shapes import Shape
 from .skeleton import pruned, skeleton
@@ -54,6 +55,9 @@ _LARGE_M2 = 1500.0
 
 # Ground lies in the lower part of the histogram ([Suri2010] 5.3.2), roofs and walls in the upper.
 _BRIGHTEST_PERCENT = 60.0
+
+# Large regions may be brighter where shadow lies before and layover behind them, see `range_order`.
+_CLEARLY_GROUND = 0.1
 
 # Regions as dark as the darkest of the scene are radar shadow, unless as large as a lake.
 _DARKEST_PERCENT = 5.0
@@ -202,17 +206,22 @@ def _kept_regions(
     grown = grow_regions(
         level, variation2, patch.valid, _SEED_EXCESS / looks, _TOLERANCE_DB, smallest
     )
-    regions = [region for region in grown if region.level_db <= brightest]
-    shadow_db = _darkest_db(regions) + _SHADOW_DB
+    regions = list(grown)
+    shadow_db = _darkest_db([r for r in regions if r.level_db <= brightest]) + _SHADOW_DB
+    order = RangeOrder.of(level, patch.valid, shadow_db, pixel_m)
     longs, wide = np.zeros(level.shape, bool), np.zeros(level.shape, bool)
     for region in regions:
         shape = Shape.of(region.mask)
         area_m2 = shape.area * pixel_m**2
         if region.level_db < shadow_db and area_m2 < _LAKE_M2:
             continue
-        if shape.length * pixel_m >= _LONG_M and shape.elongation >= _ELONGATION:
+        is_long = shape.length * pixel_m >= _LONG_M and shape.elongation >= _ELONGATION
+        is_wide = area_m2 >= _LARGE_M2 and shape.width * pixel_m > width_m
+        if region.level_db > brightest:
+            is_long, is_wide = False, is_wide and order.evidence_of_ground(region) > _CLEARLY_GROUND
+        if is_long:
             _add(longs, region)
-        if area_m2 >= _LARGE_M2 and shape.width * pixel_m > width_m:
+        if is_wide:
             _add(wide, region)
     return longs, wide
 

@@ -1,0 +1,125 @@
+"""How much of a simulated city's ground `mask-regions` finds, and how much of that is ground."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from groundtie.geometry.views import View
+from groundtie.masks.cast_shadow import shadow_azimuth_deg
+from groundtie.masks.object_heights import RasterModel
+from groundtie.masks.regions import HIGH_PERCENT, LOW_PERCENT, WIDTH_M, find_ground
+from groundtie.masks.scene import Scene
+from groundtie.masks.surface_model import SurfaceGround
+from groundtie.rasters.patch import middle_window
+from groundtie.rasters.reading import Mask, open_raster
+from groundtie.simulation import files
+
+from .city import city
+from .suites import Goal, Settings, SuiteResult, Table
+
+
+@dataclass(frozen=True)
+class FoundGround:
+    """A mask against the ground that ray casting finds in the simulator's heights.
+
+    Parameters
+    ----------
+    seed
+        The city.
+    share
+        Share of the image that the mask keeps.
+    radar_precision
+        Share of the mask that is ground which the radar shows, neither laid over nor in its shadow.
+    precision, recall
+        Share of the mask that is ground which both images show, out of cast shadow; share of this
+        ground that the mask keeps.
+    """
+
+    seed: int
+    share: float
+    radar_precision: float
+    precision: float
+    recall: float
+
+    @classmethod
+    def of(cls, seed: int, mask: Mask, radar: Mask, both: Mask) -> FoundGround:
+        """Compare a mask with the ground that the radar shows, and that both images show."""
+        return cls(
+            seed,
+            float(mask.mean()),
+            float(radar[mask].mean()) if mask.any() else float("nan"),
+            float(both[mask].mean()) if mask.any() else float("nan"),
+            float(mask[both].mean()) if both.any() else float("nan"),
+        )
+
+    def record(self) -> dict[str, Any]:
+        """Return this as values that JSON can carry."""
+        return dict(vars(self))
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite."""
+    count = 1 if settings.quick else settings.seeds
+    found = []
+    for seed in range(settings.first_seed, settings.first_seed + count):
+        found.append(of_seed(seed, settings.cache))
+        print(f"city, seed {seed}: {found[-1].share:.0%} of the image", flush=True)
+    return SuiteResult(
+        "Ground that regions find in simulated dense cities",
+        [goal(found)],
+        (table(found),),
+        [f.record() for f in found],
+        ("Truth: ray casting in the simulator's heights, changes between the images left out.",),
+    )
+
+
+def of_seed(seed: int, cache: Path) -> FoundGround:
+    """Return what the mask that `coregister` makes of a city finds."""
+    pair = city(seed).pair(cache)
+    views = [View.of(path, None) for path in (pair.reference, pair.input)]
+    with ExitStack() as stack:
+        reference, input, heights = (
+            stack.enter_context(open_raster(path))
+            for path in (pair.reference, pair.input, pair.reference.parent / files.NAMES["dsm"])
+        )
+        scene, other = Scene.of(reference), Scene.of(input)
+        shadow = shadow_azimuth_deg(other.read(middle_window(other.grid)))
+        ground = find_ground(
+            scene, WIDTH_M, HIGH_PERCENT, shadow_azimuth_deg=shadow, low_percent=LOW_PERCENT
+        )
+        radar, both = (
+            SurfaceGround(scene, RasterModel(heights), tuple(v for v in seen if v is not None))
+            for seen in (views[:1], views)
+        )
+        return FoundGround.of(
+            seed,
+            ground.select(scene.whole).part,
+            radar.select(scene.whole).part,
+            both.select(scene.whole).part,
+        )
+
+
+def goal(found: Sequence[FoundGround]) -> Goal:
+    """Return the medians of all cities."""
+    precision, recall = (
+        float(np.median([getattr(f, name) for f in found])) for name in ("precision", "recall")
+    )
+    return Goal(
+        "Median precision and recall", "reported", f"{precision:.0%} and {recall:.0%}", None
+    )
+
+
+def table(found: Sequence[FoundGround]) -> Table:
+    """Return a table with a row for each city."""
+    head = ("seed", "share kept", "ground to the radar", "ground to both", "of both, kept")
+    rows = [
+        [str(f.seed)] + [f"{s:.0%}" for s in (f.share, f.radar_precision, f.precision, f.recall)]
+        for f in found
+    ]
+    return Table("By city", head, rows)
