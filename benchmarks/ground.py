@@ -91,7 +91,12 @@ def of_seed(seed: int, cache: Path) -> FoundGround:
         scene, other = Scene.of(reference), Scene.of(input)
         shadow = shadow_azimuth_deg(other.read(middle_window(other.grid)))
         ground = find_ground(
-            scene, WIDTH_M, HIGH_PERCENT, shadow_azimuth_deg=shadow, low_percent=LOW_PERCENT
+            scene,
+            WIDTH_M,
+            HIGH_PERCENT,
+            shadow_azimuth_deg=shadow,
+            low_percent=LOW_PERCENT,
+            keeps_bright=True,
         )
         radar, both = (
             SurfaceGround(scene, RasterModel(heights), tuple(v for v in seen if v is not None))

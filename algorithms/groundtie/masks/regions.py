@@ -137,6 +137,7 @@ def find_ground(
     progress: Progress = SILENT,
     shadow_azimuth_deg: float | None = None,
     low_percent: float = 0.0,
+    keeps_bright: bool = False,
 ) -> GroundRegions:
     """Find the ground in a radar image.
 
@@ -155,6 +156,9 @@ def find_ground(
         that they may reach takes no part. None: there are none.
     low_percent
         Percentage of the darkest pixels inside that take no part after all.
+    keeps_bright
+        Whether large bright regions may be ground, by the order of shadow and layover around them,
+        as between the buildings of a dense town.
 
     Raises
     ------
@@ -166,7 +170,8 @@ def find_ground(
     if not patch.valid.any():
         raise RasterContentError(f"{scene.like.path} has no valid pixels to make a mask of")
     pixel_m = scene.grid.pixel_size_m * factor
-    longs, wide = _kept_regions(patch, pixel_m, width_m, progress.part(0.3, 0.8))
+    growing = progress.part(0.3, 0.8)
+    longs, wide = _kept_regions(patch, pixel_m, width_m, keeps_bright, growing)
     even = _without_holes(longs, round(_SMALLEST_M2 / pixel_m**2), max(round(_EVEN_M / pixel_m), 1))
     lines = pruned(skeleton(even), round(width_m / pixel_m / 2))
     progress.update(0.9)
@@ -193,7 +198,7 @@ def find_ground(
 
 
 def _kept_regions(
-    patch: Patch, pixel_m: float, width_m: float, progress: Progress
+    patch: Patch, pixel_m: float, width_m: float, keeps_bright: bool, progress: Progress
 ) -> tuple[Mask, Mask]:
     """Return the long regions on the ground, and the large ones wider than the window."""
     intensity = power(patch)
@@ -208,7 +213,7 @@ def _kept_regions(
     )
     regions = list(grown)
     shadow_db = _darkest_db([r for r in regions if r.level_db <= brightest]) + _SHADOW_DB
-    order = RangeOrder.of(level, patch.valid, shadow_db, pixel_m)
+    order = RangeOrder.of(level, patch.valid, shadow_db, pixel_m) if keeps_bright else None
     longs, wide = np.zeros(level.shape, bool), np.zeros(level.shape, bool)
     for region in regions:
         shape = Shape.of(region.mask)
@@ -218,7 +223,8 @@ def _kept_regions(
         is_long = shape.length * pixel_m >= _LONG_M and shape.elongation >= _ELONGATION
         is_wide = area_m2 >= _LARGE_M2 and shape.width * pixel_m > width_m
         if region.level_db > brightest:
-            is_long, is_wide = False, is_wide and order.evidence_of_ground(region) > _CLEARLY_GROUND
+            is_long = False
+            is_wide = is_wide and _is_clearly_ground(region, order)
         if is_long:
             _add(longs, region)
         if is_wide:
@@ -235,6 +241,10 @@ def _darkest_db(regions: list[Region]) -> float:
     order = level.argsort()
     below = np.cumsum(area[order]) / area.sum()
     return float(level[order][np.searchsorted(below, _DARKEST_PERCENT / 100)])
+
+
+def _is_clearly_ground(region: Region, order: RangeOrder | None) -> bool:
+    return order is not None and order.evidence_of_ground(region) > _CLEARLY_GROUND
 
 
 def _without_holes(mask: Mask, smallest_px: int, radius_px: int) -> Mask:

@@ -9,6 +9,7 @@ from typing import Annotated
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..kinds import RasterOut
+from ..masks.choice import is_dense, share_of_strong_scatterers
 from ..masks.regions import HIGH_PERCENT, WIDTH_M, find_ground
 from ..masks.scene import Scene, write_mask
 from ..progress import SILENT, Progress
@@ -57,7 +58,9 @@ def mask_regions(
     files = {"mask": output, "regions": regions, "skeleton": skeleton}
     with bounded_cache(), open_raster(input) as source:
         scene = Scene.of(source, band)
-        ground = find_ground(scene, mask_width, high, progress.part(0.0, 0.7))
+        is_town = is_dense(share_of_strong_scatterers(scene))
+        searching = progress.part(0.0, 0.7)
+        ground = find_ground(scene, mask_width, high, searching, keeps_bright=is_town)
         with Outputs() as outputs:
             share = write_mask(scene, outputs.stage(output), ground.select, progress.part(0.7, 0.8))
             for path, part in ((regions, ground.regions), (skeleton, ground.skeleton)):
