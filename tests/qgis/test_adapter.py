@@ -95,7 +95,7 @@ class TestRun:
         assert "accepted" in log
         assert "size 3.0" in log
 
-    @pytest.mark.parametrize(("most", "workers"), [(-1, None), (1, 1)])
+    @pytest.mark.parametrize(("most", "workers"), [(-1, None), (3, 3)])
     def test_threads_are_those_of_the_settings(
         self,
         algorithm: Any,
@@ -104,6 +104,7 @@ class TestRun:
         most: int,
         workers: int | None,
     ) -> None:
+        """Newer QGIS have two at least."""
         from qgis.core import QgsApplication
 
         before = QgsApplication.maxThreads()
