@@ -22,8 +22,8 @@ SMALLEST_INLIER_SHARE = 0.25
 SMALLEST_SHARE_UNROTATED = 0.5
 
 # Chance agreement must be less likely than this (log10). Three of nine agree by chance with
-# 10^-3.2: of twelve attacks that were accepted with no more, four were wrong, by parts that had
-# moved (suite attacks).
+# 10^-3.2: of eleven attacks that were accepted with no more, four were wrong, by parts that had
+# moved and by repetition (suite attacks).
 LARGEST_LOG10_CHANCE = -4.0
 
 # What chance explains with less than this (log10) is evidence against a registration.

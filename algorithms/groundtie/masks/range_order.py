@@ -38,7 +38,7 @@ class RangeOrder:
     Parameters
     ----------
     dark, bright
-        What may be radar shadow, and layover; shape (h, w).
+        What may be radar shadow, and layover, with a rim of r pixels; shape (h + 2 r, w + 2 r).
     behind
         Window that holds a region's centre and what lies behind it, shape (2 r + 1, 2 r + 1).
     """
@@ -72,7 +72,10 @@ class RangeOrder:
         cols, rows = (np.rint(f * steps).astype(int) for f in (np.sin(along), -np.cos(along)))
         behind: NDArray[np.uint8] = np.zeros((2 * reach + 1,) * 2, np.uint8)
         behind[reach + rows, reach + cols] = 1
-        return cls((level_db < shadow_db) & valid, (level_db > brightest) & valid, behind)
+        dark, bright = (
+            np.pad(mask & valid, reach) for mask in (level_db < shadow_db, level_db > brightest)
+        )
+        return cls(dark, bright, behind)
 
     def evidence_of_ground(self, region: Region) -> float:
         """Return by how much a region looks like ground: −2, a roof, to 2, ground.
@@ -88,10 +91,8 @@ class RangeOrder:
             (cv2.dilate(whole, window) > 0) & (whole == 0)
             for window in (np.ascontiguousarray(self.behind[::-1, ::-1]), self.behind)
         )
-        around = Window(
-            box.col - reach, box.row - reach, box.width + 2 * reach, box.height + 2 * reach
-        )
-        dark, bright = _cut(self.dark, around), _cut(self.bright, around)
+        around = Window(box.col, box.row, box.width + 2 * reach, box.height + 2 * reach).slices
+        dark, bright = self.dark[around], self.bright[around]
         before, behind = before & ~behind, behind & ~before
         return (
             _share(dark, before)
@@ -99,16 +100,6 @@ class RangeOrder:
             + _share(bright, behind)
             - _share(bright, before)
         )
-
-
-def _cut(mask: Mask, window: Window) -> Mask:
-    """Return a mask in a window; nothing lies beyond its image."""
-    found = np.zeros((window.height, window.width), bool)
-    top, left = max(-window.row, 0), max(-window.col, 0)
-    inside = mask[max(window.row, 0) : window.row + window.height]
-    inside = inside[:, max(window.col, 0) : window.col + window.width]
-    found[top:, left:][: inside.shape[0], : inside.shape[1]] = inside
-    return found
 
 
 def _share(of: Mask, side: Mask) -> float:

@@ -211,7 +211,8 @@ def _kept_regions(
     grown = grow_regions(
         level, variation2, patch.valid, _SEED_EXCESS / looks, _TOLERANCE_DB, smallest
     )
-    regions = list(grown)
+    # What is too bright is not measured, nor held, where none of it can be ground.
+    regions = [region for region in grown if keeps_bright or region.level_db <= brightest]
     shadow_db = _darkest_db([r for r in regions if r.level_db <= brightest]) + _SHADOW_DB
     order = RangeOrder.of(level, patch.valid, shadow_db, pixel_m) if keeps_bright else None
     longs, wide = np.zeros(level.shape, bool), np.zeros(level.shape, bool)

@@ -73,8 +73,8 @@ class LockedContent:
     offset_px: tuple[int, int]
     sameness: Sameness
     is_whole: bool
-    of_one_kind: bool = True
-    is_exact: bool = False
+    of_one_kind: bool
+    is_exact: bool
 
     @property
     def is_evident(self) -> bool:

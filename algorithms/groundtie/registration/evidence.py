@@ -43,7 +43,7 @@ AGREEMENT, ERROR, SCENE, LAYOVER = "agreement", "error", "scene", "layover"
 SURVEY, REFINEMENT, SERIES = "survey", "refinement", "series"
 
 # Scatter along a line is that of heights unless chance explains it with more than 5 %, as usual.
-_LOG10_SIGNIFICANCE = math.log10(0.05)
+_LOG10_FIVE_PERCENT = math.log10(0.05)
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,7 @@ class RegistrationEvidence:
             return np.zeros(2)
         shifts = self.survey.shifts_px
         weights = self._mixture(shifts, SURVEY_RADIUS_PX).probability
-        scatter = scatter_along_line(shifts, weights, _LOG10_SIGNIFICANCE)
+        scatter = scatter_along_line(shifts, weights, _LOG10_FIVE_PERCENT)
         mean = (self.layover_factor or EVEN_MEAN_OVER_SCATTER) * scatter
         return mean if self.mask.is_ground else 2 * mean
 

@@ -11,10 +11,7 @@ import numpy as np
 
 from ..context import Context
 from ..geometry.chance import agreement_probability, log10_chance
-from ..geometry.judging import (
-    SMALLEST_INLIER_SHARE,
-    SMALLEST_SHARE_UNROTATED,
-)
+from ..geometry.judging import SMALLEST_INLIER_SHARE, SMALLEST_SHARE_UNROTATED
 from ..geometry.limits import SearchLimits
 from ..masks.choice import NONE, MaskUsed
 from ..matching.bands import BandSurvey

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask
 from .sameness import (
@@ -24,14 +25,18 @@ from .sameness import (
     without,
 )
 
-FloatArray = NDArray[np.float64]
-
 # Gradients above this percentile of their image are strong.
 _STRONG_PERCENT = 70.0
 
-# Offsets at which gradients are the same by chance: so many, on a spiral around the found one.
+# None, and offsets (x, y) at which gradients are the same by chance: so many, on a spiral.
 _CHANCE_OFFSETS = 8
 _FIRST_TURN_PX, _GOLDEN_ANGLE = 7.0, np.pi * (3 - np.sqrt(5))
+_STEPS = np.arange(_CHANCE_OFFSETS)
+_SPIRAL = (_FIRST_TURN_PX + 2 * _STEPS) * np.stack(
+    [np.cos(_STEPS * _GOLDEN_ANGLE), np.sin(_STEPS * _GOLDEN_ANGLE)]
+)
+_OFFSETS = np.vstack([[0, 0], np.rint(_SPIRAL.T)]).astype(int)
+LOOK_REACH_PX = int(np.abs(_OFFSETS).max())
 
 # So many times as many as by chance, and of gradients this share of the strong ones, are more than
 # two sensors show of one ground; what else they show is asked then. Gradients were measured on the
@@ -147,7 +152,7 @@ class Look:
     gradients
         Of the reference; of the input also what is around it.
     edges
-        How many coincide, at each of `_offsets`, shape (k, 2).
+        How many coincide, at each of `_OFFSETS`, shape (k, 2).
     windows
         How many pixels are the same, related, and valid (see `Windows`): of the images, of reduced
         ones, and of these without what is the same in the images, shape (3, 3).
@@ -178,7 +183,7 @@ def sameness_of(looks: Sequence[Look]) -> Sameness:
     """Return how much arrays have the same in windows all over them."""
     own, others = ([look.gradients[k] for look in looks] for k in (0, 1))
     strong = _strong(own), _strong(others)
-    same = [_share([one.same(shift, strong) for one in looks]) for shift in _offsets()]
+    same = [_share([one.same(shift, strong) for one in looks]) for shift in _OFFSETS]
     chance = float(np.median(same[1:]))
     counts = np.sum([one.edges for one in looks], axis=0)
     sharpness = _sharpness(counts) if looks else 0.0
@@ -198,7 +203,7 @@ def sameness_of(looks: Sequence[Look]) -> Sameness:
 
 
 def _sharpness(counts: FloatArray) -> float:
-    """Return `Sameness.sharpness` of counts of edges, (sharp, less so) at each of `_offsets`."""
+    """Return `Sameness.sharpness` of counts of edges, (sharp, less so) at each of `_OFFSETS`."""
     chance = counts[1:].mean(axis=0)
     sharp, blurred = counts[0] - chance
     # Of counts, which vary as much as they are many.
@@ -207,9 +212,9 @@ def _sharpness(counts: FloatArray) -> float:
 
 
 def _count_edges(reference: Patch, input: Patch) -> NDArray[np.int_]:
-    """Return how many strong edges coincide sharply, and less so, at each of `_offsets`, (k, 2)."""
+    """Return how many strong edges coincide sharply, and less so, at each of `_OFFSETS`, (k, 2)."""
     one, other = (Edges.of(patch).strongest for patch in (reference, input))
-    apart = edges_apart_px(one.inner(LOOK_REACH_PX), other, _offsets())
+    apart = edges_apart_px(one.inner(LOOK_REACH_PX), other, _OFFSETS)
     sharp = (apart < _SHARP_PX).sum(axis=1)
     return np.column_stack([sharp, (apart < _BLURRED_PX).sum(axis=1) - sharp])
 
@@ -237,14 +242,3 @@ def _strong(gradients: list[Gradients]) -> float:
     """Return the length from which gradients of an image are strong."""
     lengths = [one.length[one.valid] for one in gradients if one.valid.any()]
     return float(np.percentile(np.concatenate(lengths), _STRONG_PERCENT)) if lengths else 0.0
-
-
-def _offsets() -> NDArray[np.int_]:
-    """Return none, and offsets (x, y) on a spiral around it, shape (n, 2)."""
-    steps = np.arange(_CHANCE_OFFSETS)
-    angle, length = steps * _GOLDEN_ANGLE, _FIRST_TURN_PX + 2 * steps
-    spiral = np.rint(np.column_stack([length * np.cos(angle), length * np.sin(angle)]))
-    return np.vstack([[0, 0], spiral]).astype(int)
-
-
-LOOK_REACH_PX = int(np.abs(_offsets()).max())
