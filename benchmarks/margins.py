@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from groundtie.errors import GroundTieError
-from groundtie.matching.parts import LEAST_EXCESS
+from groundtie.matching.parts import LEAST_EXCESS, LEAST_EXCESS_OF_MINORITY
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
@@ -55,9 +55,14 @@ class Statistic:
     is_refused_above: bool = True
 
 
-def _excess(evidence: RegistrationEvidence) -> float:
-    part = None if evidence.survey is None else evidence.survey.highest_part
-    return math.nan if part is None else part.excess
+def _excess(of_minority: bool) -> Callable[[RegistrationEvidence], float]:
+    def value(evidence: RegistrationEvidence) -> float:
+        survey = evidence.survey
+        if survey is None or survey.is_minority != of_minority or survey.highest_part is None:
+            return math.nan
+        return survey.highest_part.excess
+
+    return value
 
 
 def _of_survey(name: str) -> Callable[[RegistrationEvidence], float]:
@@ -103,7 +108,8 @@ def _elsewhere(evidence: RegistrationEvidence) -> float:
 
 
 STATISTICS = (
-    Statistic("part elsewhere: excess", LEAST_EXCESS, _excess),
+    Statistic("part elsewhere: excess", LEAST_EXCESS, _excess(False)),
+    Statistic("part elsewhere: excess of minorities", LEAST_EXCESS_OF_MINORITY, _excess(True)),
     Statistic("second place: share of the height", RIVAL_HEIGHT, _rival),
     Statistic("second place: ghost", GHOST_HEIGHT, _of_survey("ghost_height")),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),

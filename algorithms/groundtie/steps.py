@@ -29,9 +29,10 @@ from .rasters.patch import Patch
 from .rasters.reading import bounded_cache, open_raster
 from .registration.evidence import SearchEvidence
 from .registration.opening import open_pair
-from .registration.pipeline import Stages, mask_pair
+from .registration.pipeline import mask_pair
 from .registration.scene import SceneInfo
 from .registration.specification import COREGISTER, Specification
+from .registration.stages import Stages
 from .registration.verdict import Verdict, judge_search
 from .registration.verdict import judge as judge_evidence
 from .similarity.description import BORDER_PX

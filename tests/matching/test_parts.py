@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from raster_files import utm_grid
 
-from groundtie.matching.parts import LEAST_EXCESS, find_parts, highest_part
+from groundtie.matching.parts import (
+    LEAST_EXCESS,
+    LEAST_EXCESS_OF_MINORITY,
+    find_parts,
+    highest_part,
+)
+from groundtie.matching.survey import Survey
 
 RADIUS = 24
 COLS, ROWS = 7, 6
@@ -90,3 +98,16 @@ def test_chips_may_be_missing() -> None:
     (part,) = find_parts(GRID, CENTRES[kept], surfaces[kept])
     assert (CENTRES[kept][list(part.members), 0] < 150).all()
     assert find_parts(GRID, CENTRES[:0], surfaces[:0]) == []
+
+
+def test_less_speaks_for_a_part_where_less_speaks_for_the_model() -> None:
+    surfaces = noise()
+    raised(surfaces, np.isin(np.arange(len(CENTRES)), [0, 1, 2, 7, 8, 9]), (9, -6), 4.1)
+    part = highest_part(GRID, CENTRES, surfaces, np.arange(len(CENTRES)))
+    assert part is not None
+    assert LEAST_EXCESS_OF_MINORITY <= part.excess < LEAST_EXCESS
+    shifts = np.zeros((len(CENTRES), 2))
+    confirmed = Survey(GRID, CENTRES, shifts, surfaces)
+    assert confirmed.parts == []
+    shifts[: len(CENTRES) // 2 + 1] = 5.0
+    assert [one.members for one in replace(confirmed, shifts_px=shifts).parts] == [part.members]

@@ -112,6 +112,16 @@ def test_images_on_different_grids(files: Files, grid: Grid, other_way: bool) ->
         np.testing.assert_allclose(reference.values[common], input.values[common], atol=1.0)
 
 
+@pytest.mark.parametrize("grid", [GRID, covering(GEOGRAPHIC, 10 / 111_195), utm_grid(60, 50, 20.0)])
+def test_a_pair_with_exchanged_roles_is_searched_as_far(files: Files, grid: Grid) -> None:
+    pair = make_pair(files.image(), files.image(grid), None, 70.0, 10.0, 1.2)
+    exchanged = pair.exchanged()
+    assert (exchanged.reference, exchanged.input) == (pair.input, pair.reference)
+    assert exchanged.limits == pair.limits
+    assert exchanged.grid.crs == grid.crs
+    assert exchanged.grid.pixel_size_m == pytest.approx(pair.grid.pixel_size_m, rel=0.03)
+
+
 def test_the_grid_is_cut_to_what_may_overlap_and_keeps_the_references_lattice(
     files: Files,
 ) -> None:

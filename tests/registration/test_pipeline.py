@@ -15,7 +15,14 @@ from contexts import context
 from facts_of_pairs import TOWN, opened, speckled
 from rpc_scenes import Scene, make_scene
 from speckled_pairs import write_speckled_pair
-from textured_pairs import TexturedPair, error_px, shift_on_map
+from textured_pairs import (
+    TexturedPair,
+    error_px,
+    pixels,
+    rewritten,
+    shift_on_map,
+    write_textured_pair,
+)
 
 import groundtie
 from groundtie.context import Context
@@ -27,12 +34,15 @@ from groundtie.matching.keypoint_fit import KeypointFit
 from groundtie.matching.pooled import PooledHistogramMatcher
 from groundtie.matching.surface_fit import SurfaceFit
 from groundtie.progress import Progress
-from groundtie.registration import masks, pipeline, verdict
+from groundtie.rasters.pair import Image, ImagePair, make_pair
+from groundtie.rasters.reading import open_raster
+from groundtie.registration import masks, verdict
 from groundtie.registration import scene as scene_module
+from groundtie.registration import stages as stages_module
 from groundtie.registration.evidence import AGREEMENT, ERROR, REFINEMENT, SCENE, SEARCH, SURVEY
 from groundtie.registration.masks import Masked
 from groundtie.registration.opening import open_pair
-from groundtie.registration.pipeline import Stages, mask_pair, run
+from groundtie.registration.pipeline import mask_pair, run
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules import Rule
 from groundtie.registration.scene import SceneInfo
@@ -43,6 +53,7 @@ from groundtie.registration.specification import (
     SAR_SAR,
     Specification,
 )
+from groundtie.registration.stages import Stages
 
 __all__ = ["context"]
 PRESETS = {"coregister": COREGISTER, "match_sar_sar": SAR_SAR, "match_optical": OPTICAL}
@@ -74,7 +85,7 @@ def nothing_found(*_: object) -> Model:
 def test_where_nothing_is_found_the_registration_has_a_verdict_alone(
     textured: TexturedPair, context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pipeline, "find_coarse_model", nothing_found)
+    monkeypatch.setattr(stages_module, "find_coarse_model", nothing_found)
     with open_pair(textured.reference, textured.input, COREGISTER, context) as pair:
         found = run(pair, COREGISTER, context)
     assert not found.verdict.accepted and found.verdict.rule == "nothing in common"
@@ -231,7 +242,7 @@ def refused_by_house_rules(
     house = HouseRules(stages)
     monkeypatch.setattr(verdict, "RULES", house.rules())
     if stages == (SEARCH,):
-        monkeypatch.setattr(pipeline, "find_coarse_model", nothing_found)
+        monkeypatch.setattr(stages_module, "find_coarse_model", nothing_found)
     with pytest.raises(NotRegisteredError, match="forbidden; go") as error:
         call()
     assert error.value.verdict is not None
@@ -322,3 +333,55 @@ def test_a_radius_beyond_the_images_is_warned_of_before_the_search(
     found = [note for note in told if "beyond the images" in note]
     assert bool(found) == warned
     assert not warned or found[0].startswith("warning: a search radius of 100000 m")
+
+
+def beside_another_place(share: float, folder: Path) -> tuple[TexturedPair, Path]:
+    """Return a pair of which a share of squares of 64 px shows another place, and all of that."""
+    pair, other = (
+        write_textured_pair(made_folder(folder / name), (450, 450), shift_on_map(73.0, -42.0), **of)
+        for name, of in (("same", {}), ("other", {"input_seed": 5}))
+    )
+    squares = np.random.default_rng(3).uniform(size=(8, 8)) < share
+    is_other = np.kron(squares, np.ones((64, 64), bool))[:450, :450]
+    elsewhere = pixels(other.input)[0]
+    return (
+        rewritten(pair, folder, input=lambda values: np.where(is_other, elsewhere, values)),
+        other.input,
+    )
+
+
+def made_folder(folder: Path) -> Path:
+    folder.mkdir()
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("share", "is_asked"), [(0.75, True), (0.1, False)])
+def test_where_few_chips_confirm_a_transform_the_exchanged_pair_must_too(
+    share: float, is_asked: bool, tmp_path: Path, context: Context
+) -> None:
+    pair, _ = beside_another_place(share, tmp_path)
+    with open_pair(pair.reference, pair.input, COREGISTER, context) as opened:
+        found = run(opened, COREGISTER, context)
+    assert found.verdict.accepted and found.survey is not None and found.evidence is not None
+    assert error_px(found.accepted(), pair) < 0.5
+    assert found.survey.is_minority == is_asked
+    exchanged = found.evidence.exchanged
+    assert (exchanged is not None) == is_asked
+    if exchanged is not None:
+        assert exchanged.apart_px < 0.5 and exchanged.agreeing >= 4
+
+
+@pytest.mark.slow
+def test_a_transform_that_the_exchanged_pair_does_not_show_is_refused(
+    tmp_path: Path, context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pair, elsewhere = beside_another_place(0.75, tmp_path)
+    with (
+        open_raster(elsewhere) as other,
+        open_pair(pair.reference, pair.input, COREGISTER, context) as opened,
+    ):
+        exchanged = make_pair(Image(other), opened.images.reference)
+        monkeypatch.setattr(ImagePair, "exchanged", lambda _: exchanged)
+        found = run(opened, COREGISTER, context)
+    assert found.verdict.rule == "exchanged roles"

@@ -49,6 +49,7 @@ from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
 from groundtie.registration import rules
 from groundtie.registration.evidence import (
+    Exchanged,
     RegistrationEvidence,
     SearchEvidence,
 )
@@ -162,6 +163,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(np.concatenate([scatter(20, 0.3), fallen(52)])),
     ),
     "another transform": (evidence(beside(15, 20)), evidence(beside(20, 16))),
+    "exchanged roles": (
+        evidence(GOOD, exchanged=Exchanged(3, 9, -3.9, 0.4)),
+        evidence(GOOD, exchanged=Exchanged(4, 9, -4.1, 0.4)),
+    ),
     "error at held-out points": (
         evidence(scatter(72, 0.9), max_error_px=1.0),
         evidence(scatter(72, 0.9), max_error_px=1.5),

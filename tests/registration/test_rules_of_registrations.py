@@ -28,9 +28,7 @@ from evidences import (
 
 from groundtie.masks.choice import LAYER, REGIONS, SURFACE, THRESHOLD, MaskUsed
 from groundtie.matching.rest import Rest
-from groundtie.registration.evidence import (
-    RegistrationEvidence,
-)
+from groundtie.registration.evidence import Exchanged, RegistrationEvidence
 from groundtie.registration.surface_masks import ModelFit
 from groundtie.registration.verdict import first_refusal
 
@@ -231,3 +229,20 @@ def test_what_is_not_explained_needs_no_higher_place_elsewhere(
 def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list[str]) -> None:
     """Regions of a camera's image that pass for a radar's are no ground."""
     assert refusing(evidence(GOOD, scene=PERHAPS, mask=masked(kind))) == expected
+
+
+@pytest.mark.parametrize(
+    ("exchanged", "is_refused"),
+    [
+        (Exchanged(9, 9, -16.0, 2.9), False),
+        (Exchanged(9, 9, -16.0, 3.1), True),
+        (Exchanged(9, 9, -16.0, math.nan), True),
+        (Exchanged(), True),
+    ],
+    ids=["near", "far", "nowhere", "nothing found"],
+)
+def test_an_exchanged_pair_must_show_the_same_transform(
+    exchanged: Exchanged, is_refused: bool
+) -> None:
+    found = evidence(GOOD, max_error_px=3.0, exchanged=exchanged)
+    assert refusing(found) == (["exchanged roles"] if is_refused else [])

@@ -18,7 +18,16 @@ from .belief_propagation import Surfaces
 from .chips import LEAST_VALID_MASKED, ChipMatcher
 from .ghost import ghost_height
 from .matcher import FloatArray, MaskOf, Places
-from .parts import ELSEWHERE_PX, LEAST_EXCESS, SAME_PX, Part, find_parts, highest_part, limited
+from .parts import (
+    ELSEWHERE_PX,
+    LEAST_EXCESS,
+    LEAST_EXCESS_OF_MINORITY,
+    SAME_PX,
+    Part,
+    find_parts,
+    highest_part,
+    limited,
+)
 
 # Chips lie side by side: so many along the shorter side of the grid if their sides allow it, and no
 # more than so many along any.
@@ -73,6 +82,11 @@ class Survey:
         return int(self.is_confirming_chip.sum())
 
     @property
+    def is_minority(self) -> bool:
+        """Whether less than half of the chips match where the model has them."""
+        return 2 * self.confirming < len(self.centres)
+
+    @property
     def comparable(self) -> int:
         """How many chips overlap with the input where the model has them: surfaces are 0 else."""
         near = self.surfaces[:, self._distance_px <= SAME_PX]
@@ -107,7 +121,8 @@ class Survey:
     @cached_property
     def parts(self) -> Sequence[Part]:
         """Neighbouring chips that together match elsewhere, the most evident first."""
-        return find_parts(self.grid, self.centres, self.surfaces)
+        least = LEAST_EXCESS_OF_MINORITY if self.is_minority else LEAST_EXCESS
+        return find_parts(self.grid, self.centres, self.surfaces, least)
 
     @property
     def excess(self) -> float:

@@ -144,6 +144,18 @@ class ImagePair:
         """Return all bands of the input on a grid; `to_input_px` as `input_patch` takes it."""
         return self.input.bands_onto(grid, to_input_px)
 
+    def exchanged(self) -> ImagePair:
+        """Return the pair with the roles of its images exchanged, searched as far."""
+        limits = self.limits
+        return make_pair(
+            self.input,
+            self.reference,
+            self.grid.pixel_size_m,
+            limits.radius,
+            limits.rotation_deg,
+            limits.scale[1],
+        )
+
     @property
     def is_masked(self) -> bool:
         """Whether a mask limits what of an image takes part."""

@@ -105,6 +105,27 @@ class HeldOut:
 
 
 @dataclass(frozen=True)
+class Exchanged:
+    """What a registration with the images' roles exchanged shows.
+
+    Parameters
+    ----------
+    agreeing, total
+        How many of its check points agree with it, and how many there are.
+    log10_chance
+        log10 of the probability that random matches would agree as well.
+    apart_px
+        How far its transform lies from the inverse of the other (root mean square), in matching
+        pixels; infinite if it has none.
+    """
+
+    agreeing: int = 0
+    total: int = 0
+    log10_chance: float = 0.0
+    apart_px: float = math.inf
+
+
+@dataclass(frozen=True)
 class RegistrationEvidence:
     """What is known of a registration that came as far as check points.
 
@@ -139,6 +160,8 @@ class RegistrationEvidence:
         What bands show each, of images whose bands do not coincide.
     input_fit
         How well a surface model fits the registered input; None: nothing is expected of it.
+    exchanged
+        What a registration with the images' roles exchanged shows; None: nobody asked for it.
     """
 
     estimate: Estimate
@@ -156,6 +179,7 @@ class RegistrationEvidence:
     rest: Rest | None = None
     bands: tuple[BandSurvey, ...] = ()
     input_fit: ModelFit | None = None
+    exchanged: Exchanged | None = None
 
     stages: ClassVar = (AGREEMENT, ERROR, SCENE, LAYOVER, SURVEY)
 

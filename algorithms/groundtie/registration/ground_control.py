@@ -29,11 +29,12 @@ from ..sensor.control_points import ControlPoints
 from ..sensor.orientation import Orientation, sensor_grid
 from .evidence import SearchEvidence
 from .opening import OpenPair, pair_images
-from .pipeline import Stages, mask_pair, register
+from .pipeline import mask_pair, register
 from .registration import Registration
 from .scene import SceneInfo
 from .sensor_input import OrientedImage
 from .specification import Specification
+from .stages import Stages
 from .verdict import judge_search
 
 # A coarse shift beyond this, in matching pixels, is put into the RPCs before points are matched: by

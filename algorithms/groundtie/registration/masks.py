@@ -66,6 +66,11 @@ class Masked:
             self.surface,
         )
 
+    def exchanged(self) -> Masked:
+        """Return the same with the roles of both images exchanged."""
+        ground = None if self.ground is None else self.ground.exchanged()
+        return replace(self, pair=self.pair.exchanged(), ground=ground)
+
 
 def with_ground_mask(
     pair: ImagePair, kind: str, scene: SceneInfo, stack: ExitStack, context: Context

@@ -53,6 +53,20 @@ def _another_transform(evidence: RegistrationEvidence | RefinementEvidence) -> s
     return f"{others} of {evidence.held_out.total} check points agree on another transform"
 
 
+def _exchanged_roles(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+    if not isinstance(evidence, RegistrationEvidence) or evidence.exchanged is None:
+        return None
+    points = evidence.exchanged
+    if points.log10_chance > LARGEST_LOG10_CHANCE:
+        return (
+            f"with reference and input exchanged, {points.agreeing} of {points.total} check points "
+            "agree, as they may by chance"
+        )
+    if points.apart_px <= evidence.max_error_px:
+        return None
+    return f"with reference and input exchanged, the transform lies {points.apart_px:.1f} px off"
+
+
 AGREEMENT_RULES: tuple[Rule, ...] = (
     Rule(
         "chance agreement",
@@ -80,5 +94,15 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
         "suites real and crossings",
         "give parts of a mosaic one by one, or a more flexible model",
         _another_transform,
+    ),
+    Rule(
+        "exchanged roles",
+        AGREEMENT,
+        "less than half of the chips all over match where the transform has them, no mask leaves "
+        "the ground alone, and with reference and input exchanged check points agree as they "
+        "may by chance, or the transform lies farther off than the largest error",
+        "[Holden2000]; suite attacks",
+        "give a larger part of the scene, or bands that show the same",
+        _exchanged_roles,
     ),
 )

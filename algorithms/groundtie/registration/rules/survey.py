@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...matching.parts import LEAST_EXCESS
+from ...matching.parts import LEAST_EXCESS, LEAST_EXCESS_OF_MINORITY
 from ...matching.rest import Rest
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
 from ..evidence import SURVEY, RegistrationEvidence
@@ -132,8 +132,9 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "part elsewhere",
         SURVEY,
         "neighbouring chips together match elsewhere "
-        f"{LEAST_EXCESS:g} standard deviations of noise better than where the transform has them",
-        "[Kulldorff1997]; suite margins",
+        f"{LEAST_EXCESS:g} standard deviations of noise better than where the transform has them, "
+        f"or {LEAST_EXCESS_OF_MINORITY:g} if less than half of all chips match there",
+        "[Kulldorff1997]; suites margins and attacks",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,
     ),

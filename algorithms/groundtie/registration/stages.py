@@ -1,0 +1,210 @@
+"""The stages of a registration between its masks and its verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..context import Context
+from ..features.presets import optical_keypoints, sar_keypoints
+from ..geometry.estimation import Estimate
+from ..geometry.models import TERRAIN, Model
+from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
+from ..matching.bands import BandSurvey, survey_bands
+from ..matching.check import CHECK_RADIUS_PX, Check, check_model
+from ..matching.chips import ChipMatcher
+from ..matching.guided_fit import GuidedFit
+from ..matching.held_out import HeldOut
+from ..matching.keypoint_fit import KeypointFit
+from ..matching.keypoints import KeypointMatcher
+from ..matching.parts import ELSEWHERE_PX
+from ..matching.pooled import PooledHistogramMatcher
+from ..matching.pyramid import find_coarse_model
+from ..matching.rest import Rest, survey_rest
+from ..matching.surface_fit import SurfaceFit
+from ..matching.survey import Survey, survey_model, survey_places
+from ..rasters.pair import ImagePair
+from ..rasters.patch import Patch
+from ..rasters.reading import Window
+from ..similarity.surface import SimilaritySettings
+from .evidence import RegistrationEvidence
+from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
+from .masks import Masked
+from .opening import open_terrain
+from .scene import SceneInfo
+from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
+from .surface_masks import ModelFit, fit_of
+
+# What chips all over show; without what the arrays share, if anything; and in bands alone.
+Surveys = tuple[Survey | None, Rest | None, tuple[BandSurvey, ...]]
+
+
+class Fit(Protocol):
+    """What finds tie points near a coarse model, blind to held-out blocks, and fits a model."""
+
+    def estimate(self, coarse: Model, kind: str, context: Context) -> Estimate:
+        """Return the model that tie points agree on; `TooFewPointsError` if none do."""
+
+
+@dataclass(frozen=True)
+class Stages:
+    """The stages of one registration, put together as its specification asks.
+
+    Parameters
+    ----------
+    masked
+        What takes part.
+    spec
+        How it is registered.
+    held_out
+        What only check chips may see.
+    matcher
+        Matches chips of the fit and, on reduced images, the coarse shift.
+    checker
+        Matches check chips: `matcher`, or another on the ground alone.
+    fit
+        Fits the model.
+    """
+
+    masked: Masked
+    spec: Specification
+    held_out: HeldOut
+    matcher: ChipMatcher | PooledHistogramMatcher
+    checker: ChipMatcher | PooledHistogramMatcher
+    fit: Fit
+
+    @classmethod
+    def of(cls, images: ImagePair, masked: Masked, spec: Specification) -> Stages:
+        """Put the stages together; `images` have no masks."""
+        held_out = HeldOut.of(images)
+
+        def pooled(pair: ImagePair) -> PooledHistogramMatcher:
+            return PooledHistogramMatcher.of(pair, held_out.layout.chip_px, held_out)
+
+        settings = SimilaritySettings(spec.similarity)
+        chips = ChipMatcher(masked.pair, settings, held_out)
+        # Chips of which a mask leaves too little share a joint histogram.
+        is_pooled = (
+            spec.matcher == CHIPS
+            and masked.used.leaves_little
+            and spec.similarity in ("fused", "nmi")
+        )
+        matcher = pooled(masked.pair) if is_pooled else chips
+        checker = matcher if masked.ground is None else pooled(masked.ground)
+        fit = _fit(images, masked.pair, matcher, held_out, spec)
+        return cls(masked, spec, held_out, matcher, checker, fit)
+
+    def checked(self, context: Context) -> tuple[Estimate, Check]:
+        """Return the estimate and its check points.
+
+        Raises
+        ------
+        NothingFoundError, TooFewPointsError
+            The search, or the fit, came to no transform.
+        """
+        context.update(0.0, "searching for the coarse shift")
+        coarse = self.coarse(context.part(0.0, 0.45))
+        context.update(0.45, "matching tie points")
+        estimate = self.fit.estimate(coarse, self.spec.model, context.part(0.45, 0.9))
+        context.update(0.9, "checking with points that took no part")
+        return estimate, self.check(estimate, context.part(0.9, 1.0))
+
+    def coarse(self, context: Context) -> Model:
+        """Return the coarse model."""
+        limits = self.masked.pair.limits
+        return find_coarse_model(self.matcher, self.held_out, limits, context)
+
+    def check(self, estimate: Estimate, context: Context) -> Check:
+        """Match the check chips around what an estimate predicts."""
+        model = estimate.transform.model
+        return check_model(self.checker, self.held_out.layout, model, context)
+
+    def survey(self, estimate: Estimate, scene: SceneInfo, context: Context) -> Surveys:
+        """Match chips all over the pair, with what its masks leave, around what was estimated.
+
+        Returns what they show (None: it is not asked for), what they show without content that is
+        the same in both arrays (None: there is none), and what bands show each where they do not
+        coincide.
+        """
+        if not self.spec.surveys:
+            return None, None, ()
+        pair, transform = self.masked.pair, estimate.transform
+        chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
+        places, kind = survey_places(pair.grid), scene.of_one_kind
+        # No rule asks for ghosts where a mask leaves nothing but ground.
+        ghosts, first = not self.masked.used.is_ground, context.part(0.0, 0.5)
+        survey = survey_model(chips, transform.model, first, seeks_ghost=ghosts)
+        rest = survey_rest(chips, transform, places, ELSEWHERE_PX, kind, context.part(0.5, 0.9))
+        last = context.part(0.9, 1.0)
+        return survey, rest, survey_bands(chips, transform.model, places, ELSEWHERE_PX, last)
+
+    def evidence(
+        self,
+        estimate: Estimate,
+        check: Check,
+        surveys: Surveys,
+        scene: SceneInfo,
+    ) -> RegistrationEvidence:
+        """Return what the rules look at."""
+        is_apart = self.checker is not self.matcher
+        is_radar = self.spec.radar == BOTH or scene.are_both_radar
+        factor = (
+            KEYPOINTS_MEAN_OVER_SCATTER
+            if self.spec.matcher == KEYPOINTS
+            else CHIPS_MEAN_OVER_SCATTER
+        )
+        return RegistrationEvidence(
+            estimate,
+            check.points,
+            self.masked.pair.grid,
+            self.spec.max_error_px,
+            CHECK_RADIUS_PX,
+            self.spec.tries,
+            check.common_shift_px if is_apart else 0.0,
+            is_apart,
+            factor if is_radar else None,
+            scene,
+            self.masked.used,
+            *surveys,
+            self._input_fit(estimate),
+        )
+
+    def _input_fit(self, estimate: Estimate) -> ModelFit | None:
+        """Return how well a surface model fits the registered input, which it was not fitted to."""
+        surface, pair, model = self.masked.surface, self.masked.pair, estimate.transform.model
+        if surface is None:
+            return None
+
+        def read(window: Window) -> Patch:
+            piece = surface.scene.grid.window(*window)
+            return pair.input_patch(piece, lambda xy: pair.nominal_px(model(xy)))
+
+        return fit_of(surface, surface.views[-1], read)
+
+
+def _fit(
+    images: ImagePair,
+    pair: ImagePair,
+    matcher: ChipMatcher | PooledHistogramMatcher,
+    held_out: HeldOut,
+    spec: Specification,
+) -> Fit:
+    """Return what fits the model, by the name of the specification's matcher."""
+    layout = held_out.layout
+    if spec.matcher == CHIPS:
+        terrain = None if spec.dem is None else open_terrain(pair, spec.dem, spec.input_dem)
+        candidates = spec.candidates if terrain is None else TERRAIN_CANDIDATES
+        if spec.light is not None:
+            # Polynomials bend along what no rendering shows: land cover and what is laid over.
+            candidates = tuple(kind for kind in candidates if kind in (*LINEAR_CANDIDATES, TERRAIN))
+        return SurfaceFit(matcher, layout, candidates, terrain=terrain)
+    presets = {KEYPOINTS: sar_keypoints, GUIDED_CHIPS: optical_keypoints}
+    detector, descriptor = presets[spec.matcher]()
+    masked = None if pair is images else pair
+    keypoints = KeypointMatcher(images, detector, descriptor, held_out=held_out, shown=masked)
+    chips = ChipMatcher(pair, SimilaritySettings(spec.refinement), held_out)
+    if spec.matcher == KEYPOINTS:
+        return KeypointFit(keypoints, SurfaceFit(matcher, layout), chips)
+    # Polynomials bend along elevated objects: "auto" chooses among what keypoints choose from.
+    fit = SurfaceFit(chips, layout, LINEAR_CANDIDATES)
+    return GuidedFit(KeypointFit(keypoints, SurfaceFit(matcher, layout)), fit)
