@@ -52,8 +52,24 @@ def test_fields_need_no_mask(tmp_path: Path) -> None:
     fields = np.kron(random.uniform(200, 500, (20, 20)), np.ones((20, 20)))
     fields *= np.sqrt(random.gamma(1, 1, fields.shape))
     scene = scene_of(tmp_path / "a.tif", fields.astype(np.float32))
-    kind, reason = choose(share_of_strong_scatterers(scene))
+    kind, reason = choose(share_of_strong_scatterers(scene), never)
     assert kind == "none" and "too few" in reason
+
+
+def never() -> bool:
+    raise AssertionError("regions are not looked for")
+
+
+@pytest.mark.parametrize(
+    ("strong_share", "has_ground", "expected"),
+    [(0.079, True, "none"), (0.081, True, "regions"), (0.081, False, "none")],
+)
+def test_suburbs_get_regions_where_they_are_reliable(
+    strong_share: float, has_ground: bool, expected: str
+) -> None:
+    kind, reason = choose(strong_share, lambda: has_ground)
+    assert kind == expected
+    assert ("suburb" in reason) == (expected == "regions")
 
 
 @pytest.mark.parametrize(
@@ -67,7 +83,7 @@ def test_dense_towns_get_regions_which_must_be_reliable(
     bright = np.kron(random.random((20, 20)) < 0.25, np.ones((20, 20)))
     town = np.where(bright, 600, 100) * np.sqrt(random.gamma(1, 1, bright.shape))
     scene = scene_of(tmp_path / "a.tif", town.astype(np.float32))
-    kind, reason = choose(share_of_strong_scatterers(scene))
+    kind, reason = choose(share_of_strong_scatterers(scene), never)
     assert kind == "regions" and "dense town" in reason
     part = np.zeros(bright.shape, bool)
     part[: round(share * 400)] = True

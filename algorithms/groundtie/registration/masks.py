@@ -98,7 +98,7 @@ def with_ground_mask(
     town = _Town(pair, scene, stack, context)
     reason = "as asked for"
     if kind == AUTO:
-        kind, reason = choose(scene.radar.strong_share)
+        kind, reason = choose(scene.radar.strong_share, lambda: is_reliable(town.regions()))
     if kind == REGIONS:
         regions = town.regions()
         masked, share = town.masked(regions.select)

@@ -2096,8 +2096,8 @@
       <translation>Was von der Maske nicht teilnimmt: Werte wie 3,8-10; scl, qa-pixel, fmask, hls-fmask oder udm2 für Wolken und ihre Schatten in den Masken dieser Missionen; inside für einen Vektorlayer dessen, was nicht teilnimmt. Ohne Angabe 0, und was außerhalb eines Layers liegt. Ohne Maske wird eine genommen, die unter den Namen der Mission neben dem Bild liegt; none nimmt keine.</translation>
     </message>
     <message>
-      <source>What takes part in scenes with high buildings, which layover displaces: threshold leaves out strong scatterers, regions all but homogeneous ground (roads, waters, squares); auto takes regions where a radar image beside a camera's shows a dense town.</source>
-      <translation>Was in Szenen mit hohen Gebäuden teilnimmt, die Layover verschiebt: Schwellen lassen starke Streuer weg, Regionen alles außer homogenem Boden (Straßen, Gewässer, Plätze); Automatisch nimmt Regionen, wo ein Radarbild neben einem Kamerabild eine dichte Stadt zeigt.</translation>
+      <source>What takes part in scenes with high buildings, which layover displaces: threshold leaves out strong scatterers, regions all but homogeneous ground (roads, waters, squares); auto takes regions where a radar image beside a camera's shows a town.</source>
+      <translation>Was in Szenen mit hohen Gebäuden teilnimmt, die Layover verschiebt: Schwellen lassen starke Streuer weg, Regionen alles außer homogenem Boden (Straßen, Gewässer, Plätze); Automatisch nimmt Regionen, wo ein Radarbild neben einem Kamerabild eine Stadt zeigt.</translation>
     </message>
     <message>
       <source>What the heights of the terrain model count from: the ellipsoid, as RPCs do, or a geoid (SRTM: EGM96; Copernicus: EGM2008). Taking one for the other moves heights by up to 100 m.</source>

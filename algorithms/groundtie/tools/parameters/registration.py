@@ -142,7 +142,7 @@ Mask = Annotated[
         label="Mask of the radar image",
         help="What takes part in scenes with high buildings, which layover displaces: threshold "
         "leaves out strong scatterers, regions all but homogeneous ground (roads, waters, "
-        "squares); auto takes regions where a radar image beside a camera's shows a dense town.",
+        "squares); auto takes regions where a radar image beside a camera's shows a town.",
         choices=MASKS,
         advanced=True,
     ),
