@@ -33,6 +33,7 @@ from groundtie.matching.guided_fit import GuidedFit
 from groundtie.matching.keypoint_fit import KeypointFit
 from groundtie.matching.pooled import PooledHistogramMatcher
 from groundtie.matching.surface_fit import SurfaceFit
+from groundtie.matching.survey import Survey
 from groundtie.progress import Progress
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
@@ -385,3 +386,19 @@ def test_a_transform_that_the_exchanged_pair_does_not_show_is_refused(
         monkeypatch.setattr(ImagePair, "exchanged", lambda _: exchanged)
         found = run(opened, COREGISTER, context)
     assert found.verdict.rule == "exchanged roles"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ratio", [0.5, 2.0])
+def test_exchanged_roles_show_the_same_across_pixel_sizes(
+    ratio: float, tmp_path: Path, context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Survey, "is_minority", True)
+    pair = write_textured_pair(
+        tmp_path, (500, 450), shift_on_map(73.0, -42.0), input_pixel_ratio=ratio
+    )
+    with open_pair(pair.reference, pair.input, COREGISTER, context) as opened:
+        found = run(opened, COREGISTER, context)
+    assert found.verdict.accepted
+    assert found.evidence is not None and found.evidence.exchanged is not None
+    assert found.evidence.exchanged.apart_px < 0.3
