@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from groundtie.errors import GroundTieError
-from groundtie.matching.parts import LEAST_EXCESS, LEAST_EXCESS_OF_MINORITY
+from groundtie.matching.parts import LEAST_EXCESS, LEAST_EXCESS_IF_WEAK
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
@@ -55,10 +55,10 @@ class Statistic:
     is_refused_above: bool = True
 
 
-def _excess(of_minority: bool) -> Callable[[RegistrationEvidence], float]:
+def _excess(is_weak: bool) -> Callable[[RegistrationEvidence], float]:
     def value(evidence: RegistrationEvidence) -> float:
         survey = evidence.survey
-        if survey is None or survey.is_minority != of_minority or survey.highest_part is None:
+        if survey is None or survey.is_weakly_confirmed != is_weak or survey.highest_part is None:
             return math.nan
         return survey.highest_part.excess
 
@@ -109,7 +109,7 @@ def _elsewhere(evidence: RegistrationEvidence) -> float:
 
 STATISTICS = (
     Statistic("part elsewhere: excess", LEAST_EXCESS, _excess(False)),
-    Statistic("part elsewhere: excess of minorities", LEAST_EXCESS_OF_MINORITY, _excess(True)),
+    Statistic("part elsewhere: excess where few confirm", LEAST_EXCESS_IF_WEAK, _excess(True)),
     Statistic("second place: share of the height", RIVAL_HEIGHT, _rival),
     Statistic("second place: ghost", GHOST_HEIGHT, _of_survey("ghost_height")),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),

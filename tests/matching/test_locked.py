@@ -17,6 +17,7 @@ from groundtie.matching.locked import LockedContent, find_locked_content
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
+from groundtie.similarity.in_common import DRAWN_SHARPNESS
 
 SIDE = 320
 
@@ -141,6 +142,30 @@ def test_one_sensors_views_of_one_ground_are_explained(tmp_path: Path, context: 
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
     assert locked is not None and locked.sameness.gradients > 0.1
     assert locked.sameness.is_explained
+
+
+def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
+    tmp_path: Path, context: Context
+) -> None:
+    locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
+    assert locked is not None
+    # As of one exposure's bands.
+    views = replace(locked.sameness, sharpness=4.2, area=0.4, reduced_area=0.7, ground=0.4)
+    assert views.is_explained
+    assert not replace(views, sharpness=DRAWN_SHARPNESS).is_explained
+    assert replace(views, area=0.8, reduced_area=0.8, sharpness=DRAWN_SHARPNESS).is_explained
+
+
+def test_sharp_edges_on_whole_pixels_are_drawn(tmp_path: Path, context: Context) -> None:
+    locked = looked_at(tmp_path, sensed(1), sensed(2, place=9), context)
+    assert locked is not None
+    for sharpness, is_exact, is_drawn in (
+        (2.4, True, False),
+        (2.6, True, True),
+        (2.6, False, False),
+    ):
+        sameness = replace(locked.sameness, sharpness=sharpness, ground=0.0)
+        assert replace(locked, sameness=sameness, is_exact=is_exact).is_drawn == is_drawn
 
 
 def test_a_copy_is_explained(tmp_path: Path, context: Context) -> None:

@@ -10,7 +10,7 @@ from raster_files import utm_grid
 
 from groundtie.matching.parts import (
     LEAST_EXCESS,
-    LEAST_EXCESS_OF_MINORITY,
+    LEAST_EXCESS_IF_WEAK,
     find_parts,
     highest_part,
 )
@@ -105,7 +105,7 @@ def test_less_speaks_for_a_part_where_less_speaks_for_the_model() -> None:
     raised(surfaces, np.isin(np.arange(len(CENTRES)), [0, 1, 2, 7, 8, 9]), (9, -6), 4.1)
     part = highest_part(GRID, CENTRES, surfaces, np.arange(len(CENTRES)))
     assert part is not None
-    assert LEAST_EXCESS_OF_MINORITY <= part.excess < LEAST_EXCESS
+    assert LEAST_EXCESS_IF_WEAK <= part.excess < LEAST_EXCESS
     shifts = np.zeros((len(CENTRES), 2))
     confirmed = Survey(GRID, CENTRES, shifts, surfaces)
     assert confirmed.parts == []

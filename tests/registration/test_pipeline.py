@@ -366,7 +366,7 @@ def test_where_few_chips_confirm_a_transform_the_exchanged_pair_must_too(
         found = run(opened, COREGISTER, context)
     assert found.verdict.accepted and found.survey is not None and found.evidence is not None
     assert error_px(found.accepted(), pair) < 0.5
-    assert found.survey.is_minority == is_asked
+    assert found.survey.is_weakly_confirmed == is_asked
     exchanged = found.evidence.exchanged
     assert (exchanged is not None) == is_asked
     if exchanged is not None:
@@ -393,7 +393,7 @@ def test_a_transform_that_the_exchanged_pair_does_not_show_is_refused(
 def test_exchanged_roles_show_the_same_across_pixel_sizes(
     ratio: float, tmp_path: Path, context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Survey, "is_minority", True)
+    monkeypatch.setattr(Survey, "is_weakly_confirmed", True)
     pair = write_textured_pair(
         tmp_path, (500, 450), shift_on_map(73.0, -42.0), input_pixel_ratio=ratio
     )

@@ -176,13 +176,22 @@ def test_what_copies_leave_may_contradict(part: int, expected: list[str]) -> Non
 
 
 @pytest.mark.parametrize(
-    ("chips", "height", "is_refused"), [(49, 1.5, True), (49, 1.7, False), (120, 1.5, False)]
+    ("chips", "height", "is_sharp", "is_refused"),
+    [
+        (49, 1.5, False, True),
+        (49, 1.7, False, False),
+        (120, 1.5, False, False),
+        (49, 2.4, True, True),
+        (49, 2.6, True, False),
+        (120, 2.4, True, False),
+    ],
 )
 def test_many_chips_that_copies_leave_must_show_something(
-    chips: int, height: float, is_refused: bool
+    chips: int, height: float, is_sharp: bool, is_refused: bool
 ) -> None:
     """Beneath one cloud deck over two grounds they match nowhere; a plain copy leaves few."""
-    rest = Rest(survey(height=height, rival=0.2), True, None, chips)
+    left = survey(height=height, rival=0.2)
+    rest = Rest(left, True, None, chips, has_sharp_edges=is_sharp)
     found = evidence(GOOD, survey=survey(), rest=rest)
     assert refusing(found) == ["pixel-locked content"] * is_refused
 

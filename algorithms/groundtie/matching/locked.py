@@ -20,6 +20,7 @@ from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.in_common import (
     DRAWN_SHARPNESS,
+    LEAST_SHARPNESS,
     LOOK_REACH_PX,
     Look,
     Sameness,
@@ -88,9 +89,9 @@ class LockedContent:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it is sharper than ground in other colours."""
+        """Whether it is sharper than ground in other colours, or sharp and on whole pixels."""
         same = self.sameness
-        is_sharper = same.sharpness >= DRAWN_SHARPNESS
+        is_sharper = same.sharpness >= (LEAST_SHARPNESS if self.is_exact else DRAWN_SHARPNESS)
         return is_sharper and not (self.is_explained or same.is_copy_in_other_colours)
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:

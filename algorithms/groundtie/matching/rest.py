@@ -31,6 +31,8 @@ class Rest:
         How many chips there are; of some too little may be left.
     is_drawn
         Whether such content is drawn over the images (see `LockedContent`).
+    has_sharp_edges
+        Whether edges coincide more sharply than those of one ground.
     """
 
     survey: Survey
@@ -38,6 +40,7 @@ class Rest:
     beyond: Survey | None = None
     chips: int = 0
     is_drawn: bool = False
+    has_sharp_edges: bool = False
 
 
 def survey_rest(
@@ -72,12 +75,19 @@ def survey_rest(
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())
     survey = survey_model(fused, transform.model, context, locked, places, elsewhere_px)
-    chips = len(places.centres)
+    rest = Rest(
+        survey,
+        locked.is_explained,
+        None,
+        len(places.centres),
+        locked.is_drawn,
+        locked.sameness.has_sharp_edges,
+    )
     if not (locked.is_explained and locked.is_whole):
-        return Rest(survey, locked.is_explained, None, chips, locked.is_drawn)
+        return rest
     # A copy may be blended into other ground, of which the same windows are no part.
     left = replace(fused, left_of=unexplained)
     beyond = survey_model(
         left, locked.model, context, None, places, elsewhere_px, seeks_ghost=False
     )
-    return Rest(survey, True, beyond, chips)
+    return replace(rest, beyond=beyond)

@@ -21,7 +21,7 @@ from .matcher import FloatArray, MaskOf, Places
 from .parts import (
     ELSEWHERE_PX,
     LEAST_EXCESS,
-    LEAST_EXCESS_OF_MINORITY,
+    LEAST_EXCESS_IF_WEAK,
     SAME_PX,
     Part,
     find_parts,
@@ -82,9 +82,9 @@ class Survey:
         return int(self.is_confirming_chip.sum())
 
     @property
-    def is_minority(self) -> bool:
-        """Whether less than half of the chips match where the model has them."""
-        return 2 * self.confirming < len(self.centres)
+    def is_weakly_confirmed(self) -> bool:
+        """Whether fewer than two of three chips match where the model has them."""
+        return 3 * self.confirming < 2 * len(self.centres)
 
     @property
     def comparable(self) -> int:
@@ -121,7 +121,7 @@ class Survey:
     @cached_property
     def parts(self) -> Sequence[Part]:
         """Neighbouring chips that together match elsewhere, the most evident first."""
-        least = LEAST_EXCESS_OF_MINORITY if self.is_minority else LEAST_EXCESS
+        least = LEAST_EXCESS_IF_WEAK if self.is_weakly_confirmed else LEAST_EXCESS
         return find_parts(self.grid, self.centres, self.surfaces, least)
 
     @property

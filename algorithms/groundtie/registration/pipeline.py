@@ -91,7 +91,7 @@ def _asks_for_exchange(
     What is rendered, or located by a sensor model, is no reference for another image.
     """
     survey = evidence.survey
-    if survey is None or not survey.is_minority or evidence.mask.is_ground:
+    if survey is None or not survey.is_weakly_confirmed or evidence.mask.is_ground:
         return False
     is_plain = spec.surface is None and spec.dem is None and spec.light is None
     return is_plain and not scene.input.is_in_sensor_geometry

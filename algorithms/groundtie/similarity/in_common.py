@@ -132,12 +132,12 @@ class Sameness:
         """Whether one image is a copy of the other, or both are one sensor's views of one ground.
 
         What is left of them need not confirm the transform, as copies leave nothing, and what one
-        sensor shows alike is most of what it shows.
+        sensor shows alike is most of what it shows, but no sharper than its bands.
         """
         if self.is_finer_than_ground:
             return False
         is_copy = min(self.area, self.reduced_area) >= _COPY_SHARE
-        return is_copy or self.ground >= _GROUND_SHARE
+        return is_copy or (self.ground >= _GROUND_SHARE and self.sharpness < DRAWN_SHARPNESS)
 
 
 _NO_WINDOWS = np.zeros((3, 3), int)

@@ -98,9 +98,9 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
     Rule(
         "exchanged roles",
         AGREEMENT,
-        "less than half of the chips all over match where the transform has them, no mask leaves "
-        "the ground alone, and with reference and input exchanged check points agree as they "
-        "may by chance, or the transform lies farther off than the largest error",
+        "fewer than two of three chips all over match where the transform has them, no mask "
+        "leaves the ground alone, and with reference and input exchanged check points agree as "
+        "they may by chance, or the transform lies farther off than the largest error",
         "[Holden2000]; suite attacks",
         "give a larger part of the scene, or bands that show the same",
         _exchanged_roles,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...matching.parts import LEAST_EXCESS, LEAST_EXCESS_OF_MINORITY
+from ...matching.parts import LEAST_EXCESS, LEAST_EXCESS_IF_WEAK
 from ...matching.rest import Rest
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
 from ..evidence import SURVEY, RegistrationEvidence
@@ -31,7 +31,9 @@ DRAWN_REST_HEIGHT = 8.0
 # former are up to 1.3 times as high; beneath clouds and labels over ground that lies elsewhere,
 # from 1.7 times and 6.1 on; ground that shows through copies stands out by 8.4 and more.
 # Nor may it show nothing where the transform has it: from 1.66 on where it is right, up to 1.5
-# beneath clouds and snow, but for one at 1.8. Of plain copies, few chips have anything left.
+# beneath clouds and snow, but for one at 1.8. Of plain copies, few chips have anything left. Where
+# edges are as sharp as drawn ones, it must be as high as of other content: right ones from 2.53
+# on, beneath clouds, snow and a reference that was blended in, up to 2.2.
 BEYOND_DEVIATIONS = 5.0
 _MASKED_RIVAL = 1.5
 _LEAST_CHIPS = 0.5
@@ -107,7 +109,8 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
         return None
     survey = rest.survey
     if rest.is_explained:
-        is_nothing = is_enough(survey, rest) and survey.height < WEAK_COPY_HEIGHT
+        least = WEAK_REST_HEIGHT if rest.has_sharp_edges else WEAK_COPY_HEIGHT
+        is_nothing = is_enough(survey, rest) and survey.height < least
         is_unconfirmed = is_nothing or deviations_elsewhere(rest) >= BEYOND_DEVIATIONS
     else:
         least = DRAWN_REST_HEIGHT if rest.is_drawn else WEAK_REST_HEIGHT
@@ -133,7 +136,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         SURVEY,
         "neighbouring chips together match elsewhere "
         f"{LEAST_EXCESS:g} standard deviations of noise better than where the transform has them, "
-        f"or {LEAST_EXCESS_OF_MINORITY:g} if less than half of all chips match there",
+        f"or {LEAST_EXCESS_IF_WEAK:g} if fewer than two of three chips match there",
         "[Kulldorff1997]; suites margins and attacks",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,
@@ -164,10 +167,10 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "both images have the same content at the same columns and rows, such as labels or clouds, "
         "and without it a part lies elsewhere, a second place matches about as "
         f"well, or the mean similarity is below {WEAK_REST_HEIGHT:g} standard deviations, "
-        f"or {DRAWN_REST_HEIGHT:g} of what is sharper than ground in other colours; of a "
-        f"copy, or one sensor's views, below {WEAK_COPY_HEIGHT:g} if half of the chips have "
-        "anything left, or where that is weak and a second place stands out by "
-        f"{BEYOND_DEVIATIONS:g}: {_MASKED_RIVAL:g} times as high in what is left, or "
+        f"or {DRAWN_REST_HEIGHT:g} of what is sharper than ground in other colours; of a copy, "
+        f"or one sensor's views, below {WEAK_COPY_HEIGHT:g}, or {WEAK_REST_HEIGHT:g} with sharp "
+        "edges, if half of the chips have anything left, or where that is weak and a second place "
+        f"stands out by {BEYOND_DEVIATIONS:g}: {_MASKED_RIVAL:g} times as high in what is left, or "
         f"{RIVAL_HEIGHT:g} times in what the reference does not explain",
         "suites margins and attacks",
         WITHOUT,
