@@ -109,6 +109,18 @@ def test_counts_are_those_of_numpy(bins: tuple[int, int], masked: bool) -> None:
     assert volume.margin == MARGIN
 
 
+@pytest.mark.parametrize("rim", [1, 5, 14])
+def test_counts_where_a_search_window_reaches_beyond_its_image(
+    monkeypatch: pytest.MonkeyPatch, rim: int
+) -> None:
+    bins = (4, 3)
+    template, search = windows(False, (20, 31), bins)
+    search[:rim], search[:, -rim:], search[-rim:], search[:, :rim] = (MASKED,) * 4
+    monkeypatch.setattr(joint_histogram, "_SPECTRAL_COST", 0.0)
+    volume = count_joint_histograms(template, search, bins, RADIUS)
+    np.testing.assert_array_equal(volume.counts, with_numpy(template, search, bins))
+
+
 @pytest.mark.parametrize("masked", [False, True])
 @pytest.mark.parametrize("shape", [(150, 160), (9, 200), (20, 31)])
 def test_all_ways_to_count_agree(

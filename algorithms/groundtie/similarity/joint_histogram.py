@@ -203,7 +203,7 @@ def _count_spectrally(
     Counts are whole numbers: several bins of the search window, times powers of 2, share a plane,
     and their counts are the digits of what is found.
     """
-    shape = fast_shape(search)
+    shape = fast_shape(template, search < bins[1])
     digits = _Digits.of(template, search, bins)
     other = np.moveaxis(np.take(digits.weights(bins[1]), search, axis=1), 0, -3)
     of_search = spectrum(other, shape, workers)
