@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-
 # From so many values on, it is quicker to select among those of a bucket alone, of so many.
 _MANY, _BUCKETS = 4096, 1024
 
