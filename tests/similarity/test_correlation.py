@@ -52,28 +52,6 @@ def test_plain_correlation(complex_valued: bool) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize(
-    "filled", [np.s_[3:-7, 5:-4], np.s_[15:-8, 20:-8], np.s_[12:13, 1:], np.s_[:0, :0]]
-)
-def test_what_is_empty_around_a_search_window_does_not_wrap(filled: tuple[slice, ...]) -> None:
-    template, whole, _, _ = fields(False)
-    search = np.zeros_like(whole)
-    search[filled] = whole[filled]
-    expected = (windows_of(search) * template.conj()).sum(axis=(2, 3)).real
-    largest = max(np.abs(expected).max(), 1)
-    np.testing.assert_allclose(correlate(template, search), expected, atol=1e-4 * largest)
-
-
-def test_of_few_shifts_and_of_small_templates_nothing_is_cut() -> None:
-    rng = np.random.default_rng(0)
-    for own, filled in (((16, 16), np.s_[9:11, 9:11]), ((3, 3), np.s_[9:11, 9:11])):
-        template, search = rng.normal(size=own), np.zeros((20, 20))
-        search[filled] = rng.normal(size=(2, 2))
-        windows = np.lib.stride_tricks.sliding_window_view(search, own)
-        expected = (windows * template).sum(axis=(2, 3))
-        np.testing.assert_allclose(correlate(template, search), expected, atol=1e-5)
-
-
 @pytest.mark.parametrize("masked", [False, True])
 def test_fields_against_their_definition(masked: bool) -> None:
     template, search, template_valid, search_valid = fields(masked)

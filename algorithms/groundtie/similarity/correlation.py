@@ -34,21 +34,31 @@ def correlate(template: NDArray[Any], search: NDArray[Any]) -> NDArray[np.float3
     -------
     Array of shape (…, ny, nx), float32.
     """
-    shape, (rows, cols) = fast_shape(template, search), spans(template, search)
+    shape, (rows, cols) = fast_shape(search), spans(template, search)
     product = spectrum(template, shape).conj() * spectrum(search, shape)
     found = from_spectrum(product, shape, (rows, cols))
     return np.asarray(found.real, np.float32)
 
 
-def fast_shape(template: NDArray[Any], search: NDArray[Any]) -> tuple[int, int]:
-    """Return a shape that is quick to transform, and in which windows can be correlated.
+def fast_shape(search: NDArray[Any]) -> tuple[int, int]:
+    """Return a shape that is quick to transform and not smaller than a search window."""
+    rows, cols = (scipy.fft.next_fast_len(n) for n in search.shape[-2:])
+    return rows, cols
+
+
+def tight_shape(template: NDArray[Any], filled: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return a shape that is quicker still, where empty ends of a search window lie on one another.
+
+    For whole numbers: sums of others have other last digits in another shape.
 
     Parameters
     ----------
-    template, search
-        As `correlate`, or where they are not 0.
+    template
+        As `correlate`.
+    filled
+        Where the search window is not 0.
     """
-    rows, cols = (_fast_length(search.shape[k] - _empty(template, search, k)) for k in (-2, -1))
+    rows, cols = (_fast_length(filled.shape[k] - _empty(template, filled, k)) for k in (-2, -1))
     return rows, cols
 
 
@@ -59,14 +69,14 @@ def _fast_length(least: int) -> int:
     return length if length % 11 else _fast_length(length + 1)
 
 
-def _empty(template: NDArray[Any], search: NDArray[Any], axis: int) -> int:
-    """Return how many lines are 0 at each end of a search window, which may lie on one another."""
-    size, own = search.shape[axis], template.shape[axis]
-    if search.take([0, -1], axis).any():
+def _empty(template: NDArray[Any], filled: NDArray[np.bool_], axis: int) -> int:
+    """Return how many lines are empty at each end of a search window, as far as is of use."""
+    size, own = filled.shape[axis], template.shape[axis]
+    if filled.take([0, -1], axis).any():
         return 0
-    others = tuple(k for k in range(-search.ndim, 0) if k != axis)
-    filled = np.flatnonzero(search.any(axis=others))
-    ends = (filled[0], size - 1 - filled[-1]) if filled.size else (size, size)
+    others = tuple(k for k in range(-filled.ndim, 0) if k != axis)
+    lines = np.flatnonzero(filled.any(axis=others))
+    ends = (lines[0], size - 1 - lines[-1]) if lines.size else (size, size)
     # The template and the shifts need their room, too.
     return int(min(*ends, size - own, own - 1))
 
@@ -195,7 +205,7 @@ def _correlate_grey(
     tm, sm = t_valid.astype(np.float32), s_valid.astype(np.float32)
     t, s = (t - own_mean) * tm, (s - mean) * sm
     # Each of a window's three spectra serves several sums.
-    shape = fast_shape(tm, sm)
+    shape = fast_shape(s)
     of_t = spectrum(np.stack([tm, t, t * t]), shape).conj()
     of_s = spectrum(np.stack([sm, s, s * s]), shape)
     products = of_t[[0, 1, 0, 1, 2, 0]] * of_s[[0, 0, 1, 1, 0, 2]]

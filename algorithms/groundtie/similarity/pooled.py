@@ -100,7 +100,7 @@ class PooledHistogram:
         other = levels(search.values, self.search_edges)
         # What is invalid takes a level of its own, without information.
         other[~search.valid] = self.information.shape[1]
-        shape, total = fast_shape(own, search.valid), np.zeros((), np.complex64)
+        shape, total = fast_shape(other), np.zeros((), np.complex64)
         for level, information in enumerate(self.information):
             pixels = (template.valid & (own == level)).astype(np.float32)
             found = np.append(information, np.float32(0))[other]
