@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -11,7 +13,7 @@ from pathlib import Path
 
 from groundtie.geometry.models import shift_model
 from groundtie.geometry.transform import Transform
-from groundtie.memory import DEFAULT_MB
+from groundtie.memory import DEFAULT_MB, LEAST_MB, MOST_MB
 from groundtie.rasters.reading import open_raster
 
 from .attempt import Pair
@@ -22,6 +24,17 @@ from .suites import Goal, Settings, SuiteResult, Table
 SIZE_PX, QUICK_SIZE_PX = 10_000, 1000
 BUDGETS_MB = (DEFAULT_MB, 300)
 _THREADS = ("--workers", "2")
+
+
+# Simulations hold their whole scenes; each of these shows another part of what they take.
+_SIMULATIONS = (
+    ("simulate", "--size", "2000"),
+    ("simulate", "--size", "3000", "--density", "urban"),
+    ("simulate", "--size", "1000", "--shift", "2000"),
+    ("simulate", "--size", "1000", "--input-pixel-size", "0.25"),
+    ("simulate-sensor", "--size", "2000"),
+    ("simulate-sensor", "--size", "1000", "--relief", "600"),
+)
 
 
 @dataclass(frozen=True)
@@ -49,7 +62,7 @@ def run(settings: Settings) -> SuiteResult:
     return SuiteResult(
         "Memory",
         goals(runs, is_complete=not settings.quick),
-        (table(runs),),
+        (table(runs), _simulated(_SIMULATIONS[:1] if settings.quick else _SIMULATIONS)),
         [asdict(one) for one in runs],
         (f"{size}² px, 16 bit: radar of one band, a camera's image of four; two threads.",),
     )
@@ -69,6 +82,26 @@ def calls(pair: Pair, folder: Path) -> dict[str, list[str]]:
         "mask-threshold": [reference, OUTPUT],
         "mask-regions": [reference, OUTPUT],
     }
+
+
+def _simulated(simulations: Sequence[Sequence[str]]) -> Table:
+    """Return what simulations take, and what they foresee."""
+    rows = []
+    for tool, *words in simulations:
+        with tempfile.TemporaryDirectory() as folder:
+
+            def program(budget_mb: int, call: Sequence[str]) -> list[str]:
+                return [sys.executable, "-m", "groundtie", "--memory", str(budget_mb), *call]
+
+            call = [tool, str(Path(folder) / "out"), *words]
+            refused = subprocess.run(
+                program(LEAST_MB, call), capture_output=True, text=True, check=False
+            )
+            foreseen = re.search(r"takes ([0-9.]+) GB", refused.stderr)
+            peak = measure(program(MOST_MB, call)).peak_bytes
+        expected = "–" if foreseen is None else f"{1000 * float(foreseen[1]):.0f}"
+        rows.append([" ".join([tool, *words]), f"{peak / 1e6:.0f}", expected])
+    return Table("Simulations", ["call", "peak MB", "foreseen MB"], rows)
 
 
 def goals(runs: Sequence[Run], *, is_complete: bool) -> list[Goal]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 import groundtie
+from groundtie.memory import MOST_MB, VARIABLE
 from groundtie.simulation import files
 
 from .accuracy import FloatArray, Mapping, Truth
@@ -47,20 +51,34 @@ class Simulation:
         )
         # The truth is there only if all files are.
         if not (folder / files.NAMES["truth"]).exists():
-            groundtie.simulate(
-                folder,
-                size=self.size,
-                density=self.density,
-                seed=self.seed,
-                shift=self.shift,
-                **dict(self.further),
-            )
+            with _any_memory():
+                groundtie.simulate(
+                    folder,
+                    size=self.size,
+                    density=self.density,
+                    seed=self.seed,
+                    shift=self.shift,
+                    **dict(self.further),
+                )
         return read_pair(folder)
 
     def _further(self) -> list[str]:
         """What else the folder's name must tell."""
         digest = hashlib.sha256(repr(self.further).encode()).hexdigest()[:8]
         return ([digest] if self.further else []) + [simulator_version()]
+
+
+@contextmanager
+def _any_memory() -> Iterator[None]:
+    """Let simulations take more than the usual budget."""
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = str(MOST_MB)
+    try:
+        yield
+    finally:
+        del os.environ[VARIABLE]
+        if before is not None:
+            os.environ[VARIABLE] = before
 
 
 def read_pair(folder: Path) -> Pair:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +14,10 @@ import pytest
 import rasterio.env
 from toys import TOY
 
+import groundtie
 from groundtie import memory
 from groundtie.cli import main
-from groundtie.errors import ParameterError
+from groundtie.errors import MemoryLimitError, ParameterError
 from groundtie.rasters.reading import bounded_cache
 
 PACKAGE = Path(__file__).resolve().parents[1] / "algorithms"
@@ -69,6 +72,55 @@ def test_a_bad_amount_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--memory", "0.5", *GOOD], tools=[TOY]) == 2
     error = capsys.readouterr().err
     assert "memory must be 100 to" in error and len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize("tool", [groundtie.simulate, groundtie.simulate_sensor])
+def test_a_scene_that_does_not_fit_is_refused_before_anything_is_written(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, tool: Callable[..., object]
+) -> None:
+    monkeypatch.setenv(memory.VARIABLE, "1000")
+    words = r"takes \d\.\d\d GB, more than the budget of 1\.00 GB"
+    with pytest.raises(MemoryLimitError, match=words) as error:
+        tool(tmp_path / "out", size=5000)
+    assert len(str(error.value).splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_surroundings_of_a_scene_count_too(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv(memory.VARIABLE, "300")
+    with pytest.raises(MemoryLimitError, match="with its surroundings"):
+        groundtie.simulate(tmp_path / "out", size=200, shift=2000)
+    monkeypatch.setenv(memory.VARIABLE, "200")
+    assert groundtie.simulate(tmp_path / "out", size=200).files
+
+
+# Of this process alone: `ru_maxrss` is no less than that of the process that started it.
+PEAK = """
+import sys
+from pathlib import Path
+import groundtie
+getattr(groundtie, sys.argv[1])(sys.argv[2], size=int(sys.argv[3]))
+print(1024 * int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="what Linux counts")
+@pytest.mark.parametrize("tool", ["simulate", "simulate_sensor"])
+def test_what_a_simulation_takes_is_foreseen(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, tool: str
+) -> None:
+    words = [sys.executable, "-c", PEAK, tool, str(tmp_path / "out"), "1500"]
+    environment = {**ENVIRONMENT, memory.VARIABLE: "1000"}
+    done = subprocess.run(words, env=environment, text=True, capture_output=True, check=True)
+    monkeypatch.setenv(memory.VARIABLE, "100")
+    with pytest.raises(MemoryLimitError) as error:
+        getattr(groundtie, tool)(tmp_path / "none", size=1500)
+    foreseen = re.search(r"takes ([0-9.]+) GB", str(error.value))
+    assert foreseen is not None
+    assert 1e9 * float(foreseen[1]) == pytest.approx(float(done.stdout), rel=0.15)
 
 
 HEAPS = """

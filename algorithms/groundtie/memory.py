@@ -12,7 +12,7 @@ import ctypes
 import os
 import sys
 
-from .errors import ParameterError
+from .errors import MemoryLimitError, ParameterError
 
 VARIABLE = "GROUNDTIE_MEMORY"
 DEFAULT_MB, LEAST_MB, MOST_MB = 1000, 100, 1_000_000
@@ -63,6 +63,22 @@ def cache_bytes() -> int:
 def dates_bytes() -> int:
     """Return how much the dates of a series may take."""
     return round(_DATES_SHARE * budget_bytes())
+
+
+def require_bytes(needed: float, what: str) -> None:
+    """Stop before something begins that takes more than the budget.
+
+    Raises
+    ------
+    MemoryLimitError
+        It does.
+    """
+    budget = budget_bytes()
+    if needed > budget:
+        raise MemoryLimitError(
+            f"{what} takes {needed / 1e9:.2f} GB, more than the budget of {budget / 1e9:.2f} GB "
+            f"(--memory, {VARIABLE})"
+        )
 
 
 def set_heaps() -> None:

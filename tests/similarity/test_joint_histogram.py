@@ -109,6 +109,23 @@ def test_counts_are_those_of_numpy(bins: tuple[int, int], masked: bool) -> None:
     assert volume.margin == MARGIN
 
 
+@pytest.mark.parametrize("shape", [(20, 31), (3, 4), (11, 9)])
+@pytest.mark.parametrize(
+    "filled",
+    [np.s_[3:-7, 5:-4], np.s_[1:-1, 0:-6], np.s_[7:9, 8:9], np.s_[:1, -1:], np.s_[:0, :0]],
+)
+def test_counts_where_a_search_window_reaches_beyond_its_image(
+    monkeypatch: pytest.MonkeyPatch, shape: tuple[int, int], filled: tuple[slice, slice]
+) -> None:
+    bins = (4, 3)
+    template, whole = windows(False, shape, bins)
+    search = np.full_like(whole, MASKED)
+    search[filled] = whole[filled]
+    monkeypatch.setattr(joint_histogram, "_SPECTRAL_COST", 0.0)
+    volume = count_joint_histograms(template, search, bins, RADIUS)
+    np.testing.assert_array_equal(volume.counts, with_numpy(template, search, bins))
+
+
 @pytest.mark.parametrize("masked", [False, True])
 @pytest.mark.parametrize("shape", [(150, 160), (9, 200), (20, 31)])
 def test_all_ways_to_count_agree(

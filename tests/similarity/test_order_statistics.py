@@ -7,7 +7,7 @@ import pytest
 
 from groundtie.similarity.order_statistics import median, quantiles, upper_median
 
-SIZES = (1, 2, 3, 10, 4095, 4096)
+SIZES = (1, 2, 3, 10, 4095, 4096, 20_001)
 
 
 def sample(size: int, dtype: str = "float32") -> np.ndarray:
@@ -26,6 +26,16 @@ def test_the_median_is_numpys(size: int, dtype: str) -> None:
 def test_the_upper_median_is_a_value(size: int) -> None:
     values = sample(size)
     assert upper_median(values) == np.sort(values)[size // 2]
+
+
+@pytest.mark.parametrize("size", [5000, 5001])
+def test_medians_of_values_of_all_sizes_are_numpys(size: int) -> None:
+    plain = sample(size)
+    far = plain.copy()
+    far[:3] = [np.inf, -np.inf, 1e38]
+    for values in (np.full_like(plain, 7), np.exp(plain / 30), np.rint(plain / 300), far, -far):
+        assert median(values) == np.median(values)
+        assert upper_median(values) == np.sort(values)[size // 2]
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -43,6 +44,41 @@ def fast_shape(search: NDArray[Any]) -> tuple[int, int]:
     """Return a shape that is quick to transform and not smaller than a search window."""
     rows, cols = (scipy.fft.next_fast_len(n) for n in search.shape[-2:])
     return rows, cols
+
+
+def tight_shape(template: NDArray[Any], filled: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return a shape that is quicker still, where empty ends of a search window lie on one another.
+
+    For whole numbers: sums of others have other last digits in another shape.
+
+    Parameters
+    ----------
+    template
+        As `correlate`.
+    filled
+        Where the search window is not 0.
+    """
+    rows, cols = (_fast_length(filled.shape[k] - _empty(template, filled, k)) for k in (-2, -1))
+    return rows, cols
+
+
+@functools.cache
+def _fast_length(least: int) -> int:
+    """Return a length that is quick to transform; multiples of 11 take a third longer."""
+    length = scipy.fft.next_fast_len(least)
+    return length if length % 11 else _fast_length(length + 1)
+
+
+def _empty(template: NDArray[Any], filled: NDArray[np.bool_], axis: int) -> int:
+    """Return how many lines are empty at each end of a search window, as far as is of use."""
+    size, own = filled.shape[axis], template.shape[axis]
+    if filled.take([0, -1], axis).any():
+        return 0
+    others = tuple(k for k in range(-filled.ndim, 0) if k != axis)
+    lines = np.flatnonzero(filled.any(axis=others))
+    ends = (lines[0], size - 1 - lines[-1]) if lines.size else (size, size)
+    # The template and the shifts need their room, too.
+    return int(min(*ends, size - own, own - 1))
 
 
 def spans(template: NDArray[Any], search: NDArray[Any]) -> tuple[int, int]:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..rasters.kernels import bspline_weights
-from .correlation import fast_shape, from_spectrum, spans, spectrum
+from .correlation import from_spectrum, spans, spectrum, tight_shape
 from .stacks import each
 
 FloatArray = NDArray[np.float32]
@@ -203,7 +203,7 @@ def _count_spectrally(
     Counts are whole numbers: several bins of the search window, times powers of 2, share a plane,
     and their counts are the digits of what is found.
     """
-    shape = fast_shape(search)
+    shape = tight_shape(template, search < bins[1])
     digits = _Digits.of(template, search, bins)
     other = np.moveaxis(np.take(digits.weights(bins[1]), search, axis=1), 0, -3)
     of_search = spectrum(other, shape, workers)

@@ -10,20 +10,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+# From so many values on, it is quicker to select among those of a bucket alone, of so many.
+_MANY, _BUCKETS = 4096, 1024
+
 
 def upper_median(values: NDArray[Any]) -> Any:
     """Return medians along the last axis; of an even number the upper of the middle two."""
-    middle = values.shape[-1] // 2
-    return np.partition(values, middle, axis=-1)[..., middle]
+    count = values.shape[-1]
+    if count < _MANY:
+        return np.partition(values, count // 2, axis=-1)[..., count // 2]
+    rows = values.reshape(-1, count)
+    found = np.array([_ordered(row, count // 2, count // 2)[0] for row in rows])
+    return found.reshape(values.shape[:-1])
 
 
 def median(values: NDArray[Any]) -> Any:
     """Return the median of values of any shape; of an even number the mean of the middle two."""
     middle = values.size // 2
-    ordered = np.partition(values, middle, axis=None)
-    if values.size % 2:
-        return ordered[middle]
-    return np.mean([ordered[:middle].max(), ordered[middle]], dtype=values.dtype)
+    return np.mean(
+        _ordered(values.ravel(), middle - 1 + values.size % 2, middle), dtype=values.dtype
+    )
 
 
 def quantiles(values: NDArray[Any], shares: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -36,3 +42,17 @@ def quantiles(values: NDArray[Any], shares: NDArray[np.float64]) -> NDArray[np.f
     # From the nearer of the two, as numpy has it.
     step = high - low
     return np.where(fraction < 0.5, low + step * fraction, high - step * (1 - fraction))
+
+
+def _ordered(values: NDArray[Any], first: int, last: int) -> NDArray[Any]:
+    """Return the values at places `first` to `last` when all, (n,), are in rising order."""
+    places = np.arange(first, last + 1)
+    low, high = values.min(), values.max()
+    if values.size < _MANY or not 0 < high - low < np.inf:
+        return np.partition(values, places)[places]
+    bucket = ((values - low) * ((_BUCKETS - 1) / (high - low))).astype(np.uint16)
+    up_to = np.bincount(bucket).cumsum()
+    lowest, highest = up_to.searchsorted([first, last], side="right")
+    among = values[(bucket >= lowest) & (bucket <= highest)]
+    places -= up_to[lowest - 1] if lowest else 0
+    return np.partition(among, places)[places]

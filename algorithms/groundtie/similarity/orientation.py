@@ -9,6 +9,7 @@ normalised gradient fields [Haber2006]). The strength of edges is a measure of i
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import cv2
@@ -85,17 +86,23 @@ def squared_gradients(
     whole = valid.all()
     for field, scale in zip(fields, scales_px, strict=True):
         gx, gy = _gradient(compressed, scale)
-        square_x, square_y = gx * gx, gy * gy
+        # In place, as most of the time is that of memory.
+        double_product = gx * gy
+        double_product *= 2
+        gx *= gx
+        gy *= gy
         # Not cv2.magnitude, whose last digits depend on where arrays lie in memory.
-        size = np.sqrt(square_x + square_y)
+        size = np.sqrt(gx + gy)
         usable = size > rounding
         if not whole:
             usable &= _erode(valid, scale)
-        divisor = (size + _typical(size, usable)) * size
+        divisor = size + _typical(size, usable)
+        divisor *= size
         divisor[~usable] = np.inf
-        weight = 1 / divisor
-        field.real = (square_x - square_y) * weight
-        field.imag = 2 * gx * gy * weight
+        weight = np.reciprocal(divisor, out=divisor)
+        gx -= gy
+        np.multiply(gx, weight, out=field.real)
+        np.multiply(double_product, weight, out=field.imag)
     return fields
 
 
@@ -116,17 +123,23 @@ def edge_strength(finest: NDArray[np.complex64], valid: NDArray[np.bool_]) -> Pa
 
 def _gradient(images: FloatArray, scale_px: float) -> tuple[FloatArray, FloatArray]:
     """Return the derivatives of images along columns and along rows, each shape (…, h, w)."""
+    slope, smooth = _kernels(scale_px)
+    gx, gy = np.empty((2, *images.shape), np.float32)
+    stacks = (stack.reshape(-1, *images.shape[-2:]) for stack in (images, gx, gy))
+    for image, x, y in zip(*stacks, strict=True):
+        cv2.sepFilter2D(image, cv2.CV_32F, slope, smooth, dst=x, borderType=cv2.BORDER_REFLECT)
+        cv2.sepFilter2D(image, cv2.CV_32F, smooth, slope, dst=y, borderType=cv2.BORDER_REFLECT)
+    return gx, gy
+
+
+@functools.cache
+def _kernels(scale_px: float) -> tuple[FloatArray, FloatArray]:
+    """Return a Gaussian's derivative, and itself."""
     reach = int(np.ceil(4 * scale_px))
     x = np.arange(-reach, reach + 1, dtype=np.float64)
     smooth = np.exp(-(x**2) / (2 * scale_px**2))
     smooth /= smooth.sum()
-    slope = x / scale_px**2 * smooth
-
-    def filtered(along_cols: FloatArray, along_rows: FloatArray) -> FloatArray:
-        kernels, border = (along_cols, along_rows), cv2.BORDER_REFLECT
-        return each(lambda i: cv2.sepFilter2D(i, cv2.CV_32F, *kernels, borderType=border), images)
-
-    return filtered(slope, smooth), filtered(smooth, slope)
+    return x / scale_px**2 * smooth, smooth
 
 
 def _typical(sizes: FloatArray, usable: NDArray[np.bool_]) -> FloatArray:

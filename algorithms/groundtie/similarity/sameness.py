@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask
+from .order_statistics import median
 
 # Two gradients are the same if they differ by no more than this share of the larger one.
 _SAME_SHARE = 0.25
@@ -44,10 +45,11 @@ _LEAST_VALID = 0.25
 
 @dataclass(frozen=True)
 class Gradients:
-    """Differences along columns and rows, and where they are known, each shape (h, w)."""
+    """Differences along columns and rows, their lengths, and where they are known, (h, w) each."""
 
     x: FloatImage
     y: FloatImage
+    length: FloatImage
     valid: Mask
 
     @classmethod
@@ -58,17 +60,13 @@ class Gradients:
             for order in ((1, 0), (0, 1))
         )
         valid = cv2.erode(patch.valid.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-        return cls(x, y, np.asarray(valid))
+        return cls(x, y, np.asarray(np.hypot(x, y), np.float32), np.asarray(valid))
 
     def part(self, col: int, row: int, shape: tuple[int, ...]) -> Gradients:
         """Return a part of a shape from a column and row on."""
         window = np.s_[row : row + shape[0], col : col + shape[1]]
-        return Gradients(self.x[window], self.y[window], self.valid[window])
-
-    @property
-    def length(self) -> FloatImage:
-        """Their lengths."""
-        return np.asarray(np.hypot(self.x, self.y), np.float32)
+        x, y, length = (of[window] for of in (self.x, self.y, self.length))
+        return Gradients(x, y, length, self.valid[window])
 
 
 def count_same(one: Gradients, other: Gradients, strong: tuple[float, float]) -> tuple[int, int]:
@@ -257,7 +255,7 @@ def _variance(values: FloatImage, valid: Mask) -> FloatImage:
         return np.asarray(cv2.blur(of, (WINDOW_PX, WINDOW_PX)), np.float32)
 
     # About a middle: of squares of large values, small differences would lose digits.
-    middle = np.median(values[valid]) if valid.any() else 0.0
+    middle = median(values[valid]) if valid.any() else 0.0
     known = np.where(valid, values - middle, 0).astype(np.float32)
     share = np.maximum(mean(valid.astype(np.float32)), np.finfo(np.float32).eps)
     return np.asarray(mean(known**2) / share - (mean(known) / share) ** 2, np.float32)

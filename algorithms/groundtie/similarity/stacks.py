@@ -27,7 +27,8 @@ def each(function: Callable[..., Array], *stacks: Array) -> Array:
     """
     leading = stacks[0].shape[:-2]
     images = (stack.reshape(-1, *stack.shape[-2:]) for stack in stacks)
-    made = np.stack([function(*of_one) for of_one in zip(*images, strict=True)])
+    # Not np.stack, which takes as long as what some functions make.
+    made = np.array([function(*of_one) for of_one in zip(*images, strict=True)])
     return made.reshape(leading + made.shape[1:])
 
 

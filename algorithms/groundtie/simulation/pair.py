@@ -19,6 +19,7 @@ from ..geometry.transform import Transform
 from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
 from .check_points import InputImage, RoofPoints, Scenes, ground_points, roof_points
+from .held import PAIR_BYTES, require_memory
 from .misregistration import (
     DistortionOptions,
     ExactPositions,
@@ -146,6 +147,8 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
     ------
     ParameterError
         The pixel sizes do not go together.
+    MemoryLimitError
+        The scene takes more memory than the budget.
     CancelledError
         The user cancelled the work.
     """
@@ -156,8 +159,9 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
     progress.update(0.0, "laying out the scene")
     reach = object_reach_px(scene_options, options.sar, options.optical) + _error_reach_px(options)
     margin = in_steps(needed_margin(model, reference_grid, nominal) + reach)
-    scenes = Scenes(*generate_scenes(scene_options, margin))
     around = scene_grid(reference_grid, margin)
+    require_memory(around, nominal, PAIR_BYTES)
+    scenes = Scenes(*generate_scenes(scene_options, margin))
     assumed_m = _assumed_terrain(scenes.radar, options)
     truth = Transform(model, reference_grid.crs, nominal)
     positions: Positions = SourcePositions.of(truth, around)

@@ -16,6 +16,7 @@ from ..sensor.rpc_fit import RPCFit, fit_rpc
 from .attitude import AttitudeError, AttitudeOptions
 from .camera import PushBroom
 from .check_points import InputImage, RoofPoints, Scenes, ground_points, roof_points
+from .held import SENSOR_BYTES, require_memory
 from .misregistration import resample
 from .noise import Stream, random_stream, strips
 from .optical import OpticalOptions, blur, quantise, render_radiance
@@ -166,6 +167,8 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
     ------
     ParameterError
         The options do not go together.
+    MemoryLimitError
+        The scene takes more memory than the budget.
     CancelledError
         The user cancelled the work.
     """
@@ -176,8 +179,10 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
     error = AttitudeError.draw(options.attitude, size, pixel_m, scene_options.seed)
     progress.update(0.0, "laying out the scene")
     margin = _margin_px(options, grid, camera, error)
+    around = scene_grid(grid, margin)
+    require_memory(around, grid, SENSOR_BYTES)
     scenes = Scenes(*generate_scenes(scene_options, margin))
-    terrain = Terrain(scenes.radar.terrain_m + np.float32(GROUND_M), scene_grid(grid, margin))
+    terrain = Terrain(scenes.radar.terrain_m + np.float32(GROUND_M), around)
     progress.update(0.25, "looking with the radar")
     reference = render_sar(scenes.radar, options.sar)
     progress.update(0.4, "looking with the camera")
