@@ -130,7 +130,7 @@ def test_without_any_ground_nothing_takes_part(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("is_roof", [False, True])
-def test_bright_and_large_is_ground_where_shadow_lies_before_it(
+def test_in_a_dense_town_bright_ground_takes_part_and_roofs_do_not(
     tmp_path: Path, is_roof: bool
 ) -> None:
     # The radar looks to the right: rows of buildings, of which it shows layover, then shadow.
@@ -140,16 +140,20 @@ def test_bright_and_large_is_ground_where_shadow_lies_before_it(
         level_db[:, col + 12 : col + 24] = 35
     level_db[::60] = 50
     large = np.zeros(level_db.shape, bool)
-    large[185:295, 252:288] = True
-    if is_roof:
-        level_db[185:295, 288:300] = 35
-    else:
-        level_db[185:295, 240:252] = 35
-        level_db[185:295, 288:300] = 60
+    large[185:295, 255:285] = True
+    before, behind = (60, 35) if is_roof else (35, 60)
+    level_db[185:295, 240:255] = before
+    level_db[185:295, 285:300] = behind
     level_db[large] = 54.5
     speckle = np.random.default_rng(1).gamma(4, 1 / 4, level_db.shape)
     amplitude = np.sqrt(10 ** (level_db / 10) * speckle).astype(np.float32)
     scene = scene_of(tmp_path / "a.tif", amplitude)
-    found = find_ground(scene, keeps_bright=True).regions[large].mean()
-    assert find_ground(scene).regions[large].mean() < 0.02
-    assert found < 0.02 if is_roof else found > 0.9
+    middle = large.copy()
+    middle[:, :264] = middle[:, 276:] = False
+    assert find_ground(scene).part[middle].mean() < 0.1
+    found = find_ground(scene, is_town=True).select(scene.whole).part
+    assert found[middle].mean() < 0.1 if is_roof else found[middle].mean() > 0.9
+    street = np.zeros(large.shape, bool)
+    street[70:170, 40:45] = True
+    assert found[street].mean() > 0.9
+    assert not found[level_db == 35].any() and not found[level_db == 60].any()
