@@ -27,7 +27,7 @@ _MEAN_PX = 3
 _DARK_PERCENT, _BRIGHT_PERCENT = 25.0, 20.0
 
 # Ground lies so far from both: a mean over distances whose weights add up to 1.
-_GROUND_M = 8.0
+_GROUND_M = 7.0
 _WEIGHT_NEAREST, _WEIGHT_ALONG = 1 / 3, 1 / 6
 
 
