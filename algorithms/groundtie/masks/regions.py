@@ -206,7 +206,7 @@ def _broadened(lines: Mask, wide: Mask, width_m: float, pixel_m: float) -> Mask:
 def _kept_regions(
     patch: Patch, pixel_m: float, width_m: float, progress: Progress
 ) -> tuple[NDArray[np.float32], Mask, Mask]:
-    """Return the level in decibels, long regions on the ground, and large ones beyond the window."""
+    """Return the level in decibels, long regions on the ground, and large and wide ones."""
     intensity = power(patch)
     looks = estimate_looks(intensity, patch.valid)
     variation2 = local_statistics(intensity, patch.valid, _SEED_PX).variation2
