@@ -10,8 +10,8 @@ from groundtie.rasters.reading import Mask
 GROUND_DB, ROOF_DB, LAYOVER_DB, SHADOW_DB = 50.0, 50.0, 60.0, 35.0
 
 # Along the range: layover, roof, shadow, ground as wide as the roof.
-LAYOVER_M, WIDE_M, SHADOW_M = 11.0, 13.0, 13.0
-PITCH_M, ROWS = LAYOVER_M + 2 * WIDE_M + SHADOW_M, 5
+LAYOVER_M, WIDE_M, SHADOW_M = 9.0, 11.0, 11.0
+PITCH_M, ROWS = LAYOVER_M + 2 * WIDE_M + SHADOW_M, 6
 
 
 def town(pixel_m: float, quarters: int = 0) -> tuple[NDArray[np.float32], Mask, Mask]:

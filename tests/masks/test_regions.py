@@ -135,8 +135,8 @@ def test_in_a_dense_town_bright_ground_between_shadow_and_layover_takes_part(
     # The radar looks to the right: rows of buildings, of which it shows layover, then shadow.
     level_db = np.full((480, 480), 50.0)
     for col in range(0, 480, 60):
-        level_db[:, col : col + 15] = 60
-        level_db[:, col + 15 : col + 30] = 35
+        level_db[:, col : col + 13] = 60
+        level_db[:, col + 13 : col + 28] = 35
     level_db[::60] = 50
     level_db[185:295, 240:255], level_db[185:295, 285:300] = 35, 60
     level_db[185:295, 255:285] = 54.5
