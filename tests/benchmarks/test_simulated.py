@@ -23,8 +23,6 @@ def test_towns_and_cities_are_rebuilt_by_every_share(tmp_path: Path) -> None:
 
 
 def test_changes_are_reported_and_must_not_be_silently_wrong() -> None:
-    outcomes = [
-        unregistered(SILENTLY_WRONG, "a", OPPOSITE, 0.0, 1.0, "accepted")
-    ]
+    outcomes = [unregistered(SILENTLY_WRONG, "a", OPPOSITE, 0.0, 1.0, "accepted")]
     goals = simulated.goals(OPPOSITE, outcomes)
     assert [goal.reached for goal in goals] == [None, None, False]

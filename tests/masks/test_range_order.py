@@ -42,6 +42,13 @@ def test_ground_lies_between_shadow_and_layover_and_roofs_do_not(
     assert found[~ground & ~roofs].mean() < 0.01
 
 
+def test_large_pixels_beside_a_building_are_no_ground() -> None:
+    level, ground, _ = town(1.0)
+    found = open_ground(level, np.ones(level.shape, bool), 10.0)
+    inner = ground & np.roll(ground, 1, axis=1) & np.roll(ground, -1, axis=1)
+    assert found[ground].any() and not found[ground & ~inner].any()
+
+
 def test_ground_is_sought_in_valid_pixels_alone() -> None:
     level, ground, _ = town(0.5)
     valid = np.ones(level.shape, bool)

@@ -26,8 +26,9 @@ _OUTER_PERCENT = 25.0
 _MEAN_PX = 3
 _DARK_PERCENT, _BRIGHT_PERCENT = 25.0, 20.0
 
-# Ground lies so far from both: a mean over distances whose weights add up to 1.
-_GROUND_M = 7.0
+# Ground lies so far from both, and by so many pixels: a mean over distances whose weights add up
+# to 1.
+_GROUND_M, _GROUND_PX = 7.0, 3.0
 _WEIGHT_NEAREST, _WEIGHT_ALONG = 1 / 3, 1 / 6
 
 
@@ -47,7 +48,7 @@ def open_ground(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:
     pixel_m
         Size of a pixel.
     """
-    farthest_px = max(_APART_M / pixel_m, 3.0)
+    farthest_px = max(_APART_M / pixel_m, _GROUND_PX)
     azimuth_deg = shadow_azimuth_deg(Patch(level_db, valid), _OUTER_PERCENT, round(farthest_px))
     level = cv2.blur(level_db, (_MEAN_PX, _MEAN_PX))
     darkest, brightest = np.percentile(level[valid], [_DARK_PERCENT, 100 - _BRIGHT_PERCENT])
@@ -61,7 +62,8 @@ def open_ground(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:
             (_WEIGHT_ALONG, distance_back_px(dark, azimuth_deg + 180)),
         ):
             found += np.float32(weight) * np.log(np.minimum(px, np.float32(farthest_px)))
-    return np.asarray((found >= np.log(_GROUND_M / pixel_m)) & valid)
+    least_px = max(_GROUND_M / pixel_m, _GROUND_PX)
+    return np.asarray((found >= np.log(least_px)) & valid)
 
 
 def _nearest_px(mask: Mask) -> FloatImage:

@@ -81,7 +81,7 @@ class GroundRegions:
         Side of the pixels of the masks, in pixels of the scene.
     regions, skeleton, part
         Homogeneous regions that were kept; the skeleton of the long ones; the mask: the broadened
-        skeleton and the large regions that are wider. Shape (h, w).
+        skeleton and the large regions that are wider, or a dense town's ground. Shape (h, w).
     low, high
         Grey values below and above which nothing takes part, of means over 4 × 4 pixels of the
         scene.
@@ -154,8 +154,8 @@ def find_ground(
     low_percent
         Percentage of the darkest pixels inside that take no part after all.
     is_town
-        Whether the scene is a dense town, whose ground is what lies between layover and shadow.
-        What regions are is found all the same, but they are no part of the mask.
+        Whether the scene is a dense town, whose ground lies apart from layover and radar shadow:
+        that alone is the mask, and no other parameter counts for it.
 
     Raises
     ------
