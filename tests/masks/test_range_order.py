@@ -10,7 +10,7 @@ from groundtie.rasters.reading import Mask
 GROUND_DB, ROOF_DB, LAYOVER_DB, SHADOW_DB = 50.0, 50.0, 60.0, 35.0
 
 # Along the range: layover, roof, shadow, ground as wide as the roof.
-LAYOVER_M, WIDE_M, SHADOW_M = 9.0, 11.0, 11.0
+LAYOVER_M, WIDE_M, SHADOW_M = 7.0, 11.0, 9.0
 PITCH_M, ROWS = LAYOVER_M + 2 * WIDE_M + SHADOW_M, 6
 
 
