@@ -66,11 +66,11 @@ class CityCase:
         return attempt(f"city, seed {self.seed}", self.setting, pair, workers, spec=spec)
 
 
-def city(seed: int) -> Simulation:
+def city(seed: int, changed_percent: float = CHANGED_PERCENT) -> Simulation:
     """Return the city of a seed, whose views follow from it: 35–47° radar, 5–25° camera."""
     generator = np.random.default_rng((35, 47, seed))
     further = (
-        ("changed", CHANGED_PERCENT),
+        ("changed", changed_percent),
         ("looks", float(generator.choice([1, 2, 4]))),
         ("incidence", round(generator.uniform(35, 47), 1)),
         ("orbit", str(generator.choice(["ascending", "descending"]))),

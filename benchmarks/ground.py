@@ -11,12 +11,10 @@ from typing import Any
 import numpy as np
 
 from groundtie.geometry.views import View
-from groundtie.masks.cast_shadow import shadow_azimuth_deg
 from groundtie.masks.object_heights import RasterModel
-from groundtie.masks.regions import HIGH_PERCENT, LOW_PERCENT, WIDTH_M, find_ground
+from groundtie.masks.regions import find_ground
 from groundtie.masks.scene import Scene
 from groundtie.masks.surface_model import SurfaceGround
-from groundtie.rasters.patch import middle_window
 from groundtie.rasters.reading import Mask, open_raster
 from groundtie.simulation import files
 
@@ -84,20 +82,12 @@ def of_seed(seed: int, cache: Path) -> FoundGround:
     pair = city(seed).pair(cache)
     views = [View.of(path, None) for path in (pair.reference, pair.input)]
     with ExitStack() as stack:
-        reference, input, heights = (
+        reference, heights = (
             stack.enter_context(open_raster(path))
-            for path in (pair.reference, pair.input, pair.reference.parent / files.NAMES["dsm"])
+            for path in (pair.reference, pair.reference.parent / files.NAMES["dsm"])
         )
-        scene, other = Scene.of(reference), Scene.of(input)
-        shadow = shadow_azimuth_deg(other.read(middle_window(other.grid)))
-        ground = find_ground(
-            scene,
-            WIDTH_M,
-            HIGH_PERCENT,
-            shadow_azimuth_deg=shadow,
-            low_percent=LOW_PERCENT,
-            keeps_bright=True,
-        )
+        scene = Scene.of(reference)
+        ground = find_ground(scene, is_town=True)
         radar, both = (
             SurfaceGround(scene, RasterModel(heights), tuple(v for v in seen if v is not None))
             for seen in (views[:1], views)

@@ -1,4 +1,4 @@
-"""Simulated pairs of 1000×1000 px, many seeds each."""
+"""Simulated pairs of 1000×1000 px, many seeds each: densities, rebuilt towns, opposite orbits."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ import numpy as np
 
 from .accuracy import CORRECT, SILENTLY_WRONG
 from .attempt import Outcome, accepted, attempt, count
+from .city import city
+from .sar_pairs import SarPair
 from .simulations import Simulation
-from .suites import Goal, Settings, SuiteResult, run_cases
+from .suites import Case, Goal, Settings, SuiteResult, run_cases
 from .tables import accuracy_table
 
 SIZE_PX = 1000
@@ -22,46 +24,75 @@ _WANTED_CORRECT = 0.95
 # Largest median error on the ground; dense urban scenes are reported only.
 _MEDIAN_ERROR_PX = {"rural": 0.3, "suburban": 0.7, "urban": None}
 
+# Shares of the buildings that stand in one image only, in percent.
+REBUILT_PERCENT = (10.0, 20.0, 30.0)
+
+# Two radar images of one dense city, from an ascending and a descending orbit: nothing but the
+# ground lies alike in them.
+OPPOSITE = "city, opposite orbits"
+_OPPOSITE_PX, _MOST_LOOKS = 800, 4
+
 
 @dataclass(frozen=True)
 class SimulatedCase:
-    """A simulated pair, registered with default parameters."""
+    """A simulated pair, registered with default parameters; `group` names what it is one of."""
 
-    simulation: Simulation
+    simulation: Simulation | SarPair
+    group: str
     cache: Path
 
     def run(self, workers: int | None) -> Outcome:
         """Make the pair if need be, register it and judge the result."""
-        pair = self.simulation.pair(self.cache)
-        return attempt(self.simulation.name, self.simulation.density, pair, workers)
+        pair, simulation = self.simulation.pair(self.cache), self.simulation
+        tool = "match_sar_sar" if isinstance(simulation, SarPair) else "coregister"
+        return attempt(simulation.name, self.group, pair, workers, tool=tool)
+
+
+def rebuilt(density: str, percent: float) -> str:
+    """Return the name of the pairs of which a share of the buildings was rebuilt."""
+    return f"{density}, {percent:g} % rebuilt"
+
+
+def changes(seeds: range, cache: Path) -> list[Case]:
+    """Return pairs between whose images time has passed, or that are seen from opposite sides."""
+    cases: list[Case] = []
+    for seed in seeds:
+        for percent in REBUILT_PERCENT:
+            town = Simulation(SIZE_PX, "suburban", seed, further=(("changed", percent),))
+            cases.append(SimulatedCase(town, rebuilt("suburban", percent), cache))
+            cases.append(SimulatedCase(city(seed, percent), rebuilt("city", percent), cache))
+        opposite = SarPair(_OPPOSITE_PX, "city", seed, 1 + seed % _MOST_LOOKS, opposite=True)
+        cases.append(SimulatedCase(opposite, OPPOSITE, cache))
+    return cases
 
 
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
-    seeds = _QUICK_SEEDS if settings.quick else settings.seeds
-    cases = [
-        SimulatedCase(Simulation(SIZE_PX, density, seed), settings.cache)
+    seeds = range(1, 1 + (_QUICK_SEEDS if settings.quick else settings.seeds))
+    cases: list[Case] = [
+        SimulatedCase(Simulation(SIZE_PX, density, seed), density, settings.cache)
         for density in _MEDIAN_ERROR_PX
-        for seed in range(1, seeds + 1)
+        for seed in seeds
     ]
-    outcomes = run_cases(cases, settings.jobs)
-    groups = {d: [o for o in outcomes if o.group == d] for d in _MEDIAN_ERROR_PX}
+    outcomes = run_cases(cases + changes(seeds, settings.cache), settings.jobs)
+    names = dict.fromkeys(outcome.group for outcome in outcomes)
+    groups = {name: [o for o in outcomes if o.group == name] for name in names}
     return SuiteResult(
-        f"Simulated SAR–optical pairs, {SIZE_PX}×{SIZE_PX} px",
-        [goal for density, group in groups.items() for goal in goals(density, group)],
+        f"Simulated pairs, {SIZE_PX}×{SIZE_PX} px",
+        [goal for name, group in groups.items() for goal in goals(name, group)],
         (accuracy_table("By density", groups),),
         [outcome.record() for outcome in outcomes],
         ("The error is that at check points on open ground; the lattice covers the whole scene.",),
     )
 
 
-def goals(density: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
-    """Return the goals for one density and what was found."""
+def goals(name: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
+    """Return the goals for one density, or one kind of change, and what was found."""
     correct, wrong = count(outcomes, CORRECT), count(outcomes, SILENTLY_WRONG)
     errors = [outcome.error_px for outcome in accepted(outcomes)]
     median = float(np.median(errors)) if errors else float("nan")
-    largest = _MEDIAN_ERROR_PX[density]
-    title = density.capitalize()
+    largest = _MEDIAN_ERROR_PX.get(name)
+    title = name.capitalize()
     share = f"{correct} of {len(outcomes)} ({correct / len(outcomes):.0%})"
     return (
         Goal(

@@ -4,71 +4,87 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from groundtie.masks.growing import Region
-from groundtie.masks.range_order import RangeOrder
-from groundtie.rasters.reading import Window
+from groundtie.masks.range_order import distance_back_px, open_ground
+from groundtie.rasters.reading import Mask
 
-GROUND_DB, LAYOVER_DB, SHADOW_DB = 50.0, 60.0, 35.0
-PITCH_PX, STRIP_PX, SIZE_PX = 60, 12, 480
+GROUND_DB, ROOF_DB, LAYOVER_DB, SHADOW_DB = 50.0, 50.0, 60.0, 35.0
 
-# The building in the middle, and what lies before its layover.
-FIRST = 4 * PITCH_PX
-COURTYARD = slice(FIRST - PITCH_PX + 2 * STRIP_PX, FIRST)
-ROWS = slice(200, 240)
+# Along the range: layover, roof, shadow, ground as wide as the roof.
+LAYOVER_M, WIDE_M, SHADOW_M = 7.0, 11.0, 9.0
+PITCH_M, ROWS = LAYOVER_M + 2 * WIDE_M + SHADOW_M, 6
 
 
-def seen_from_the_left(roof_px: int = 0) -> NDArray[np.float32]:
-    """Return a town in which the radar looks to the right: layover, then shadow.
+def town(pixel_m: float, quarters: int = 0) -> tuple[NDArray[np.float32], Mask, Mask]:
+    """Return the level in decibels, the ground and the roofs of rows of buildings.
 
-    What is laid over hides all roofs but that of the building in the middle.
+    Roofs and ground are as bright and as wide as each other; the radar looks to the right, and the
+    scene is rotated by some quarters, counterclockwise.
     """
-    level = np.full((SIZE_PX, SIZE_PX), GROUND_DB, np.float32)
-    for col in range(0, SIZE_PX, PITCH_PX):
-        shadow = col + STRIP_PX + (roof_px if col == FIRST else 0)
-        level[:, col : col + STRIP_PX] = LAYOVER_DB
-        level[:, shadow : shadow + STRIP_PX] = SHADOW_DB
-    level[::PITCH_PX] = GROUND_DB  # lanes
-    return level
-
-
-def region(rows: slice, cols: slice) -> Region:
-    window = Window(cols.start, rows.start, cols.stop - cols.start, rows.stop - rows.start)
-    return Region(window, np.ones((window.height, window.width), bool), GROUND_DB)
-
-
-def evidence(level: NDArray[np.float32], where: Region, quarters: int) -> float:
-    """Return the evidence where the scene is rotated by some quarters, counterclockwise."""
-    mask = np.zeros(level.shape, bool)
-    box = where.box
-    mask[box.row : box.row + box.height, box.col : box.col + box.width] = where.mask
-    rows, cols = np.nonzero(np.rot90(mask, quarters))
-    rotated = region(slice(rows.min(), rows.max() + 1), slice(cols.min(), cols.max() + 1))
-    level = np.ascontiguousarray(np.rot90(level, quarters))
-    order = RangeOrder.of(level, np.ones(level.shape, bool), SHADOW_DB + 1, 1.0)
-    return order.evidence_of_ground(rotated)
+    size_px = round(ROWS * PITCH_M / pixel_m)
+    along_m = (np.arange(size_px) + 0.5) * pixel_m % PITCH_M
+    ends = np.cumsum([LAYOVER_M, WIDE_M, SHADOW_M])
+    kind = np.tile(np.searchsorted(ends, along_m), (size_px, 1))
+    level = np.array([LAYOVER_DB, ROOF_DB, SHADOW_DB, GROUND_DB], np.float32)[kind]
+    level += np.random.default_rng(1).normal(0, 0.5, level.shape).astype(np.float32)
+    level, kind = (np.ascontiguousarray(np.rot90(of, quarters)) for of in (level, kind))
+    return level, kind == 3, kind == 1
 
 
 @pytest.mark.parametrize("quarters", range(4))
-def test_between_shadow_and_layover_lies_ground(quarters: int) -> None:
-    assert evidence(seen_from_the_left(), region(ROWS, COURTYARD), quarters) > 1.5
+@pytest.mark.parametrize("pixel_m", [0.5, 1.0])
+def test_ground_lies_between_shadow_and_layover_and_roofs_do_not(
+    quarters: int, pixel_m: float
+) -> None:
+    level, ground, roofs = town(pixel_m, quarters)
+    found = open_ground(level, np.ones(level.shape, bool), pixel_m)
+    assert found[ground].mean() > 0.7
+    assert found[roofs].mean() < 0.05
+    assert found[~ground & ~roofs].mean() < 0.01
 
 
-@pytest.mark.parametrize("quarters", range(4))
-def test_between_layover_and_shadow_lies_a_roof(quarters: int) -> None:
-    roof = region(ROWS, slice(FIRST + STRIP_PX, FIRST + STRIP_PX + 20))
-    assert evidence(seen_from_the_left(roof_px=20), roof, quarters) < -1.5
+def test_large_pixels_beside_a_building_are_no_ground() -> None:
+    level, ground, _ = town(1.0)
+    found = open_ground(level, np.ones(level.shape, bool), 10.0)
+    inner = ground[:, 1:-1] & ground[:, :-2] & ground[:, 2:]
+    outer = ground[:, 1:-1] & ~inner
+    assert found[:, 1:-1][inner].any() and not found[:, 1:-1][outer].any()
 
 
-def test_where_nothing_stands_there_is_no_evidence() -> None:
-    level = np.random.default_rng(1).normal(GROUND_DB, 0.5, (SIZE_PX, SIZE_PX)).astype(np.float32)
-    assert abs(evidence(level, region(ROWS, slice(100, 200)), 0)) < 0.1
+def test_ground_is_sought_in_valid_pixels_alone() -> None:
+    level, ground, _ = town(0.5)
+    valid = np.ones(level.shape, bool)
+    valid[: len(level) // 2] = False
+    found = open_ground(level, valid, 0.5)
+    assert not found[~valid].any()
+    assert found[ground & valid].mean() > 0.5
 
 
-def test_regions_at_the_borders_of_the_scene_are_looked_at() -> None:
-    level = seen_from_the_left()
-    order = RangeOrder.of(level, np.ones(level.shape, bool), SHADOW_DB + 1, 1.0)
-    corner = order.evidence_of_ground(
-        region(slice(0, 40), slice(SIZE_PX - PITCH_PX + 2 * STRIP_PX, SIZE_PX))
-    )
-    # Shadow lies before it, and nothing is known of what is behind.
-    assert corner == pytest.approx(1.0, abs=0.1)
+@pytest.mark.parametrize(
+    ("azimuth_deg", "way"),
+    [(0, (-1, 0)), (90, (0, 1)), (180, (1, 0)), (270, (0, -1)), (135, (1, 1)), (315, (-1, -1))],
+)
+def test_distances_are_those_behind_a_place(azimuth_deg: float, way: tuple[int, int]) -> None:
+    mask = np.zeros((41, 51), bool)
+    mask[20, 25] = True
+    found = distance_back_px(mask, azimuth_deg)
+    steps = np.arange(15)
+    rows, cols = 20 + steps * way[0], 25 + steps * way[1]
+    np.testing.assert_allclose(found[rows, cols], steps * np.hypot(*way), rtol=1e-6)
+    assert np.isinf(found[20 - way[0], 25 - way[1]])
+    # Nobody beside the line has it before him.
+    on_line = np.zeros(mask.shape, bool)
+    steps = np.arange(26) if way[0] == 0 else np.arange(21)
+    on_line[20 + steps * way[0], 25 + steps * way[1]] = True
+    assert np.isinf(found[~on_line]).all()
+
+
+def test_distances_on_a_slanting_line_are_those_on_the_ground() -> None:
+    mask = np.zeros((60, 90), bool)
+    mask[50, 10] = True
+    found = distance_back_px(mask, 60.0)
+    rows, cols = np.nonzero(np.isfinite(found))
+    east, north = cols - 10, 50 - rows
+    np.testing.assert_allclose(np.hypot(east, north), found[rows, cols], atol=1)
+    aside = east * np.cos(np.deg2rad(60)) - north * np.sin(np.deg2rad(60))
+    # Both ends of a line are rounded to pixels.
+    assert np.abs(aside).max() <= 1 and len(rows) == 80

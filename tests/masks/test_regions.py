@@ -129,27 +129,22 @@ def test_without_any_ground_nothing_takes_part(tmp_path: Path) -> None:
     assert found.part.mean() < 0.02 and found.skeleton_m < 50
 
 
-@pytest.mark.parametrize("is_roof", [False, True])
-def test_bright_and_large_is_ground_where_shadow_lies_before_it(
-    tmp_path: Path, is_roof: bool
+def test_in_a_dense_town_bright_ground_between_shadow_and_layover_takes_part(
+    tmp_path: Path,
 ) -> None:
     # The radar looks to the right: rows of buildings, of which it shows layover, then shadow.
     level_db = np.full((480, 480), 50.0)
     for col in range(0, 480, 60):
-        level_db[:, col : col + 12] = 60
-        level_db[:, col + 12 : col + 24] = 35
+        level_db[:, col : col + 13] = 60
+        level_db[:, col + 13 : col + 28] = 35
     level_db[::60] = 50
-    large = np.zeros(level_db.shape, bool)
-    large[185:295, 252:288] = True
-    if is_roof:
-        level_db[185:295, 288:300] = 35
-    else:
-        level_db[185:295, 240:252] = 35
-        level_db[185:295, 288:300] = 60
-    level_db[large] = 54.5
+    level_db[185:295, 240:255], level_db[185:295, 285:300] = 35, 60
+    level_db[185:295, 255:285] = 54.5
     speckle = np.random.default_rng(1).gamma(4, 1 / 4, level_db.shape)
     amplitude = np.sqrt(10 ** (level_db / 10) * speckle).astype(np.float32)
     scene = scene_of(tmp_path / "a.tif", amplitude)
-    found = find_ground(scene, keeps_bright=True).regions[large].mean()
-    assert find_ground(scene).regions[large].mean() < 0.02
-    assert found < 0.02 if is_roof else found > 0.9
+    square, street = np.s_[190:290, 264:276], np.s_[70:170, 43:48]
+    assert find_ground(scene).part[square].mean() < 0.1
+    found = find_ground(scene, is_town=True).select(scene.whole).part
+    assert found[square].mean() > 0.9 and found[street].mean() > 0.9
+    assert found[level_db == 35].mean() < 0.01 and found[level_db == 60].mean() < 0.05

@@ -1,106 +1,103 @@
-"""What lies before and behind a region as the radar looks: of ground and of roofs, the opposite.
+"""Ground of a dense town: what lies apart from layover and radar shadow, and where no roof lies.
 
 Along the radar's range direction an elevated object shows its bright layover first and its shadow
 last. So a roof has layover before it and shadow behind it; ground between buildings has the shadow
-of the nearer one before it and the layover of the farther one behind it.
+of the nearer one before it and the layover of the farther one behind it. Layover and shadow mark
+where ground ends better than its brightness or texture.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
-from ..rasters.reading import Mask, Window
+from ..rasters.reading import FloatImage, Mask
 from .cast_shadow import shadow_azimuth_deg
-from .growing import Region
 
-# Dark lies behind bright at all distances up to a building's layover and shadow together.
+# Dark lies behind bright at all distances up to a building's layover and shadow together; nothing
+# farther matters.
 _APART_M = 40.0
 _OUTER_PERCENT = 25.0
 
-# What lies within this distance from a region is looked at, and it is bright if among so many of
-# the brightest of the scene.
-_REACH_M = 12.0
-_BRIGHT_PERCENT = 20.0
+# Of means over 3 × 3 pixels, so many of the darkest may be radar shadow, and of the brightest
+# layover.
+_MEAN_PX = 3
+_DARK_PERCENT, _BRIGHT_PERCENT = 25.0, 20.0
 
-# Holes of a region up to so many pixels wide are speckle.
-_HOLE_PX = 5
+# Ground lies so far from both, and by so many pixels: a mean over distances whose weights add up
+# to 1.
+_GROUND_M, _GROUND_PX = 7.0, 3.0
+_WEIGHT_NEAREST, _WEIGHT_ALONG = 1 / 3, 1 / 6
 
 
-@dataclass(frozen=True)
-class RangeOrder:
-    """Shadow and layover of a radar image, and where it looks.
+def open_ground(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:
+    """Return the ground between the buildings of a radar image.
+
+    It is where the geometric mean of four distances is large: to the nearest layover and to the
+    nearest shadow in any direction, to layover before the place as the radar looks, and to shadow
+    behind it. Where the radar looks is inferred from the image.
 
     Parameters
     ----------
-    dark, bright
-        What may be radar shadow, and layover, with a rim of r pixels; shape (h + 2 r, w + 2 r).
-    behind
-        Window that holds a region's centre and what lies behind it, shape (2 r + 1, 2 r + 1).
+    level_db
+        Smoothed image in decibels, shape (h, w).
+    valid
+        Which of its pixels are valid, same shape.
+    pixel_m
+        Size of a pixel.
     """
-
-    dark: Mask
-    bright: Mask
-    behind: NDArray[np.uint8]
-
-    @classmethod
-    def of(
-        cls, level_db: NDArray[np.float32], valid: Mask, shadow_db: float, pixel_m: float
-    ) -> RangeOrder:
-        """Return the order in a radar image, whose look direction is inferred from itself.
-
-        Parameters
-        ----------
-        level_db
-            Smoothed image in decibels, shape (h, w).
-        valid
-            Which of its pixels are valid, same shape.
-        shadow_db
-            Level of the brightest radar shadow.
-        pixel_m
-            Size of a pixel.
-        """
-        apart_px = max(round(_APART_M / pixel_m), 3)
-        azimuth_deg = shadow_azimuth_deg(Patch(level_db, valid), _OUTER_PERCENT, apart_px)
-        brightest = np.percentile(level_db[valid], 100 - _BRIGHT_PERCENT)
-        reach = max(round(_REACH_M / pixel_m), 1)
-        along, steps = np.deg2rad(azimuth_deg), np.arange(reach + 1)
-        cols, rows = (np.rint(f * steps).astype(int) for f in (np.sin(along), -np.cos(along)))
-        behind: NDArray[np.uint8] = np.zeros((2 * reach + 1,) * 2, np.uint8)
-        behind[reach + rows, reach + cols] = 1
-        dark, bright = (
-            np.pad(mask & valid, reach) for mask in (level_db < shadow_db, level_db > brightest)
-        )
-        return cls(dark, bright, behind)
-
-    def evidence_of_ground(self, region: Region) -> float:
-        """Return by how much a region looks like ground: −2, a roof, to 2, ground.
-
-        Shares of shadow before and layover behind it speak for ground; shadow behind and layover
-        before, for a roof.
-        """
-        reach, box = len(self.behind) // 2, region.box
-        mask = np.pad(region.mask.astype(np.uint8), reach)
-        whole = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((_HOLE_PX, _HOLE_PX), np.uint8))
-        # A pixel lies behind the region if the window finds it on the other side of the pixel.
-        behind, before = (
-            (cv2.dilate(whole, window) > 0) & (whole == 0)
-            for window in (np.ascontiguousarray(self.behind[::-1, ::-1]), self.behind)
-        )
-        around = Window(box.col, box.row, box.width + 2 * reach, box.height + 2 * reach).slices
-        dark, bright = self.dark[around], self.bright[around]
-        before, behind = before & ~behind, behind & ~before
-        return (
-            _share(dark, before)
-            - _share(dark, behind)
-            + _share(bright, behind)
-            - _share(bright, before)
-        )
+    farthest_px = max(_APART_M / pixel_m, _GROUND_PX)
+    azimuth_deg = shadow_azimuth_deg(Patch(level_db, valid), _OUTER_PERCENT, round(farthest_px))
+    level = cv2.blur(level_db, (_MEAN_PX, _MEAN_PX))
+    darkest, brightest = np.percentile(level[valid], [_DARK_PERCENT, 100 - _BRIGHT_PERCENT])
+    dark, bright = (level < darkest) & valid, (level > brightest) & valid
+    found = np.zeros(level.shape, np.float32)
+    with np.errstate(divide="ignore"):  # layover and shadow themselves lie 0 from themselves
+        for weight, px in (
+            (_WEIGHT_NEAREST, _nearest_px(bright)),
+            (_WEIGHT_NEAREST, _nearest_px(dark)),
+            (_WEIGHT_ALONG, distance_back_px(bright, azimuth_deg)),
+            (_WEIGHT_ALONG, distance_back_px(dark, azimuth_deg + 180)),
+        ):
+            found += np.float32(weight) * np.log(np.minimum(px, np.float32(farthest_px)))
+    least_px = max(_GROUND_M / pixel_m, _GROUND_PX)
+    return np.asarray((found >= np.log(least_px)) & valid)
 
 
-def _share(of: Mask, side: Mask) -> float:
-    return float(of[side].mean()) if side.any() else 0.0
+def _nearest_px(mask: Mask) -> FloatImage:
+    return np.asarray(cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5))
+
+
+def distance_back_px(mask: Mask, azimuth_deg: float) -> FloatImage:
+    """Return how far each pixel lies behind the nearest of a mask, on lines in a direction.
+
+    Parameters
+    ----------
+    mask
+        Shape (h, w).
+    azimuth_deg
+        The direction from the mask to the pixels, clockwise from the top of the image.
+
+    Returns
+    -------
+    FloatImage
+        Infinite where no pixel of the mask lies before it, same shape.
+    """
+    along = np.deg2rad(azimuth_deg)
+    way = np.array([-np.cos(along), np.sin(along)])  # rows, columns
+    axis = int(np.abs(way).argmax())
+    forward = slice(None, None, 1 if way[axis] > 0 else -1)
+    lines = (mask if axis == 0 else mask.T)[forward]
+    # A line of sight moves aside from one row to the next; it keeps its place in `last`.
+    aside = np.rint(np.arange(len(lines)) * way[1 - axis] / abs(way[axis])).astype(int)
+    places = aside.max() - aside
+    last: NDArray[np.float32] = np.full(lines.shape[1] + np.ptp(aside), -np.inf, np.float32)
+    steps = np.empty(lines.shape, np.float32)
+    for number, (line, place) in enumerate(zip(lines, places, strict=True)):
+        passed = last[place : place + len(line)]
+        passed[line] = number
+        steps[number] = number - passed
+    steps = (steps / np.float32(abs(way[axis])))[forward]
+    return np.asarray(steps if axis == 0 else steps.T)

@@ -21,7 +21,7 @@ from ..speckle.statistics import estimate_looks, local_statistics
 from .cast_shadow import out_of_shadow
 from .growing import Region, grow_regions
 from .radar import power
-from .range_order import RangeOrder
+from .range_order import open_ground
 from .scene import Scene, Selection
 from .shapes import Shape
 from .skeleton import pruned, skeleton
@@ -56,9 +56,6 @@ _LARGE_M2 = 1500.0
 # Ground lies in the lower part of the histogram ([Suri2010] 5.3.2), roofs and walls in the upper.
 _BRIGHTEST_PERCENT = 60.0
 
-# Large regions may be brighter where shadow lies before and layover behind them, see `range_order`.
-_CLEARLY_GROUND = 0.1
-
 # Regions as dark as the darkest of the scene are radar shadow, unless as large as a lake.
 _DARKEST_PERCENT = 5.0
 _SHADOW_DB = 1.5
@@ -84,7 +81,7 @@ class GroundRegions:
         Side of the pixels of the masks, in pixels of the scene.
     regions, skeleton, part
         Homogeneous regions that were kept; the skeleton of the long ones; the mask: the broadened
-        skeleton and the large regions that are wider. Shape (h, w).
+        skeleton and the large regions that are wider, or a dense town's ground. Shape (h, w).
     low, high
         Grey values below and above which nothing takes part, of means over 4 × 4 pixels of the
         scene.
@@ -137,7 +134,7 @@ def find_ground(
     progress: Progress = SILENT,
     shadow_azimuth_deg: float | None = None,
     low_percent: float = 0.0,
-    keeps_bright: bool = False,
+    is_town: bool = False,
 ) -> GroundRegions:
     """Find the ground in a radar image.
 
@@ -156,9 +153,9 @@ def find_ground(
         that they may reach takes no part. None: there are none.
     low_percent
         Percentage of the darkest pixels inside that take no part after all.
-    keeps_bright
-        Whether large bright regions may be ground, by the order of shadow and layover around them,
-        as between the buildings of a dense town.
+    is_town
+        Whether the scene is a dense town, whose ground lies apart from layover and radar shadow:
+        that alone is the mask, and no other parameter counts for it.
 
     Raises
     ------
@@ -171,19 +168,21 @@ def find_ground(
         raise RasterContentError(f"{scene.like.path} has no valid pixels to make a mask of")
     pixel_m = scene.grid.pixel_size_m * factor
     growing = progress.part(0.3, 0.8)
-    longs, wide = _kept_regions(patch, pixel_m, width_m, keeps_bright, growing)
+    level, longs, wide = _kept_regions(patch, pixel_m, width_m, growing)
     even = _without_holes(longs, round(_SMALLEST_M2 / pixel_m**2), max(round(_EVEN_M / pixel_m), 1))
     lines = pruned(skeleton(even), round(width_m / pixel_m / 2))
     progress.update(0.9)
-    broad = cv2.dilate(lines.astype(np.uint8), disc(max(round(width_m / pixel_m / 2), 1)))
-    border = disc(max(round(_BORDER_M / pixel_m), 1))
-    part = (cv2.dilate(((broad > 0) | wide).astype(np.uint8), border) > 0) & patch.valid
-    if shadow_azimuth_deg is not None:
-        part = out_of_shadow(part, shadow_azimuth_deg, pixel_m)
-    inside = _smooth(patch)[part]
-    shares = [low_percent, 100 - high_percent]
-    low, high = np.percentile(inside, shares).tolist() if inside.size else (-np.inf, np.inf)
-    low = low if low_percent > 0 else -np.inf
+    low, high = -np.inf, np.inf
+    if is_town:
+        part = open_ground(level, patch.valid, pixel_m)
+    else:
+        part = _broadened(lines, wide, width_m, pixel_m) & patch.valid
+        if shadow_azimuth_deg is not None:
+            part = out_of_shadow(part, shadow_azimuth_deg, pixel_m)
+        inside = _smooth(patch)[part]
+        if inside.size:
+            high = float(np.percentile(inside, 100 - high_percent))
+            low = float(np.percentile(inside, low_percent)) if low_percent > 0 else low
     return GroundRegions(
         scene,
         factor,
@@ -197,10 +196,17 @@ def find_ground(
     )
 
 
+def _broadened(lines: Mask, wide: Mask, width_m: float, pixel_m: float) -> Mask:
+    """Return the skeleton with its window, the wide regions, and the border of both."""
+    broad = cv2.dilate(lines.astype(np.uint8), disc(max(round(width_m / pixel_m / 2), 1)))
+    border = disc(max(round(_BORDER_M / pixel_m), 1))
+    return np.asarray(cv2.dilate(((broad > 0) | wide).astype(np.uint8), border) > 0)
+
+
 def _kept_regions(
-    patch: Patch, pixel_m: float, width_m: float, keeps_bright: bool, progress: Progress
-) -> tuple[Mask, Mask]:
-    """Return the long regions on the ground, and the large ones wider than the window."""
+    patch: Patch, pixel_m: float, width_m: float, progress: Progress
+) -> tuple[NDArray[np.float32], Mask, Mask]:
+    """Return the level in decibels, long regions on the ground, and large and wide ones."""
     intensity = power(patch)
     looks = estimate_looks(intensity, patch.valid)
     variation2 = local_statistics(intensity, patch.valid, _SEED_PX).variation2
@@ -211,26 +217,19 @@ def _kept_regions(
     grown = grow_regions(
         level, variation2, patch.valid, _SEED_EXCESS / looks, _TOLERANCE_DB, smallest
     )
-    # What is too bright is not measured, nor held, where none of it can be ground.
-    regions = [region for region in grown if keeps_bright or region.level_db <= brightest]
-    shadow_db = _darkest_db([r for r in regions if r.level_db <= brightest]) + _SHADOW_DB
-    order = RangeOrder.of(level, patch.valid, shadow_db, pixel_m) if keeps_bright else None
+    regions = [region for region in grown if region.level_db <= brightest]
+    shadow_db = _darkest_db(regions) + _SHADOW_DB
     longs, wide = np.zeros(level.shape, bool), np.zeros(level.shape, bool)
     for region in regions:
         shape = Shape.of(region.mask)
         area_m2 = shape.area * pixel_m**2
         if region.level_db < shadow_db and area_m2 < _LAKE_M2:
             continue
-        is_long = shape.length * pixel_m >= _LONG_M and shape.elongation >= _ELONGATION
-        is_wide = area_m2 >= _LARGE_M2 and shape.width * pixel_m > width_m
-        if region.level_db > brightest:
-            is_long = False
-            is_wide = is_wide and _is_clearly_ground(region, order)
-        if is_long:
+        if shape.length * pixel_m >= _LONG_M and shape.elongation >= _ELONGATION:
             _add(longs, region)
-        if is_wide:
+        if area_m2 >= _LARGE_M2 and shape.width * pixel_m > width_m:
             _add(wide, region)
-    return longs, wide
+    return level, longs, wide
 
 
 def _darkest_db(regions: list[Region]) -> float:
@@ -242,10 +241,6 @@ def _darkest_db(regions: list[Region]) -> float:
     order = level.argsort()
     below = np.cumsum(area[order]) / area.sum()
     return float(level[order][np.searchsorted(below, _DARKEST_PERCENT / 100)])
-
-
-def _is_clearly_ground(region: Region, order: RangeOrder | None) -> bool:
-    return order is not None and order.evidence_of_ground(region) > _CLEARLY_GROUND
 
 
 def _without_holes(mask: Mask, smallest_px: int, radius_px: int) -> Mask:

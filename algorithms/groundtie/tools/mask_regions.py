@@ -60,7 +60,7 @@ def mask_regions(
         scene = Scene.of(source, band)
         is_town = is_dense(share_of_strong_scatterers(scene))
         searching = progress.part(0.0, 0.7)
-        ground = find_ground(scene, mask_width, high, searching, keeps_bright=is_town)
+        ground = find_ground(scene, mask_width, high, searching, is_town=is_town)
         with Outputs() as outputs:
             share = write_mask(scene, outputs.stage(output), ground.select, progress.part(0.7, 0.8))
             for path, part in ((regions, ground.regions), (skeleton, ground.skeleton)):
