@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from turned_pairs import patch, turned_pair
+from turned_pairs import patch, texture, turned_pair
 
 from groundtie.context import Context
 from groundtie.geometry.limits import SearchLimits
@@ -15,7 +15,8 @@ from groundtie.registration.pose_verdict import PoseEvidence, judge_pose
 from groundtie.similarity.surface import SimilaritySettings
 
 TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
-ANY = SearchLimits(30, 180, (0.8, 1.25))
+# As wide as any search: half of the input's longer side.
+ANY = SearchLimits(85, 180, (0.8, 1.25))
 
 
 def candidates(*heights: float) -> list[PoseFound]:
@@ -84,6 +85,22 @@ class TestWhatAnotherSearchFound:
         verdict = judge_pose(PoseEvidence.of(windows, limits, found, True, context))
         assert not verdict.accepted
         assert "prefers 50" in verdict.reason or "prefers 49" in verdict.reason
+
+
+@pytest.mark.slow
+def test_a_repetition_whose_right_place_lies_beyond_the_radius(context: Context) -> None:
+    """Shifted by 25 px, a scene that repeats after 32 px matches 7 px from its place, too."""
+    rng = np.random.default_rng(7)
+    scene = np.tile(texture(32, 32, 3), (8, 8))
+    reference, input = (
+        patch(100 + 30 * (shown + 0.3 * rng.normal(size=shown.shape)))
+        for shown in (scene[30:190, 30:190], scene[30:190, 5:165])
+    )
+    limits = SearchLimits(10, 10, (1.0, 1.0))
+    found = find_poses(reference, input, limits, SimilaritySettings(), context)
+    assert abs(found[0].pose.shift_px[0] + 7) < 1
+    evidence = PoseEvidence.of((reference, input), limits, found, True, context)
+    assert not judge_pose(evidence).accepted
 
 
 @pytest.mark.slow

@@ -22,7 +22,7 @@ from .pose import Pose
 LONGEST_PX = 512
 
 # How far the input may be off by default, as a share of its longer side.
-_DEFAULT_RADIUS_SHARE = 0.25
+DEFAULT_RADIUS_SHARE = 0.25
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def read_windows(
         raise NoOverlapError(_apart(reference, input))
     nominal_low, nominal_high = _box(frame, outline)
     side = float((nominal_high - nominal_low).max())
-    radius = _DEFAULT_RADIUS_SHARE * side if radius_m is None else radius_m
+    radius = DEFAULT_RADIUS_SHARE * side if radius_m is None else radius_m
     # However it is rotated, the input shows no more of the reference than this.
     reach = float(np.hypot(*(nominal_high - nominal_low))) / 2 / scale[0] + radius
     middle = (nominal_low + nominal_high) / 2

@@ -186,8 +186,8 @@ class _Search:
     def scan(self) -> Scan:
         rotations, scales = self.rotations_deg(), self.scales()
         level = self.level(self.coarse_px, scales)
-        # A search that has few steps finds several candidates at each.
-        peaks = max(2 * _KEPT[0] // (len(rotations) * len(scales)), 1)
+        # A second one shows what repeats; a search that has few steps finds several at each.
+        peaks = max(2 * _KEPT[0] // (len(rotations) * len(scales)), 2)
 
         def at_scale(scale: float) -> list[list[PoseFound]]:
             template = Template(level.reference, self.radius(level, scale))

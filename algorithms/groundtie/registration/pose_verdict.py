@@ -19,7 +19,7 @@ from ..matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey, survey_pose
 from ..matching.rest import Rest
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..pose.pose import Pose, PoseFound
-from ..pose.rotation_windows import PoseWindows
+from ..pose.rotation_windows import DEFAULT_RADIUS_SHARE, PoseWindows
 from ..pose.search import find_poses, moved_px
 from ..rasters.grid import FloatArray
 from ..rasters.pair import Image, make_pair
@@ -63,7 +63,8 @@ class PoseEvidence:
     ) -> PoseEvidence:
         """Put the candidates of a search beside those of an exhaustive one over all rotations.
 
-        Rotations beyond the limits measure how high chance is, and may hold a better pose.
+        Rotations and shifts beyond the limits measure how high chance is, and may hold a better
+        pose: where the scene repeats, one within small limits is as good as the right one.
 
         Parameters
         ----------
@@ -79,9 +80,12 @@ class PoseEvidence:
             Threads to work in.
         """
         everything = found
-        if found and (not exhaustive or limits.rotation_deg < 180):
+        least_radius = DEFAULT_RADIUS_SHARE * max(windows[1].values.shape)
+        is_wide = limits.rotation_deg >= 180 and limits.radius >= least_radius
+        if found and not (exhaustive and is_wide):
             low, high = limits.scale
-            wide = SearchLimits(limits.radius, 180.0, (min(low, 0.8), max(high, 1.25)))
+            radius = max(limits.radius, least_radius)
+            wide = SearchLimits(radius, 180.0, (min(low, 0.8), max(high, 1.25)))
             everything = find_poses(*windows, wide, SimilaritySettings(), context)
         rows, cols = windows[0].values.shape
         return cls(found, everything, (rows, cols))
