@@ -68,9 +68,9 @@ POSE_RULES: tuple[Rule, ...] = (
     Rule(
         "other pose",
         POSE,
-        "an exhaustive search over all rotations, and shifts of up to a quarter of the input, finds "
-        f"another pose, whose corners are more than {SAME_SHARE:.0%} of the reference's longer "
-        "side away",
+        "an exhaustive search over all rotations, and shifts of up to a quarter of the input, "
+        f"finds another pose, whose corners are more than {SAME_SHARE:.0%} of the reference's "
+        "longer side away",
         "suite rotated_pairs",
         "take the exhaustive search",
         _not_exhaustive,
