@@ -31,7 +31,10 @@ SAID = {"ce50_px": 0.5, "ce90_px": 0.9, "ce95_px": 0.95}
 # Of every so many seeds one is a large scene, too: it takes five times as long.
 _SMALL_PX, _LARGE_PX, _LARGE_EVERY = 500, 1500, 5
 
-_RADIUS_PX = 20.0
+# Ground of dense towns is found in larger scenes only: name, side in pixels, their size in metres.
+_CITIES = ("city, 1 m", 1000, 1.0), ("city, 2 m", 800, 2.0)
+
+_RADIUS_M = 20.0
 
 # What is wanted of the runs of each class, and of how many runs that can be told.
 _WANTED = 0.88, 0.93
@@ -110,11 +113,12 @@ class SimulatedCase:
     group: str
     tool: str
     cache: Path
+    radius_m: float = _RADIUS_M
 
     def run(self, workers: int | None) -> CalibrationRun:
         """Make the pair if need be, register it and compare."""
         pair = self.made.pair(self.cache)
-        return compare(self.made.name, self.group, self.tool, pair, _RADIUS_PX, workers)
+        return compare(self.made.name, self.group, self.tool, pair, self.radius_m, workers)
 
 
 @dataclass(frozen=True)
@@ -135,13 +139,13 @@ class RealPairCase:
 
 
 def compare(
-    name: str, group: str, tool: str, pair: Pair, radius_px: float, workers: int | None
+    name: str, group: str, tool: str, pair: Pair, radius_m: float, workers: int | None
 ) -> CalibrationRun:
     """Register a pair and compare its errors over the reference with the radii of the verdict."""
     started = time.perf_counter()
     try:
         files = pair.reference, pair.input
-        found = getattr(groundtie, tool)(*files, search_radius=radius_px, workers=workers)
+        found = getattr(groundtie, tool)(*files, search_radius=radius_m, workers=workers)
     except NotRegisteredError as refusal:
         reason = str(refusal) if refusal.verdict is None else refusal.verdict.reason
         return CalibrationRun(name, group, REFUSED, reason)
@@ -221,29 +225,34 @@ def cases(settings: Settings) -> list[SimulatedCase | RealPairCase]:
     for seed in seeds:
         sizes = (_SMALL_PX, _LARGE_PX) if seed % _LARGE_EVERY == 0 else (_SMALL_PX,)
         for size in sizes[: 1 if settings.quick else 2]:
-            found += [
-                SimulatedCase(made, group, tool, settings.cache)
-                for group, tool, made in _simulated(seed, size)
-            ]
+            found += _simulated(seed, size, settings.cache)
     if not settings.quick:
         found += [RealPairCase(case, settings.first_seed) for case in read_cases(settings.data)]
     return found
 
 
-def _simulated(seed: int, size: int) -> list[tuple[str, str, Made]]:
-    """Return class, tool and pair; looks and changes differ from seed to seed."""
+def _simulated(seed: int, size: int, cache: Path) -> list[SimulatedCase]:
+    """Return pairs of all classes; looks and changes differ from seed to seed."""
     further = (("looks", float(1 + seed % 3)), ("changed", 10.0 * (seed % 2)))
-    large = ", large" if size >= _LARGE_PX else ""
-    made: list[tuple[str, str, Made]] = [
-        (density + large, "coregister", Simulation(size, density, seed, 8.0, further))
+    is_large = size >= _LARGE_PX
+    large = ", large" if is_large else ""
+    found = [
+        SimulatedCase(
+            Simulation(size, density, seed, 8.0, further), density + large, "coregister", cache
+        )
         for density in ("rural", "suburban", "urban", "city")
     ]
     for density in ("rural", "suburban"):
         radar = SarPair(size, density, seed, 1 + seed % 4, bool(seed % 2))
-        made.append((f"SAR–SAR, {density}{large}", "match_sar_sar", radar))
         camera = OpticalPair(size, density, seed)
-        made.append((f"optical, {density}{large}", "match_optical", camera))
-    return made
+        found += [
+            SimulatedCase(radar, f"SAR–SAR, {density}{large}", "match_sar_sar", cache),
+            SimulatedCase(camera, f"optical, {density}{large}", "match_optical", cache),
+        ]
+    for name, side, pixel_m in () if is_large else _CITIES:
+        town = Simulation(side, "city", seed, 8.0, (*further, ("pixel_size", pixel_m)))
+        found.append(SimulatedCase(town, name, "coregister", cache, _RADIUS_M * pixel_m))
+    return found
 
 
 def goal(name: str, runs: Sequence[CalibrationRun]) -> Goal:

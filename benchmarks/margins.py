@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from groundtie.errors import GroundTieError
-from groundtie.matching.parts import LEAST_EXCESS, LEAST_EXCESS_IF_WEAK
+from groundtie.matching.parts import LEAST_EXCESS
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
@@ -60,7 +60,7 @@ def _excess(is_weak: bool) -> Callable[[RegistrationEvidence], float]:
         survey = evidence.survey
         if survey is None or survey.is_weakly_confirmed != is_weak or survey.highest_part is None:
             return math.nan
-        return survey.highest_part.excess
+        return survey.highest_part.excess / survey.least_excess
 
     return value
 
@@ -108,8 +108,8 @@ def _elsewhere(evidence: RegistrationEvidence) -> float:
 
 
 STATISTICS = (
-    Statistic("part elsewhere: excess", LEAST_EXCESS, _excess(False)),
-    Statistic("part elsewhere: excess where few confirm", LEAST_EXCESS_IF_WEAK, _excess(True)),
+    Statistic("part elsewhere: excess over its limit", 1.0, _excess(False)),
+    Statistic("part elsewhere: excess over its limit where few confirm", 1.0, _excess(True)),
     Statistic("second place: share of the height", RIVAL_HEIGHT, _rival),
     Statistic("second place: ghost", GHOST_HEIGHT, _of_survey("ghost_height")),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),

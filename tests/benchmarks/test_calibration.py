@@ -124,8 +124,8 @@ def test_every_class_and_size_is_drawn_for_the_seeds(tmp_path: Path) -> None:
     settings = Settings(False, 5, 1, data_folder(), tmp_path, first_seed=200)
     found = [case for case in calibration.cases(settings) if isinstance(case, SimulatedCase)]
     small = [case for case in found if "large" not in case.group]
-    assert len({case.group for case in small}) == 8
-    assert len(small) == 5 * 8
+    assert len({case.group for case in small}) == 10
+    assert len(small) == 5 * 10
     # Seed 200 alone is a multiple of five.
     assert len(found) - len(small) == 8
     assert len({case.made.name for case in found}) == len(found)

@@ -13,6 +13,7 @@ from groundtie.geometry.accuracy import (
     UNKNOWN,
     Accuracy,
     CheckResiduals,
+    Common,
     predict_accuracy,
     standard_deviation_px,
 )
@@ -21,7 +22,8 @@ from groundtie.geometry.fitting import fit_model
 
 SIZE_PX = 500
 RUNS = 80
-NO_HEIGHTS = np.zeros(2)
+NOTHING = Common()
+NO_BIAS = np.zeros(2)
 
 
 def lattice(count: int, margin: float) -> np.ndarray:
@@ -33,7 +35,7 @@ PLACES, FIT, CHECK = lattice(9, 0), lattice(8, 25), lattice(4, 80)
 
 
 def run(
-    seed: int, kind: str, sigma: float, check_sigma: float, bias: np.ndarray = NO_HEIGHTS
+    seed: int, kind: str, sigma: float, check_sigma: float, bias: np.ndarray = NO_BIAS
 ) -> tuple[Accuracy, float]:
     """Fit a model to points with noise; return its predicted accuracy and error at a place."""
     random = np.random.default_rng(seed)
@@ -43,7 +45,7 @@ def run(
     matched = CHECK + check_sigma * random.standard_normal(CHECK.shape)
     check = CheckResiduals(CHECK, matched - model(CHECK), np.ones(len(CHECK)))
     place = random.uniform(0, SIZE_PX, (1, 2))
-    found = predict_accuracy(folds, PLACES, check, NO_HEIGHTS)
+    found = predict_accuracy(folds, PLACES, check, NOTHING)
     return found, float(np.hypot(*(model(place) - place)[0]))
 
 
@@ -69,9 +71,23 @@ def test_an_error_that_no_block_shows_is_seen_by_check_points() -> None:
 def test_heights_may_displace_all_points_evenly_up_to_the_largest() -> None:
     folds = [partial(np.add, (0.01 * k, 0.0)) for k in range(5)]
     check = CheckResiduals(CHECK, np.zeros_like(CHECK), np.ones(len(CHECK)))
-    accuracy = predict_accuracy(folds, PLACES, check, 4.0 * np.array([0.6, 0.8]))
+    accuracy = predict_accuracy(folds, PLACES, check, Common(4.0 * np.array([0.6, 0.8])))
     assert accuracy.ce50_px == pytest.approx(2.0, rel=0.05)
     assert accuracy.ce90_px == pytest.approx(3.6, rel=0.05)
+
+
+def test_what_displaces_all_points_in_any_direction_is_normal() -> None:
+    folds = [partial(np.add, (0.001 * k, 0.0)) for k in range(5)]
+    check = CheckResiduals(CHECK, np.zeros_like(CHECK), np.ones(len(CHECK)))
+    common = Common(sigma_px=0.5)
+    accuracy = predict_accuracy(folds, PLACES, check, common)
+    # Circles of two normal variates: sqrt(-2 ln(1 - p)) standard deviations.
+    assert accuracy.ce50_px == pytest.approx(0.5 * 1.177, rel=0.05)
+    assert accuracy.ce90_px == pytest.approx(0.5 * 2.146, rel=0.05)
+    assert accuracy.ellipse.minor_px == pytest.approx(0.5 * 2.146, rel=0.01)
+    assert accuracy.heights_px == 0.0
+    sigma = standard_deviation_px(folds, PLACES, check, common)
+    assert sigma == pytest.approx(0.5, rel=0.01)
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 30.0, 90.0, 135.0])
@@ -81,7 +97,7 @@ def test_the_ellipse_is_longest_along_what_heights_displace(angle_deg: float) ->
     along = np.array([math.sin(angle), -math.cos(angle)])
     folds = [partial(np.add, (0.01 * k, 0.01 * k**2)) for k in range(5)]
     check = CheckResiduals(CHECK, np.zeros_like(CHECK), np.ones(len(CHECK)))
-    accuracy = predict_accuracy(folds, PLACES, check, 4.0 * along)
+    accuracy = predict_accuracy(folds, PLACES, check, Common(4.0 * along))
     # An even distribution to ±4 px has a standard deviation of 4 / √3; 90 % of two normal
     # variates lie within 2.146 of theirs.
     assert accuracy.ellipse.major_px == pytest.approx(2.146 * 4 / math.sqrt(3), rel=0.01)
@@ -127,9 +143,9 @@ def test_one_block_or_no_check_point_predicts_nothing() -> None:
     check = CheckResiduals(CHECK, np.zeros_like(CHECK), np.ones(len(CHECK)))
     none = CheckResiduals(CHECK[:0], CHECK[:0], np.ones(0))
     alike = partial(np.add, 0.0)
-    assert predict_accuracy([alike], PLACES, check, NO_HEIGHTS) is UNKNOWN
-    assert predict_accuracy([alike] * 5, PLACES, none, NO_HEIGHTS) is UNKNOWN
-    assert predict_accuracy([alike] * 5, PLACES, check, NO_HEIGHTS).ce90_px == 0.0
+    assert predict_accuracy([alike], PLACES, check, NOTHING) is UNKNOWN
+    assert predict_accuracy([alike] * 5, PLACES, none, NOTHING) is UNKNOWN
+    assert predict_accuracy([alike] * 5, PLACES, check, NOTHING).ce90_px == 0.0
 
 
 def test_fewer_check_points_leave_a_wider_interval() -> None:
@@ -140,7 +156,7 @@ def test_fewer_check_points_leave_a_wider_interval() -> None:
         # The same error to the left and to the right in turns: nothing is shared.
         own = np.where((np.arange(len(px)) + np.arange(len(px)) // side) % 2, 0.5, -0.5)
         check = CheckResiduals(px, np.column_stack([own, 0 * own]), np.ones(len(px)))
-        low, high = predict_accuracy(folds, PLACES, check, NO_HEIGHTS).ce90_range_px
+        low, high = predict_accuracy(folds, PLACES, check, NOTHING).ce90_range_px
         return high / low
 
     assert width(2) > 1.2 * width(6)
@@ -157,7 +173,7 @@ def test_the_standard_deviation_is_that_of_errors(kind: str) -> None:
         matched = CHECK + random.standard_normal(CHECK.shape)
         check = CheckResiduals(CHECK, matched - model(CHECK), np.ones(len(CHECK)))
         place = random.uniform(0, SIZE_PX, (1, 2))
-        sigma = standard_deviation_px(folds, place, check, NO_HEIGHTS)
+        sigma = standard_deviation_px(folds, place, check, NOTHING)
         squared.append(((model(place) - place)[0] / sigma) ** 2)
     # 1, and a little more, as blocks know their variance badly; 160 values are good to 11 %.
     assert 0.75 < np.mean(squared) < 1.6
@@ -166,6 +182,6 @@ def test_the_standard_deviation_is_that_of_errors(kind: str) -> None:
 def test_heights_add_the_variance_of_an_even_distribution() -> None:
     still = [lambda px: px] * 4
     check = CheckResiduals(CHECK, np.zeros(CHECK.shape), np.ones(len(CHECK)))
-    found = standard_deviation_px(still, PLACES, check, np.array([3.0, 3.0]))
+    found = standard_deviation_px(still, PLACES, check, Common(np.array([3.0, 3.0])))
     np.testing.assert_allclose(found, math.sqrt(3.0))
-    assert np.isinf(standard_deviation_px(still[:1], PLACES, check, NO_HEIGHTS)).all()
+    assert np.isinf(standard_deviation_px(still[:1], PLACES, check, NOTHING)).all()

@@ -10,7 +10,7 @@ from raster_files import utm_grid
 
 from groundtie.matching.parts import (
     LEAST_EXCESS,
-    LEAST_EXCESS_IF_WEAK,
+    excess_if_weak,
     find_parts,
     highest_part,
 )
@@ -105,9 +105,18 @@ def test_less_speaks_for_a_part_where_less_speaks_for_the_model() -> None:
     raised(surfaces, np.isin(np.arange(len(CENTRES)), [0, 1, 2, 7, 8, 9]), (9, -6), 4.1)
     part = highest_part(GRID, CENTRES, surfaces, np.arange(len(CENTRES)))
     assert part is not None
-    assert LEAST_EXCESS_IF_WEAK <= part.excess < LEAST_EXCESS
+    weak = excess_if_weak(len(CENTRES), False)
+    assert weak <= part.excess < LEAST_EXCESS
     shifts = np.zeros((len(CENTRES), 2))
-    confirmed = Survey(GRID, CENTRES, shifts, surfaces)
+    confirmed = Survey(GRID, CENTRES, shifts, surfaces, excess_if_weak=weak)
     assert confirmed.parts == []
     shifts[: len(CENTRES) // 2 + 1] = 5.0
     assert [one.members for one in replace(confirmed, shifts_px=shifts).parts] == [part.members]
+
+
+def test_what_a_weakly_confirmed_part_needs_grows_with_the_chips() -> None:
+    """As the sum of chips that are all one standard deviation higher, over that of noise."""
+    assert excess_if_weak(49, is_masked=False) == excess_if_weak(9, is_masked=True) == 7.0
+    assert excess_if_weak(36, is_masked=False) == 6.0
+    assert excess_if_weak(9, is_masked=False) == 5.0
+    assert excess_if_weak(100, is_masked=False) == LEAST_EXCESS

@@ -2,14 +2,15 @@
 
 Residuals of check points are no errors of the transform: each holds its own matching error, too.
 What the transform errs by is what it would change by with other points (jackknife), what
-neighbouring check points have in common, and what displaces all points alike: heights.
+neighbouring check points have in common, and what displaces all points alike: heights, and what
+is left of them where the ground was guessed.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -135,18 +136,35 @@ class CheckResiduals:
         return max(float((weights * products).sum() / max(weights.sum(), _LEAST_WEIGHT)), 0.0)
 
 
+@dataclass(frozen=True)
+class Common:
+    """What displaces all points alike, so that no check point shows it.
+
+    Parameters
+    ----------
+    heights_px
+        The most that heights may displace all points by, to either side, shape (2,).
+    sigma_px
+        Standard deviation along an axis of a displacement in any direction.
+    """
+
+    heights_px: FloatArray = field(default_factory=lambda: np.zeros(2))
+    sigma_px: float = 0.0
+
+
 def predict_accuracy(
     fold_models: Sequence[Callable[[FloatArray], FloatArray]],
     places_px: FloatArray,
     check: CheckResiduals,
-    displacement_px: FloatArray,
+    common: Common,
 ) -> Accuracy:
     """Predict the error of a transform at a random one of some places.
 
     Its random part is that of the models without one block of points after the other
     ([Efron1993]), with the mean of two variances at the check points: theirs, and what the check
     points share. It has Student's distribution, with one degree of freedom less than there are
-    blocks. Its common part is what heights displace all points by: evenly up to the largest.
+    blocks. Its common part is what heights displace all points by, evenly up to the largest, and
+    a normal displacement in any direction.
 
     Parameters
     ----------
@@ -156,8 +174,8 @@ def predict_accuracy(
         Places all over the overlap, shape (m, 2).
     check
         Points that took no part.
-    displacement_px
-        The most that heights may displace all points by, to either side, shape (2,).
+    common
+        What displaces all points alike.
     """
     count = len(fold_models)
     if count < 2 or len(check.px) == 0:
@@ -168,14 +186,15 @@ def predict_accuracy(
     random = np.random.default_rng(0)
     parts = random.standard_normal((_DRAWS, count)) * factor
     moved = np.einsum("dk,kmx->dmx", parts, deviations)
-    common = random.uniform(-1, 1, (_DRAWS, 1, 1)) * displacement_px
-
-    def radii(scale: FloatArray | float, shares: Sequence[float]) -> list[float]:
-        error = moved * scale + common
-        return [float(r) for r in np.quantile(np.hypot(error[..., 0], error[..., 1]), shares)]
-
+    alike = random.uniform(-1, 1, (_DRAWS, 1, 1)) * common.heights_px
     # So few blocks know their variance badly: Student's distribution.
     known = random.chisquare(count - 1, (_DRAWS, 1, 1)) / (count - 1)
+    alike = alike + random.normal(0, common.sigma_px, (_DRAWS, 1, 2))
+
+    def radii(scale: FloatArray | float, shares: Sequence[float]) -> list[float]:
+        error = moved * scale + alike
+        return [float(r) for r in np.quantile(np.hypot(error[..., 0], error[..., 1]), shares)]
+
     ce50, ce90, ce95 = radii(1 / np.sqrt(known), (0.5, 0.9, 0.95))
     freedom = _degrees_of_freedom(blocks, count, check)
     low, high = (
@@ -184,14 +203,15 @@ def predict_accuracy(
     )
     # Heights displace evenly between both limits.
     covariance = factor**2 * np.einsum("kmx,kmy->xy", deviations, deviations) / len(places_px)
-    covariance += np.outer(displacement_px, displacement_px) / 3
+    covariance += np.outer(common.heights_px, common.heights_px) / 3
+    covariance += common.sigma_px**2 * np.eye(2)
     return Accuracy(
         ce50,
         ce90,
         ce95,
         (min(low, ce90), max(high, ce90)),
         Ellipse.of(covariance),
-        float(np.hypot(*displacement_px)),
+        float(np.hypot(*common.heights_px)),
     )
 
 
@@ -199,7 +219,7 @@ def standard_deviation_px(
     fold_models: Sequence[Callable[[FloatArray], FloatArray]],
     places_px: FloatArray,
     check: CheckResiduals,
-    displacement_px: FloatArray,
+    common: Common,
 ) -> FloatArray:
     """Return the standard deviation along an axis of a transform's error at places, shape (m,).
 
@@ -210,9 +230,9 @@ def standard_deviation_px(
         return np.full(len(places_px), np.inf)
     factor = _factor(_block_variance_px2(fold_models, check), check)
     variance = (_deviations(fold_models, places_px) ** 2).sum(axis=0).mean(axis=-1) * factor**2
-    # Of an even distribution between both limits.
-    common = float((np.asarray(displacement_px) ** 2).mean()) / 3
-    return np.asarray(np.sqrt(variance + common))
+    # Heights: of an even distribution between both limits.
+    alike = float((common.heights_px**2).mean()) / 3 + common.sigma_px**2
+    return np.asarray(np.sqrt(variance + alike))
 
 
 def _deviations(

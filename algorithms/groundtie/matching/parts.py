@@ -8,6 +8,7 @@ of another pass, layover. It is a scan statistic [Kulldorff1997].
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -30,10 +31,12 @@ ELSEWHERE_PX, _FARTHEST_PX = 2 * SAME_PX, 20.0
 # controls one at 9.0; where a part was moved, 8.6 and more, but 3.8 and 8.0 in two of six.
 LEAST_EXCESS = 8.5
 
-# The same where fewer than two of three chips match where the model has them, so that less speaks
-# for the model. Measured by the suites real and attacks: right transforms up to 6.9, but for three
-# of 380 at 7.1 to 7.5; of 18 wrong ones that were accepted, 6 from 7.2 on.
-LEAST_EXCESS_IF_WEAK = 7.0
+# Where fewer than two of three chips match where the model has them, less speaks for it: a part may
+# not stand out as all n chips do of which each is one such deviation higher elsewhere, √n. Measured
+# by the suites real, rotated_pairs and attacks, from 25 chips on: right transforms up to 0.97 times
+# that, and one at 1.4; of ten wrong ones four from 1.08 times on. Pixels that a mask leaves vary
+# more: of right copies up to 6.9, so that there are never fewer than 49 counted.
+_FEWEST_IF_WEAK, _FEWEST_MASKED = 25, 49
 
 # Fewer chips are no part. None counts for more than this, so that two of three are no part, either,
 # unless few match where the model has them: 2 * 7 / sqrt(3) = 8.1.
@@ -82,8 +85,14 @@ class Part:
         return self.height - self.model_height
 
 
+def excess_if_weak(chips: int, is_masked: bool) -> float:
+    """Return the excess from which on a part lies elsewhere, where few of so many chips confirm."""
+    fewest = _FEWEST_MASKED if is_masked else _FEWEST_IF_WEAK
+    return min(math.sqrt(max(chips, fewest)), LEAST_EXCESS)
+
+
 def find_parts(
-    grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces, least_excess: float = LEAST_EXCESS
+    grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces, least: float = LEAST_EXCESS
 ) -> list[Part]:
     """Return evident parts, the most evident first; no chip is in two of them.
 
@@ -96,13 +105,13 @@ def find_parts(
     surfaces
         Their similarity around where the model has them, in robust standard deviations, shape
         (n, 2 r + 1, 2 r + 1).
-    least_excess
+    least
         The excess from which on neither noise nor the model explains a part.
     """
     found = []
     left = np.arange(len(centres))
     while part := highest_part(grid, centres, surfaces, left):
-        if part.excess < least_excess:
+        if part.excess < least:
             break
         found.append(part)
         left = np.setdiff1d(left, part.members)

@@ -21,9 +21,9 @@ from .matcher import FloatArray, MaskOf, Places
 from .parts import (
     ELSEWHERE_PX,
     LEAST_EXCESS,
-    LEAST_EXCESS_IF_WEAK,
     SAME_PX,
     Part,
+    excess_if_weak,
     find_parts,
     highest_part,
     limited,
@@ -54,6 +54,8 @@ class Survey:
         shape (n, 2 r + 1, 2 r + 1).
     elsewhere_px
         Places farther than this from where the model has all chips are second places.
+    excess_if_weak
+        The excess from which on a part lies elsewhere, if few chips match where the model has them.
     ghost_height
         How high the mean is elsewhere when what the reference repeats of itself is taken out, in
         robust standard deviations of what is left.
@@ -64,6 +66,7 @@ class Survey:
     shifts_px: FloatArray
     surfaces: Surfaces
     elsewhere_px: float = ELSEWHERE_PX
+    excess_if_weak: float = LEAST_EXCESS
     ghost_height: float = 0.0
 
     @cached_property
@@ -121,8 +124,12 @@ class Survey:
     @cached_property
     def parts(self) -> Sequence[Part]:
         """Neighbouring chips that together match elsewhere, the most evident first."""
-        least = LEAST_EXCESS_IF_WEAK if self.is_weakly_confirmed else LEAST_EXCESS
-        return find_parts(self.grid, self.centres, self.surfaces, least)
+        return find_parts(self.grid, self.centres, self.surfaces, self.least_excess)
+
+    @property
+    def least_excess(self) -> float:
+        """The excess from which on a part lies elsewhere."""
+        return self.excess_if_weak if self.is_weakly_confirmed else LEAST_EXCESS
 
     @property
     def excess(self) -> float:
@@ -188,7 +195,8 @@ def survey_model(
         kept, surfaces = seen.match_forward(*asked)
     surfaces = _of_overlaps(surfaces)
     shifts = np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
-    survey = Survey(places.grid, kept, shifts, surfaces, elsewhere_px)
+    weak = excess_if_weak(len(places.centres), without is not None)
+    survey = Survey(places.grid, kept, shifts, surfaces, elsewhere_px, weak)
     if own is None or len(own) == 0:
         return survey
     return replace(survey, ghost_height=ghost_height(survey.mean, _of_overlaps(own).mean(axis=0)))

@@ -15,6 +15,7 @@ from ..geometry.accuracy import (
     UNKNOWN,
     Accuracy,
     CheckResiduals,
+    Common,
     predict_accuracy,
     standard_deviation_px,
 )
@@ -44,6 +45,11 @@ SURVEY, REFINEMENT, SERIES = "survey", "refinement", "series"
 
 # Scatter along a line is that of heights unless chance explains it with more than 5 %, as usual.
 _LOG10_FIVE_PERCENT = math.log10(0.05)
+
+# Ground that is found in a radar image holds some of what is elevated: it displaces all points
+# alike, by so many matching pixels along an axis (standard deviation), of whatever size they are.
+# Measured by the suite calibration, classes city.
+GUESSED_GROUND_PX = 0.5
 
 
 @dataclass(frozen=True)
@@ -224,14 +230,14 @@ class RegistrationEvidence:
             float(np.sqrt(np.mean(self.estimate.spread_px(lattice) ** 2))),
             "the overlap",
             predict_accuracy(
-                self.estimate.fold_models, lattice, self._check_residuals, self.displacement_px
+                self.estimate.fold_models, lattice, self._check_residuals, self.common
             ),
         )
 
     def standard_deviation_px(self, px: FloatArray) -> FloatArray:
         """Return that of the transform's error along an axis, shape (n,), at pixels (n, 2)."""
         return standard_deviation_px(
-            self.estimate.fold_models, px, self._check_residuals, self.displacement_px
+            self.estimate.fold_models, px, self._check_residuals, self.common
         )
 
     @cached_property
@@ -240,8 +246,13 @@ class RegistrationEvidence:
         mixture = self._mixture(self.residuals_px, self.radius_px)
         return CheckResiduals(places, self.residuals_px, mixture.probability)
 
+    @property
+    def common(self) -> Common:
+        """What displaces all points alike: heights, and what is no ground where it was guessed."""
+        return Common(self._heights_px, GUESSED_GROUND_PX if self.mask.is_guessed else 0.0)
+
     @cached_property
-    def displacement_px(self) -> FloatArray:
+    def _heights_px(self) -> FloatArray:
         """The most that heights may displace all matches by, to either side, shape (2,).
 
         By what they scatter the survey's chips by: twice their mean where the ground may be the

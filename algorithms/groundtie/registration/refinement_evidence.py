@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..assessment.statistics import Statistics
-from ..geometry.accuracy import CheckResiduals, predict_accuracy
+from ..geometry.accuracy import CheckResiduals, Common, predict_accuracy
 from ..geometry.chance import agreement_probability, log10_chance
 from ..geometry.judging import (
     FEWEST_CHECK_POINTS,
@@ -138,7 +138,7 @@ class RefinementEvidence:
             max_error_px,
             _spread_px(adjustment, nodes_px),
             "the image",
-            predict_accuracy(adjustment.fold_biases, nodes_px, residuals, np.zeros(2)),
+            predict_accuracy(adjustment.fold_biases, nodes_px, residuals, Common()),
         )
         used_px = control.found_px[adjustment.used]
         return cls(

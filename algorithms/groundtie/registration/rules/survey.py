@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...matching.parts import LEAST_EXCESS, LEAST_EXCESS_IF_WEAK
+from ...matching.parts import LEAST_EXCESS
 from ...matching.rest import Rest
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
 from ..evidence import SURVEY, RegistrationEvidence
@@ -136,7 +136,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         SURVEY,
         "neighbouring chips together match elsewhere "
         f"{LEAST_EXCESS:g} standard deviations of noise better than where the transform has them, "
-        f"or {LEAST_EXCESS_IF_WEAK:g} if fewer than two of three chips match there",
+        "or, if fewer than two of three chips match there, by the square root of their number, at "
+        "least 5",
         "[Kulldorff1997]; suites margins and attacks",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,
