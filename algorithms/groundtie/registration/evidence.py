@@ -48,7 +48,7 @@ _LOG10_FIVE_PERCENT = math.log10(0.05)
 
 # Ground that is found in a radar image holds some of what is elevated: it displaces all points
 # alike, by so many matching pixels along an axis (standard deviation), of whatever size they are.
-# Measured by the suite calibration, classes city.
+# Measured by the suite calibration, classes city, seeds 400 to 439.
 GUESSED_GROUND_PX = 0.5
 
 

@@ -25,9 +25,8 @@ WEAK_REST_HEIGHT = 2.5
 # pairs (suite attacks); one ground in other colours leaves 10 to 23.
 DRAWN_REST_HEIGHT = 8.0
 
-# Copies and one sensor's views leave little, which may be weak; but a second place may not stand
-# out by so many robust standard deviations of its surfaces, and be so many times as high in what a
-# mask leaves. Measured by the suites margins and attacks: right transforms with more than the
+# Copies and one sensor's views leave little; but a second place may not stand out by so many
+# robust standard deviations of its surfaces, and be so many times as high in what a mask leaves. Measured by the suites margins and attacks: right transforms with more than the
 # former are up to 1.3 times as high; beneath clouds and labels over ground that lies elsewhere,
 # from 1.7 times and 6.1 on; ground that shows through copies stands out by 8.4 and more.
 # Nor may it show nothing where the transform has it: from 1.66 on where it is right, up to 1.5
@@ -94,9 +93,7 @@ def deviations_elsewhere(rest: Rest) -> float:
     shares = ((rest.survey, _MASKED_RIVAL), (rest.beyond, RIVAL_HEIGHT))
     return max(
         left.rival_deviations
-        if is_enough(left, rest)
-        and left.height < WEAK_REST_HEIGHT
-        and left.rival_height >= share * left.height
+        if is_enough(left, rest) and left.rival_height >= share * left.height
         else 0.0
         for left, share in shares
     )
@@ -170,7 +167,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         f"well, or the mean similarity is below {WEAK_REST_HEIGHT:g} standard deviations, "
         f"or {DRAWN_REST_HEIGHT:g} of what is sharper than ground in other colours; of a copy, "
         f"or one sensor's views, below {WEAK_COPY_HEIGHT:g}, or {WEAK_REST_HEIGHT:g} with sharp "
-        "edges, if half of the chips have anything left, or where that is weak and a second place "
+        "edges, if half of the chips have anything left, or where a second place "
         f"stands out by {BEYOND_DEVIATIONS:g}: {_MASKED_RIVAL:g} times as high in what is left, or "
         f"{RIVAL_HEIGHT:g} times in what the reference does not explain",
         "suites margins and attacks",
