@@ -200,7 +200,8 @@ def test_many_chips_that_copies_leave_must_show_something(
     ("height", "rival", "noise", "is_refused"),
     [
         (1.7, 2.7, 0.1, True),
-        (2.6, 2.6, 0.1, False),
+        (2.6, 4.0, 0.1, True),
+        (2.6, 2.0, 0.1, False),
         (1.7, 2.7, 6.0, False),
     ],
 )
@@ -208,7 +209,7 @@ def test_many_chips_that_copies_leave_must_show_something(
 def test_copies_must_not_leave_ground_elsewhere(
     height: float, rival: float, noise: float, is_refused: bool, is_beyond: bool
 ) -> None:
-    """A weak rest is no evidence, unless a second place stands out of its noise."""
+    """However high the rest is at the transform, unless the second place is noise."""
     plain, left = survey(height=6.0), survey(height=height, rival=rival)
     drawn = noise * np.random.default_rng(3).normal(size=left.surfaces.shape)
     is_flat = left.surfaces == 0

@@ -26,9 +26,10 @@ WEAK_REST_HEIGHT = 2.5
 DRAWN_REST_HEIGHT = 8.0
 
 # Copies and one sensor's views leave little; but a second place may not stand out by so many
-# robust standard deviations of its surfaces, and be so many times as high in what a mask leaves. Measured by the suites margins and attacks: right transforms with more than the
-# former are up to 1.3 times as high; beneath clouds and labels over ground that lies elsewhere,
-# from 1.7 times and 6.1 on; ground that shows through copies stands out by 8.4 and more.
+# robust standard deviations of its surfaces, and be so many times as high in what a mask leaves.
+# Measured by the suites margins and attacks: right transforms with more than the former are up to
+# 1.3 times as high; beneath clouds and labels over ground that lies elsewhere, from 1.6 times and
+# 6.1 on; ground that shows through copies stands out by 8.4 and more.
 # Nor may it show nothing where the transform has it: from 1.66 on where it is right, up to 1.5
 # beneath clouds and snow, but for one at 1.8. Of plain copies, few chips have anything left. Where
 # edges are as sharp as drawn ones, it must be as high as of other content: right ones from 2.53
