@@ -3,7 +3,7 @@
 Residuals of check points are no errors of the transform: each holds its own matching error, too.
 What the transform errs by is what it would change by with other points (jackknife), what
 neighbouring check points have in common, and what displaces all points alike: heights, and what
-is left of them where the ground was guessed.
+of them is left where the ground is not known for sure.
 """
 
 from __future__ import annotations

@@ -74,11 +74,6 @@ class MaskUsed:
         return self.kind in (REGIONS, LAYER, SURFACE)
 
     @property
-    def is_guessed(self) -> bool:
-        """Whether the ground was found by the grey values of a radar image alone."""
-        return self.kind == REGIONS
-
-    @property
     def leaves_little(self) -> bool:
         """Whether chips of what takes part are too poor to be matched each by itself."""
         return self.share < _LITTLE

@@ -29,7 +29,7 @@ from ..geometry.judging import (
 )
 from ..geometry.robust import Mixture, fit_mixture
 from ..geometry.tie_points import TiePoints
-from ..masks.choice import NONE, MaskUsed
+from ..masks.choice import NONE, REGIONS, MaskUsed
 from ..matching.bands import BandSurvey
 from ..matching.rest import Rest
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
@@ -46,10 +46,10 @@ SURVEY, REFINEMENT, SERIES = "survey", "refinement", "series"
 # Scatter along a line is that of heights unless chance explains it with more than 5 %, as usual.
 _LOG10_FIVE_PERCENT = math.log10(0.05)
 
-# Ground that is found in a radar image holds some of what is elevated: it displaces all points
-# alike, by so many matching pixels along an axis (standard deviation), of whatever size they are.
-# Measured by the suite calibration, classes city, seeds 400 to 439.
-GUESSED_GROUND_PX = 0.5
+# The ground of a dense town that is found in its radar image holds some of what is elevated: it
+# displaces all points alike, by so many matching pixels along an axis (standard deviation), of
+# whatever size they are. Measured by the suite calibration, classes city, seeds 400 to 439.
+TOWN_GROUND_PX = 0.5
 
 
 @dataclass(frozen=True)
@@ -248,8 +248,9 @@ class RegistrationEvidence:
 
     @property
     def common(self) -> Common:
-        """What displaces all points alike: heights, and what is no ground where it was guessed."""
-        return Common(self._heights_px, GUESSED_GROUND_PX if self.mask.is_guessed else 0.0)
+        """What displaces all points alike: heights, and what is no ground of a dense town's."""
+        is_town = self.mask.kind == REGIONS and self.scene is not None and self.scene.is_dense_town
+        return Common(self._heights_px, TOWN_GROUND_PX if is_town else 0.0)
 
     @cached_property
     def _heights_px(self) -> FloatArray:
