@@ -21,7 +21,7 @@ _LEAST_GROUND_SHARE, _LARGEST_EXTRAPOLATED = 0.09, 0.5
 
 # An oblique view displaces fit and check points alike: by grey levels, where four sums of check
 # chips all agree, as in images of 700 px, the suite rpc_city has errors up to 6 px; with five and
-# more, below 1 px. By colours three and more that chance does not explain are right.
+# more, below 1 px. By colours, three and more that chance does not explain: up to 2.1 px.
 _FEWEST_IN_SENSOR_GEOMETRY = 5
 
 # From this share of agreeing check points on, more agree than roofs alone do. Measured where a
