@@ -130,6 +130,7 @@ def facts(
     strong_share: float = 0.02,
     is_known_radar: bool = False,
     is_in_sensor_geometry: bool = False,
+    has_colours: bool = False,
 ) -> ImageFacts:
     """Return facts about an image that need no image: by default a camera's, of fields."""
     found = ImageFacts(None, None)  # type: ignore[arg-type]
@@ -138,6 +139,7 @@ def facts(
         strong_share=strong_share,
         is_known_radar=is_known_radar,
         is_in_sensor_geometry=is_in_sensor_geometry,
+        has_colours=has_colours,
     )
     return found
 

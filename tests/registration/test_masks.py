@@ -61,9 +61,9 @@ def test_a_towns_ground_is_masked_once_for_fit_and_check(
     found = masks.find_ground
     calls = []
 
-    def counted(*given: object) -> object:
+    def counted(*given: object, **named: object) -> object:
         calls.append(given)
-        return found(*given)  # type: ignore[arg-type]
+        return found(*given, **named)  # type: ignore[arg-type]
 
     monkeypatch.setattr(masks, "find_ground", counted)
     with opened(tmp_path, speckled(0.25), FIELDS) as pair:

@@ -120,9 +120,10 @@ def counting(monkeypatch: pytest.MonkeyPatch) -> Counter[tuple[str, object]]:
             name: str = name,
             key: Callable[[Any], object] = key,
             function: Callable[..., Any] = function,
+            **named: Any,
         ) -> Any:
             found[name, key(of)] += 1
-            return function(of, *more)
+            return function(of, *more, **named)
 
         monkeypatch.setattr(module, name, counted)
     return found

@@ -108,15 +108,22 @@ def test_ground_must_be_reliable_and_span_the_overlap() -> None:
     assert refusing(evidence(GOOD, narrow)) == []
 
 
-@pytest.mark.parametrize(("agreeing", "expected"), [(4, ["too little ground"]), (5, [])])
-def test_an_oblique_view_needs_more_check_points_on_the_ground(
-    agreeing: int, expected: list[str]
+@pytest.mark.parametrize(
+    ("agreeing", "has_colours", "expected"),
+    [
+        (4, False, ["too little ground"]),
+        (5, False, []),
+        (4, True, []),
+        (2, True, ["chance agreement"]),
+    ],
+)
+def test_an_oblique_view_without_colours_needs_more_check_points_on_the_ground(
+    agreeing: int, has_colours: bool, expected: list[str]
 ) -> None:
     regions = MaskUsed(REGIONS, "reference", 0.3, "as in a dense town")
-    oblique = scene(facts(variation2=0.25, strong_share=0.2), facts(is_in_sensor_geometry=True))
-    errors = scatter(agreeing, 0.3)
-    assert refusing(evidence(errors, mask=regions, scene=oblique)) == expected
-    assert refusing(evidence(errors, mask=regions)) == []
+    camera = facts(is_in_sensor_geometry=True, has_colours=has_colours)
+    oblique = scene(facts(variation2=0.25, strong_share=0.2), camera)
+    assert refusing(evidence(scatter(agreeing, 0.3), mask=regions, scene=oblique)) == expected
 
 
 @pytest.mark.parametrize("kind", [REGIONS, LAYER, SURFACE])

@@ -32,11 +32,6 @@ from .threshold import disc
 WIDTH_M = 11.0
 HIGH_PERCENT = 10.0
 
-# In a dense town, so many of the darkest take no part either: the radar shadows of trees, cars and
-# fences, which lie behind what casts them, so that they draw a match away from the ground. Measured
-# with `benchmarks/run.py --only layover`. In the country, the darkest are roads and waters.
-LOW_PERCENT = 10.0
-
 # Larger scenes are reduced to larger pixels.
 _MOST_PIXELS = 24_000_000
 

@@ -23,7 +23,7 @@ from ..masks.choice import (
     choose,
     is_reliable,
 )
-from ..masks.regions import HIGH_PERCENT, LOW_PERCENT, WIDTH_M, GroundRegions, find_ground
+from ..masks.regions import GroundRegions, find_ground
 from ..masks.scene import Scene, Selection
 from ..masks.surface_model import SurfaceGround
 from ..masks.threshold import Threshold
@@ -132,14 +132,13 @@ class _Town:
         return self.masked(self.regions().select)[0]
 
     def _find(self) -> GroundRegions:
+        progress = self._context.progress
+        if self._info.is_dense_town:
+            return find_ground(self.scene, progress=progress, is_town=True)
         other = self._info.other.scene
         middle = other.read(middle_window(other.grid))
         shadow = shadow_azimuth_deg(middle) if middle.valid.any() else None
-        is_town, progress = self._info.is_dense_town, self._context.progress
-        low = LOW_PERCENT if is_town else 0.0
-        # Measured by the suite rpc_city: regions alone are right more often in oblique images.
-        is_open = is_town and not self._info.input.is_in_sensor_geometry
-        return find_ground(self.scene, WIDTH_M, HIGH_PERCENT, progress, shadow, low, is_open)
+        return find_ground(self.scene, progress=progress, shadow_azimuth_deg=shadow)
 
 
 def require_one_mask(kind: str, used: MaskUsed | None) -> None:

@@ -58,6 +58,11 @@ class ImageFacts:
         """Whether it is located by a sensor model, so that relief displaces elevated objects."""
         return isinstance(self.image.source.grid, SensorGrid)
 
+    @cached_property
+    def has_colours(self) -> bool:
+        """Whether its bands make classes of colour, by which a town's ground is matched."""
+        return self.image.has_colours
+
     @property
     def has_speckle(self) -> bool:
         """Whether it varies in its most homogeneous windows as a radar image does."""
@@ -152,6 +157,11 @@ class SceneInfo:
     def is_dense_town(self) -> bool:
         """Whether the radar image of a pair with a camera's shows a dense town."""
         return self.is_radar_and_camera and is_dense(self.radar.strong_share)
+
+    @property
+    def is_grey_and_oblique(self) -> bool:
+        """Whether the input is located by a sensor model, and a camera's bands make no colours."""
+        return self.input.is_in_sensor_geometry and not self.other.has_colours
 
     @property
     def may_be_dense_town(self) -> bool:

@@ -19,8 +19,9 @@ _LARGEST_GROUND_SHIFT_PX = 1.0
 # part then.
 _LEAST_GROUND_SHARE, _LARGEST_EXTRAPOLATED = 0.09, 0.5
 
-# An oblique view displaces fit and check points alike: where four sums of check chips all agree, as
-# in images of 700 px, the suite rpc_city has errors up to 6 px; with five and more, below 1 px.
+# An oblique view displaces fit and check points alike: by grey levels, where four sums of check
+# chips all agree, as in images of 700 px, the suite rpc_city has errors up to 6 px; with five and
+# more, below 1 px. By colours, three and more that chance does not explain: up to 2.1 px.
 _FEWEST_IN_SENSOR_GEOMETRY = 5
 
 # From this share of agreeing check points on, more agree than roofs alone do. Measured where a
@@ -38,9 +39,12 @@ def _little_ground(evidence: RegistrationEvidence) -> str | None:
     if mask.share < _LEAST_GROUND_SHARE:
         return f"only {mask.share:.0%} of the {mask.image} is ground that was found"
     agreeing = evidence.held_out.agreeing
-    is_oblique = evidence.scene is not None and evidence.scene.input.is_in_sensor_geometry
-    if is_oblique and agreeing < _FEWEST_IN_SENSOR_GEOMETRY:
-        return f"only {agreeing} check points on the ground agree, where the view is oblique"
+    is_grey_and_oblique = evidence.scene is not None and evidence.scene.is_grey_and_oblique
+    if is_grey_and_oblique and agreeing < _FEWEST_IN_SENSOR_GEOMETRY:
+        return (
+            f"only {agreeing} check points on the ground agree, where the view is oblique and "
+            "without colours"
+        )
     if evidence.extrapolated_share > _LARGEST_EXTRAPOLATED:
         share = f"{evidence.extrapolated_share:.0%}"
         return f"{share} of the overlap lies beyond the ground that was matched"
@@ -97,8 +101,8 @@ SCENE_RULES: tuple[Rule, ...] = (
         SCENE,
         "where the regions of a radar image were taken for its ground: too few roads and banks, "
         f"less than {_LEAST_GROUND_SHARE:.0%} of the image, points over less than "
-        f"{1 - _LARGEST_EXTRAPOLATED:.0%} of the overlap, or, in an image with RPCs, fewer than "
-        f"{_FEWEST_IN_SENSOR_GEOMETRY} check points that agree",
+        f"{1 - _LARGEST_EXTRAPOLATED:.0%} of the overlap, or, in an image with RPCs and without "
+        f"colours, fewer than {_FEWEST_IN_SENSOR_GEOMETRY} check points that agree",
         "suite rpc_city",
         GROUND,
         _little_ground,
