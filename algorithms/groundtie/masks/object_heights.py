@@ -26,6 +26,9 @@ WIDEST_M = 100.0
 # Pixels within which the lowest height counts as ground, in metres: courtyards are wider.
 _GROUND_CELL_M = 4.0
 
+# Nothing on Earth lies so high.
+_NOWHERE_M = np.float32(1e5)
+
 _HEIGHT_FIELDS = ("height", "height_m", "hoehe", "z_height", "measuredheight")
 _NUMBER = re.compile(r"\s*(\d+(?:\.\d+)?)\s*m?\s*")
 
@@ -120,16 +123,20 @@ def _metres(value: Any) -> float | None:
     return None if match is None else float(match[1])
 
 
+def ground_cell_px(pixel_m: float) -> int:
+    """Return how many pixels a side those cells have whose lowest heights count as ground."""
+    return max(round(_GROUND_CELL_M / pixel_m), 1)
+
+
 def _bare_ground(surface: FloatImage, known: Mask, pixel_m: float) -> FloatImage:
     """Return the height of the ground below all that is narrower than `WIDEST_M`.
 
     Morphological opening of cells' lowest heights: level ground and slopes stay as they are.
     """
-    cell = max(round(_GROUND_CELL_M / pixel_m), 1)
+    cell = ground_cell_px(pixel_m)
     rows, cols = surface.shape
     padding = [(0, -n % cell) for n in (rows, cols)]
-    highest = np.float32(surface[known].max())
-    filled = np.pad(np.where(known, surface, highest), padding, mode="edge")
+    filled = np.pad(np.where(known, surface, _NOWHERE_M), padding, mode="edge")
     blocks = filled.reshape(filled.shape[0] // cell, cell, filled.shape[1] // cell, cell)
     lowest = blocks.min(axis=(1, 3))
     side = max(round(WIDEST_M / (cell * pixel_m)), 1) | 1
