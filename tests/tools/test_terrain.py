@@ -97,7 +97,7 @@ def test_what_does_not_go_together_is_refused(
 
 @pytest.mark.slow
 def test_register_takes_the_view_of_a_terrain_model_only(hills: Path) -> None:
-    with pytest.raises(ParameterError, match="view of a terrain model only"):
+    with pytest.raises(ParameterError, match="view of a terrain or surface model only"):
         groundtie.register(
             hills / "reference.tif", hills / "input.tif", views="radar azimuth=280 incidence=35"
         )

@@ -45,9 +45,17 @@ class RasterModel:
     """A raster of heights of roofs, canopies and ground (DSM), on any grid and map.
 
     The ground is what is left if everything narrower than a block of houses is taken off.
+
+    Parameters
+    ----------
+    raster
+        The heights.
+    band
+        Number of their band, from 1; None: the mean of all.
     """
 
     raster: RasterSource
+    band: int | None = None
 
     def heights(self, piece: Grid) -> tuple[Heights, Mask]:
         """Return heights on a grid, and where they are known; the ground is found in it."""
@@ -57,13 +65,15 @@ class RasterModel:
             piece,
             lambda xy: own.map_to_pixel(reproject(xy, piece.crs, own.crs)),
             "bilinear",
+            self.band,
         )
         if not known.any():
             return Heights(np.zeros_like(surface), np.zeros_like(surface)), known
-        ground = _bare_ground(surface, known, piece.pixel_size_m)
+        ground = bare_ground(surface, known, piece.pixel_size_m)
         # What is not known hides nothing and is laid over nothing.
         lowest = np.float32(ground[known].min())
-        return Heights(*(np.where(known, part, lowest) for part in (surface, ground))), known
+        surface, ground = (np.where(known, part, lowest) for part in (surface, ground))
+        return Heights(surface, ground), known
 
 
 @dataclass(frozen=True)
@@ -128,7 +138,7 @@ def ground_cell_px(pixel_m: float) -> int:
     return max(round(_GROUND_CELL_M / pixel_m), 1)
 
 
-def _bare_ground(surface: FloatImage, known: Mask, pixel_m: float) -> FloatImage:
+def bare_ground(surface: FloatImage, known: Mask, pixel_m: float) -> FloatImage:
     """Return the height of the ground below all that is narrower than `WIDEST_M`.
 
     Morphological opening of cells' lowest heights: level ground and slopes stay as they are.

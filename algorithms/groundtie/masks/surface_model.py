@@ -157,9 +157,7 @@ def write_reasons(ground: SurfaceGround, path: Path, progress: Progress = SILENT
             progress.update((number + 1) / tile_count(grid))
 
 
-def write_image(
-    ground: SurfaceGround, view: View, path: Path, progress: Progress = SILENT
-) -> None:
+def write_image(ground: SurfaceGround, view: View, path: Path, progress: Progress = SILENT) -> None:
     """Write a raster of the amplitudes that a radar image from a view may show."""
     grid = ground.scene.grid
     like = one_band(ground.scene.like, "float32")
