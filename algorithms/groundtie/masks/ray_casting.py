@@ -79,7 +79,7 @@ def hidden_ground(heights: Heights, sight: LineOfSight) -> Mask:
     rise_m = sight.pixel_m / sight.tangent
 
     def hidden(surface: _Lines, ground: _Lines) -> Mask:
-        return np.asarray(ground < _lowest_sight_m(surface, rise_m) - _LEVEL_M)
+        return np.asarray(ground < _lowest_sight_m(surface, ground, rise_m) - _LEVEL_M)
 
     return _along_rays(heights, sight, hidden)
 
@@ -88,41 +88,46 @@ def radar_echoes(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
     """Return how many things that stand a radar shows together with each pixel's ground, (h, w).
 
     They are imaged nearer to the radar than their feet, over the ground at the same range: nearer
-    by h / tan(incidence) on level ground. Each pixel of a roof is one, and each of a wall's foot,
-    as far up as the radar sees the wall; what it does not see is none.
+    by h / tan(incidence) on level ground. Each pixel of a roof is one, and each of the wall before
+    it, as far down as the radar sees it; what it does not see is none.
     """
     # Pixels of level ground by which a metre of height is laid over.
     lean_px = 1 / (sight.pixel_m * sight.tangent)
 
     def echoes(surface: _Lines, ground: _Lines) -> NDArray[np.int32]:
-        foot = np.maximum(_lowest_sight_m(surface, sight.pixel_m / sight.tangent), ground)
-        row, col = np.nonzero(surface > foot + _LEVEL_M)
+        rise_m = sight.pixel_m / sight.tangent
+        lowest = np.maximum(_lowest_sight_m(surface, ground, rise_m), ground)
+        row, col = np.nonzero(surface > lowest + _LEVEL_M)
+        before = surface[row, np.maximum(col - 1, 0)]
+        roof = surface[row, col]
+        foot = np.clip(before, lowest[row, col], roof)
         # Ranges, in pixels of level ground and rising away from the radar; a wall stands at the
-        # near side of its pixel.
+        # near side of its pixel, of which the roof is one long.
         own = np.arange(ground.shape[1]) - ground * lean_px
-        far, near = (col - 0.5 - height[row, col] * lean_px for height in (foot, surface))
+        far, near = (col - 0.5 - height * lean_px for height in (foot, roof))
         first = math.floor(min(float(own.min()), float(near.min(initial=0)))) - 1
         last = math.ceil(max(float(own.max()), float(far.max(initial=0)))) + 1
-        starts, stops = (_nearest(edge) - first for edge in (near, far + 1))
+        # Pixels whose centres lie in between.
+        start, stop = (np.ceil(edge - first).astype(np.intp) for edge in (near, far))
         changes = np.zeros((len(ground), last - first + 2), np.int32)
-        np.add.at(changes, (row, starts), 1)
-        np.add.at(changes, (row, stops), -1)
+        for at, step in ((start, 2), (start + 1, -1), (stop, -1)):
+            np.add.at(changes, (row, at), step)
         place = _nearest(own) - first
         return np.take_along_axis(np.cumsum(changes, axis=1, dtype=np.int32), place, axis=1)
 
     return _along_rays(heights, sight, echoes)
 
 
-def _lowest_sight_m(surface: _Lines, rise_m: float) -> _Lines:
+def _lowest_sight_m(surface: _Lines, ground: _Lines, rise_m: float) -> _Lines:
     """Return how high the lowest free line of sight is over each pixel of rays; -inf: all are.
 
     Rays run away from the sensor along the columns; towards it, a line of sight rises by `rise_m`
-    for each pixel.
+    for each pixel. It grazes the far ends of pixels, where the ground lies halfway to the next one.
     """
     rise = np.arange(surface.shape[1]) * rise_m
-    highest = np.maximum.accumulate(surface + rise, axis=1)
+    far_ends = surface[:, :-1] + np.diff(ground, axis=1) / 2 + rise[:-1] + rise_m / 2
     lowest = np.full_like(surface, -np.inf)
-    lowest[:, 1:] = highest[:, :-1] - rise[1:]
+    lowest[:, 1:] = np.maximum.accumulate(far_ends, axis=1) - rise[1:]
     return lowest
 
 

@@ -22,13 +22,10 @@ from ..rasters.grid import Grid
 from ..rasters.reading import FloatImage, Mask, Window
 from ..rasters.tiling import tile_count, tiles
 from ..rasters.writing import create_like, one_band
-from .object_heights import WIDEST_M, SurfaceModel, ground_cell_px
+from .object_heights import GROUND_REACH_M, LOWEST_M, SurfaceModel, ground_cell_px
 from .ray_casting import Heights, LineOfSight, hidden_ground, radar_echoes
 from .scene import Scene, Selection
 from .threshold import grown
-
-# What rises by less is taken for ground: cars, hedges, the noise of a surface model.
-_LOWEST_M = 2.0
 
 # Brightness of shadow, that of ground being 1; what correlates with it hardly depends on it.
 _SHADOW = np.float32(0.1)
@@ -122,7 +119,8 @@ class SurfaceGround:
         """Return heights of what stands so far around, where they are known, and the window."""
         # Ground is found in cells: they are the same in every window.
         cell = ground_cell_px(self.scene.grid.pixel_size_m)
-        reach = math.ceil((reach_m + WIDEST_M) / self.scene.grid.pixel_size_m) + _GROWN_PX + cell
+        around = (reach_m + GROUND_REACH_M) / self.scene.grid.pixel_size_m
+        reach = math.ceil(around) + _GROWN_PX + cell
         left, above = (reach + (at - reach) % cell for at in window[:2])
         first_px = window.col - left, window.row - above
         width, height = left + window.width + reach, above + window.height + reach
@@ -131,7 +129,7 @@ class SurfaceGround:
             self.scene.grid.window(first_px[0] - right, first_px[1] - down, width, height)
         )
         # What counts as ground hides nothing.
-        stands = heights.surface_m - heights.ground_m > _LOWEST_M
+        stands = heights.surface_m - heights.ground_m > LOWEST_M
         surface = np.where(stands, heights.surface_m, heights.ground_m)
         inside = slice(above, above + window.height), slice(left, left + window.width)
         return Heights(surface, heights.ground_m, first_px), known, inside
