@@ -1,4 +1,4 @@
-"""Dense cities with a surface model: the ground that both images show, or the model as reference."""
+"""Dense cities with a surface model: of the ground that both images show, or as reference."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from affine import Affine
 from rasterio.enums import Resampling
 
 from groundtie.geometry.views import View
-from groundtie.masks.object_heights import bare_ground
+from groundtie.masks.object_heights import LOWEST_M, bare_ground
 from groundtie.rasters.grid import compose
 from groundtie.rasters.reading import FloatImage, open_raster
 from groundtie.simulation import files
@@ -56,7 +56,7 @@ _QUICK_SEEDS = 1
 # Pixels, noise and displacement (east, north) of a model as stereo images of a satellite give it;
 # where it is the reference, there is none, but a share of the objects are missing.
 _ROUGH_M, _NOISE_M, _MOVED_M = 2.0, 0.5, (3.0, -2.0)
-_MISSING_SHARE, _STANDS_M = 0.1, 2.0
+_MISSING_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ def rough(model: Path, is_reference: bool = False) -> Path:
 def without_some(surface_m: FloatImage, pixel_m: float) -> FloatImage:
     """Return heights without a share of the objects, drawn at random: built since."""
     ground = bare_ground(surface_m, np.ones(surface_m.shape, bool), pixel_m)
-    stands = (surface_m - ground > _STANDS_M).astype(np.uint8)
+    stands = (surface_m - ground > LOWEST_M).astype(np.uint8)
     count, labels = cv2.connectedComponents(stands, connectivity=4)
     missing = np.random.default_rng(0).random(count) < _MISSING_SHARE
     missing[0] = False
