@@ -1,24 +1,28 @@
-"""Dense cities with a surface model: the ground that both images show."""
+"""Dense cities with a surface model: of the ground that both images show, or as reference."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import rasterio
 from affine import Affine
 from rasterio.enums import Resampling
 
 from groundtie.geometry.views import View
+from groundtie.masks.object_heights import LOWEST_M, bare_ground
 from groundtie.rasters.grid import compose
+from groundtie.rasters.reading import FloatImage, open_raster
 from groundtie.simulation import files
 
-from .accuracy import REFUSED, SILENTLY_WRONG
-from .attempt import Outcome, accepted, attempt, count
+from .accuracy import REFUSED, SILENTLY_WRONG, Truth
+from .attempt import Outcome, Pair, accepted, attempt, count
 from .city import WITHIN_PX, city, median_px, share_within
-from .suites import Goal, Settings, SuiteResult, Table, run_cases
+from .simulations import Simulation
+from .suites import Case, Goal, Settings, SuiteResult, Table, run_cases
 from .tables import accuracy_table
 
 NONE, MODEL, ROUGH, OTHER, ROTATED, OPPOSITE = (
@@ -30,14 +34,29 @@ NONE, MODEL, ROUGH, OTHER, ROTATED, OPPOSITE = (
     "both views from the other side",
 )
 SETTINGS = (NONE, MODEL, ROUGH, OTHER, ROTATED, OPPOSITE)
+# A radar image registered to a rough model in which a tenth of the objects are missing.
+TO_MODEL, STEEPER, TO_OTHER, TO_ROTATED, TO_OPPOSITE = (
+    "to the rough model",
+    "to it, incidence stated 5° too large",
+    "to the rough model of another city",
+    "to it, azimuth rotated by 90°",
+    "to it, from the other side",
+)
+REFERENCES = {TO_MODEL: (0.0, 0.0), STEEPER: (0.0, 5.0), TO_OTHER: (0.0, 0.0)} | {
+    TO_ROTATED: (90.0, 0.0),
+    TO_OPPOSITE: (180.0, 0.0),
+}
+_REFUSED = (OTHER, TO_OTHER, TO_ROTATED, TO_OPPOSITE)
 # By how much the azimuths of the radar, of the camera and of its sun are stated wrong, in degrees.
 _ROTATIONS_DEG = {ROTATED: (90.0, 0.0), OPPOSITE: (180.0, 180.0)}
 WANTED_SHARE = 0.9
 LARGEST_PX = 3.0
 _QUICK_SEEDS = 1
 
-# Pixels, noise and displacement (east, north) of a model as stereo images of a satellite give it.
+# Pixels, noise and displacement (east, north) of a model as stereo images of a satellite give it;
+# where it is the reference, there is none, but a share of the objects are missing.
 _ROUGH_M, _NOISE_M, _MOVED_M = 2.0, 0.5, (3.0, -2.0)
+_MISSING_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -63,6 +82,48 @@ class TownCase:
         return attempt(name, self.setting, pair, workers, **parameters)
 
 
+@dataclass(frozen=True)
+class ReferenceCase:
+    """A radar image of a city, registered to a surface model by one of `REFERENCES`."""
+
+    seed: int
+    setting: str
+    cache: Path
+
+    def run(self, workers: int | None) -> Outcome:
+        """Make the pair if need be, register it and judge the result."""
+        pair = seen_by_radar(self.seed).pair(self.cache)
+        of = pair if self.setting != TO_OTHER else seen_by_radar(self.seed + 1).pair(self.cache)
+        model = rough(of.reference.parent / files.NAMES["dsm"], is_reference=True)
+        view = View.of(pair.input, None)
+        assert view is not None
+        azimuth_deg, incidence_deg = REFERENCES[self.setting]
+        stated = replace(view, incidence_deg=view.incidence_deg + incidence_deg)
+        views = f"surface {_words(stated, azimuth_deg)}"
+        name = f"city, seed {self.seed}"
+        return attempt(name, self.setting, to_model(pair, model), workers, views=views)
+
+
+def seen_by_radar(seed: int) -> Simulation:
+    """Return the city of a seed with the radar image as the input."""
+    simulation = city(seed)
+    return replace(simulation, further=(*simulation.further, ("input", "sar")))
+
+
+def to_model(pair: Pair, model: Path) -> Pair:
+    """Return a pair with a model as the reference, and the truth in its pixels."""
+    with open_raster(pair.reference) as image, open_raster(model) as heights:
+        larger = heights.grid.pixel_size_m / image.grid.pixel_size_m
+
+        def of_model(truth: Truth | None) -> Truth | None:
+            if truth is None:
+                return None
+            px = heights.grid.map_to_pixel(image.grid.pixel_to_map(truth.reference_px))
+            return Truth(px, truth.input_px, truth.linear * larger)
+
+        return Pair(model, pair.input, of_model(pair.truth), of_model(pair.lattice))
+
+
 def rotated_views(
     reference: Path, input: Path, radar_deg: float, camera_deg: float
 ) -> dict[str, str]:
@@ -82,9 +143,12 @@ def _words(view: View | None, rotation_deg: float) -> str:
     return " ".join(words)
 
 
-def rough(model: Path) -> Path:
-    """Return a surface model with larger pixels, noise and a displacement, made beside the fine."""
-    path = model.with_name("rough.tif")
+def rough(model: Path, is_reference: bool = False) -> Path:
+    """Return a surface model with larger pixels and noise, made beside the fine one.
+
+    It is displaced; or, if it is to be the reference, a share of the objects are missing.
+    """
+    path = model.with_name("rough_reference.tif" if is_reference else "rough.tif")
     if path.exists():
         return path
     with rasterio.open(model) as fine:
@@ -92,7 +156,11 @@ def rough(model: Path) -> Path:
         shape = (round(fine.height / factor), round(fine.width / factor))
         heights = fine.read(1, out_shape=shape, resampling=Resampling.average)
         noise = np.random.default_rng(0).standard_normal(shape, np.float32)
-        moved = compose(Affine.translation(*_MOVED_M), fine.transform)
+        moved = fine.transform
+        if is_reference:
+            heights = without_some(heights, _ROUGH_M)
+        else:
+            moved = compose(Affine.translation(*_MOVED_M), moved)
         scale = Affine.scale(fine.width / shape[1], fine.height / shape[0])
         profile = {
             "driver": "GTiff",
@@ -111,6 +179,16 @@ def rough(model: Path) -> Path:
     return path
 
 
+def without_some(surface_m: FloatImage, pixel_m: float) -> FloatImage:
+    """Return heights without a share of the objects, drawn at random: built since."""
+    ground = bare_ground(surface_m, np.ones(surface_m.shape, bool), pixel_m)
+    stands = (surface_m - ground > LOWEST_M).astype(np.uint8)
+    count, labels = cv2.connectedComponents(stands, connectivity=4)
+    missing = np.random.default_rng(0).random(count) < _MISSING_SHARE
+    missing[0] = False
+    return np.where(missing[labels], ground, surface_m)
+
+
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
     count_of = _QUICK_SEEDS if settings.quick else settings.seeds
@@ -118,9 +196,13 @@ def run(settings: Settings) -> SuiteResult:
     # Seed by seed, so that processes do not make the same pair at the same time.
     for seed in (*seeds, seeds[-1] + 1):
         city(seed).pair(settings.cache)
-    cases = [TownCase(seed, setting, settings.cache) for seed in seeds for setting in SETTINGS]
+        seen_by_radar(seed).pair(settings.cache)
+    cases: list[Case] = []
+    for seed in seeds:
+        cases += [TownCase(seed, setting, settings.cache) for setting in SETTINGS]
+        cases += [ReferenceCase(seed, setting, settings.cache) for setting in REFERENCES]
     outcomes = run_cases(cases, settings.jobs)
-    groups = {s: [o for o in outcomes if o.group == s] for s in SETTINGS}
+    groups = {s: [o for o in outcomes if o.group == s] for s in (*SETTINGS, *REFERENCES)}
     return SuiteResult(
         "Simulated dense cities with a surface model",
         [goal for name, group in groups.items() for goal in goals(name, group)],
@@ -129,7 +211,8 @@ def run(settings: Settings) -> SuiteResult:
         (
             "The error is that at check points on open ground. A rough model has pixels of "
             f"{_ROUGH_M:g} m, noise of {_NOISE_M:g} m, and lies {_MOVED_M[0]:g} m and "
-            f"{_MOVED_M[1]:g} m off.",
+            f"{_MOVED_M[1]:g} m off; as the reference it lies right, {_MISSING_SHARE:.0%} of the "
+            "objects are missing, and errors are in its own pixels.",
         ),
     )
 
@@ -138,7 +221,7 @@ def goals(name: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
     """Return the goals of one setting and what was found."""
     wrong, taken = count(outcomes, SILENTLY_WRONG), len(accepted(outcomes))
     found = [Goal(f"{name}: silently wrong", "none", f"{wrong} of {len(outcomes)}", wrong == 0)]
-    if name == OTHER:
+    if name in _REFUSED:
         found.append(Goal(f"{name}: accepted", "none", str(taken), taken == 0))
     if name == MODEL:
         share = share_within(outcomes)

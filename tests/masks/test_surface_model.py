@@ -62,6 +62,23 @@ def test_a_house_on_a_slope_is_found_and_the_slope_is_not(tmp_path: Path) -> Non
     assert raised[HOUSE].all() and raised.sum() == 32 * 32
 
 
+def test_noise_does_not_lower_the_ground(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).normal(0, 0.3, (180, 200))
+    heights, _ = ground_of(tmp_path, (house() + noise).astype(np.float32)).model.heights(GRID)
+    # The lowest of a cell of 16 pixels lies 0.5 m too low, that of cells around it even more.
+    np.testing.assert_allclose(heights.ground_m.mean(), 100, atol=0.1)
+    assert np.abs(heights.ground_m - 100).max() < 0.5
+
+
+def test_the_rims_of_voids_are_no_walls(tmp_path: Path) -> None:
+    heights = house(height_m=0)
+    heights[40:160, 40:160] = -9999
+    found, known = ground_of(tmp_path, heights, nodata=-9999).model.heights(GRID)
+    np.testing.assert_array_equal(known, heights != -9999)
+    np.testing.assert_array_equal(found.surface_m[known], 100)
+    np.testing.assert_array_equal(found.ground_m[known], 100)
+
+
 def test_each_reason_lies_where_geometry_puts_it(tmp_path: Path) -> None:
     seen = ground_of(tmp_path, house()).seen(Window(0, 0, 200, 180))
     layover_px = 12 / math.tan(math.radians(40))
@@ -77,14 +94,49 @@ def test_each_reason_lies_where_geometry_puts_it(tmp_path: Path) -> None:
     assert (seen[1:60, 1:-1] == 0).all()
 
 
-def test_windows_join_but_for_pixels_on_the_borders_of_oblique_shadows(tmp_path: Path) -> None:
+def test_the_image_of_a_house_has_its_layover_and_radar_shadow(tmp_path: Path) -> None:
+    """Echoes of level ground, of a wall and of a roof that is wider than its layover, as power."""
     ground = ground_of(tmp_path, house())
-    whole = ground.seen(Window(0, 0, 200, 180))
-    parts = np.hstack([ground.seen(Window(col, 0, 100, 180)) for col in (0, 100)])
-    straight = Seen.RAISED | Seen.LAYOVER | Seen.RADAR_SHADOW | Seen.UNKNOWN
-    np.testing.assert_array_equal(whole & straight, parts & straight)
-    inside, around = (cv2.erode(whole, np.ones((3, 3))), cv2.dilate(whole, np.ones((3, 3))))
-    assert np.all((inside <= parts) & (parts <= around))
+    row = ground.image(Window(0, 95, 200, 1), RADAR)[0] ** 2 - 0.1
+    layover_m, shadow_m = (12 * f(math.radians(40)) for f in (lambda a: 1 / math.tan(a), math.tan))
+    # Ground, wall and roof fall together before the house; the roof alone lies on its near part.
+    pieces = [(90 - layover_m, 1), (90, 3), (120 - layover_m, 1), (120 + shadow_m, 0), (200, 1)]
+    start = 0.0
+    for end, echoes in pieces:
+        inside = row[math.ceil(start) + 1 : math.floor(end) - 1]
+        np.testing.assert_allclose(inside, echoes, atol=1e-5)
+        start = end
+
+
+def test_nothing_is_imaged_where_heights_are_not_known(tmp_path: Path) -> None:
+    heights = house()
+    heights[20:40, 30:60] = -9999
+    image = ground_of(tmp_path, heights, nodata=-9999).image(Window(0, 0, 200, 180), RADAR)
+    np.testing.assert_array_equal(np.isnan(image), heights == -9999)
+
+
+def test_tiles_are_those_of_the_whole(tmp_path: Path) -> None:
+    """Blocks on rough ground with a void, at an oblique azimuth."""
+    generator = np.random.default_rng(1)
+    heights = np.kron(generator.integers(0, 4, (18, 20)) * 5.0, np.ones((10, 10)))
+    heights = (heights + generator.normal(0, 0.5, heights.shape)).astype(np.float32)
+    heights[50:70, 20:90] = -9999
+    ground = ground_of(tmp_path, heights, nodata=-9999)
+    view = replace(RADAR, azimuth_deg=251.0)
+    whole = ground.image(ground.scene.whole, view)
+    for window in (Window(0, 0, 61, 77), Window(61, 13, 100, 90), Window(150, 101, 50, 79)):
+        np.testing.assert_array_equal(ground.image(window, view), whole[window.slices])
+
+
+def test_windows_join(tmp_path: Path) -> None:
+    ground = ground_of(tmp_path, house())
+    whole, windows = Window(0, 0, 200, 180), [Window(0, 0, 87, 180), Window(87, 0, 113, 180)]
+    parts = np.hstack([ground.seen(window) for window in windows])
+    np.testing.assert_array_equal(ground.seen(whole), parts)
+    for view in (RADAR, CAMERA, replace(RADAR, azimuth_deg=251.0)):
+        ground = replace(ground, views=(view,))
+        parts = np.hstack([ground.image(window, view) for window in windows])
+        np.testing.assert_array_equal(ground.image(whole, view), parts)
 
 
 def test_what_is_not_known_takes_no_part_and_hides_nothing(tmp_path: Path) -> None:
@@ -111,8 +163,13 @@ def test_a_model_of_another_place_is_refused(tmp_path: Path) -> None:
 def test_an_offset_moves_what_stands(tmp_path: Path) -> None:
     ground = ground_of(tmp_path, house())
     window = Window(50, 50, 100, 100)
-    moved = replace(ground, offset_px=(5, -3)).seen(window)
-    np.testing.assert_array_equal(moved, ground.seen(Window(45, 53, 100, 100)))
+    # By whole cells of the ground; oblique rays are those of the map, so that borders may differ.
+    moved = replace(ground, offset_px=(8, -4)).seen(window)
+    there = ground.seen(Window(42, 54, 100, 100))
+    straight = Seen.RAISED | Seen.LAYOVER | Seen.RADAR_SHADOW | Seen.UNKNOWN
+    np.testing.assert_array_equal(moved & straight, there & straight)
+    inside, around = (cv2.erode(there, np.ones((3, 3))), cv2.dilate(there, np.ones((3, 3))))
+    assert np.all((inside <= moved) & (moved <= around))
 
 
 def test_directions_follow_the_map_not_the_pixels(tmp_path: Path) -> None:

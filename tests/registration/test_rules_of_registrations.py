@@ -29,7 +29,7 @@ from evidences import (
 from groundtie.masks.choice import LAYER, REGIONS, SURFACE, THRESHOLD, MaskUsed
 from groundtie.matching.rest import Rest
 from groundtie.registration.evidence import Exchanged, RegistrationEvidence
-from groundtie.registration.surface_masks import ModelFit
+from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
 from groundtie.registration.verdict import first_refusal
 
 
@@ -87,6 +87,8 @@ def test_an_image_of_fields_is_not_suspected() -> None:
         (ModelFit(0.4, (2, -2)), None),
         (ModelFit(0.4, (-3, 1)), "3.2 px off"),
         (ModelFit(0.08, (0, 0)), "the registered input does not show"),
+        (ModelFit(0.45, (0, 0), RENDERED_CORRELATION), None),
+        (ModelFit(0.35, (0, 0), RENDERED_CORRELATION), "the registered input does not show"),
     ],
 )
 def test_the_input_shows_elevated_objects_where_the_surface_model_has_them(

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import groundtie
-from groundtie.errors import NoOverlapError, ParameterError
+from groundtie.errors import NoOverlapError, NotRegisteredError, ParameterError
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.asked import asked_lights
+from groundtie.registration.asked import asked_lights, asked_surface_view
 
 SIZE = 400
 
@@ -97,7 +97,7 @@ def test_what_does_not_go_together_is_refused(
 
 @pytest.mark.slow
 def test_register_takes_the_view_of_a_terrain_model_only(hills: Path) -> None:
-    with pytest.raises(ParameterError, match="view of a terrain model only"):
+    with pytest.raises(ParameterError, match="view of a terrain or surface model only"):
         groundtie.register(
             hills / "reference.tif", hills / "input.tif", views="radar azimuth=280 incidence=35"
         )
@@ -116,6 +116,63 @@ def test_light_is_stated_as_views_are(words: str | None, azimuths: list[float]) 
     lights = asked_lights({"views": words})
     assert [light.azimuth_deg for light in lights] == azimuths
     assert {light.kind for light in lights} <= set(str(words).lower().replace(",", " ").split())
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("surface radar", "states no radar's view"),
+        ("surface camera azimuth=1 incidence=2", "states no radar's view"),
+        ("surface radar azimuth=100", "does not state incidence"),
+        ("surface sun", "states no view"),
+    ],
+)
+def test_a_surface_model_needs_the_view_of_a_radar(words: str, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        asked_surface_view({"views": words, "input": "alone.tif"})
+
+
+def test_the_view_of_a_surface_model_is_stated_or_the_inputs_own(town: Path) -> None:
+    input = town / "input.tif"
+    for words in ("Surface radar azimuth=270, incidence=40", "surface radar"):
+        found = asked_surface_view({"views": words, "input": input})
+        assert found is not None and found.sensor == "radar"
+        assert (found.azimuth_deg, found.incidence_deg) == pytest.approx((270, 40), abs=0.1)
+    assert asked_surface_view({"views": "terrain radar", "input": input}) is None
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A radar image of a dense city, 6 px off, and its surface model."""
+    folder = tmp_path_factory.mktemp("town")
+    groundtie.simulate(
+        folder,
+        size=600,
+        density="city",
+        looks=4.0,
+        incidence=40.0,
+        shift=6.0,
+        warp=1.0,
+        input="sar",
+        seed=5,
+    )
+    return folder
+
+
+@pytest.mark.slow
+def test_a_radar_image_is_registered_to_a_surface_model(town: Path) -> None:
+    found = groundtie.coregister(town / "dsm.tif", town / "input.tif", views="surface radar")
+    assert found.transform is not None
+    assert np.sqrt((error_px(found.transform, town) ** 2).mean()) < 0.5
+    assert found.mask.kind == "none" and "layover" in found.mask.reason
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("azimuth", [90.0, 0.0])
+def test_a_surface_model_seen_from_elsewhere_is_refused(town: Path, azimuth: float) -> None:
+    views = f"surface radar azimuth={azimuth} incidence=40"
+    with pytest.raises(NotRegisteredError):
+        groundtie.register(town / "dsm.tif", town / "input.tif", views=views)
 
 
 @pytest.mark.slow

@@ -23,8 +23,20 @@ from .ray_casting import Heights
 # What is wider is taken for ground: halls and blocks are up to so wide, or have courtyards.
 WIDEST_M = 100.0
 
+# What rises by less is taken for ground: cars, hedges, the noise of a surface model.
+LOWEST_M = 2.0
+
+# So far around a place, heights tell its ground: the widest object, and the mean's window.
+GROUND_REACH_M = 1.5 * WIDEST_M
+
 # Pixels within which the lowest height counts as ground, in metres: courtyards are wider.
 _GROUND_CELL_M = 4.0
+
+# Nothing on Earth lies so high.
+_NOWHERE_M = np.float32(1e5)
+
+# Heights are summed up as whole numbers of these: the same whatever is summed up before them.
+_STEP_M = 1 / 1024
 
 _HEIGHT_FIELDS = ("height", "height_m", "hoehe", "z_height", "measuredheight")
 _NUMBER = re.compile(r"\s*(\d+(?:\.\d+)?)\s*m?\s*")
@@ -42,9 +54,17 @@ class RasterModel:
     """A raster of heights of roofs, canopies and ground (DSM), on any grid and map.
 
     The ground is what is left if everything narrower than a block of houses is taken off.
+
+    Parameters
+    ----------
+    raster
+        The heights.
+    band
+        Number of their band, from 1; None: the mean of all.
     """
 
     raster: RasterSource
+    band: int | None = None
 
     def heights(self, piece: Grid) -> tuple[Heights, Mask]:
         """Return heights on a grid, and where they are known; the ground is found in it."""
@@ -54,13 +74,15 @@ class RasterModel:
             piece,
             lambda xy: own.map_to_pixel(reproject(xy, piece.crs, own.crs)),
             "bilinear",
+            self.band,
         )
         if not known.any():
             return Heights(np.zeros_like(surface), np.zeros_like(surface)), known
-        ground = _bare_ground(surface, known, piece.pixel_size_m)
+        ground = bare_ground(surface, known, piece.pixel_size_m)
         # What is not known hides nothing and is laid over nothing.
         lowest = np.float32(ground[known].min())
-        return Heights(*(np.where(known, part, lowest) for part in (surface, ground))), known
+        surface, ground = (np.where(known, part, lowest) for part in (surface, ground))
+        return Heights(np.maximum(surface, ground), ground), known
 
 
 @dataclass(frozen=True)
@@ -120,20 +142,56 @@ def _metres(value: Any) -> float | None:
     return None if match is None else float(match[1])
 
 
-def _bare_ground(surface: FloatImage, known: Mask, pixel_m: float) -> FloatImage:
+def ground_cell_px(pixel_m: float) -> int:
+    """Return how many pixels a side those cells have whose lowest heights count as ground."""
+    return max(round(_GROUND_CELL_M / pixel_m), 1)
+
+
+def bare_ground(surface: FloatImage, known: Mask, pixel_m: float) -> FloatImage:
     """Return the height of the ground below all that is narrower than `WIDEST_M`.
 
-    Morphological opening of cells' lowest heights: level ground and slopes stay as they are.
+    Morphological opening of cells' lowest heights: level ground and slopes stay as they are. Noise
+    makes the lowest too low: the mean of what is no object lies above that by the same all around.
     """
-    cell = max(round(_GROUND_CELL_M / pixel_m), 1)
+    cell = ground_cell_px(pixel_m)
     rows, cols = surface.shape
     padding = [(0, -n % cell) for n in (rows, cols)]
-    highest = np.float32(surface[known].max())
-    filled = np.pad(np.where(known, surface, highest), padding, mode="edge")
+    filled = np.pad(np.where(known, surface, _NOWHERE_M), padding, mode="edge")
     blocks = filled.reshape(filled.shape[0] // cell, cell, filled.shape[1] // cell, cell)
-    lowest = blocks.min(axis=(1, 3))
-    side = max(round(WIDEST_M / (cell * pixel_m)), 1) | 1
+    side = _cells(WIDEST_M, cell * pixel_m)
     # Beyond the border nothing is lower, nor higher.
-    opened = cv2.morphologyEx(lowest, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
-    ground = cv2.resize(opened, filled.shape[::-1], interpolation=cv2.INTER_LINEAR)
-    return np.asarray(np.minimum(ground[:rows, :cols], surface))
+    opened: FloatImage = np.asarray(
+        cv2.morphologyEx(blocks.min(axis=(1, 3)), cv2.MORPH_OPEN, np.ones((side, side), np.uint8)),
+        np.float32,
+    )
+    raised = opened + _mean_above(blocks, opened, _cells(WIDEST_M / 2, cell * pixel_m))
+    # Between the outermost cells and what is not known, those cells' own height holds.
+    rim = cv2.erode(raised, np.ones((3, 3), np.uint8))
+    ground = np.where(opened < _NOWHERE_M, raised, rim)
+    whole = cv2.resize(ground, filled.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    return np.asarray(whole[:rows, :cols], np.float32)
+
+
+def _mean_above(blocks: FloatImage, lowest: FloatImage, side: int) -> FloatImage:
+    """Return how far what is no object rises above the lowest ground on average, (rows, cols).
+
+    Blocks are cells of heights, shape (rows, n, cols, n); the mean is that of `side` cells a side.
+    """
+    steps = np.rint((blocks - lowest[:, None, :, None]) / _STEP_M)
+    is_ground = steps <= LOWEST_M / _STEP_M
+    total, count = (
+        cv2.boxFilter(
+            values.sum(axis=(1, 3), dtype=np.float64),
+            -1,
+            (side, side),
+            normalize=False,
+            borderType=cv2.BORDER_CONSTANT,
+        )
+        for values in (np.where(is_ground, steps, 0), is_ground)
+    )
+    return (total / np.maximum(count, 1) * _STEP_M).astype(np.float32)
+
+
+def _cells(length_m: float, cell_m: float) -> int:
+    """Return how many cells a length is, an odd number."""
+    return max(round(length_m / cell_m), 1) | 1

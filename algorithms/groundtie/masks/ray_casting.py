@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from ..rasters.reading import FloatImage, Mask
 
-_Lines = NDArray[np.float32]
+_Lines = NDArray[np.float64]
 _T = TypeVar("_T", bound=np.generic)
 
-# What lies lower by less than this is no lower: single precision has 0.001 m at 10 km.
+# What lies lower by less than this is no lower: heights in single precision have 0.001 m at 10 km.
 _LEVEL_M = 0.05
 
 
@@ -33,10 +33,14 @@ class Heights:
         Height of what is seen from above: roofs, canopies, ground, shape (h, w).
     ground_m
         Height of the bare ground, nowhere above the surface, shape (h, w).
+    first_px
+        Column and row of the first pixel on the whole map: rays are those of the map, so that
+        pieces of it join.
     """
 
     surface_m: FloatImage
     ground_m: FloatImage
+    first_px: tuple[int, int] = (0, 0)
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,7 @@ def hidden_ground(heights: Heights, sight: LineOfSight) -> Mask:
     rise_m = sight.pixel_m / sight.tangent
 
     def hidden(surface: _Lines, ground: _Lines) -> Mask:
-        return np.asarray(ground < _lowest_sight_m(surface, rise_m) - _LEVEL_M)
+        return np.asarray(ground < _lowest_sight_m(surface, ground, rise_m) - _LEVEL_M)
 
     return _along_rays(heights, sight, hidden)
 
@@ -84,41 +88,46 @@ def radar_echoes(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
     """Return how many things that stand a radar shows together with each pixel's ground, (h, w).
 
     They are imaged nearer to the radar than their feet, over the ground at the same range: nearer
-    by h / tan(incidence) on level ground. Each pixel of a roof is one, and each of a wall's foot,
-    as far up as the radar sees the wall; what it does not see is none.
+    by h / tan(incidence) on level ground. Each pixel of a roof is one, and each of the wall before
+    it, as far down as the radar sees it; what it does not see is none.
     """
     # Pixels of level ground by which a metre of height is laid over.
     lean_px = 1 / (sight.pixel_m * sight.tangent)
 
     def echoes(surface: _Lines, ground: _Lines) -> NDArray[np.int32]:
-        foot = np.maximum(_lowest_sight_m(surface, sight.pixel_m / sight.tangent), ground)
-        row, col = np.nonzero(surface > foot + _LEVEL_M)
+        rise_m = sight.pixel_m / sight.tangent
+        lowest = np.maximum(_lowest_sight_m(surface, ground, rise_m), ground)
+        row, col = np.nonzero(surface > lowest + _LEVEL_M)
+        before = surface[row, np.maximum(col - 1, 0)]
+        roof = surface[row, col]
+        foot = np.clip(before, lowest[row, col], roof)
         # Ranges, in pixels of level ground and rising away from the radar; a wall stands at the
-        # near side of its pixel.
-        own = np.arange(ground.shape[1], dtype=np.float32) - ground * lean_px
-        far, near = (col - 0.5 - height[row, col] * lean_px for height in (foot, surface))
+        # near side of its pixel, of which the roof is one long.
+        own = np.arange(ground.shape[1]) - ground * lean_px
+        far, near = (col - 0.5 - height * lean_px for height in (foot, roof))
         first = math.floor(min(float(own.min()), float(near.min(initial=0)))) - 1
         last = math.ceil(max(float(own.max()), float(far.max(initial=0)))) + 1
-        starts, stops = (np.rint(edge - first).astype(np.intp) for edge in (near, far + 1))
+        # Pixels whose centres lie in between.
+        start, stop = (np.ceil(edge - first).astype(np.intp) for edge in (near, far))
         changes = np.zeros((len(ground), last - first + 2), np.int32)
-        np.add.at(changes, (row, starts), 1)
-        np.add.at(changes, (row, stops), -1)
-        place = np.rint(own - first).astype(np.intp)
+        for at, step in ((start, 2), (start + 1, -1), (stop, -1)):
+            np.add.at(changes, (row, at), step)
+        place = _nearest(own) - first
         return np.take_along_axis(np.cumsum(changes, axis=1, dtype=np.int32), place, axis=1)
 
     return _along_rays(heights, sight, echoes)
 
 
-def _lowest_sight_m(surface: _Lines, rise_m: float) -> _Lines:
+def _lowest_sight_m(surface: _Lines, ground: _Lines, rise_m: float) -> _Lines:
     """Return how high the lowest free line of sight is over each pixel of rays; -inf: all are.
 
     Rays run away from the sensor along the columns; towards it, a line of sight rises by `rise_m`
-    for each pixel.
+    for each pixel. It grazes the far ends of pixels, where the ground lies halfway to the next one.
     """
-    rise = np.arange(surface.shape[1], dtype=np.float32) * np.float32(rise_m)
-    highest = np.maximum.accumulate(surface + rise, axis=1)
+    rise = np.arange(surface.shape[1]) * rise_m
+    far_ends = surface[:, :-1] + np.diff(ground, axis=1) / 2 + rise[:-1] + rise_m / 2
     lowest = np.full_like(surface, -np.inf)
-    lowest[:, 1:] = highest[:, :-1] - rise[1:]
+    lowest[:, 1:] = np.maximum.accumulate(far_ends, axis=1) - rise[1:]
     return lowest
 
 
@@ -132,19 +141,21 @@ def _along_rays(
     rows, cols = heights.surface_m.shape
     away = -np.array(sight.towards_px) * sight.pixel_m
     across = np.array([-away[1], away[0]])
-    middle = np.array([cols - 1, rows - 1]) / 2
-    # Half of what the image extends along the rays and across them.
-    reach = [float(np.abs(axis) @ middle) for axis in (away, across)]
-    along, aside = (np.arange(math.ceil(2 * half - 1e-6) + 1) - half for half in reach)
+    x, y = (np.arange(n) + first for n, first in zip((cols, rows), heights.first_px, strict=True))
+    # Which of the map's rays, and which point of it, each pixel is nearest to.
+    ray, place = (_nearest(np.add.outer(y * axis[1], x * axis[0])) for axis in (across, away))
+    aside, along = (np.arange(at.min(), at.max() + 1) for at in (ray, place))
     col, row = (
-        np.rint(middle[k] + np.add.outer(aside * across[k], along * away[k])).astype(np.intp)
-        for k in (0, 1)
+        np.clip(_nearest(np.add.outer(aside * across[k], along * away[k])) - at[0], 0, len(at) - 1)
+        for k, at in enumerate((x, y))
     )
-    at = np.clip(row, 0, rows - 1) * cols + np.clip(col, 0, cols - 1)
-    found = function(heights.surface_m.ravel()[at], heights.ground_m.ravel()[at])
-    x, y = np.arange(cols) - middle[0], np.arange(rows) - middle[1]
-    ray, place = (
-        np.rint(np.add.outer(y * axis[1], x * axis[0]) + half).astype(np.intp)
-        for axis, half in ((across, reach[1]), (away, reach[0]))
+    at = row * cols + col
+    surface, ground = (
+        part.ravel()[at].astype(np.float64) for part in (heights.surface_m, heights.ground_m)
     )
-    return found[ray, place]
+    return function(surface, ground)[ray - aside[0], place - along[0]]
+
+
+def _nearest(values: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the nearest whole numbers; halves go up, wherever the count begins."""
+    return np.floor(values + 0.5).astype(np.intp)

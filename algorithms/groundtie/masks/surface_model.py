@@ -1,4 +1,4 @@
-"""Masks by a surface model: the ground that both images show, by the geometry of their views.
+"""What images show of a surface model, by the geometry of their views: which ground, and what else.
 
 Elevated objects are imaged elsewhere than their feet, hide ground, and cast shadows. With heights
 and views all of that is computed, and nothing is guessed from grey values.
@@ -22,13 +22,10 @@ from ..rasters.grid import Grid
 from ..rasters.reading import FloatImage, Mask, Window
 from ..rasters.tiling import tile_count, tiles
 from ..rasters.writing import create_like, one_band
-from .object_heights import WIDEST_M, SurfaceModel
+from .object_heights import GROUND_REACH_M, LOWEST_M, SurfaceModel, ground_cell_px
 from .ray_casting import Heights, LineOfSight, hidden_ground, radar_echoes
 from .scene import Scene, Selection
 from .threshold import grown
-
-# What rises by less is taken for ground: cars, hedges, the noise of a surface model.
-_LOWEST_M = 2.0
 
 # Brightness of shadow, that of ground being 1; what correlates with it hardly depends on it.
 _SHADOW = np.float32(0.1)
@@ -76,10 +73,10 @@ class SurfaceGround:
 
     def seen(self, window: Window) -> NDArray[np.uint8]:
         """Return what of a window's ground is not seen, and why: bits of `Seen`, shape (h, w)."""
-        piece, heights, known, inside = self._around(window)
+        heights, known, inside = self._around(window)
         found = [(Seen.RAISED, heights.surface_m > heights.ground_m), (Seen.UNKNOWN, ~known)]
         for view in self.views:
-            found += _not_shown(heights, view, piece)
+            found += _not_shown(heights, view, self.scene.grid)
         seen = np.zeros(known.shape, np.uint8)
         for why, where in found:
             seen[grown(where, _GROWN_PX)] |= np.uint8(why)
@@ -90,54 +87,62 @@ class SurfaceGround:
 
         All surfaces are taken for equally bright, radar and cast shadow for darker by 10 dB.
         """
-        piece, heights, _, inside = self._around(window)
-        found = dict(_not_shown(heights, view, piece))
+        return self._level(window, view)[0]
+
+    def image(self, window: Window, view: View) -> FloatImage:
+        """Return that as the amplitude of a radar image, shape (h, w); NaN where not known."""
+        level, known = self._level(window, view)
+        return np.where(known, np.exp(level / 2), np.float32(np.nan))
+
+    def _level(self, window: Window, view: View) -> tuple[FloatImage, Mask]:
+        """Return `level`, and where the model is known."""
+        heights, known, inside = self._around(window)
+        found = dict(_not_shown(heights, view, self.scene.grid))
         if view.sensor == RADAR:
             ground = ~found[Seen.RADAR_SHADOW] & (heights.surface_m == heights.ground_m)
-            shown = radar_echoes(heights, _sight(view, piece)) + ground
+            shown = radar_echoes(heights, _sight(view, self.scene.grid)) + ground
         else:
             shown = ~(found.get(Seen.CAST_SHADOW, np.zeros((), bool)) & ~found[Seen.HIDDEN])
-        return np.log(np.asarray(shown[inside], np.float32) + _SHADOW)
+        return np.log(np.asarray(shown[inside], np.float32) + _SHADOW), known[inside]
 
     def require_cover(self) -> None:
         """Raise `NoOverlapError` if the model knows nothing of the scene."""
         if self._highest_m is None:
             raise NoOverlapError("the surface model does not cover the reference")
 
-    def _around(self, window: Window) -> tuple[Grid, Heights, Mask, tuple[slice, slice]]:
-        """Return all that matters to a window: grid, heights, where known, and where it lies."""
+    def _around(self, window: Window) -> tuple[Heights, Mask, tuple[slice, slice]]:
+        """Return all that matters to a window: heights, where known, and where it lies."""
         longest = max(_longest(view) for view in self.views)
-        reach = self._pixels((self._highest_m or 0.0) * longest + WIDEST_M) + _GROWN_PX
-        piece, heights, known = self._piece(window, reach)
-        inside = slice(reach, reach + window.height), slice(reach, reach + window.width)
-        return piece, heights, known, inside
+        return self._piece(window, (self._highest_m or 0.0) * longest)
 
-    def _piece(self, window: Window, reach: int) -> tuple[Grid, Heights, Mask]:
-        """Return a grid, its heights where anything stands, and where they are known."""
-        width, height = window.width + 2 * reach, window.height + 2 * reach
-        col, row = (at - reach for at in window[:2])
-        piece = self.scene.grid.window(col, row, width, height)
+    def _piece(self, window: Window, reach_m: float) -> tuple[Heights, Mask, tuple[slice, slice]]:
+        """Return heights of what stands so far around, where they are known, and the window."""
+        # Ground is found in cells: they are the same in every window.
+        cell = ground_cell_px(self.scene.grid.pixel_size_m)
+        around = (reach_m + GROUND_REACH_M) / self.scene.grid.pixel_size_m
+        reach = math.ceil(around) + _GROWN_PX + cell
+        left, above = (reach + (at - reach) % cell for at in window[:2])
+        first_px = window.col - left, window.row - above
+        width, height = left + window.width + reach, above + window.height + reach
         right, down = self.offset_px
         heights, known = self.model.heights(
-            self.scene.grid.window(col - right, row - down, width, height)
+            self.scene.grid.window(first_px[0] - right, first_px[1] - down, width, height)
         )
         # What counts as ground hides nothing.
-        stands = heights.surface_m - heights.ground_m > _LOWEST_M
+        stands = heights.surface_m - heights.ground_m > LOWEST_M
         surface = np.where(stands, heights.surface_m, heights.ground_m)
-        return piece, Heights(surface, heights.ground_m), known
+        inside = slice(above, above + window.height), slice(left, left + window.width)
+        return Heights(surface, heights.ground_m, first_px), known, inside
 
     @cached_property
     def _highest_m(self) -> float | None:
         """Height of the highest object; None if the model knows nothing here."""
         highest = []
         for tile in tiles(self.scene.grid):
-            _, heights, known = self._piece(tile, self._pixels(WIDEST_M))
+            heights, known, _ = self._piece(tile, 0.0)
             if known.any():
                 highest.append(float((heights.surface_m - heights.ground_m).max()))
         return max(highest, default=None)
-
-    def _pixels(self, length_m: float) -> int:
-        return math.ceil(length_m / self.scene.grid.pixel_size_m)
 
 
 def write_reasons(ground: SurfaceGround, path: Path, progress: Progress = SILENT) -> None:
@@ -147,6 +152,16 @@ def write_reasons(ground: SurfaceGround, path: Path, progress: Progress = SILENT
     with create_like(like, grid, path, nodata=None) as file:
         for number, tile in enumerate(tiles(grid)):
             file.write(ground.seen(tile), window=tile)
+            progress.update((number + 1) / tile_count(grid))
+
+
+def write_image(ground: SurfaceGround, view: View, path: Path, progress: Progress = SILENT) -> None:
+    """Write a raster of the amplitudes that a radar image from a view may show."""
+    grid = ground.scene.grid
+    like = one_band(ground.scene.like, "float32")
+    with create_like(like, grid, path, nodata=math.nan) as file:
+        for number, tile in enumerate(tiles(grid)):
+            file.write(ground.image(tile, view), window=tile)
             progress.update((number + 1) / tile_count(grid))
 
 
@@ -160,23 +175,23 @@ def _longest(view: View) -> float:
     return max(tangents)
 
 
-def _not_shown(heights: Heights, view: View, piece: Grid) -> list[tuple[Seen, Mask]]:
+def _not_shown(heights: Heights, view: View, grid: Grid) -> list[tuple[Seen, Mask]]:
     """Return what of the ground an image from a view does not show, and why."""
-    sight = _sight(view, piece)
+    sight = _sight(view, grid)
     hidden = hidden_ground(heights, sight)
     if view.sensor == RADAR:
         laid_over = radar_echoes(heights, sight) > 0
         return [(Seen.RADAR_SHADOW, hidden), (Seen.LAYOVER, np.asarray(laid_over))]
     found = [(Seen.HIDDEN, hidden)]
     if view.sun_azimuth_deg is not None and view.sun_elevation_deg is not None:
-        towards_sun = _on_pixels(view.sun_azimuth_deg, piece)
+        towards_sun = _on_pixels(view.sun_azimuth_deg, grid)
         sunlight = LineOfSight.from_vertical(towards_sun, 90 - view.sun_elevation_deg)
         found.append((Seen.CAST_SHADOW, hidden_ground(heights, sunlight)))
     return found
 
 
-def _sight(view: View, piece: Grid) -> LineOfSight:
-    return LineOfSight.from_vertical(_on_pixels(view.azimuth_deg, piece), view.incidence_deg)
+def _sight(view: View, grid: Grid) -> LineOfSight:
+    return LineOfSight.from_vertical(_on_pixels(view.azimuth_deg, grid), view.incidence_deg)
 
 
 def _on_pixels(azimuth_deg: float, grid: Grid) -> tuple[float, float]:

@@ -8,11 +8,11 @@ from dataclasses import replace
 from typing import Any
 
 from ..errors import ParameterError
-from ..geometry.views import View, split_views
+from ..geometry.views import View, parse_view, split_views
 from ..matching.surface_fit import AUTO
 from ..rasters.rendered import LIGHTS, RADAR, SUN, Light
 from .registered_output import grid_of_output, model_for_grid
-from .specification import Specification, StatedSurface
+from .specification import BOTH, Specification, StatedSurface
 from .user_masks import UserMask
 
 # What tools may leave out that do not ask for it.
@@ -31,8 +31,8 @@ USUAL: Mapping[str, Any] = {
 # of the sun. Measured with `benchmarks/run.py --only mountains`: 15° off costs little.
 _AZIMUTHS_DEG = {RADAR: (270.0, 90.0), SUN: (150.0, 120.0, 180.0, 90.0, 30.0, 60.0)}
 
-# What a view begins with that is that of a terrain model.
-_TERRAIN = "terrain"
+# What a view begins with that is that of heights.
+_TERRAIN, _SURFACE = "terrain", "surface"
 
 _WORDS = re.compile(rf"{_TERRAIN}[\s,]+({'|'.join(LIGHTS)})(?:[\s,]+azimuth=(\d+(?:\.\d+)?)°?)?")
 
@@ -57,7 +57,7 @@ def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:
     model = given["surface_model"]
     words = split_views(given["views"])
     if model is None:
-        if words[1] is not None or (words[0] is not None and not asked_lights(given)):
+        if words[1] is not None or (words[0] is not None and not asked_rendering(given)):
             raise ParameterError("views go with a surface model (surface_model)")
         return None
     names = ("reference", image)
@@ -77,7 +77,7 @@ def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specifica
     return replace(
         searched(preset, {**USUAL, **parameters}, "input"),
         **asked_terrain(parameters),
-        light=asked_light(parameters),
+        **asked_rendering(parameters),
         model=model_for_grid(
             parameters["model"], grid_of_output(parameters["output"], parameters["output_grid"])
         ),
@@ -112,6 +112,47 @@ def asked_terrain(given: Mapping[str, Any]) -> dict[str, Any]:
     if dem is not None and model != AUTO:
         raise ParameterError(f"a terrain model (dem) goes with model {AUTO}, not {model}")
     return {"dem": dem, "input_dem": input_dem}
+
+
+def asked_rendering(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what of a specification the view of a reference states that is heights; {}: none.
+
+    Raises
+    ------
+    ParameterError
+        The words state none, or not where the sun or the radar stands.
+    """
+    view = asked_surface_view(given)
+    if view is not None:
+        return {"surface_view": view, "radar": BOTH}
+    light = asked_light(given)
+    return {} if light is None else {"light": light}
+
+
+def asked_surface_view(given: Mapping[str, Any]) -> View | None:
+    """Return from where a reference that is a surface model is to be rendered; None: it is none.
+
+    Parameters
+    ----------
+    given
+        The values of a tool's parameters. The reference's view is `surface radar azimuth=280
+        incidence=35`, or without numbers, which the input's metadata then must state.
+
+    Raises
+    ------
+    ParameterError
+        The words state no view of a radar.
+    """
+    words = (split_views(given.get("views"))[0] or "").lower()
+    if not words.startswith(_SURFACE):
+        return None
+    stated = words.removeprefix(_SURFACE).strip(" ,")
+    view = View.of(given.get("input"), None) if stated == RADAR else parse_view(stated)
+    if view is None or view.sensor != RADAR:
+        raise ParameterError(
+            f"{words!r} states no radar's view: give '{_SURFACE} {RADAR} azimuth=280 incidence=35'"
+        )
+    return view
 
 
 def asked_lights(given: Mapping[str, Any]) -> tuple[Light, ...]:

@@ -6,7 +6,7 @@ characteristics" as future work.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -18,9 +18,8 @@ from ..masks.choice import AUTO
 from ..progress import Progress
 from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster
-from ..rasters.rendered import Light
 from ..sensor.rpc_files import rpc_of
-from .asked import USUAL, asked_lights, asked_terrain
+from .asked import USUAL, asked_lights, asked_rendering, asked_surface_view, asked_terrain
 from .delivery import Call
 from .evidence import SCENE, SURVEY
 from .orthorectification import write_orthoimage
@@ -93,9 +92,13 @@ def plan(scene: SceneInfo, is_georeferenced: bool) -> tuple[Try, ...]:
     return tuple(tries)
 
 
-def plan_lit(lights: Iterable[Light]) -> Iterator[Try]:
-    """Yield what is tried where the reference is a terrain model, rendered in these lights."""
-    for light in lights:
+def plan_rendered(given: Mapping[str, Any]) -> Iterator[Try]:
+    """Yield what is tried where the reference is heights, by the values of a tool's parameters."""
+    if asked_surface_view(given) is not None:
+        because = "the reference is a surface model, rendered as the radar image"
+        yield Try("coregister", replace(COREGISTER, **asked_rendering(given)), because)
+        return
+    for light in asked_lights(given):
         place = f"{light.kind} in {light.azimuth_deg:g}° from north"
         because = f"the reference is a terrain model, rendered with the {place}"
         yield Try("coregister", replace(COREGISTER, light=light), because)
@@ -131,10 +134,10 @@ def register_anything(
     call = Call.of(parameters, progress)
     with bounded_cache(), threads(parameters["workers"], progress) as context:
         asked = asked_terrain(parameters) | {"max_error_px": parameters["max_error"]}
-        lit = tuple(plan_lit(asked_lights(parameters)))
-        if parameters["views"] is not None and not lit:
-            raise ParameterError("register takes the view of a terrain model only")
-        found, stack = _first_accepted(call, asked, lit, context.part(0.0, 0.7))
+        ways = tuple(plan_rendered(parameters))
+        if parameters["views"] is not None and not ways:
+            raise ParameterError("register takes the view of a terrain or surface model only")
+        found, stack = _first_accepted(call, asked, ways, context.part(0.0, 0.7))
         return call.deliver(found, context.part(0.7, 1.0), stack)
 
 
@@ -149,7 +152,7 @@ def _first_accepted(
     with ExitStack() as stack:
         first = ways[0].spec if ways else COREGISTER
         opened = stack.enter_context(call.open(first, context.part(0.0, 0.02)))
-        scene = SceneInfo.of(opened.pair)
+        scene = SceneInfo.of(opened.pair, first.radar)
         is_georeferenced = opened.pair.input.source.grid.is_georeferenced
         ways = ways or plan(scene, is_georeferenced)
         if asked["dem"] is not None:

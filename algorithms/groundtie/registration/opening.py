@@ -16,6 +16,7 @@ from ..rasters.reading import open_raster
 from ..rasters.rendered import rendered
 from .masks import require_one_mask
 from .specification import Specification
+from .surface_masks import rendered_surface
 from .user_masks import named_masks, with_user_masks
 
 
@@ -75,6 +76,9 @@ def open_pair(
             Image(stack.enter_context(open_raster(raster)), band)
             for raster, band in zip((reference, input), bands, strict=True)
         ]
+        if spec.surface_view is not None:
+            context.update(0.0, "rendering the surface model")
+            opened[0] = rendered_surface(opened[0], spec.surface_view, stack, context.quiet())
         yield pair_images(opened[0], opened[1], spec, context, masks, stack, started)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..context import Context
 from ..errors import NoOverlapError, NothingFoundError, TooFewPointsError
+from ..masks.choice import AUTO, NONE, MaskUsed
 from ..rasters.reading import bounded_cache
 from .evidence import Exchanged, RegistrationEvidence, SearchEvidence
 from .masks import Masked, with_ground_mask
@@ -53,6 +54,9 @@ def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: 
         return with_surface_mask(opened.pair, spec.surface, spec.mask, opened.stack, context)
     if opened.user_mask is not None:
         return Masked(opened.pair, opened.user_mask)
+    if spec.surface_view is not None and spec.mask in (AUTO, NONE):
+        reason = "the surface model is rendered with the layover of the radar image"
+        return Masked(opened.pair, MaskUsed(NONE, None, 1.0, reason))
     return with_ground_mask(opened.pair, spec.mask, scene, opened.stack, context)
 
 
@@ -93,7 +97,7 @@ def _asks_for_exchange(
     survey = evidence.survey
     if survey is None or not survey.is_weakly_confirmed or evidence.mask.is_ground:
         return False
-    is_plain = spec.surface is None and spec.dem is None and spec.light is None
+    is_plain = spec.surface is None and spec.dem is None and not spec.is_rendered
     return is_plain and not scene.input.is_in_sensor_geometry
 
 

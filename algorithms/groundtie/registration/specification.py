@@ -115,7 +115,10 @@ class Specification:
         was orthorectified with (None: one height everywhere). With the first, "auto" may choose
         `models.TERRAIN`; chips alone know it.
     light
-        The reference is a terrain model: it is rendered in this light. None: it is an image.
+        The reference is a terrain model: it is rendered in this light. None: it is none.
+    surface_view
+        The reference is a surface model: it is rendered as a radar image from this view, with
+        layover and radar shadow. None: it is none.
     surveys
         Whether chips all over the pair are matched, too, which rules ask for.
     """
@@ -138,7 +141,13 @@ class Specification:
     dem: Any = None
     input_dem: Any = None
     light: Light | None = None
+    surface_view: View | None = None
     surveys: bool = True
+
+    @property
+    def is_rendered(self) -> bool:
+        """Whether the reference is no image, but heights that one is made of."""
+        return self.light is not None or self.surface_view is not None
 
     def with_surface(self, surface: StatedSurface) -> Specification:
         """Return the same with elevated objects, and whose images show them."""

@@ -23,9 +23,9 @@ from ..matching.pyramid import find_coarse_model
 from ..matching.rest import Rest, survey_rest
 from ..matching.surface_fit import SurfaceFit
 from ..matching.survey import Survey, survey_model, survey_places
+from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
-from ..rasters.patch import Patch
-from ..rasters.reading import Window
+from ..rasters.patch import Patch, middle_window
 from ..similarity.surface import SimilaritySettings
 from .evidence import RegistrationEvidence
 from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
@@ -33,7 +33,7 @@ from .masks import Masked
 from .opening import open_terrain
 from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
-from .surface_masks import ModelFit, fit_of
+from .surface_masks import ModelFit, fit_of, fit_of_images
 
 # What chips all over show; without what the arrays share, if anything; and in bands alone.
 Surveys = tuple[Survey | None, Rest | None, tuple[BandSurvey, ...]]
@@ -131,8 +131,10 @@ class Stages:
         pair, transform = self.masked.pair, estimate.transform
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
         places, kind = survey_places(pair.grid), scene.of_one_kind
-        # No rule asks for ghosts where a mask leaves nothing but ground.
-        ghosts, first = not self.masked.used.is_ground, context.part(0.0, 0.5)
+        # No rule asks for ghosts where a mask leaves nothing but ground. And nobody copies what was
+        # rendered: a second place there is what echoes more strongly than the model lets expect.
+        ghosts = not self.masked.used.is_ground and self.spec.surface_view is None
+        first = context.part(0.0, 0.5)
         survey = survey_model(chips, transform.model, first, seeks_ghost=ghosts)
         rest = survey_rest(chips, transform, places, ELSEWHERE_PX, kind, context.part(0.5, 0.9))
         last = context.part(0.9, 1.0)
@@ -170,16 +172,19 @@ class Stages:
         )
 
     def _input_fit(self, estimate: Estimate) -> ModelFit | None:
-        """Return how well a surface model fits the registered input, which it was not fitted to."""
+        """Return how well a surface model fits the registered input as a whole."""
         surface, pair, model = self.masked.surface, self.masked.pair, estimate.transform.model
-        if surface is None:
-            return None
 
-        def read(window: Window) -> Patch:
-            piece = surface.scene.grid.window(*window)
+        def registered(piece: Grid) -> Patch:
             return pair.input_patch(piece, lambda xy: pair.nominal_px(model(xy)))
 
-        return fit_of(surface, surface.views[-1], read)
+        if surface is not None:
+            grid = surface.scene.grid
+            return fit_of(surface, surface.views[-1], lambda at: registered(grid.window(*at)))
+        if self.spec.surface_view is not None:
+            piece = pair.grid.window(*middle_window(pair.grid))
+            return fit_of_images(pair.reference_patch(piece), registered(piece))
+        return None
 
 
 def _fit(
@@ -194,7 +199,7 @@ def _fit(
     if spec.matcher == CHIPS:
         terrain = None if spec.dem is None else open_terrain(pair, spec.dem, spec.input_dem)
         candidates = spec.candidates if terrain is None else TERRAIN_CANDIDATES
-        if spec.light is not None:
+        if spec.is_rendered:
             # Polynomials bend along what no rendering shows: land cover and what is laid over.
             candidates = tuple(kind for kind in candidates if kind in (*LINEAR_CANDIDATES, TERRAIN))
         return SurfaceFit(matcher, layout, candidates, terrain=terrain)

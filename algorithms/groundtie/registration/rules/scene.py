@@ -6,7 +6,7 @@ import numpy as np
 
 from ...masks.choice import LAYER, REGIONS, SURFACE
 from ..evidence import SCENE, RegistrationEvidence
-from ..surface_masks import CLEAR_CORRELATION
+from ..surface_masks import CLEAR_CORRELATION, RENDERED_CORRELATION
 from .rule import GROUND, Rule
 
 # What the ground shows of a fit that was not made on it: it is itself good to a pixel or two.
@@ -112,7 +112,7 @@ SCENE_RULES: tuple[Rule, ...] = (
         SCENE,
         f"the reference or the registered input does not correlate by {CLEAR_CORRELATION:g} with "
         "what the surface model and the view let expect, or the input does elsewhere by more than "
-        "the largest error",
+        f"the largest error; by {RENDERED_CORRELATION:g} where the surface model is the reference",
         "suite towns",
         "give the surface model of this place and the right views, or leave it out",
         _surface_elsewhere,

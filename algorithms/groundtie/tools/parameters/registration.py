@@ -166,7 +166,8 @@ _VIEWS = (
 _TERRAIN_VIEW = (
     "If the reference is a terrain model, how it is rendered: 'terrain sun azimuth=155' for a "
     "camera's image, 'terrain radar' for a radar's; without azimuth a radar stands in the west, "
-    "and register tries azimuths."
+    "and register tries azimuths. If it is a surface model of a town, 'surface radar azimuth=280 "
+    "incidence=35' for a radar image; 'surface radar' takes these from the input's metadata."
 )
 Views = Annotated[str | None, Text(label="Views", help=f"{_VIEWS} {_TERRAIN_VIEW}", advanced=True)]
 SurfaceViews = Annotated[str | None, Text(label="Views", help=_VIEWS, advanced=True)]
