@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from rpc_models import camera_rpc, to_rasterio, write_dem, write_positions
 from rpc_scenes import SIZE, Scene, ground_texture, make_scene
 
 import groundtie
+from benchmarks.rpc_city import true_error_px
 from groundtie.errors import GroundTieError, NotRegisteredError, OutputError, ParameterError
 from groundtie.sensor.bias import Bias, fold
 from groundtie.sensor.rpc import RPC
@@ -108,23 +110,27 @@ def test_a_refused_matching_leaves_its_report(scene: Scene, tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_a_small_dense_town_is_refused(tmp_path: Path) -> None:
-    """Four sums of check points on the ground agree on biased RPCs as well as on right ones."""
+def test_a_small_dense_town_is_right_by_colours_and_refused_without(tmp_path: Path) -> None:
+    """All open ground takes part; by grey levels its few check points may agree on biased RPCs."""
     groundtie.simulate_sensor(tmp_path, density="urban", shift=30.0, seed=6, size=600)
-    files = {"dem": tmp_path / "dem.tif", "dem_datum": "ellipsoidal"}
-    output = tmp_path / "refined_RPC.TXT"
-    with pytest.raises(NotRegisteredError) as refusal:
+
+    def refine(output: Path, **more: Any) -> None:
         groundtie.refine_rpc(
             tmp_path / "sensor.tif",
             output,
             tmp_path / "reference.tif",
             mask="regions",
             search_radius=60.0,
-            **files,
+            dem=tmp_path / "dem.tif",
+            dem_datum="ellipsoidal",
+            **more,
         )
-    assert refusal.value.verdict is not None
-    assert refusal.value.verdict.rule == "too little ground"
-    assert not output.exists()
+
+    refine(tmp_path / "refined_RPC.TXT")
+    assert true_error_px(tmp_path, tmp_path / "refined_RPC.TXT") < 2.0
+    with pytest.raises(NotRegisteredError):
+        refine(tmp_path / "grey_RPC.TXT", image_band=1)
+    assert not (tmp_path / "grey_RPC.TXT").exists()
 
 
 def write_points(
