@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ...matching.parts import LEAST_EXCESS
 from ...matching.rest import Rest
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
@@ -29,7 +31,8 @@ DRAWN_REST_HEIGHT = 8.0
 # robust standard deviations of its surfaces, and be so many times as high in what a mask leaves.
 # Measured by the suites margins and attacks: right transforms with more than the former are up to
 # 1.3 times as high; beneath clouds and labels over ground that lies elsewhere, from 1.6 times and
-# 6.1 on; ground that shows through copies stands out by 8.4 and more.
+# 6.1 on; ground that shows through copies stands out by 8.4 and more, where what the reference does
+# not explain is weak at the transform: of copies of what repeats, it may be high at both places.
 # Nor may it show nothing where the transform has it: from 1.66 on where it is right, up to 1.5
 # beneath clouds and snow, but for one at 1.8. Of plain copies, few chips have anything left. Where
 # edges are as sharp as drawn ones, it must be as high as of other content: right ones from 2.53
@@ -91,12 +94,14 @@ def deviations_elsewhere(rest: Rest) -> float:
     """
     if rest.beyond is None:
         return 0.0
-    shares = ((rest.survey, _MASKED_RIVAL), (rest.beyond, RIVAL_HEIGHT))
+    limits = ((rest.survey, _MASKED_RIVAL, math.inf), (rest.beyond, RIVAL_HEIGHT, WEAK_REST_HEIGHT))
     return max(
         left.rival_deviations
-        if is_enough(left, rest) and left.rival_height >= share * left.height
+        if is_enough(left, rest)
+        and left.height < strong
+        and left.rival_height >= share * left.height
         else 0.0
-        for left, share in shares
+        for left, share, strong in limits
     )
 
 
@@ -170,7 +175,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         f"or one sensor's views, below {WEAK_COPY_HEIGHT:g}, or {WEAK_REST_HEIGHT:g} with sharp "
         "edges, if half of the chips have anything left, or where a second place "
         f"stands out by {BEYOND_DEVIATIONS:g}: {_MASKED_RIVAL:g} times as high in what is left, or "
-        f"{RIVAL_HEIGHT:g} times in what the reference does not explain",
+        f"{RIVAL_HEIGHT:g} times in what the reference does not explain, if that is weak",
         "suites margins and attacks",
         WITHOUT,
         _locked,
