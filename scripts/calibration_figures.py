@@ -23,6 +23,8 @@ _STYLES = {
     "SAR–SAR, suburban": (ORANGE, "s"),
     "optical, rural": (GREEN, "o"),
     "optical, suburban": (GREEN, "s"),
+    "city, 1 m": (BLUE, "^"),
+    "city, 2 m": (BLUE, "v"),
     "real sar-optical": ("black", "D"),
     "real optical-optical": (GREY, "D"),
 }

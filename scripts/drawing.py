@@ -40,6 +40,10 @@ class Scenes:
         """Return the folder of a dense city of 400 px."""
         return self._pair("city", size=400, density="city", looks=4, seed=3)
 
+    def large_city(self) -> Path:
+        """Return the folder of one of 1000 px, as masks of the ground go by the whole scene."""
+        return self._pair("large-city", size=1000, density="city", seed=225)
+
     def speckled(self) -> Path:
         """Return the folder of a rural pair with one look."""
         return self._pair("speckled", size=300, density="rural", looks=1, seed=4)

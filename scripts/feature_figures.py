@@ -50,9 +50,9 @@ def hog(scenes: Scenes) -> Figure:
 
 def masks(scenes: Scenes) -> Figure:
     """A radar image of a city, and two masks of it."""
-    radar = scenes.city() / "reference.tif"
+    radar = scenes.large_city() / "reference.tif"
     figure, axes = canvas(8, 2.85, 3)
-    window = np.s_[90:310:2, 90:310:2]
+    window = np.s_[60:500:2, 120:560:2]
     power = cv2.blur(read_band(radar) ** 2, (3, 3))
     grey = stretched(np.log(power + 1.0))[window]
     axes[0].imshow(grey, cmap="gray")
