@@ -52,7 +52,7 @@ def masks(scenes: Scenes) -> Figure:
     """A radar image of a city, and two masks of it."""
     radar = scenes.large_city() / "reference.tif"
     figure, axes = canvas(8, 2.85, 3)
-    window = np.s_[100:480:2, 170:550:2]
+    window = np.s_[120:420:2, 200:500:2]
     power = cv2.blur(read_band(radar) ** 2, (3, 3))
     grey = stretched(np.log(power + 1.0))[window]
     axes[0].imshow(grey, cmap="gray")
