@@ -52,7 +52,7 @@ SUITES = (
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Return the options of the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, fromfile_prefix_chars="@")
     parser.add_argument(
         "--only", type=_suite_names, default=SUITES, help=f"suites, of {','.join(SUITES)}"
     )
@@ -74,7 +74,9 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     attacks.add_argument(
         "--classes", nargs="+", default=(), help="classes or groups of classes, by their names"
     )
-    attacks.add_argument("--case", default="", help="one case, by the name that a table gives")
+    attacks.add_argument(
+        "--case", nargs="+", default=(), help="by the names that a table gives, or @FILE of them"
+    )
     attacks.add_argument("--save", type=Path, help="folder for the images of what is run")
     parser.add_argument("--results", type=Path, default=HERE / "results", help="folder of results")
     return parser.parse_args(arguments)
@@ -141,7 +143,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         first_seed,
         options.sample,
         tuple(options.classes),
-        options.case,
+        tuple(options.case),
         options.save,
     )
     crashed = 0

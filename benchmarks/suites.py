@@ -31,9 +31,9 @@ class Settings:
         Folder of the real image pairs.
     cache
         Folder of simulated pairs, which take long to make.
-    first_seed, sample, classes, case, save
+    first_seed, sample, classes, named, save
         The first of the seeds, of attacks, calibration and towns; of attacks alone: how many cases,
-        of all classes; which classes; one case by its name; a folder for the images of what is run.
+        of all classes; which classes; which by their names; a folder for the images.
     """
 
     quick: bool
@@ -44,7 +44,7 @@ class Settings:
     first_seed: int = 1
     sample: int | None = None
     classes: tuple[str, ...] = ()
-    case: str = ""
+    named: tuple[str, ...] = ()
     save: Path | None = None
 
 

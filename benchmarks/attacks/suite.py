@@ -23,7 +23,7 @@ _QUICK = 20
 
 
 def run(settings: Settings) -> SuiteResult:
-    """Run the suite, or the one case that is named."""
+    """Run the suite, or the cases that are named."""
     chosen = choose(settings)
     if settings.save is not None:
         for case in chosen:
@@ -55,8 +55,8 @@ def run(settings: Settings) -> SuiteResult:
 
 def choose(settings: Settings) -> list[AnyCase]:
     """Return the cases that settings ask for."""
-    if settings.case:
-        return [named(settings.case, settings.data, settings.cache)]
+    if settings.named:
+        return [named(name, settings.data, settings.cache) for name in settings.named]
     is_whole = not (settings.sample or settings.classes)
     number = min(settings.seeds, _SEEDS) if is_whole else settings.seeds
     seeds = range(settings.first_seed, settings.first_seed + number)

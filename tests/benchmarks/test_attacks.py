@@ -278,7 +278,7 @@ def test_classes_are_chosen_by_their_names_or_those_of_their_groups(tmp_path: Pa
 @pytest.mark.usefixtures("made_scenes")
 def test_a_case_runs_alone_and_keeps_its_images(tmp_path: Path) -> None:
     name = "ground elsewhere/0/made-rural/coregister/1"
-    result = suite.run(settings(tmp_path, case=name, save=tmp_path / "kept"))
+    result = suite.run(settings(tmp_path, named=(name,), save=tmp_path / "kept"))
     (record,) = result.records
     assert (record["name"], record["verdict"], record["group"]) == (name, CORRECT, CONTROLS)
     assert record["error_px"] < 0.3
@@ -290,7 +290,7 @@ def test_a_case_runs_alone_and_keeps_its_images(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("made_scenes")
 def test_another_place_is_refused_by_a_rule(tmp_path: Path) -> None:
-    result = suite.run(settings(tmp_path, case="another place/-/made-rural/match_optical/1"))
+    result = suite.run(settings(tmp_path, named=("another place/-/made-rural/match_optical/1",)))
     (record,) = result.records
     assert record["verdict"] == REFUSED
     assert record["rule"]

@@ -53,11 +53,14 @@ def test_options_reach_the_suites(suites: dict[str, list[Settings]], tmp_path: P
 
 
 def test_attacks_are_chosen(suites: dict[str, list[Settings]], tmp_path: Path) -> None:
+    names = tmp_path / "names.txt"
+    names.write_text("a/-/b/c/1\nparts lie off/-/b/c/2\n")
     options = ["--only", "attacks", "--seeds", "4-6", "--sample", "9", "--results", str(tmp_path)]
-    run.main([*options, "--classes", "watermark", "dense city", "--case", "a/-/b/c/1"])
+    run.main([*options, "--classes", "watermark", "dense city", "--case", f"@{names}"])
     (settings,) = suites["attacks"]
     assert (settings.first_seed, settings.seeds, settings.sample) == (4, 3, 9)
-    assert (settings.classes, settings.case) == (("watermark", "dense city"), "a/-/b/c/1")
+    assert settings.classes == ("watermark", "dense city")
+    assert settings.named == ("a/-/b/c/1", "parts lie off/-/b/c/2")
     with pytest.raises(SystemExit):
         run.main(["--seeds", "few"])
 

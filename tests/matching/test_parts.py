@@ -119,4 +119,4 @@ def test_what_a_weakly_confirmed_part_needs_grows_with_the_chips() -> None:
     assert excess_if_weak(49, is_masked=False) == excess_if_weak(9, is_masked=True) == 7.0
     assert excess_if_weak(36, is_masked=False) == 6.0
     assert excess_if_weak(9, is_masked=False) == 5.0
-    assert excess_if_weak(100, is_masked=False) == LEAST_EXCESS
+    assert excess_if_weak(100, is_masked=False) == 7.0

@@ -33,10 +33,11 @@ LEAST_EXCESS = 8.5
 
 # Where fewer than two of three chips match where the model has them, less speaks for it: a part may
 # not stand out as all n chips do of which each is one such deviation higher elsewhere, √n. Measured
-# by the suites real, rotated_pairs and attacks, from 25 chips on: right transforms up to 0.97 times
-# that, and one at 1.4; of ten wrong ones four from 1.08 times on. Pixels that a mask leaves vary
-# more: of right copies up to 6.9, so that there are never fewer than 49 counted.
-_FEWEST_IF_WEAK, _FEWEST_MASKED = 25, 49
+# by the suites real, rotated_pairs and attacks, from 25 to 49 chips: right transforms up to 0.97
+# times that, and one at 1.4; of ten wrong ones four from 1.08 times on. With more chips, right ones
+# up to 6.5 and wrong ones from 7.4 on. Pixels that a mask leaves vary more: of right copies up to
+# 6.9, so that there are never fewer than 49 counted.
+_FEWEST_IF_WEAK, _MOST_IF_WEAK = 25, 49
 
 # Fewer chips are no part. None counts for more than this, so that two of three are no part, either,
 # unless few match where the model has them: 2 * 7 / sqrt(3) = 8.1.
@@ -87,8 +88,8 @@ class Part:
 
 def excess_if_weak(chips: int, is_masked: bool) -> float:
     """Return the excess from which on a part lies elsewhere, where few of so many chips confirm."""
-    fewest = _FEWEST_MASKED if is_masked else _FEWEST_IF_WEAK
-    return min(math.sqrt(max(chips, fewest)), LEAST_EXCESS)
+    fewest = _MOST_IF_WEAK if is_masked else _FEWEST_IF_WEAK
+    return math.sqrt(np.clip(chips, fewest, _MOST_IF_WEAK))
 
 
 def find_parts(

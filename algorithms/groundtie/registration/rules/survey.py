@@ -139,8 +139,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         SURVEY,
         "neighbouring chips together match elsewhere "
         f"{LEAST_EXCESS:g} standard deviations of noise better than where the transform has them, "
-        "or, if fewer than two of three chips match there, by the square root of their number, at "
-        "least 5",
+        "or, if fewer than two of three chips match there, by the square root of their number, "
+        "5 to 7",
         "[Kulldorff1997]; suites margins and attacks",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,
