@@ -5,7 +5,7 @@ import pytest
 from raster_files import UTM, utm_grid
 
 from groundtie.errors import TooFewPointsError
-from groundtie.geometry.estimation import Estimate, fit_thin_plate
+from groundtie.geometry.estimation import fit_thin_plate, jackknife_spread
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.model_choice import block_folds
 from groundtie.geometry.models import Frame, Model, PolynomialModel
@@ -40,11 +40,6 @@ def tie_points(px: np.ndarray, nominal_px: np.ndarray, variance: float = 0.05) -
     )
 
 
-def spread_of(models: list[Model], at: np.ndarray) -> np.ndarray:
-    none = tie_points(np.zeros((0, 2)), np.zeros((0, 2)))
-    return Estimate(NOMINAL, none, tuple(models)).spread_px(at)
-
-
 @pytest.mark.parametrize("kind", ["translation", "affine", "polynomial2"])
 def test_the_spread_is_how_much_estimates_vary(kind: str) -> None:
     """The jackknife's mean over many drawn data sets is the scatter of their predictions."""
@@ -56,7 +51,7 @@ def test_the_spread_is_how_much_estimates_vary(kind: str) -> None:
         claimed = px + sigma * rng.normal(size=px.shape)
         predictions.append(fit_model(kind, px, claimed)(at))
         left_out = [fit_model(kind, px[folds != f], claimed[folds != f]) for f in range(5)]
-        told.append(spread_of(left_out, at) ** 2)
+        told.append(jackknife_spread(left_out, at) ** 2)
     actual = np.var(predictions, axis=0).sum(axis=1)
     assert np.sqrt(np.mean(told)) == pytest.approx(np.sqrt(actual.mean()), rel=0.25)
 
@@ -67,7 +62,7 @@ def test_the_spread_of_a_mean_by_hand() -> None:
     models: list[Model] = [
         PolynomialModel("translation", Frame.around(np.zeros((1, 2))), s) for s in shifts
     ]
-    np.testing.assert_allclose(spread_of(models, np.zeros((3, 2))), np.sqrt(4 / 5 * 10))
+    np.testing.assert_allclose(jackknife_spread(models, np.zeros((3, 2))), np.sqrt(4 / 5 * 10))
 
 
 def test_the_spread_grows_away_from_the_points() -> None:
@@ -76,12 +71,12 @@ def test_the_spread_grows_away_from_the_points() -> None:
     claimed = px + 0.3 * rng.normal(size=px.shape)
     folds = block_folds(px)
     models = [fit_model("affine", px[folds != f], claimed[folds != f]) for f in range(5)]
-    near, far = spread_of(models, np.array([[80.0, 60.0], [780.0, 580.0]]))
+    near, far = jackknife_spread(models, np.array([[80.0, 60.0], [780.0, 580.0]]))
     assert far > 5 * near
 
 
 def test_a_single_model_tells_nothing_of_its_spread() -> None:
-    assert np.isinf(spread_of([IDENTITY], np.zeros((2, 2)))).all()
+    assert np.isinf(jackknife_spread([IDENTITY], np.zeros((2, 2)))).all()
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from textured_pairs import TexturedPair, everywhere, rms, shift_on_map, write_te
 
 from groundtie.context import Context
 from groundtie.errors import TooFewPointsError
+from groundtie.geometry.estimation import jackknife_spread
 from groundtie.geometry.models import KINDS, Model
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.held_out import HeldOut
@@ -49,7 +50,7 @@ def test_every_model_is_fitted_from_a_coarse_one(
     at = np.array([[130.0, 120.0]])
     for fold in estimate.fold_models:
         assert np.abs(fold(at) - at - [7.0, 4.5]).max() < 0.7
-    assert estimate.spread_px(at)[0] < 1
+    assert jackknife_spread(estimate.fold_models, at)[0] < 1
 
 
 def test_tie_points_are_places_in_both_images(

@@ -303,7 +303,12 @@ def test_only_rules_of_the_evidence_are_asked() -> None:
     )
     assert RefinementEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.REFINEMENT)
     assert PoseEvidence.stages == (stages.POSE,)
-    assert PoseSurveyEvidence.stages == (stages.AGREEMENT, stages.LAYOVER, stages.SURVEY)
+    assert PoseSurveyEvidence.stages == (
+        stages.AGREEMENT,
+        stages.ERROR,
+        stages.LAYOVER,
+        stages.SURVEY,
+    )
 
 
 def test_a_failure_that_is_no_refusal_decides_nothing() -> None:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
 import numpy as np
 import pytest
 from evidences import (
     displaced,
     estimated,
+    fallen,
     fit_points,
     in_band,
     refusing,
@@ -14,11 +20,39 @@ from evidences import (
     survey,
 )
 
-from groundtie.matching.pose_survey import PoseSurvey
+from groundtie.matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import Survey
 from groundtie.registration.layover import CHIPS_MEAN_OVER_SCATTER
 from groundtie.registration.pose_verdict import PoseSurveyEvidence
+
+CHIPS = np.stack(np.meshgrid(*[np.arange(5) * 100 + 50] * 2), -1).reshape(-1, 2)
+
+
+def posed(
+    residuals: np.ndarray,
+    chips: Survey | None = None,
+    *,
+    layover_factor: float | None = None,
+    is_shift: bool = False,
+    **more: Any,
+) -> PoseSurveyEvidence:
+    """Return the evidence of a pose that chips miss by residuals, shape (n, 2)."""
+    fitted = estimated(fit_points())
+    found = PoseSurvey(
+        CHIPS[: len(residuals)],
+        residuals,
+        chips or survey(),
+        transform=fitted.transform,
+        **{"rest": None, "fold_models": fitted.fold_models, **more},
+    )
+    return PoseSurveyEvidence(found, layover_factor, is_shift)
+
+
+def fallen_beyond(count: int) -> np.ndarray:
+    """Return errors of matches that fell anywhere but where chips agree, shape (n, 2)."""
+    errors = fallen(4 * count + 4)
+    return errors[np.hypot(*errors.T) > POSE_TOLERANCE_PX][:count]
 
 
 @pytest.mark.parametrize(
@@ -36,19 +70,14 @@ def test_rules_of_registrations_judge_poses(
     agreeing: int, found: Survey, rest: Rest | None, expected: list[str]
 ) -> None:
     """Of 21 chips, about as many agree as at the worst real pose that is right."""
-    errors = np.where(np.arange(21) < agreeing, 4.9, 5.1)
-    residuals = np.column_stack([errors, np.zeros(21)])
-    moved = estimated(fit_points()).transform
-    assert refusing(PoseSurveyEvidence(PoseSurvey(residuals, found, rest, moved))) == expected
+    residuals = np.concatenate([scatter(agreeing, 1.5), fallen_beyond(21 - agreeing)])
+    assert refusing(posed(residuals, found, rest=rest)) == expected
 
 
 @pytest.mark.parametrize(("rival", "expected"), [(8.0, ["band elsewhere"]), (1.0, [])])
 def test_a_band_of_other_ground_refuses_a_pose(rival: float, expected: list[str]) -> None:
-    residuals, moved = np.zeros((21, 2)), estimated(fit_points()).transform
     alone = in_band(survey(height=2.0, rival=rival))
-    assert refusing(PoseSurveyEvidence(PoseSurvey(residuals, survey(), None, moved, alone))) == (
-        expected
-    )
+    assert refusing(posed(scatter(21, 0.5), bands=alone)) == expected
 
 
 @pytest.mark.parametrize(
@@ -68,9 +97,7 @@ def test_poses_of_elevated_objects_are_refused(
     residuals: np.ndarray, factor: float | None, expected: list[str]
 ) -> None:
     """Between two radar images, canopies and roofs lie along a line beside the ground."""
-    moved = estimated(fit_points()).transform
-    found = PoseSurvey(residuals, survey(), None, moved)
-    assert refusing(PoseSurveyEvidence(found, factor)) == expected
+    assert refusing(posed(residuals, layover_factor=factor)) == expected
 
 
 @pytest.mark.parametrize(
@@ -82,5 +109,24 @@ def test_half_of_the_chips_agree_on_a_pose_that_only_shifts(
 ) -> None:
     """Labels that are drawn into both arrays move no array otherwise."""
     residuals = np.concatenate([scatter(agreeing, 0.5), np.full((25 - agreeing, 2), np.inf)])
-    found = PoseSurvey(residuals, survey(), None, estimated(fit_points()).transform)
-    assert refusing(PoseSurveyEvidence(found, None, is_shift)) == expected
+    assert refusing(posed(residuals, is_shift=is_shift)) == expected
+
+
+# By 5 px, divided by √2 and times the radius of 90 % of a normal distribution, 2.15: 7.6 px.
+@pytest.mark.parametrize(("half_px", "expected"), [(3.9, []), (4.6, ["uncertain transform"])])
+def test_heights_that_may_displace_a_pose_too_far_refuse_it(
+    half_px: float, expected: list[str]
+) -> None:
+    """Heights from -h to h have a mean of h above the lowest: the ground is anywhere in ± 2 h."""
+    chips = replace(survey(), shifts_px=displaced(49, -half_px, half_px))
+    assert refusing(posed(scatter(21, 0.5), chips)) == expected
+    found = posed(scatter(21, 0.5), chips).held_out.accuracy.ce90_px
+    assert found == pytest.approx(0.9 * 2 * half_px, rel=0.07)
+
+
+@pytest.mark.parametrize(("apart_px", "expected"), [(2.4, []), (2.6, ["uncertain transform"])])
+def test_chips_that_do_not_hold_a_pose_refuse_it(apart_px: float, expected: list[str]) -> None:
+    """Five poses, each without a fifth of the chips, vary by √(4/5 · 4 · 5/4) = 2 times this."""
+    off = apart_px * np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [0, 0]])
+    models = tuple(partial(np.add, one) for one in off * math.sqrt(5 / 4))
+    assert refusing(posed(scatter(21, 0.5), fold_models=models)) == expected

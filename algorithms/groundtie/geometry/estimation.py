@@ -39,26 +39,14 @@ class Estimate:
     points: TiePoints
     fold_models: tuple[Callable[[FloatArray], FloatArray], ...]
 
-    def spread_px(self, at_px: FloatArray) -> FloatArray:
-        """Return the standard deviation of predictions, shape (n,), in matching pixels.
-
-        By the jackknife over blocks of neighbouring points (see `jackknife_sigma`), so it grows
-        where the points do not hold the model.
-
-        Parameters
-        ----------
-        at_px
-            Where to predict, pixel positions of the matching grid, shape (n, 2).
-        """
-        return jackknife_spread(self.fold_models, at_px)
-
 
 def jackknife_spread(
     fold_models: Sequence[Callable[[FloatArray], FloatArray]], at_px: FloatArray
 ) -> FloatArray:
     """Return the standard deviation of predictions, shape (n,), at positions, shape (n, 2).
 
-    Infinite for fewer than two models, each of which was fitted without one block of points.
+    Infinite for fewer than two models, each of which was fitted without one block of neighbouring
+    points: so it grows where the points do not hold the model (see `jackknife_sigma`).
     """
     return jackknife_sigma([model(at_px) for model in fold_models], len(at_px))
 

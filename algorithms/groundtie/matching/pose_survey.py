@@ -19,7 +19,7 @@ from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..similarity.peak import find_peak
 from ..similarity.surface import SimilaritySettings
-from .alignment import IDENTITY, align
+from .alignment import IDENTITY, Alignment, align
 from .bands import BandSurvey, survey_bands
 from .belief_propagation import Surfaces
 from .chips import ChipMatcher
@@ -46,6 +46,8 @@ class PoseSurvey:
 
     Parameters
     ----------
+    px
+        The chips' centres, in pixels of the survey's grid, shape (n, 2).
     residuals_px
         Where each chip matches, (x, y) from where a pose has it that was moved without the chip,
         shape (n, 2); infinite where too few chips are left.
@@ -55,14 +57,19 @@ class PoseSurvey:
         The same without content that is the same in both arrays; None: there is none.
     transform
         The pose that was moved by all of them.
+    fold_models
+        The pose moved without one block of chips after the other, between pixels of that grid;
+        none where too few chips are left.
     bands
         What bands show each, of images whose bands do not coincide.
     """
 
+    px: NDArray[np.int_]
     residuals_px: FloatArray
     survey: Survey
     rest: Rest | None
     transform: Transform
+    fold_models: tuple[Model, ...] = ()
     bands: tuple[BandSurvey, ...] = ()
 
     @property
@@ -100,14 +107,16 @@ def survey_pose(
     kept, surfaces = matcher.match_forward(transform.model, places, SURVEY_RADIUS_PX, quiet)
     residuals = _cross_fitted_px(kept, surfaces, places.chip_px)
     model = transform.model
+    fold_models: tuple[Model, ...] = ()
     if len(kept) >= _FEWEST:
-        model = compose(model, _moved(kept, surfaces), level)
+        aligned = _moved(kept, surfaces)
+        model, fold_models = compose(model, aligned.model, level), aligned.fold_models
     elsewhere_px = max(accuracy_share * max(level.width, level.height), POSE_TOLERANCE_PX)
     survey = survey_model(matcher, model, quiet, None, places, elsewhere_px)
     moved = Transform(model, transform.crs, transform.input_grid)
     rest = survey_rest(matcher, moved, places, elsewhere_px, of_one_kind, quiet)
     bands = survey_bands(matcher, model, places, elsewhere_px, quiet)
-    return PoseSurvey(residuals, survey, rest, moved, bands)
+    return PoseSurvey(kept, residuals, survey, rest, moved, fold_models, bands)
 
 
 def _covered(grid: Grid, transform: Transform) -> Grid:
@@ -136,11 +145,11 @@ def _places(grid: Grid) -> Places:
     return Places(level, np.column_stack([cols.ravel(), rows.ravel()]), chip)
 
 
-def _moved(px: NDArray[np.int_], surfaces: Surfaces) -> Model:
+def _moved(px: NDArray[np.int_], surfaces: Surfaces) -> Alignment:
     """Return the similarity transform of a grid's pixels on which chips' surfaces agree."""
     # Every chip counts the same; none is as low as 1, but for those that show nothing.
     equal = surfaces / np.maximum(surfaces.max(axis=(1, 2), keepdims=True), 1)
-    return align("similarity", px, equal, IDENTITY, np.copy).model
+    return align("similarity", px, equal, IDENTITY, np.copy)
 
 
 def _cross_fitted_px(px: NDArray[np.int_], surfaces: Surfaces, pitch_px: int) -> FloatArray:
@@ -151,6 +160,6 @@ def _cross_fitted_px(px: NDArray[np.int_], surfaces: Surfaces, pitch_px: int) ->
         return residuals
     found = px + np.array([find_peak(surface).shift_px for surface in surfaces])
     for which in (is_black, ~is_black):
-        model = _moved(px[~which], surfaces[~which])
+        model = _moved(px[~which], surfaces[~which]).model
         residuals[which] = found[which] - model(px[which].astype(float))
     return residuals

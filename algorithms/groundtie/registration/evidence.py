@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -14,20 +15,13 @@ from ..errors import GroundTieError
 from ..geometry.accuracy import (
     UNKNOWN,
     Accuracy,
-    CheckResiduals,
     Common,
     predict_accuracy,
     standard_deviation_px,
 )
-from ..geometry.chance import agreement_probability, log10_chance
-from ..geometry.estimation import Estimate
-from ..geometry.judging import (
-    CE90_FACTOR,
-    SMALLEST_INLIER_SHARE,
-    TOLERANCE_PX,
-    sigma_range_px,
-)
-from ..geometry.robust import Mixture, fit_mixture
+from ..geometry.estimation import Estimate, jackknife_spread
+from ..geometry.judging import CE90_FACTOR, SMALLEST_INLIER_SHARE
+from ..geometry.misses import Misses
 from ..geometry.tie_points import TiePoints
 from ..masks.choice import NONE, REGIONS, MaskUsed
 from ..matching.bands import BandSurvey
@@ -108,6 +102,27 @@ class HeldOut:
     def largest_ce90_px(self) -> float:
         """Largest radius of 90 % that is accepted: that of errors as large as the largest."""
         return self.max_error_px / math.sqrt(2) * CE90_FACTOR
+
+
+class EvidenceOfPoints(Protocol):
+    """Evidence of which points that took no part in a fit are a part.
+
+    Parameters
+    ----------
+    stages
+        Whose rules read it.
+    held_out
+        How the points agree.
+    extrapolated_share
+        Share of the area outside of the hull of the points that hold the model.
+    """
+
+    @property
+    def stages(self) -> Collection[str]: ...
+    @property
+    def held_out(self) -> HeldOut: ...
+    @property
+    def extrapolated_share(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -216,35 +231,30 @@ class RegistrationEvidence:
     @cached_property
     def held_out(self) -> HeldOut:
         """How the check points agree; those without a peak count as disagreeing."""
-        agreeing = int((np.hypot(*self.residuals_px.T) <= TOLERANCE_PX).sum())
-        probability = agreement_probability(TOLERANCE_PX, self.radius_px)
-        mixture = self._mixture(self.residuals_px, self.radius_px)
-        lattice = self.grid.lattice()
+        misses, lattice = self._misses, self.grid.lattice()
+        fold_models = self.estimate.fold_models
         return HeldOut(
             "check points",
-            agreeing,
+            misses.agreeing,
             len(self.check),
-            min(log10_chance(agreeing, len(self.check), probability) + math.log10(self.tries), 0.0),
-            mixture.sigma * math.sqrt(2),
+            min(misses.log10_chance(len(self.check)) + math.log10(self.tries), 0.0),
+            misses.rmse_px,
             self.max_error_px,
-            float(np.sqrt(np.mean(self.estimate.spread_px(lattice) ** 2))),
+            float(np.sqrt(np.mean(jackknife_spread(fold_models, lattice) ** 2))),
             "the overlap",
-            predict_accuracy(
-                self.estimate.fold_models, lattice, self._check_residuals, self.common
-            ),
+            predict_accuracy(fold_models, lattice, misses.weighed, self.common),
         )
 
     def standard_deviation_px(self, px: FloatArray) -> FloatArray:
         """Return that of the transform's error along an axis, shape (n,), at pixels (n, 2)."""
         return standard_deviation_px(
-            self.estimate.fold_models, px, self._check_residuals, self.common
+            self.estimate.fold_models, px, self._misses.weighed, self.common
         )
 
     @cached_property
-    def _check_residuals(self) -> CheckResiduals:
+    def _misses(self) -> Misses:
         places = self.grid.map_to_pixel(self.counted.reference_xy)
-        mixture = self._mixture(self.residuals_px, self.radius_px)
-        return CheckResiduals(places, self.residuals_px, mixture.probability)
+        return Misses(places, self.residuals_px, self.radius_px, self.max_error_px)
 
     @property
     def common(self) -> Common:
@@ -254,28 +264,32 @@ class RegistrationEvidence:
 
     @cached_property
     def _heights_px(self) -> FloatArray:
-        """The most that heights may displace all matches by, to either side, shape (2,).
-
-        By what they scatter the survey's chips by: twice their mean where the ground may be the
-        lowest of what matched, their mean where a mask left more ground than heights.
-        """
-        if self.survey is None or len(self.survey.shifts_px) == 0:
+        if self.survey is None:
             return np.zeros(2)
-        shifts = self.survey.shifts_px
-        weights = self._mixture(shifts, SURVEY_RADIUS_PX).probability
-        scatter = scatter_along_line(shifts, weights, _LOG10_FIVE_PERCENT)
-        mean = (self.layover_factor or EVEN_MEAN_OVER_SCATTER) * scatter
+        mean = mean_of_heights_px(self.survey, self.layover_factor, self.max_error_px)
         return mean if self.mask.is_ground else 2 * mean
-
-    def _mixture(self, residuals_px: FloatArray, radius_px: int) -> Mixture:
-        area = (2 * radius_px + 1) ** 2
-        return fit_mixture(residuals_px, area, sigma_range_px(self.max_error_px))
 
     @property
     def extrapolated_share(self) -> float:
         """Share of the overlap outside of the hull of the points that were used."""
         size = self.grid.width, self.grid.height
         return 1 - hull_share(self.grid.map_to_pixel(self._fitted.reference_xy), size)
+
+
+def mean_of_heights_px(
+    survey: Survey, layover_factor: float | None, max_error_px: float
+) -> FloatArray:
+    """Return what heights displace all matches by on average, as they scatter chips, shape (2,).
+
+    So far they may displace all to either side where a mask left more ground than heights; twice
+    as far where the ground may be the lowest of what matched.
+    """
+    shifts = survey.shifts_px
+    if len(shifts) == 0:
+        return np.zeros(2)
+    misses = Misses(survey.centres.astype(float), shifts, SURVEY_RADIUS_PX, max_error_px)
+    scatter = scatter_along_line(shifts, misses.mixture.probability, _LOG10_FIVE_PERCENT)
+    return (layover_factor or EVEN_MEAN_OVER_SCATTER) * scatter
 
 
 def hull_share(px: FloatArray, size: tuple[int, int]) -> float:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
 from ..context import Context
-from ..geometry.chance import agreement_probability, log10_chance
+from ..geometry.accuracy import Common, predict_accuracy
+from ..geometry.estimation import jackknife_spread
 from ..geometry.judging import SMALLEST_INLIER_SHARE, SMALLEST_SHARE_UNROTATED
 from ..geometry.limits import SearchLimits
+from ..geometry.misses import Misses
 from ..masks.choice import NONE, MaskUsed
 from ..matching.bands import BandSurvey
 from ..matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey, survey_pose
@@ -25,11 +27,20 @@ from ..rasters.grid import FloatArray
 from ..rasters.pair import Image, make_pair
 from ..rasters.patch import Patch
 from ..similarity.surface import SimilaritySettings
-from .evidence import AGREEMENT, LAYOVER, POSE, SURVEY, HeldOut
+from .evidence import (
+    AGREEMENT,
+    ERROR,
+    LAYOVER,
+    POSE,
+    SURVEY,
+    HeldOut,
+    hull_share,
+    mean_of_heights_px,
+)
 from .layover import CHIPS_MEAN_OVER_SCATTER
 from .rules.pose import SAME_SHARE
 from .scene import SceneInfo
-from .verdict import Verdict, decide
+from .verdict import Verdict, decide, decide_by_points
 
 
 @dataclass(frozen=True)
@@ -135,7 +146,7 @@ class PoseSurveyEvidence:
     layover_factor: float | None = None
     is_shift: bool = False
 
-    stages: ClassVar = (AGREEMENT, LAYOVER, SURVEY)
+    stages: ClassVar = (AGREEMENT, ERROR, LAYOVER, SURVEY)
     mask: ClassVar = MaskUsed(NONE, None, 1.0, "a pose is searched for without a mask")
     radius_px: ClassVar = SURVEY_RADIUS_PX
     max_error_px: ClassVar = POSE_TOLERANCE_PX
@@ -165,23 +176,52 @@ class PoseSurveyEvidence:
         """The same of chips that agree, shape (n, 2)."""
         return self.found.residuals_px[self.found.agrees]
 
-    @property
+    @cached_property
     def held_out(self) -> HeldOut:
         """How each chip agrees with the pose as the others have it."""
-        errors = np.hypot(*self.fit_residuals_px.T)
-        agreeing, total = len(errors), len(self.found.agrees)
-        probability = agreement_probability(POSE_TOLERANCE_PX, SURVEY_RADIUS_PX)
+        misses, total = self._misses, len(self.found.agrees)
+        fold_models, lattice = self.found.fold_models, self.survey.grid.lattice()
+        heights = mean_of_heights_px(self.survey, self.layover_factor, POSE_TOLERANCE_PX)
         return HeldOut(
             "chips all over",
-            agreeing,
+            misses.agreeing,
             total,
-            min(log10_chance(agreeing, total, probability), 0.0),
-            float(np.sqrt(np.mean(errors**2))) if agreeing else math.nan,
+            misses.log10_chance(total),
+            misses.rmse_px,
             POSE_TOLERANCE_PX,
-            math.nan,
+            float(np.sqrt(np.mean(jackknife_spread(fold_models, lattice) ** 2))),
             "the overlap",
-            least_share=SMALLEST_SHARE_UNROTATED if self.is_shift else SMALLEST_INLIER_SHARE,
+            predict_accuracy(fold_models, lattice, misses.weighed, Common(2 * heights)),
+            SMALLEST_SHARE_UNROTATED if self.is_shift else SMALLEST_INLIER_SHARE,
         )
+
+    @cached_property
+    def _misses(self) -> Misses:
+        is_known = np.isfinite(self.found.residuals_px).all(axis=1)
+        return Misses(
+            self.found.px[is_known].astype(float),
+            self.found.residuals_px[is_known],
+            SURVEY_RADIUS_PX,
+            POSE_TOLERANCE_PX,
+            POSE_TOLERANCE_PX,
+        )
+
+    @property
+    def extrapolated_share(self) -> float:
+        """Share of the overlap outside of the hull of the chips that agree."""
+        grid, agreeing = self.survey.grid, self.found.px[self.found.agrees]
+        return 1 - hull_share(agreeing.astype(float), (grid.width, grid.height))
+
+
+def judge_pose_survey(evidence: PoseSurveyEvidence) -> Verdict:
+    """Return the verdict on a pose by chips all over; errors in pixels they were matched at."""
+    return decide_by_points(
+        evidence,
+        "chips all over confirm it, and no other pose matches nearly as well",
+        0,
+        0,
+        evidence.survey.grid.pixel_size_m,
+    )
 
 
 def confirm_pose(
@@ -210,12 +250,6 @@ def confirm_pose(
     grid, shift = windows.reference_grid, Pose(shift_px=moved.shift_px)
     is_shift = moved_px(moved, shift, (grid.height, grid.width)) <= POSE_TOLERANCE_PX
     evidence = PoseSurveyEvidence(found, factor, is_shift)
-    points = evidence.held_out
-    verdict = replace(
-        decide(evidence, "chips all over confirm it, and no other pose matches nearly as well"),
-        check_points=points.total,
-        check_points_agreeing=points.agreeing,
-        log10_chance=points.log10_chance,
-    )
+    verdict = judge_pose_survey(evidence)
     # What the chips confirm is where they have moved it.
     return verdict, moved if verdict.accepted else pose

@@ -9,14 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..assessment.statistics import Statistics
-from ..geometry.accuracy import CheckResiduals, Common, predict_accuracy
-from ..geometry.chance import agreement_probability, log10_chance
-from ..geometry.judging import (
-    FEWEST_CHECK_POINTS,
-    TOLERANCE_PX,
-    sigma_range_px,
-)
-from ..geometry.robust import fit_mixture
+from ..geometry.accuracy import Common, predict_accuracy
+from ..geometry.judging import FEWEST_CHECK_POINTS, TOLERANCE_PX
+from ..geometry.misses import Misses
 from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid
 from ..sensor.adjustment import LEAST_REACH_PX, Adjustment, Control
 from .evidence import AGREEMENT, ERROR, REFINEMENT, HeldOut, hull_share
@@ -122,29 +117,26 @@ class RefinementEvidence:
             name, points = CHECK_POINTS, check
             after = check.residuals_px(adjustment.bias)
         before = points.residuals_px(None)
-        length = np.hypot(*after.T)
-        reach = max(int(np.ceil(length.max(initial=0.0))), LEAST_REACH_PX)
-        mixture = fit_mixture(after, (2 * reach + 1) ** 2, sigma_range_px(max_error_px))
-        residuals = CheckResiduals(points.expected_px, after, mixture.probability)
+        reach = max(int(np.ceil(np.hypot(*after.T).max(initial=0.0))), LEAST_REACH_PX)
         tolerance = max(TOLERANCE_PX, max_error_px)
-        agreeing = int((length <= tolerance).sum())
+        misses = Misses(points.expected_px, after, reach, max_error_px, tolerance)
         nodes_px = Grid(PIXEL_COORDINATES, None, *control.size).lattice()
         held_out = HeldOut(
             name,
-            agreeing,
+            misses.agreeing,
             len(after),
-            log10_chance(agreeing, len(after), agreement_probability(tolerance, reach)),
-            mixture.sigma * math.sqrt(2),
+            misses.log10_chance(len(after)),
+            misses.rmse_px,
             max_error_px,
             _spread_px(adjustment, nodes_px),
             "the image",
-            predict_accuracy(adjustment.fold_biases, nodes_px, residuals, Common()),
+            predict_accuracy(adjustment.fold_biases, nodes_px, misses.weighed, Common()),
         )
         used_px = control.found_px[adjustment.used]
         return cls(
             held_out,
-            before[mixture.inliers],
-            after[mixture.inliers],
+            before[misses.mixture.inliers],
+            after[misses.mixture.inliers],
             float((np.ptp(used_px, axis=0) / np.array(control.size)).min()),
             1 - hull_share(used_px, control.size),
             len(control),

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
 from ..geometry.accuracy import UNKNOWN_ELLIPSE, Ellipse
-from .evidence import AGREEMENT, RegistrationEvidence, SearchEvidence
+from .evidence import AGREEMENT, EvidenceOfPoints, RegistrationEvidence, SearchEvidence
 from .refinement_evidence import RefinementEvidence
 from .rules import RULES, Rule
 
@@ -153,7 +153,7 @@ def judge(evidence: RegistrationEvidence) -> Verdict:
     """Return the verdict on a registration by its check points and its scene."""
     estimate = evidence.estimate
     metres = evidence.grid.pixel_size_m
-    return _verdict(
+    return decide_by_points(
         evidence,
         "check points confirm the registration",
         len(estimate.points),
@@ -164,7 +164,7 @@ def judge(evidence: RegistrationEvidence) -> Verdict:
 
 def judge_refinement(evidence: RefinementEvidence) -> Verdict:
     """Return the verdict on refined RPCs, its errors in image pixels and in metres."""
-    return _verdict(
+    return decide_by_points(
         evidence,
         f"{evidence.held_out.name} confirm the refined RPCs",
         evidence.control_points,
@@ -173,13 +173,14 @@ def judge_refinement(evidence: RefinementEvidence) -> Verdict:
     )
 
 
-def _verdict(
-    evidence: RegistrationEvidence | RefinementEvidence,
+def decide_by_points(
+    evidence: EvidenceOfPoints,
     confirmed: str,
     fit_points: int,
     fit_points_used: int,
     metres_per_px: float,
 ) -> Verdict:
+    """Return what the rules make of evidence, with the numbers that its held-out points give."""
     points = evidence.held_out
     verdict = replace(
         decide(evidence, confirmed),

@@ -85,6 +85,7 @@ class RotationResult:
             f"shift: {self.right:+.2f} {self.unit} right, {self.down:+.2f} {self.unit} down",
             f"accepted: {self.verdict.reason}; height {self.evidence.height:.1f}, "
             f"{self.evidence.rival_ratio:.2f} times that of the best elsewhere",
+            self.verdict.accuracy_line(),
             *(f"{name}: {path}" for name, path in self.files.items()),
         ]
 
@@ -101,6 +102,7 @@ class RotationResult:
         ResultOutput(
             "RIVAL_RATIO", "Height over that of the best elsewhere", "verdict.rival_ratio"
         ),
+        ResultOutput("CE90_M", "CE90 of the pose (m)", "verdict.check_ce90_m"),
     ),
 )
 def estimate_rotation(

@@ -208,6 +208,10 @@
       <translation>CE90 vorher (m)</translation>
     </message>
     <message>
+      <source>CE90 of the pose (m)</source>
+      <translation>CE90 der Lage (m)</translation>
+    </message>
+    <message>
       <source>CE90 of the transform (m)</source>
       <translation>CE90 der Transformation (m)</translation>
     </message>

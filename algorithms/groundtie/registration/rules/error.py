@@ -1,20 +1,19 @@
-"""Rules on the error of a registration or of refined RPCs, and on how well points hold it."""
+"""Rules on the error of a transform or of refined RPCs, and on how well points hold it."""
 
 from __future__ import annotations
 
-from ..evidence import ERROR, RegistrationEvidence
-from ..refinement_evidence import RefinementEvidence
+from ..evidence import ERROR, EvidenceOfPoints
 from .rule import Rule
 
 
-def _large_error(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+def _large_error(evidence: EvidenceOfPoints) -> str | None:
     points = evidence.held_out
     if not points.rmse_px > points.max_error_px:
         return None
     return f"error at {points.name} is {points.rmse_px:.2f} px, above {points.max_error_px:g} px"
 
 
-def _uncertain(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+def _uncertain(evidence: EvidenceOfPoints) -> str | None:
     points = evidence.held_out
     # What is not a number is not known to be small: it refuses.
     if not points.spread_px <= points.max_error_px:
