@@ -13,7 +13,7 @@ from textured_pairs import shift_on_map, texture
 from groundtie.context import Context
 from groundtie.geometry.models import Frame, Model, PolynomialModel
 from groundtie.geometry.transform import Transform
-from groundtie.matching.locked import LockedContent, find_locked_content
+from groundtie.matching.locked import EXACT_PX, LockedContent, find_locked_content
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
@@ -28,6 +28,7 @@ def looked_at(
     input: np.ndarray,
     context: Context,
     model: Model | None = None,
+    exact_px: float = EXACT_PX,
 ) -> LockedContent | None:
     """Look for content that two arrays of one grid have in common under a model."""
     grid = utm_grid(SIDE, SIDE)
@@ -38,7 +39,9 @@ def looked_at(
     with open_raster(paths[0]) as one, open_raster(paths[1]) as other:
         pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
         transform = Transform(model or shift_on_map(0.0, 0.0), pair.grid.crs, other.grid)
-        return find_locked_content(pair, transform, survey_places(pair.grid), context)
+        return find_locked_content(
+            pair, transform, survey_places(pair.grid), context, exact_px=exact_px
+        )
 
 
 def drawn_into(values: np.ndarray, offset: tuple[int, int] = (0, 0)) -> np.ndarray:
@@ -123,13 +126,16 @@ def test_views_without_anything_drawn_have_none(
     assert locked is not None and not locked.sameness.is_evident
 
 
-@pytest.mark.parametrize(("off_m", "is_evident"), [(0.3, True), (0.6, False)])
+@pytest.mark.parametrize(
+    ("off_m", "exact_px", "is_evident"),
+    [(0.3, EXACT_PX, True), (0.6, EXACT_PX, False), (1.9, 0.2, True), (2.1, 0.2, False)],
+)
 def test_a_transform_to_whole_pixels_is_evidence_itself(
-    tmp_path: Path, context: Context, off_m: float, is_evident: bool
+    tmp_path: Path, context: Context, off_m: float, exact_px: float, is_evident: bool
 ) -> None:
-    """By 0.03 pixels of 10 m, or 0.06: no two sensors' views match so exactly."""
+    """By 0.03 pixels of 10 m, or 0.06: no two sensors' views match so exactly; nor a pose to 0.2."""
     images = sensed(1, 0.8), -sensed(2, 0.8, 9)
-    locked = looked_at(tmp_path, *images, context, shift_on_map(70.0 + off_m, -30.0))
+    locked = looked_at(tmp_path, *images, context, shift_on_map(70.0 + off_m, -30.0), exact_px)
     assert locked is not None and locked.offset_px == (7, 3)
     assert not locked.sameness.is_evident
     assert locked.is_evident == is_evident

@@ -39,7 +39,7 @@ _WHOLE_PX = 0.125
 # What is drawn lies on whole pixels all over; different sensors' views, by chance or on one grid,
 # no nearer than they can be matched. Measured (suite attacks): drawn up to 0.03; views that have no
 # more in common, from 0.05 on but for one, in whose rest the ground is found.
-_EXACT_PX = 0.04
+EXACT_PX = 0.04
 
 _LATTICE = 9
 
@@ -130,6 +130,7 @@ def find_locked_content(
     places: Places,
     context: Context,
     of_one_kind: bool = True,
+    exact_px: float = EXACT_PX,
 ) -> LockedContent | None:
     """Return what the images repeat where a transform puts the input's array.
 
@@ -145,6 +146,8 @@ def find_locked_content(
         Threads.
     of_one_kind
         See `LockedContent`.
+    exact_px
+        Within this of whole pixels, what was found lies on them as exactly as it is known.
 
     Returns
     -------
@@ -167,7 +170,7 @@ def find_locked_content(
 
     sameness = sameness_of(list(context.map(look, list(places.centres))))
     is_whole = bool(np.abs(np.median(moved, axis=0) - offset).max() <= _WHOLE_PX)
-    is_exact = bool(np.abs(moved - offset).max() <= _EXACT_PX)
+    is_exact = bool(np.abs(moved - offset).max() <= exact_px)
     return LockedContent(pair, found, sameness, is_whole, of_one_kind, is_exact)
 
 

@@ -36,6 +36,10 @@ _ALONG = 5
 # A chip agrees with a pose within this: 2 % of the smallest images that poses are asked for.
 POSE_TOLERANCE_PX = 5.0
 
+# Poses of what is drawn into both arrays lie within this of whole pixels all over, those of ground
+# that no grid of pixels was cut by no nearer than 0.24 (suite attacks).
+_EXACT_PX = 0.2
+
 # Fewer chips than this hold no similarity transform, whose four parameters need two.
 _FEWEST = 4
 
@@ -114,7 +118,7 @@ def survey_pose(
     elsewhere_px = max(accuracy_share * max(level.width, level.height), POSE_TOLERANCE_PX)
     survey = survey_model(matcher, model, quiet, None, places, elsewhere_px)
     moved = Transform(model, transform.crs, transform.input_grid)
-    rest = survey_rest(matcher, moved, places, elsewhere_px, of_one_kind, quiet)
+    rest = survey_rest(matcher, moved, places, elsewhere_px, of_one_kind, quiet, _EXACT_PX)
     bands = survey_bands(matcher, model, places, elsewhere_px, quiet)
     return PoseSurvey(kept, residuals, survey, rest, moved, fold_models, bands)
 

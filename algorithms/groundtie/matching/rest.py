@@ -9,7 +9,7 @@ from ..geometry.transform import Transform
 from ..similarity.surface import SimilaritySettings
 from ..similarity.unexplained import unexplained
 from .chips import ChipMatcher
-from .locked import find_locked_content
+from .locked import EXACT_PX, find_locked_content
 from .matcher import Places
 from .survey import Survey, survey_model, survey_places
 
@@ -50,6 +50,7 @@ def survey_rest(
     elsewhere_px: float,
     of_one_kind: bool,
     context: Context,
+    exact_px: float = EXACT_PX,
 ) -> Rest | None:
     """Return what chips show without content that is the same in both arrays; None: there is none.
 
@@ -67,9 +68,11 @@ def survey_rest(
         See `LockedContent`.
     context
         Threads and progress.
+    exact_px
+        See `find_locked_content`.
     """
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
-    locked = find_locked_content(pair, transform, asked, context.quiet(), of_one_kind)
+    locked = find_locked_content(pair, transform, asked, context.quiet(), of_one_kind, exact_px)
     if locked is None or not locked.is_evident:
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
