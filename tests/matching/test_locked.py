@@ -133,7 +133,7 @@ def test_views_without_anything_drawn_have_none(
 def test_a_transform_to_whole_pixels_is_evidence_itself(
     tmp_path: Path, context: Context, off_m: float, exact_px: float, is_evident: bool
 ) -> None:
-    """By 0.03 pixels of 10 m, or 0.06: no two sensors' views match so exactly; nor a pose to 0.2."""
+    """By 0.03 pixels of 10 m, or 0.06: no two sensors' views match so exactly. Poses: to 0.2."""
     images = sensed(1, 0.8), -sensed(2, 0.8, 9)
     locked = looked_at(tmp_path, *images, context, shift_on_map(70.0 + off_m, -30.0), exact_px)
     assert locked is not None and locked.offset_px == (7, 3)

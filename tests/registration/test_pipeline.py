@@ -33,14 +33,21 @@ from groundtie.matching.guided_fit import GuidedFit
 from groundtie.matching.keypoint_fit import KeypointFit
 from groundtie.matching.pooled import PooledHistogramMatcher
 from groundtie.matching.surface_fit import SurfaceFit
-from groundtie.matching.survey import Survey
 from groundtie.progress import Progress
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration import masks, verdict
 from groundtie.registration import scene as scene_module
 from groundtie.registration import stages as stages_module
-from groundtie.registration.evidence import AGREEMENT, ERROR, REFINEMENT, SCENE, SEARCH, SURVEY
+from groundtie.registration.evidence import (
+    AGREEMENT,
+    ERROR,
+    REFINEMENT,
+    SCENE,
+    SEARCH,
+    SURVEY,
+    RegistrationEvidence,
+)
 from groundtie.registration.masks import Masked
 from groundtie.registration.opening import open_pair
 from groundtie.registration.pipeline import mask_pair, run
@@ -394,7 +401,7 @@ def test_a_transform_that_the_exchanged_pair_does_not_show_is_refused(
 def test_exchanged_roles_show_the_same_across_pixel_sizes(
     ratio: float, tmp_path: Path, context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Survey, "is_weakly_confirmed", True)
+    monkeypatch.setattr(RegistrationEvidence, "is_weakly_confirmed", True)
     pair = write_textured_pair(
         tmp_path, (500, 450), shift_on_map(73.0, -42.0), input_pixel_ratio=ratio
     )

@@ -245,6 +245,12 @@ class RegistrationEvidence:
             predict_accuracy(fold_models, lattice, misses.weighed, self.common),
         )
 
+    @property
+    def is_weakly_confirmed(self) -> bool:
+        """Whether few chips confirm the transform, and no more than two of three check points."""
+        is_weak = self.survey is not None and self.survey.is_weakly_confirmed
+        return is_weak and 3 * self.held_out.agreeing <= 2 * self.held_out.total
+
     def standard_deviation_px(self, px: FloatArray) -> FloatArray:
         """Return that of the transform's error along an axis, shape (n,), at pixels (n, 2)."""
         return standard_deviation_px(

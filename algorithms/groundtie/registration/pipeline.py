@@ -90,12 +90,11 @@ def register(
 def _asks_for_exchange(
     evidence: RegistrationEvidence, scene: SceneInfo, spec: Specification
 ) -> bool:
-    """Whether so few chips confirm a transform that the exchanged pair must, too.
+    """Whether so few chips and check points confirm a transform that the exchanged pair must, too.
 
     What is rendered, or located by a sensor model, is no reference for another image.
     """
-    survey = evidence.survey
-    if survey is None or not survey.is_weakly_confirmed or evidence.mask.is_ground:
+    if not evidence.is_weakly_confirmed or evidence.mask.is_ground:
         return False
     is_plain = spec.surface is None and spec.dem is None and not spec.is_rendered
     return is_plain and not scene.input.is_in_sensor_geometry
