@@ -28,7 +28,7 @@ from groundtie.registration.rules.survey import (
     WEAK_HEIGHT,
     WEAK_REST_HEIGHT,
     deviations_elsewhere,
-    is_enough,
+    least_height_of_copies,
 )
 from groundtie.registration.specification import COREGISTER
 
@@ -91,7 +91,7 @@ def _drawn_height(evidence: RegistrationEvidence) -> float:
 
 def _copy_height(evidence: RegistrationEvidence) -> float:
     rest = evidence.rest
-    if rest is None or not rest.is_explained or not is_enough(rest.survey, rest):
+    if rest is None or not rest.is_explained or least_height_of_copies(rest) < 0:
         return math.nan
     return rest.survey.height
 
