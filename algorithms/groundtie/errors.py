@@ -6,10 +6,7 @@ the command line: 2 for bad input, 3 for a refused registration.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .registration.verdict import Verdict
+from typing import Any, Protocol
 
 
 class GroundTieError(Exception):
@@ -96,12 +93,24 @@ class CancelledError(GroundTieError, RuntimeError):
     exit_code = 130
 
 
+class Refusal(Protocol):
+    """What a refused registration's verdict states: see `registration.verdict.Verdict`."""
+
+    @property
+    def rule(self) -> str: ...
+    @property
+    def reason(self) -> str: ...
+    @property
+    def advice(self) -> str: ...
+    def summary(self) -> dict[str, Any]: ...
+
+
 class NotRegisteredError(GroundTieError, RuntimeError):
     """The registration was refused; `verdict` gives the reason."""
 
     exit_code = 3
 
-    def __init__(self, message: str, verdict: Verdict | None = None) -> None:
+    def __init__(self, message: str, verdict: Refusal | None = None) -> None:
         super().__init__(message)
         self.verdict = verdict
 

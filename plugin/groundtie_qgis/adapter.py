@@ -20,11 +20,12 @@ from qgis.PyQt.QtGui import QIcon
 
 from .definitions import definition, qgis_name
 from .dependencies import complaint, missing_for, rasterio_env
-from .library import LazyTool, errors, kinds, plugin_metadata, progress
+from .library import errors, kinds, plugin_metadata, progress
 from .pages import help_url
 from .preselection import NOTHING, preselect
 from .results import forget_layers, load_on_completion, show_report
 from .styling import LoadedLayers, icon_of
+from .tool_loading import LazyTool
 from .translation import tr
 from .unavailable import UnavailableAlgorithm, broken, named_tools
 from .values import Reader, with_layers_as_files

@@ -11,9 +11,10 @@ from qgis.PyQt.QtGui import QIcon
 from .adapter import ToolAlgorithm
 from .compat import WARNING
 from .dependencies import complaint, missing_packages, rasterio_env
-from .library import LazyTool, all_tools, plugin_metadata
+from .library import plugin_metadata
 from .shipped_models import load_models
 from .styling import ICON
+from .tool_loading import LazyTool, all_tools
 from .unavailable import UnavailableAlgorithm, broken, named_tools
 
 # The endings, without dot, that outputs of the tools may have, the usual one first: to ask the

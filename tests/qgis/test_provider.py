@@ -15,7 +15,7 @@ TOOLS = set(NAMES)
 
 
 def test_the_provider_offers_every_tool(provider: Any) -> None:
-    from groundtie_qgis.library import all_tools
+    from groundtie_qgis.tool_loading import all_tools
 
     offered = {a.name() for a in provider.algorithms() if a.group() != "Models"}
     assert offered == {tool.name for tool in all_tools()}

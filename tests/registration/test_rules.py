@@ -33,7 +33,7 @@ from evidences import (
     two_thirds,
 )
 
-from groundtie.assessment.accuracy import AssessmentEvidence
+from groundtie.assessment.assessed_points import AssessmentEvidence
 from groundtie.assessment.point_errors import PointErrors
 from groundtie.errors import (
     AmbiguousPlaceError,
@@ -53,7 +53,7 @@ from groundtie.registration.evidence import (
     RegistrationEvidence,
     SearchEvidence,
 )
-from groundtie.registration.pose_verdict import PoseEvidence, PoseSurveyEvidence
+from groundtie.registration.pose_evidence import PoseEvidence, PoseSurveyEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
 from groundtie.registration.series_evidence import DateEvidence

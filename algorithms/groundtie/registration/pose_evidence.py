@@ -1,0 +1,203 @@
+"""What a verdict on a pose rests on: the candidates of a search, and chips all over."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..context import Context
+from ..geometry.accuracy import Common, predict_accuracy
+from ..geometry.estimation import jackknife_spread
+from ..geometry.judging import SMALLEST_INLIER_SHARE, SMALLEST_SHARE_UNROTATED
+from ..geometry.limits import SearchLimits
+from ..geometry.misses import Misses
+from ..masks.choice import NONE, MaskUsed
+from ..matching.bands import BandSurvey
+from ..matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey
+from ..matching.rest import Rest
+from ..matching.survey import SURVEY_RADIUS_PX, Survey
+from ..pose.pose import PoseFound
+from ..pose.rotation_windows import DEFAULT_RADIUS_SHARE
+from ..pose.search import find_poses, moved_px
+from ..rasters.grid import FloatArray
+from ..rasters.patch import Patch
+from ..similarity.surface import SimilaritySettings
+from .evidence import (
+    AGREEMENT,
+    ERROR,
+    LAYOVER,
+    POSE,
+    SURVEY,
+    HeldOut,
+    hull_share,
+    mean_of_heights_px,
+)
+
+
+@dataclass(frozen=True)
+class PoseEvidence:
+    """What is known of a pose.
+
+    Parameters
+    ----------
+    found
+        The poses that a search found, best first.
+    exhaustive
+        Those of an exhaustive search over all rotations, best first.
+    shape
+        Rows and columns of the reference.
+    """
+
+    found: Sequence[PoseFound]
+    exhaustive: Sequence[PoseFound]
+    shape: tuple[int, int]
+
+    stages: ClassVar = (POSE,)
+
+    @classmethod
+    def of(
+        cls,
+        windows: tuple[Patch, Patch],
+        limits: SearchLimits,
+        found: Sequence[PoseFound],
+        exhaustive: bool,
+        context: Context,
+    ) -> PoseEvidence:
+        """Put the candidates of a search beside those of an exhaustive one over all rotations.
+
+        Rotations and shifts beyond the limits measure how high chance is, and may hold a better
+        pose: where the scene repeats, one within small limits is as good as the right one.
+
+        Parameters
+        ----------
+        windows
+            Reference and input.
+        limits
+            Those of the search.
+        found
+            What the search found, best first.
+        exhaustive
+            Whether the search was `find_poses`; it is not repeated if it was over all rotations.
+        context
+            Threads to work in.
+        """
+        everything = found
+        least_radius = DEFAULT_RADIUS_SHARE * max(windows[1].values.shape)
+        is_wide = limits.rotation_deg >= 180 and limits.radius >= least_radius
+        if found and not (exhaustive and is_wide):
+            low, high = limits.scale
+            radius = max(limits.radius, least_radius)
+            wide = SearchLimits(radius, 180.0, (min(low, 0.8), max(high, 1.25)))
+            everything = find_poses(*windows, wide, SimilaritySettings(), context)
+        rows, cols = windows[0].values.shape
+        return cls(found, everything, (rows, cols))
+
+    @property
+    def height(self) -> float:
+        """Height of the best exhaustive pose, in robust standard deviations."""
+        return self.exhaustive[0].height if self.exhaustive else 0.0
+
+    @property
+    def rival_ratio(self) -> float | None:
+        """Its height over that of the best one elsewhere; None if there is none."""
+        if len(self.exhaustive) < 2:
+            return None
+        return self.exhaustive[0].height / self.exhaustive[1].height
+
+    @property
+    def apart_px(self) -> float:
+        """By how much the found pose moves the reference's corners against the exhaustive one."""
+        return moved_px(self.exhaustive[0].pose, self.found[0].pose, self.shape)
+
+    def summary(self) -> dict[str, Any]:
+        """Return how high the pose stands, as values that JSON can carry."""
+        return {"height": self.height, "rival_ratio": self.rival_ratio}
+
+
+@dataclass(frozen=True)
+class PoseSurveyEvidence:
+    """What chips all over a pair show of a pose that a search found.
+
+    Parameters
+    ----------
+    found
+        What they show.
+    layover_factor
+        See `RegistrationEvidence`.
+    is_shift
+        Whether the pose neither rotates nor scales, as far as chips show.
+    """
+
+    found: PoseSurvey
+    layover_factor: float | None = None
+    is_shift: bool = False
+
+    stages: ClassVar = (AGREEMENT, ERROR, LAYOVER, SURVEY)
+    mask: ClassVar = MaskUsed(NONE, None, 1.0, "a pose is searched for without a mask")
+    radius_px: ClassVar = SURVEY_RADIUS_PX
+    max_error_px: ClassVar = POSE_TOLERANCE_PX
+
+    @property
+    def survey(self) -> Survey:
+        """Where the chips match around the pose."""
+        return self.found.survey
+
+    @property
+    def rest(self) -> Rest | None:
+        """The same without content that is the same in both arrays."""
+        return self.found.rest
+
+    @property
+    def bands(self) -> tuple[BandSurvey, ...]:
+        """What bands show each, of images whose bands do not coincide."""
+        return self.found.bands
+
+    @property
+    def check_residuals_px(self) -> FloatArray:
+        """Where each chip matches, from where the others have it, shape (n, 2)."""
+        return self.found.residuals_px
+
+    @property
+    def fit_residuals_px(self) -> FloatArray:
+        """The same of chips that agree, shape (n, 2)."""
+        return self.found.residuals_px[self.found.agrees]
+
+    @cached_property
+    def held_out(self) -> HeldOut:
+        """How each chip agrees with the pose as the others have it."""
+        misses, total = self._misses, len(self.found.agrees)
+        fold_models, lattice = self.found.fold_models, self.survey.grid.lattice()
+        heights = mean_of_heights_px(self.survey, self.layover_factor, POSE_TOLERANCE_PX)
+        return HeldOut(
+            "chips all over",
+            misses.agreeing,
+            total,
+            misses.log10_chance(total),
+            misses.rmse_px,
+            POSE_TOLERANCE_PX,
+            float(np.sqrt(np.mean(jackknife_spread(fold_models, lattice) ** 2))),
+            "the overlap",
+            predict_accuracy(fold_models, lattice, misses.weighed, Common(2 * heights)),
+            SMALLEST_SHARE_UNROTATED if self.is_shift else SMALLEST_INLIER_SHARE,
+        )
+
+    @cached_property
+    def _misses(self) -> Misses:
+        is_known = np.isfinite(self.found.residuals_px).all(axis=1)
+        return Misses(
+            self.found.px[is_known].astype(float),
+            self.found.residuals_px[is_known],
+            SURVEY_RADIUS_PX,
+            POSE_TOLERANCE_PX,
+            POSE_TOLERANCE_PX,
+        )
+
+    @property
+    def extrapolated_share(self) -> float:
+        """Share of the overlap outside of the hull of the chips that agree."""
+        grid, agreeing = self.survey.grid, self.found.px[self.found.agrees]
+        return 1 - hull_share(agreeing.astype(float), (grid.width, grid.height))

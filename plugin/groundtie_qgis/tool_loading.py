@@ -1,0 +1,51 @@
+"""Loads the declarations of tools, each when QGIS first needs more than its name."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from typing import Any
+
+from .dependencies import rasterio_env
+from .library import library_module, library_name
+
+
+def all_tools() -> tuple[Any, ...]:
+    """Return the declarations of all tools."""
+    # warnings of dependencies to the library's developers are nothing for QGIS's log
+    warnings.filterwarnings("ignore", module=rf"{re.escape(library_name())}\b")
+    return tuple(library_module("tools").load_tools())
+
+
+class LazyTool:
+    """A tool's declaration, imported with all that it needs when more than its name is asked for.
+
+    Raises
+    ------
+    ImportError
+        Then: a package cannot be used.
+    """
+
+    def __init__(self, name: str, title: str, group: str, summary: str) -> None:
+        self.name = name
+        self.title = title
+        self.group = group
+        self.summary = summary
+
+    def loaded(self) -> bool:
+        """Whether it is imported."""
+        return self.name in _TOOLS
+
+    def __getattr__(self, attribute: str) -> Any:
+        return getattr(_tool(self.name), attribute)
+
+
+_TOOLS: dict[str, Any] = {}
+
+
+def _tool(name: str) -> Any:
+    if name in _TOOLS:
+        return _TOOLS[name]
+    warnings.filterwarnings("ignore", module=rf"{re.escape(library_name())}\b")
+    with rasterio_env():
+        return _TOOLS.setdefault(name, library_module("tools").load_tool(name))
