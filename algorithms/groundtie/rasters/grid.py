@@ -112,6 +112,11 @@ class Grid:
         return float(np.sqrt(area))
 
     @property
+    def metres_per_pixel(self) -> float:
+        """The same; NaN without georeferencing, where nobody knows it."""
+        return self.pixel_size_m if self.is_georeferenced else float("nan")
+
+    @property
     def centre_px(self) -> tuple[float, float]:
         """Pixel position (col, row) of the centre."""
         return (self.width - 1) / 2, (self.height - 1) / 2

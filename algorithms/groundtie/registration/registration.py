@@ -34,7 +34,7 @@ from .registered_output import RegisteredOutput, resampled_onto
 from .scene import SceneInfo
 from .specification import Specification
 from .stored_transform import transform_of
-from .verdict import NOT_JUDGED, Verdict
+from .verdict import NOT_JUDGED, Verdict, both_units
 
 # How many surfaces of the best and of the worst check points a report shows.
 _EXTREMES = 3
@@ -224,7 +224,7 @@ class Registration:
         if v.accepted and transform is not None:
             lines += [
                 f"model: {transform.model.kind}, {v.fit_points_used} of {v.fit_points} points",
-                f"error at check points: RMSE {v.check_rmse_px:.2f} px ({v.check_rmse_m:.2f} m)",
+                f"error at check points: RMSE {both_units(v.check_rmse_px, v.check_rmse_m)}",
                 v.accuracy_line(),
                 f"check points that agree: {v.check_points_agreeing} of {v.check_points}; by "
                 f"chance 1 in 10^{-v.log10_chance:.0f}",

@@ -25,7 +25,7 @@ from .refinement_evidence import RefinementEvidence
 from .refinement_output import RefinementFiles
 from .sensor_input import Ground, OrientedImage, open_oriented_image
 from .specification import Specification
-from .verdict import Verdict
+from .verdict import Verdict, both_units
 
 
 @dataclass(frozen=True)
@@ -66,12 +66,12 @@ class GcpResult:
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
         table, verdict = self.points.points, self.verdict
+        error = both_units(verdict.check_rmse_px, verdict.check_rmse_m)
         return [
             f"accepted: {verdict.reason}",
             f"{int(table.fit.sum())} of {int((~table.is_check).sum())} "
             f"points, and {int(table.check.sum())} check points",
-            f"error at check points: RMSE {verdict.check_rmse_px:.2f} px "
-            f"({verdict.check_rmse_m:.2f} m)",
+            f"error at check points: RMSE {error}",
             self.heights,
             self.mask.line(),
             f"wrote {self.output}",

@@ -28,7 +28,8 @@ class Verdict:
     check_points, check_points_agreeing
         How many points were held out, and how many of them agree with the model.
     check_rmse_px, check_rmse_m
-        Root mean square error of inliers among the check points, in matching pixels and metres.
+        Root mean square error of inliers among the check points, in matching pixels, and in
+        metres, unless there is no georeferencing.
     check_ce90_px, check_ce90_m
         Radius within which the error of the transform at a random place lies with 90 %.
     log10_chance
@@ -89,11 +90,11 @@ class Verdict:
     def accuracy_line(self) -> str:
         """Return the predicted error at a random place, with its interval, as a line of text."""
         low, high = self.ce90_range_px
+        ce90 = both_units(self.check_ce90_px, self.check_ce90_m)
         return (
-            f"accuracy at a random place: CE90 {self.check_ce90_px:.2f} px "
-            f"({self.check_ce90_m:.2f} m), known to {low:.2f}–{high:.2f} px; 90 % in an ellipse of "
-            f"{self.ellipse.major_px:.2f} × {self.ellipse.minor_px:.2f} px, longer at "
-            f"{self.ellipse.angle_deg:.0f}°, of which heights {self.heights_px:.2f} px"
+            f"accuracy at a random place: CE90 {ce90}, known to {low:.2f}–{high:.2f} px; 90 % in "
+            f"an ellipse of {self.ellipse.major_px:.2f} × {self.ellipse.minor_px:.2f} px, longer "
+            f"at {self.ellipse.angle_deg:.0f}°, of which heights {self.heights_px:.2f} px"
         )
 
     def summary(self) -> dict[str, Any]:
@@ -105,6 +106,11 @@ class Verdict:
         del values["ce90_range_px"], values["ellipse"]
         unknown = {k for k, v in values.items() if isinstance(v, float) and not math.isfinite(v)}
         return {k: None if k in unknown else v for k, v in values.items()}
+
+
+def both_units(px: float, metres: float) -> str:
+    """Return a length in pixels and, if known, in metres, as text."""
+    return f"{px:.2f} px ({metres:.2f} m)" if math.isfinite(metres) else f"{px:.2f} px"
 
 
 NOT_JUDGED = Verdict(False, "not judged")
@@ -152,7 +158,7 @@ def judge_search(evidence: SearchEvidence) -> Verdict:
 def judge(evidence: RegistrationEvidence) -> Verdict:
     """Return the verdict on a registration by its check points and its scene."""
     estimate = evidence.estimate
-    metres = evidence.grid.pixel_size_m
+    metres = evidence.grid.metres_per_pixel
     return decide_by_points(
         evidence,
         "check points confirm the registration",

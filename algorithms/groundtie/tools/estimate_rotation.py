@@ -103,7 +103,7 @@ class RotationResult:
         ResultOutput(
             "RIVAL_RATIO", "Height over that of the best elsewhere", "verdict.rival_ratio"
         ),
-        ResultOutput("CE90_M", "CE90 of the pose (m)", "verdict.check_ce90_m"),
+        ResultOutput("CE90_PX", "CE90 of the pose (px)", "verdict.check_ce90_px"),
     ),
 )
 def estimate_rotation(

@@ -208,8 +208,8 @@
       <translation>CE90 vorher (m)</translation>
     </message>
     <message>
-      <source>CE90 of the pose (m)</source>
-      <translation>CE90 der Lage (m)</translation>
+      <source>CE90 of the pose (px)</source>
+      <translation>CE90 der Lage (px)</translation>
     </message>
     <message>
       <source>CE90 of the transform (m)</source>
