@@ -50,7 +50,8 @@ def draw_rotation(
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11, 9), layout="constrained")
+    figure = Figure(figsize=(12, 9))
+    figure.set_layout_engine("constrained", wspace=0.08)
     axes = figure.subplots(2, 2)
     figure.suptitle(title)
     _draw_scan(figure, axes[0, 0], reference, input, limits, pose, context)
