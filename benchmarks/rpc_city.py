@@ -197,7 +197,8 @@ def judge(error_px: float) -> str:
 def cases(settings: Settings) -> list[CityCase]:
     """Return the cases, city by city."""
     seeds = 1 if settings.quick else min(settings.seeds, SEEDS)
-    cities = [City(*values) for values in product(SIZES_PX, LOOKS, range(1, seeds + 1))]
+    numbers = range(settings.first_seed, settings.first_seed + seeds)
+    cities = [City(*values) for values in product(SIZES_PX, LOOKS, numbers)]
     cities = cities[:1] if settings.quick else cities
     return [CityCase(city, what, settings.cache) for city in cities for what in RUNS]
 

@@ -17,7 +17,7 @@ from groundtie.geometry.limits import SearchLimits
 from groundtie.geometry.models import Frame, Model, PolynomialModel
 from groundtie.matching.check import Check, check_model
 from groundtie.matching.held_out import HeldOut
-from groundtie.matching.matcher import Places
+from groundtie.matching.matcher import ChipSurfaces, Places
 from groundtie.matching.pooled import PooledHistogramMatcher
 from groundtie.matching.pyramid import find_coarse_model
 from groundtie.matching.surface_fit import SurfaceFit
@@ -172,3 +172,35 @@ def test_tiles_cover_the_grid_side_by_side() -> None:
         seen[row - 12 : row + 13, col - 12 : col + 13] += 1
     assert seen.min() >= 0 and seen.max() == 1
     assert seen[:125].min() == 1
+
+
+def test_neighbours_are_added_by_their_weights() -> None:
+    """At a corner of a lattice of chips there are four, in its middle nine."""
+    random = np.random.default_rng(4)
+    centres = np.stack(np.meshgrid(*[np.arange(5) * 61 + 30] * 2), -1).reshape(-1, 2)
+    forward, backward = random.normal(size=(2, 25, 9, 9)).astype(np.float32)
+    weight = random.uniform(0.5, 2.0, 25)
+    chips = ChipSurfaces(centres, forward, backward, weight)
+    found = chips.with_neighbours(61)
+    np.testing.assert_array_equal(found.centres, centres)
+    for chip, members in ((0, [0, 1, 5, 6]), (12, [6, 7, 8, 11, 12, 13, 16, 17, 18])):
+        assert found.weight[chip] == pytest.approx(weight[members].sum())
+        for own, added in ((forward, found.forward), (backward, found.backward)):
+            total = sum(weight[i] * own[i] for i in members)
+            # Surfaces are normalised: in robust standard deviations, so by a factor and an offset.
+            assert np.corrcoef(total.ravel(), added[chip].ravel())[0, 1] > 0.99999
+
+
+def test_neighbours_show_what_single_chips_do_not() -> None:
+    """Peaks of two standard deviations are lost in noise; of nine chips, they are six."""
+    random = np.random.default_rng(5)
+    centres = np.stack(np.meshgrid(*[np.arange(9) * 61 + 30] * 2), -1).reshape(-1, 2)
+    surfaces = random.normal(size=(81, 21, 21)).astype(np.float32)
+    surfaces[:, 10 - 2, 10 + 3] += 2.0
+    chips = ChipSurfaces(centres, surfaces, surfaces, np.ones(81))
+
+    def right(found: ChipSurfaces) -> int:
+        errors = found.correspondences().partner_px - found.correspondences().px - [3.0, -2.0]
+        return int((np.hypot(*errors.T) < 1).sum())
+
+    assert right(chips) < 27 and right(chips.with_neighbours(61)) > 65

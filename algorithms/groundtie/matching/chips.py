@@ -150,6 +150,10 @@ class ChipMatcher:
         """
         return not np.quantile(np.hypot(*expected_px.T), 0.9) > _FAR_PX
 
+    def for_points(self, surfaces: ChipSurfaces) -> ChipSurfaces:
+        """Return the surfaces that points of the fit are taken from: each chip's own."""
+        return surfaces
+
     def for_check(self, surfaces: ChipSurfaces, layout: ChipLayout) -> ChipSurfaces:
         """Return the surfaces that check points are taken from: each chip's own."""
         return surfaces

@@ -144,20 +144,32 @@ class ChipSurfaces:
         groups
             The number of each chip's group, shape (n,).
         """
-        members = [groups == group for group in np.unique(groups)]
+        members = [np.flatnonzero(groups == group) for group in np.unique(groups)]
+        middles = [np.rint(self.centres[of].mean(axis=0)) for of in members]
+        return self._sums(np.array(middles, int).reshape(-1, 2), members)
+
+    def with_neighbours(self, spacing_px: float) -> ChipSurfaces:
+        """Return each chip's weighted sum with those around it, whose spacing is given."""
+        from scipy.spatial import cKDTree  # takes long to import; few scenes need it
+
+        if len(self.centres) == 0:
+            return self
+        reach = 1.5 * spacing_px
+        members = cKDTree(self.centres).query_ball_point(self.centres, reach, p=np.inf)
+        return self._sums(self.centres, [np.sort(of) for of in members])
+
+    def _sums(self, centres: NDArray[np.int_], members: list[NDArray[np.int_]]) -> ChipSurfaces:
+        """Return the weighted sums of chips, by number, for each of some centres."""
         weight = self.weight[:, None, None]
 
         def total(surfaces: Surfaces) -> Surfaces:
             added = [(surfaces[of] * weight[of]).sum(axis=0) for of in members]
             return normalise(np.array(added, np.float32).reshape(-1, *surfaces.shape[1:]))
 
-        middles = [np.rint(self.centres[of].mean(axis=0)) for of in members]
-        return ChipSurfaces(
-            np.array(middles, int).reshape(-1, 2),
-            total(self.forward),
-            total(self.backward),
-            np.array([self.weight[of].sum() for of in members]),
-        )
+        forward = total(self.forward)
+        backward = forward if self.backward is self.forward else total(self.backward)
+        weights = np.array([self.weight[of].sum() for of in members])
+        return ChipSurfaces(centres, forward, backward, weights)
 
 
 class Matcher(Protocol):

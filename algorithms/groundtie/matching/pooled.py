@@ -140,6 +140,14 @@ class PooledHistogramMatcher:
         """
         return False
 
+    def for_points(self, surfaces: ChipSurfaces) -> ChipSurfaces:
+        """Return the surfaces that points of the fit are taken from: sums of neighbouring chips.
+
+        Little of each chip is ground. Measured by the suite rpc_city, with surface models: RPCs
+        refined by single chips are off by 0.73 px (median), by such sums 0.63 px.
+        """
+        return surfaces.with_neighbours(self.pooled_chip_px)
+
     def for_check(self, surfaces: ChipSurfaces, layout: ChipLayout) -> ChipSurfaces:
         """Return the surfaces that check points are taken from: sums over neighbouring blocks."""
         return surfaces.summed(layout.neighbourhoods(surfaces.centres))

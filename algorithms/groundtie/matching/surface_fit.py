@@ -58,6 +58,8 @@ class SurfaceMatcher(Protocol):
 
     def is_settled(self, expected_px: FloatArray) -> bool: ...
 
+    def for_points(self, surfaces: ChipSurfaces) -> ChipSurfaces: ...
+
     def for_check(self, surfaces: ChipSurfaces, layout: ChipLayout) -> ChipSurfaces: ...
 
     def seeing_all(self) -> SurfaceMatcher: ...
@@ -114,6 +116,7 @@ class SurfaceFit:
                 # Chips that were displaced by heights have lost them: they justify no more.
                 kind = TERRAIN
             surfaces, aligned, expected = self._align(coarse, kind, context)
+        surfaces = self.matcher.for_points(surfaces)
         points = fit_points(pair, surfaces, coarse, expected, self.forward_backward_px)
         model, fold_models = aligned.model, aligned.fold_models
         nominal = Transform.nominal(pair.grid.crs, pair.input.source.grid)
