@@ -35,7 +35,7 @@ LEAST_EXCESS = 8.5
 # not stand out as all n chips do of which each is one such deviation higher elsewhere, √n. Measured
 # by the suites real, rotated_pairs and attacks, from 25 to 49 chips: right transforms up to 0.97
 # times that, and one at 1.4; of ten wrong ones four from 1.08 times on. With more chips, right ones
-# up to 6.5 and wrong ones from 7.4 on. Pixels that a mask leaves vary more: of right copies up to
+# up to 6.5 and wrong ones from 7.1 on. Pixels that a mask leaves vary more: of right copies up to
 # 6.9, so that there are never fewer than 49 counted.
 _FEWEST_IF_WEAK, _MOST_IF_WEAK = 25, 49
 

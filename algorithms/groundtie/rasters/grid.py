@@ -112,9 +112,9 @@ class Grid:
         return float(np.sqrt(area))
 
     @property
-    def metres_per_pixel(self) -> float:
-        """The same; NaN without georeferencing, where nobody knows it."""
-        return self.pixel_size_m if self.is_georeferenced else float("nan")
+    def metres_per_pixel(self) -> float | None:
+        """The same; None without georeferencing, where nobody knows it."""
+        return self.pixel_size_m if self.is_georeferenced else None
 
     @property
     def centre_px(self) -> tuple[float, float]:

@@ -184,10 +184,10 @@ def decide_by_points(
     confirmed: str,
     fit_points: int,
     fit_points_used: int,
-    metres_per_px: float,
+    metres_per_px: float | None,
 ) -> Verdict:
     """Return what the rules make of evidence, with the numbers that its held-out points give."""
-    points = evidence.held_out
+    points, metres = evidence.held_out, math.nan if metres_per_px is None else metres_per_px
     verdict = replace(
         decide(evidence, confirmed),
         fit_points=fit_points,
@@ -202,9 +202,9 @@ def decide_by_points(
     return replace(
         verdict,
         check_rmse_px=points.rmse_px,
-        check_rmse_m=points.rmse_px * metres_per_px,
+        check_rmse_m=points.rmse_px * metres,
         check_ce90_px=points.accuracy.ce90_px,
-        check_ce90_m=points.accuracy.ce90_px * metres_per_px,
+        check_ce90_m=points.accuracy.ce90_px * metres,
         spread_px=points.spread_px,
         extrapolated_share=evidence.extrapolated_share,
         ce50_px=points.accuracy.ce50_px,

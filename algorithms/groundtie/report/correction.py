@@ -53,7 +53,7 @@ class Correction:
             float(lengths.max()),
             move_in_words(move, grid),
             *_turn(nominal, xy, grid),
-            grid.pixel_size_m if grid.is_georeferenced else None,
+            grid.metres_per_pixel,
         )
 
     def text(self) -> str:

@@ -11,7 +11,6 @@ from ..assessment.point_errors import PointErrors
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..masks.choice import MaskUsed
-from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..registration.verdict import Verdict
 from ..similarity.peak import find_peak
@@ -79,7 +78,7 @@ class Report(Page):
             "verdict": self.verdict,
             "grid": grid,
             "notes": [*self.pair.notes(), *([] if self.mask is None else [self.mask.line()])],
-            "metres": _metres_per_px(grid),
+            "metres": grid.metres_per_pixel,
             "model": None if found is None else found.model.kind,
             "correction": self.correction(),
             "pictures": Comparison.of(self.pair, found),
@@ -110,7 +109,7 @@ class Report(Page):
         }
         if shown["errors"]:
             reach = figures.error_reach_px(errors, verdict)
-            histogram = figures.error_histogram(errors, verdict, _metres_per_px(grid))
+            histogram = figures.error_histogram(errors, verdict, grid.metres_per_pixel)
             shown |= {
                 "histogram": figures.svg_uri(histogram),
                 "scatter": figures.svg_uri(figures.error_scatter(errors, verdict)),
@@ -132,7 +131,3 @@ def _shown_surface(label: str, surface: Surface) -> dict[str, Any]:
         # Where the peak lies in a picture of (2 radius + 1)² unit squares.
         "at": [radius + 0.5 + shift for shift in peak.shift_px],
     }
-
-
-def _metres_per_px(grid: Grid) -> float | None:
-    return grid.pixel_size_m if grid.is_georeferenced else None
