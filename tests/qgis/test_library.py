@@ -51,11 +51,11 @@ def test_what_is_installed_but_cannot_be_found_does_not_win(
 
 
 def test_warnings_meant_for_developers_stay_out_of_the_log(plugin: Any) -> None:
-    from groundtie_qgis import library
+    from groundtie_qgis import library, tool_loading
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.resetwarnings()
-        library.all_tools()
+        tool_loading.all_tools()
         for module in (f"{library.library_name()}.rasters.grid", "groundtie_qgis.adapter"):
             warnings.warn_explicit("old", DeprecationWarning, "file.py", 1, module=module)
     assert len(caught) == 1

@@ -31,16 +31,15 @@ DRAWN_REST_HEIGHT = 8.0
 # robust standard deviations of its surfaces, and be so many times as high in what a mask leaves.
 # Measured by the suites margins and attacks: right transforms with more than the former are up to
 # 1.3 times as high; beneath clouds and labels over ground that lies elsewhere, from 1.6 times and
-# 6.1 on; ground that shows through copies stands out by 8.4 and more, and is 2.4 times as high in
-# what the reference does not explain, or that is weak at the transform: of copies of what repeats,
-# it may be about as high at both places.
+# 6.1 on; ground that shows through copies stands out by 8.4 and more, where what the reference does
+# not explain is weak at the transform: of copies of what repeats, it may be higher at both places.
 # Nor may it show nothing where the transform has it: from 1.66 on where it is right, up to 1.5
 # beneath clouds and snow, but for one at 1.8. Of plain copies, few chips have anything left: up to
 # an eighth where they are right, from 0.3 on beneath clouds. Where edges are as sharp as drawn ones
 # and half of the chips are left, it must be as high as of other content: right ones from 2.53 on,
 # beneath clouds, snow and a reference that was blended in, up to 2.2.
 BEYOND_DEVIATIONS = 5.0
-_CLEAR_RIVAL = 1.5
+_MASKED_RIVAL = 1.5
 _LEAST_CHIPS, _MANY_CHIPS = 0.25, 0.5
 WEAK_COPY_HEIGHT = 1.6
 
@@ -103,13 +102,14 @@ def deviations_elsewhere(rest: Rest) -> float:
     """
     if rest.beyond is None:
         return 0.0
-    is_weak = rest.beyond.height < WEAK_REST_HEIGHT
-    limits = (rest.survey, _CLEAR_RIVAL), (rest.beyond, RIVAL_HEIGHT if is_weak else _CLEAR_RIVAL)
+    limits = ((rest.survey, _MASKED_RIVAL, math.inf), (rest.beyond, RIVAL_HEIGHT, WEAK_REST_HEIGHT))
     return max(
         left.rival_deviations
-        if _has_many_chips(left, rest) and left.rival_height >= share * left.height
+        if _has_many_chips(left, rest)
+        and left.height < strong
+        and left.rival_height >= share * left.height
         else 0.0
-        for left, share in limits
+        for left, share, strong in limits
     )
 
 
@@ -181,8 +181,9 @@ SURVEY_RULES: tuple[Rule, ...] = (
         f"or {DRAWN_REST_HEIGHT:g} of what is sharper than ground in other colours; of a copy, "
         f"or one sensor's views, below {WEAK_COPY_HEIGHT:g} if a quarter of the chips have "
         f"anything left, below {WEAK_REST_HEIGHT:g} with sharp edges if half have, or where a "
-        f"second place stands out by {BEYOND_DEVIATIONS:g}: {_CLEAR_RIVAL:g} times as high in what "
-        "is left or in what the reference does not explain, or about as high if the latter is weak",
+        f"second place stands out by {BEYOND_DEVIATIONS:g}: {_MASKED_RIVAL:g} times as high in "
+        f"what is left, or {RIVAL_HEIGHT:g} times in what the reference does not explain, if that "
+        "is weak",
         "suites margins and attacks",
         WITHOUT,
         _locked,
