@@ -99,7 +99,7 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
         "exchanged roles",
         AGREEMENT,
         "fewer than two of three chips all over match where the transform has them, no more than "
-        "half of the check points agree, no mask leaves the ground alone, and with reference and "
+        "two of three check points agree, no mask leaves the ground alone, and with reference and "
         "input exchanged check points agree as they may by chance, or the transform lies farther "
         "off than the largest error",
         "[Holden2000]; suite attacks",
