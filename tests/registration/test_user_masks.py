@@ -16,6 +16,7 @@ from raster_files import write_raster
 from groundtie.context import Context
 from groundtie.errors import ParameterError
 from groundtie.rasters.grid import Grid
+from groundtie.registration.asked import asked_masks
 from groundtie.registration.scene import SceneInfo
 from groundtie.registration.user_masks import UserMask, named_masks, with_user_masks
 
@@ -103,3 +104,62 @@ def test_a_mask_beside_the_image_is_taken_unless_it_is_not_wanted(tmp_path: Path
 def test_values_belong_to_their_kind_of_mask(mask: str | None, values: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         UserMask.of("input.tif", mask, values)
+
+
+@pytest.mark.parametrize(
+    ("values", "masks", "expected"),
+    [
+        (None, ("a.tif", "b.tif"), (None, None)),
+        ("1; scl", ("a.tif", "b.tif"), ("1", "scl")),
+        ("; scl", ("a.tif", "b.tif"), (None, "scl")),
+        ("3,8-10", ("a.tif", "b.tif"), ("3,8-10", "3,8-10")),
+        ("scl", (None, "b.tif"), (None, "scl")),
+        ("scl", ("a.tif", None), ("scl", None)),
+    ],
+)
+def test_one_text_states_the_values_of_both_masks(
+    values: str | None, masks: tuple[str | None, str | None], expected: tuple[str | None, ...]
+) -> None:
+    found = asked_masks(called(masks, values), "input")
+    assert tuple(mask and mask.values for mask in found) == expected
+    assert tuple(mask and mask.mask for mask in found) == masks
+
+
+def test_no_mask_is_looked_for_where_none_is_wanted(tmp_path: Path) -> None:
+    (tmp_path / "T32UQD_20200620T101031_SCL_20m.jp2").touch()
+    images = (tmp_path / "T32UQD_20200620T101031_B04_20m.jp2",) * 2
+    beside = asked_masks(called((None, None), None, images), "input")
+    assert [mask is None for mask in beside] == [False, False]
+    assert asked_masks(called((None, None), "none", images), "input") == (None, None)
+    of_input = asked_masks(called((None, None), "none;", images), "input")
+    assert [mask is None for mask in of_input] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("values", "masks", "message"),
+    [
+        ("scl", (None, None), "there is no mask that the values scl belong to"),
+        ("1; 2; 3", ("a.tif", "b.tif"), "there are two masks, not 3"),
+        ("1; scl", ("a.tif", None), "there is no mask that the values scl belong to"),
+    ],
+)
+def test_values_without_a_mask_are_refused(
+    values: str, masks: tuple[str | None, str | None], message: str
+) -> None:
+    with pytest.raises(ParameterError, match=message):
+        asked_masks(called(masks, values), "input")
+
+
+def called(
+    masks: tuple[str | None, str | None],
+    values: str | None,
+    images: tuple[Path, Path] = (Path("r.tif"), Path("i.tif")),
+) -> dict[str, object]:
+    """Return what a tool is called with."""
+    return {
+        "reference": images[0],
+        "input": images[1],
+        "reference_mask": masks[0],
+        "input_mask": masks[1],
+        "mask_values": values,
+    }

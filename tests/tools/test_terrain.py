@@ -77,6 +77,33 @@ def test_what_wrong_heights_displace_is_taken_out_and_warped(hills: Path, tmp_pa
 
 
 @pytest.mark.slow
+def test_a_radar_image_of_hills_is_matched_with_their_terrain_model_at_twice_its_pixels(
+    tmp_path: Path,
+) -> None:
+    groundtie.simulate(
+        tmp_path,
+        size=600,
+        density="rural",
+        pixel_size=10.0,
+        looks=4.0,
+        shift=4.0,
+        warp=2.0,
+        relief=300.0,
+        slope=25.0,
+        input="sar",
+        orbit="ascending",
+        seed=11,
+    )
+    files = (tmp_path / "dem.tif", tmp_path / "input.tif")
+    found = groundtie.coregister(*files, views="terrain radar")
+    assert found.transform is not None
+    assert np.sqrt((error_px(found.transform, tmp_path) ** 2).mean()) < 1.0
+    assert found.pair.grid.pixel_size_m == pytest.approx(20.0)
+    asked = groundtie.coregister(*files, views="terrain radar", matching_pixel_size=30.0)
+    assert asked.pair.grid.pixel_size_m == pytest.approx(30.0)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("given", "message"),
     [

@@ -218,7 +218,7 @@ def make_pair(
     if ref.is_same_as(inp):
         raise SameFileError(f"reference and input are the same raster: {ref.path}")
     require_georeferenced_alike(ref, inp)
-    wanted = matching_pixel_size_m or _coarser_m(ref.grid, inp.grid)
+    wanted = matching_pixel_size_m or coarser_m(ref.grid, inp.grid)
     factor = wanted / ref.grid.pixel_size_m
     grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
     radius = default_radius_m(grid) if search_radius_m is None else search_radius_m
@@ -306,7 +306,8 @@ def default_radius_m(grid: Grid) -> float:
     return max(usual, 20 * grid.pixel_size_m)
 
 
-def _coarser_m(reference: Grid, input: Grid) -> float:
+def coarser_m(reference: Grid, input: Grid) -> float:
+    """Return the pixel size of the coarser of two grids, in metres."""
     if reference.crs is not None or not input.is_georeferenced:
         return max(reference.pixel_size_m, input.pixel_size_m if input.is_georeferenced else 0.0)
     return max(reference.pixel_size_m, input.pixel_size_m)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from ..errors import ParameterError
 from ..geometry.views import View, parse_view, split_views
+from ..masks.choice import NONE
 from ..matching.surface_fit import AUTO
 from ..rasters.rendered import LIGHTS, RADAR, SUN, Light
 from .registered_output import grid_of_output, model_for_grid
@@ -20,8 +21,7 @@ USUAL: Mapping[str, Any] = {
     "displacement": None,
     "output_grid": "reference",
     "resampling": "cubic",
-    "reference_mask_values": None,
-    "input_mask_values": None,
+    "mask_values": None,
     "surface_model": None,
     "views": None,
 }
@@ -34,16 +34,35 @@ _AZIMUTHS_DEG = {RADAR: (270.0, 90.0), SUN: (150.0, 120.0, 180.0, 90.0, 30.0, 60
 # What a view begins with that is that of heights.
 _TERRAIN, _SURFACE = "terrain", "surface"
 
+# What stands between the values of the reference's mask and of the other image's.
+_BETWEEN = ";"
+
 _WORDS = re.compile(rf"{_TERRAIN}[\s,]+({'|'.join(LIGHTS)})(?:[\s,]+azimuth=(\d+(?:\.\d+)?)°?)?")
 
 
 def asked_masks(given: Mapping[str, Any], image: str) -> tuple[UserMask | None, UserMask | None]:
     """Return the masks of the reference and of `image`, by the values of a tool's parameters."""
+    names = ("reference", image)
+    masks = [given[f"{name}_mask"] for name in names]
+    values = _values_of_each(given["mask_values"], masks)
     reference, other = (
-        UserMask.of(given[name], given[f"{name}_mask"], given[f"{name}_mask_values"])
-        for name in ("reference", image)
+        UserMask.of(given[name], mask, text)
+        for name, mask, text in zip(names, masks, values, strict=True)
     )
     return reference, other
+
+
+def _values_of_each(values: str | None, masks: Sequence[Any]) -> tuple[str | None, str | None]:
+    """Return what of each of two masks takes no part: one text is for all masks that there are."""
+    if values is None:
+        return None, None
+    texts = [part.strip() or None for part in values.split(_BETWEEN)]
+    if len(texts) > len(masks):
+        raise ParameterError(f"there are two masks, not {len(texts)}, as in {values!r}")
+    if len(texts) == 1:
+        is_for_all = texts[0] == NONE or all(mask is None for mask in masks)
+        texts = [texts[0] if is_for_all or mask is not None else None for mask in masks]
+    return texts[0], texts[1]
 
 
 def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:

@@ -207,7 +207,6 @@ def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> Orthorectifie
         "image": given["input"],
         "image_band": given["input_band"],
         "image_mask": given["input_mask"],
-        "image_mask_values": given["input_mask_values"],
         "residuals": given["tie_points"],
     }
     output = Path(given["output"])

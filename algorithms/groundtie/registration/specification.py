@@ -106,7 +106,7 @@ class Specification:
     surface
         Its elevated objects; None: unknown.
     matching_pixel_size_m
-        Pixel size of the matching grid; None: by the images.
+        Pixel size of the matching grid; None: by the images, see `opening.pair_images`.
     tries
         How many registrations of this pair were tried, this one included: the probability of
         agreement by chance is counted for all of them.

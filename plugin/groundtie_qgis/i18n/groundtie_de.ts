@@ -1204,8 +1204,8 @@
       <translation>Pixelgröße</translation>
     </message>
     <message>
-      <source>Pixel size at which the images are compared; by default that of the coarser image.</source>
-      <translation>Pixelgröße, in der die Bilder verglichen werden; ohne Angabe die des gröberen Bildes.</translation>
+      <source>Pixel size at which the images are compared; by default that of the coarser image, twice that for a radar image and a terrain model.</source>
+      <translation>Pixelgröße, in der die Bilder verglichen werden; ohne Angabe die des gröberen Bildes, bei einem Radarbild und einem Geländemodell das Doppelte.</translation>
     </message>
     <message>
       <source>Pixel size for matching</source>
@@ -2012,12 +2012,8 @@
       <translation>Werte des Attributs oder des Rasters, durch Kommas getrennt, deren Merkmale wegbleiben; die aller anderen Werte bleiben.</translation>
     </message>
     <message>
-      <source>Values of the image's mask</source>
-      <translation>Werte der Maske des Bildes</translation>
-    </message>
-    <message>
-      <source>Values of the input's mask</source>
-      <translation>Werte der Maske der Eingabe</translation>
+      <source>Values of the masks</source>
+      <translation>Werte der Masken</translation>
     </message>
     <message>
       <source>Values of the reference's mask</source>
@@ -2096,8 +2092,12 @@
       <translation>Was innerhalb dieser Entfernung von maskierten Pixeln liegt, nimmt auch nicht teil.</translation>
     </message>
     <message>
-      <source>What of the mask takes no part: values as 3,8-10; scl, qa-pixel, fmask, hls-fmask or udm2 for clouds and their shadows in these missions' masks; inside for a vector layer of what takes no part. By default 0, and what lies outside of a layer. Without a mask one is taken that lies beside the image by the mission's names; none takes none.</source>
-      <translation>Was von der Maske nicht teilnimmt: Werte wie 3,8-10; scl, qa-pixel, fmask, hls-fmask oder udm2 für Wolken und ihre Schatten in den Masken dieser Missionen; inside für einen Vektorlayer dessen, was nicht teilnimmt. Ohne Angabe 0, und was außerhalb eines Layers liegt. Ohne Maske wird eine genommen, die unter den Namen der Mission neben dem Bild liegt; none nimmt keine.</translation>
+      <source>What of a mask takes no part: values as 3,8-10; scl, qa-pixel, fmask, hls-fmask or udm2 for clouds and their shadows in these missions' masks; inside for a vector layer of what takes no part. By default 0, and what lies outside of a layer. Without a mask one is taken that lies beside the image by the mission's names; none takes none.</source>
+      <translation>Was von einer Maske nicht teilnimmt: Werte wie 3,8-10; scl, qa-pixel, fmask, hls-fmask oder udm2 für Wolken und ihre Schatten in den Masken dieser Missionen; inside für einen Vektorlayer dessen, was nicht teilnimmt. Ohne Angabe 0, und was außerhalb eines Layers liegt. Ohne Maske wird eine genommen, die unter den Namen der Mission neben dem Bild liegt; none nimmt keine.</translation>
+    </message>
+    <message>
+      <source>What of a mask takes no part: values as 3,8-10; scl, qa-pixel, fmask, hls-fmask or udm2 for clouds and their shadows in these missions' masks; inside for a vector layer of what takes no part. By default 0, and what lies outside of a layer. Without a mask one is taken that lies beside the image by the mission's names; none takes none. With two masks that differ, those of the reference first, as in '1; scl'.</source>
+      <translation>Was von einer Maske nicht teilnimmt: Werte wie 3,8-10; scl, qa-pixel, fmask, hls-fmask oder udm2 für Wolken und ihre Schatten in den Masken dieser Missionen; inside für einen Vektorlayer dessen, was nicht teilnimmt. Ohne Angabe 0, und was außerhalb eines Layers liegt. Ohne Maske wird eine genommen, die unter den Namen der Mission neben dem Bild liegt; none nimmt keine. Bei zwei verschiedenen Masken zuerst die der Referenz, wie in '1; scl'.</translation>
     </message>
     <message>
       <source>What takes part in scenes with high buildings, which layover displaces: threshold leaves out strong scatterers, regions all but homogeneous ground (roads, waters, squares); auto takes regions where a radar image beside a camera's shows a town.</source>

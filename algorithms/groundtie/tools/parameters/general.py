@@ -92,7 +92,8 @@ MatchingPixelSize = Annotated[
     float | None,
     Distance(
         label="Pixel size for matching",
-        help="Pixel size at which the images are compared; by default that of the coarser image.",
+        help="Pixel size at which the images are compared; by default that of the coarser image, "
+        "twice that for a radar image and a terrain model.",
         minimum=1e-6,
         advanced=True,
     ),

@@ -102,7 +102,7 @@ ReferenceMask = Annotated[
 ]
 InputMask = Annotated[Path | None, MaskIn(label="Mask of the input", help=MASK_HELP, advanced=True)]
 _MASK_VALUES = (
-    "What of the mask takes no part: values as 3,8-10; scl, qa-pixel, fmask, hls-fmask or udm2 for "
+    "What of a mask takes no part: values as 3,8-10; scl, qa-pixel, fmask, hls-fmask or udm2 for "
     "clouds and their shadows in these missions' masks; inside for a vector layer of what takes no "
     "part. By default 0, and what lies outside of a layer. Without a mask one is taken that lies "
     "beside the image by the mission's names; none takes none."
@@ -111,11 +111,14 @@ ReferenceMaskValues = Annotated[
     str | None,
     Text(label="Values of the reference's mask", help=_MASK_VALUES, advanced=True),
 ]
-InputMaskValues = Annotated[
-    str | None, Text(label="Values of the input's mask", help=_MASK_VALUES, advanced=True)
-]
-ImageMaskValues = Annotated[
-    str | None, Text(label="Values of the image's mask", help=_MASK_VALUES, advanced=True)
+MaskValues = Annotated[
+    str | None,
+    Text(
+        label="Values of the masks",
+        help=f"{_MASK_VALUES} With two masks that differ, those of the reference first, as in "
+        "'1; scl'.",
+        advanced=True,
+    ),
 ]
 TerrainDem = Annotated[
     Path | None,
