@@ -31,6 +31,7 @@ from groundtie.registration.rules.survey import (
     least_height_of_copies,
 )
 from groundtie.registration.specification import COREGISTER
+from groundtie.registration.verdict import refusals
 
 from .accuracy import SILENTLY_WRONG_PX
 from .attacks.cases import AttackCase, cases
@@ -131,8 +132,8 @@ class Margins:
         Which case.
     error_px, is_right
         Error of the transform, and whether it is right, whatever the verdict is.
-    rule
-        What refused it; empty: nothing.
+    rules
+        Names of all rules that refuse it, the one that decides first.
     values
         A value for each of `STATISTICS`; NaN: there is none.
     """
@@ -140,7 +141,7 @@ class Margins:
     name: str
     error_px: float
     is_right: bool
-    rule: str
+    rules: tuple[str, ...]
     values: tuple[float, ...]
 
     def record(self) -> dict[str, Any]:
@@ -154,7 +155,7 @@ class Margins:
             "name": self.name,
             "error_px": error_px,
             "is_right": self.is_right,
-            "rule": self.rule,
+            "rules": list(self.rules),
             **values,
         }
 
@@ -162,7 +163,7 @@ class Margins:
         """Return what was measured as a line of text."""
         kind = "right" if self.is_right else "wrong"
         values = ", ".join(f"{value:.1f}" for value in self.values)
-        return f"{self.name}: {kind} ({self.error_px:.1f} px), {values}; {self.rule}"
+        return f"{self.name}: {kind} ({self.error_px:.1f} px), {values}; {', '.join(self.rules)}"
 
 
 @dataclass(frozen=True)
@@ -177,7 +178,7 @@ class AttackedPair:
         try:
             found = found_by(COREGISTER, *pair.rasters(), **pair.arguments(), workers=workers)
         except GroundTieError as error:
-            return Margins(self.case.name, math.inf, False, str(error), _NOTHING)
+            return Margins(self.case.name, math.inf, False, (str(error),), _NOTHING)
         error_px = math.inf if found.transform is None else pair.errors_px(found.transform)[0]
         return _measured(self.case.name, found, error_px, pair.sigma_px)
 
@@ -208,7 +209,10 @@ def _measured(name: str, found: Registration, error_px: float, sigma_px: float) 
     evidence = found.evidence
     values = _NOTHING if evidence is None else tuple(one.of(evidence) for one in STATISTICS)
     is_right = error_px <= SILENTLY_WRONG_PX + sigma_px
-    return Margins(name, error_px, is_right, found.verdict.rule, values)
+    # A search that came to no transform has no evidence of one: its verdict names its only rule.
+    decided = (found.verdict.rule,) if found.verdict.rule else ()
+    rules = decided if evidence is None else tuple(rule.name for rule, _ in refusals(evidence))
+    return Margins(name, error_px, is_right, rules, values)
 
 
 def run(settings: Settings) -> SuiteResult:
@@ -228,11 +232,14 @@ def run(settings: Settings) -> SuiteResult:
     return SuiteResult(
         "Margins: what right and wrong transforms leave to the limits of rules",
         (),
-        tuple(_table(number, statistic, found) for number, statistic in enumerate(STATISTICS)),
+        (
+            *(_table(number, statistic, found) for number, statistic in enumerate(STATISTICS)),
+            rules_table(found),
+        ),
         [one.record() for one in found],
         (
             "Right and wrong are transforms, whatever the verdict on them is: other rules may "
-            "refuse what is wrong.",
+            "refuse what is wrong. Alone: no other rule refuses the same transform.",
         ),
     )
 
@@ -250,3 +257,18 @@ def _table(number: int, statistic: Statistic, found: Sequence[Margins]) -> Table
         rows.append([kind, str(len(values)), *cells, str(int(refused.sum()))])
     head = ("", "transforms", *(f"{p} %" for p in _PERCENT), f"refused at {statistic.limit:g}")
     return Table(statistic.name, head, rows)
+
+
+def rules_table(found: Sequence[Margins]) -> Table:
+    """Return how often each rule refuses wrong and right transforms, and how often no other does.
+
+    A rule that refuses nothing wrong alone can go without making anything pass.
+    """
+    rows = []
+    for name in sorted({rule for one in found for rule in one.rules}):
+        cells = []
+        for is_right in (False, True):
+            refused = [one for one in found if one.is_right is is_right and name in one.rules]
+            cells += [str(len(refused)), str(sum(one.rules == (name,) for one in refused))]
+        rows.append([name, *cells])
+    return Table("By rule", ("rule", "wrong", "alone", "right", "alone"), rows)

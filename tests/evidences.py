@@ -17,9 +17,8 @@ from groundtie.matching.bands import BandSurvey
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
-from groundtie.registration.rules import RULES
 from groundtie.registration.scene import ImageFacts, SceneInfo
-from groundtie.registration.verdict import Evidence
+from groundtie.registration.verdict import Evidence, refusals
 from groundtie.sensor.adjustment import Control, adjust
 
 GRID = utm_grid(600, 500)
@@ -197,5 +196,4 @@ def masked(kind: str) -> MaskUsed:
 
 def refusing(found: Evidence) -> list[str]:
     """Return the names of all rules that refuse, whichever decides."""
-    asked = [rule for rule in RULES if rule.stage in found.stages]
-    return [rule.name for rule in asked if rule.reason(found) is not None]
+    return [rule.name for rule, _ in refusals(found)]

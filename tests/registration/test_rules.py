@@ -58,7 +58,7 @@ from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
 from groundtie.registration.series_evidence import DateEvidence
 from groundtie.registration.tie_point_evidence import TiePointEvidence
-from groundtie.registration.verdict import first_refusal
+from groundtie.registration.verdict import refusals
 
 RANK = (
     stages.TIE_POINTS,
@@ -254,7 +254,7 @@ def test_evidence_stands_here_for_every_rule_and_for_no_other() -> None:
 def test_a_rule_refuses_what_it_is_for_and_no_other_does(rule: Rule) -> None:
     refused, _ = EVIDENCE[rule.name]
     assert refusing(refused) == [rule.name]
-    decided = first_refusal(refused)
+    decided = next(refusals(refused), None)
     assert decided is not None and decided[0] is rule
     assert decided[1] == rule.reason(refused) and len(decided[1]) > 10
 
@@ -312,4 +312,4 @@ def test_only_rules_of_the_evidence_are_asked() -> None:
 
 
 def test_a_failure_that_is_no_refusal_decides_nothing() -> None:
-    assert first_refusal(SearchEvidence(NotRegisteredError("refused elsewhere"))) is None
+    assert next(refusals(SearchEvidence(NotRegisteredError("refused elsewhere"))), None) is None

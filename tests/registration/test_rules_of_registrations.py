@@ -30,7 +30,7 @@ from groundtie.masks.choice import LAYER, REGIONS, SURFACE, THRESHOLD, MaskUsed
 from groundtie.matching.rest import Rest
 from groundtie.registration.evidence import Exchanged, RegistrationEvidence
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
-from groundtie.registration.verdict import first_refusal
+from groundtie.registration.verdict import refusals
 
 
 def test_what_heights_may_displace_all_points_by_is_refused() -> None:
@@ -95,7 +95,7 @@ def test_the_input_shows_elevated_objects_where_the_surface_model_has_them(
     fit: ModelFit, reason: str | None
 ) -> None:
     found = evidence(GOOD, mask=masked(SURFACE), input_fit=fit, max_error_px=3.0)
-    decided = first_refusal(found)
+    decided = next(refusals(found), None)
     assert (decided is None) == (reason is None)
     assert decided is None or (reason is not None and reason in decided[1])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
@@ -123,18 +123,17 @@ class Evidence(Protocol):
     def stages(self) -> Collection[str]: ...
 
 
-def first_refusal(evidence: Evidence) -> tuple[Rule, str] | None:
-    """Return the first rule of the evidence's stages that refuses, and why; None: none does."""
+def refusals(evidence: Evidence) -> Iterator[tuple[Rule, str]]:
+    """Yield the rules of the evidence's stages that refuse, and why; the first of them decides."""
     for rule in RULES:
         reason = rule.reason(evidence) if rule.stage in evidence.stages else None
         if reason is not None:
-            return rule, reason
-    return None
+            yield rule, reason
 
 
 def decide(evidence: Evidence, confirmed: str) -> Verdict:
     """Return what the rules make of evidence, without its numbers; `confirmed` is why it stands."""
-    refusal = first_refusal(evidence)
+    refusal = next(refusals(evidence), None)
     if refusal is None:
         return Verdict(True, confirmed)
     rule, reason = refusal
