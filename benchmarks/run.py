@@ -20,6 +20,7 @@ SUITES = (
     "simulated",
     "city",
     "towns",
+    "double_bounce",
     "layover",
     "radar_likeness",
     "sharpness",

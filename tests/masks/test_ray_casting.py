@@ -7,7 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from groundtie.masks.ray_casting import Heights, LineOfSight, hidden_ground, radar_echoes
+from groundtie.masks.ray_casting import (
+    Heights,
+    LineOfSight,
+    double_bounce,
+    hidden_ground,
+    radar_echoes,
+)
 
 HEIGHT_M, PIXEL_M = 24.0, 0.5
 ROWS, COLS = slice(110, 170), slice(120, 160)
@@ -107,6 +113,37 @@ def test_nothing_is_hidden_from_the_zenith_nor_on_bare_ground() -> None:
     ground = box(0.1).ground_m
     bare, sight = Heights(ground, ground), LineOfSight.from_vertical(towards("left"), 40.0)
     assert not hidden_ground(bare, sight).any() and not radar_echoes(bare, sight).any()
+
+
+@pytest.mark.parametrize(
+    ("side", "place"),
+    [
+        ("left", (ROWS, slice(119, 120))),
+        ("right", (ROWS, slice(160, 161))),
+        ("up", (slice(109, 110), COLS)),
+        ("down", (slice(170, 171), COLS)),
+    ],
+)
+def test_double_bounce_lies_at_the_feet_of_walls_that_face_the_radar(
+    side: str, place: tuple[slice, slice]
+) -> None:
+    expected = np.zeros(SHAPE)
+    expected[place] = HEIGHT_M / PIXEL_M
+    found = double_bounce(box(), LineOfSight.from_vertical(towards(side), 40.0))
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+def test_double_bounce_needs_a_wall_and_ground_that_the_radar_sees() -> None:
+    sight = LineOfSight.from_vertical(towards("left"), 45.0)
+    ground = box(0.3).ground_m
+    assert not double_bounce(Heights(ground, ground), sight).any()
+    behind, alone = box(), double_bounce(box(), sight)
+    # 20 m behind a house of 24 m: its foot is hidden, at 45° from 24 m on no more.
+    behind.surface_m[ROWS, 200:210] = HEIGHT_M
+    np.testing.assert_array_equal(double_bounce(behind, sight), alone)
+    beyond = box()
+    beyond.surface_m[ROWS, 212:222] = HEIGHT_M
+    assert double_bounce(beyond, sight)[ROWS, 211].min() == pytest.approx(HEIGHT_M / PIXEL_M)
 
 
 def test_what_the_radar_does_not_see_is_laid_over_nothing() -> None:

@@ -94,10 +94,14 @@ def test_each_reason_lies_where_geometry_puts_it(tmp_path: Path) -> None:
     assert (seen[1:60, 1:-1] == 0).all()
 
 
-def test_the_image_of_a_house_has_its_layover_and_radar_shadow(tmp_path: Path) -> None:
+def test_the_image_of_a_house_has_its_layover_radar_shadow_and_double_bounce(
+    tmp_path: Path,
+) -> None:
     """Echoes of level ground, of a wall and of a roof that is wider than its layover, as power."""
     ground = ground_of(tmp_path, house())
     row = ground.image(Window(0, 95, 200, 1), RADAR)[0] ** 2 - 0.1
+    # Three for each of the wall's 12 m, besides ground, wall and roof at its foot.
+    assert row[89] == pytest.approx(3 + 3 * 12, abs=1e-3)
     layover_m, shadow_m = (12 * f(math.radians(40)) for f in (lambda a: 1 / math.tan(a), math.tan))
     # Ground, wall and roof fall together before the house; the roof alone lies on its near part.
     pieces = [(90 - layover_m, 1), (90, 3), (120 - layover_m, 1), (120 + shadow_m, 0), (200, 1)]

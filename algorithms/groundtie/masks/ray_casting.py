@@ -118,6 +118,28 @@ def radar_echoes(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
     return _along_rays(heights, sight, echoes)
 
 
+def double_bounce(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
+    """Return how many pixels high a wall that faces the radar stands behind each pixel's ground.
+
+    Wall and ground reflect together at the range of the wall's foot, wherever on the wall: if the
+    radar sees its foot, all of it is one bright line there. Shape (h, w); 0: no such wall. Source:
+    [Suri2010].
+    """
+
+    def lines(surface: _Lines, ground: _Lines) -> NDArray[np.int32]:
+        rise_m = sight.pixel_m / sight.tangent
+        foot, lowest = surface[:, :-1], _lowest_sight_m(surface, ground, rise_m)[:, :-1]
+        is_foot = (foot <= ground[:, :-1]) & (foot >= lowest - _LEVEL_M)
+        # Ground that rises is no wall.
+        is_foot &= surface[:, 1:] > ground[:, 1:]
+        found = np.zeros(surface.shape, np.int32)
+        high_px = _nearest(np.diff(surface) / sight.pixel_m)
+        found[:, :-1] = np.where(is_foot, np.maximum(high_px, 0), 0)
+        return found
+
+    return _along_rays(heights, sight, lines)
+
+
 def _lowest_sight_m(surface: _Lines, ground: _Lines, rise_m: float) -> _Lines:
     """Return how high the lowest free line of sight is over each pixel of rays; -inf: all are.
 

@@ -118,7 +118,7 @@ class Specification:
         The reference is a terrain model: it is rendered in this light. None: it is none.
     surface_view
         The reference is a surface model: it is rendered as a radar image from this view, with
-        layover and radar shadow. None: it is none.
+        layover, radar shadow and double bounce. None: it is none.
     surveys
         Whether chips all over the pair are matched, too, which rules ask for.
     """

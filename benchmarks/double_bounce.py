@@ -1,0 +1,158 @@
+"""Whether double bounce makes what is rendered of a surface model more like the radar image.
+
+A wall that faces the radar and the ground before it reflect twice: a bright line at the foot of the
+wall. It is added here with several weights, of which the product has one.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from groundtie.context import threads
+from groundtie.geometry.views import View
+from groundtie.masks.object_heights import RasterModel
+from groundtie.masks.scene import Scene
+from groundtie.masks.surface_model import DOUBLE_BOUNCE, SurfaceGround, write_image
+from groundtie.rasters.pair import Image
+from groundtie.rasters.reading import open_raster
+from groundtie.registration.opening import pair_images
+from groundtie.registration.pipeline import run as run_pipeline
+from groundtie.registration.specification import BOTH, COREGISTER
+from groundtie.simulation import files
+
+from .accuracy import SILENTLY_WRONG_PX
+from .attempt import on_pixels
+from .suites import Goal, Settings, SuiteResult, Table, run_cases
+from .towns import rough, seen_by_radar, to_model
+
+# How many echoes it adds for each pixel of the wall's height; 0: without.
+WEIGHTS = (0.0, 1.0, DOUBLE_BOUNCE, 10.0)
+_QUICK_SEEDS = 1
+
+
+@dataclass(frozen=True)
+class Bounce:
+    """What a weight makes of one city.
+
+    Parameters
+    ----------
+    name, weight
+        Which city, and one of `WEIGHTS`.
+    is_accepted, reason
+        The verdict on the registration of the radar image to what is rendered.
+    error_px
+        Error of its transform, whatever the verdict is, in pixels of the model.
+    correlation
+        Of the registered radar image with what is rendered; NaN: nothing was found.
+    """
+
+    name: str
+    weight: float
+    is_accepted: bool
+    reason: str
+    error_px: float
+    correlation: float
+
+    def record(self) -> dict[str, Any]:
+        """Return it as values that JSON can carry."""
+        values = asdict(self)
+        return {
+            key: None if isinstance(value, float) and not math.isfinite(value) else value
+            for key, value in values.items()
+        }
+
+    def line(self) -> str:
+        """Return it as a line of text."""
+        found = f"{self.error_px:.2f} px, correlation {self.correlation:.3f}"
+        return f"{self.name}, weight {self.weight:g}: {found}; {self.reason}"
+
+
+@dataclass(frozen=True)
+class BounceCase:
+    """A radar image of a city, registered to its rough surface model, rendered with a weight."""
+
+    seed: int
+    weight: float
+    cache: Path
+
+    def run(self, workers: int | None) -> Bounce:
+        """Render the model and register as the product does with what it renders itself."""
+        pair = seen_by_radar(self.seed).pair(self.cache)
+        view = View.of(pair.input, None)
+        assert view is not None
+        model = rough(pair.reference.parent / files.NAMES["dsm"], is_reference=True)
+        rendered = with_double_bounce(model, view, self.weight)
+        spec = replace(COREGISTER, surface_view=view, radar=BOTH)
+        with threads(workers) as context, ExitStack() as stack:
+            images = [Image(stack.enter_context(open_raster(p))) for p in (rendered, pair.input)]
+            started = time.perf_counter()
+            opened = pair_images(*images, spec, context, (None, None), stack, started)
+            found = run_pipeline(opened, spec, context)
+        truth, error_px, correlation = to_model(pair, rendered).truth, math.inf, math.nan
+        if found.transform is not None and truth is not None:
+            error_px = truth.error_px(on_pixels(found.transform, rendered))
+        if found.evidence is not None and found.evidence.input_fit is not None:
+            correlation = found.evidence.input_fit.correlation
+        verdict = found.verdict
+        return Bounce(
+            f"city, seed {self.seed}",
+            self.weight,
+            verdict.accepted,
+            verdict.reason,
+            error_px,
+            correlation,
+        )
+
+
+def with_double_bounce(model: Path, view: View, weight: float) -> Path:
+    """Render a surface model as the product does, with this weight; made beside the model."""
+    path = model.with_name(f"rendered_{weight:g}.tif")
+    if path.exists():
+        return path
+    made = path.with_name(f"{path.stem}-{np.random.default_rng().integers(2**31)}.tif")
+    with ExitStack() as stack:
+        source = stack.enter_context(open_raster(model))
+        ground = SurfaceGround(Scene.of(source), RasterModel(source), (view,))
+        write_image(ground, view, made, bounce=weight)
+    made.rename(path)
+    return path
+
+
+def run(settings: Settings) -> SuiteResult:
+    """Run the suite."""
+    seeds = _QUICK_SEEDS if settings.quick else settings.seeds
+    numbers = range(settings.first_seed, settings.first_seed + seeds)
+    for seed in numbers:
+        seen_by_radar(seed).pair(settings.cache)
+    cases = [BounceCase(seed, weight, settings.cache) for seed in numbers for weight in WEIGHTS]
+    found: list[Bounce] = list(run_cases(cases, settings.jobs))  # type: ignore[arg-type]
+    wrong = sum(one.is_accepted and one.error_px > SILENTLY_WRONG_PX for one in found)
+    return SuiteResult(
+        "Double bounce in what is rendered of rough surface models of dense cities",
+        (Goal("silently wrong", "none", f"{wrong} of {len(found)}", wrong == 0),),
+        (weights_table(found),),
+        [one.record() for one in found],
+        (f"The product has {DOUBLE_BOUNCE:g}. Errors are in pixels of the rough model.",),
+    )
+
+
+def weights_table(found: Sequence[Bounce]) -> Table:
+    """Return a table of what each weight makes of the cities."""
+    rows = []
+    for weight in WEIGHTS:
+        of_weight = [one for one in found if one.weight == weight]
+        errors = [one.error_px for one in of_weight if one.is_accepted]
+        correlation = np.nanmean([one.correlation for one in of_weight])
+        median = float(np.median(errors)) if errors else math.nan
+        counts = f"{len(errors)} of {len(of_weight)}"
+        rows.append([f"{weight:g}", f"{correlation:.3f}", counts, f"{median:.2f}"])
+    head = ("weight", "correlation, mean", "accepted", "median error (px)")
+    return Table("By weight", head, rows)
