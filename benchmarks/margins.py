@@ -199,7 +199,8 @@ class RealPair:
             error_px = math.inf
             if found.transform is not None and pair.truth is not None:
                 error_px = pair.truth.error_px(on_pixels(found.transform, pair.reference))
-        return _measured(self.case.name, found, error_px, pair.sigma_px)
+            # Rules may read the images, which are gone with the folder.
+            return _measured(self.case.name, found, error_px, pair.sigma_px)
 
 
 _NOTHING = (math.nan,) * len(STATISTICS)
