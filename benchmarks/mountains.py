@@ -47,7 +47,10 @@ VIEWS: dict[str, tuple[tuple[str, float | str], ...]] = {
 # right inputs to the terrain model itself by `register`, and to that of another scene.
 WITHOUT, WITH, NEEDLESS = "without heights", "with heights", "with needless heights"
 LIT, ELSEWHERE = "to the terrain", "to another terrain"
-WAYS = (WITHOUT, WITH, NEEDLESS, LIT, ELSEWHERE)
+# An input that wrong heights displace, to the right terrain model.
+DISPLACED = "to the terrain, without heights"
+WAYS = (WITHOUT, WITH, NEEDLESS, LIT, ELSEWHERE, DISPLACED)
+_WRONG_WAYS = (WITHOUT, WITH, DISPLACED)
 _LIT_PX = 1.0
 
 
@@ -65,7 +68,7 @@ class MountainCase:
         """Make the pair if need be, register it and judge the result."""
         pair = self._scene(self.seed)
         of = pair
-        if self.way in (LIT, ELSEWHERE):
+        if self.way in (LIT, ELSEWHERE, DISPLACED):
             of = replace(pair, reference=pair.reference.with_name(NAMES["dem"]))
         if self.way == ELSEWHERE:
             dem = self._scene(self.seed + 1).reference.with_name(NAMES["dem"])
@@ -88,14 +91,14 @@ def further(pair: Pair, view: str, way: str) -> dict[str, Any]:
     dem = pair.reference.with_name(NAMES["dem"])
     if way == WITHOUT:
         return {}
-    if way in (LIT, ELSEWHERE):
+    if way in (LIT, ELSEWHERE, DISPLACED):
         return {"views": f"terrain {RADAR if view == 'SAR' else SUN}"}
     return {"dem": dem, "input_dem": dem.with_name(NAMES["input_dem"]) if way == WITH else None}
 
 
 def group(country: str, view: str, way: str) -> str:
     """Return what the cases of a kind are called."""
-    return f"{country}, {view} {'wrong' if way in (WITHOUT, WITH) else 'right'}, {way}"
+    return f"{country}, {view} {'wrong' if way in _WRONG_WAYS else 'right'}, {way}"
 
 
 def mountain(country: str, view: str, way: str, seed: int) -> Simulation:
@@ -106,7 +109,7 @@ def mountain(country: str, view: str, way: str, seed: int) -> Simulation:
         ("looks", 4.0),
         ("warp", 2.0),
         ("relief", terrain.relief_m),
-        ("terrain_error", ERROR_M if way in (WITHOUT, WITH) else 0.0),
+        ("terrain_error", ERROR_M if way in _WRONG_WAYS else 0.0),
         ("orbit", "ascending" if seed % 2 else "descending"),
         ("view_azimuth", 100.0 * seed % 360),
         *VIEWS[view],
@@ -145,7 +148,7 @@ def goals(country: str, view: str, way: str, outcomes: Sequence[Outcome]) -> tup
         found = f"{len(errors)} of {len(outcomes)}"
         return (Goal(f"{title}: accepted", "none", found, not errors),)
     largest = _LIT_PX if way == LIT else COUNTRIES[country].rmse_px
-    largest = None if way == WITHOUT else largest
+    largest = None if way in (WITHOUT, DISPLACED) else largest
     return (
         Goal(
             f"{title}: RMSE",

@@ -11,7 +11,7 @@ from benchmark_outcomes import outcome
 from benchmarks import mountains
 from benchmarks.accuracy import CORRECT, REFUSED, SILENTLY_WRONG
 from benchmarks.attempt import Pair
-from benchmarks.mountains import ELSEWHERE, LIT, NEEDLESS, WITH, WITHOUT
+from benchmarks.mountains import DISPLACED, ELSEWHERE, LIT, NEEDLESS, WITH, WITHOUT
 
 
 def test_only_what_is_needless_was_made_with_right_heights() -> None:
@@ -19,7 +19,8 @@ def test_only_what_is_needless_was_made_with_right_heights() -> None:
         way: dict(mountains.mountain("hilly", "SAR", way, 1).further)["terrain_error"]
         for way in mountains.WAYS
     }
-    assert errors == {WITHOUT: 30.0, WITH: 30.0, NEEDLESS: 0.0, LIT: 0.0, ELSEWHERE: 0.0}
+    right = {NEEDLESS: 0.0, LIT: 0.0, ELSEWHERE: 0.0}
+    assert errors == {WITHOUT: 30.0, WITH: 30.0, DISPLACED: 30.0, **right}
     assert mountains.mountain("hilly", "SAR", WITH, 1) == mountains.mountain(
         "hilly", "SAR", WITHOUT, 1
     )
@@ -32,6 +33,7 @@ def test_heights_that_are_given() -> None:
     assert mountains.further(pair, "SAR", WITH) == {"dem": dem, "input_dem": taken}
     assert mountains.further(pair, "SAR", NEEDLESS) == {"dem": dem, "input_dem": None}
     assert mountains.further(pair, "SAR", LIT) == {"views": "terrain radar"}
+    assert mountains.further(pair, "SAR", DISPLACED) == {"views": "terrain radar"}
     assert mountains.further(pair, "optical", ELSEWHERE) == {"views": "terrain sun"}
 
 
@@ -50,6 +52,8 @@ def test_heights_that_are_given() -> None:
         ("flat", LIT, [0.1], [False]),
         ("flat", LIT, [math.nan], [True]),
         ("hilly", ELSEWHERE, [math.nan], [True]),
+        ("mountains", DISPLACED, [2.0], [None, True]),
+        ("mountains", DISPLACED, [5.0], [None, False]),
     ],
 )
 def test_goals(country: str, way: str, errors: list[float], expected: list[bool | None]) -> None:

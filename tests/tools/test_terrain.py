@@ -76,24 +76,28 @@ def test_what_wrong_heights_displace_is_taken_out_and_warped(hills: Path, tmp_pa
         assert source.read(source.window)[1].mean() > 0.9
 
 
+def seen_by_radar(folder: Path, **country: float) -> None:
+    """Make a radar image of 6 km and its terrain model."""
+    orbit = "descending" if country["seed"] == 10 else "ascending"
+    fixed = {"size": 600, "density": "rural", "pixel_size": 10.0, "looks": 4.0}
+    groundtie.simulate(folder, shift=4.0, warp=2.0, input="sar", orbit=orbit, **fixed, **country)
+
+
+@pytest.mark.slow
+def test_a_radar_image_that_wrong_heights_displace_is_not_registered_to_the_terrain(
+    tmp_path: Path,
+) -> None:
+    """Errors are judged in pixels of the image, however large those are that it is matched at."""
+    seen_by_radar(tmp_path, relief=1500.0, slope=45.0, terrain_error=30.0, seed=10)
+    with pytest.raises(NotRegisteredError, match=r"error at check points is .* above 1\.5 px"):
+        groundtie.coregister(tmp_path / "dem.tif", tmp_path / "input.tif", views="terrain radar")
+
+
 @pytest.mark.slow
 def test_a_radar_image_of_hills_is_matched_with_their_terrain_model_at_twice_its_pixels(
     tmp_path: Path,
 ) -> None:
-    groundtie.simulate(
-        tmp_path,
-        size=600,
-        density="rural",
-        pixel_size=10.0,
-        looks=4.0,
-        shift=4.0,
-        warp=2.0,
-        relief=300.0,
-        slope=25.0,
-        input="sar",
-        orbit="ascending",
-        seed=11,
-    )
+    seen_by_radar(tmp_path, relief=300.0, slope=25.0, seed=11)
     files = (tmp_path / "dem.tif", tmp_path / "input.tif")
     found = groundtie.coregister(*files, views="terrain radar")
     assert found.transform is not None

@@ -107,8 +107,8 @@ class SurfaceGround:
         """
         heights, known, inside = self._around(window)
         lines = double_bounce(heights, _sight(view, self.scene.grid))
-        power = self._echoes(heights, view) + np.float32(bounce) * lines + _SHADOW
-        return np.where(known, np.sqrt(power), np.float32(np.nan))[inside]
+        power = (self._echoes(heights, view) + np.float32(bounce) * lines)[inside] + _SHADOW
+        return np.where(known[inside], np.sqrt(power), np.float32(np.nan))
 
     def _echoes(self, heights: Heights, view: View) -> NDArray[np.int32]:
         """Return how many echoes a radar image shows at each pixel, ground among them."""

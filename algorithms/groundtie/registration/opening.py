@@ -13,16 +13,11 @@ from ..geometry.terrain import Terrain
 from ..masks.choice import MaskUsed
 from ..rasters.pair import Image, ImagePair, coarser_m, make_pair
 from ..rasters.reading import open_raster
-from ..rasters.rendered import RADAR, rendered
+from ..rasters.rendered import rendered
 from .masks import require_one_mask
 from .specification import Specification
 from .surface_masks import rendered_surface
 from .user_masks import named_masks, with_user_masks
-
-# A radar image and what is rendered of a terrain model are matched at pixels this many times as
-# large: speckle averages out, and relief has larger forms than what it covers. Measured with
-# `benchmarks/run.py --only mountains`: of hills at 1, 6 of 16 pairs are accepted, at 2 all 16.
-_RADAR_OF_TERRAIN = 2.0
 
 
 @dataclass(frozen=True)
@@ -108,13 +103,11 @@ def pair_images(
     started: float,
 ) -> OpenPair:
     """Put two open images on a common matching grid, and the user's masks on them."""
-    pixel_size_m = spec.matching_pixel_size_m
     grid = input.source.grid
     if spec.light is not None:
         lit = rendered(reference.source, spec.light, reference.band)
         reference = Image(lit, 1)
-        if spec.light.kind == RADAR and pixel_size_m is None:
-            pixel_size_m = _RADAR_OF_TERRAIN * coarser_m(lit.grid, grid)
+    usual_m = spec.enlargement * coarser_m(reference.source.grid, grid)
     radius_m, rotation_deg, scale = spec.search_radius_m, spec.rotation_deg, spec.scale
     if not grid.is_georeferenced:
         if radius_m is None and spec.free.radius_share is not None:
@@ -124,7 +117,7 @@ def pair_images(
     images = make_pair(
         reference,
         input,
-        pixel_size_m,
+        spec.matching_pixel_size_m or usual_m,
         radius_m,
         0.0 if rotation_deg is None else rotation_deg,
         1.0 if scale is None else scale,

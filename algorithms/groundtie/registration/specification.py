@@ -91,7 +91,8 @@ class Specification:
     candidates
         What "auto" chooses from, from simple to flexible.
     max_error_px
-        Largest root mean square error at check points, in matching pixels.
+        Largest root mean square error at check points, in pixels of the coarser image, or of the
+        size that is stated for matching.
     search_radius_m
         How far the input may lie from its nominal place; None: 100 m or 20 pixels.
     rotation_deg, scale
@@ -106,7 +107,7 @@ class Specification:
     surface
         Its elevated objects; None: unknown.
     matching_pixel_size_m
-        Pixel size of the matching grid; None: by the images, see `opening.pair_images`.
+        Pixel size of the matching grid; None: that of the coarser image, `enlargement` times.
     tries
         How many registrations of this pair were tried, this one included: the probability of
         agreement by chance is counted for all of them.
@@ -148,6 +149,17 @@ class Specification:
     def is_rendered(self) -> bool:
         """Whether the reference is no image, but heights that one is made of."""
         return self.light is not None or self.surface_view is not None
+
+    @property
+    def enlargement(self) -> float:
+        """How many times as large as the coarser image's pixels matching pixels are."""
+        is_stated = self.matching_pixel_size_m is not None
+        return 1.0 if self.light is None or is_stated else self.light.enlargement
+
+    @property
+    def largest_error_px(self) -> float:
+        """`max_error_px` in matching pixels."""
+        return self.max_error_px / self.enlargement
 
     def with_surface(self, surface: StatedSurface) -> Specification:
         """Return the same with elevated objects, and whose images show them."""

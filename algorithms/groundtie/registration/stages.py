@@ -159,7 +159,7 @@ class Stages:
             estimate,
             check.points,
             self.masked.pair.grid,
-            self.spec.max_error_px,
+            self.spec.largest_error_px,
             CHECK_RADIUS_PX,
             self.spec.tries,
             check.common_shift_px if is_apart else 0.0,
