@@ -81,15 +81,20 @@ class Outcome:
 
     def record(self) -> dict[str, Any]:
         """Return the outcome as values that JSON can carry."""
-        return {
-            key: None if isinstance(value, float) and not math.isfinite(value) else value
-            for key, value in asdict(self).items()
-        }
+        return for_json(asdict(self))
 
     def line(self) -> str:
         """Return the outcome as a line of text."""
         error = "" if not self.model else f" {self.error_px:.2f} px ({self.model})"
         return f"{self.name}: {self.verdict}{error} in {self.seconds:.1f} s; {self.reason}"
+
+
+def for_json(values: dict[str, Any]) -> dict[str, Any]:
+    """Return values of which those that JSON has no number for, infinite or unknown, are None."""
+    return {
+        key: None if isinstance(value, float) and not math.isfinite(value) else value
+        for key, value in values.items()
+    }
 
 
 def attempt(

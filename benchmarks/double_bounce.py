@@ -21,6 +21,7 @@ from groundtie.geometry.views import View
 from groundtie.masks.object_heights import RasterModel
 from groundtie.masks.scene import Scene
 from groundtie.masks.surface_model import DOUBLE_BOUNCE, SurfaceGround, write_image
+from groundtie.rasters.atomic import scratch_folder
 from groundtie.rasters.pair import Image
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.opening import pair_images
@@ -29,7 +30,7 @@ from groundtie.registration.specification import BOTH, COREGISTER
 from groundtie.simulation import files
 
 from .accuracy import SILENTLY_WRONG_PX
-from .attempt import on_pixels
+from .attempt import for_json, on_pixels
 from .suites import Goal, Settings, SuiteResult, Table, run_cases
 from .towns import rough, seen_by_radar, to_model
 
@@ -63,11 +64,7 @@ class Bounce:
 
     def record(self) -> dict[str, Any]:
         """Return it as values that JSON can carry."""
-        values = asdict(self)
-        return {
-            key: None if isinstance(value, float) and not math.isfinite(value) else value
-            for key, value in values.items()
-        }
+        return for_json(asdict(self))
 
     def line(self) -> str:
         """Return it as a line of text."""
@@ -89,16 +86,17 @@ class BounceCase:
         view = View.of(pair.input, None)
         assert view is not None
         model = rough(pair.reference.parent / files.NAMES["dsm"], is_reference=True)
-        rendered = with_double_bounce(model, view, self.weight)
         spec = replace(COREGISTER, surface_view=view, radar=BOTH)
         with threads(workers) as context, ExitStack() as stack:
+            rendered = stack.enter_context(scratch_folder()) / "rendered.tif"
+            write_rendered(model, view, self.weight, rendered)
             images = [Image(stack.enter_context(open_raster(p))) for p in (rendered, pair.input)]
             started = time.perf_counter()
             opened = pair_images(*images, spec, context, (None, None), stack, started)
             found = run_pipeline(opened, spec, context)
-        truth, error_px, correlation = to_model(pair, rendered).truth, math.inf, math.nan
+        truth, error_px, correlation = to_model(pair, model).truth, math.inf, math.nan
         if found.transform is not None and truth is not None:
-            error_px = truth.error_px(on_pixels(found.transform, rendered))
+            error_px = truth.error_px(on_pixels(found.transform, model))
         if found.evidence is not None and found.evidence.input_fit is not None:
             correlation = found.evidence.input_fit.correlation
         verdict = found.verdict
@@ -112,18 +110,11 @@ class BounceCase:
         )
 
 
-def with_double_bounce(model: Path, view: View, weight: float) -> Path:
-    """Render a surface model as the product does, with this weight; made beside the model."""
-    path = model.with_name(f"rendered_{weight:g}.tif")
-    if path.exists():
-        return path
-    made = path.with_name(f"{path.stem}-{np.random.default_rng().integers(2**31)}.tif")
-    with ExitStack() as stack:
-        source = stack.enter_context(open_raster(model))
+def write_rendered(model: Path, view: View, weight: float, path: Path) -> None:
+    """Render a surface model as the product does, with this weight."""
+    with open_raster(model) as source:
         ground = SurfaceGround(Scene.of(source), RasterModel(source), (view,))
-        write_image(ground, view, made, bounce=weight)
-    made.rename(path)
-    return path
+        write_image(ground, view, path, bounce=weight)
 
 
 def run(settings: Settings) -> SuiteResult:

@@ -36,7 +36,7 @@ from groundtie.registration.verdict import refusals
 from .accuracy import SILENTLY_WRONG_PX
 from .attacks.cases import AttackCase, cases
 from .attacks.suite import sample
-from .attempt import on_pixels
+from .attempt import for_json, on_pixels
 from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
 from .pipeline_runs import found_by
 from .real import LARGEST_SHIFT_PX
@@ -146,18 +146,16 @@ class Margins:
 
     def record(self) -> dict[str, Any]:
         """Return what was measured as values that JSON can carry."""
-        values = {
-            statistic.name: value if math.isfinite(value) else None
-            for statistic, value in zip(STATISTICS, self.values, strict=True)
-        }
-        error_px = self.error_px if math.isfinite(self.error_px) else None
-        return {
-            "name": self.name,
-            "error_px": error_px,
-            "is_right": self.is_right,
-            "rules": list(self.rules),
-            **values,
-        }
+        names = [statistic.name for statistic in STATISTICS]
+        return for_json(
+            {
+                "name": self.name,
+                "error_px": self.error_px,
+                "is_right": self.is_right,
+                "rules": list(self.rules),
+                **dict(zip(names, self.values, strict=True)),
+            }
+        )
 
     def line(self) -> str:
         """Return what was measured as a line of text."""

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 from groundtie.errors import GroundTieError, NotRegisteredError
 
 from ..accuracy import CRASHED, REFUSED
+from ..attempt import for_json
 
 ACCEPTED = "accepted"
 
@@ -60,10 +61,7 @@ class AttackOutcome:
 
     def record(self) -> dict[str, Any]:
         """Return the outcome as values that JSON can carry."""
-        return {
-            key: None if isinstance(value, float) and not math.isfinite(value) else value
-            for key, value in asdict(self).items()
-        }
+        return for_json(asdict(self))
 
     def line(self) -> str:
         """Return the outcome as a line of text."""
