@@ -34,9 +34,9 @@ _BLOCK_PX = 384
 # Images of so many pixels are resampled as a whole: 5 bytes each are held for either.
 _HELD_PIXELS = 4_000_000
 
-# Windows are worked in stacks of about so many pixels, which stay in the processor's cache:
-# `benchmarks/run.py --only kernels`.
-_STACK_PIXELS = 65_536
+# Windows are worked in stacks of about so many pixels. Larger ones leave the processor's cache; of
+# smaller ones, threads wait more often for one another: `benchmarks/run.py --only kernels`.
+_STACK_PIXELS = 131_072
 
 
 @dataclass(frozen=True)

@@ -190,29 +190,47 @@ def correlate_grey(template: Patch, search: Patch) -> NDArray[np.float32]:
     -------
     Array of shape (…, ny, nx), float32.
     """
-    return each(_correlate_grey, template.values, template.valid, search.values, search.valid)
+    t, s = _centred(template), _centred(search)
+    whole = template.valid.all(axis=(-2, -1)) & search.valid.all(axis=(-2, -1))
+    found = np.empty((*whole.shape, *spans(t, s)), np.float32)
+    # An image alone has the digits that it has in a stack.
+    if whole.any():
+        found[whole] = each(_coefficients, t[whole], s[whole])
+    if not whole.all():
+        part = t[~whole], template.valid[~whole], s[~whole], search.valid[~whole]
+        found[~whole] = _masked_coefficients(*part)
+    return found
 
 
-def _correlate_grey(
+def _coefficients(t: FloatImage, s: FloatImage) -> FloatImage:
+    return np.asarray(cv2.matchTemplate(s, t, cv2.TM_CCOEFF_NORMED), np.float32)
+
+
+def _centred(patch: Patch) -> FloatImage:
+    """Return images without the means of their valid pixels, 0 where they are not valid.
+
+    Single precision would lose small contrast on large values.
+    """
+    counts = patch.valid.astype(np.float32)
+    sums = (patch.values * counts).sum(axis=(-2, -1), keepdims=True)
+    means = sums / np.maximum(counts.sum(axis=(-2, -1), keepdims=True), 1)
+    return (patch.values - means) * counts
+
+
+def _masked_coefficients(
     t: FloatImage, t_valid: NDArray[np.bool_], s: FloatImage, s_valid: NDArray[np.bool_]
 ) -> FloatImage:
-    # Means are taken off first: single precision would lose small contrast on large values.
-    mean = s[s_valid].mean() if s_valid.any() else np.float32(0)
-    own_mean = t[t_valid].mean() if t_valid.any() else mean
-    if t_valid.all() and s_valid.all():
-        found = cv2.matchTemplate(s - mean, t - own_mean, cv2.TM_CCOEFF_NORMED)
-        return np.asarray(found, np.float32)
-    tm, sm = t_valid.astype(np.float32), s_valid.astype(np.float32)
-    t, s = (t - own_mean) * tm, (s - mean) * sm
+    """Return the correlation of images, 0 where they are not valid, by what is valid in both."""
     # Each of a window's three spectra serves several sums.
     shape = fast_shape(s)
-    of_t = spectrum(np.stack([tm, t, t * t]), shape).conj()
-    of_s = spectrum(np.stack([sm, s, s * s]), shape)
-    products = of_t[[0, 1, 0, 1, 2, 0]] * of_s[[0, 0, 1, 1, 0, 2]]
-    count, sum_t, sum_s, sum_ts, sum_tt, sum_ss = from_spectrum(products, shape, spans(t, s))
-    count = np.maximum(count, 1)
-    covariance = sum_ts - sum_t * sum_s / count
-    variance_t, variance_s = sum_tt - sum_t**2 / count, sum_ss - sum_s**2 / count
-    product = variance_t * variance_s
-    floor = 1e-6 * max(float(product.max(initial=0)), 1e-12)
+    of_t = spectrum(np.stack([t_valid.astype(np.float32), t, t * t]), shape).conj()
+    of_s = spectrum(np.stack([s_valid.astype(np.float32), s, s * s]), shape)
+
+    def sums(own: int, other: int) -> FloatImage:
+        return np.asarray(from_spectrum(of_t[own] * of_s[other], shape, spans(t, s)), np.float32)
+
+    count, sum_t, sum_s = np.maximum(sums(0, 0), 1), sums(1, 0), sums(0, 1)
+    covariance = sums(1, 1) - sum_t * sum_s / count
+    product = (sums(2, 0) - sum_t**2 / count) * (sums(0, 2) - sum_s**2 / count)
+    floor = 1e-6 * np.maximum(product.max(axis=(-2, -1), keepdims=True, initial=0), 1e-12)
     return np.where(product > floor, covariance / np.sqrt(np.maximum(product, floor)), 0)

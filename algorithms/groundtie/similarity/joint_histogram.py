@@ -208,13 +208,13 @@ def _count_spectrally(
     other = np.moveaxis(np.take(digits.weights(bins[1]), search, axis=1), 0, -3)
     of_search = spectrum(other, shape, workers)
     counts = np.empty((*template.shape[:-2], *bins, *spans(template, search)), np.float32)
-    # Bin by bin, so that what is worked stays in the processor's cache.
+    # Bin by bin, so that what is worked stays in the processor's cache, and always in one place.
+    product = np.empty_like(of_search)
     for bin in range(bins[0]):
         of_template = spectrum((template == bin).astype(digits.dtype), shape, workers).conj()
-        product = of_search * of_template[..., None, :, :]
-        digits.read(
-            from_spectrum(product, shape, counts.shape[-2:], workers), counts[..., bin, :, :, :]
-        )
+        np.multiply(of_search, of_template[..., None, :, :], out=product)
+        found = from_spectrum(product, shape, counts.shape[-2:], workers)
+        digits.read(found, counts[..., bin, :, :, :])
     return np.moveaxis(counts, (-4, -3), (-2, -1))
 
 

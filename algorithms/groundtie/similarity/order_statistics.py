@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# From so many values on, it is quicker to select among those of a bucket alone, of so many.
-_MANY, _BUCKETS = 4096, 1024
+# NumPy sorts and selects by vector instructions since version 2. Before, it is quicker to select
+# among the values of a bucket alone, of so many, from so many values on.
+_MANY = np.inf if np.lib.NumpyVersion(np.__version__) >= "2.0.0" else 4096
+_BUCKETS = 1024
 
 
 def upper_median(values: NDArray[Any]) -> Any:
@@ -37,7 +39,8 @@ def quantiles(values: NDArray[Any], shares: NDArray[np.float64]) -> NDArray[np.f
     place = shares * (values.size - 1)
     below = np.floor(place).astype(int)
     above = np.minimum(below + 1, values.size - 1)
-    ordered = np.partition(values, np.union1d(below, above), axis=None)
+    # Sorting takes a ninth of the time of selecting several (suite kernels).
+    ordered = np.sort(values, axis=None)
     low, high, fraction = ordered[below], ordered[above], place - below
     # From the nearer of the two, as numpy has it.
     step = high - low
@@ -45,14 +48,21 @@ def quantiles(values: NDArray[Any], shares: NDArray[np.float64]) -> NDArray[np.f
 
 
 def _ordered(values: NDArray[Any], first: int, last: int) -> NDArray[Any]:
-    """Return the values at places `first` to `last` when all, (n,), are in rising order."""
-    places = np.arange(first, last + 1)
+    """Return the values at places `first` to `last`, one or two, when all, (n,), are in order."""
+    if values.size < _MANY:
+        return _selected(values, first, last)
     low, high = values.min(), values.max()
-    if values.size < _MANY or not 0 < high - low < np.inf:
-        return np.partition(values, places)[places]
+    if not 0 < high - low < np.inf:
+        return _selected(values, first, last)
     bucket = ((values - low) * ((_BUCKETS - 1) / (high - low))).astype(np.uint16)
     up_to = np.bincount(bucket).cumsum()
     lowest, highest = up_to.searchsorted([first, last], side="right")
     among = values[(bucket >= lowest) & (bucket <= highest)]
-    places -= up_to[lowest - 1] if lowest else 0
-    return np.partition(among, places)[places]
+    fewer = up_to[lowest - 1] if lowest else 0
+    return _selected(among, first - fewer, last - fewer)
+
+
+def _selected(values: NDArray[Any], first: int, last: int) -> NDArray[Any]:
+    ordered = np.partition(values, last)
+    # Selecting one place alone is quicker than two.
+    return ordered[[last]] if first == last else np.array([ordered[:last].max(), ordered[last]])

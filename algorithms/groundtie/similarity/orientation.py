@@ -84,25 +84,25 @@ def squared_gradients(
     largest = np.abs(compressed).max(axis=(-2, -1), keepdims=True, initial=0)
     rounding = np.float32(_ROUNDING) * largest
     whole = valid.all()
+    # Everything in place, as most of the time is that of memory.
+    gx, gy, product, size = np.empty((4, *compressed.shape), np.float32)
     for field, scale in zip(fields, scales_px, strict=True):
-        gx, gy = _gradient(compressed, scale)
-        # In place, as most of the time is that of memory.
-        double_product = gx * gy
-        double_product *= 2
+        _differentiate(compressed, scale, gx, gy)
+        np.multiply(gx, gy, out=product)
+        product *= 2
         gx *= gx
         gy *= gy
         # Not cv2.magnitude, whose last digits depend on where arrays lie in memory.
-        size = np.sqrt(gx + gy)
+        np.sqrt(np.add(gx, gy, out=size), out=size)
         usable = size > rounding
         if not whole:
             usable &= _erode(valid, scale)
-        divisor = size + _typical(size, usable)
-        divisor *= size
-        divisor[~usable] = np.inf
-        weight = np.reciprocal(divisor, out=divisor)
         gx -= gy
-        np.multiply(gx, weight, out=field.real)
-        np.multiply(double_product, weight, out=field.imag)
+        divisor = np.add(size, _typical(size, usable), out=gy)
+        divisor *= size
+        np.copyto(divisor, np.inf, where=~usable)
+        np.divide(gx, divisor, out=field.real)
+        np.divide(product, divisor, out=field.imag)
     return fields
 
 
@@ -121,15 +121,13 @@ def edge_strength(finest: NDArray[np.complex64], valid: NDArray[np.bool_]) -> Pa
     return Patch(strength, valid if valid.all() else _erode(valid, SCALES_PX[0]))
 
 
-def _gradient(images: FloatArray, scale_px: float) -> tuple[FloatArray, FloatArray]:
-    """Return the derivatives of images along columns and along rows, each shape (…, h, w)."""
+def _differentiate(images: FloatArray, scale_px: float, gx: FloatArray, gy: FloatArray) -> None:
+    """Write the derivatives of images, (…, h, w), along columns and along rows."""
     slope, smooth = _kernels(scale_px)
-    gx, gy = np.empty((2, *images.shape), np.float32)
     stacks = (stack.reshape(-1, *images.shape[-2:]) for stack in (images, gx, gy))
     for image, x, y in zip(*stacks, strict=True):
         cv2.sepFilter2D(image, cv2.CV_32F, slope, smooth, dst=x, borderType=cv2.BORDER_REFLECT)
         cv2.sepFilter2D(image, cv2.CV_32F, smooth, slope, dst=y, borderType=cv2.BORDER_REFLECT)
-    return gx, gy
 
 
 @functools.cache
