@@ -102,7 +102,7 @@ def test_chips_that_are_held_out_are_left_out(pair: ImagePair, context: Context)
 def test_progress_counts_chips_and_may_cancel(pair: ImagePair, context: Context) -> None:
     told: list[float] = []
     progress = Progress(lambda fraction, _: told.append(fraction))
-    several = np.tile(CENTRES, (30, 1))
+    several = np.tile(CENTRES, (60, 1))
     matched(matcher(pair), replace(context, progress=progress), several)
     assert len(told) > 5
     assert np.diff(told).min() > 0

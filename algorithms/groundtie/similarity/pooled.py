@@ -99,12 +99,15 @@ class PooledHistogram:
         own = levels(template.values, self.template_edges)
         other = levels(search.values, self.search_edges)
         # What is invalid takes a level of its own, without information.
+        own[~template.valid] = len(self.information)
         other[~search.valid] = self.information.shape[1]
-        shape, total = fast_shape(other), np.zeros((), np.complex64)
+        shape, total = fast_shape(other), np.complex64(0)
+        found = np.empty(other.shape, np.float32)
         for level, information in enumerate(self.information):
-            pixels = (template.valid & (own == level)).astype(np.float32)
-            found = np.append(information, np.float32(0))[other]
-            total = total + spectrum(pixels, shape).conj() * spectrum(found, shape)
+            np.append(information, np.float32(0)).take(other, out=found, mode="clip")
+            product = spectrum((own == level).astype(np.float32), shape).conj()
+            product *= spectrum(found, shape)
+            total = np.add(total, product, out=product)
         return np.asarray(from_spectrum(total, shape, spans(own, other)), np.float32)
 
 
