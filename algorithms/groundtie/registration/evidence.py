@@ -98,6 +98,45 @@ class HeldOut:
     accuracy: Accuracy = UNKNOWN
     least_share: float = SMALLEST_INLIER_SHARE
 
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        misses: Misses,
+        total: int,
+        area: str,
+        spread_px: FloatArray,
+        accuracy: Accuracy,
+        tries: int = 1,
+        least_share: float = SMALLEST_INLIER_SHARE,
+    ) -> HeldOut:
+        """Return how points agree by what a model misses those by that have a peak.
+
+        Parameters
+        ----------
+        misses
+            Of points with a peak.
+        total
+            How many points there are, with and without one.
+        spread_px
+            Standard deviation of the model's predictions at places of the area, shape (n,).
+        tries
+            How many registrations were tried, any of which might agree by chance.
+        """
+        chance = min(misses.log10_chance(total) + math.log10(tries), 0.0)
+        return cls(
+            name,
+            misses.agreeing,
+            total,
+            chance,
+            misses.rmse_px,
+            misses.max_error_px,
+            float(np.sqrt(np.mean(spread_px**2))),
+            area,
+            accuracy,
+            least_share,
+        )
+
     @property
     def largest_ce90_px(self) -> float:
         """Largest radius of 90 % that is accepted: that of errors as large as the largest."""
@@ -233,16 +272,14 @@ class RegistrationEvidence:
         """How the check points agree; those without a peak count as disagreeing."""
         misses, lattice = self._misses, self.grid.lattice()
         fold_models = self.estimate.fold_models
-        return HeldOut(
+        return HeldOut.of(
             "check points",
-            misses.agreeing,
+            misses,
             len(self.check),
-            min(misses.log10_chance(len(self.check)) + math.log10(self.tries), 0.0),
-            misses.rmse_px,
-            self.max_error_px,
-            float(np.sqrt(np.mean(jackknife_spread(fold_models, lattice) ** 2))),
             "the overlap",
+            jackknife_spread(fold_models, lattice),
             predict_accuracy(fold_models, lattice, misses.weighed, self.common),
+            self.tries,
         )
 
     @property

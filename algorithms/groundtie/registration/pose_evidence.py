@@ -172,17 +172,14 @@ class PoseSurveyEvidence:
         misses, total = self._misses, len(self.found.agrees)
         fold_models, lattice = self.found.fold_models, self.survey.grid.lattice()
         heights = mean_of_heights_px(self.survey, self.layover_factor, POSE_TOLERANCE_PX)
-        return HeldOut(
+        return HeldOut.of(
             "chips all over",
-            misses.agreeing,
+            misses,
             total,
-            misses.log10_chance(total),
-            misses.rmse_px,
-            POSE_TOLERANCE_PX,
-            float(np.sqrt(np.mean(jackknife_spread(fold_models, lattice) ** 2))),
             "the overlap",
+            jackknife_spread(fold_models, lattice),
             predict_accuracy(fold_models, lattice, misses.weighed, Common(2 * heights)),
-            SMALLEST_SHARE_UNROTATED if self.is_shift else SMALLEST_INLIER_SHARE,
+            least_share=SMALLEST_SHARE_UNROTATED if self.is_shift else SMALLEST_INLIER_SHARE,
         )
 
     @cached_property

@@ -121,15 +121,12 @@ class RefinementEvidence:
         tolerance = max(TOLERANCE_PX, max_error_px)
         misses = Misses(points.expected_px, after, reach, max_error_px, tolerance)
         nodes_px = Grid(PIXEL_COORDINATES, None, *control.size).lattice()
-        held_out = HeldOut(
+        held_out = HeldOut.of(
             name,
-            misses.agreeing,
+            misses,
             len(after),
-            misses.log10_chance(len(after)),
-            misses.rmse_px,
-            max_error_px,
-            _spread_px(adjustment, nodes_px),
             "the image",
+            _spread_px(adjustment, nodes_px),
             predict_accuracy(adjustment.fold_biases, nodes_px, misses.weighed, Common()),
         )
         used_px = control.found_px[adjustment.used]
@@ -147,8 +144,6 @@ class RefinementEvidence:
         )
 
 
-def _spread_px(adjustment: Adjustment, px: FloatArray) -> float:
-    """Return how far the correction varies with its points at places, root mean square."""
-    by_points = adjustment.spread_px(px)
-    by_noise = adjustment.bias.sigma_px(px)
-    return float(np.sqrt(np.mean(np.maximum(by_points, by_noise) ** 2)))
+def _spread_px(adjustment: Adjustment, px: FloatArray) -> FloatArray:
+    """Return how far the correction varies with its points at places (n, 2), shape (n,)."""
+    return np.maximum(adjustment.spread_px(px), adjustment.bias.sigma_px(px))

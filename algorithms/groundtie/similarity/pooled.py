@@ -101,7 +101,8 @@ class PooledHistogram:
         # What is invalid takes a level of its own, without information.
         own[~template.valid] = len(self.information)
         other[~search.valid] = self.information.shape[1]
-        shape, total = fast_shape(other), np.complex64(0)
+        shape = fast_shape(other)
+        total: NDArray[np.complexfloating] = np.zeros((), np.complex64)
         found = np.empty(other.shape, np.float32)
         for level, information in enumerate(self.information):
             np.append(information, np.float32(0)).take(other, out=found, mode="clip")
