@@ -265,8 +265,8 @@ def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list
 @pytest.mark.parametrize(
     ("exchanged", "is_refused"),
     [
-        (Exchanged(9, 9, -16.0, 2.9), False),
-        (Exchanged(9, 9, -16.0, 3.1), True),
+        (Exchanged(9, 9, -16.0, 1.9), False),
+        (Exchanged(9, 9, -16.0, 2.1), True),
         (Exchanged(9, 9, -16.0, math.nan), True),
         (Exchanged(), True),
     ],

@@ -9,6 +9,7 @@ from ...geometry.judging import (
     LARGEST_LOG10_CHANCE,
     SMALLEST_INLIER_SHARE,
     SMALLEST_SHARE_UNROTATED,
+    TOLERANCE_PX,
 )
 from ...geometry.robust import distances, find_consensus
 from ..evidence import AGREEMENT, RegistrationEvidence
@@ -62,7 +63,7 @@ def _exchanged_roles(evidence: RegistrationEvidence | RefinementEvidence) -> str
             f"with reference and input exchanged, {points.agreeing} of {points.total} check points "
             "agree, as they may by chance"
         )
-    if points.apart_px <= evidence.max_error_px:
+    if points.apart_px <= min(TOLERANCE_PX, evidence.max_error_px):
         return None
     return f"with reference and input exchanged, the transform lies {points.apart_px:.1f} px off"
 
@@ -101,7 +102,7 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
         "fewer than two of three chips all over match where the transform has them, no more than "
         "two of three check points agree, no mask leaves the ground alone, and with reference and "
         "input exchanged check points agree as they may by chance, or the transform lies farther "
-        "off than the largest error",
+        f"off than the largest error, or than {TOLERANCE_PX:g} px, within which points agree",
         "[Holden2000]; suite attacks",
         "give a larger part of the scene, or bands that show the same",
         _exchanged_roles,
