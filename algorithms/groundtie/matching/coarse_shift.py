@@ -22,6 +22,7 @@ from ..similarity.description import BORDER_PX
 from ..similarity.peak import find_peak
 from ..similarity.peaks import suppress
 from ..similarity.surface import SimilaritySettings, describe, similarity_surface
+from .frames import compose
 from .matcher import MaskOf
 
 # The longer side of the reduced image, in pixels, and how many candidates are kept.
@@ -84,31 +85,75 @@ def coarse_candidates(
     if settings.bins is None:
         settings = replace(settings, bins=_BINS)
     if limits.is_shift:
-        return _shifts(pair, level, limits.radius, settings, held_out, context)
+        nominal = shift_model(0.0, 0.0)
+        places = _places(pair, level, limits.radius, settings, held_out, context, nominal)
+        return [Candidate(shift_model(*place.shift_m(level)), place.height) for place in places]
     windows = read_windows(pair.reference, pair.input, limits.scale, limits.radius, held_out)
     pose_limits = windows.limits(limits.rotation_deg, limits.scale)
     found = find_poses(windows.reference, windows.input, pose_limits, settings, context.quiet())[
         :CANDIDATES
     ]
     high = [one for one in found if one.height > found[0].height * _LOW]
-    return [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in high]
+    poses = [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in high]
+    if not poses:
+        return []
+    places = _places(pair, level, limits.radius, settings, held_out, context, poses[0].model)
+    poses += _elsewhere(poses[0], places, level)
+    return sorted(poses, key=lambda one: one.height, reverse=True)
 
 
-def _shifts(
+def _elsewhere(pose: Candidate, places: list[_Place], level: Grid) -> list[Candidate]:
+    """Return candidates with the rotation and scale of a pose, as high as other shifts are by it.
+
+    Of each rotation and scale the search of poses keeps one shift: what repeats has more.
+    """
+    own = max((place.height for place in places if place.is_near), default=0.0)
+    if own <= 0:
+        return []
+    return [
+        Candidate(
+            compose(pose.model, shift_model(*place.shift_px), level),
+            pose.height * place.height / own,
+        )
+        for place in places
+        if not place.is_near
+    ]
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A shift from a model, in pixels of the level, and how high the similarity is there."""
+
+    shift_px: tuple[float, float]
+    height: float
+
+    @property
+    def is_near(self) -> bool:
+        """Whether it is that of the model itself."""
+        return bool(np.abs(self.shift_px).max() <= _SAME_PLACE.shape[0] // 2)
+
+    def shift_m(self, level: Grid) -> tuple[float, float]:
+        """Return the shift on the map."""
+        dx, dy = level.pixel_to_map([self.shift_px])[0] - level.pixel_to_map([[0, 0]])[0]
+        return float(dx), float(dy)
+
+
+def _places(
     pair: ImagePair,
     level: Grid,
     radius_m: float,
     settings: SimilaritySettings,
     held_out: MaskOf,
     context: Context,
-) -> list[Candidate]:
-    """Search all shifts, and return the highest peaks of their similarity."""
+    model: Model,
+) -> list[_Place]:
+    """Search all shifts from a model on, and return the highest peaks of their similarity."""
     # The true place may lie a pixel of the level further than whole pixels show.
     radius_px = int(np.ceil(radius_m / level.pixel_size_m)) + 1
     # Farther off too little of the images overlaps.
     radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.width, level.height)))
     reach = radius_px + BORDER_PX
-    reference, input = _patches(pair, level, BORDER_PX, reach, held_out, context)
+    reference, input = _patches(pair, level, model, reach, held_out, context)
     # What a mask leaves of the input is all that can lie under the reference.
     valid = 1.0 if pair.input.mask is None else input.valid_share
     surface = similarity_surface(
@@ -119,29 +164,27 @@ def _shifts(
         context.quiet(),
         MINIMUM_OVERLAP * valid,
     )
-    found: list[Candidate] = []
+    found: list[_Place] = []
     for _ in range(CANDIDATES):
         peak = find_peak(surface)
         if peak.height <= (found[0].height * _LOW if found else 0.0):
             break
         x, y = peak.shift_px
-        dx, dy = level.pixel_to_map([[x, y]])[0] - level.pixel_to_map([[0, 0]])[0]
-        found.append(Candidate(shift_model(float(dx), float(dy)), peak.height))
-        row, col = round(y) + radius_px, round(x) + radius_px
-        suppress(surface, (row, col), _SAME_PLACE)
+        found.append(_Place((x, y), peak.height))
+        suppress(surface, (round(y) + radius_px, round(x) + radius_px), _SAME_PLACE)
     return found
 
 
 def _patches(
-    pair: ImagePair, level: Grid, border: int, reach: int, held_out: MaskOf, context: Context
+    pair: ImagePair, level: Grid, model: Model, reach: int, held_out: MaskOf, context: Context
 ) -> tuple[Patch, Patch]:
     """Return the reference with a border around the level, and the input with a wider one."""
     template, search = (
         level.window(-more, -more, level.width + 2 * more, level.height + 2 * more)
-        for more in (border, reach)
+        for more in (BORDER_PX, reach)
     )
     reading = context.executor.submit(pair.reference_patch, template, held_out(template))
-    input = pair.input_patch(search, pair.nominal_px)
+    input = pair.input_patch(search, lambda xy: pair.nominal_px(model(xy)))
     reference = reading.result()
     for image, patch in ((pair.reference, reference), (pair.input, input)):
         _require_content(image.source.path, patch)
