@@ -73,6 +73,25 @@ def test_low_candidates_of_any_search_are_left_out(
     assert [candidate.height for candidate in found] == [10.0, 4.1]
 
 
+def test_what_repeats_matches_a_period_off_at_the_same_rotation(
+    textured: TexturedPair, tmp_path: Path, context: Context
+) -> None:
+    tile = np.random.default_rng(1).integers(100, 1000, (40, 40)).astype(np.uint16)
+    tiles = np.tile(tile, (6, 7))[:240, :260]
+    one, other = (write_raster(tmp_path / f"{k}.tif", tiles, textured.grid) for k in range(2))
+    period_m = 40 * textured.grid.pixel_size_m
+    limits = SearchLimits(1.2 * period_m, 5.0)
+    with open_raster(one) as reference, open_raster(other) as input:
+        pair = make_pair(Image(reference), Image(input), None, limits.radius, 5.0)
+        found = coarse_candidates(pair, pair.grid, limits, SETTINGS, nothing_held_out, context)
+    high = [one for one in found if one.height > 0.8 * found[0].height]
+    centre = pair.grid.pixel_to_map([pair.grid.centre_px])
+    moved_m = [np.hypot(*(one.model(centre) - centre)[0]) for one in high]
+    # The place itself, and at least one of its neighbours.
+    assert min(moved_m) == pytest.approx(0, abs=0.05 * period_m)
+    assert max(moved_m) == pytest.approx(period_m, rel=0.05)
+
+
 @pytest.mark.parametrize("which", ["reference", "input"])
 @pytest.mark.parametrize(("value", "text"), [(5, "constant"), (0, "no valid pixel")])
 def test_images_without_content_are_named(
