@@ -19,7 +19,7 @@ from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.correlation import MINIMUM_OVERLAP
 from ..similarity.description import BORDER_PX
-from ..similarity.peak import find_peak
+from ..similarity.peak import Peak, find_peak
 from ..similarity.peaks import suppress
 from ..similarity.surface import SimilaritySettings, describe, similarity_surface
 from .frames import compose
@@ -87,7 +87,7 @@ def coarse_candidates(
     if limits.is_shift:
         nominal = shift_model(0.0, 0.0)
         places = _places(pair, level, limits.radius, settings, held_out, context, nominal)
-        return [Candidate(shift_model(*place.shift_m(level)), place.height) for place in places]
+        return [Candidate(_shift_on_map(place, level), place.height) for place in places]
     windows = read_windows(pair.reference, pair.input, limits.scale, limits.radius, held_out)
     pose_limits = windows.limits(limits.rotation_deg, limits.scale)
     found = find_poses(windows.reference, windows.input, pose_limits, settings, context.quiet())[
@@ -102,12 +102,22 @@ def coarse_candidates(
     return sorted(poses, key=lambda one: one.height, reverse=True)
 
 
-def _elsewhere(pose: Candidate, places: list[_Place], level: Grid) -> list[Candidate]:
+def _shift_on_map(place: Peak, level: Grid) -> Model:
+    dx, dy = level.pixel_to_map([place.shift_px])[0] - level.pixel_to_map([[0, 0]])[0]
+    return shift_model(float(dx), float(dy))
+
+
+def _elsewhere(pose: Candidate, places: list[Peak], level: Grid) -> list[Candidate]:
     """Return candidates with the rotation and scale of a pose, as high as other shifts are by it.
 
     Of each rotation and scale the search of poses keeps one shift: what repeats has more.
     """
-    own = max((place.height for place in places if place.is_near), default=0.0)
+    near_px = _SAME_PLACE.shape[0] // 2
+
+    def is_own(place: Peak) -> bool:
+        return max(map(abs, place.shift_px)) <= near_px
+
+    own = max((place.height for place in places if is_own(place)), default=0.0)
     if own <= 0:
         return []
     return [
@@ -116,26 +126,8 @@ def _elsewhere(pose: Candidate, places: list[_Place], level: Grid) -> list[Candi
             pose.height * place.height / own,
         )
         for place in places
-        if not place.is_near
+        if not is_own(place)
     ]
-
-
-@dataclass(frozen=True)
-class _Place:
-    """A shift from a model, in pixels of the level, and how high the similarity is there."""
-
-    shift_px: tuple[float, float]
-    height: float
-
-    @property
-    def is_near(self) -> bool:
-        """Whether it is that of the model itself."""
-        return bool(np.abs(self.shift_px).max() <= _SAME_PLACE.shape[0] // 2)
-
-    def shift_m(self, level: Grid) -> tuple[float, float]:
-        """Return the shift on the map."""
-        dx, dy = level.pixel_to_map([self.shift_px])[0] - level.pixel_to_map([[0, 0]])[0]
-        return float(dx), float(dy)
 
 
 def _places(
@@ -146,7 +138,7 @@ def _places(
     held_out: MaskOf,
     context: Context,
     model: Model,
-) -> list[_Place]:
+) -> list[Peak]:
     """Search all shifts from a model on, and return the highest peaks of their similarity."""
     # The true place may lie a pixel of the level further than whole pixels show.
     radius_px = int(np.ceil(radius_m / level.pixel_size_m)) + 1
@@ -164,13 +156,13 @@ def _places(
         context.quiet(),
         MINIMUM_OVERLAP * valid,
     )
-    found: list[_Place] = []
+    found: list[Peak] = []
     for _ in range(CANDIDATES):
         peak = find_peak(surface)
         if peak.height <= (found[0].height * _LOW if found else 0.0):
             break
+        found.append(peak)
         x, y = peak.shift_px
-        found.append(_Place((x, y), peak.height))
         suppress(surface, (round(y) + radius_px, round(x) + radius_px), _SAME_PLACE)
     return found
 
