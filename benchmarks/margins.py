@@ -21,8 +21,6 @@ from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
     BEYOND_DEVIATIONS,
-    DRAWN_REST_HEIGHT,
-    GHOST_HEIGHT,
     RIVAL_HEIGHT,
     WEAK_COPY_HEIGHT,
     WEAK_HEIGHT,
@@ -80,14 +78,9 @@ def _rival(evidence: RegistrationEvidence) -> float:
 
 def _rest_height(evidence: RegistrationEvidence) -> float:
     rest = evidence.rest
-    if rest is None or rest.is_explained or rest.is_drawn:
+    if rest is None or rest.is_explained:
         return math.nan
     return rest.survey.height
-
-
-def _drawn_height(evidence: RegistrationEvidence) -> float:
-    rest = evidence.rest
-    return rest.survey.height if rest is not None and rest.is_drawn else math.nan
 
 
 def _copy_height(evidence: RegistrationEvidence) -> float:
@@ -112,10 +105,8 @@ STATISTICS = (
     Statistic("part elsewhere: excess over its limit", 1.0, _excess(False)),
     Statistic("part elsewhere: excess over its limit where few confirm", 1.0, _excess(True)),
     Statistic("second place: share of the height", RIVAL_HEIGHT, _rival),
-    Statistic("second place: ghost", GHOST_HEIGHT, _of_survey("ghost_height")),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),
     Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),
-    Statistic("pixel-locked content: height, drawn", DRAWN_REST_HEIGHT, _drawn_height, False),
     Statistic("pixel-locked content: height of copies", WEAK_COPY_HEIGHT, _copy_height, False),
     Statistic("pixel-locked content: copies", BEYOND_DEVIATIONS, _elsewhere),
     Statistic("band elsewhere: excess", LEAST_EXCESS, _in_bands),

@@ -8,9 +8,7 @@ from textured_pairs import texture
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.sameness import (
     Edges,
-    Gradients,
     Windows,
-    count_same,
     edges_apart_px,
     reduced,
     without,
@@ -22,31 +20,6 @@ def patch(values: np.ndarray, hidden: tuple[slice, slice] | None = None) -> Patc
     if hidden is not None:
         valid[hidden] = False
     return Patch(values.astype(np.float32), valid)
-
-
-def test_all_gradients_of_an_array_and_its_offset_copy_are_the_same() -> None:
-    one = texture(60, 60)
-    gradients = [Gradients.of(patch(values)) for values in (one, one + 100.0)]
-    same, every = count_same(*gradients, (0.1, 0.1))
-    assert same == every > 1000
-
-
-def test_gradients_of_two_places_are_rarely_the_same() -> None:
-    """Two vectors of like lengths in any directions: within a quarter of the length, a few %."""
-    gradients = [Gradients.of(patch(texture(200, 200, seed))) for seed in (1, 2)]
-    limit = float(np.median(gradients[0].length))
-    same, every = count_same(*gradients, (limit, limit))
-    assert 0 < same < 0.03 * every
-
-
-def test_gradients_beside_invalid_pixels_do_not_count() -> None:
-    one = texture(60, 60)
-    hidden = np.s_[20:30, 20:30]
-    counts = [
-        count_same(Gradients.of(patch(one, where)), Gradients.of(patch(one)), (0.0, 0.0))[1]
-        for where in (None, hidden)
-    ]
-    assert counts[0] - counts[1] == 12 * 12
 
 
 @pytest.mark.parametrize(("along", "contrast"), [(0.3, 1.0), (-0.45, -0.01)])
@@ -135,22 +108,6 @@ def test_noise_within_a_fifth_of_what_varies_leaves_windows_the_same() -> None:
     # The difference varies by 2 · 0.2² = 0.08 of what one varies, a 25th of both.
     other = one + 0.2 * rng.normal(size=one.shape)
     assert Windows.of(patch(one), patch(other)).same.mean() > 0.95
-
-
-@pytest.mark.parametrize(("gain", "noise", "least", "most"), [(-1.5, 0.3, 0.9, 1), (1, 2, 0, 0.1)])
-def test_windows_are_related_as_far_as_one_explains_the_other(
-    gain: float, noise: float, least: float, most: float
-) -> None:
-    """Of what varies by 1, noise leaves 1 / (1 + noise² / gain²): 0.96 of it, and 0.2."""
-    rng = np.random.default_rng(4)
-    one = texture(120, 120)
-    other = 50 + gain * one + noise * rng.normal(size=one.shape)
-    assert least <= Windows.of(patch(one), patch(other)).related.mean() <= most
-
-
-def test_windows_of_two_places_are_rarely_related() -> None:
-    related = Windows.of(*(patch(texture(200, 200, seed)) for seed in (1, 2))).related
-    assert 0 < related.mean() < 0.25
 
 
 def test_invalid_pixels_are_no_part_of_windows() -> None:

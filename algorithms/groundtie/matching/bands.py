@@ -87,7 +87,7 @@ def survey_bands(
             is_reference = image is pair.reference
             alone = replace(pair, reference=one) if is_reference else replace(pair, input=one)
             seen = replace(matcher, pair=alone, settings=SimilaritySettings())
-            survey = survey_model(seen, model, quiet, None, places, elsewhere_px, seeks_ghost=False)
+            survey = survey_model(seen, model, quiet, None, places, elsewhere_px)
             found.append(BandSurvey(name, band, survey))
     return tuple(found)
 

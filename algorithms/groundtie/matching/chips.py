@@ -114,16 +114,6 @@ class ChipMatcher:
         kept, found = self._run(model, places, radius_px, context, _forward)
         return kept, found[:, 0]
 
-    def match_forward_and_own(
-        self, model: Model, places: Places, radius_px: int, context: Context
-    ) -> tuple[NDArray[np.int_], Surfaces, Surfaces]:
-        """Return what `match_forward` does, and the surfaces of its chips in the reference itself.
-
-        Parameters as `match`.
-        """
-        kept, found = self._run(model, places, radius_px, context, _forward, _own)
-        return kept, found[:, 0], found[:, 1]
-
     def fit_places(self, layout: ChipLayout) -> Places:
         """Return the chips that a fit is made of."""
         return Places(self.pair.grid, layout.fit_centres, layout.chip_px)
@@ -214,13 +204,6 @@ def _backward(
     """Return the surfaces of chips of the input in the reference, as those of the way forward."""
     backward = similarity_surface(input.inner(radius_px), reference, radius_px, settings)
     return backward[..., ::-1, ::-1]
-
-
-def _own(
-    reference: Description, input: Description, radius_px: int, settings: SimilaritySettings
-) -> Surface:
-    """Return the surfaces of chips of the reference in the reference itself."""
-    return similarity_surface(reference.inner(radius_px), reference, radius_px, settings)
 
 
 def _equal_weight(surfaces: Surfaces) -> FloatArray:

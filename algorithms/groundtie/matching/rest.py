@@ -29,8 +29,6 @@ class Rest:
         the transform moves the array by whole pixels; None elsewhere.
     chips
         How many chips there are; of some too little may be left.
-    is_drawn
-        Whether such content is drawn over the images (see `LockedContent`).
     has_sharp_edges
         Whether edges coincide more sharply than those of one ground.
     """
@@ -39,7 +37,6 @@ class Rest:
     is_explained: bool = False
     beyond: Survey | None = None
     chips: int = 0
-    is_drawn: bool = False
     has_sharp_edges: bool = False
 
 
@@ -78,19 +75,11 @@ def survey_rest(
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())
     survey = survey_model(fused, transform.model, context, locked, places, elsewhere_px)
-    rest = Rest(
-        survey,
-        locked.is_explained,
-        None,
-        len(places.centres),
-        locked.is_drawn,
-        locked.sameness.has_sharp_edges,
-    )
+    chips, is_sharp = len(places.centres), locked.sameness.has_sharp_edges
+    rest = Rest(survey, locked.is_explained, None, chips, is_sharp)
     if not (locked.is_explained and locked.is_whole):
         return rest
     # A copy may be blended into other ground, of which the same windows are no part.
     left = replace(fused, left_of=unexplained)
-    beyond = survey_model(
-        left, locked.model, context, None, places, elsewhere_px, seeks_ghost=False
-    )
+    beyond = survey_model(left, locked.model, context, None, places, elsewhere_px)
     return replace(rest, beyond=beyond)

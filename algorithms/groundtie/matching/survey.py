@@ -16,7 +16,6 @@ from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
 from .belief_propagation import Surfaces
 from .chips import LEAST_VALID_MASKED, ChipMatcher
-from .ghost import ghost_height
 from .matcher import FloatArray, MaskOf, Places
 from .parts import (
     ELSEWHERE_PX,
@@ -56,9 +55,6 @@ class Survey:
         Places farther than this from where the model has all chips are second places.
     excess_if_weak
         The excess from which on a part lies elsewhere, if few chips match where the model has them.
-    ghost_height
-        How high the mean is elsewhere when what the reference repeats of itself is taken out, in
-        robust standard deviations of what is left.
     """
 
     grid: Grid
@@ -67,7 +63,6 @@ class Survey:
     surfaces: Surfaces
     elsewhere_px: float = ELSEWHERE_PX
     excess_if_weak: float = LEAST_EXCESS
-    ghost_height: float = 0.0
 
     @cached_property
     def mean(self) -> Surface:
@@ -163,7 +158,6 @@ def survey_model(
     without: MaskOf | None = None,
     places: Places | None = None,
     elsewhere_px: float = ELSEWHERE_PX,
-    seeks_ghost: bool = True,
 ) -> Survey:
     """Match chips all over a pair around what a model on the map predicts.
 
@@ -181,25 +175,15 @@ def survey_model(
         The chips, on a regular layout; None: side by side on the matching grid.
     elsewhere_px
         See `Survey`.
-    seeks_ghost
-        Whether a ghost is looked for, which takes as long again; never where pixels are left out.
     """
     places = places or survey_places(matcher.pair.grid)
-    asked = model, places, SURVEY_RADIUS_PX, context
     least = None if without is None else LEAST_VALID_MASKED
     seen = replace(matcher, held_out=without, least_valid=least)
-    own = None
-    if seeks_ghost and without is None:
-        kept, surfaces, own = seen.match_forward_and_own(*asked)
-    else:
-        kept, surfaces = seen.match_forward(*asked)
+    kept, surfaces = seen.match_forward(model, places, SURVEY_RADIUS_PX, context)
     surfaces = _of_overlaps(surfaces)
     shifts = np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
     weak = excess_if_weak(len(places.centres), without is not None)
-    survey = Survey(places.grid, kept, shifts, surfaces, elsewhere_px, weak)
-    if own is None or len(own) == 0:
-        return survey
-    return replace(survey, ghost_height=ghost_height(survey.mean, _of_overlaps(own).mean(axis=0)))
+    return Survey(places.grid, kept, shifts, surfaces, elsewhere_px, weak)
 
 
 def _of_overlaps(surfaces: Surfaces) -> Surfaces:

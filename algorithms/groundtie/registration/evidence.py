@@ -20,7 +20,7 @@ from ..geometry.accuracy import (
     standard_deviation_px,
 )
 from ..geometry.estimation import Estimate, jackknife_spread
-from ..geometry.judging import CE90_FACTOR, SMALLEST_INLIER_SHARE
+from ..geometry.judging import CE90_FACTOR, LARGEST_LOG10_CHANCE, SMALLEST_INLIER_SHARE
 from ..geometry.misses import Misses
 from ..geometry.tie_points import TiePoints
 from ..masks.choice import NONE, REGIONS, MaskUsed
@@ -284,13 +284,12 @@ class RegistrationEvidence:
 
     @property
     def is_weakly_confirmed(self) -> bool:
-        """Whether few chips confirm the transform, and few of the check points.
+        """Whether so few check points agree that the exchanged pair must confirm the transform.
 
-        Of each no more than two of three: of 40 transforms that few chips but more check points
-        confirm, all were right; with as few, three wrong ones are known (suite attacks).
+        By chance, both pass with about the square of the limit: agreement that is as improbable
+        already needs no second pass.
         """
-        is_weak = self.survey is not None and self.survey.is_weakly_confirmed
-        return is_weak and 3 * self.held_out.agreeing <= 2 * self.held_out.total
+        return self.held_out.log10_chance > 2 * LARGEST_LOG10_CHANCE
 
     def standard_deviation_px(self, px: FloatArray) -> FloatArray:
         """Return that of the transform's error along an axis, shape (n,), at pixels (n, 2)."""

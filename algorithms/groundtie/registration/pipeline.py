@@ -90,7 +90,7 @@ def register(
 def _asks_for_exchange(
     evidence: RegistrationEvidence, scene: SceneInfo, spec: Specification
 ) -> bool:
-    """Whether so few chips and check points confirm a transform that the exchanged pair must, too.
+    """Whether so few check points confirm a transform that the exchanged pair must, too.
 
     What is rendered, or located by a sensor model, is no reference for another image.
     """

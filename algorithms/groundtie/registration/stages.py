@@ -131,11 +131,7 @@ class Stages:
         pair, transform = self.masked.pair, estimate.transform
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
         places, kind = survey_places(pair.grid), scene.of_one_kind
-        # No rule asks for ghosts where a mask leaves nothing but ground. And nobody copies what was
-        # rendered: a second place there is what echoes more strongly than the model lets expect.
-        ghosts = not self.masked.used.is_ground and self.spec.surface_view is None
-        first = context.part(0.0, 0.5)
-        survey = survey_model(chips, transform.model, first, seeks_ghost=ghosts)
+        survey = survey_model(chips, transform.model, context.part(0.0, 0.5))
         rest = survey_rest(chips, transform, places, ELSEWHERE_PX, kind, context.part(0.5, 0.9))
         last = context.part(0.9, 1.0)
         return survey, rest, survey_bands(chips, transform.model, places, ELSEWHERE_PX, last)

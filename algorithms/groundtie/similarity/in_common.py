@@ -17,18 +17,13 @@ from ..rasters.reading import Mask
 from .sameness import (
     WINDOW_PX,
     Edges,
-    Gradients,
     Windows,
-    count_same,
     edges_apart_px,
     reduced,
     without,
 )
 
-# Gradients above this percentile of their image are strong.
-_STRONG_PERCENT = 70.0
-
-# None, and offsets (x, y) at which gradients are the same by chance: so many, on a spiral.
+# None, and offsets (x, y) at which edges coincide by chance: so many, on a spiral.
 _CHANCE_OFFSETS = 8
 _FIRST_TURN_PX, _GOLDEN_ANGLE = 7.0, np.pi * (3 - np.sqrt(5))
 _STEPS = np.arange(_CHANCE_OFFSETS)
@@ -38,12 +33,6 @@ _SPIRAL = (_FIRST_TURN_PX + 2 * _STEPS) * np.stack(
 _OFFSETS = np.vstack([[0, 0], np.rint(_SPIRAL.T)]).astype(int)
 LOOK_REACH_PX = int(np.abs(_OFFSETS).max())
 
-# So many times as many as by chance, and of gradients this share of the strong ones, are more than
-# two sensors show of one ground; what else they show is asked then. Gradients were measured on the
-# shared pairs at their true places: 0.7 to 2.9 % of different sensors and physics, up to 3.4 times
-# as many as by chance; 3.5 to 28 % of one sensor's. With content drawn into both: 3 to 43 %.
-_LEAST_RATIO, _LEAST_SHARE = 2.0, 0.03
-
 # What is drawn has its edges at one fraction of a pixel, in whatever colours: beyond chance, within
 # the first of the other's are so many times as many as from there to the second. Edges of one
 # ground are blurred by noise, light and physics. Suite sharpness: of different sensors and dates up
@@ -51,8 +40,9 @@ _LEAST_RATIO, _LEAST_SHARE = 2.0, 0.03
 _SHARP_PX, _BLURRED_PX = 0.25, 0.5
 LEAST_SHARPNESS, DRAWN_SHARPNESS = 2.5, 5.0
 
-# The same of the area that varies alike: where holes or waters of one shape are cut into noise,
-# few gradients are the same. Different sensors' views: up to 17 %.
+# More of the area than this varies alike where holes or waters of one shape are cut into noise, or
+# clouds of one deck lie over both. Different sensors' views of one ground: up to 17 %, measured on
+# the shared pairs at their true places.
 _LEAST_AREA = 0.2
 
 # One sensor's views of one ground vary alike where nothing is drawn, too, on images that are so
@@ -76,8 +66,6 @@ class Sameness:
 
     Parameters
     ----------
-    gradients, chance
-        Share of the strong gradients that are the same there, and at other offsets.
     sharpness
         How many times as many edges coincide there within a quarter of a pixel as between a
         quarter and a half, each beyond those at other offsets; at least, as far as the latter are
@@ -88,25 +76,18 @@ class Sameness:
         The latter, of what does not vary alike in the images.
     windows
         How many windows of the reduced images do not overlap.
-    related
-        Share of the area where one is half a linear function of the other, in the images or in
-        reduced ones, whichever is smaller.
     """
 
-    gradients: float
-    chance: float
     sharpness: float
     area: float
     reduced_area: float
     ground: float
     windows: float
-    related: float = 0.0
 
     @property
     def is_evident(self) -> bool:
         """Whether more is the same than two views show of one ground."""
-        is_more = self.gradients >= max(_LEAST_RATIO * self.chance, _LEAST_SHARE)
-        return is_more or self.has_sharp_edges or self.area >= _LEAST_AREA
+        return self.has_sharp_edges or self.area >= _LEAST_AREA
 
     @property
     def has_sharp_edges(self) -> bool:
@@ -123,11 +104,6 @@ class Sameness:
         return bool(self.reduced_area < self.area - _STANDARD_ERRORS * error)
 
     @property
-    def is_copy_in_other_colours(self) -> bool:
-        """Whether one image follows from the other nearly everywhere, as from its negative."""
-        return self.related >= _COPY_SHARE
-
-    @property
     def is_explained(self) -> bool:
         """Whether one image is a copy of the other, or both are one sensor's views of one ground.
 
@@ -140,7 +116,7 @@ class Sameness:
         return is_copy or (self.ground >= _GROUND_SHARE and self.sharpness < DRAWN_SHARPNESS)
 
 
-_NO_WINDOWS = np.zeros((3, 3), int)
+_NO_WINDOWS = np.zeros((3, 2), int)
 
 
 @dataclass(frozen=True)
@@ -149,16 +125,13 @@ class Look:
 
     Parameters
     ----------
-    gradients
-        Of the reference; of the input also what is around it.
     edges
         How many coincide, at each of `_OFFSETS`, shape (k, 2).
     windows
-        How many pixels are the same, related, and valid (see `Windows`): of the images, of reduced
-        ones, and of these without what is the same in the images, shape (3, 3).
+        How many pixels are the same, and how many are valid (see `Windows`): of the images, of
+        reduced ones, and of these without what is the same in the images, shape (3, 2).
     """
 
-    gradients: tuple[Gradients, Gradients]
     edges: NDArray[np.int_]
     windows: NDArray[np.int_]
 
@@ -168,37 +141,21 @@ class Look:
         left = without(reference, whole.same), without(input, whole.same)
         smaller, rest = _reduced(reference, input), _reduced(*left)
         counts = np.array([windows.counts for windows in (whole, smaller, rest)])
-        inner = reference.inner(LOOK_REACH_PX)
-        gradients = Gradients.of(inner), Gradients.of(input)
-        return cls(gradients, _count_edges(reference, input), counts)
-
-    def same(self, shift: NDArray[np.int_], strong: tuple[float, float]) -> tuple[int, int]:
-        """Return how many strong gradients are the same at a shift of the input, and all."""
-        reference, input = self.gradients
-        col, row = (int(LOOK_REACH_PX + by) for by in shift)
-        return count_same(reference, input.part(col, row, reference.x.shape), strong)
+        return cls(_count_edges(reference, input), counts)
 
 
 def sameness_of(looks: Sequence[Look]) -> Sameness:
     """Return how much arrays have the same in windows all over them."""
-    own, others = ([look.gradients[k] for look in looks] for k in (0, 1))
-    strong = _strong(own), _strong(others)
-    same = [_share([one.same(shift, strong) for one in looks]) for shift in _OFFSETS]
-    chance = float(np.median(same[1:]))
     counts = np.sum([one.edges for one in looks], axis=0)
     sharpness = _sharpness(counts) if looks else 0.0
     whole, smaller, left = np.sum([one.windows for one in looks], axis=0) if looks else _NO_WINDOWS
-    every = max(float(smaller[2]), 1.0)
-    area, related = (float(count / max(whole[2], 1)) for count in whole[:2])
+    every = max(float(smaller[1]), 1.0)
     return Sameness(
-        same[0],
-        chance,
         sharpness,
-        area,
+        area=float(whole[0] / max(whole[1], 1)),
         reduced_area=float(smaller[0] / every),
-        ground=float(left[0] / max(left[2], _LEAST_LEFT * every)),
+        ground=float(left[0] / max(left[1], _LEAST_LEFT * every)),
         windows=every / WINDOW_PX**2,
-        related=min(related, float(smaller[1] / every)),
     )
 
 
@@ -230,15 +187,3 @@ def drawn_edges(reference: Patch, input: Patch) -> Mask:
 
 def _reduced(reference: Patch, input: Patch) -> Windows:
     return Windows.of(reduced(reference, _REDUCTION), reduced(input, _REDUCTION))
-
-
-def _share(counts: list[tuple[int, int]]) -> float:
-    """Return the share of what is the same of all."""
-    same, every = np.sum(counts, axis=0) if counts else (0, 0)
-    return float(same / max(every, 1))
-
-
-def _strong(gradients: list[Gradients]) -> float:
-    """Return the length from which gradients of an image are strong."""
-    lengths = [one.length[one.valid] for one in gradients if one.valid.any()]
-    return float(np.percentile(np.concatenate(lengths), _STRONG_PERCENT)) if lengths else 0.0

@@ -1,4 +1,4 @@
-"""What two arrays have the same: gradients, edges, and windows that vary alike.
+"""What two arrays have the same: edges, and windows that vary alike.
 
 Independent views of one ground are similar, but hardly ever the same: noise, light, physics and
 the phase of the pixels differ. What is drawn into both arrays is the same.
@@ -15,9 +15,6 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask
 from .order_statistics import median
-
-# Two gradients are the same if they differ by no more than this share of the larger one.
-_SAME_SHARE = 0.25
 
 # Where one thing is drawn into both, their difference varies less than this share of what both
 # vary, in windows of this side; independent content would have it vary as much as both.
@@ -41,49 +38,6 @@ _NONE = np.zeros((1, 2), int)
 
 # Means of a reduced image need this share of their pixels.
 _LEAST_VALID = 0.25
-
-
-@dataclass(frozen=True)
-class Gradients:
-    """Differences along columns and rows, their lengths, and where they are known, (h, w) each."""
-
-    x: FloatImage
-    y: FloatImage
-    length: FloatImage
-    valid: Mask
-
-    @classmethod
-    def of(cls, patch: Patch) -> Gradients:
-        """Return the central differences of a patch."""
-        x, y = (
-            np.asarray(cv2.Sobel(patch.values, cv2.CV_32F, *order, ksize=1), np.float32)
-            for order in ((1, 0), (0, 1))
-        )
-        valid = cv2.erode(patch.valid.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-        return cls(x, y, np.asarray(np.hypot(x, y), np.float32), np.asarray(valid))
-
-    def part(self, col: int, row: int, shape: tuple[int, ...]) -> Gradients:
-        """Return a part of a shape from a column and row on."""
-        window = np.s_[row : row + shape[0], col : col + shape[1]]
-        x, y, length = (of[window] for of in (self.x, self.y, self.length))
-        return Gradients(x, y, length, self.valid[window])
-
-
-def count_same(one: Gradients, other: Gradients, strong: tuple[float, float]) -> tuple[int, int]:
-    """Return how many gradients are the same, and how many there are, of those that are strong.
-
-    Parameters
-    ----------
-    one, other
-        Of the same shape.
-    strong
-        The length from which a gradient is strong in the one and in the other.
-    """
-    lengths = one.length, other.length
-    is_strong = one.valid & other.valid & ((lengths[0] > strong[0]) | (lengths[1] > strong[1]))
-    apart = np.hypot(one.x - other.x, one.y - other.y)
-    is_same = apart <= _SAME_SHARE * np.maximum(*lengths)
-    return int((is_strong & is_same).sum()), int(is_strong.sum())
 
 
 @dataclass(frozen=True)
@@ -116,18 +70,9 @@ class Windows:
         return self.valid & (self.differing <= _DIFFERING_SHARE * (self.one + self.other))
 
     @property
-    def related(self) -> Mask:
-        """Around which pixels a linear function of one is half of the other.
-
-        As in copies, also those in other colours.
-        """
-        covariance = (self.one + self.other - self.differing) / 2
-        return self.valid & (covariance**2 >= (1 - _DIFFERING_SHARE) * self.one * self.other)
-
-    @property
-    def counts(self) -> tuple[int, int, int]:
-        """How many pixels are the same, related, and valid."""
-        return int(self.same.sum()), int(self.related.sum()), int(self.valid.sum())
+    def counts(self) -> tuple[int, int]:
+        """How many pixels are the same, and how many are valid."""
+        return int(self.same.sum()), int(self.valid.sum())
 
 
 @dataclass(frozen=True)

@@ -99,10 +99,10 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
     Rule(
         "exchanged roles",
         AGREEMENT,
-        "fewer than two of three chips all over match where the transform has them, no more than "
-        "two of three check points agree, no mask leaves the ground alone, and with reference and "
-        "input exchanged check points agree as they may by chance, or the transform lies farther "
-        f"off than the largest error, or than {TOLERANCE_PX:g} px, within which points agree",
+        "check points would agree as well by chance with a probability above "
+        f"10^{2 * LARGEST_LOG10_CHANCE:.0f}, no mask leaves the ground alone, and with reference "
+        "and input exchanged they agree as they may by chance, or the transform lies farther off "
+        f"than the largest error, or than {TOLERANCE_PX:g} px, within which points agree",
         "[Holden2000]; suite attacks",
         "give a larger part of the scene, or bands that show the same",
         _exchanged_roles,
