@@ -366,15 +366,15 @@ def made_folder(folder: Path) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("share", "is_asked"), [(0.75, True), (0.1, False)])
-def test_where_few_chips_confirm_a_transform_the_exchanged_pair_must_too(
+def test_where_few_check_points_agree_the_exchanged_pair_must_show_the_same(
     share: float, is_asked: bool, tmp_path: Path, context: Context
 ) -> None:
     pair, _ = beside_another_place(share, tmp_path)
     with open_pair(pair.reference, pair.input, COREGISTER, context) as opened:
         found = run(opened, COREGISTER, context)
-    assert found.verdict.accepted and found.survey is not None and found.evidence is not None
+    assert found.verdict.accepted and found.evidence is not None
     assert error_px(found.accepted(), pair) < 0.5
-    assert found.survey.is_weakly_confirmed == is_asked
+    assert found.evidence.needs_second_confirmation == is_asked
     exchanged = found.evidence.exchanged
     assert (exchanged is not None) == is_asked
     if exchanged is not None:
@@ -401,7 +401,7 @@ def test_a_transform_that_the_exchanged_pair_does_not_show_is_refused(
 def test_exchanged_roles_show_the_same_across_pixel_sizes(
     ratio: float, tmp_path: Path, context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(RegistrationEvidence, "is_weakly_confirmed", True)
+    monkeypatch.setattr(RegistrationEvidence, "needs_second_confirmation", True)
     pair = write_textured_pair(
         tmp_path, (500, 450), shift_on_map(73.0, -42.0), input_pixel_ratio=ratio
     )

@@ -25,6 +25,7 @@ from evidences import (
     survey,
     two_thirds,
 )
+from scipy.stats import binom
 
 from groundtie.masks.choice import LAYER, REGIONS, SURFACE, THRESHOLD, MaskUsed
 from groundtie.matching.rest import Rest
@@ -230,6 +231,19 @@ def test_what_is_high_at_both_places_repeats() -> None:
 def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list[str]) -> None:
     """Regions of a camera's image that pass for a radar's are no ground."""
     assert refusing(evidence(GOOD, scene=PERHAPS, mask=masked(kind))) == expected
+
+
+@pytest.mark.parametrize(("agreeing", "is_needed"), [(5, True), (6, False), (9, False)])
+def test_what_chance_explains_with_less_than_its_squared_limit_needs_no_second_pass(
+    agreeing: int, is_needed: bool
+) -> None:
+    """Within 2 px of ± 16 px lie 4 π / 33² of random matches: 5 of 9 with 10^-7.5, 6 with 10^-9.6."""
+    errors = np.concatenate([scatter(agreeing, 0.3), np.full((9 - agreeing, 2), 9.0)])
+    probability = 4 * math.pi / 33**2
+    tail = binom.sf(agreeing - 1, 9, probability)
+    found = evidence(errors)
+    assert found.held_out.log10_chance == pytest.approx(math.log10(tail), abs=1e-6)
+    assert found.needs_second_confirmation == is_needed
 
 
 @pytest.mark.parametrize(

@@ -283,7 +283,7 @@ class RegistrationEvidence:
         )
 
     @property
-    def is_weakly_confirmed(self) -> bool:
+    def needs_second_confirmation(self) -> bool:
         """Whether so few check points agree that the exchanged pair must confirm the transform.
 
         By chance, both pass with about the square of the limit: agreement that is as improbable

@@ -94,7 +94,7 @@ def _asks_for_exchange(
 
     What is rendered, or located by a sensor model, is no reference for another image.
     """
-    if not evidence.is_weakly_confirmed or evidence.mask.is_ground:
+    if not evidence.needs_second_confirmation or evidence.mask.is_ground:
         return False
     is_plain = spec.surface is None and spec.dem is None and not spec.is_rendered
     return is_plain and not scene.input.is_in_sensor_geometry
