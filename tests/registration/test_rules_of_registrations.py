@@ -237,7 +237,7 @@ def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list
 def test_what_chance_explains_with_less_than_its_squared_limit_needs_no_second_pass(
     agreeing: int, is_needed: bool
 ) -> None:
-    """Within 2 px of ± 16 px lie 4 π / 33² of random matches: 5 of 9 with 10^-7.5, 6 with 10^-9.6."""
+    """A random match within 16 px lies within 2 px with 4 π / 33²: 5 of 9 do with 10^-7.5."""
     errors = np.concatenate([scatter(agreeing, 0.3), np.full((9 - agreeing, 2), 9.0)])
     probability = 4 * math.pi / 33**2
     tail = binom.sf(agreeing - 1, 9, probability)
