@@ -165,7 +165,9 @@ def run(settings: Settings) -> SuiteResult:
     )
     every += run_cases(attacked, settings.jobs)
     found = [one for one in every if one.is_drawn]
-    ground = [one for one in every if not one.is_drawn and not one.sameness.is_explained]
+    ground = [
+        one for one in every if not (one.is_drawn or one.sameness.is_copy or one.sameness.is_view)
+    ]
     apart = [one for one in ground if one.group != BANDS_OF_ONE]
     most, most_of_one = (
         max((one.sameness.sharpness for one in some), default=0.0) for some in (apart, ground)

@@ -13,7 +13,7 @@ from textured_pairs import shift_on_map, texture
 from groundtie.context import Context
 from groundtie.geometry.models import Frame, Model, PolynomialModel
 from groundtie.geometry.transform import Transform
-from groundtie.matching.locked import EXACT_PX, LockedContent, find_locked_content
+from groundtie.matching.locked import EXACT_PX, LockedContent, Sensors, find_locked_content
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
@@ -146,7 +146,19 @@ def test_one_sensors_views_of_one_ground_are_explained(tmp_path: Path, context: 
     """Most windows vary alike; so do those of reduced images where single pixels do not."""
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
     assert locked is not None and locked.sameness.area > 0.5
-    assert locked.sameness.is_explained
+    assert locked.is_explained
+
+
+def test_what_varies_alike_in_two_radar_images_is_no_ground(
+    tmp_path: Path, context: Context
+) -> None:
+    """Each view of a radar has speckle of its own."""
+    locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
+    assert locked is not None
+    views = replace(locked.sameness, sharpness=1.5, area=0.4, reduced_area=0.7, ground=0.4)
+    for sensors in Sensors:
+        found = replace(locked, sameness=views, sensors=sensors)
+        assert found.is_explained == (sensors is Sensors.CAMERAS)
 
 
 def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
@@ -156,15 +168,17 @@ def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
     assert locked is not None
     # As of one exposure's bands.
     views = replace(locked.sameness, sharpness=4.2, area=0.4, reduced_area=0.7, ground=0.4)
-    assert views.is_explained
-    assert not replace(views, sharpness=DRAWN_SHARPNESS).is_explained
-    assert replace(views, area=0.8, reduced_area=0.8, sharpness=DRAWN_SHARPNESS).is_explained
+    assert views.is_view
+    assert not replace(views, sharpness=DRAWN_SHARPNESS).is_view
+    assert replace(views, area=0.8, reduced_area=0.8, sharpness=DRAWN_SHARPNESS).is_copy
 
 
-def test_a_copy_is_explained(tmp_path: Path, context: Context) -> None:
+def test_a_copy_is_explained_of_one_kind_of_sensor(tmp_path: Path, context: Context) -> None:
     locked = looked_at(tmp_path, sensed(1), sensed(1), context)
     assert locked is not None and locked.sameness.area > 0.99
     assert locked.is_explained
+    assert replace(locked, sensors=Sensors.RADARS).is_explained
+    assert not replace(locked, sensors=Sensors.DIFFERENT).is_explained
     assert not locked.sameness.is_finer_than_ground
 
 
@@ -187,7 +201,7 @@ def test_a_pattern_of_rows_and_columns_is_no_ground(tmp_path: Path, context: Con
     locked = looked_at(tmp_path, reference, input, context)
     assert locked is not None and locked.sameness.is_evident
     assert locked.sameness.reduced_area < locked.sameness.area
-    assert not locked.sameness.is_explained
+    assert not locked.is_explained
 
 
 def test_the_same_holes_are_found_in_speckle(tmp_path: Path, context: Context) -> None:
@@ -198,7 +212,7 @@ def test_the_same_holes_are_found_in_speckle(tmp_path: Path, context: Context) -
     locked = looked_at(tmp_path, reference, input, context)
     assert locked is not None and 0.4 < locked.sameness.area < 0.6
     assert locked.sameness.is_evident
-    assert not locked.sameness.is_explained
+    assert not locked.is_explained
 
 
 @pytest.mark.parametrize("side_m", [10.0, 12.0])

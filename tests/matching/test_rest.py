@@ -10,6 +10,7 @@ from textured_pairs import shift_on_map, texture
 from groundtie.context import Context
 from groundtie.geometry.transform import Transform
 from groundtie.matching.chips import ChipMatcher
+from groundtie.matching.locked import Sensors
 from groundtie.matching.parts import ELSEWHERE_PX
 from groundtie.matching.rest import Rest, survey_rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, survey_places
@@ -38,7 +39,7 @@ def rest_of(
     input: np.ndarray,
     context: Context,
     offset: tuple[int, int] = (0, 0),
-    of_one_kind: bool = True,
+    sensors: Sensors = Sensors.CAMERAS,
 ) -> Rest | None:
     """Return what two arrays leave whose rows and columns are an offset apart."""
     paths = [
@@ -54,7 +55,7 @@ def rest_of(
         transform = Transform(found, pair.grid.crs, other.grid)
         matcher = ChipMatcher(pair, SimilaritySettings())
         places = survey_places(pair.grid)
-        return survey_rest(matcher, transform, places, ELSEWHERE_PX, of_one_kind, context)
+        return survey_rest(matcher, transform, places, ELSEWHERE_PX, sensors, context)
 
 
 @pytest.mark.parametrize("share", [0.35, 0.6])
@@ -86,5 +87,5 @@ def test_what_a_radar_and_a_camera_show_alike_is_no_view_of_one_sensor(
     tmp_path: Path, context: Context
 ) -> None:
     views = noisy(place(), 1), noisy(place(), 2)
-    rest = rest_of(tmp_path, *views, context, of_one_kind=False)
+    rest = rest_of(tmp_path, *views, context, sensors=Sensors.DIFFERENT)
     assert rest is not None and not rest.is_explained and rest.beyond is None

@@ -13,10 +13,12 @@ from evidences import facts, scene
 from facts_of_pairs import FIELDS, TOWN, grey_values, opened, speckled
 
 from groundtie.masks.choice import INPUT, REFERENCE
+from groundtie.matching.locked import Sensors
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration import scene as scene_module
 from groundtie.registration.scene import SceneInfo
+from groundtie.registration.specification import BOTH, NEITHER
 
 
 @pytest.mark.parametrize(
@@ -96,8 +98,11 @@ def test_speckle_shows_which_is_the_radars(tmp_path: Path, looks: int) -> None:
             assert not info.are_both_radar
         assert twice.are_both_radar == (looks < 20)
         # What a mask is made of is declared of one image, whatever the other is.
-        assert replace(twice, declared=REFERENCE).of_one_kind == (looks < 20)
-        assert not replace(one_way, declared=REFERENCE).of_one_kind
+        of_both = replace(twice, declared=REFERENCE).sensors
+        assert of_both is (Sensors.RADARS if looks < 20 else Sensors.DIFFERENT)
+        assert replace(one_way, declared=REFERENCE).sensors is Sensors.DIFFERENT
+        assert replace(one_way, declared=NEITHER).sensors is Sensors.CAMERAS
+        assert replace(one_way, declared=BOTH).sensors is Sensors.RADARS
 
 
 def test_metadata_count_before_speckle(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ columns and rows, whatever ground they show.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum, auto
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,14 @@ _LATTICE = 9
 _EDGE_SURROUNDINGS_PX = 9
 
 
+class Sensors(Enum):
+    """What sensors the images may be of."""
+
+    CAMERAS = auto()
+    RADARS = auto()
+    DIFFERENT = auto()
+
+
 @dataclass(frozen=True)
 class LockedContent:
     """Which pixels of the reference the input repeats at an offset of whole columns and rows.
@@ -62,8 +71,8 @@ class LockedContent:
     is_whole
         Whether the transform moves the array by whole pixels: what was resampled is no copy of
         pixels.
-    of_one_kind
-        Whether the images may be one sensor's: not a radar's and a camera's.
+    sensors
+        What the images may be.
     is_exact
         Whether the transform moves the array by whole pixels all over, and does nothing else.
     """
@@ -72,7 +81,7 @@ class LockedContent:
     offset_px: tuple[int, int]
     sameness: Sameness
     is_whole: bool
-    of_one_kind: bool
+    sensors: Sensors
     is_exact: bool
 
     @property
@@ -82,14 +91,21 @@ class LockedContent:
 
     @property
     def is_explained(self) -> bool:
-        """Whether the images are copies, or one sensor's views of one ground."""
-        return self.of_one_kind and self.sameness.is_explained
+        """Whether the images are copies, or one camera's views of one ground.
+
+        What is left of them need not confirm the transform: copies leave nothing, and what a camera
+        shows alike is most of what it shows. Each view of a radar has speckle of its own.
+        """
+        if self.sensors is Sensors.DIFFERENT:
+            return False
+        is_view = self.sensors is Sensors.CAMERAS and self.sameness.is_view
+        return is_view or self.sameness.is_copy
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
 
         What is drawn ends somewhere in the windows that vary alike: all of them is taken, unless
-        the surroundings are one sensor's views of the ground, and what is around edges if they
+        the surroundings are one camera's views of the ground, and what is around edges if they
         or the transform are evidence.
         """
         reach = 2 * REACH_PX
@@ -120,7 +136,7 @@ def find_locked_content(
     transform: Transform,
     places: Places,
     context: Context,
-    of_one_kind: bool = True,
+    sensors: Sensors = Sensors.CAMERAS,
     exact_px: float = EXACT_PX,
 ) -> LockedContent | None:
     """Return what the images repeat where a transform puts the input's array.
@@ -135,8 +151,8 @@ def find_locked_content(
         Where it is looked for.
     context
         Threads.
-    of_one_kind
-        See `LockedContent`.
+    sensors
+        What the images may be.
     exact_px
         Within this of whole pixels, what was found lies on them as exactly as it is known.
 
@@ -162,7 +178,7 @@ def find_locked_content(
     sameness = sameness_of(list(context.map(look, list(places.centres))))
     is_whole = bool(np.abs(np.median(moved, axis=0) - offset).max() <= _WHOLE_PX)
     is_exact = bool(np.abs(moved - offset).max() <= exact_px)
-    return LockedContent(pair, found, sameness, is_whole, of_one_kind, is_exact)
+    return LockedContent(pair, found, sameness, is_whole, sensors, is_exact)
 
 
 def _patches(pair: ImagePair, piece: Grid, offset_px: tuple[int, int]) -> tuple[Patch, Patch]:

@@ -25,6 +25,7 @@ from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .coarse_shift import level_factor
 from .frames import compose
+from .locked import Sensors
 from .matcher import FloatArray, Places
 from .rest import Rest, survey_rest
 from .survey import SURVEY_RADIUS_PX, Survey, survey_model
@@ -86,7 +87,7 @@ def survey_pose(
     pair: ImagePair,
     transform: Transform,
     accuracy_share: float,
-    of_one_kind: bool,
+    sensors: Sensors,
     context: Context,
 ) -> PoseSurvey:
     """Match chips all over a pair around a pose.
@@ -99,8 +100,8 @@ def survey_pose(
         The pose, as a transform between them.
     accuracy_share
         Its accuracy, as a share of the reference's longer side.
-    of_one_kind
-        See `LockedContent`.
+    sensors
+        What the images may be.
     context
         Threads and progress.
     """
@@ -118,7 +119,7 @@ def survey_pose(
     elsewhere_px = max(accuracy_share * max(level.width, level.height), POSE_TOLERANCE_PX)
     survey = survey_model(matcher, model, quiet, None, places, elsewhere_px)
     moved = Transform(model, transform.crs, transform.input_grid)
-    rest = survey_rest(matcher, moved, places, elsewhere_px, of_one_kind, quiet, _EXACT_PX)
+    rest = survey_rest(matcher, moved, places, elsewhere_px, sensors, quiet, _EXACT_PX)
     bands = survey_bands(matcher, model, places, elsewhere_px, quiet)
     return PoseSurvey(kept, residuals, survey, rest, moved, fold_models, bands)
 

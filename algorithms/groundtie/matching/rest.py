@@ -9,7 +9,7 @@ from ..geometry.transform import Transform
 from ..similarity.surface import SimilaritySettings
 from ..similarity.unexplained import unexplained
 from .chips import ChipMatcher
-from .locked import EXACT_PX, find_locked_content
+from .locked import EXACT_PX, Sensors, find_locked_content
 from .matcher import Places
 from .survey import Survey, survey_model, survey_places
 
@@ -45,7 +45,7 @@ def survey_rest(
     transform: Transform,
     places: Places,
     elsewhere_px: float,
-    of_one_kind: bool,
+    sensors: Sensors,
     context: Context,
     exact_px: float = EXACT_PX,
 ) -> Rest | None:
@@ -61,15 +61,15 @@ def survey_rest(
         The chips.
     elsewhere_px
         See `Survey`.
-    of_one_kind
-        See `LockedContent`.
+    sensors
+        What the images may be.
     context
         Threads and progress.
     exact_px
         See `find_locked_content`.
     """
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
-    locked = find_locked_content(pair, transform, asked, context.quiet(), of_one_kind, exact_px)
+    locked = find_locked_content(pair, transform, asked, context.quiet(), sensors, exact_px)
     if locked is None or not locked.is_evident:
         return None
     # What a mask leaves is little: one measure alone would miss most of it.

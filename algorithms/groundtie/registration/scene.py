@@ -15,6 +15,7 @@ from ..masks.choice import (
 )
 from ..masks.radar import LEAST_VARIATION2, LEAST_VARIATION2_RATIO, variation2_of
 from ..masks.scene import Scene
+from ..matching.locked import Sensors
 from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch
 from ..rasters.radar_tags import is_known_radar
@@ -148,10 +149,13 @@ class SceneInfo:
         return all(one.is_known_radar or one.has_speckle for one in (self.reference, self.input))
 
     @property
-    def of_one_kind(self) -> bool:
-        """Whether the images may be one sensor's: not a radar's and a camera's."""
-        is_one = self.declared in (BOTH, NEITHER) or self.are_both_radar
-        return is_one or not self.is_radar_and_camera
+    def sensors(self) -> Sensors:
+        """What the images may be: a camera's unless they are known to be a radar's."""
+        if self.declared == BOTH or (self.declared != NEITHER and self.are_both_radar):
+            return Sensors.RADARS
+        if self.declared != NEITHER and self.is_radar_and_camera:
+            return Sensors.DIFFERENT
+        return Sensors.CAMERAS
 
     @property
     def is_dense_town(self) -> bool:

@@ -130,9 +130,9 @@ class Stages:
             return None, None, ()
         pair, transform = self.masked.pair, estimate.transform
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
-        places, kind = survey_places(pair.grid), scene.of_one_kind
+        places, sensors = survey_places(pair.grid), scene.sensors
         survey = survey_model(chips, transform.model, context.part(0.0, 0.5))
-        rest = survey_rest(chips, transform, places, ELSEWHERE_PX, kind, context.part(0.5, 0.9))
+        rest = survey_rest(chips, transform, places, ELSEWHERE_PX, sensors, context.part(0.5, 0.9))
         last = context.part(0.9, 1.0)
         return survey, rest, survey_bands(chips, transform.model, places, ELSEWHERE_PX, last)
 

@@ -104,16 +104,20 @@ class Sameness:
         return bool(self.reduced_area < self.area - _STANDARD_ERRORS * error)
 
     @property
-    def is_explained(self) -> bool:
-        """Whether one image is a copy of the other, or both are one sensor's views of one ground.
+    def is_copy(self) -> bool:
+        """Whether one image is a copy of the other: nearly everything is the same."""
+        share = min(self.area, self.reduced_area)
+        return share >= _COPY_SHARE and not self.is_finer_than_ground
 
-        What is left of them need not confirm the transform, as copies leave nothing, and what one
-        sensor shows alike is most of what it shows, but no sharper than its bands.
+    @property
+    def is_view(self) -> bool:
+        """Whether both may be one camera's views of one ground.
+
+        What is not the same varies alike, too, and edges coincide no more sharply than those of
+        its bands.
         """
-        if self.is_finer_than_ground:
-            return False
-        is_copy = min(self.area, self.reduced_area) >= _COPY_SHARE
-        return is_copy or (self.ground >= _GROUND_SHARE and self.sharpness < DRAWN_SHARPNESS)
+        is_ground = self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
+        return is_ground and self.sharpness < DRAWN_SHARPNESS
 
 
 _NO_WINDOWS = np.zeros((3, 2), int)

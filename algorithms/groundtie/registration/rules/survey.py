@@ -22,7 +22,7 @@ WEAK_HEIGHT = 2.0
 # one is higher than 1.5 by far, at 3.4.
 WEAK_REST_HEIGHT = 2.5
 
-# Copies and one sensor's views leave little. Where a quarter of the chips have anything left, it
+# Copies and one camera's views leave little. Where a quarter of the chips have anything left, it
 # must be so high: right transforms from 1.66 on; beneath clouds and snow up to 1.5, but for one at
 # 1.8. Plain copies leave something of an eighth of the chips at most, clouds of 0.3 and more. Where
 # edges are sharp and half of the chips are left, it must be as high as of other content: right ones
@@ -92,7 +92,7 @@ def deviations_elsewhere(rest: Rest) -> float:
 
 
 def _locked(evidence: RegistrationEvidence) -> str | None:
-    """Ask of the rest what is asked of all; where one sensor shows one ground, little is left."""
+    """Ask of the rest what is asked of all; of copies and one camera's views little is left."""
     rest = evidence.rest
     if rest is None:
         return None
@@ -152,7 +152,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         SURVEY,
         "both images have the same content at the same columns and rows, such as labels or clouds, "
         "and without it a part lies elsewhere, a second place matches about as well, or the mean "
-        f"similarity is below {WEAK_REST_HEIGHT:g} standard deviations; of a copy, or one sensor's "
+        f"similarity is below {WEAK_REST_HEIGHT:g} standard deviations; of a copy, or one camera's "
         f"views, below {WEAK_COPY_HEIGHT:g} if a quarter of the chips have anything left, below "
         f"{WEAK_REST_HEIGHT:g} with sharp edges if half have, or what the reference does not "
         f"explain of it matches elsewhere, and stands out there by {BEYOND_DEVIATIONS:g}",
