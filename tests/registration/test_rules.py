@@ -79,11 +79,6 @@ SPECKLED = scene(facts(variation2=0.2, **TOWN))
 DESPECKLED = scene(facts(is_known_radar=True, **TOWN))
 
 
-def beside(right: int, others: int) -> np.ndarray:
-    """Return errors of check points of which some agree on a place 7 px off."""
-    return np.concatenate([scatter(right, 0.3), scatter(others, 0.3) + [5.0, 5.0]])
-
-
 def loose(by_px: float) -> Estimate:
     """Return an estimate that varies by so much, and a little more, with each block of points."""
     shifts = [(side * by_px, 0.0) for side in (-1, 1)] * 3
@@ -162,7 +157,6 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(np.concatenate([scatter(14, 0.3), fallen(58)])),
         evidence(np.concatenate([scatter(20, 0.3), fallen(52)])),
     ),
-    "another transform": (evidence(beside(15, 20)), evidence(beside(20, 16))),
     "exchanged roles": (
         evidence(GOOD, exchanged=Exchanged(3, 9, -3.9, 0.4)),
         evidence(GOOD, exchanged=Exchanged(4, 9, -4.1, 0.4)),

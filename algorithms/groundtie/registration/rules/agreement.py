@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ...geometry.judging import (
     FEWEST_CHECK_POINTS,
     LARGEST_LOG10_CHANCE,
@@ -11,17 +9,9 @@ from ...geometry.judging import (
     SMALLEST_SHARE_UNROTATED,
     TOLERANCE_PX,
 )
-from ...geometry.robust import distances, find_consensus
 from ..evidence import AGREEMENT, RegistrationEvidence
 from ..refinement_evidence import RefinementEvidence
 from .rule import Rule
-
-# Check points that agree on another transform within this distance make it a rival, if they are
-# more by so many, as three always agree on an affine model and one or two more may by chance, and
-# by this factor. Measured by the suites real and crossings.
-_RIVAL_TOLERANCE_PX = 3.0
-_RIVAL_POINTS = 3
-_RIVAL_SHARE = 1.25
 
 
 def _by_chance(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
@@ -37,21 +27,6 @@ def _few_agree(evidence: RegistrationEvidence | RefinementEvidence) -> str | Non
     if points.agreeing >= points.least_share * points.total:
         return None
     return f"only {points.agreeing} of {points.total} {points.name} agree"
-
-
-def _another_transform(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
-    if not isinstance(evidence, RegistrationEvidence):
-        return None
-    residuals = evidence.residuals_px
-    if len(residuals) < _RIVAL_POINTS:
-        return None
-    own = int((np.hypot(*residuals.T) <= _RIVAL_TOLERANCE_PX).sum())
-    px = evidence.grid.map_to_pixel(evidence.counted.reference_xy)
-    rival = find_consensus(px, px + residuals, _RIVAL_TOLERANCE_PX)
-    others = int((distances(rival, px, px + residuals) <= _RIVAL_TOLERANCE_PX).sum())
-    if others < max(own + _RIVAL_POINTS, _RIVAL_SHARE * own):
-        return None
-    return f"{others} of {evidence.held_out.total} check points agree on another transform"
 
 
 def _exchanged_roles(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
@@ -86,15 +61,6 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
         "suites simulated, real and attacks",
         "mask clouds and changes; give bands that show the same",
         _few_agree,
-    ),
-    Rule(
-        "another transform",
-        AGREEMENT,
-        f"check points agree on another transform: {_RIVAL_POINTS} more than on this one, and "
-        f"{_RIVAL_SHARE:g} times as many",
-        "suites real and crossings",
-        "give parts of a mosaic one by one, or a more flexible model",
-        _another_transform,
     ),
     Rule(
         "exchanged roles",
