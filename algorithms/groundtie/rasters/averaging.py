@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -78,11 +79,11 @@ def area_average(
     down = overlaps(row_edges, values.shape[0], precision)
     across = overlaps(col_edges, values.shape[1], precision)
     if valid.all():
-        total = _sum(down, across, values)
+        total = weighted_sums(down, across, values)
         weight = np.outer(down.sum(axis=1).A1, across.sum(axis=1).A1)
     else:
-        total = _sum(down, across, np.where(valid, values, values.dtype.type(0)))
-        weight = _sum(down, across, valid.astype(precision))
+        total = weighted_sums(down, across, np.where(valid, values, values.dtype.type(0)))
+        weight = weighted_sums(down, across, valid.astype(precision))
     area = np.outer(np.diff(row_edges), np.diff(col_edges))
     enough = weight >= MIN_VALID_SHARE * area - 1e-6 * area
     means = np.divide(total, weight, out=np.zeros_like(total), where=enough)
@@ -144,7 +145,12 @@ def _edges(
     return start, edges if whole == reduced else (first + edges) * reduced / whole - start
 
 
-def _sum(down: sparse.csr_matrix, across: sparse.csr_matrix, values: NDArray[Any]) -> NDArray[Any]:
+def weighted_sums(
+    down: sparse.csr_matrix, across: sparse.csr_matrix, values: NDArray[Any]
+) -> NDArray[Any]:
+    """Return the sums of an image over rectangles, of whose sides `overlaps` states the pixels."""
     # Rows first: that runs along contiguous memory and leaves little for the second product.
     lines = down @ values
-    return np.asarray((across @ np.ascontiguousarray(lines.T)).T)
+    # OpenCV, which has no complex numbers, turns images of 2^n columns in a fifth of the time.
+    turned = np.ascontiguousarray(lines.T) if np.iscomplexobj(lines) else cv2.transpose(lines)
+    return np.asarray((across @ turned).T)
