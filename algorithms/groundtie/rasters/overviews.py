@@ -17,6 +17,7 @@ from rasterio.env import env_ctx_if_needed
 from scipy import sparse
 
 from .averaging import overlaps, weighted_sums
+from .bands import numpy_dtype
 from .handles import OpenDataset
 from .tiled_file import Level
 from .windows import Mask, Window
@@ -100,7 +101,9 @@ class Reduced:
         )
         shape = (window.height, window.width)
         how = Resampling.nearest if self.nearest else Resampling.average
-        values = dataset.read(bands, window=place, out_shape=(len(bands), *shape), resampling=how)
+        # Where nothing is valid GDAL leaves complex pixels as they are in memory.
+        values = np.zeros((len(bands), *shape), numpy_dtype(dataset.dtypes[0]))
+        dataset.read(bands, out=values, window=place, resampling=how)
         if not self._has_mask(bands):
             return values, None
         mask = dataset.read_masks(1, window=place, out_shape=shape, resampling=how)

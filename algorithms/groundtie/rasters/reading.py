@@ -21,7 +21,7 @@ from ..errors import BandError, RasterOpenError
 from ..memory import cache_bytes
 from ..raster_names import is_remote, raster_name
 from .averaging import average_window
-from .bands import MOST_BANDS, BandInfo, colormap, stated, tags_of, working_dtype
+from .bands import MOST_BANDS, BandInfo, colormap, numpy_dtype, stated, tags_of, working_dtype
 from .georeferencing import grid_of
 from .grid import PIXEL_COORDINATES, Grid
 from .handles import ArrayHandles, FileHandles, Handles, OpenDataset
@@ -105,7 +105,7 @@ class RasterSource:
     @property
     def dtype(self) -> np.dtype[Any]:
         """Type that holds the pixels of every band."""
-        return np.result_type(*(band.numpy_dtype for band in self.bands))
+        return np.result_type(*(numpy_dtype(band.dtype) for band in self.bands))
 
     @property
     def is_complex(self) -> bool:
