@@ -8,7 +8,7 @@ everywhere else (the first pixel's centre is at 0).
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any
@@ -22,6 +22,9 @@ from rasterio.crs import CRS
 from ..errors import GeoreferencingError, GridSizeError, raised_by
 
 FloatArray = NDArray[np.float64]
+
+# Takes positions, shape (n, 2), to values at them, (n, k): mostly to other positions.
+PointFunction = Callable[[FloatArray], FloatArray]
 
 # Longitude and latitude.
 LON_LAT = CRS.from_epsg(4326)

@@ -10,9 +10,9 @@ from affine import Affine
 from ..arrays import Raster
 from ..context import Context
 from .bands import BandInfo
-from .grid import Grid, compose
+from .grid import Grid, PointFunction, compose
 from .handles import ArrayHandles
-from .pair import Image, ImagePair, ToPixel
+from .pair import Image, ImagePair
 from .reading import FloatImage, Mask, RasterSource
 from .tiling import tiles
 from .warping import reduction
@@ -39,7 +39,7 @@ def held_grey(source: RasterSource, band: int | None = None) -> RasterSource:
     return _held(source, source.grid, *source.read(source.window, band))
 
 
-def held_onto(image: Image, grid: Grid, to_px: ToPixel, context: Context) -> Image:
+def held_onto(image: Image, grid: Grid, to_px: PointFunction, context: Context) -> Image:
     """Return an image that reads the same onto parts of a grid as another one, from memory.
 
     Parameters
@@ -99,7 +99,7 @@ def held_on_level(pair: ImagePair, level: Grid, context: Context) -> ImagePair:
     )
 
 
-def _means(image: Image, level: Grid, to_px: ToPixel, context: Context) -> Image:
+def _means(image: Image, level: Grid, to_px: PointFunction, context: Context) -> Image:
     """Return an image of the means that `sample` takes first: it starts at multiples of them."""
     source = image.source
     x, y = reduction(level, to_px, (source.grid.width, source.grid.height))

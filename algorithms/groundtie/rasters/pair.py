@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -11,12 +10,10 @@ import numpy as np
 from ..errors import GeoreferencingError, NoOverlapError, SameFileError
 from ..geometry.limits import SearchLimits
 from .colours import Colours
-from .grid import FloatArray, Grid, reproject
+from .grid import FloatArray, Grid, PointFunction, reproject
 from .patch import Patch
 from .reading import FloatImage, Mask, RasterSource, Window
 from .warping import sample, sample_bands
-
-ToPixel = Callable[[FloatArray], FloatArray]
 
 # Areas of zeros from this side on hold no data; interpolation reaches this far (side) around them.
 _EMPTY_PX = 9
@@ -68,14 +65,14 @@ class Image:
         """Whether its bands make classes of colour: nobody chose one, and there are enough."""
         return self.band is None and len(self.source.image_bands) >= _LEAST_BANDS
 
-    def values_onto(self, grid: Grid, to_px: ToPixel) -> tuple[FloatImage, Mask]:
+    def values_onto(self, grid: Grid, to_px: PointFunction) -> tuple[FloatImage, Mask]:
         """Return grey values, or classes of colour, on a grid, and where they are valid."""
         if self.colours is None:
             return sample(self.source, grid, to_px, "cubic", self.band)
         bands, valid = sample_bands(self.source, grid, to_px)
         return self.colours.classes(bands), valid
 
-    def read_onto(self, grid: Grid, to_px: ToPixel, hidden: Mask | None = None) -> Patch:
+    def read_onto(self, grid: Grid, to_px: PointFunction, hidden: Mask | None = None) -> Patch:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
         values, valid = self.values_onto(grid, to_px)
         if hidden is not None:
@@ -87,7 +84,7 @@ class Image:
             valid = valid & self.shown_on(grid, to_px)
         return Patch(values, valid)
 
-    def shown_on(self, grid: Grid, to_px: ToPixel) -> Mask:
+    def shown_on(self, grid: Grid, to_px: PointFunction) -> Mask:
         """Return what the mask, which there must be, lets take part; parameters as `read_onto`."""
         assert self.mask is not None
         own, to_mask = self.source.grid, _nominal_pixels(self.source.grid, self.mask.grid)
@@ -96,7 +93,7 @@ class Image:
         )
         return known & (shown != 0)
 
-    def bands_onto(self, grid: Grid, to_px: ToPixel) -> FloatImage:
+    def bands_onto(self, grid: Grid, to_px: PointFunction) -> FloatImage:
         """Return all bands but alpha on a grid, shape (bands, h, w), 0 where one is invalid."""
         return sample_bands(self.source, grid, to_px)[0]
 
@@ -132,7 +129,7 @@ class ImagePair:
         """Return the reference on a grid in its CRS, masked where it is to be hidden."""
         return self.reference.read_onto(grid, self.reference.source.grid.map_to_pixel, hidden)
 
-    def input_patch(self, grid: Grid, to_input_px: ToPixel) -> Patch:
+    def input_patch(self, grid: Grid, to_input_px: PointFunction) -> Patch:
         """Return the input on a grid; `to_input_px` takes map positions to input pixels."""
         return self.input.read_onto(grid, to_input_px)
 
@@ -140,7 +137,7 @@ class ImagePair:
         """Return all bands of the reference on a grid in its CRS, shape (bands, h, w)."""
         return self.reference.bands_onto(grid, self.reference.source.grid.map_to_pixel)
 
-    def input_bands(self, grid: Grid, to_input_px: ToPixel) -> FloatImage:
+    def input_bands(self, grid: Grid, to_input_px: PointFunction) -> FloatImage:
         """Return all bands of the input on a grid; `to_input_px` as `input_patch` takes it."""
         return self.input.bands_onto(grid, to_input_px)
 
@@ -313,7 +310,7 @@ def coarser_m(reference: Grid, input: Grid) -> float:
     return max(reference.pixel_size_m, input.pixel_size_m)
 
 
-def _nominal_pixels(source: Grid, target: Grid) -> ToPixel:
+def _nominal_pixels(source: Grid, target: Grid) -> PointFunction:
     """Return the function from map positions of `source` to pixels of `target`."""
     return lambda xy: target.map_to_pixel(reproject(xy, source.crs, target.crs))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoOverlapError, RasterContentError
-from .grid import FloatArray
+from .grid import FloatArray, PointFunction
 from .kernels import interpolate
 from .reading import FloatImage, Mask, RasterSource, Window
-
-Positions = Callable[[FloatArray], FloatArray]
 
 # Pixels of the raster that are read at a time, a side.
 _BLOCK = 1024
@@ -32,7 +29,7 @@ _RELAXATIONS = 300
 # No place of the Earth is lower or higher, in metres: such values are voids that nobody declared.
 _LOWEST_M, _HIGHEST_M = -600.0, 9_200.0
 
-# Positions in pixels of the raster may be wrong by this much.
+# PointFunction in pixels of the raster may be wrong by this much.
 TOLERANCE_PX = 1e-3
 
 # The outer pixels' values hold as far as these pixels reach.
@@ -58,7 +55,7 @@ class RasterSurface:
     """
 
     source: RasterSource
-    to_px: Positions
+    to_px: PointFunction
     region: Window
     filled: FloatImage
     margin_px: float = _HALF_PX
@@ -149,7 +146,7 @@ def read_heights(
     return values, valid & (values > _LOWEST_M) & (values < _HIGHEST_M)
 
 
-def surface_around(source: RasterSource, to_px: Positions, region: FloatArray) -> RasterSurface:
+def surface_around(source: RasterSource, to_px: PointFunction, region: FloatArray) -> RasterSurface:
     """Return the surface of a raster over a region.
 
     Parameters
@@ -159,7 +156,7 @@ def surface_around(source: RasterSource, to_px: Positions, region: FloatArray) -
     to_px
         From positions to its pixels, shapes (n, 2); NaN where they have none.
     region
-        Positions of the region, (n, 2): those in between are asked for, too.
+        PointFunction of the region, (n, 2): those in between are asked for, too.
 
     Raises
     ------

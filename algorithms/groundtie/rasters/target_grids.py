@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from affine import Affine
 from rasterio.crs import CRS
@@ -13,6 +11,7 @@ from .grid import (
     MOST_PX,
     FloatArray,
     Grid,
+    PointFunction,
     is_invertible,
     metres_per_unit_at,
     require_workable,
@@ -65,7 +64,7 @@ def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Gri
 
 def registered_grid(
     input_grid: Grid,
-    px_to_map: Callable[[FloatArray], FloatArray],
+    px_to_map: PointFunction,
     crs: CRS | None,
     pixel_size_m: float | None = None,
 ) -> Grid:
@@ -107,7 +106,7 @@ def registered_grid(
 
 def _registered_grid(
     input_grid: Grid,
-    px_to_map: Callable[[FloatArray], FloatArray],
+    px_to_map: PointFunction,
     crs: CRS | None,
     pixel_size_m: float | None,
 ) -> Grid:

@@ -21,7 +21,7 @@ from ..runs import RUN_TAG, run_tags
 from .atomic import final_name, scratch_file, scratch_folder, writing
 from .bands import BandInfo, fits
 from .blocks import PixelType
-from .grid import PIXEL_COORDINATES, Grid
+from .grid import Grid
 from .overviews import Reduced, before_level
 from .reading import RasterSource
 from .tiff import BLOCK, base_image
@@ -152,7 +152,7 @@ def _profile(
         "endianness": "LITTLE",
         "sparse_ok": True,
     }
-    if grid.crs is not None or grid.transform != PIXEL_COORDINATES:
+    if grid.is_georeferenced:
         profile["transform"] = grid.transform
     return profile
 
