@@ -20,8 +20,8 @@ Read = Callable[["RasterSource", Window], tuple[NDArray[Any], Mask]]
 # A larger pixel is valid if at least this share of its area is.
 MIN_VALID_SHARE = 0.5
 
-# Pixels that are held at a time.
-_STRIP_PIXELS = 4_000_000
+# Pixels that are held at a time: many blocks of a file, of which those at the border are read twice.
+HELD_PIXELS = 2048**2
 
 
 def overlaps(edges: NDArray[np.float64], count: int, dtype: Any = np.float32) -> sparse.csr_matrix:
@@ -118,7 +118,7 @@ def average_window(
         window.col, window.width, shape[1], (source.grid.width, level.grid.width)
     )
     width = int(np.ceil(col_edges[-1]))
-    lines = max(int(_STRIP_PIXELS / col_edges[-1] * shape[0] / row_edges[-1]), 1)
+    lines = max(int(HELD_PIXELS / col_edges[-1] * shape[0] / row_edges[-1]), 1)
     strips = []
     for first in range(0, shape[0], lines):
         edges = row_edges[first : first + lines + 1]

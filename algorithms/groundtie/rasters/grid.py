@@ -35,6 +35,9 @@ METRES_PER_DEGREE = 111_195.0
 # Units of maps lie between millimetres and thousands of kilometres, in metres.
 _LARGEST_UNIT_M = 1e6
 
+# Positions that come through projections, or are interpolated in their place, are known to this.
+POSITION_ERROR_PX = 1e-3
+
 # GDAL counts the pixels of a side in 32 bits.
 MOST_PX = 2**31 - 1
 
@@ -195,6 +198,11 @@ class Grid:
 def mesh(cols: ArrayLike, rows: ArrayLike) -> FloatArray:
     """Return the positions (col, row) of all columns in all rows, shape (n, 2), row by row."""
     return np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2)
+
+
+def finite(points: FloatArray) -> FloatArray:
+    """Return those of some positions, shape (n, 2), that are finite."""
+    return points[np.isfinite(points).all(axis=1)]
 
 
 def is_invertible(transform: Affine) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from affine import Affine
 
 from ..arrays import Raster
 from ..context import Context
+from .averaging import HELD_PIXELS
 from .bands import BandInfo
 from .grid import Grid, PointFunction, compose
 from .handles import ArrayHandles
@@ -17,10 +19,6 @@ from .reading import FloatImage, Mask, RasterSource
 from .tiling import tiles
 from .warping import reduction
 from .windows import Window
-
-# Means are made of windows of so many pixels a side: few enough to be held, and many blocks of a
-# file, of which those at the border are read twice.
-_MEANS_PX = 2048
 
 # Of an image of which a level shows less than this share, parts are read as they are needed.
 _SHOWN_SHARE = 0.5
@@ -117,7 +115,7 @@ def _means(image: Image, level: Grid, to_px: PointFunction, context: Context) ->
         shape = tile.height, tile.width
         values[tile.slices], valid[tile.slices] = source.read(window, image.band, shape)
 
-    for _ in context.map(average, list(tiles(grid, max(_MEANS_PX // max(x, y), 1)))):
+    for _ in context.map(average, list(tiles(grid, max(math.isqrt(HELD_PIXELS) // max(x, y), 1)))):
         pass
     return replace(image, source=_held(source, grid, values, valid), band=1)
 
