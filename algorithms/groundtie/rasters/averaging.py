@@ -20,7 +20,7 @@ Read = Callable[["RasterSource", Window], tuple[NDArray[Any], Mask]]
 # A larger pixel is valid if at least this share of its area is.
 MIN_VALID_SHARE = 0.5
 
-# Pixels that are held at a time: many blocks of a file, of which those at the border are read twice.
+# Pixels that are held at a time: many blocks of a file, as those at the border are read twice.
 HELD_PIXELS = 2048**2
 
 
