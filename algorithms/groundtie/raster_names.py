@@ -30,7 +30,6 @@ _FILE_SYSTEMS = {
     "abfs": "/vsiadls/",
     "abfss": "/vsiadls/",
     "oss": "/vsioss/",
-    "file": "",
 }
 
 # Those that read over a network, also inside of others, as /vsizip//vsicurl/….

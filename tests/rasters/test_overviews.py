@@ -57,6 +57,16 @@ def test_one_pixel_that_is_not_a_number_spoils_no_other(tmp_path: Path) -> None:
     _assert_near(found, expected, "float32")
 
 
+def test_complex_pixels_are_0_where_nothing_is_valid(tmp_path: Path) -> None:
+    image = (RNG.normal(size=(1, *ODD)) + 1j * RNG.normal(size=(1, *ODD))).astype(np.complex64)
+    mask = np.ones(ODD, bool)
+    mask[200:900, 300:1000] = False
+    for _ in range(5):  # memory that is taken anew holds what was there before
+        found, shown = _overview(tmp_path, image, mask, nodata=None)
+        assert 0 < np.count_nonzero(~shown) < shown.size
+        np.testing.assert_array_equal(found[0][~shown[0]], 0)
+
+
 def _overview(
     folder: Path, image: NDArray[Any], mask: NDArray[np.bool_], nodata: float | None
 ) -> tuple[NDArray[Any], NDArray[np.bool_]]:

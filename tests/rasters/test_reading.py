@@ -167,7 +167,7 @@ def test_complex_pixels_give_their_amplitude(tmp_path: Path, dtype: str) -> None
 def test_reduced_reading_averages_valid_pixels(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, strip_pixels: int
 ) -> None:
-    monkeypatch.setattr(averaging, "_STRIP_PIXELS", strip_pixels)
+    monkeypatch.setattr(averaging, "HELD_PIXELS", strip_pixels)
     image = IMAGE.copy()
     image[8:12, 16:20] = 65535
     image[20, 20] = 65535

@@ -11,17 +11,9 @@ from hypothesis import strategies as st
 from raster_files import utm_grid, wave_image, waves, write_raster
 
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
+from groundtie.rasters.lattice import coordinates, lattice
 from groundtie.rasters.reading import Window, open_raster
-from groundtie.rasters.warping import (
-    METHODS,
-    coordinates,
-    lattice,
-    lies_within,
-    reduction,
-    resample,
-    sample,
-    source_window,
-)
+from groundtie.rasters.warping import METHODS, reduction, resample, sample, source_window
 
 RNG = np.random.default_rng(0)
 PLANE = Grid(PIXEL_COORDINATES, None, 100, 80)
@@ -82,10 +74,10 @@ def test_positions_outside_of_a_projection_are_nowhere() -> None:
 
 def test_a_lattice_knows_whether_it_lies_on_the_image() -> None:
     nodes = lattice(PLANE, lambda xy: xy)
-    assert lies_within(nodes, 100, 80)
-    assert not lies_within(nodes, 99, 80)
-    assert not lies_within(lattice(PLANE, lambda xy: xy - 0.6), 100, 80)
-    assert lies_within(lattice(PLANE, lambda xy: xy * 0.5 + 10), 100, 80)
+    assert nodes.lies_within(100, 80)
+    assert not nodes.lies_within(99, 80)
+    assert not lattice(PLANE, lambda xy: xy - 0.6).lies_within(100, 80)
+    assert lattice(PLANE, lambda xy: xy * 0.5 + 10).lies_within(100, 80)
 
 
 def shifted(image: np.ndarray, dx: float, dy: float, method: str) -> tuple[np.ndarray, np.ndarray]:

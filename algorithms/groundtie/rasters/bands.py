@@ -52,12 +52,11 @@ class BandInfo:
         )
         return tuple(cls(*band) for band in zip(*columns, strict=True))
 
-    @property
-    def numpy_dtype(self) -> np.dtype[Any]:
-        """Type that holds the pixels."""
-        # GDAL has complex integers; numpy has none.
-        names = {"complex_int16": "complex64", "complex_int32": "complex128"}
-        return np.dtype(names.get(self.dtype, self.dtype))
+
+def numpy_dtype(name: str) -> np.dtype[Any]:
+    """Return the type that holds the pixels of a band, given rasterio's name of theirs."""
+    # GDAL has complex integers; numpy has none.
+    return np.dtype({"complex_int16": "complex64", "complex_int32": "complex128"}.get(name, name))
 
 
 def stated(read: Callable[[], T]) -> T:

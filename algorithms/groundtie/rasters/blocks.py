@@ -15,9 +15,6 @@ from numpy.typing import NDArray
 from .tiff import BLOCK
 from .windows import Mask
 
-# The fastest: the next ones take twice the time for a few percent.
-LEVEL = 1
-
 _NO_PREDICTOR, _DIFFERENCES, _FLOATS = 1, 2, 3
 
 # Complex integers, which numpy lacks, are pairs of these.
@@ -72,7 +69,8 @@ def encoded_mask(valid: Mask) -> bytes:
 
 
 def _compressed(values: NDArray[Any], strategy: int) -> bytes:
-    compressor = zlib.compressobj(LEVEL, strategy=strategy)
+    # The next levels take twice the time for a few percent.
+    compressor = zlib.compressobj(zlib.Z_BEST_SPEED, strategy=strategy)
     return compressor.compress(values.data) + compressor.flush()
 
 

@@ -13,21 +13,11 @@ from numpy.typing import NDArray
 
 from ..arrays import Raster
 from ..progress import SILENT, Progress
-from .grid import PIXEL_COORDINATES, Grid
+from .grid import Grid, PointFunction
+from .lattice import DenseMap, coordinates, lattice
 from .reading import RasterSource
 from .tiling import band_groups, in_order, tile_count, tiles
-from .warping import (
-    DenseMap,
-    ToInputPx,
-    coordinates,
-    inside_window,
-    lattice,
-    lies_within,
-    reduced_shape,
-    reduction,
-    resample,
-    source_window,
-)
+from .warping import read_around, reduction, resample
 from .windows import Mask, Window
 from .writing import create_like, fill_value, keep_apart, require_fit
 
@@ -43,7 +33,7 @@ class _Warp:
     """What all tiles of one raster share."""
 
     source: RasterSource
-    to_input_px: ToInputPx
+    to_input_px: PointFunction
     target: Grid
     method: str
     nodata: float | None
@@ -54,7 +44,7 @@ class _Warp:
     def of(
         cls,
         source: RasterSource,
-        to_input_px: ToInputPx,
+        to_input_px: PointFunction,
         target: Grid,
         resampling: str,
     ) -> _Warp:
@@ -89,15 +79,20 @@ class _Warp:
         place, bands = task
         px = coordinates(self.target.window(*place), self.to_input_px)
         size = (self.source.grid.width, self.source.grid.height)
-        window = source_window(px, size, self.method, self.factor)
         out = np.empty((len(bands), place.height, place.width), self.source.dtype)
         valid = np.zeros(out.shape, bool)
-        if not window.width or not window.height:
+        found = read_around(
+            px,
+            size,
+            self.method,
+            self.factor,
+            lambda window, shape: self.source.read_bands(window, bands, shape),
+        )
+        if found is None:
             for i, band in enumerate(bands):
                 out[i] = fill_value(self.source, self.nodata, band)
             return out, valid[0]
-        px = inside_window(px, window, self.factor)
-        images, shown = self.source.read_bands(window, bands, reduced_shape(window, self.factor))
+        images, shown, px = found
         for first in range(0, len(bands), _BANDS):
             part = slice(first, first + _BANDS)
             out[part], valid[part] = resample(
@@ -113,7 +108,7 @@ class _Warp:
 
 def warp_raster(
     source: RasterSource,
-    to_input_px: ToInputPx,
+    to_input_px: PointFunction,
     target: Grid,
     path: str | os.PathLike[str],
     resampling: str = "cubic",
@@ -184,7 +179,7 @@ def warp_raster(
 
 def warp_to_array(
     source: RasterSource,
-    to_input_px: ToInputPx,
+    to_input_px: PointFunction,
     target: Grid,
     resampling: str = "cubic",
     *,
@@ -212,8 +207,8 @@ def warp_to_array(
                 valid[rows, cols] = known
     if warp.leaves_gaps:
         values = np.ma.MaskedArray(values, np.broadcast_to(~valid, values.shape))
-    located = target.crs is not None or target.transform != PIXEL_COORDINATES
-    return Raster(values, target.transform if located else None, target.crs, warp.nodata)
+    transform = target.transform if target.is_georeferenced else None
+    return Raster(values, transform, target.crs, warp.nodata)
 
 
 def write_with_geotransform(
@@ -274,6 +269,6 @@ def _is_covered(warp: _Warp) -> bool:
         return False
     grid = warp.source.grid
     return all(
-        lies_within(lattice(warp.target.window(*tile), warp.to_input_px), grid.width, grid.height)
+        lattice(warp.target.window(*tile), warp.to_input_px).lies_within(grid.width, grid.height)
         for tile in tiles(warp.target)
     )

@@ -8,7 +8,7 @@ everywhere else (the first pixel's centre is at 0).
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any
@@ -23,6 +23,9 @@ from ..errors import GeoreferencingError, GridSizeError, raised_by
 
 FloatArray = NDArray[np.float64]
 
+# Takes positions, shape (n, 2), to values at them, (n, k): mostly to other positions.
+PointFunction = Callable[[FloatArray], FloatArray]
+
 # Longitude and latitude.
 LON_LAT = CRS.from_epsg(4326)
 
@@ -31,6 +34,9 @@ METRES_PER_DEGREE = 111_195.0
 
 # Units of maps lie between millimetres and thousands of kilometres, in metres.
 _LARGEST_UNIT_M = 1e6
+
+# Positions that come through projections, or are interpolated in their place, are known to this.
+POSITION_ERROR_PX = 1e-3
 
 # GDAL counts the pixels of a side in 32 bits.
 MOST_PX = 2**31 - 1
@@ -192,6 +198,11 @@ class Grid:
 def mesh(cols: ArrayLike, rows: ArrayLike) -> FloatArray:
     """Return the positions (col, row) of all columns in all rows, shape (n, 2), row by row."""
     return np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2)
+
+
+def finite(points: FloatArray) -> FloatArray:
+    """Return those of some positions, shape (n, 2), that are finite."""
+    return points[np.isfinite(points).all(axis=1)]
 
 
 def is_invertible(transform: Affine) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,18 +10,15 @@ from affine import Affine
 
 from ..arrays import Raster
 from ..context import Context
+from .averaging import HELD_PIXELS
 from .bands import BandInfo
-from .grid import Grid, compose
+from .grid import Grid, PointFunction, compose
 from .handles import ArrayHandles
-from .pair import Image, ImagePair, ToPixel
+from .pair import Image, ImagePair
 from .reading import FloatImage, Mask, RasterSource
 from .tiling import tiles
 from .warping import reduction
 from .windows import Window
-
-# Means are made of windows of so many pixels a side: few enough to be held, and many blocks of a
-# file, of which those at the border are read twice.
-_MEANS_PX = 2048
 
 # Of an image of which a level shows less than this share, parts are read as they are needed.
 _SHOWN_SHARE = 0.5
@@ -39,7 +37,7 @@ def held_grey(source: RasterSource, band: int | None = None) -> RasterSource:
     return _held(source, source.grid, *source.read(source.window, band))
 
 
-def held_onto(image: Image, grid: Grid, to_px: ToPixel, context: Context) -> Image:
+def held_onto(image: Image, grid: Grid, to_px: PointFunction, context: Context) -> Image:
     """Return an image that reads the same onto parts of a grid as another one, from memory.
 
     Parameters
@@ -99,7 +97,7 @@ def held_on_level(pair: ImagePair, level: Grid, context: Context) -> ImagePair:
     )
 
 
-def _means(image: Image, level: Grid, to_px: ToPixel, context: Context) -> Image:
+def _means(image: Image, level: Grid, to_px: PointFunction, context: Context) -> Image:
     """Return an image of the means that `sample` takes first: it starts at multiples of them."""
     source = image.source
     x, y = reduction(level, to_px, (source.grid.width, source.grid.height))
@@ -117,7 +115,7 @@ def _means(image: Image, level: Grid, to_px: ToPixel, context: Context) -> Image
         shape = tile.height, tile.width
         values[tile.slices], valid[tile.slices] = source.read(window, image.band, shape)
 
-    for _ in context.map(average, list(tiles(grid, max(_MEANS_PX // max(x, y), 1)))):
+    for _ in context.map(average, list(tiles(grid, max(math.isqrt(HELD_PIXELS) // max(x, y), 1)))):
         pass
     return replace(image, source=_held(source, grid, values, valid), band=1)
 

@@ -1,23 +1,47 @@
-"""Smooth functions of the map at all pixels of a grid, by interpolation between nodes."""
+"""Pixel positions, and other smooth functions of the map, at all pixels of a grid.
+
+They are interpolated between the nodes of a lattice.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .grid import FloatArray, Grid, mesh
+from .grid import FloatArray, Grid, PointFunction, mesh
 from .kernels import CACHED_PIXELS
-
-# Takes map positions, (n, 2), to values, (n, k).
-MapFunction = Callable[[FloatArray], FloatArray]
+from .windows import Window
 
 _FIRST_STEP = 64
+
+# Pixel positions between the nodes of a lattice may be wrong by this much.
+_TOLERANCE_PX = 0.005
+
+# Positions nearer than this to pixels lie on them: map coordinates have no more digits.
+ON_PIXELS = 1e-6
+
+# Stands for positions that are not finite: outside of every image.
+NOWHERE = -1e9
+
+
+@runtime_checkable
+class DenseMap(Protocol):
+    """A map from a grid to input pixels with a way of its own to find them for all of its pixels.
+
+    It need not be smooth: terrain, for one, may have steps anywhere.
+    """
+
+    def __call__(self, xy: FloatArray) -> FloatArray:
+        """Return the input pixels (col, row), shape (n, 2), at map positions (n, 2)."""
+
+    def coordinates(self, grid: Grid) -> FloatArray:
+        """Return the input column and row of every pixel of a grid, shape (2, height, width)."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +88,36 @@ class Lattice:
         within = slice(self.step, self.step + self.grid.width)
         return np.asarray(whole.reshape(count, height, -1)[..., within])
 
+    def coordinates(self) -> FloatArray:
+        """Return the values, if they are pixel positions, at all pixels: (2, height, width).
+
+        Those that are not known become `NOWHERE`.
+        """
+        px = np.empty((2, self.grid.height, self.grid.width))
+        for rows in row_strips(self.grid.height, self.grid.width):
+            px[:, rows] = self.lines(rows)
+        if np.isnan(self.values).any():
+            px[np.isnan(px)] = NOWHERE
+        return px
+
+    def window(self) -> Window | None:
+        """Return the window, if values are pixel positions, on whose pixels the grid's lie.
+
+        None: they lie between pixels, or are no neighbours.
+        """
+        rows, cols = (np.arange(n) * self.step for n in self.values.shape[1:])
+        corner = self.values - np.stack(np.meshgrid(cols, rows))
+        # The first node lies half a cell before the first pixel's corner.
+        first = np.rint(corner[:, 0, 0] + (self.step + 1) / 2)
+        if not np.abs(corner + (self.step + 1) / 2 - first[:, None, None]).max() < ON_PIXELS:
+            return None
+        return Window(int(first[0]), int(first[1]), self.grid.width, self.grid.height)
+
+    def lies_within(self, width: int, height: int) -> bool:
+        """Return whether the values, pixel positions, all lie on pixels of an image of a size."""
+        low, high = self.bounds()
+        return bool(np.all((low > -0.49) & (high < np.array([width, height]) - 0.51)))
+
     @cached_property
     def _lines(self) -> NDArray[Any]:
         """The values at the columns of nodes in all rows of pixels, shape (k, height, cols)."""
@@ -79,6 +133,35 @@ class Lattice:
         return np.where(share > 0, mixed, values[:, above])
 
 
+def lattice(grid: Grid, to_input_px: PointFunction) -> Lattice:
+    """Return input positions at a lattice of pixels, fine enough to interpolate between.
+
+    Parameters
+    ----------
+    grid
+        The pixels in question.
+    to_input_px
+        Takes map positions of the grid, shape (n, 2), to input pixels (col, row), shape (n, 2).
+        Positions that are not finite become NaN.
+    """
+
+    def finite(xy: FloatArray) -> FloatArray:
+        px = np.asarray(to_input_px(xy), float)
+        return np.where(np.isfinite(px), px, np.nan)
+
+    return fine_lattice(grid, finite, _TOLERANCE_PX)
+
+
+def coordinates(grid: Grid, to_input_px: PointFunction) -> FloatArray:
+    """Return the input column and row of every pixel of a grid, shape (2, height, width).
+
+    Good to 0.01 px; positions that are not finite become far outside. Parameters as `lattice`.
+    """
+    if isinstance(to_input_px, DenseMap):
+        return to_input_px.coordinates(grid)
+    return lattice(grid, to_input_px).coordinates()
+
+
 def row_strips(height: int, width: int) -> Iterator[slice]:
     """Return the rows of an array in parts that are worked in the processor's cache."""
     lines = max(CACHED_PIXELS // width, 1)
@@ -86,7 +169,7 @@ def row_strips(height: int, width: int) -> Iterator[slice]:
         yield slice(first, min(first + lines, height))
 
 
-def fine_lattice(grid: Grid, function: MapFunction, tolerance: float) -> Lattice:
+def fine_lattice(grid: Grid, function: PointFunction, tolerance: float) -> Lattice:
     """Evaluate a function at a lattice that is halved until it is right halfway between nodes.
 
     Parameters
@@ -115,7 +198,7 @@ def fine_lattice(grid: Grid, function: MapFunction, tolerance: float) -> Lattice
     return Lattice(grid, 1, _evaluate(grid, function, 1, 1))
 
 
-def _evaluate(grid: Grid, function: MapFunction, step: int, parts: int) -> FloatArray:
+def _evaluate(grid: Grid, function: PointFunction, step: int, parts: int) -> FloatArray:
     """Return a function at the nodes of a lattice, and in parts between, shape (k, rows, cols)."""
     rows, cols = (
         np.arange(-parts, parts * -(-side // step) + 1) * (step / parts) + (step - 1) / 2

@@ -7,7 +7,6 @@ pixel, and show what averaging would have taken away.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,15 +14,13 @@ import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
 
-from .averaging import area_average, average_by_strips
+from .averaging import area_average
 from .grid import FloatArray, compose
 from .handles import FileHandles
 from .windows import Mask, Window
 
 if TYPE_CHECKING:
     from .reading import RasterSource
-
-Read = Callable[["RasterSource", Window], tuple[NDArray[Any], Mask]]
 
 # Pixels of a side that are looked at to see how an overview was made, in places of the image.
 _SAMPLE_PX = 64
@@ -76,41 +73,6 @@ class Levels:
             self._is_complete = True
         else:
             self._known.append(found)
-
-
-def average_of(
-    read: Read, source: RasterSource, level: RasterSource, window: Window, shape: tuple[int, int]
-) -> tuple[NDArray[Any], Mask]:
-    """Return a window of a raster as means over larger pixels.
-
-    Parameters
-    ----------
-    read
-        Returns values and validity of a window of the raster or of a level, (bands, h, w).
-    source, level
-        The raster, and the image of it that is read; both may be the same.
-    window
-        In pixels of the raster.
-    shape
-        Height and width of the result.
-    """
-    starts, edges = [], []
-    axes = (
-        (source.grid.height, level.grid.height, window.row, window.height, shape[0]),
-        (source.grid.width, level.grid.width, window.col, window.width, shape[1]),
-    )
-    for whole, reduced, first, side, count in axes:
-        start = int(np.floor(first * reduced / whole))
-        starts.append(start)
-        edges.append(np.linspace(0, side, count + 1))
-        if whole != reduced:
-            edges[-1] = (first + edges[-1]) * reduced / whole - start
-    width = int(np.ceil(edges[1][-1]))
-
-    def read_lines(first: int, lines: int) -> tuple[NDArray[Any], Mask]:
-        return read(level, Window(starts[1], starts[0] + first, width, lines))
-
-    return average_by_strips(read_lines, edges[0], edges[1])
 
 
 def _factor(source: RasterSource, level: RasterSource) -> float:

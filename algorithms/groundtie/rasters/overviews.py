@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,11 @@ import rasterio.windows
 from numpy.typing import NDArray
 from rasterio.enums import MaskFlags, Resampling
 from rasterio.env import env_ctx_if_needed
+from scipy import sparse
 
+from .averaging import overlaps, weighted_sums
+from .bands import numpy_dtype
 from .handles import OpenDataset
-from .kernels import CACHED_PIXELS
 from .tiled_file import Level
 from .windows import Mask, Window
 
@@ -99,7 +101,9 @@ class Reduced:
         )
         shape = (window.height, window.width)
         how = Resampling.nearest if self.nearest else Resampling.average
-        values = dataset.read(bands, window=place, out_shape=(len(bands), *shape), resampling=how)
+        # Where nothing is valid GDAL leaves complex pixels as they are in memory.
+        values = np.zeros((len(bands), *shape), numpy_dtype(dataset.dtypes[0]))
+        dataset.read(bands, out=values, window=place, resampling=how)
         if not self._has_mask(bands):
             return values, None
         mask = dataset.read_masks(1, window=place, out_shape=shape, resampling=how)
@@ -112,107 +116,43 @@ class Reduced:
         if dataset.dtypes[0] not in _MEANS:
             return None
         before, made = self.before.image, self.level.image
-        down = _Halves.of(before.height, made.height, window.row, window.height)
-        across = _Halves.of(before.width, made.width, window.col, window.width)
-        place = rasterio.windows.Window(across.first, down.first, across.count, down.count)
+        precision = np.result_type(dataset.dtypes[0], np.float32)
+        rows, down = _shares(before.height, made.height, window.row, window.height, precision)
+        cols, across = _shares(before.width, made.width, window.col, window.width, precision)
+        place = rasterio.windows.Window.from_slices(rows, cols)
         masks = _masks(dataset, bands, place)
         if masks is None:
             return None
-        around = (down.beyond, across.beyond)
         fill = 0 if dataset.nodata is None else dataset.nodata
         values = dataset.read(bands, window=place)
         means = np.empty((len(bands), window.height, window.width), values.dtype)
         known = np.ones(means.shape, bool)
+        x, y = self._scale
         for band, mask, into, valid in zip(values, masks, means, known, strict=True):
-            shown = None
+            weight: Any = x * y
             if mask is not None:
                 band[~mask] = 0
-                shown = np.pad(mask, around)
-            _average(np.pad(band, around), shown, down, across, (into, valid))
+                weight = weighted_sums(down, across, mask.astype(precision))
+                valid[:] = weight > 0
+                weight[~valid] = 1
+            mean = weighted_sums(down, across, band.astype(precision)) / weight
+            into[:] = mean if precision == values.dtype else np.floor(mean + 0.5)
             if dataset.nodata is not None and (into[valid] == fill).any():
                 return None
             into[~valid] = fill
         return means, known[0] if self._has_mask(bands) else None
 
 
-@dataclass(frozen=True)
-class _Halves:
-    """How pixels of an overview are made of those of the level before, along an axis.
+def _shares(
+    before: int, made: int, start: int, count: int, precision: np.dtype[Any]
+) -> tuple[slice, sparse.csr_matrix]:
+    """Return which pixels of the level before make some of an overview's, and their shares in each.
 
-    Parameters
-    ----------
-    first, count
-        The pixels that are read.
-    beyond
-        How many before and after them do not exist.
-    shares
-        How much each pixel has of the one before its two, and of the second of these, shape (2, n);
-        None: nothing and all.
-    size
-        How many pixels of the level before each has.
+    Along an axis of `before` and `made` pixels; those of the overview are `count` from `start` on.
     """
-
-    first: int
-    count: int
-    beyond: tuple[int, int]
-    shares: NDArray[np.float64] | None
-    size: float
-
-    @classmethod
-    def of(cls, before: int, made: int, start: int, count: int) -> _Halves:
-        """Return it of `count` pixels from `start` on, of levels of these sizes."""
-        if before == 2 * made:
-            return cls(2 * start, 2 * count, (0, 0), None, 2)
-        # Pixel i reaches from 2 i - i / made to 2 (i + 1) - (i + 1) / made.
-        lost = np.arange(start, start + count + 1) / made
-        first, stop = max(2 * start - 1, 0), min(2 * (start + count), before)
-        beyond = first - (2 * start - 1), 2 * (start + count) - stop
-        return cls(first, stop - first, beyond, np.stack([lost[:-1], 1 - lost[1:]]), before / made)
-
-    def part(self, pixels: slice) -> _Halves:
-        """Return it of some of the pixels."""
-        shares = None if self.shares is None else self.shares[:, pixels]
-        return replace(self, shares=shares)
-
-    def sums(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return the sums along the first axis of values, shape (2 n or 2 n + 1, m)."""
-        if self.shares is None:
-            return np.asarray(values[::2] + values[1::2])
-        ahead, behind = self.shares.astype(values.dtype)[:, :, None]
-        total = ahead * values[:-1:2]
-        total += values[1::2]
-        total += behind * values[2::2]
-        return np.asarray(total)
-
-
-def _average(
-    values: NDArray[Any],
-    shown: Mask | None,
-    down: _Halves,
-    across: _Halves,
-    into: tuple[NDArray[Any], Mask],
-) -> None:
-    """Put the means of an image's pixels, 0 where they are not shown, and validity into arrays."""
-    means, known = into
-    precision = np.result_type(values, np.float32)
-    height, width = means.shape
-    lines = max(CACHED_PIXELS // width, 1)
-    area: Any = down.size * across.size
-    for first in range(0, height, lines):
-        some = slice(first, min(first + lines, height))
-        rows = slice(2 * some.start, 2 * some.stop + (down.shares is not None))
-        halves = down.part(some)
-
-        def sums(part: NDArray[Any], halves: _Halves = halves) -> NDArray[Any]:
-            return across.sums(halves.sums(part.astype(precision)).T).T
-
-        total = sums(values[rows])
-        if shown is not None:
-            area = sums(shown[rows])
-            known[some] = area > 0
-            area = np.where(known[some], area, 1)
-        total /= area
-        means[some] = total if precision == values.dtype else np.floor(total + 0.5)
+    edges = np.arange(start, start + count + 1) * before / made
+    pixels = slice(int(edges[0]), min(int(np.ceil(edges[-1])), before))
+    return pixels, overlaps(edges - pixels.start, pixels.stop - pixels.start, precision)
 
 
 def _masks(dataset: Any, bands: list[int], place: Any) -> list[Mask | None] | None:

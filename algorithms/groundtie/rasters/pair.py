@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -11,16 +10,14 @@ import numpy as np
 from ..errors import GeoreferencingError, NoOverlapError, SameFileError
 from ..geometry.limits import SearchLimits
 from .colours import Colours
-from .grid import FloatArray, Grid, reproject
+from .grid import FloatArray, Grid, PointFunction, finite, reproject
+from .kernels import REACH
 from .patch import Patch
 from .reading import FloatImage, Mask, RasterSource, Window
 from .warping import sample, sample_bands
 
-ToPixel = Callable[[FloatArray], FloatArray]
-
-# Areas of zeros from this side on hold no data; interpolation reaches this far (side) around them.
+# Areas of zeros from this side on hold no data.
 _EMPTY_PX = 9
-_EMPTY_MARGIN_PX = 5
 
 # Rotated images are tried at angles this far apart for what they reach.
 _ANGLE_STEP_DEG = 5.0
@@ -68,14 +65,14 @@ class Image:
         """Whether its bands make classes of colour: nobody chose one, and there are enough."""
         return self.band is None and len(self.source.image_bands) >= _LEAST_BANDS
 
-    def values_onto(self, grid: Grid, to_px: ToPixel) -> tuple[FloatImage, Mask]:
+    def values_onto(self, grid: Grid, to_px: PointFunction) -> tuple[FloatImage, Mask]:
         """Return grey values, or classes of colour, on a grid, and where they are valid."""
         if self.colours is None:
             return sample(self.source, grid, to_px, "cubic", self.band)
         bands, valid = sample_bands(self.source, grid, to_px)
         return self.colours.classes(bands), valid
 
-    def read_onto(self, grid: Grid, to_px: ToPixel, hidden: Mask | None = None) -> Patch:
+    def read_onto(self, grid: Grid, to_px: PointFunction, hidden: Mask | None = None) -> Patch:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
         values, valid = self.values_onto(grid, to_px)
         if hidden is not None:
@@ -87,7 +84,7 @@ class Image:
             valid = valid & self.shown_on(grid, to_px)
         return Patch(values, valid)
 
-    def shown_on(self, grid: Grid, to_px: ToPixel) -> Mask:
+    def shown_on(self, grid: Grid, to_px: PointFunction) -> Mask:
         """Return what the mask, which there must be, lets take part; parameters as `read_onto`."""
         assert self.mask is not None
         own, to_mask = self.source.grid, _nominal_pixels(self.source.grid, self.mask.grid)
@@ -96,7 +93,7 @@ class Image:
         )
         return known & (shown != 0)
 
-    def bands_onto(self, grid: Grid, to_px: ToPixel) -> FloatImage:
+    def bands_onto(self, grid: Grid, to_px: PointFunction) -> FloatImage:
         """Return all bands but alpha on a grid, shape (bands, h, w), 0 where one is invalid."""
         return sample_bands(self.source, grid, to_px)[0]
 
@@ -132,7 +129,7 @@ class ImagePair:
         """Return the reference on a grid in its CRS, masked where it is to be hidden."""
         return self.reference.read_onto(grid, self.reference.source.grid.map_to_pixel, hidden)
 
-    def input_patch(self, grid: Grid, to_input_px: ToPixel) -> Patch:
+    def input_patch(self, grid: Grid, to_input_px: PointFunction) -> Patch:
         """Return the input on a grid; `to_input_px` takes map positions to input pixels."""
         return self.input.read_onto(grid, to_input_px)
 
@@ -140,7 +137,7 @@ class ImagePair:
         """Return all bands of the reference on a grid in its CRS, shape (bands, h, w)."""
         return self.reference.bands_onto(grid, self.reference.source.grid.map_to_pixel)
 
-    def input_bands(self, grid: Grid, to_input_px: ToPixel) -> FloatImage:
+    def input_bands(self, grid: Grid, to_input_px: PointFunction) -> FloatImage:
         """Return all bands of the input on a grid; `to_input_px` as `input_patch` takes it."""
         return self.input.bands_onto(grid, to_input_px)
 
@@ -253,20 +250,18 @@ def require_georeferenced_alike(reference: RasterSource, input: RasterSource) ->
 
 def _farthest_px(grid: Grid, outline_px: FloatArray) -> float:
     """Return the shift from which on an image with an outline, (n, 2), shows nothing of a grid."""
-    finite = outline_px[np.isfinite(outline_px).all(axis=1)]
-    size = np.array([grid.width, grid.height])
-    return float(np.hypot(*np.maximum(size - finite.min(axis=0), finite.max(axis=0))))
+    low, high = _extent(outline_px)
+    return float(np.hypot(*np.maximum(np.array([grid.width, grid.height]) - low, high)))
 
 
 def _rotated(outline_px: FloatArray, largest_deg: float, largest_scale: float) -> FloatArray:
     """Return all that an outline, shape (n, 2), rotated and scaled reaches about its centre."""
-    finite = outline_px[np.isfinite(outline_px).all(axis=1)]
-    centre = (finite.min(axis=0) + finite.max(axis=0)) / 2
+    centre = np.add(*_extent(outline_px)) / 2
     steps = int(np.ceil(2 * largest_deg / _ANGLE_STEP_DEG)) + 1
     angles = np.radians(np.linspace(-largest_deg, largest_deg, steps))
     cosine, sine = np.cos(angles), np.sin(angles)
     rotations = np.array([[cosine, -sine], [sine, cosine]])
-    around = largest_scale * (finite - centre)
+    around = largest_scale * (finite(outline_px) - centre)
     return np.asarray(centre + np.einsum("ijk,nj->kni", rotations, around).reshape(-1, 2))
 
 
@@ -278,10 +273,10 @@ def _surroundings(reach: Window, radius_px: float, nominal_px: FloatArray | None
     low = np.array(reach[:2]) - int(np.ceil(radius_px))
     high = np.array(reach[:2]) + reach[2:] + int(np.ceil(radius_px))
     if nominal_px is not None:
-        finite = nominal_px[np.isfinite(nominal_px).all(axis=1)]
-        low = np.minimum(low, np.floor(finite.min(axis=0)).astype(int))
-        high = np.maximum(high, np.ceil(finite.max(axis=0)).astype(int) + 1)
-    return Window(int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1]))
+        first, last = _extent(nominal_px)
+        low = np.minimum(low, np.floor(first).astype(int))
+        high = np.maximum(high, np.ceil(last).astype(int) + 1)
+    return Window.between(low, high)
 
 
 def _empty_areas(values: FloatImage, valid: Mask) -> Mask:
@@ -297,7 +292,8 @@ def _empty_areas(values: FloatImage, valid: Mask) -> Mask:
         return zero > 0
     areas = cv2.morphologyEx(zero, cv2.MORPH_OPEN, np.ones((_EMPTY_PX, _EMPTY_PX), np.uint8))
     areas[~valid] = 0
-    return cv2.dilate(areas, np.ones((_EMPTY_MARGIN_PX,) * 2, np.uint8)) > 0
+    # As far as interpolation reaches around them.
+    return cv2.dilate(areas, np.ones((2 * REACH["cubic"] + 1,) * 2, np.uint8)) > 0
 
 
 def default_radius_m(grid: Grid) -> float:
@@ -313,19 +309,23 @@ def coarser_m(reference: Grid, input: Grid) -> float:
     return max(reference.pixel_size_m, input.pixel_size_m)
 
 
-def _nominal_pixels(source: Grid, target: Grid) -> ToPixel:
+def _nominal_pixels(source: Grid, target: Grid) -> PointFunction:
     """Return the function from map positions of `source` to pixels of `target`."""
     return lambda xy: target.map_to_pixel(reproject(xy, source.crs, target.crs))
 
 
 def _box(grid: Grid, outline_px: FloatArray, margin_px: float) -> Window | None:
     """Return the pixels of a grid within the bounding box of an outline and a margin."""
-    outline_px = outline_px[np.isfinite(outline_px).all(axis=1)]
-    if len(outline_px) == 0:
+    if not len(finite(outline_px)):
         return None
+    first, last = _extent(outline_px)
     size = np.array([grid.width, grid.height])
-    low = np.clip(np.ceil(outline_px.min(axis=0) - margin_px), 0, size).astype(int)
-    high = np.clip(np.floor(outline_px.max(axis=0) + margin_px) + 1, 0, size).astype(int)
-    if (high - low).min() <= 0:
-        return None
-    return Window(int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1]))
+    low = np.clip(np.ceil(first - margin_px), 0, size).astype(int)
+    high = np.clip(np.floor(last + margin_px) + 1, 0, size).astype(int)
+    return Window.between(low, high) if (high > low).all() else None
+
+
+def _extent(px: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the least and the largest column and row of positions that are finite."""
+    px = finite(px)
+    return px.min(axis=0), px.max(axis=0)

@@ -20,11 +20,12 @@ from ..arrays import Raster, in_memory
 from ..errors import BandError, RasterOpenError
 from ..memory import cache_bytes
 from ..raster_names import is_remote, raster_name
-from .bands import MOST_BANDS, BandInfo, colormap, stated, tags_of, working_dtype
+from .averaging import average_window
+from .bands import MOST_BANDS, BandInfo, colormap, numpy_dtype, stated, tags_of, working_dtype
 from .georeferencing import grid_of
 from .grid import PIXEL_COORDINATES, Grid
 from .handles import ArrayHandles, FileHandles, Handles, OpenDataset
-from .levels import Levels, average_of
+from .levels import Levels
 from .windows import Mask, Window, read_window
 
 # Images without georeferencing are a supported case, see `Grid.is_georeferenced`.
@@ -104,7 +105,7 @@ class RasterSource:
     @property
     def dtype(self) -> np.dtype[Any]:
         """Type that holds the pixels of every band."""
-        return np.result_type(*(band.numpy_dtype for band in self.bands))
+        return np.result_type(*(numpy_dtype(band.dtype) for band in self.bands))
 
     @property
     def is_complex(self) -> bool:
@@ -181,7 +182,7 @@ class RasterSource:
             if self._levels is not None:
                 reduction = min(window.height / out_shape[0], window.width / out_shape[1])
                 level = self._levels.coarsest(self, reduction)
-            values, valid = average_of(grey, self, level, window, out_shape)
+            values, valid = average_window(grey, self, level, window, out_shape)
         grey_values = np.where(valid[0], values[0], np.float32(0)).astype(np.float32)
         return grey_values, valid[0]
 
@@ -213,7 +214,7 @@ class RasterSource:
             values, valid = native(source, part)
             return values.astype(working_dtype(values.dtype), copy=False), valid
 
-        return average_of(floating, self, self, window, out_shape)
+        return average_window(floating, self, self, window, out_shape)
 
     def read_untouched(self, window: Window) -> tuple[NDArray[Any], NDArray[np.uint8]]:
         """Read all bands, shape (bands, h, w), and the mask, (h, w), of a window inside as stored.

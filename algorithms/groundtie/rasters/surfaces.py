@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoOverlapError, RasterContentError
-from .grid import FloatArray
+from .grid import POSITION_ERROR_PX, FloatArray, PointFunction, finite
 from .kernels import interpolate
 from .reading import FloatImage, Mask, RasterSource, Window
-
-Positions = Callable[[FloatArray], FloatArray]
 
 # Pixels of the raster that are read at a time, a side.
 _BLOCK = 1024
@@ -32,11 +29,8 @@ _RELAXATIONS = 300
 # No place of the Earth is lower or higher, in metres: such values are voids that nobody declared.
 _LOWEST_M, _HIGHEST_M = -600.0, 9_200.0
 
-# Positions in pixels of the raster may be wrong by this much.
-TOLERANCE_PX = 1e-3
-
 # The outer pixels' values hold as far as these pixels reach.
-_HALF_PX = 0.5 + TOLERANCE_PX
+_HALF_PX = 0.5 + POSITION_ERROR_PX
 
 
 @dataclass(frozen=True)
@@ -58,7 +52,7 @@ class RasterSurface:
     """
 
     source: RasterSource
-    to_px: Positions
+    to_px: PointFunction
     region: Window
     filled: FloatImage
     margin_px: float = _HALF_PX
@@ -75,14 +69,14 @@ class RasterSurface:
     def piece(self, px: FloatArray) -> SurfacePiece:
         """Return the part of the surface that some of its pixel positions, (n, 2), need."""
         size = np.array([self.source.grid.width, self.source.grid.height])
-        left, top = np.clip(np.floor(px.min(axis=0)), 0, size - 1).astype(int).tolist()
-        right, bottom = np.clip(np.floor(px.max(axis=0)) + 1, 0, size - 1).astype(int).tolist()
-        window = Window(left, top, right + 1 - left, bottom + 1 - top)
+        low = np.clip(np.floor(px.min(axis=0)), 0, size - 1).astype(int)
+        high = np.clip(np.floor(px.max(axis=0)) + 1, 0, size - 1).astype(int)
+        window = Window.between(low, high + 1)
         image, valid = read_heights(self.source, window)
         if not valid.all():
             void_rows, void_cols = np.nonzero(~valid)
-            image[void_rows, void_cols] = self._fill_at(void_cols + left, void_rows + top)
-        return SurfacePiece(image, np.array([left, top], float), self.margin_px)
+            image[void_rows, void_cols] = self._fill_at(void_cols + low[0], void_rows + low[1])
+        return SurfacePiece(image, low.astype(float), self.margin_px)
 
     def _fill_at(self, cols: NDArray[np.int_], rows: NDArray[np.int_]) -> FloatImage:
         height, width = self.filled.shape
@@ -149,7 +143,7 @@ def read_heights(
     return values, valid & (values > _LOWEST_M) & (values < _HIGHEST_M)
 
 
-def surface_around(source: RasterSource, to_px: Positions, region: FloatArray) -> RasterSurface:
+def surface_around(source: RasterSource, to_px: PointFunction, region: FloatArray) -> RasterSurface:
     """Return the surface of a raster over a region.
 
     Parameters
@@ -169,8 +163,7 @@ def surface_around(source: RasterSource, to_px: Positions, region: FloatArray) -
         It holds no value there.
     """
     size = np.array([source.grid.width, source.grid.height])
-    px = to_px(region)
-    px = px[np.isfinite(px).all(axis=1)]
+    px = finite(to_px(region))
     if not len(px):
         raise NoOverlapError(f"{source.path} does not cover the image")
     # Where the image sees nothing of the raster, its pixels may be any number.
@@ -179,7 +172,7 @@ def surface_around(source: RasterSource, to_px: Positions, region: FloatArray) -
     high = np.clip(np.ceil(px.max(axis=0)).astype(int) + _AROUND_PX + 1, 0, size)
     if (high <= low).any():
         raise NoOverlapError(f"{source.path} does not cover the image")
-    window = Window(int(low[0]), int(low[1]), *(high - low).tolist())
+    window = Window.between(low, high)
     reduce = max(max(window.width, window.height) / _FILL_SIDE, 1.0)
     shape = (max(int(window.height / reduce), 1), max(int(window.width / reduce), 1))
     values, valid = read_heights(source, window, None if reduce == 1 else shape)

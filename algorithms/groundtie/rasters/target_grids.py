@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from affine import Affine
 from rasterio.crs import CRS
@@ -11,15 +9,16 @@ from rasterio.crs import CRS
 from ..errors import GridSizeError, NoOverlapError
 from .grid import (
     MOST_PX,
+    POSITION_ERROR_PX,
     FloatArray,
     Grid,
+    PointFunction,
+    finite,
     is_invertible,
     metres_per_unit_at,
     require_workable,
 )
-
-# A footprint that reaches into a further row or column by less than this does not need it.
-_TOLERANCE_PX = 1e-3
+from .windows import Window
 
 # A registered raster has a diagonal of so many times as many pixels as the input has. The largest
 # scale that is searched for is 4, and a projection may double that again.
@@ -45,27 +44,26 @@ def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Gri
     GridSizeError
         It would have more pixels than a raster can have, or than can be worked through.
     """
-    px = lattice.map_to_pixel(xy[np.isfinite(xy).all(axis=1)])
+    px = lattice.map_to_pixel(finite(xy))
     if len(px) == 0:
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")
     if not (np.abs(px) < MOST_PX).all() and not within:
         raise GridSizeError("the result would have more pixels a side than a raster can have")
     px = np.clip(px, -MOST_PX, MOST_PX)
-    low = np.floor(px.min(axis=0) + 0.5 + _TOLERANCE_PX).astype(int)
-    high = np.ceil(px.max(axis=0) + 0.5 - _TOLERANCE_PX).astype(int)
+    # By its error alone it needs no further row or column.
+    low = np.floor(px.min(axis=0) + 0.5 + POSITION_ERROR_PX).astype(int)
+    high = np.ceil(px.max(axis=0) + 0.5 - POSITION_ERROR_PX).astype(int)
     if within:
         size = (lattice.width, lattice.height)
         low, high = np.clip(low, 0, size), np.clip(high, 0, size)
     if np.any(high <= low):
         raise NoOverlapError("the footprint of the image does not lie on the grid")
-    width, height = high - low
-    found = lattice.window(int(low[0]), int(low[1]), int(width), int(height))
-    return require_workable(found, "the result")
+    return require_workable(lattice.window(*Window.between(low, high)), "the result")
 
 
 def registered_grid(
     input_grid: Grid,
-    px_to_map: Callable[[FloatArray], FloatArray],
+    px_to_map: PointFunction,
     crs: CRS | None,
     pixel_size_m: float | None = None,
 ) -> Grid:
@@ -107,7 +105,7 @@ def registered_grid(
 
 def _registered_grid(
     input_grid: Grid,
-    px_to_map: Callable[[FloatArray], FloatArray],
+    px_to_map: PointFunction,
     crs: CRS | None,
     pixel_size_m: float | None,
 ) -> Grid:

@@ -84,9 +84,9 @@ class Image:
         """Number of pixels."""
         return self.width * self.height
 
-    def overview(self, factor: int) -> Image:
-        """Return a reduced image of this one, without blocks yet."""
-        width, height = -(-self.width // factor), -(-self.height // factor)
+    def overview(self) -> Image:
+        """Return an image of half the size of this one, without blocks yet."""
+        width, height = -(-self.width // 2), -(-self.height // 2)
         kind = _OVERVIEW | _number(self.tags.get(_KIND, _short(0)))
         shared = {tag: self.tags[tag] for tag in _SHARED if tag in self.tags}
         return Image(width, height, {**shared, _KIND: _long(kind)}, self.planes)

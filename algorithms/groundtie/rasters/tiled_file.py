@@ -39,10 +39,9 @@ class Level:
         """Both, in the order of their directories."""
         return [self.image] if self.mask is None else [self.image, self.mask]
 
-    def overview(self, factor: int) -> Level:
-        """Return this level reduced by a factor, without blocks yet."""
-        mask = None if self.mask is None else self.mask.overview(factor)
-        return Level(self.image.overview(factor), mask)
+    def overview(self) -> Level:
+        """Return the next level, of half the size, without blocks yet."""
+        return Level(self.image.overview(), None if self.mask is None else self.mask.overview())
 
 
 @dataclass
@@ -179,8 +178,7 @@ class TiledFile:
 
     def copy_as_cog(self, path: Path) -> None:
         """Write a Cloud Optimized GeoTIFF of what is finished: the smallest level first."""
-        order = [image for level in self.levels for image in level.images]
-        start, copied = len(header(order, self._big, cog=True)), []
+        start, copied = len(header(self._images, self._big, cog=True)), []
         for level in reversed(self.levels):
             for image in level.images:
                 copied.append((image.offsets.copy(), image.counts))
@@ -189,7 +187,7 @@ class TiledFile:
                 image.offsets[:] = starts.reshape(image.offsets.shape)
                 start = int(ends[-1])
         with writing(path, start), path.open("wb", buffering=0) as file:
-            _write(file, header(order, self._big, cog=True))
+            _write(file, header(self._images, self._big, cog=True))
             for offsets, counts in copied:
                 for offset, count in zip(offsets.flat, counts.flat, strict=True):
                     self._file.seek(int(offset))

@@ -3,100 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .bands import working_dtype
-from .grid import FloatArray, Grid
+from .grid import FloatArray, Grid, PointFunction
 from .kernels import REACH, interpolate
-from .lattice import Lattice, fine_lattice, row_strips
+from .lattice import ON_PIXELS, DenseMap, lattice, row_strips
 from .reading import FloatImage, RasterSource
 from .windows import Mask, Window
 
-ToInputPx = Callable[[FloatArray], FloatArray]
-
 METHODS = tuple(REACH)
-
-# Interpolating between the nodes of the lattice may be wrong by this much.
-_TOLERANCE_PX = 0.005
-
-# Positions nearer than this to pixels lie on them: map coordinates have no more digits.
-_ON_PIXELS = 1e-6
-_SPARSE = 61
 
 # Within windows of fewer pixels a side, single precision holds multiples of 1/8192; a sum with this
 # number, in double precision, is one.
 _SINGLE_PX = 2000
 _ROUNDING = 1.5 * 2.0**39
 
-# Reads a window, reduced to a shape if one is given: values, ([bands,] h, w), and validity, (h, w).
-_Read = Callable[[Window, tuple[int, int] | None], tuple[FloatImage, Mask]]
-
-# Stands for positions that are not finite: outside of every image.
-NOWHERE = -1e9
-
-
-@runtime_checkable
-class DenseMap(Protocol):
-    """A map from a grid to input pixels with a way of its own to find them for all of its pixels.
-
-    It need not be smooth: terrain, for one, may have steps anywhere.
-    """
-
-    def __call__(self, xy: FloatArray) -> FloatArray:
-        """Return the input pixels (col, row), shape (n, 2), at map positions (n, 2)."""
-
-    def coordinates(self, grid: Grid) -> FloatArray:
-        """Return the input column and row of every pixel of a grid, shape (2, height, width)."""
-
-
-def lattice(grid: Grid, to_input_px: ToInputPx) -> Lattice:
-    """Return input positions at a lattice of pixels, fine enough to interpolate between.
-
-    Parameters
-    ----------
-    grid
-        The pixels in question.
-    to_input_px
-        Takes map positions of the grid, shape (n, 2), to input pixels (col, row), shape (n, 2).
-        Positions that are not finite become NaN.
-    """
-
-    def finite(xy: FloatArray) -> FloatArray:
-        px = np.asarray(to_input_px(xy), float)
-        return np.where(np.isfinite(px), px, np.nan)
-
-    return fine_lattice(grid, finite, _TOLERANCE_PX)
-
-
-def lies_within(nodes: Lattice, width: int, height: int) -> bool:
-    """Return whether all positions of a lattice lie on pixels of an image of a size."""
-    low, high = nodes.bounds()
-    return bool(np.all((low > -0.49) & (high < np.array([width, height]) - 0.51)))
-
-
-def coordinates(grid: Grid, to_input_px: ToInputPx) -> FloatArray:
-    """Return the input column and row of every pixel of a grid, shape (2, height, width).
-
-    Good to 0.01 px; positions that are not finite become far outside. Parameters as `lattice`.
-    """
-    if isinstance(to_input_px, DenseMap):
-        return to_input_px.coordinates(grid)
-    return _between_nodes(lattice(grid, to_input_px))
-
-
-def _between_nodes(nodes: Lattice) -> FloatArray:
-    """Return a lattice's values at every pixel of its grid, shape (2, height, width)."""
-    grid = nodes.grid
-    px = np.empty((2, grid.height, grid.width))
-    for rows in row_strips(grid.height, grid.width):
-        px[:, rows] = nodes.lines(rows)
-    if np.isnan(nodes.values).any():
-        px[np.isnan(px)] = NOWHERE
-    return px
+# Reads a window, averaged to a shape if one is given: values and validity, ([bands,] h, w).
+Read = Callable[[Window, tuple[int, int] | None], tuple[NDArray[Any], Mask]]
 
 
 def resample(
@@ -134,8 +62,8 @@ def resample(
     """
     px = np.asarray(px)
     dtype = image.dtype if dtype is None else dtype
-    # A few suffice mostly to find that they do not lie on pixels.
-    if _on_pixels(px[:, ::_SPARSE, ::_SPARSE]) and _on_pixels(px):
+    # The first row suffices mostly to find that they do not lie on pixels.
+    if _on_pixels(px[:, :1]) and _on_pixels(px):
         method = "nearest"  # every kernel gives the pixel itself
     if valid.ndim == 2:
         return _resample(image, valid, px, method, dtype)
@@ -197,7 +125,7 @@ def _are_inside(px: NDArray[Any], shape: tuple[int, ...], margin: int) -> bool:
     )
 
 
-def reduction(grid: Grid, to_input_px: ToInputPx, size: tuple[int, int]) -> tuple[int, int]:
+def reduction(grid: Grid, to_input_px: PointFunction, size: tuple[int, int]) -> tuple[int, int]:
     """Return how many input columns and rows a pixel at the grid's centre spans, rounded, >= 1.
 
     No more than the input's width and height, `size`.
@@ -245,7 +173,7 @@ def source_window(
 def sample(
     source: RasterSource,
     grid: Grid,
-    to_input_px: ToInputPx,
+    to_input_px: PointFunction,
     method: str = "cubic",
     band: int | None = None,
 ) -> tuple[FloatImage, Mask]:
@@ -274,7 +202,7 @@ def sample(
 
 
 def sample_bands(
-    source: RasterSource, grid: Grid, to_input_px: ToInputPx
+    source: RasterSource, grid: Grid, to_input_px: PointFunction
 ) -> tuple[FloatImage, Mask]:
     """Resample all bands but alpha as `sample` does one by "cubic"; pixels must be valid in all.
 
@@ -294,45 +222,52 @@ def sample_bands(
 
 
 def _sample(
-    source: RasterSource, grid: Grid, to_input_px: ToInputPx, method: str, read: _Read
+    source: RasterSource, grid: Grid, to_input_px: PointFunction, method: str, read: Read
 ) -> tuple[FloatImage, Mask]:
     """Return `sample` of what `read` reads of a window, shape ([bands,] height, width)."""
     if isinstance(to_input_px, DenseMap):
         px = to_input_px.coordinates(grid)
     else:
         nodes = lattice(grid, to_input_px)
-        window = _window_of(nodes)
+        window = nodes.window()
         if window is not None:  # every kernel gives the pixels themselves
             return read(window, None)
-        px = _between_nodes(nodes)
+        px = nodes.coordinates()
     size = (source.grid.width, source.grid.height)
     factor = (1, 1) if method == "nearest" else reduction(grid, to_input_px, size)
+    part = read_around(px, size, method, factor, read)
+    if part is None:
+        nothing, shape = read(Window(0, 0, 0, 0), None)[0], (grid.height, grid.width)
+        return np.zeros((*nothing.shape[:-2], *shape), np.float32), np.zeros(shape, bool)
+    return resample(*part, method)
+
+
+def read_around(
+    px: FloatArray, size: tuple[int, int], method: str, factor: tuple[int, int], read: Read
+) -> tuple[NDArray[Any], Mask, NDArray[Any]] | None:
+    """Read what positions need of an image, averaged by `factor`; None: nothing.
+
+    Parameters
+    ----------
+    px, size, method, factor
+        As `source_window`.
+    read
+        Reads a window, averaged to a shape if one is given: values and validity.
+
+    Returns
+    -------
+    image, valid, px
+        What `resample` takes: the positions are those in the image.
+    """
     window = source_window(px, size, method, factor)
     if not window.width or not window.height:
-        nothing = read(window, None)[0]
-        shape = (grid.height, grid.width)
-        return np.zeros((*nothing.shape[:-2], *shape), np.float32), np.zeros(shape, bool)
-    image, valid = read(window, reduced_shape(window, factor))
-    return resample(image, valid, inside_window(px, window, factor), method)
-
-
-def _window_of(nodes: Lattice) -> Window | None:
-    """Return the window of input pixels that a lattice's grid lies on, one by one; None: none."""
-    rows, cols = (np.arange(n) * nodes.step for n in nodes.values.shape[1:])
-    corner = nodes.values - np.stack(np.meshgrid(cols, rows))
-    # The first node lies half a cell before the first pixel's corner.
-    first = np.rint(corner[:, 0, 0] + (nodes.step + 1) / 2)
-    if not np.abs(corner + (nodes.step + 1) / 2 - first[:, None, None]).max() < _ON_PIXELS:
         return None
-    return Window(int(first[0]), int(first[1]), nodes.grid.width, nodes.grid.height)
+    reduced = None if factor == (1, 1) else (window.height // factor[1], window.width // factor[0])
+    image, valid = read(window, reduced)
+    return image, valid, _inside_window(px, window, factor)
 
 
-def reduced_shape(window: Window, factor: tuple[int, int]) -> tuple[int, int] | None:
-    """Return the shape of a window whose pixels are averaged by `factor`; None if they are not."""
-    return None if factor == (1, 1) else (window.height // factor[1], window.width // factor[0])
-
-
-def inside_window(px: FloatArray, window: Window, factor: tuple[int, int]) -> NDArray[Any]:
+def _inside_window(px: FloatArray, window: Window, factor: tuple[int, int]) -> NDArray[Any]:
     """Return positions, shape (2, m, n), in the pixels of a window averaged by `factor`.
 
     In windows that are not too large they are rounded to 1/8192 pixel, which single precision
@@ -354,7 +289,7 @@ def inside_window(px: FloatArray, window: Window, factor: tuple[int, int]) -> ND
 
 
 def _on_pixels(px: NDArray[Any]) -> bool:
-    return bool(np.abs(px - np.rint(px)).max(initial=0) < _ON_PIXELS)
+    return bool(np.abs(px - np.rint(px)).max(initial=0) < ON_PIXELS)
 
 
 def _rounded(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:

@@ -25,6 +25,12 @@ class Window(NamedTuple):
     width: int
     height: int
 
+    @classmethod
+    def between(cls, low: NDArray[np.int_], high: NDArray[np.int_]) -> Window:
+        """Return the window from the pixel `low` (col, row) to that before `high`."""
+        (left, top), (width, height) = low.tolist(), (high - low).tolist()
+        return cls(left, top, width, height)
+
     @property
     def slices(self) -> tuple[slice, slice]:
         """Its rows and columns in an array."""

@@ -21,7 +21,7 @@ from ..runs import RUN_TAG, run_tags
 from .atomic import final_name, scratch_file, scratch_folder, writing
 from .bands import BandInfo, fits
 from .blocks import PixelType
-from .grid import PIXEL_COORDINATES, Grid
+from .grid import Grid
 from .overviews import Reduced, before_level
 from .reading import RasterSource
 from .tiff import BLOCK, base_image
@@ -100,8 +100,9 @@ def create_like(
     with writing(path):
         template, beside = _template(source, profile, rpc_tags)
     base = base_image(template, grid.width, grid.height)
-    raster = Level(base, base.mask() if masked else None)
-    levels = [raster, *(raster.overview(factor) for factor in _overviews(grid))]
+    levels = [Level(base, base.mask() if masked else None)]
+    while max(levels[-1].image.width, levels[-1].image.height) > BLOCK:
+        levels.append(levels[-1].overview())
     is_cog = final_name(path).lower().endswith(COG_SUFFIXES)
     with (
         scratch_file(path) if is_cog else contextlib.nullcontext(path) as first,
@@ -152,7 +153,7 @@ def _profile(
         "endianness": "LITTLE",
         "sparse_ok": True,
     }
-    if grid.crs is not None or grid.transform != PIXEL_COORDINATES:
+    if grid.is_georeferenced:
         profile["transform"] = grid.transform
     return profile
 
@@ -198,16 +199,6 @@ def _describe(dataset: Any, source: RasterSource) -> None:
     dataset.offsets = [band.offset for band in bands]
     if any(band.unit for band in bands):
         dataset.units = [band.unit or "" for band in bands]
-
-
-def _overviews(grid: Grid) -> list[int]:
-    """Return by how much each overview is smaller than the raster."""
-    factors: list[int] = []
-    size = max(grid.width, grid.height)
-    while size > BLOCK:
-        factors.append(2 << len(factors))
-        size = -(-size // 2)
-    return factors
 
 
 def _write_overviews(file: TiledFile, *, nearest: bool, progress: Progress) -> None:

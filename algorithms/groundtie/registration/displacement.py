@@ -10,8 +10,8 @@ from affine import Affine
 
 from ..rasters.bands import BandInfo
 from ..rasters.grid import FloatArray, Grid, compose, mesh
+from ..rasters.lattice import lattice
 from ..rasters.reading import RasterSource
-from ..rasters.warping import lattice
 from ..rasters.writing import create_like, one_band
 from .evidence import RegistrationEvidence
 

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rasters.grid import FloatArray, Grid
-from ..rasters.lattice import Lattice, fine_lattice, row_strips
+from ..rasters.lattice import NOWHERE, Lattice, fine_lattice, row_strips
 from ..rasters.reading import FloatImage
-from ..rasters.warping import NOWHERE
 from .orientation import Orientation
 from .smooth_map import Positions
 
@@ -32,7 +31,7 @@ _LARGEST_PX = 4096
 
 @dataclass(frozen=True)
 class DenseOrientation:
-    """An orientation as the function that rasters are warped by: see `warping.DenseMap`."""
+    """An orientation as the function that rasters are warped by: see `lattice.DenseMap`."""
 
     orientation: Orientation
 

@@ -10,10 +10,10 @@ from typing import ClassVar
 import numpy as np
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
-from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject
+from ..rasters.grid import LON_LAT, POSITION_ERROR_PX, FloatArray, Grid, reproject
 from ..rasters.lattice import Lattice
 from ..rasters.reading import FloatImage, RasterSource
-from ..rasters.surfaces import TOLERANCE_PX, RasterSurface, SurfacePiece, surface_around
+from ..rasters.surfaces import RasterSurface, SurfacePiece, surface_around
 from .geoids import GEOID_GRIDS
 from .smooth_map import Positions, smooth_map
 
@@ -95,7 +95,7 @@ class TerrainHeights:
 
     def on_grid(self, on_nodes: OnNodes) -> HeightsOnGrid | None:
         """Return the heights at all pixels of a grid; None if none is known."""
-        place = on_nodes(self.terrain.to_px, TOLERANCE_PX)
+        place = on_nodes(self.terrain.to_px, POSITION_ERROR_PX)
         geoid = None
         if self.geoid is not None:
             surface = self.geoid
@@ -229,5 +229,5 @@ def surface_over(source: RasterSource, lon_lat: FloatArray) -> RasterSurface:
     surface = surface_around(source, exact, lon_lat)
     corner, opposite = lon_lat.min(axis=0), lon_lat.max(axis=0)
     around = 0.05 * (opposite - corner) + 1e-4
-    fast = smooth_map(exact, corner - around, opposite + around, TOLERANCE_PX)
+    fast = smooth_map(exact, corner - around, opposite + around, POSITION_ERROR_PX)
     return replace(surface, to_px=fast)
