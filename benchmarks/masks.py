@@ -17,7 +17,7 @@ import numpy as np
 from groundtie.geometry.transform import load_transform
 from groundtie.masks.regions import find_ground
 from groundtie.masks.scene import Scene, Selection, write_mask
-from groundtie.masks.threshold import Threshold
+from groundtie.masks.threshold import ThresholdMask
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import Window, open_raster
 from groundtie.similarity.peak import find_peak
@@ -36,7 +36,7 @@ Select = Callable[[Window], Selection]
 
 def by_threshold(percent: float) -> Callable[[Scene], Select]:
     """Return what masks the brightest percent of a scene."""
-    return lambda scene: Threshold(percent).on(scene).select
+    return lambda scene: ThresholdMask.of(scene, percent).select
 
 
 def by_regions(width_m: float) -> Callable[[Scene], Select]:

@@ -13,20 +13,12 @@ from functools import cache
 
 from ..context import Context
 from ..errors import ParameterError
-from ..masks import threshold
 from ..masks.cast_shadow import shadow_azimuth_deg
-from ..masks.choice import (
-    AUTO,
-    NONE,
-    REGIONS,
-    MaskUsed,
-    choose,
-    is_reliable,
-)
+from ..masks.choice import AUTO, NONE, REGIONS, MaskUsed, choose, is_reliable
 from ..masks.regions import GroundRegions, find_ground
 from ..masks.scene import Scene, Selection
 from ..masks.surface_model import SurfaceGround
-from ..masks.threshold import Threshold
+from ..masks.threshold import ThresholdMask
 from ..rasters.pair import ImagePair
 from ..rasters.patch import middle_window
 from ..rasters.reading import Window
@@ -107,7 +99,7 @@ def with_ground_mask(
     ground = town.ground() if scene.is_dense_town else None
     if kind == NONE:
         return Masked(pair, MaskUsed(NONE, None, 1.0, reason), ground)
-    by_level = Threshold(threshold.HIGH_PERCENT, 0.0, 0).on(town.scene, context.progress)
+    by_level = ThresholdMask.of(town.scene, progress=context.progress)
     masked, share = town.masked(by_level.select)
     return Masked(masked, MaskUsed(kind, scene.radar_name, share, reason), ground)
 
