@@ -16,7 +16,6 @@ from ..context import Context
 from ..errors import ParameterError
 from ..features.classified import ClassifiedScene
 from ..features.classifier import read_classifier
-from ..features.patch_statistics import FloatImage
 from ..masks.beside import mask_beside
 from ..masks.choice import INPUT, LAYER, NONE, REFERENCE, MaskUsed
 from ..masks.layer import read_layer
@@ -26,7 +25,7 @@ from ..masks.values import INSIDE, RasterMask, mask_values
 from ..raster_names import file_name, raster_name
 from ..rasters.atomic import scratch_folder
 from ..rasters.pair import ImagePair
-from ..rasters.reading import Window, open_raster
+from ..rasters.reading import FloatImage, Window, open_raster
 from .scene import scene_of
 
 _CLASSIFIER_SUFFIX = ".json"
