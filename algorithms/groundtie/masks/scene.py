@@ -27,6 +27,9 @@ class Selection(NamedTuple):
     valid: Mask
 
 
+# What returns which pixels of a window take part.
+Select = Callable[[Window], Selection]
+
 # Pixels of the result that are averaged at a time.
 _STRIP_PIXELS = 1 << 18
 
@@ -119,7 +122,7 @@ def sampled_onto(
 def write_mask(
     scene: Scene,
     path: str | os.PathLike[str],
-    select: Callable[[Window], Selection],
+    select: Select,
     progress: Progress = SILENT,
 ) -> float:
     """Write a mask raster, 1 where pixels take part and else 0, and return the share of them.
