@@ -5,7 +5,6 @@ The input is resampled by the truth, so that every peak away from 0 is an error 
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -16,10 +15,12 @@ import numpy as np
 
 from groundtie.geometry.transform import load_transform
 from groundtie.masks.regions import find_ground
-from groundtie.masks.scene import Scene, Selection, write_mask
-from groundtie.masks.threshold import Threshold
+from groundtie.masks.scene import Scene, Select
+from groundtie.masks.threshold import ThresholdMask
+from groundtie.progress import SILENT
 from groundtie.rasters.pair import Image, ImagePair, make_pair
-from groundtie.rasters.reading import Window, open_raster
+from groundtie.rasters.reading import open_raster
+from groundtie.registration.user_masks import drawn_mask
 from groundtie.similarity.peak import find_peak
 from groundtie.similarity.surface import SimilaritySettings, describe, similarity_surface
 
@@ -31,12 +32,10 @@ RADIUS_PX = 20
 SIMILARITIES = ("nmi", "orientation", "fused")
 PLAIN = "no mask"
 
-Select = Callable[[Window], Selection]
-
 
 def by_threshold(percent: float) -> Callable[[Scene], Select]:
     """Return what masks the brightest percent of a scene."""
-    return lambda scene: Threshold(percent).on(scene).select
+    return lambda scene: ThresholdMask.of(scene, percent).select
 
 
 def by_regions(width_m: float) -> Callable[[Scene], Select]:
@@ -121,9 +120,7 @@ def of_seed(seed: int, cache: Path) -> list[Found]:
 
 def masked_by(images: ImagePair, scene: Scene, select: Select, stack: ExitStack) -> ImagePair:
     """Return a pair whose reference is masked."""
-    folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-    write_mask(scene, folder / "mask.tif", select)
-    mask = stack.enter_context(open_raster(folder / "mask.tif"))
+    mask, _ = drawn_mask(scene, select, stack, SILENT)
     return replace(images, reference=replace(images.reference, mask=mask))
 
 

@@ -32,7 +32,7 @@ def test_what_missions_call_their_masks(tmp_path: Path, image: str, mask: str, s
     (tmp_path / mask).touch()
     found = mask_beside(tmp_path / image)
     assert found is not None
-    assert (found.path.resolve(), found.scheme) == ((tmp_path / mask).resolve(), scheme)
+    assert (found[0].resolve(), found[1]) == ((tmp_path / mask).resolve(), scheme)
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import label
 
-from groundtie.masks.growing import grow_regions
-from groundtie.masks.shapes import Shape
+from groundtie.masks.growing import Shape, grow_regions
 
 TOLERANCE = 2.0
 

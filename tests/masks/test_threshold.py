@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt
 
 from groundtie.errors import RasterContentError
 from groundtie.masks.scene import Scene, write_mask
-from groundtie.masks.threshold import Threshold
+from groundtie.masks.threshold import ThresholdMask
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.reading import Window, open_raster
 
@@ -35,7 +35,7 @@ def test_so_many_percent_of_the_blocks_take_no_part(
     tmp_path: Path, image: np.ndarray, high: float, low: float
 ) -> None:
     scene = scene_of(tmp_path / "a.tif", image)
-    chosen = Threshold(high, low).on(scene).select(scene.whole).part
+    chosen = ThresholdMask.of(scene, high, low).select(scene.whole).part
     means = block_means(image)
     lowest, highest = np.percentile(means, [low, 100 - high])
     expected = (means >= lowest) & (means <= highest)
@@ -45,8 +45,8 @@ def test_so_many_percent_of_the_blocks_take_no_part(
 
 def test_a_mask_grows_by_a_distance(tmp_path: Path, image: np.ndarray) -> None:
     scene = scene_of(tmp_path / "a.tif", image)
-    plain = Threshold(3).on(scene).select(scene.whole).part
-    grown = Threshold(3, grow_px=5).on(scene).select(scene.whole).part
+    plain = ThresholdMask.of(scene, 3).select(scene.whole).part
+    grown = ThresholdMask.of(scene, 3, grow_px=5).select(scene.whole).part
     np.testing.assert_array_equal(grown, distance_transform_edt(plain) > 5.5)
 
 
@@ -55,7 +55,7 @@ def test_windows_are_cut_from_one_and_the_same_mask(
     tmp_path: Path, image: np.ndarray, grow: int
 ) -> None:
     scene = scene_of(tmp_path / "a.tif", image[:118, :157])
-    mask = Threshold(15, 5, grow).on(scene)
+    mask = ThresholdMask.of(scene, 15, 5, grow)
     whole = mask.select(scene.whole).part
     for window in (Window(0, 0, 64, 64), Window(33, 17, 70, 50), Window(101, 90, 56, 28)):
         part = whole[window.row :, window.col :][: window.height, : window.width]
@@ -67,7 +67,7 @@ def test_what_holds_no_data_takes_no_part_and_does_not_count(
 ) -> None:
     image[:, 80:] = -9999
     scene = scene_of(tmp_path / "a.tif", image, nodata=-9999)
-    chosen = Threshold(25).on(scene).select(scene.whole).part
+    chosen = ThresholdMask.of(scene, 25).select(scene.whole).part
     assert not chosen[:, 80:].any()
     assert chosen[:, :80].mean() == pytest.approx(0.75, abs=0.01)
 
@@ -75,12 +75,12 @@ def test_what_holds_no_data_takes_no_part_and_does_not_count(
 def test_an_image_without_data_is_refused(tmp_path: Path) -> None:
     scene = scene_of(tmp_path / "a.tif", np.zeros((40, 40), np.float32), nodata=0)
     with pytest.raises(RasterContentError, match="no valid pixels"):
-        Threshold(20).on(scene)
+        ThresholdMask.of(scene, 20)
 
 
 def test_a_written_mask_is_0_and_1_on_the_same_grid(tmp_path: Path, image: np.ndarray) -> None:
     scene = scene_of(tmp_path / "a.tif", np.tile(image, (5, 4)))
-    mask = Threshold(30).on(scene)
+    mask = ThresholdMask.of(scene, 30)
     with Outputs() as outputs:
         share = write_mask(scene, outputs.stage(tmp_path / "mask.tif"), mask.select)
     with rasterio.open(tmp_path / "mask.tif") as written, rasterio.open(tmp_path / "a.tif") as own:
@@ -93,6 +93,6 @@ def test_a_written_mask_is_0_and_1_on_the_same_grid(tmp_path: Path, image: np.nd
 def test_the_share_is_that_of_valid_pixels(tmp_path: Path, image: np.ndarray) -> None:
     image[:, 80:] = -9999
     scene = scene_of(tmp_path / "a.tif", image, nodata=-9999)
-    mask = Threshold(25).on(scene)
+    mask = ThresholdMask.of(scene, 25)
     share = write_mask(scene, tmp_path / "mask.tif", mask.select)
     assert share == pytest.approx(0.75, abs=0.01)

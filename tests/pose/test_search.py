@@ -9,9 +9,7 @@ from groundtie.geometry.limits import SearchLimits
 from groundtie.pose.pose import Pose
 from groundtie.pose.search import find_poses, moved_px, scan, shift_surface
 from groundtie.rasters.patch import Patch
-from groundtie.similarity.surface import SimilaritySettings
 
-SETTINGS = SimilaritySettings()
 ANY = SearchLimits(45.0, 180.0, (0.5, 2.0))
 
 # What the verdict asks for: see rotation_verdict.
@@ -37,7 +35,7 @@ class TestKnownPoses:
     def test_any_pose_is_found(self, truth: Pose, context: Context) -> None:
         shape = round(150 * truth.scale), round(140 * truth.scale)
         reference, input = turned_pair(truth, input=shape)
-        found = find_poses(reference, input, ANY, SETTINGS, context)
+        found = find_poses(reference, input, ANY, context)
         assert error_px(found[0].pose, truth, reference, input) < 0.5
         assert rotated(found[0].pose, truth) < 0.3
         assert found[0].height > RIVAL_RATIO * found[1].height
@@ -46,14 +44,14 @@ class TestKnownPoses:
     def test_images_larger_than_the_finest_level(self, context: Context) -> None:
         truth = Pose(-58.0, 1.1, (40.0, -22.0))
         reference, input = turned_pair(truth, (460, 440), (450, 470))
-        found = find_poses(reference, input, SearchLimits(80, 180, (0.8, 1.3)), SETTINGS, context)
+        found = find_poses(reference, input, SearchLimits(80, 180, (0.8, 1.3)), context)
         assert error_px(found[0].pose, truth, reference, input) < 0.7
 
     @pytest.mark.slow
     def test_images_smaller_than_the_coarsest_level(self, context: Context) -> None:
         truth = Pose(20.0, 1.0, (3.0, -5.0))
         reference, input = turned_pair(truth, (70, 60), (80, 80), noise=0.1)
-        found = find_poses(reference, input, SearchLimits(10, 180, (0.8, 1.25)), SETTINGS, context)
+        found = find_poses(reference, input, SearchLimits(10, 180, (0.8, 1.25)), context)
         assert error_px(found[0].pose, truth, reference, input) < 0.7
 
     @pytest.mark.slow
@@ -61,7 +59,7 @@ class TestKnownPoses:
         truth = Pose(-75.0, 1.0, (60.0, -45.0))
         reference, input = turned_pair(truth, (280, 300), (130, 140), noise=0.1)
         limits = SearchLimits(90, 180, (0.8, 1.25))
-        found = find_poses(reference, input, limits, SETTINGS, context)
+        found = find_poses(reference, input, limits, context)
         assert error_px(found[0].pose, truth, reference, input) < 0.7
 
     @pytest.mark.slow
@@ -71,7 +69,7 @@ class TestKnownPoses:
         rows, cols = np.indices(reference.values.shape)
         valid = rows + cols > 70
         masked = Patch(np.where(valid, reference.values, np.float32(0)), valid)
-        found = find_poses(masked, input, ANY, SETTINGS, context)
+        found = find_poses(masked, input, ANY, context)
         assert error_px(found[0].pose, truth, reference, input) < 0.5
 
 
@@ -79,7 +77,7 @@ class TestLimits:
     def test_without_rotation_and_scale_only_shifts_are_tried(self, context: Context) -> None:
         truth = Pose(shift_px=(14.0, -9.0))
         reference, input = turned_pair(truth)
-        found = find_poses(reference, input, SearchLimits(20), SETTINGS, context)
+        found = find_poses(reference, input, SearchLimits(20), context)
         assert len(found) > 1
         assert {(one.pose.rotation_deg, one.pose.scale) for one in found} == {(0.0, 1.0)}
         np.testing.assert_allclose(found[0].pose.shift_px, truth.shift_px, atol=0.3)
@@ -90,7 +88,7 @@ class TestLimits:
         truth = Pose(80.0, 1.5)
         reference, input = turned_pair(truth)
         limits = SearchLimits(12, largest, (0.9, 1.1))
-        for found in find_poses(reference, input, limits, SETTINGS, context):
+        for found in find_poses(reference, input, limits, context):
             assert abs(found.pose.rotation_deg) <= largest
             assert 0.9 <= found.pose.scale <= 1.1
 
@@ -98,17 +96,17 @@ class TestLimits:
     def test_shifts_beyond_the_radius_are_not_found(self, context: Context) -> None:
         truth = Pose(45.0, 1.0, (30.0, 0.0))
         reference, input = turned_pair(truth)
-        near = find_poses(reference, input, SearchLimits(12, 180, (0.9, 1.1)), SETTINGS, context)
+        near = find_poses(reference, input, SearchLimits(12, 180, (0.9, 1.1)), context)
         # A pixel of the small images, and what finer levels may add.
         assert np.abs([one.pose.shift_px for one in near]).max() < 12 + 6
-        far = find_poses(reference, input, SearchLimits(32, 180, (0.9, 1.1)), SETTINGS, context)
+        far = find_poses(reference, input, SearchLimits(32, 180, (0.9, 1.1)), context)
         assert error_px(far[0].pose, truth, reference, input) < 0.5
 
     @pytest.mark.slow
     def test_corners_of_the_square_of_shifts_are_reached(self, context: Context) -> None:
         truth = Pose(45.0, 1.0, (24.0, 24.0))
         reference, input = turned_pair(truth)
-        found = find_poses(reference, input, SearchLimits(25, 180, (0.9, 1.1)), SETTINGS, context)
+        found = find_poses(reference, input, SearchLimits(25, 180, (0.9, 1.1)), context)
         assert error_px(found[0].pose, truth, reference, input) < 0.5
 
 
@@ -153,14 +151,14 @@ class TestNothingInCommon:
     @pytest.mark.parametrize("seed", [5, 6])
     def test_no_pose_stands_out(self, seed: int, context: Context) -> None:
         reference, input = turned_pair(Pose(40.0, 1.2), seed=seed, input_seed=seed + 50)
-        found = find_poses(reference, input, ANY, SETTINGS, context)
+        found = find_poses(reference, input, ANY, context)
         assert found[0].height < RIVAL_RATIO * found[1].height
 
     @pytest.mark.slow
     def test_noise(self, context: Context) -> None:
         rng = np.random.default_rng(0)
         windows = [patch(rng.gamma(1.0, 100.0, (120, 120))) for _ in range(2)]
-        found = find_poses(*windows, SearchLimits(30, 180, (0.8, 1.25)), SETTINGS, context)
+        found = find_poses(*windows, SearchLimits(30, 180, (0.8, 1.25)), context)
         assert found[0].height < RIVAL_RATIO * found[1].height
 
     def test_flat_and_empty_windows_have_no_pose(self, context: Context) -> None:
@@ -168,16 +166,16 @@ class TestNothingInCommon:
         flat = patch(np.full((90, 90), 7.0))
         empty = Patch(np.zeros((90, 90), np.float32), np.zeros((90, 90), bool))
         for other in (flat, empty):
-            assert find_poses(reference, other, ANY, SETTINGS, context) == []
-            assert find_poses(other, reference, ANY, SETTINGS, context) == []
+            assert find_poses(reference, other, ANY, context) == []
+            assert find_poses(other, reference, ANY, context) == []
 
 
 @pytest.mark.slow
 def test_threads_change_nothing(context: Context, one_thread: Context) -> None:
     reference, input = turned_pair(Pose(-20.0, 0.9, (5.0, 5.0)))
     limits = SearchLimits(20, 60, (0.8, 1.25))
-    alone = find_poses(reference, input, limits, SETTINGS, one_thread)
-    together = find_poses(reference, input, limits, SETTINGS, context)
+    alone = find_poses(reference, input, limits, one_thread)
+    together = find_poses(reference, input, limits, context)
     assert [one.pose for one in alone] == [one.pose for one in together]
 
 
@@ -185,14 +183,14 @@ def test_threads_change_nothing(context: Context, one_thread: Context) -> None:
 def test_evaluations_are_counted(context: Context) -> None:
     reference, input = turned_pair(Pose())
     limits = SearchLimits(20, 60, (0.8, 1.25))
-    found = find_poses(reference, input, limits, SETTINGS, context)
+    found = find_poses(reference, input, limits, context)
     assert found[0].evaluations > scan(reference, input, limits, context).heights.size
 
 
 @pytest.mark.slow
 def test_candidates_differ(context: Context) -> None:
     reference, input = turned_pair(Pose(10.0))
-    found = find_poses(reference, input, ANY, SETTINGS, context)
+    found = find_poses(reference, input, ANY, context)
     for i, one in enumerate(found):
         for other in found[:i]:
             assert moved_px(one.pose, other.pose, (150, 160)) > 5

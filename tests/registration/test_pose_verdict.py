@@ -13,7 +13,6 @@ from groundtie.pose.search import find_poses
 from groundtie.rasters.patch import Patch
 from groundtie.registration.pose_evidence import PoseEvidence
 from groundtie.registration.pose_verdict import judge_pose
-from groundtie.similarity.surface import SimilaritySettings
 
 TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
 # As wide as any search: half of the input's longer side.
@@ -82,7 +81,7 @@ class TestWhatAnotherSearchFound:
         self, windows: tuple[Patch, Patch], context: Context
     ) -> None:
         limits = SearchLimits(30, 10, (1.0, 1.0))
-        found = find_poses(*windows, limits, SimilaritySettings(), context)
+        found = find_poses(*windows, limits, context)
         verdict = judge_pose(PoseEvidence.of(windows, limits, found, True, context))
         assert not verdict.accepted
         assert "prefers 50" in verdict.reason or "prefers 49" in verdict.reason
@@ -98,7 +97,7 @@ def test_a_repetition_whose_right_place_lies_beyond_the_radius(context: Context)
         for shown in (scene[30:190, 30:190], scene[30:190, 5:165])
     )
     limits = SearchLimits(10, 10, (1.0, 1.0))
-    found = find_poses(reference, input, limits, SimilaritySettings(), context)
+    found = find_poses(reference, input, limits, context)
     assert abs(found[0].pose.shift_px[0] + 7) < 1
     evidence = PoseEvidence.of((reference, input), limits, found, True, context)
     assert not judge_pose(evidence).accepted
@@ -108,7 +107,7 @@ def test_a_repetition_whose_right_place_lies_beyond_the_radius(context: Context)
 @pytest.mark.parametrize("seed", [20, 21, 22])
 def test_two_places_are_refused(seed: int, context: Context) -> None:
     windows = turned_pair(TRUTH, seed=seed, input_seed=seed + 100)
-    found = find_poses(*windows, ANY, SimilaritySettings(), context)
+    found = find_poses(*windows, ANY, context)
     assert not judge_pose(PoseEvidence.of(windows, ANY, found, True, context)).accepted
 
 

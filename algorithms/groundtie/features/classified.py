@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 
 from ..masks.scene import Scene, Selection
-from ..rasters.reading import Mask, Window
+from ..rasters.reading import FloatImage, Mask, Window
 from .classifier import FeatureClassifier
-from .patch_statistics import NO_BANDS, PATCH_PX, FloatImage
+from .patch_statistics import NO_BANDS, PATCH_PX
 
 # So many pixels a side are decided together: few of those that their patches see.
 _CELL_PX = 8
@@ -43,36 +43,23 @@ class ClassifiedScene:
 
     def select(self, window: Window) -> Selection:
         """Return which pixels of a window take part, the same whatever the window."""
-        back = _BACK_PX
-        col, row, width, height = window
-        around = Window(col - back, row - back, width + 2 * back, height + 2 * back)
+        around = window.widened(_BACK_PX)
         kept, valid = self._kept(around)
         # Nothing is drawn back from where the image ends.
         masked = (~(kept & valid)).astype(np.uint8)
-        core = cv2.erode(masked, np.ones((2 * back + 1,) * 2, np.uint8))
-        inside = slice(back, back + height), slice(back, back + width)
+        core = cv2.erode(masked, np.ones((2 * _BACK_PX + 1,) * 2, np.uint8))
+        inside = window.slices_in(around)
         return Selection((core == 0)[inside] & valid[inside], valid[inside])
 
     def _kept(self, window: Window) -> tuple[Mask, Mask]:
         """Return which pixels' surroundings the classifier keeps, and which are valid."""
-        col, row = (at - at % _CELL_PX for at in window[:2])
-        across, down = (
-            -(-(at + size - first) // _CELL_PX)
-            for at, size, first in zip(window[:2], window[2:], (col, row), strict=True)
-        )
-        around = Window(
-            col - _MARGIN_PX,
-            row - _MARGIN_PX,
-            across * _CELL_PX + 2 * _MARGIN_PX,
-            down * _CELL_PX + 2 * _MARGIN_PX,
-        )
+        cells = window.aligned(_CELL_PX)
+        across, down = cells.width // _CELL_PX, cells.height // _CELL_PX
+        around = cells.widened(_MARGIN_PX)
         patch = self.scene.read(around)
         bands = self.bands(around) if self.classifier.bands else NO_BANDS
         cols, rows = np.meshgrid(np.arange(across), np.arange(down))
         middles = _MARGIN_PX + _CELL_PX * np.array([cols.ravel() + 0.5, rows.ravel() + 0.5]).T
         kept = self.classifier.keep(patch, middles, bands).reshape(down, across)
         pixels = kept.repeat(_CELL_PX, axis=0).repeat(_CELL_PX, axis=1)
-        inside = slice(window.row - row, None), slice(window.col - col, None)
-        valid = patch.valid[_MARGIN_PX:, _MARGIN_PX:]
-        size = slice(window.height), slice(window.width)
-        return pixels[inside][size], valid[inside][size]
+        return pixels[window.slices_in(cells)], patch.valid[window.slices_in(around)]

@@ -16,8 +16,9 @@ from ..errors import ParameterError
 from ..rasters.atomic import write_json
 from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
+from ..rasters.reading import FloatImage
 from ..strict_json import read_json
-from .patch_statistics import BAND_RATIOS, NO_BANDS, STATISTICS, FloatImage, patch_statistics
+from .patch_statistics import BAND_RATIOS, NO_BANDS, STATISTICS, patch_statistics
 
 # Degrees of the kernels (γ x·v + 1) ^ degree; the others have none.
 DEGREE = {"polynomial": 3, "quadratic": 2}

@@ -17,9 +17,6 @@ FEWEST_POINTS = 10
 # More of a class make training longer, not better.
 _MOST_POINTS = 2000
 
-# How much a point on the wrong side costs (the C of C-SVM).
-_COST = 1.0
-
 # Labelled points are divided into so many blocks a side, which are left out one fold at a time.
 _BLOCKS, _FOLDS = 6, 3
 
@@ -97,8 +94,8 @@ def train_classifier(
     weights = {
         kept: (labelled.kept == kept).sum() / (chosen.kept == kept).sum() for kept in (True, False)
     }
+    # How much a point on the wrong side costs, C, is 1 by default.
     machine = SVC(
-        C=_COST,
         kernel="poly" if kernel in DEGREE else kernel,
         degree=DEGREE.get(kernel, 1),
         gamma=gamma,

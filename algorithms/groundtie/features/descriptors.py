@@ -14,11 +14,11 @@ import numpy as np
 
 from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
+from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
-from .gradients import FloatImage, Gradient
 from .keypoints import Keypoints
 from .sampling import sampled_gradient, square_lattice, unit_rows
-from .scale_space import describe_at_scales
+from .scale_space import Gradient, describe_at_scales
 
 CELLS = 4
 DIRECTIONS = 8

@@ -20,7 +20,7 @@ from ..rasters.patch import Patch, reduced_patch
 from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from .keypoints import Keypoints
-from .scale_space import FIRST_SCALE_PX, LAYERS
+from .scale_space import FIRST_SCALE_PX, IMAGE_BLUR_PX, LAYERS
 
 ByteImage = NDArray[np.uint8]
 
@@ -28,9 +28,6 @@ _EDGE_RATIO = 10.0
 
 # OpenCV enlarges its image so that positions come out a quarter of a pixel too far.
 _OPENCV_OFFSET_PX = 0.25
-
-# OpenCV takes its image to be blurred by this, in its pixels.
-_OPENCV_BLUR_PX = 0.5
 
 # The mean of two pixels blurs by this, in pixels twice as large.
 _MEAN_BLUR_PX = 0.25
@@ -96,8 +93,8 @@ class SiftOctDetector(SiftDetector):
         blur_px = FIRST_SCALE_PX / 2
         blurred = cv2.GaussianBlur(to_grey(self.prepare(half), half.valid), (0, 0), blur_px)
         found = self._opencv(np.asarray(blurred, np.uint8))
-        # Variances add up, so the true scale follows from what OpenCV assumes.
-        more = blur_px**2 + _MEAN_BLUR_PX**2 - _OPENCV_BLUR_PX**2
+        # Variances add up, so the true scale follows from the blur that OpenCV assumes.
+        more = blur_px**2 + _MEAN_BLUR_PX**2 - IMAGE_BLUR_PX**2
         scale_px = np.sqrt(found.scale_px**2 + more)
         # The first half-sized pixel is the mean of the first two.
         position_px = 2 * found.position_px + 0.5

@@ -16,11 +16,11 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
+from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
-from .gradients import FloatImage, Gradient
 from .keypoints import Keypoints
 from .sampling import unit_rows
-from .scale_space import gradient_at_scale
+from .scale_space import Gradient, gradient_at_scale
 
 PATCH_PX = 41
 CELLS = 3

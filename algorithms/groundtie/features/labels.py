@@ -10,18 +10,18 @@ from typing import Any, ClassVar
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from rasterio.crs import CRS
 
 from ..context import Context
 from ..errors import ParameterError, VectorLayerError
 from ..geometry.vector_layers import read_vector_layer
-from ..rasters.grid import FloatArray, Grid, reproject
+from ..masks.layer import AREAS, drawn_onto
+from ..masks.scene import sampled_onto
+from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import Image
 from ..rasters.reading import RasterSource, Window
-from ..rasters.warping import sample
 from .classifier_training import Training
 from .patch_statistics import BAND_RATIOS, NO_BANDS, PATCH_PX, patch_statistics
-from .tiles import MARGIN_PX, Detecting, inside, tiles, widened
+from .tiles import MARGIN_PX, Detecting, inside, tiles
 
 Labels = NDArray[np.int8]
 
@@ -42,8 +42,6 @@ class RasterLabels:
     ----------
     source
         The raster.
-    crs
-        CRS of the image's map.
     left_out
         The values.
     chosen
@@ -51,18 +49,12 @@ class RasterLabels:
     """
 
     source: RasterSource
-    crs: CRS | None
     left_out: frozenset[str]
     chosen: ClassVar = False
 
     def label(self, piece: Grid) -> Labels:
         """Return the labels of a grid's pixels, shape (h, w)."""
-        own = self.source.grid
-
-        def to_px(xy: FloatArray) -> FloatArray:
-            return own.map_to_pixel(reproject(xy, self.crs, own.crs))
-
-        values, known = sample(self.source, piece, to_px, "nearest", 1)
+        values, known = sampled_onto(piece, self.source, "nearest", 1)
         numbers = [float(text) for text in self.left_out]
         labels = np.where(np.isin(values, numbers), LEFT_OUT, KEPT)
         return np.where(known, labels, UNKNOWN).astype(np.int8)
@@ -95,17 +87,9 @@ class LayerLabels:
 
     def label(self, piece: Grid) -> Labels:
         """Return the labels of a grid's pixels, shape (h, w)."""
-        if not self.areas:
-            return np.full((piece.height, piece.width), UNKNOWN, np.int8)
-        from rasterio.features import rasterize
-
-        drawn = rasterize(
-            [(geometry, label + 1) for geometry, label in self.areas],
-            out_shape=(piece.height, piece.width),
-            transform=piece.transform,
-            dtype=np.uint8,
-        )
-        return np.asarray(drawn.astype(np.int8) - 1)
+        # Where nothing is drawn, 0, labels are unknown.
+        shapes = [(geometry, label - UNKNOWN) for geometry, label in self.areas]
+        return np.asarray(drawn_onto(piece, shapes, np.uint8).astype(np.int8) + UNKNOWN, np.int8)
 
     def points(self, piece: Grid) -> tuple[FloatArray, Labels]:
         """Return points of its own as positions on a grid, shape (m, 2), and their labels."""
@@ -139,7 +123,7 @@ def patch_labels(labels: Labels, px: FloatArray) -> Labels:
     return np.where(labels == UNKNOWN, UNKNOWN, label)[rows, cols].astype(np.int8)
 
 
-def raster_labels(source: RasterSource, image: Image, left_out: Sequence[str]) -> RasterLabels:
+def raster_labels(source: RasterSource, left_out: Sequence[str]) -> RasterLabels:
     """Return the labels of a raster.
 
     Raises
@@ -152,7 +136,7 @@ def raster_labels(source: RasterSource, image: Image, left_out: Sequence[str]) -
             float(text)
         except ValueError:
             raise ParameterError(f"left_out must be numbers for a raster, not {text!r}") from None
-    return RasterLabels(source, image.source.grid.crs, frozenset(left_out))
+    return RasterLabels(source, frozenset(left_out))
 
 
 def layer_labels(
@@ -188,7 +172,7 @@ def layer_labels(
         if value is None:
             continue
         label = LEFT_OUT if _is_one_of(value, left_out) else KEPT
-        if geometry["type"] in ("Polygon", "MultiPolygon"):
+        if geometry["type"] in AREAS:
             areas.append((geometry, label))
         elif geometry["type"] in ("Point", "MultiPoint"):
             each = np.atleast_2d(geometry["coordinates"])[:, :2]
@@ -230,7 +214,7 @@ def labelled_points(
     looked_at = len(image.source.image_bands) if statistics == BAND_RATIOS else 0
 
     def look(tile: Window) -> Training:
-        piece = grid.window(*widened(tile, MARGIN_PX))
+        piece = grid.window(*tile.widened(MARGIN_PX))
         core = Window(MARGIN_PX, MARGIN_PX, tile.width, tile.height)
         patch = image.read_onto(piece, grid.map_to_pixel)
         found = detector.detect(patch)

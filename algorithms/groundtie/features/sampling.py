@@ -6,8 +6,9 @@ import cv2
 import numpy as np
 
 from ..rasters.grid import FloatArray
-from .gradients import FloatImage, Gradient
+from ..rasters.reading import FloatImage
 from .keypoints import Keypoints
+from .scale_space import Gradient
 
 
 def square_lattice(half: float, count: int) -> FloatArray:

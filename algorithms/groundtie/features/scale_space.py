@@ -1,4 +1,4 @@
-"""Gradients of an image at the scales of its keypoints, for whatever describes these."""
+"""Gradients of an image, and at the scales of its keypoints, for whatever describes these."""
 
 from __future__ import annotations
 
@@ -10,16 +10,21 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .gradients import FloatImage, Gradient, GradientOperator, differences
+from ..rasters.reading import FloatImage
 from .keypoints import Keypoints
+
+# Derivatives along columns and rows, shape (h, w) each, and what estimates them.
+Gradient = tuple[FloatImage, FloatImage]
+GradientOperator = Callable[[FloatImage], Gradient]
 
 Describe = Callable[[Gradient, Keypoints], FloatImage]
 Orient = Callable[[Gradient, Keypoints], tuple[Keypoints, NDArray[np.int_]]]
 
-# Scale space: layers an octave, the first scale, and how much an image is blurred as it is.
+# Scale space: layers an octave, the first scale, and how much an image is blurred as it is, as
+# [Lowe2004] has them, and OpenCV.
 LAYERS = 3
 FIRST_SCALE_PX = 1.6
-_IMAGE_BLUR_PX = 0.5
+IMAGE_BLUR_PX = 0.5
 
 # A gradient sees what lies within so many scales, but for the Gaussian's tail.
 _SEES_SCALES = 2.5
@@ -29,6 +34,14 @@ _ROUNDING = 1e-5
 
 # So many keypoints are described at a time.
 _BLOCK = 512
+
+
+def differences(image: FloatImage) -> Gradient:
+    """Return differences between the next and the previous pixel ([Suri2010] eq 6.5, 6.6)."""
+    padded = cv2.copyMakeBorder(image, 1, 1, 1, 1, cv2.BORDER_REFLECT_101)
+    along_cols = padded[1:-1, 2:] - padded[1:-1, :-2]
+    along_rows = padded[2:, 1:-1] - padded[:-2, 1:-1]
+    return np.asarray(along_cols, np.float32), np.asarray(along_rows, np.float32)
 
 
 def describe_at_scales(
@@ -118,7 +131,7 @@ def _distance(valid: NDArray[np.bool_]) -> FloatImage:
 
 def _scale_space(image: FloatImage, layers: Iterable[int]) -> Iterator[FloatImage]:
     """Return an image blurred to the scales of rising layers, each in the pixels of its octave."""
-    own = _blurred(image, _IMAGE_BLUR_PX, FIRST_SCALE_PX)
+    own = _blurred(image, IMAGE_BLUR_PX, FIRST_SCALE_PX)
     octave = 0
     for layer in layers:
         while octave < _octave_of(layer):
@@ -126,7 +139,7 @@ def _scale_space(image: FloatImage, layers: Iterable[int]) -> Iterator[FloatImag
             own = _blurred(own, FIRST_SCALE_PX, 2 * FIRST_SCALE_PX)[::2, ::2]
             octave += 1
         if layer <= 0:
-            yield _blurred(image, _IMAGE_BLUR_PX, _scale_of(layer))
+            yield _blurred(image, IMAGE_BLUR_PX, _scale_of(layer))
         else:
             yield _blurred(own, FIRST_SCALE_PX, _scale_of(layer) / 2**octave)
 

@@ -10,8 +10,7 @@ import numpy as np
 from ..rasters import tiling
 from ..rasters.grid import FloatArray, Grid
 from ..rasters.patch import Patch
-from ..rasters.reading import Mask, Window
-from .detectors import FloatImage
+from ..rasters.reading import FloatImage, Mask, Window
 from .keypoints import Keypoints
 
 # Tiles of a grid, and what keypoints near their border see beyond it.
@@ -31,12 +30,6 @@ class Describing(Protocol):
 
     def describe(self, window: Patch, found: Keypoints) -> tuple[Keypoints, FloatImage]:
         """Return m keypoints, which may be repeated, and their descriptors, shape (m, k)."""
-
-
-def widened(window: Window, margin: int) -> Window:
-    """Return a window with a margin on each side."""
-    size = window.width + 2 * margin, window.height + 2 * margin
-    return Window(window.col - margin, window.row - margin, *size)
 
 
 def inside(px: FloatArray, window: Window) -> Mask:

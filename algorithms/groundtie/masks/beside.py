@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 _SENTINEL_2 = re.compile(
@@ -21,38 +20,28 @@ _PLANET = re.compile(
 )
 
 
-@dataclass(frozen=True)
-class MaskBeside:
-    """A mask that lies beside an image, and the scheme of its values (see `values.SCHEMES`)."""
-
-    path: Path
-    scheme: str
-
-
-def mask_beside(image: Path | str) -> MaskBeside | None:
+def mask_beside(image: Path | str) -> tuple[Path, str] | None:
     """Return the mask that belongs to an image, if both have the names that the mission gives.
 
-    Sentinel-2 L2A has its classification in the folder of another pixel size. Only files on disk
-    are looked for: what is asked of a server costs a request each.
+    With it comes the scheme of its values (see `values.SCHEMES`). Sentinel-2 L2A has its
+    classification in the folder of another pixel size. Only files on disk are looked for: what is
+    asked of a server costs a request each.
     """
     if isinstance(image, str):
         return None
-    for candidate in _candidates(image):
-        if candidate.path.is_file():
-            return candidate
-    return None
+    return next((mask for mask in _candidates(image) if mask[0].is_file()), None)
 
 
-def _candidates(image: Path) -> list[MaskBeside]:
+def _candidates(image: Path) -> list[tuple[Path, str]]:
     name, folder = image.name, image.parent
     if found := _SENTINEL_2.fullmatch(name):
         names = [f"{found[1]}_SCL_{size}m.{found[2]}" for size in (20, 60)]
         folders = [folder, folder.parent / "R20m", folder.parent / "R60m"]
-        return [MaskBeside(place / name, "scl") for name in names for place in folders]
+        return [(place / name, "scl") for name in names for place in folders]
     if found := _LANDSAT.fullmatch(name):
-        return [MaskBeside(folder / f"{found[1]}_QA_PIXEL.{found[2]}", "qa-pixel")]
+        return [(folder / f"{found[1]}_QA_PIXEL.{found[2]}", "qa-pixel")]
     if found := _HLS.fullmatch(name):
-        return [MaskBeside(folder / f"{found[1]}.Fmask.{found[2]}", "hls-fmask")]
+        return [(folder / f"{found[1]}.Fmask.{found[2]}", "hls-fmask")]
     if found := _PLANET.fullmatch(name):
-        return [MaskBeside(folder / f"{found[1]}_udm2{found[2] or ''}.{found[3]}", "udm2")]
+        return [(folder / f"{found[1]}_udm2{found[2] or ''}.{found[3]}", "udm2")]
     return []

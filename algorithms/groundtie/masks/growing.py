@@ -1,4 +1,4 @@
-"""Region growing: from homogeneous seeds to all connected pixels of like brightness."""
+"""Region growing, from seeds to all connected pixels of like brightness, and regions' shapes."""
 
 from __future__ import annotations
 
@@ -88,3 +88,30 @@ def _seeds(variation2: NDArray[np.float32], largest: float) -> NDArray[np.intp]:
     row, col = row[order], col[order]
     inner = place[row, col]
     return np.column_stack([row * _SEED_PX + inner // _SEED_PX, col * _SEED_PX + inner % _SEED_PX])
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Area, and the sides of the rectangle that has the region's second moments, in pixels."""
+
+    area: float
+    length: float
+    width: float
+
+    @classmethod
+    def of(cls, region: Mask) -> Shape:
+        """Return the shape of the pixels of a mask, shape (h, w)."""
+        m = cv2.moments(region.astype(np.uint8), binaryImage=True)
+        area = m["m00"]
+        if area == 0:
+            return cls(0.0, 0.0, 0.0)
+        # A pixel is a square: it has moments of its own.
+        xx, yy, xy = m["mu20"] / area + 1 / 12, m["mu02"] / area + 1 / 12, m["mu11"] / area
+        middle, half = (xx + yy) / 2, float(np.hypot((xx - yy) / 2, xy))
+        sides = np.sqrt(12 * np.maximum([middle + half, middle - half], 0))
+        return cls(area, float(sides[0]), float(sides[1]))
+
+    @property
+    def elongation(self) -> float:
+        """Length over width, at least 1."""
+        return self.length / max(self.width, 1e-9)

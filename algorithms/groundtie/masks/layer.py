@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import VectorLayerError
 from ..geometry.vector_layers import read_vector_layer
+from ..rasters.grid import Grid
 from ..rasters.reading import Mask, Window
 from .scene import Scene, Selection
 from .threshold import grown
 
 AREAS = ("Polygon", "MultiPolygon")
 _LINES = ("LineString", "MultiLineString")
+
+_Number = TypeVar("_Number", np.uint8, np.float32)
 
 
 @dataclass(frozen=True)
@@ -42,28 +47,42 @@ class LayerMask:
 
     def select(self, window: Window) -> Selection:
         """Return which pixels of a window take part: those whose centres it covers."""
-        reach = self.reach_px
-        around = Window(
-            window.col - reach,
-            window.row - reach,
-            window.width + 2 * reach,
-            window.height + 2 * reach,
-        )
-        along = grown(self._drawn(self.lines, around), reach)
-        inside = np.s_[reach : reach + window.height, reach : reach + window.width]
-        covered = self._drawn(self.areas, window) | along[inside]
+        around = window.widened(self.reach_px)
+        along = grown(self._drawn(self.lines, around), self.reach_px)[window.slices_in(around)]
+        covered = self._drawn(self.areas, window) | along
         valid = self.scene.read(window).valid
         return Selection(valid & (covered != self.is_outside), valid)
 
     def _drawn(self, geometries: tuple[Any, ...], window: Window) -> Mask:
-        from rasterio.features import rasterize
+        shapes = [(geometry, 1) for geometry in geometries]
+        return drawn_onto(self.scene.grid.window(*window), shapes, np.uint8) > 0
 
-        shape = (window.height, window.width)
-        if not geometries:
-            return np.zeros(shape, bool)
-        transform = self.scene.grid.window(*window).transform
-        drawn = rasterize(geometries, out_shape=shape, transform=transform, dtype=np.uint8)
-        return np.asarray(drawn > 0)
+
+def drawn_onto(
+    grid: Grid,
+    shapes: Sequence[tuple[Any, float]],
+    dtype: type[_Number],
+    all_touched: bool = False,
+) -> NDArray[_Number]:
+    """Return shapes' values on the pixels of a grid, shape (h, w); 0 where there is none.
+
+    Parameters
+    ----------
+    grid
+        The pixels.
+    shapes
+        GeoJSON geometries on the grid's map and their values; the last one counts.
+    dtype
+        Of the values.
+    all_touched
+        Whether a shape covers all pixels that it touches; else those whose centres it covers.
+    """
+    from rasterio.features import rasterize
+
+    drawn = np.zeros((grid.height, grid.width), dtype)
+    if shapes:
+        rasterize(shapes, out=drawn, transform=grid.transform, all_touched=all_touched)
+    return drawn
 
 
 def read_layer(path: str | os.PathLike[str], scene: Scene, width_m: float) -> LayerMask:

@@ -10,15 +10,14 @@ from typing import Any, Protocol
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import VectorLayerError
 from ..geometry.vector_layers import read_vector_layer
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import Grid
 from ..rasters.reading import FloatImage, Mask, RasterSource
-from ..rasters.warping import sample
-from .layer import AREAS
+from .layer import AREAS, drawn_onto
 from .ray_casting import Heights
+from .scene import sampled_onto
 
 # What is wider is taken for ground: halls and blocks are up to so wide, or have courtyards.
 WIDEST_M = 100.0
@@ -68,14 +67,7 @@ class RasterModel:
 
     def heights(self, piece: Grid) -> tuple[Heights, Mask]:
         """Return heights on a grid, and where they are known; the ground is found in it."""
-        own = self.raster.grid
-        surface, known = sample(
-            self.raster,
-            piece,
-            lambda xy: own.map_to_pixel(reproject(xy, piece.crs, own.crs)),
-            "bilinear",
-            self.band,
-        )
+        surface, known = sampled_onto(piece, self.raster, "bilinear", self.band)
         if not known.any():
             return Heights(np.zeros_like(surface), np.zeros_like(surface)), known
         ground = bare_ground(surface, known, piece.pixel_size_m)
@@ -99,13 +91,8 @@ class FootprintModel:
 
     def heights(self, piece: Grid) -> tuple[Heights, Mask]:
         """Return heights on a grid, and that all are known."""
-        from rasterio.features import rasterize
-
-        shape = (piece.height, piece.width)
-        surface: NDArray[np.float32] = np.zeros(shape, np.float32)
-        if self.buildings:
-            rasterize(self.buildings, out=surface, transform=piece.transform, all_touched=True)
-        return Heights(surface, np.zeros(shape, np.float32)), np.ones(shape, bool)
+        surface = drawn_onto(piece, self.buildings, np.float32, all_touched=True)
+        return Heights(surface, np.zeros_like(surface)), np.ones(surface.shape, bool)
 
 
 def read_footprints(path: str | os.PathLike[str], grid: Grid) -> FootprintModel:

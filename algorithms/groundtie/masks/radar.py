@@ -6,7 +6,8 @@ import numpy as np
 
 from ..rasters.pair import Image
 from ..rasters.patch import Patch, middle_window
-from ..speckle.statistics import FloatImage, homogeneous_variation2
+from ..rasters.reading import FloatImage
+from ..speckle.statistics import homogeneous_variation2
 
 # Looked at in the middle of an image, at full resolution: averaging would take speckle away.
 _SAMPLE_PX = 1024

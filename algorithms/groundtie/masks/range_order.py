@@ -26,18 +26,16 @@ _OUTER_PERCENT = 25.0
 _MEAN_PX = 3
 _DARK_PERCENT, _BRIGHT_PERCENT = 25.0, 20.0
 
-# Ground lies so far from both, and by so many pixels: a mean over distances whose weights add up
-# to 1.
+# Ground lies so far from both, and by so many pixels.
 _GROUND_M, _GROUND_PX = 7.0, 3.0
-_WEIGHT_NEAREST, _WEIGHT_ALONG = 1 / 3, 1 / 6
 
 
 def open_ground(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:
     """Return the ground between the buildings of a radar image.
 
-    It is where the geometric mean of four distances is large: to the nearest layover and to the
-    nearest shadow in any direction, to layover before the place as the radar looks, and to shadow
-    behind it. Where the radar looks is inferred from the image.
+    It is where the geometric mean of distances is large: to the nearest layover and to the nearest
+    shadow in any direction, which count twice, to layover before the place as the radar looks, and
+    to shadow behind it. Where the radar looks is inferred from the image.
 
     Parameters
     ----------
@@ -55,13 +53,13 @@ def open_ground(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:
     dark, bright = (level < darkest) & valid, (level > brightest) & valid
     found = np.zeros(level.shape, np.float32)
     with np.errstate(divide="ignore"):  # layover and shadow themselves lie 0 from themselves
-        for weight, px in (
-            (_WEIGHT_NEAREST, _nearest_px(bright)),
-            (_WEIGHT_NEAREST, _nearest_px(dark)),
-            (_WEIGHT_ALONG, distance_back_px(bright, azimuth_deg)),
-            (_WEIGHT_ALONG, distance_back_px(dark, azimuth_deg + 180)),
+        for times, px in (
+            (2, _nearest_px(bright)),
+            (2, _nearest_px(dark)),
+            (1, distance_back_px(bright, azimuth_deg)),
+            (1, distance_back_px(dark, azimuth_deg + 180)),
         ):
-            found += np.float32(weight) * np.log(np.minimum(px, np.float32(farthest_px)))
+            found += np.float32(times / 6) * np.log(np.minimum(px, np.float32(farthest_px)))
     least_px = max(_GROUND_M / pixel_m, _GROUND_PX)
     return np.asarray((found >= np.log(least_px)) & valid)
 

@@ -68,6 +68,11 @@ class LineOfSight:
         """Length on the ground of a pixel's width along the line."""
         return 1 / math.hypot(*self.towards_px)
 
+    @property
+    def rise_m(self) -> float:
+        """By how much the line rises towards the sensor over a pixel."""
+        return self.pixel_m / self.tangent
+
 
 def hidden_ground(heights: Heights, sight: LineOfSight) -> Mask:
     """Return the ground that is hidden from a camera, a radar or the sun, shape (h, w).
@@ -76,10 +81,9 @@ def hidden_ground(heights: Heights, sight: LineOfSight) -> Mask:
     """
     if sight.tangent <= 0:
         return np.zeros(heights.surface_m.shape, bool)
-    rise_m = sight.pixel_m / sight.tangent
 
     def hidden(surface: _Lines, ground: _Lines) -> Mask:
-        return np.asarray(ground < _lowest_sight_m(surface, ground, rise_m) - _LEVEL_M)
+        return np.asarray(ground < _lowest_sight_m(surface, ground, sight.rise_m) - _LEVEL_M)
 
     return _along_rays(heights, sight, hidden)
 
@@ -95,8 +99,7 @@ def radar_echoes(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
     lean_px = 1 / (sight.pixel_m * sight.tangent)
 
     def echoes(surface: _Lines, ground: _Lines) -> NDArray[np.int32]:
-        rise_m = sight.pixel_m / sight.tangent
-        lowest = np.maximum(_lowest_sight_m(surface, ground, rise_m), ground)
+        lowest = np.maximum(_lowest_sight_m(surface, ground, sight.rise_m), ground)
         row, col = np.nonzero(surface > lowest + _LEVEL_M)
         before = surface[row, np.maximum(col - 1, 0)]
         roof = surface[row, col]
@@ -127,8 +130,7 @@ def double_bounce(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
     """
 
     def lines(surface: _Lines, ground: _Lines) -> NDArray[np.int32]:
-        rise_m = sight.pixel_m / sight.tangent
-        foot, lowest = surface[:, :-1], _lowest_sight_m(surface, ground, rise_m)[:, :-1]
+        foot, lowest = surface[:, :-1], _lowest_sight_m(surface, ground, sight.rise_m)[:, :-1]
         is_foot = (foot <= ground[:, :-1]) & (foot >= lowest - _LEVEL_M)
         # Ground that rises is no wall.
         is_foot &= surface[:, 1:] > ground[:, 1:]

@@ -17,15 +17,14 @@ from ..progress import SILENT, Progress
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
 from ..speckle.filters import SpeckleFilter
-from ..speckle.statistics import estimate_looks, local_statistics
+from ..speckle.statistics import LOOKS_WINDOW_PX, estimate_looks, local_statistics
 from .cast_shadow import out_of_shadow
-from .growing import Region, grow_regions
+from .growing import Region, Shape, grow_regions
 from .radar import power
 from .range_order import open_ground
 from .scene import Scene, Selection
-from .shapes import Shape
 from .skeleton import pruned, skeleton
-from .threshold import disc
+from .threshold import BLOCK_PX, disc, grown
 
 # Window by which skeletons are broadened, 5–19 m in [Suri2010], and percentage of the brightest
 # pixels inside that take no part after all.
@@ -36,10 +35,9 @@ HIGH_PERCENT = 10.0
 _MOST_PIXELS = 24_000_000
 
 _FILTER_PX = 7
-_SEED_PX = 9
 
-# Seeds vary little more than speckle alone; a region takes in pixels that differ from its seed by
-# so much.
+# Seeds vary little more than speckle alone, in the windows in which looks are estimated; a region
+# takes in pixels that differ from its seed by so much.
 _SEED_EXCESS = 1.3
 _TOLERANCE_DB = 2.5
 
@@ -193,9 +191,8 @@ def find_ground(
 
 def _broadened(lines: Mask, wide: Mask, width_m: float, pixel_m: float) -> Mask:
     """Return the skeleton with its window, the wide regions, and the border of both."""
-    broad = cv2.dilate(lines.astype(np.uint8), disc(max(round(width_m / pixel_m / 2), 1)))
-    border = disc(max(round(_BORDER_M / pixel_m), 1))
-    return np.asarray(cv2.dilate(((broad > 0) | wide).astype(np.uint8), border) > 0)
+    broad = grown(lines, max(round(width_m / pixel_m / 2), 1))
+    return grown(broad | wide, max(round(_BORDER_M / pixel_m), 1))
 
 
 def _kept_regions(
@@ -204,15 +201,15 @@ def _kept_regions(
     """Return the level in decibels, long regions on the ground, and large and wide ones."""
     intensity = power(patch)
     looks = estimate_looks(intensity, patch.valid)
-    variation2 = local_statistics(intensity, patch.valid, _SEED_PX).variation2
+    variation2 = local_statistics(intensity, patch.valid, LOOKS_WINDOW_PX).variation2
     level = _decibels(SpeckleFilter("enhanced-frost", _FILTER_PX, looks)(intensity, patch.valid))
     brightest = np.percentile(level[patch.valid], _BRIGHTEST_PERCENT)
     progress.update(0.5)
     smallest = max(int(_SMALLEST_M2 / pixel_m**2), 1)
-    grown = grow_regions(
+    found = grow_regions(
         level, variation2, patch.valid, _SEED_EXCESS / looks, _TOLERANCE_DB, smallest
     )
-    regions = [region for region in grown if region.level_db <= brightest]
+    regions = [region for region in found if region.level_db <= brightest]
     shadow_db = _darkest_db(regions) + _SHADOW_DB
     longs, wide = np.zeros(level.shape, bool), np.zeros(level.shape, bool)
     for region in regions:
@@ -258,8 +255,9 @@ def _decibels(intensity: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _smooth(patch: Patch) -> NDArray[np.float32]:
-    """Return the mean over 4 × 4 pixels around each pixel; invalid ones count as 0."""
-    return np.asarray(cv2.blur(np.where(patch.valid, patch.values, np.float32(0)), (4, 4)))
+    """Return the mean over as many pixels around each as in a block; invalid ones count as 0."""
+    known = np.where(patch.valid, patch.values, np.float32(0))
+    return np.asarray(cv2.blur(known, (BLOCK_PX, BLOCK_PX)))
 
 
 def _length_px(lines: Mask) -> float:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..progress import SILENT, Progress
 from ..rasters.averaging import area_average
-from ..rasters.grid import Grid, require_workable
+from ..rasters.grid import FloatArray, Grid, reproject, require_workable
 from ..rasters.patch import Patch
-from ..rasters.reading import Mask, RasterSource, Window
+from ..rasters.reading import FloatImage, Mask, RasterSource, Window
 from ..rasters.tiling import tile_count, tiles
+from ..rasters.warping import sample
 from ..rasters.writing import create_like, one_band
 
 
@@ -25,6 +26,9 @@ class Selection(NamedTuple):
     part: Mask
     valid: Mask
 
+
+# What returns which pixels of a window take part.
+Select = Callable[[Window], Selection]
 
 # Pixels of the result that are averaged at a time.
 _STRIP_PIXELS = 1 << 18
@@ -103,10 +107,22 @@ def block_means(patch: Patch, factor: int) -> Patch:
     return Patch(*area_average(patch.values, patch.valid, edges[0], edges[1]))
 
 
+def sampled_onto(
+    grid: Grid, raster: RasterSource, method: str, band: int | None = None
+) -> tuple[FloatImage, Mask]:
+    """Return a raster of any grid and map on the pixels of another: see `warping.sample`."""
+    own = raster.grid
+
+    def to_px(xy: FloatArray) -> FloatArray:
+        return own.map_to_pixel(reproject(xy, grid.crs, own.crs))
+
+    return sample(raster, grid, to_px, method, band)
+
+
 def write_mask(
     scene: Scene,
     path: str | os.PathLike[str],
-    select: Callable[[Window], Selection],
+    select: Select,
     progress: Progress = SILENT,
 ) -> float:
     """Write a mask raster, 1 where pixels take part and else 0, and return the share of them.
@@ -127,14 +143,40 @@ def write_mask(
     float
         Share of the valid pixels that take part, 0 to 1.
     """
-    like = one_band(scene.like, "uint8")
-    count = tile_count(scene.grid)
     selected = valid = 0
-    with create_like(like, scene.grid, path, nodata=None) as file:
-        for i, tile in enumerate(tiles(scene.grid)):
-            chosen = select(tile)
-            selected += int(np.count_nonzero(chosen.part))
-            valid += int(np.count_nonzero(chosen.valid))
-            file.write(chosen.part.astype(np.uint8), window=tile)
-            progress.update((i + 1) / count)
+
+    def part(tile: Window) -> NDArray[np.uint8]:
+        nonlocal selected, valid
+        chosen = select(tile)
+        selected += int(np.count_nonzero(chosen.part))
+        valid += int(np.count_nonzero(chosen.valid))
+        return chosen.part.astype(np.uint8)
+
+    write_tiles(scene, path, part, progress)
     return selected / max(valid, 1)
+
+
+def write_tiles(
+    scene: Scene,
+    path: str | os.PathLike[str],
+    values: Callable[[Window], NDArray[Any]],
+    progress: Progress = SILENT,
+    dtype: str = "uint8",
+    nodata: float | None = None,
+) -> None:
+    """Write a raster of one band on a scene's grid, tile by tile.
+
+    Parameters
+    ----------
+    scene, path, progress
+        As `write_mask` takes them.
+    values
+        Returns the pixels of a tile.
+    dtype, nodata
+        Of the raster.
+    """
+    count = tile_count(scene.grid)
+    with create_like(one_band(scene.like, dtype), scene.grid, path, nodata=nodata) as file:
+        for number, tile in enumerate(tiles(scene.grid), start=1):
+            file.write(values(tile), window=tile)
+            progress.update(number / count)

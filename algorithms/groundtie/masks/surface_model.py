@@ -20,11 +20,10 @@ from ..geometry.views import RADAR, View, direction
 from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
 from ..rasters.reading import FloatImage, Mask, Window
-from ..rasters.tiling import tile_count, tiles
-from ..rasters.writing import create_like, one_band
+from ..rasters.tiling import tiles
 from .object_heights import GROUND_REACH_M, LOWEST_M, SurfaceModel, ground_cell_px
 from .ray_casting import Heights, LineOfSight, double_bounce, hidden_ground, radar_echoes
-from .scene import Scene, Selection
+from .scene import Scene, Selection, write_tiles
 from .threshold import grown
 
 # Brightness of shadow, that of ground being 1; what correlates with it hardly depends on it.
@@ -132,18 +131,15 @@ class SurfaceGround:
         cell = ground_cell_px(self.scene.grid.pixel_size_m)
         around = (reach_m + GROUND_REACH_M) / self.scene.grid.pixel_size_m
         reach = math.ceil(around) + _GROWN_PX + cell
-        left, above = (reach + (at - reach) % cell for at in window[:2])
-        first_px = window.col - left, window.row - above
-        width, height = left + window.width + reach, above + window.height + reach
+        piece = window.widened(reach).aligned(cell)
         right, down = self.offset_px
-        heights, known = self.model.heights(
-            self.scene.grid.window(first_px[0] - right, first_px[1] - down, width, height)
-        )
+        moved = piece._replace(col=piece.col - right, row=piece.row - down)
+        heights, known = self.model.heights(self.scene.grid.window(*moved))
         # What counts as ground hides nothing.
         stands = heights.surface_m - heights.ground_m > LOWEST_M
         surface = np.where(stands, heights.surface_m, heights.ground_m)
-        inside = slice(above, above + window.height), slice(left, left + window.width)
-        return Heights(surface, heights.ground_m, first_px), known, inside
+        first_px = piece.col, piece.row
+        return Heights(surface, heights.ground_m, first_px), known, window.slices_in(piece)
 
     @cached_property
     def _highest_m(self) -> float | None:
@@ -156,16 +152,6 @@ class SurfaceGround:
         return max(highest, default=None)
 
 
-def write_reasons(ground: SurfaceGround, path: Path, progress: Progress = SILENT) -> None:
-    """Write a raster of `Seen`: why pixels take no part; see `scene.write_mask`."""
-    grid = ground.scene.grid
-    like = one_band(ground.scene.like, "uint8")
-    with create_like(like, grid, path, nodata=None) as file:
-        for number, tile in enumerate(tiles(grid)):
-            file.write(ground.seen(tile), window=tile)
-            progress.update((number + 1) / tile_count(grid))
-
-
 def write_image(
     ground: SurfaceGround,
     view: View,
@@ -174,12 +160,11 @@ def write_image(
     bounce: float = DOUBLE_BOUNCE,
 ) -> None:
     """Write a raster of `SurfaceGround.image`."""
-    grid = ground.scene.grid
-    like = one_band(ground.scene.like, "float32")
-    with create_like(like, grid, path, nodata=math.nan) as file:
-        for number, tile in enumerate(tiles(grid)):
-            file.write(ground.image(tile, view, bounce), window=tile)
-            progress.update((number + 1) / tile_count(grid))
+
+    def image(tile: Window) -> FloatImage:
+        return ground.image(tile, view, bounce)
+
+    write_tiles(ground.scene, path, image, progress, "float32", math.nan)
 
 
 def _longest(view: View) -> float:

@@ -25,23 +25,27 @@ HIGH_PERCENT = 20.0
 
 
 @dataclass(frozen=True)
-class Threshold:
-    """Which shares of a scene's grey values are masked.
+class ThresholdMask:
+    """The blocks of a scene whose mean grey values are `low` to `high`.
 
-    Parameters
-    ----------
-    high_percent, low_percent
-        Percentage of the brightest and of the darkest blocks.
-    grow_px
-        Distance, in pixels, up to which the surroundings of masked blocks are masked, too.
+    What lies up to `grow_px` pixels beside other blocks takes no part, either.
     """
 
-    high_percent: float
-    low_percent: float = 0.0
-    grow_px: int = 0
+    scene: Scene
+    low: float
+    high: float
+    grow_px: int
 
-    def on(self, scene: Scene, progress: Progress = SILENT) -> ThresholdMask:
-        """Return the mask of a scene.
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        high_percent: float = HIGH_PERCENT,
+        low_percent: float = 0.0,
+        grow_px: int = 0,
+        progress: Progress = SILENT,
+    ) -> ThresholdMask:
+        """Return the mask of a scene without some percent of its brightest and darkest blocks.
 
         Raises
         ------
@@ -51,37 +55,22 @@ class Threshold:
         sample = scene.sample(BLOCK_PX, progress)
         if sample.size == 0:
             raise RasterContentError(f"{scene.like.path} has no valid pixels to make a mask of")
-        low, high = np.percentile(sample, [self.low_percent, 100 - self.high_percent])
-        return ThresholdMask(
+        low, high = np.percentile(sample, [low_percent, 100 - high_percent])
+        return cls(
             scene,
-            float(low) if self.low_percent > 0 else -np.inf,
-            float(high) if self.high_percent > 0 else np.inf,
-            self.grow_px,
+            float(low) if low_percent > 0 else -np.inf,
+            float(high) if high_percent > 0 else np.inf,
+            grow_px,
         )
-
-
-@dataclass(frozen=True)
-class ThresholdMask:
-    """Selects the blocks of a scene whose mean grey values are `low` to `high`."""
-
-    scene: Scene
-    low: float
-    high: float
-    grow_px: int
 
     def select(self, window: Window) -> Selection:
         """Return which pixels of a window take part."""
         # Whole blocks, and as many around as the mask grows by.
-        left, top = (_blocks_before(at - self.grow_px) for at in (window.col, window.row))
-        right = _blocks_after(window.col + window.width + self.grow_px)
-        bottom = _blocks_after(window.row + window.height + self.grow_px)
-        patch = self.scene.read(Window(left, top, right - left, bottom - top))
+        around = window.widened(self.grow_px).aligned(BLOCK_PX)
+        patch = self.scene.read(around)
         means = block_means(patch, BLOCK_PX)
         out = means.valid & ((means.values > self.high) | (means.values < self.low))
-        inside = np.s_[
-            window.row - top : window.row - top + window.height,
-            window.col - left : window.col - left + window.width,
-        ]
+        inside = window.slices_in(around)
         full = np.repeat(np.repeat(out, BLOCK_PX, axis=0), BLOCK_PX, axis=1)
         valid = patch.valid[inside]
         return Selection(valid & ~grown(full, self.grow_px)[inside], valid)
@@ -98,11 +87,3 @@ def disc(radius_px: int) -> NDArray[np.uint8]:
     """Return the pixels within a distance of the centre, shape (2 r + 1, 2 r + 1), as 0 and 1."""
     offset = np.arange(-radius_px, radius_px + 1)
     return np.asarray(np.hypot.outer(offset, offset) <= radius_px + 0.5, np.uint8)
-
-
-def _blocks_before(position: int) -> int:
-    return position // BLOCK_PX * BLOCK_PX
-
-
-def _blocks_after(position: int) -> int:
-    return -(-position // BLOCK_PX) * BLOCK_PX

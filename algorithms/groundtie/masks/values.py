@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ParameterError
-from ..rasters.grid import reproject
 from ..rasters.reading import Mask, RasterSource, Window
-from ..rasters.warping import sample
-from .scene import Scene, Selection
+from .scene import Scene, Selection, sampled_onto
 
 # What a vector layer is if it shows what takes no part.
 INSIDE = "inside"
@@ -116,13 +114,6 @@ class RasterMask:
         """Return which pixels of a window take part."""
         bands = tuple(replace(band, nodata=None) for band in self.mask.bands)
         mask = replace(self.mask, bands=bands, has_mask_band=False)
-        piece, grid = self.scene.grid.window(*window), mask.grid
-        found, inside = sample(
-            mask,
-            piece,
-            lambda xy: grid.map_to_pixel(reproject(xy, piece.crs, grid.crs)),
-            "nearest",
-            1,
-        )
+        found, inside = sampled_onto(self.scene.grid.window(*window), mask, "nearest", 1)
         valid = self.scene.read(window).valid
         return Selection(valid & inside & ~self.values.excluded(found), valid)

@@ -90,9 +90,7 @@ def coarse_candidates(
         return [Candidate(_shift_on_map(place, level), place.height) for place in places]
     windows = read_windows(pair.reference, pair.input, limits.scale, limits.radius, held_out)
     pose_limits = windows.limits(limits.rotation_deg, limits.scale)
-    found = find_poses(windows.reference, windows.input, pose_limits, settings, context.quiet())[
-        :CANDIDATES
-    ]
+    found = find_poses(windows.reference, windows.input, pose_limits, context.quiet())[:CANDIDATES]
     high = [one for one in found if one.height > found[0].height * _LOW]
     poses = [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in high]
     if not poses:

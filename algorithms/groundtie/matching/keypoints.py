@@ -12,7 +12,7 @@ from ..context import Context
 from ..features.detectors import seen_whole
 from ..features.keypoints import Keypoints
 from ..features.matching import match_near
-from ..features.tiles import MARGIN_PX, Describing, Detecting, inside, tiles, widened
+from ..features.tiles import MARGIN_PX, Describing, Detecting, inside, tiles
 from ..geometry.models import Model
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
@@ -134,7 +134,7 @@ class KeypointMatcher:
                 self.shown.input_patch(piece, nominal_px).valid,
             )
         own = self._features(reference, core, parts[0])
-        others = self._features(input, widened(core, gate), parts[1])
+        others = self._features(input, core.widened(gate), parts[1])
         points, descriptors = self.descriptor.describe(reference, own)
         partners, partner_descriptors = self.descriptor.describe(input, others)
         matches = match_near(
@@ -168,11 +168,8 @@ def seen_around(tile: Window, grid: Grid, gate: int) -> Window:
 
     Further beyond the grid mostly nothing is valid, and all that is done there is done in vain.
     """
-    seen = widened(tile, gate + MARGIN_PX)
-    most = widened(Window(0, 0, grid.width, grid.height), gate)
-    low = np.maximum(seen[:2], most[:2])
-    high = np.minimum(np.add(seen[:2], seen[2:]), np.add(most[:2], most[2:]))
-    return Window(*low.tolist(), *(high - low).tolist())
+    whole = Window(0, 0, grid.width, grid.height)
+    return tile.widened(gate + MARGIN_PX).common(whole.widened(gate))
 
 
 def correspondences(matches: KeypointMatches, radius_px: int) -> Correspondences:

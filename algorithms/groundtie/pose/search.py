@@ -18,7 +18,7 @@ from ..context import Context
 from ..geometry.limits import SearchLimits
 from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
-from ..similarity.surface import SimilaritySettings, Surface
+from ..similarity.surface import Surface
 from .pose import Pose, PoseFound
 from .rotation_fields import Template
 from .rotation_levels import HEIGHT, Climber, Level
@@ -71,7 +71,6 @@ def find_poses(
     reference: Patch,
     input: Patch,
     limits: SearchLimits,
-    settings: SimilaritySettings,
     context: Context,
 ) -> list[PoseFound]:
     """Return how an input window may lie against a reference window, best first.
@@ -82,9 +81,6 @@ def find_poses(
         The windows; their sizes may differ, their centres are compared.
     limits
         Within which rotation, scale and shift (in input pixels) are searched for.
-    settings
-        Not used: similarity is the correlation of squared orientation fields. The searches that
-        are compared with this one have it.
     context
         Threads to work in.
 

@@ -43,6 +43,19 @@ class Window(NamedTuple):
         bottom = min(self.row + self.height, other.row + other.height)
         return Window(left, top, right - left, bottom - top)
 
+    def widened(self, margin: int) -> Window:
+        """Return it with a margin on each side."""
+        size = self.width + 2 * margin, self.height + 2 * margin
+        return Window(self.col - margin, self.row - margin, *size)
+
+    def aligned(self, side: int) -> Window:
+        """Return the whole blocks, of a side and counted from pixel 0, that hold it."""
+        left, top = self.col // side * side, self.row // side * side
+        right, bottom = (
+            -(-end // side) * side for end in (self.col + self.width, self.row + self.height)
+        )
+        return Window(left, top, right - left, bottom - top)
+
     def slices_in(self, whole: Window) -> tuple[slice, slice]:
         """Return its rows and columns in the array of a window that holds it."""
         return self._replace(col=self.col - whole.col, row=self.row - whole.row).slices

@@ -6,30 +6,20 @@ masks one image of the pair (see `user_masks`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cached_property
 
 from ..context import Context
 from ..errors import ParameterError
-from ..masks import threshold
 from ..masks.cast_shadow import shadow_azimuth_deg
-from ..masks.choice import (
-    AUTO,
-    NONE,
-    REGIONS,
-    MaskUsed,
-    choose,
-    is_reliable,
-)
+from ..masks.choice import AUTO, NONE, REGIONS, MaskUsed, choose, is_reliable
 from ..masks.regions import GroundRegions, find_ground
-from ..masks.scene import Scene, Selection
+from ..masks.scene import Scene, Select
 from ..masks.surface_model import SurfaceGround
-from ..masks.threshold import Threshold
+from ..masks.threshold import ThresholdMask
 from ..rasters.pair import ImagePair
 from ..rasters.patch import middle_window
-from ..rasters.reading import Window
 from .scene import SceneInfo
 from .user_masks import with_mask
 
@@ -98,47 +88,46 @@ def with_ground_mask(
     town = _Town(pair, scene, stack, context)
     reason = "as asked for"
     if kind == AUTO:
-        kind, reason = choose(scene.radar.strong_share, lambda: is_reliable(town.regions()))
+        kind, reason = choose(scene.radar.strong_share, lambda: is_reliable(town.regions))
     if kind == REGIONS:
-        regions = town.regions()
-        masked, share = town.masked(regions.select)
-        used = MaskUsed(REGIONS, scene.radar_name, share, reason, is_reliable(regions))
+        masked, share = town.masked(town.regions.select)
+        used = MaskUsed(REGIONS, scene.radar_name, share, reason, is_reliable(town.regions))
         return Masked(masked, used)
-    ground = town.ground() if scene.is_dense_town else None
+    ground = town.masked(town.regions.select)[0] if scene.is_dense_town else None
     if kind == NONE:
         return Masked(pair, MaskUsed(NONE, None, 1.0, reason), ground)
-    by_level = Threshold(threshold.HIGH_PERCENT, 0.0, 0).on(town.scene, context.progress)
+    by_level = ThresholdMask.of(town.scene, progress=context.progress)
     masked, share = town.masked(by_level.select)
     return Masked(masked, MaskUsed(kind, scene.radar_name, share, reason), ground)
 
 
+@dataclass(frozen=True)
 class _Town:
     """The radar image of a pair, and its ground, which is found once."""
 
-    def __init__(
-        self, pair: ImagePair, info: SceneInfo, stack: ExitStack, context: Context
-    ) -> None:
-        self._pair, self._info, self._stack, self._context = pair, info, stack, context
-        self.scene: Scene = info.radar.scene
-        self.regions: Callable[[], GroundRegions] = cache(self._find)
+    pair: ImagePair
+    info: SceneInfo
+    stack: ExitStack
+    context: Context
 
-    def masked(self, select: Callable[[Window], Selection]) -> tuple[ImagePair, float]:
-        """Return the pair with a mask on the radar image, and the share that takes part."""
-        name = self._info.radar_name
-        return with_mask(self._pair, name, self.scene, select, self._stack, self._context)
+    @property
+    def scene(self) -> Scene:
+        return self.info.radar.scene
 
-    def ground(self) -> ImagePair:
-        """Return the pair with a mask of the ground on the radar image."""
-        return self.masked(self.regions().select)[0]
-
-    def _find(self) -> GroundRegions:
-        progress = self._context.progress
-        if self._info.is_dense_town:
+    @cached_property
+    def regions(self) -> GroundRegions:
+        progress = self.context.progress
+        if self.info.is_dense_town:
             return find_ground(self.scene, progress=progress, is_town=True)
-        other = self._info.other.scene
+        other = self.info.other.scene
         middle = other.read(middle_window(other.grid))
         shadow = shadow_azimuth_deg(middle) if middle.valid.any() else None
         return find_ground(self.scene, progress=progress, shadow_azimuth_deg=shadow)
+
+    def masked(self, select: Select) -> tuple[ImagePair, float]:
+        """Return the pair with a mask on the radar image, and the share that takes part."""
+        name = self.info.radar_name
+        return with_mask(self.pair, name, self.scene, select, self.stack, self.context)
 
 
 def require_one_mask(kind: str, used: MaskUsed | None) -> None:

@@ -25,7 +25,6 @@ from ..pose.rotation_windows import DEFAULT_RADIUS_SHARE
 from ..pose.search import find_poses, moved_px
 from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
-from ..similarity.surface import SimilaritySettings
 from .evidence import (
     AGREEMENT,
     ERROR,
@@ -92,7 +91,7 @@ class PoseEvidence:
             low, high = limits.scale
             radius = max(limits.radius, least_radius)
             wide = SearchLimits(radius, 180.0, (min(low, 0.8), max(high, 1.25)))
-            everything = find_poses(*windows, wide, SimilaritySettings(), context)
+            everything = find_poses(*windows, wide, context)
         rows, cols = windows[0].values.shape
         return cls(found, everything, (rows, cols))
 

@@ -6,7 +6,6 @@ masks one image of the pair.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,17 +15,17 @@ from ..context import Context
 from ..errors import ParameterError
 from ..features.classified import ClassifiedScene
 from ..features.classifier import read_classifier
-from ..features.patch_statistics import FloatImage
 from ..masks.beside import mask_beside
 from ..masks.choice import INPUT, LAYER, NONE, REFERENCE, MaskUsed
 from ..masks.layer import read_layer
 from ..masks.regions import WIDTH_M
-from ..masks.scene import Scene, Selection, write_mask
+from ..masks.scene import Scene, Select, write_mask
 from ..masks.values import INSIDE, RasterMask, mask_values
+from ..progress import Progress
 from ..raster_names import file_name, raster_name
 from ..rasters.atomic import scratch_folder
 from ..rasters.pair import ImagePair
-from ..rasters.reading import Window, open_raster
+from ..rasters.reading import FloatImage, RasterSource, Window, open_raster
 from .scene import scene_of
 
 _CLASSIFIER_SUFFIX = ".json"
@@ -75,7 +74,8 @@ class UserMask:
             found = mask_beside(raster_name(image)) if is_named else None
             if found is None:
                 return None
-            return cls(found.path, found.scheme, f", found beside {file_name(image)},")
+            path, scheme = found
+            return cls(path, scheme, f", found beside {file_name(image)},")
         if values is not None:
             _check_values(mask, values)
         return cls(mask, values)
@@ -164,8 +164,12 @@ def with_user_masks(
             image = replace(getattr(pair, name), mask=stack.enter_context(open_raster(mask.mask)))
             pair = replace(pair, **{name: image})
             continue
-        select = _selection(pair, name, mask, stack)
-        pair, share = with_mask(pair, name, scene_of(pair, name), select, stack, context)
+        scene = scene_of(pair, name)
+        if mask.is_layer or mask.values is not None:
+            select = select_drawn(scene, mask, stack)
+        else:
+            select = _scene_classifier(pair, name, scene, Path(mask.mask)).select
+        pair, share = with_mask(pair, name, scene, select, stack, context)
         if mask.is_layer and mask.values is None:
             used = MaskUsed(LAYER, name, share, f"what {mask.name} covers")
         note = f"{mask.name}{mask.origin} keeps {share:.0%} of the {name}"
@@ -176,25 +180,12 @@ def with_user_masks(
     return pair, used
 
 
-def _selection(
-    pair: ImagePair, name: str, mask: UserMask, stack: ExitStack
-) -> Callable[[Window], Selection]:
-    """Return what tells which pixels of a window of an image a mask keeps."""
-    scene = scene_of(pair, name)
-    if mask.values is not None:
-        return select_by_values(scene, mask, stack)
+def select_drawn(scene: Scene, mask: UserMask, stack: ExitStack) -> Select:
+    """Return what selects the pixels of a scene that a layer, or a raster's values, keep."""
     if mask.is_layer:
-        return read_layer(mask.mask, scene, WIDTH_M).select
-    return _scene_classifier(pair, name, scene, Path(mask.mask)).select
-
-
-def select_by_values(
-    scene: Scene, mask: UserMask, stack: ExitStack
-) -> Callable[[Window], Selection]:
-    """Return what tells which pixels of a window of a scene a mask's values keep."""
+        layer = read_layer(mask.mask, scene, WIDTH_M)
+        return replace(layer, is_outside=mask.values is not None).select
     assert mask.values is not None
-    if mask.is_layer:
-        return replace(read_layer(mask.mask, scene, WIDTH_M), is_outside=True).select
     source = stack.enter_context(open_raster(mask.mask))
     return RasterMask(scene, source, mask_values(mask.values)).select
 
@@ -227,7 +218,7 @@ def with_mask(
     pair: ImagePair,
     name: str,
     scene: Scene,
-    select: Callable[[Window], Selection],
+    select: Select,
     stack: ExitStack,
     context: Context,
 ) -> tuple[ImagePair, float]:
@@ -235,7 +226,14 @@ def with_mask(
 
     The mask is a file until the stack is closed.
     """
-    folder = stack.enter_context(scratch_folder())
-    share = write_mask(scene, folder / "mask.tif", select, context.quiet().progress)
-    mask = stack.enter_context(open_raster(folder / "mask.tif"))
+    mask, share = drawn_mask(scene, select, stack, context.quiet().progress)
     return replace(pair, **{name: replace(getattr(pair, name), mask=mask)}), share
+
+
+def drawn_mask(
+    scene: Scene, select: Select, stack: ExitStack, progress: Progress
+) -> tuple[RasterSource, float]:
+    """Return what takes part of a scene as a file until the stack is closed, and its share."""
+    path = stack.enter_context(scratch_folder()) / "mask.tif"
+    share = write_mask(scene, path, select, progress)
+    return stack.enter_context(open_raster(path)), share

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
-from ..masks.scene import Scene, Selection, write_mask
+from ..masks.scene import Scene, Select, Selection
 from ..progress import Progress
-from ..rasters.atomic import scratch_folder
 from ..rasters.pair import Image
 from ..rasters.reading import RasterSource, Window, open_raster
-from ..registration.user_masks import UserMask, select_by_values
+from ..registration.user_masks import UserMask, drawn_mask, select_drawn
 
 
 @dataclass(frozen=True)
@@ -55,20 +53,16 @@ def draw_mask(
         Receives every tile.
     """
     scene = Scene.of(source)
-    folder = stack.enter_context(scratch_folder())
     with ExitStack() as own:
         select = _selection(scene, source, mask, own)
-        share = write_mask(scene, folder / "mask.tif", select, progress)
-    raster = stack.enter_context(open_raster(folder / "mask.tif"))
+        raster, share = drawn_mask(scene, select, stack, progress)
     note = f"{mask.name}{mask.origin} keeps {share:.0%} of {source.path}"
     return DateMask(raster, mask.values is not None, note)
 
 
-def _selection(
-    scene: Scene, source: RasterSource, mask: UserMask, stack: ExitStack
-) -> Callable[[Window], Selection]:
+def _selection(scene: Scene, source: RasterSource, mask: UserMask, stack: ExitStack) -> Select:
     if mask.values is not None:
-        return select_by_values(scene, mask, stack)
+        return select_drawn(scene, mask, stack)
     raster = stack.enter_context(open_raster(mask.mask))
     image, grid = Image(source, mask=raster), source.grid
 

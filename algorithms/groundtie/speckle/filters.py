@@ -13,9 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ..rasters.reading import FloatImage, Mask
 from .frost import enhanced_frost
 from .isef import decay_for_window, isef
-from .statistics import FloatImage, LocalStatistics, Mask, local_statistics
+from .statistics import LocalStatistics, local_statistics
 
 # Side of tiles that stay, with all that filters need, in the processor's cache.
 _TILE_PX = 256

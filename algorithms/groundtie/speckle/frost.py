@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .statistics import FloatImage, LocalStatistics, Mask
+from ..rasters.reading import FloatImage, Mask
+from .statistics import LocalStatistics
 
 
 def enhanced_frost(

@@ -72,16 +72,14 @@ class RasterFilter:
 
     def tile(self, tile: Window) -> tuple[NDArray[Any], Mask]:
         """Return all bands of a tile, filtered, and which pixels of the first are valid."""
-        reach, source = self.filter.reach_px, self.source
-        around = Window(
-            tile.col - reach, tile.row - reach, tile.width + 2 * reach, tile.height + 2 * reach
-        )
-        inside = np.s_[:, reach : reach + tile.height, reach : reach + tile.width]
+        source, around = self.source, tile.widened(self.filter.reach_px)
+        inside = tile.slices_in(around)
         values, valid = source.read_bands(around)
-        out = np.empty_like(values[inside], dtype=np.float32 if source.is_complex else None)
+        dtype = np.dtype(np.float32) if source.is_complex else values.dtype
+        out = np.empty((source.count, tile.height, tile.width), dtype)
         for i in range(source.count):
-            out[i] = self._filtered(values[i], valid[i], i + 1, out.dtype)[inside[1:]]
-        return out, valid[inside][0]
+            out[i] = self._filtered(values[i], valid[i], i + 1, dtype)[inside]
+        return out, valid[0][inside]
 
     def _filtered(
         self, values: NDArray[Any], valid: Mask, band: int, dtype: np.dtype[Any]

@@ -14,7 +14,7 @@ _NO_POWER = np.float32(1e-30)
 
 # Window in which looks are estimated, and the bins, in octaves of the squared coefficient of
 # variation; homogeneous areas share the fullest. No image has less than one look.
-_LOOKS_WINDOW_PX = 9
+LOOKS_WINDOW_PX = 9
 _BIN_OCTAVES = 0.125
 _OCTAVES = (-14.0, 0.375)
 _PEAK = 0.2
@@ -118,8 +118,8 @@ def estimate_looks(intensity: FloatImage, valid: Mask) -> float:
     float
         At least 1, which is returned, too, if no window is valid or none varies.
     """
-    variation2 = local_statistics(intensity, valid, _LOOKS_WINDOW_PX).variation2
-    full = window_counts(valid, _LOOKS_WINDOW_PX) >= _LEAST_VALID * _LOOKS_WINDOW_PX**2
+    variation2 = local_statistics(intensity, valid, LOOKS_WINDOW_PX).variation2
+    full = window_counts(valid, LOOKS_WINDOW_PX) >= _LEAST_VALID * LOOKS_WINDOW_PX**2
     inside = (variation2 > 2 ** _OCTAVES[0]) & (variation2 < 2 ** _OCTAVES[1])
     usual = variation2[full & inside]
     if usual.size == 0:

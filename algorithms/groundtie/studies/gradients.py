@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features.gradients import FloatImage, Gradient, GradientOperator, differences
+from ..features.scale_space import Gradient, GradientOperator, differences
+from ..rasters.reading import FloatImage
 from ..speckle.isef import isef_along
 
 # Decay of the exponential averages, per pixel.

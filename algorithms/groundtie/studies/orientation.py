@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features.gradients import Gradient
 from ..features.keypoints import Keypoints
 from ..features.sampling import sampled_gradient, square_lattice
+from ..features.scale_space import Gradient
 
 # Orientation: bins of its histogram, width of its window in scales, how far it reaches in widths,
 # and how high a further peak must be.

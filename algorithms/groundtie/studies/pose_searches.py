@@ -24,7 +24,13 @@ HISTOGRAM_SEARCHES = frozenset({"spsa", "spsa2", "discrete-spsa", "powell", "nel
 
 
 class PoseSearch(Protocol):
-    """A way to find the pose of an input window in a reference window; see `find_poses`."""
+    """A way to find the pose of an input window in a reference window, as `find_poses` does.
+
+    Parameters
+    ----------
+    settings
+        Similarity of the searches that climb a joint histogram.
+    """
 
     def __call__(
         self,
@@ -37,9 +43,20 @@ class PoseSearch(Protocol):
         """Search within limits; return candidates, best first."""
 
 
+def rotation_steps(
+    reference: Patch,
+    input: Patch,
+    limits: SearchLimits,
+    settings: SimilaritySettings,
+    context: Context,
+) -> list[PoseFound]:
+    """Search as registrations do, by orientation fields whatever the similarity."""
+    return find_poses(reference, input, limits, context)
+
+
 SEARCHES = MappingProxyType[str, PoseSearch](
     {
-        DEFAULT_SEARCH: find_poses,
+        DEFAULT_SEARCH: rotation_steps,
         "fourier-mellin": fourier_mellin,
         "radon": radon,
         "phase-correlation": phase_correlation,

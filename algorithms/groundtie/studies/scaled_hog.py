@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..features.gradients import FloatImage, Gradient, differences
 from ..features.hog import CELLS, PATCH_PX, directed_shares, weights_along
 from ..features.keypoints import Keypoints
 from ..features.sampling import sampled_gradient, square_lattice, unit_rows
-from ..features.scale_space import describe_at_scales
+from ..features.scale_space import Gradient, describe_at_scales, differences
 from ..rasters.patch import Patch
+from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from .orientation import oriented
 

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from ..features.descriptors import LENGTH, sift_rows
 from ..features.detectors import SiftDetector, SiftOctDetector
-from ..features.gradients import FloatImage
 from ..features.keypoints import Keypoints
 from ..features.scale_space import describe_at_scales
 from ..rasters.patch import Patch, is_logarithmic
+from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from ..speckle.isef import isef
 from .gradients import GRADIENTS, gradient_operator, needs_positive

@@ -12,8 +12,7 @@ from ..declaration import tool
 from ..errors import ParameterError
 from ..geometry.views import View, split_views, stated_view
 from ..kinds import RasterOut
-from ..masks.scene import Scene, write_mask
-from ..masks.surface_model import write_reasons
+from ..masks.scene import Scene, write_mask, write_tiles
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
@@ -67,7 +66,7 @@ def mask_surface(
         with Outputs() as outputs:
             share = write_mask(scene, outputs.stage(output), ground.select, progress.part(0.1, 0.6))
             if reasons is not None:
-                write_reasons(ground, outputs.stage(reasons), progress.part(0.6, 1.0))
+                write_tiles(scene, outputs.stage(reasons), ground.seen, progress.part(0.6, 1.0))
     if fit is None:
         unknown = {"correlation": None, "offset_px": None}
         return WrittenMask(share, unknown, "nothing is expected of the image", files)

@@ -7,7 +7,7 @@ import math
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
 from ..masks.scene import Scene, write_mask
-from ..masks.threshold import HIGH_PERCENT, Threshold
+from ..masks.threshold import HIGH_PERCENT, ThresholdMask
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
@@ -39,8 +39,8 @@ def mask_threshold(
         scene = Scene.of(source, band)
         grow_px = round(mask_growth / source.grid.pixel_size_m)
         high = HIGH_PERCENT if mask_high_percent is None else mask_high_percent
-        threshold = Threshold(high, mask_low_percent, grow_px)
-        mask = threshold.on(scene, progress.part(0.0, 0.3))
+        searching = progress.part(0.0, 0.3)
+        mask = ThresholdMask.of(scene, high, mask_low_percent, grow_px, searching)
         with Outputs() as outputs:
             share = write_mask(scene, outputs.stage(output), mask.select, progress.part(0.3, 1.0))
     limits = {"low": mask.low, "high": mask.high}

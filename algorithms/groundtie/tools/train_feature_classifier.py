@@ -154,7 +154,7 @@ def train_feature_classifier(
             source = layer_labels(labels, field, values, image.source.grid)
         else:
             assert label_raster is not None
-            source = raster_labels(stack.enter_context(open_raster(label_raster)), image, values)
+            source = raster_labels(stack.enter_context(open_raster(label_raster)), values)
         detector = SiftDetector(_CONTRAST)
         with threads(progress=progress.part(0.0, 0.6)) as context:
             points = labelled_points(image, source, detector, statistics, context)
