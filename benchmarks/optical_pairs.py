@@ -15,7 +15,7 @@ import numpy as np
 from groundtie.geometry.transform import Transform, load_transform
 from groundtie.simulation.misregistration import (
     DistortionOptions,
-    SourcePositions,
+    Positions,
     draw_misregistration,
     needed_margin,
     resample,
@@ -95,7 +95,7 @@ class OpticalPair:
         write_image(image[None], grid.transform, reference_path)
         light = render_radiance(later, _LATER)[0]
         blur(light, _LATER.psf_sigma_px)
-        seen = resample(light, SourcePositions.of(truth, scene_grid(grid, around)), self.size)
+        seen = resample(light, Positions.interpolated(truth, scene_grid(grid, around)))
         write_image(quantise(seen, _LATER, noise[1])[None], grid.transform, input_path)
         truth_path.write_text(json.dumps(truth.to_json()), encoding="utf-8")
 

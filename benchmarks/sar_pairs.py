@@ -20,12 +20,18 @@ from groundtie.geometry.transform import Transform, load_transform
 from groundtie.rasters.grid import Grid
 from groundtie.simulation.misregistration import (
     DistortionOptions,
-    SourcePositions,
+    Positions,
     draw_misregistration,
     needed_margin,
     resample,
 )
-from groundtie.simulation.sar import SarOptions, add_speckle, quantise_amplitude, sar_power
+from groundtie.simulation.sar import (
+    NOISE_FLOOR,
+    SarOptions,
+    add_speckle,
+    quantise_amplitude,
+    sar_power,
+)
 from groundtie.simulation.scene import Scene, SceneOptions, generate_scenes
 
 from .accuracy import Truth
@@ -38,9 +44,6 @@ from .simulations import linear_of, simulator_version
 INCIDENCES_DEG = (30.0, 40.0)
 CHANGED_BUILDINGS = 0.1
 _CHANGED_PARCELS, _CHANGE_DB = 0.3, 4.0
-
-# Bright points would ring when they are resampled: nothing is darker than the noise floor.
-_FLOOR = 10 ** (-25 / 10)
 
 # The second image's textures and speckle are others.
 _LATER = 100_000
@@ -131,9 +134,10 @@ class SarPair:
         image = quantise_amplitude(power, first)
         write_image(image[None], grid.transform, reference_path)
         wide = grid.window(-around, -around, *options.size_px)
-        positions = SourcePositions.of(truth, wide)
-        seen = resample(sar_power(_changed(later), second), positions, self.size)
-        power = add_speckle(np.maximum(seen, np.float32(_FLOOR)), looks, speckle[1])
+        positions = Positions.interpolated(truth, wide)
+        seen = resample(sar_power(_changed(later), second), positions)
+        # Bright points ring when they are resampled: nothing is darker than the noise floor.
+        power = add_speckle(np.maximum(seen, np.float32(NOISE_FLOOR)), looks, speckle[1])
         write_image(quantise_amplitude(power, second)[None], grid.transform, input_path)
         hidden = _hidden(earlier, first) | _hidden(later, second)
         beside = np.ones((2 * _BESIDE_PX + 1,) * 2, np.uint8)
@@ -146,8 +150,7 @@ def _hidden(scene: Scene, sar: SarOptions) -> NDArray[np.bool_]:
     """Return what of the ground an image does not show: under layover, in shadow, built upon."""
     tangent = math.tan(math.radians(sar.incidence_deg))
     height_px = scene.object_m / scene.pixel_size_m
-    # A radar that looks towards larger columns sees heights lean towards smaller ones.
-    towards = -1 if sar.orbit == "ascending" else 1
+    towards = sar.towards_radar
     hidden = height_px > 0
     for direction, reach in ((towards, 1 / tangent), (-towards, tangent)):
         for steps in range(1, math.ceil(float(height_px.max()) * reach) + 1):

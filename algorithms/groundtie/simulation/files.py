@@ -113,10 +113,9 @@ def truth_json(pair: SimulatedPair) -> dict[str, Any]:
     return values
 
 
-def _matrix(
-    function: Callable[[FloatArray], FloatArray], centre: FloatArray, step: float = 1000.0
-) -> list[list[float]]:
+def _matrix(function: Callable[[FloatArray], FloatArray], centre: FloatArray) -> list[list[float]]:
     """Return the 2×3 matrix of an affine function of the plane, from its values at the centre."""
+    step = 1000.0
     base, along_x, along_y = function(centre + [[0, 0], [step, 0], [0, step]])
     linear = np.column_stack([along_x - base, along_y - base]) / step
     return np.column_stack([linear, base - linear @ centre]).tolist()
