@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
-import inspect
-import json
 import math
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from groundtie.geometry.transform import Transform, load_transform
+from groundtie.geometry.transform import Transform
+from groundtie.rasters.atomic import write_json
+from groundtie.simulation.files import NAMES
 from groundtie.simulation.misregistration import (
     DistortionOptions,
-    SourcePositions,
+    Positions,
     draw_misregistration,
     needed_margin,
     resample,
@@ -24,17 +22,14 @@ from groundtie.simulation.optical import OpticalOptions, blur, quantise, render_
 from groundtie.simulation.pair import map_grid, scene_grid
 from groundtie.simulation.scene import SceneOptions, generate_scenes
 
-from .accuracy import Truth
-from .attempt import Pair, on_pixels
+from .attempt import Pair
 from .cases import write_image
 from .sar_pairs import CHANGED_BUILDINGS
-from .simulations import linear_of, simulator_version
+from .simulations import fingerprint, kept, read_exact, simulator_version
 
 # Morning and afternoon, from the west and from the east.
 _EARLIER = OpticalOptions(sun_azimuth_deg=140.0, bands=("green",))
 _LATER = OpticalOptions(210.0, 35.0, view_azimuth_deg=100.0, off_nadir_deg=8.0, bands=("red",))
-
-_NAMES = ("reference.tif", "input.tif", "truth.json")
 
 # The second image's textures and noise are others.
 _OTHER_DATE = 100_000
@@ -62,18 +57,11 @@ class OpticalPair:
     def pair(self, cache: Path) -> Pair:
         """Return the pair, which is made unless the folder `cache` has it."""
         words = f"{self.size}-{self.density}-{self.seed}"
-        folder = cache / f"optical-{words}-{simulator_version()}-{_own_version()}"
-        reference, image, found = (folder / name for name in _NAMES)
-        # The truth is written last.
-        if not found.exists():
-            folder.mkdir(parents=True, exist_ok=True)
-            self._write(reference, image, found)
-        mapping = on_pixels(load_transform(found), reference)
-        size = (self.size, self.size)
-        lattice = Truth.on_lattice(mapping, size, linear_of(mapping, size))
-        return Pair(reference, image, lattice, lattice)
+        folder = cache / f"optical-{words}-{simulator_version()}-{fingerprint([Path(__file__)])}"
+        return read_exact(kept(folder, self._write))
 
-    def _write(self, reference_path: Path, input_path: Path, truth_path: Path) -> None:
+    def _write(self, folder: Path) -> None:
+        folder.mkdir()
         options = SceneOptions(
             (self.size, self.size),
             density=self.density,
@@ -92,14 +80,9 @@ class OpticalPair:
         blur(light, _EARLIER.psf_sigma_px)
         inner = slice(around, around + self.size)
         image = quantise(light[inner, inner], _EARLIER, noise[0])
-        write_image(image[None], grid.transform, reference_path)
+        write_image(image[None], grid.transform, folder / NAMES["reference"])
         light = render_radiance(later, _LATER)[0]
         blur(light, _LATER.psf_sigma_px)
-        seen = resample(light, SourcePositions.of(truth, scene_grid(grid, around)), self.size)
-        write_image(quantise(seen, _LATER, noise[1])[None], grid.transform, input_path)
-        truth_path.write_text(json.dumps(truth.to_json()), encoding="utf-8")
-
-
-def _own_version() -> str:
-    source = inspect.getsource(sys.modules[__name__])
-    return hashlib.sha256(source.encode()).hexdigest()[:8]
+        seen = resample(light, Positions.interpolated(truth, scene_grid(grid, around)))
+        write_image(quantise(seen, _LATER, noise[1])[None], grid.transform, folder / NAMES["input"])
+        write_json(folder / NAMES["truth"], truth.to_json())

@@ -20,7 +20,7 @@ from groundtie.sensor.rpc_files import read_rpc
 from .accuracy import CORRECT, CRASHED, INACCURATE, REFUSED, SILENTLY_WRONG, FloatArray
 from .attempt import Outcome, accepted, count, unregistered
 from .rpc import crs_of, image_positions, misses, rms
-from .simulations import simulator_version
+from .simulations import kept, simulator_version
 from .suites import Goal, Settings, SuiteResult, Table, run_cases
 
 SIZES_PX = (700, 1000)
@@ -79,21 +79,18 @@ class City:
     def scene(self, cache: Path) -> Path:
         """Return the folder of the scene, which is made unless the folder `cache` has it."""
         parts = self.size, f"{self.looks:g}", self.seed, simulator_version()
-        folder = cache / "-".join(map(str, ("sensor-city", *parts)))
-        if not folder.exists():
-            cache.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(dir=cache) as made:
-                groundtie.simulate_sensor(
-                    Path(made) / "scene",
-                    size=self.size,
-                    density=DENSITY,
-                    off_nadir=OFF_NADIR_DEG,
-                    looks=self.looks,
-                    seed=self.seed,
-                )
-                # Whole or not at all, also where a run is stopped.
-                (Path(made) / "scene").rename(folder)
-        return folder
+
+        def make(folder: Path) -> None:
+            groundtie.simulate_sensor(
+                folder,
+                size=self.size,
+                density=DENSITY,
+                off_nadir=OFF_NADIR_DEG,
+                looks=self.looks,
+                seed=self.seed,
+            )
+
+        return kept(cache / "-".join(map(str, ("sensor-city", *parts))), make)
 
 
 @dataclass(frozen=True)

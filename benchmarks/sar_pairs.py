@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-import inspect
-import json
 import math
-import sys
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -16,22 +12,29 @@ import rasterio.crs
 from affine import Affine
 from numpy.typing import NDArray
 
-from groundtie.geometry.transform import Transform, load_transform
+from groundtie.geometry.transform import Transform
+from groundtie.rasters.atomic import write_json
 from groundtie.rasters.grid import Grid
+from groundtie.simulation.files import NAMES
 from groundtie.simulation.misregistration import (
     DistortionOptions,
-    SourcePositions,
+    Positions,
     draw_misregistration,
     needed_margin,
     resample,
 )
-from groundtie.simulation.sar import SarOptions, add_speckle, quantise_amplitude, sar_power
+from groundtie.simulation.sar import (
+    NOISE_FLOOR,
+    SarOptions,
+    add_speckle,
+    quantise_amplitude,
+    sar_power,
+)
 from groundtie.simulation.scene import Scene, SceneOptions, generate_scenes
 
-from .accuracy import Truth
-from .attempt import Pair, on_pixels
+from .attempt import Pair
 from .cases import CRS, write_image
-from .simulations import linear_of, simulator_version
+from .simulations import fingerprint, kept, read_exact, simulator_version
 
 # How the second image differs: incidence angles, the share of buildings that stand in one image
 # only, and of parcels (fields, woods) that shine otherwise, by up to so much.
@@ -39,13 +42,10 @@ INCIDENCES_DEG = (30.0, 40.0)
 CHANGED_BUILDINGS = 0.1
 _CHANGED_PARCELS, _CHANGE_DB = 0.3, 4.0
 
-# Bright points would ring when they are resampled: nothing is darker than the noise floor.
-_FLOOR = 10 ** (-25 / 10)
-
 # The second image's textures and speckle are others.
 _LATER = 100_000
 
-_NAMES = ("reference.tif", "input.tif", "ground.tif", "truth.json")
+_GROUND = "ground.tif"
 
 # The input may be off by this, so ground nearer to what leans in it is left out, too.
 _BESIDE_PX = 8
@@ -83,24 +83,15 @@ class SarPair:
     def pair(self, cache: Path) -> Pair:
         """Return the pair, which is made unless the folder `cache` has it."""
         words = "-".join(f"{value}" for value in asdict(self).values())
-        folder = cache / f"sar-{words}-{simulator_version()}-{_own_version()}"
-        paths = [folder / name for name in _NAMES]
-        # The truth is written last.
-        if not paths[-1].exists():
-            folder.mkdir(parents=True, exist_ok=True)
-            self._write(*paths)
-        mapping = on_pixels(load_transform(paths[-1]), paths[0])
-        size = (self.size, self.size)
-        lattice = Truth.on_lattice(mapping, size, linear_of(mapping, size))
-        return Pair(paths[0], paths[1], lattice, lattice)
+        folder = cache / f"sar-{words}-{simulator_version()}-{fingerprint([Path(__file__)])}"
+        return read_exact(kept(folder, self._write))
 
     def ground(self, cache: Path) -> Path:
         """Return the mask of the level ground on the reference, once the pair is made."""
-        return self.pair(cache).reference.with_name(_NAMES[2])
+        return self.pair(cache).reference.with_name(_GROUND)
 
-    def _write(
-        self, reference_path: Path, input_path: Path, ground_path: Path, truth_path: Path
-    ) -> None:
+    def _write(self, folder: Path) -> None:
+        folder.mkdir()
         grid = Grid(
             Affine(1, 0, 412_000, 0, -1, 5_334_000),
             rasterio.crs.CRS.from_string(CRS),
@@ -129,25 +120,27 @@ class SarPair:
         speckle = np.random.default_rng((self.seed, 1)), np.random.default_rng((self.seed, 2))
         power = add_speckle(sar_power(earlier, first)[inner, inner], looks, speckle[0])
         image = quantise_amplitude(power, first)
-        write_image(image[None], grid.transform, reference_path)
+        write_image(image[None], grid.transform, folder / NAMES["reference"])
         wide = grid.window(-around, -around, *options.size_px)
-        positions = SourcePositions.of(truth, wide)
-        seen = resample(sar_power(_changed(later), second), positions, self.size)
-        power = add_speckle(np.maximum(seen, np.float32(_FLOOR)), looks, speckle[1])
-        write_image(quantise_amplitude(power, second)[None], grid.transform, input_path)
+        positions = Positions.interpolated(truth, wide)
+        seen = resample(sar_power(_changed(later), second), positions)
+        # Bright points ring when they are resampled: nothing is darker than the noise floor.
+        power = add_speckle(np.maximum(seen, np.float32(NOISE_FLOOR)), looks, speckle[1])
+        write_image(
+            quantise_amplitude(power, second)[None], grid.transform, folder / NAMES["input"]
+        )
         hidden = _hidden(earlier, first) | _hidden(later, second)
         beside = np.ones((2 * _BESIDE_PX + 1,) * 2, np.uint8)
         ground = 1 - cv2.dilate(hidden.astype(np.uint8), beside)[earlier.window][inner, inner]
-        write_image(ground[None], grid.transform, ground_path)
-        truth_path.write_text(json.dumps(truth.to_json()), encoding="utf-8")
+        write_image(ground[None], grid.transform, folder / _GROUND)
+        write_json(folder / NAMES["truth"], truth.to_json())
 
 
 def _hidden(scene: Scene, sar: SarOptions) -> NDArray[np.bool_]:
     """Return what of the ground an image does not show: under layover, in shadow, built upon."""
     tangent = math.tan(math.radians(sar.incidence_deg))
     height_px = scene.object_m / scene.pixel_size_m
-    # A radar that looks towards larger columns sees heights lean towards smaller ones.
-    towards = -1 if sar.orbit == "ascending" else 1
+    towards = sar.towards_radar
     hidden = height_px > 0
     for direction, reach in ((towards, 1 / tangent), (-towards, tangent)):
         for steps in range(1, math.ceil(float(height_px.max()) * reach) + 1):
@@ -171,8 +164,3 @@ def _reach_px(options: SceneOptions) -> int:
     tangent = math.tan(math.radians(min(INCIDENCES_DEG)))
     height = options.highest_object_m + options.relief_m
     return math.ceil(height / tangent + options.highest_object_m * tangent) + 1
-
-
-def _own_version() -> str:
-    source = inspect.getsource(sys.modules[__name__])
-    return hashlib.sha256(source.encode()).hexdigest()[:8]

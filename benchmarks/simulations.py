@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -81,19 +82,35 @@ def _any_memory() -> Iterator[None]:
             os.environ[VARIABLE] = before
 
 
+def kept(folder: Path, make: Callable[[Path], object]) -> Path:
+    """Return a folder, which is made unless it is there.
+
+    Whole or not at all: a run may be stopped, and other processes may make it, too.
+    """
+    if not folder.exists():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent) as temporary:
+            made = Path(temporary) / "made"
+            make(made)
+            if not folder.exists():
+                made.rename(folder)
+    return folder
+
+
+def read_exact(folder: Path) -> Pair:
+    """Return the pair in a folder whose truth is exact everywhere; files as of `read_pair`."""
+    reference, image, truth = (folder / files.NAMES[key] for key in ("reference", "input", "truth"))
+    mapping, size = on_pixels(groundtie.load_transform(truth), reference), image_size(reference)
+    lattice = Truth.on_lattice(mapping, size, linear_of(mapping, size))
+    return Pair(reference, image, lattice, lattice)
+
+
 def read_pair(folder: Path) -> Pair:
     """Return the pair in a folder that `groundtie.simulate` wrote."""
-    paths = {key: folder / name for key, name in files.NAMES.items()}
-    mapping = on_pixels(groundtie.load_transform(paths["truth"]), paths["reference"])
-    size = image_size(paths["reference"])
-    linear = linear_of(mapping, size)
-    points = read_check_points(paths["check_points"])
-    return Pair(
-        paths["reference"],
-        paths["input"],
-        Truth(points[:, :2], points[:, 2:], linear),
-        Truth.on_lattice(mapping, size, linear),
-    )
+    exact = read_exact(folder)
+    points = read_check_points(folder / files.NAMES["check_points"])
+    assert exact.truth is not None
+    return replace(exact, truth=Truth(points[:, :2], points[:, 2:], exact.truth.linear))
 
 
 def linear_of(mapping: Mapping, size: tuple[int, int]) -> FloatArray:
@@ -107,6 +124,9 @@ def linear_of(mapping: Mapping, size: tuple[int, int]) -> FloatArray:
 
 def simulator_version() -> str:
     """Return a fingerprint of the simulator's source, so that no pair outlives it."""
-    folder = Path(files.__file__).parent
-    sources = b"".join(path.read_bytes() for path in sorted(folder.glob("*.py")))
-    return hashlib.sha256(sources).hexdigest()[:8]
+    return fingerprint(sorted(Path(files.__file__).parent.glob("*.py")))
+
+
+def fingerprint(paths: Iterable[Path]) -> str:
+    """Return what changes when one of some files does."""
+    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()[:8]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import tempfile
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from groundtie.simulation import files
 from ..attempt import on_pixels
 from ..cases import REFERENCE_TRANSFORM, SAR_OPTICAL, RealCase, image_size, read_cases, read_image
 from ..sar_pairs import SarPair
-from ..simulations import simulator_version
+from ..simulations import kept, simulator_version
 from .pairs import Image, Pair, Source, pixels, render, to_bytes
 
 SAR_SAR = "sar-sar"
@@ -185,23 +184,17 @@ def _simulated(kind: str, density: str, seed: int, cache: Path) -> Source:
         found = made.reference.with_name("truth.json")
         reference, image = (to_grey(read_image(path)) for path in (made.reference, made.input))
         return Source(reference, image, on_pixels(groundtie.load_transform(found), made.reference))
-    folder = cache / f"attacked-{density}-{_SIMULATED_PX}-{seed}-{simulator_version()}"
-    if not folder.exists():
-        cache.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=cache) as temporary:
-            groundtie.simulate(
-                Path(temporary) / "scene",
-                size=_SIMULATED_PX,
-                density=density,
-                seed=seed,
-                shift=0.0,
-                looks=float(1 + seed % 3),
-                changed=10.0 * (seed % 2),
-                warp=2.0,
-            )
-            # Whole or not at all: other processes make it, too.
-            if not folder.exists():
-                (Path(temporary) / "scene").rename(folder)
+    make = partial(
+        groundtie.simulate,
+        size=_SIMULATED_PX,
+        density=density,
+        seed=seed,
+        shift=0.0,
+        looks=float(1 + seed % 3),
+        changed=10.0 * (seed % 2),
+        warp=2.0,
+    )
+    folder = kept(cache / f"attacked-{density}-{_SIMULATED_PX}-{seed}-{simulator_version()}", make)
     reference, image = (folder / files.NAMES[key] for key in ("reference", "input"))
     truth = groundtie.load_transform(folder / files.NAMES["truth"])
     return Source(

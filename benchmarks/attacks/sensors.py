@@ -11,6 +11,7 @@ import time
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from shutil import copytree
 from typing import Any
@@ -24,7 +25,7 @@ from groundtie.sensor.rpc_files import read_rpc
 from ..accuracy import FloatArray
 from ..rpc import crs_of, image_positions, misses
 from ..rpc_city import RUNS, judge
-from ..simulations import simulator_version
+from ..simulations import kept, simulator_version
 from .catalogue import SENSOR, direction
 from .overlays import OVERLAYS
 from .pairs import ERROR_PERCENTILE, Image
@@ -131,23 +132,16 @@ class SensorCase:
 
     def _simulated(self, density: str, changed: float, size: int, looks: float) -> Path:
         parts = density, changed, size, looks, self.seed, simulator_version()
-        folder = self.cache / "-".join(map(str, ("attacked-sensor", *parts)))
-        if not folder.exists():
-            self.cache.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(dir=self.cache) as made:
-                groundtie.simulate_sensor(
-                    Path(made) / "scene",
-                    size=size,
-                    density=density,
-                    shift=_SHIFT_M,
-                    looks=looks,
-                    changed=changed,
-                    seed=self.seed,
-                )
-                # Whole or not at all: other processes make it, too.
-                if not folder.exists():
-                    (Path(made) / "scene").rename(folder)
-        return folder
+        make = partial(
+            groundtie.simulate_sensor,
+            size=size,
+            density=density,
+            shift=_SHIFT_M,
+            looks=looks,
+            changed=changed,
+            seed=self.seed,
+        )
+        return kept(self.cache / "-".join(map(str, ("attacked-sensor", *parts))), make)
 
     def run(self, workers: int | None) -> AttackOutcome:
         """Make the scene, let the tool try, and judge what it wrote."""

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from groundtie.simulation.canvas import NO_CHANGES, Changes
+from groundtie.simulation.canvas import Changes
 from groundtie.simulation.city import CityLayout
 from groundtie.simulation.cover import Cover, ParcelBook, ParcelTable
 
@@ -15,7 +15,7 @@ def laid_out(
 ) -> tuple[np.ndarray, np.ndarray, ParcelTable]:
     """The images' labels, and the parcels."""
     book = ParcelBook(np.random.default_rng(seed))
-    changes = Changes(changed, np.random.default_rng(seed + 100)) if changed else NO_CHANGES
+    changes = Changes(changed, np.random.default_rng(seed + 100))
     layout = CityLayout(
         SHAPE,
         px_per_m,
@@ -60,9 +60,8 @@ class TestParts:
     def test_nothing_stands_across_water_or_rails(self) -> None:
         """Their outlines do not touch them: the ground on both sides of a wall is dry."""
         book = ParcelBook(np.random.default_rng(7))
-        layout = CityLayout(
-            SHAPE, 1.0, np.random.default_rng(7), book, NO_CHANGES, np.random.default_rng(1)
-        )
+        layout_of, changing, traffic = (np.random.default_rng(seed) for seed in (7, 2, 1))
+        layout = CityLayout(SHAPE, 1.0, layout_of, book, Changes(0.0, changing), traffic)
         radar, _ = layout.draw()
         cover = book.table().cover
         ground = cover[layout.labels]

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from groundtie.simulation.canvas import Changes
 from groundtie.simulation.cover import Cover, ParcelBook, ParcelTable
 from groundtie.simulation.layout import CANOPY_M, DENSITIES, Layout, highest_object_m
 
@@ -12,7 +13,8 @@ def laid_out(
     density: str, seed: int = 0, shape: tuple[int, int] = (700, 800), px_per_m: float = 1.0
 ) -> tuple[np.ndarray, ParcelTable]:
     book = ParcelBook(np.random.default_rng(seed))
-    layout = Layout(shape, px_per_m, density, np.random.default_rng(seed), book)
+    changes = Changes(0.0, np.random.default_rng(1))
+    layout = Layout(shape, px_per_m, density, np.random.default_rng(seed), book, changes)
     return layout.draw()[0], book.table()
 
 

@@ -17,7 +17,7 @@ from groundtie.rasters.grid import Grid
 from groundtie.simulation.misregistration import (
     DISTORTIONS,
     DistortionOptions,
-    SourcePositions,
+    Positions,
     draw_misregistration,
     needed_margin,
     resample,
@@ -136,7 +136,7 @@ class TestNeededMargin:
         assert 200 <= needed_margin(model, GRID, GRID) <= 206
 
 
-class TestSourcePositions:
+class TestPositions:
     @pytest.mark.slow
     @pytest.mark.parametrize("kind", KINDS)
     @pytest.mark.parametrize("ratio", [0.5, 1.0, 2.5])
@@ -145,7 +145,7 @@ class TestSourcePositions:
         options = DistortionOptions(kind, 7.3, rotation_deg=25, scale=1.2, warp_px=3)
         truth = Transform(draw_misregistration(options, claimed, 3), UTM, claimed)
         scene_grid = GRID.window(-50, -50, 500, 400)
-        position = SourcePositions.of(truth, scene_grid).strip(0, claimed.height)
+        position = Positions.interpolated(truth, scene_grid).strip(0, claimed.height)
         xy = scene_grid.pixel_to_map(position[::-1].reshape(2, -1).T)
         row, column = np.mgrid[: claimed.height, : claimed.width]
         expected = np.stack([column, row], axis=-1).reshape(-1, 2)
@@ -153,7 +153,7 @@ class TestSourcePositions:
 
     def test_strip_is_a_part_of_the_whole(self) -> None:
         truth = Transform(draw_misregistration(DistortionOptions(), GRID, 3), UTM, GRID)
-        positions = SourcePositions.of(truth, GRID)
+        positions = Positions.interpolated(truth, GRID)
         whole = positions.strip(0, 300)
         np.testing.assert_allclose(positions.strip(100, 140), whole[:, 100:140], atol=1e-9)
 
@@ -166,8 +166,8 @@ class TestResample:
         truth = Transform(draw_misregistration(DistortionOptions("affine"), GRID, 1), UTM, GRID)
         scene_grid = GRID.window(-40, -40, 480, 380)
         row, column = np.mgrid[:380, :480]
-        positions = SourcePositions.of(truth, scene_grid)
-        image = resample(function(column, row).astype(np.float32), positions, 300)
+        positions = Positions.interpolated(truth, scene_grid)
+        image = resample(function(column, row).astype(np.float32), positions)
         source_row, source_column = positions.strip(0, 300)
         np.testing.assert_allclose(image, function(source_column, source_row), atol=1e-3)
 
@@ -192,7 +192,7 @@ class TestDeliveredDistortion:
         options = DistortionOptions(kind, shift_px=6.4, rotation_deg=3, scale=1.03, warp_px=4)
         truth = Transform(draw_misregistration(options, self.grid, seed), UTM, self.grid)
         scene_grid = self.grid.window(-30, -30, 460, 360)
-        delivered = resample(light, SourcePositions.of(truth, scene_grid), 300)
+        delivered = resample(light, Positions.interpolated(truth, scene_grid))
 
         row, column = np.mgrid[40:260, 40:360]
         px = np.stack([column, row], axis=-1).reshape(-1, 2)

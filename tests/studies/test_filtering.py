@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from groundtie.geometry.fitting import fit_model
-from groundtie.studies.filtering import filter_matches
+from groundtie.studies.matching import filter_matches
 
 
 def pairs(wrong: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

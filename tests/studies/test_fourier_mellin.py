@@ -19,7 +19,7 @@ from groundtie.studies.fourier_mellin import (
     spectra,
     spectrum,
 )
-from groundtie.studies.polar import ANGLE_STEP_DEG, ANGLES, half_turns
+from groundtie.studies.spectra import ANGLE_STEP_DEG, ANGLES, half_turns
 
 GREY, FIELD = SimilaritySettings("ncc"), SimilaritySettings("fused")
 REFERENCE = window((160, 160))

@@ -13,12 +13,11 @@ from groundtie.rasters.patch import Patch
 from groundtie.similarity.surface import SimilaritySettings
 from groundtie.studies.phase_correlation import (
     CANDIDATES,
-    gaussian_peak,
     phase_correlation,
     phase_surface,
     shifts_at,
-    whitened,
 )
+from groundtie.studies.spectra import gaussian_peak, whitened
 from groundtie.studies.spectral_windows import structure
 
 GREY, FIELD = SimilaritySettings("ncc"), SimilaritySettings("orientation")

@@ -11,7 +11,6 @@ from groundtie.geometry.limits import SearchLimits
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.surface import SimilaritySettings
-from groundtie.studies.polar import ANGLE_STEP_DEG, ANGLES, evened, log_power
 from groundtie.studies.radon import (
     RETURNED,
     projection_spectra,
@@ -21,6 +20,7 @@ from groundtie.studies.radon import (
     shift_along,
     shift_by_projections,
 )
+from groundtie.studies.spectra import ANGLE_STEP_DEG, ANGLES, evened, log_power
 
 GREY, FIELD = SimilaritySettings("ncc"), SimilaritySettings("fused")
 REFERENCE = window((160, 160))

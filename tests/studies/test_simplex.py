@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from groundtie.geometry.limits import SearchLimits
 from groundtie.pose.pose import Pose
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.surface import SimilaritySettings
-from groundtie.studies.climbing import Counted, Effort, PoseSpace
+from groundtie.studies.climbing import Effort, PoseSpace
 from groundtie.studies.simplex import NELDER_MEAD, POWELL, climb, nelder_mead, powell
 
 Place = tuple[float, ...]
@@ -37,10 +38,10 @@ def test_the_top_of_a_paraboloid_is_reached(method: str, start: Place) -> None:
         off = np.array(place) - top
         return float(1.05 - 1e-4 * off @ mixed @ off)
 
-    similarity = Counted(paraboloid)
+    similarity = cache(paraboloid)
     found = climb(similarity, space, start, RNG, method)
     np.testing.assert_allclose(found, top, atol=0.2)
-    assert similarity.evaluations <= 400
+    assert similarity.cache_info().misses <= 400
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -52,7 +53,7 @@ def test_places_stay_within_limits(method: str) -> None:
         return place[0] - place[1]
 
     space = PoseSpace(SearchLimits(7), 30.0)
-    found = climb(Counted(outward), space, (0.0, 0.0), RNG, method)
+    found = climb(cache(outward), space, (0.0, 0.0), RNG, method)
     np.testing.assert_allclose(found, (7.0, -7.0), atol=0.1)
     assert np.abs(asked).max() <= 7
 
@@ -65,16 +66,16 @@ def test_evaluations_are_places_that_were_asked_for(method: str) -> None:
         asked.append(place)
         return -float(np.hypot(place[0] - 2, place[1] + 3))
 
-    similarity = Counted(hill)
+    similarity = cache(hill)
     climb(similarity, PoseSpace(SearchLimits(7), 30.0), (0.0, 0.0), RNG, method)
-    assert similarity.evaluations == len(asked) == len(set(asked))
+    assert similarity.cache_info().misses == len(asked) == len(set(asked))
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_start_that_nothing_beats_is_kept(method: str) -> None:
     start = (7.0, -7.0)
     space = PoseSpace(SearchLimits(7), 30.0)
-    found = climb(Counted(lambda p: float(p == start)), space, start, RNG, method)
+    found = climb(cache(lambda p: float(p == start)), space, start, RNG, method)
     assert found == start
 
 

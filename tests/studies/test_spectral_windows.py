@@ -169,7 +169,7 @@ def test_a_candidate_is_corrected_by_what_is_left() -> None:
         1.2 / 1.25,
         tuple(back @ (np.array(TURNED.shift_px) - wrong.pose.shift_px)),  # type: ignore[arg-type]
     )
-    found = aligned(REFERENCE, input, wrong, LIMITS, lambda both: PoseFound(left, 9.0))
+    found = aligned(REFERENCE, input, wrong, LIMITS, GREY, lambda *_: PoseFound(left, 9.0))
     # Nothing is cut off, so that the part's centre is the reference's.
     assert turned_by(found, TURNED) < 1e-9
     assert shifted_by(found, TURNED) < 1e-9
@@ -179,9 +179,9 @@ def test_a_candidate_is_corrected_by_what_is_left() -> None:
 def test_a_candidate_without_correction_stays() -> None:
     one = PoseFound(TURNED, 5.0)
     input = window((150, 150), TURNED)
-    assert aligned(REFERENCE, input, one, LIMITS, lambda both: None) is one
+    assert aligned(REFERENCE, input, one, LIMITS, GREY, lambda *_: None) is one
     far = PoseFound(Pose(shift_px=(300.0, 0.0)), 5.0)
-    assert aligned(REFERENCE, input, far, LIMITS, lambda both: one) is far
+    assert aligned(REFERENCE, input, far, LIMITS, GREY, lambda *_: one) is far
 
 
 def test_candidates_that_are_the_same_are_one() -> None:

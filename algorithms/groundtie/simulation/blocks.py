@@ -17,6 +17,7 @@ from .polygons import (
     fitted_rectangle,
     inset,
     main_frame,
+    moved,
     rectangle,
     subdivide,
 )
@@ -73,10 +74,10 @@ class Quarter:
 
 def perimeter(block: Polygon, scale: float, generator: np.random.Generator) -> list[Building]:
     """Houses side by side around a courtyard."""
-    yard = inset(block, _between(generator, 11, 15) * scale)
+    yard = inset(block, generator.uniform(11, 15) * scale)
     if yard is None:
         return lots(block, scale, generator)
-    eaves_m = _between(generator, 12, 22)
+    eaves_m = generator.uniform(12, 22)
     buildings = []
     for k in range(len(block)):
         after = (k + 1) % len(block)
@@ -87,11 +88,11 @@ def perimeter(block: Polygon, scale: float, generator: np.random.Generator) -> l
         for start, stop in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
             house = [_at(outer, start), _at(outer, stop), _at(inner, stop), _at(inner, start)]
             if generator.random() > 0.04:
-                height_m = eaves_m + _between(generator, -4, 4)
+                height_m = eaves_m + generator.uniform(-4, 4)
                 buildings.append(_with_roof(house, height_m, scale, generator))
     back = fitted_rectangle(yard, (0.5, 0.3))
     if back is not None and generator.random() < 0.5:
-        buildings.append(Building(((back, _between(generator, 4, 10)),)))
+        buildings.append(Building(((back, generator.uniform(4, 10)),)))
     return buildings
 
 
@@ -99,7 +100,7 @@ def lots(block: Polygon, scale: float, generator: np.random.Generator) -> list[B
     """Closely built lots, mostly of middle height."""
     buildings = []
     for lot in subdivide(block, 1100 * scale**2, 0.0, generator).cells:
-        fill = (_between(generator, 0.85, 0.98), _between(generator, 0.85, 0.98))
+        fill = (generator.uniform(0.85, 0.98), generator.uniform(0.85, 0.98))
         footprint = fitted_rectangle(lot, fill)
         if footprint is not None:
             height_m = 8 + 30 * generator.random() ** 2.5
@@ -115,11 +116,11 @@ def towers(block: Polygon, scale: float, generator: np.random.Generator) -> list
         if footprint is None:
             continue
         centre, half, angle = main_frame(footprint)
-        podium_m = _between(generator, 5, 14)
-        reach = [min(_between(generator, 9, 17) * scale, 0.9 * h) for h in half]
-        aside = [_between(generator, -1, 1) * (h - r) for h, r in zip(half, reach, strict=True)]
-        tower = rectangle(_moved(centre, aside[0], aside[1], angle), (reach[0], reach[1]), angle)
-        height_m = _between(generator, 25, HIGHEST_M - _ROOF_BOX_M[1])
+        podium_m = generator.uniform(5, 14)
+        reach = [min(generator.uniform(9, 17) * scale, 0.9 * h) for h in half]
+        aside = [generator.uniform(-1, 1) * (h - r) for h, r in zip(half, reach, strict=True)]
+        tower = rectangle(moved(centre, aside[0], aside[1], angle), (reach[0], reach[1]), angle)
+        height_m = generator.uniform(25, HIGHEST_M - _ROOF_BOX_M[1])
         parts = _with_roof(tower, height_m, scale, generator).parts
         buildings.append(Building(((footprint, podium_m), *parts)))
     return buildings
@@ -128,17 +129,17 @@ def towers(block: Polygon, scale: float, generator: np.random.Generator) -> list
 def slabs(block: Polygon, scale: float, generator: np.random.Generator) -> list[Building]:
     """Parallel slabs of flats, far enough apart for some sun."""
     centre, half, angle = main_frame(block)
-    height_m = _between(generator, 15, 36)
-    depth = _between(generator, 5.5, 7.5) * scale
+    height_m = generator.uniform(15, 36)
+    depth = generator.uniform(5.5, 7.5) * scale
     pitch = 2 * depth + max(0.8 * height_m, 18) * scale
     buildings = []
     for row in np.arange(-half[1] + 1.4 * depth, half[1] - 1.3 * depth, pitch).tolist():
-        reach = min(0.86 * half[0], _between(generator, 24, 45) * scale)
+        reach = min(0.86 * half[0], generator.uniform(24, 45) * scale)
         for side in (-1, 1) if half[0] > 2.2 * reach else (0,):
-            middle = _moved(centre, side * half[0] / 2, row, angle)
+            middle = moved(centre, side * half[0] / 2, row, angle)
             slab = rectangle(middle, (reach, depth), angle)
             if all(contains(block, corner) for corner in slab):
-                high_m = height_m + _between(generator, -3, 3)
+                high_m = height_m + generator.uniform(-3, 3)
                 buildings.append(_with_roof(slab, high_m, scale, generator))
     return buildings
 
@@ -147,10 +148,10 @@ def halls(block: Polygon, scale: float, generator: np.random.Generator) -> list[
     """Large flat halls and department stores."""
     buildings = []
     for lot in subdivide(block, 5500 * scale**2, 0.0, generator).cells:
-        fill = (_between(generator, 0.6, 0.9), _between(generator, 0.6, 0.85))
+        fill = (generator.uniform(0.6, 0.9), generator.uniform(0.6, 0.85))
         footprint = fitted_rectangle(lot, fill)
         if footprint is not None:
-            high_m = _between(generator, 6, 16)
+            high_m = generator.uniform(6, 16)
             buildings.append(_with_roof(footprint, high_m, scale, generator))
     return buildings
 
@@ -171,23 +172,14 @@ def _with_roof(
     parts = [(outline, height_m)]
     centre, half, angle = main_frame(outline)
     for _ in range(int(generator.poisson(min(area(outline) / (500 * scale**2), 4)))):
-        size = [min(_between(generator, 1.5, 4) * scale, 0.3 * h) for h in half]
-        u, v = (_between(generator, -0.55, 0.55) * h for h in half)
-        box = rectangle(_moved(centre, u, v, angle), (size[0], size[1]), angle)
+        size = [min(generator.uniform(1.5, 4) * scale, 0.3 * h) for h in half]
+        u, v = (generator.uniform(-0.55, 0.55) * h for h in half)
+        box = rectangle(moved(centre, u, v, angle), (size[0], size[1]), angle)
         if all(contains(outline, corner) for corner in box):
-            parts.append((box, height_m + _between(generator, *_ROOF_BOX_M)))
+            parts.append((box, height_m + generator.uniform(*_ROOF_BOX_M)))
     return Building(tuple(parts))
-
-
-def _moved(place: Point, u: float, v: float, angle: float) -> Point:
-    cos, sin = math.cos(angle), math.sin(angle)
-    return place[0] + u * cos - v * sin, place[1] + u * sin + v * cos
 
 
 def _at(side: tuple[Point, Point], share: float) -> Point:
     (x, y), (x1, y1) = side
     return x + share * (x1 - x), y + share * (y1 - y)
-
-
-def _between(generator: np.random.Generator, low: float, high: float) -> float:
-    return low + (high - low) * float(generator.random())

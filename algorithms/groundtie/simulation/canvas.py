@@ -11,11 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from .cover import Cover, ParcelBook
-from .polygons import Point, Polygon
+from .polygons import Point, Polygon, main_frame, moved, points_along, rectangle
 
 Labels = npt.NDArray[np.int32]
 
 _SUBPIXEL_BITS = 4
+_PROBES_PER_SIDE = 6
+_CROWN_M = 4.0
 
 
 class Acquisition(IntEnum):
@@ -67,24 +69,19 @@ class Changes:
     ----------
     share : float
         How many of them: half are pulled down after the radar's image, half are new by then.
-    generator : numpy.random.Generator or None
-        None if the share is 0.
+    generator : numpy.random.Generator
+        Source of what changes.
     """
 
     share: float
-    generator: np.random.Generator | None
+    generator: np.random.Generator
 
     def draw(self) -> When:
         """Draw when the next building stands."""
-        if self.generator is None:
-            return BOTH
         drawn = self.generator.random()
         if drawn >= self.share:
             return BOTH
         return (Acquisition.RADAR,) if drawn < self.share / 2 else (Acquisition.CAMERA,)
-
-
-NO_CHANGES = Changes(0.0, None)
 
 
 class Canvas:
@@ -119,6 +116,7 @@ class Canvas:
         self._changes = changes
         self._cover_of: list[Cover] = []
         self._things: list[Standing | Tree] = []
+        self._trees: list[Point] = []
 
     def images(self) -> tuple[Labels, Labels]:
         """Return the label images at the radar's and at the camera's acquisition.
@@ -145,22 +143,51 @@ class Canvas:
         drawn, self.labels = self.labels, ground
         return drawn
 
-    def _stand(self, thing: Standing | Tree) -> None:
-        self._things.append(thing)
+    def _rotated_outline(self) -> Polygon:
+        """Draw a rotated square that reaches beyond the scene on all sides: streets follow it."""
+        height, width = self.labels.shape
+        half = math.hypot(height, width) / 2
+        angle = self._random.uniform(0, math.pi / 2)
+        return rectangle((width / 2, height / 2), (half, half), angle)
 
-    def _river(
-        self, height: int, width: int, half_m: Point, bank_m: float
-    ) -> tuple[Polygon, Polygon]:
-        """Outlines of the banks and of the water of a winding river across the scene."""
-        angle = self._uniform(0, math.pi)
+    def _touches(self, outline: Polygon, covers: tuple[Cover, ...]) -> bool:
+        """Whether the ground along an outline is of certain covers."""
+        return any(self._cover_at(p) in covers for p in points_along(outline, _PROBES_PER_SIDE))
+
+    def _scatter_trees(self, polygon: Polygon, mean_count: float, share: float) -> None:
+        """Draw places of trees in the middle share of the box around a polygon."""
+        centre, half, angle = main_frame(polygon)
+        for _ in range(int(self._random.poisson(mean_count))):
+            u, v = (self._random.uniform(-share, share) * h for h in half)
+            self._trees.append(moved(centre, u, v, angle))
+
+    def _plant_trees(
+        self, kinds: int, highest_m: float, crown_m: float, keep_off: tuple[Cover, ...]
+    ) -> None:
+        """Let trees grow in their places, with crowns of `crown_m` to `_CROWN_M` in radius."""
+        parcels = [
+            self._add(Cover.FOREST, self._random.uniform(4, highest_m)) for _ in range(kinds)
+        ]
+        for place in self._trees:
+            kind, size = self._random.random(2).tolist()
+            radius = (crown_m + (_CROWN_M - crown_m) * size) * self._scale
+            if radius >= 1:
+                crown = self._blob(place, radius)
+                self._things.append(Tree(crown, parcels[int(kind * kinds)], place, keep_off))
+
+    def _river(self, half_m: Point, bank_m: float) -> tuple[Polygon, Polygon]:
+        """Draw the outlines of the banks and of the water of a winding river across the scene."""
+        height, width = self.labels.shape
+        angle = self._random.uniform(0, math.pi)
         length = math.hypot(height, width)
         s = np.linspace(-length / 2, length / 2, max(int(length / (8 * self._scale)), 20))
         wave = np.zeros_like(s)
         for wavelength, amplitude in ((900.0, 70.0), (380.0, 28.0), (170.0, 7.0)):
-            phase = self._uniform(0, 2 * math.pi)
+            phase = self._random.uniform(0, 2 * math.pi)
             wave += amplitude * np.sin(2 * math.pi * s / (wavelength * self._scale) + phase)
-        wave = wave * self._scale + self._uniform(-0.2, 0.2) * min(height, width)
-        half = self._uniform(*half_m) * self._scale * (1 + 0.25 * np.sin(s / (60 * self._scale)))
+        wave = wave * self._scale + self._random.uniform(-0.2, 0.2) * min(height, width)
+        widest = self._random.uniform(*half_m) * self._scale
+        half = widest * (1 + 0.25 * np.sin(s / (60 * self._scale)))
 
         def outline(reach: npt.NDArray[np.float64]) -> Polygon:
             along = np.concatenate([s, s[::-1]])
@@ -202,6 +229,3 @@ class Canvas:
             cv2.fillConvexPoly(self.labels, corners, label, cv2.LINE_8, _SUBPIXEL_BITS)
         else:
             cv2.fillPoly(self.labels, [corners], label, cv2.LINE_8, _SUBPIXEL_BITS)
-
-    def _uniform(self, low: float, high: float) -> float:
-        return low + (high - low) * float(self._random.random())

@@ -14,8 +14,9 @@ from ..rasters.grid import FloatArray, Grid
 from .cover import OPEN_GROUND, Cover
 from .noise import Stream, random_stream
 from .optical import OpticalOptions, direction
+from .range_power import LEVEL_PX
 from .sar import SarOptions
-from .scene import Scene
+from .scene import Scene, Scenes
 
 IntArray = npt.NDArray[np.intp]
 
@@ -23,15 +24,6 @@ _PER_SIDE = 12
 _TRIES = 20
 _ROOF_MARGIN_PX = 2
 _ITERATIONS = 30
-_LEVEL_PX = 0.05
-
-
-@dataclass(frozen=True)
-class Scenes:
-    """A scene when the radar and when the camera took its image."""
-
-    radar: Scene
-    camera: Scene
 
 
 @dataclass(frozen=True)
@@ -131,7 +123,6 @@ def radar_position(
     height_m : float64 array (...)
         Heights above the ground.
     """
-    towards_radar = -1 if sar.orbit == "ascending" else 1
     column, row = px[..., 0], px[..., 1]
 
     def terrain_m(x: FloatArray) -> FloatArray:
@@ -143,7 +134,7 @@ def radar_position(
     level_m, shown = terrain_m(column), column
     for _ in range(_ITERATIONS):
         above_m = level_m + height_m - terrain_m(shown)
-        shown = column + towards_radar * above_m * sar.cot_incidence / scene.pixel_size_m
+        shown = column + sar.towards_radar * above_m * sar.cot_incidence / scene.pixel_size_m
     return np.stack([shown, row], axis=-1)
 
 
@@ -192,7 +183,7 @@ def _inside_a_roof(scenes: Scenes, place: tuple[IntArray, IntArray]) -> npt.NDAr
 def _hidden_from_radar(
     scene: Scene, place: tuple[IntArray, IntArray], sar: SarOptions
 ) -> npt.NDArray[np.bool_]:
-    step = (-1.0 if sar.orbit == "ascending" else 1.0, 0.0)
+    step = (sar.towards_radar, 0)
     return _hidden(scene.terrain_m + scene.object_m, scene, place, step, sar.cot_incidence)
 
 
@@ -225,5 +216,5 @@ def _hidden(
             np.rint(column + k * step[0]).astype(np.intp),
         )
         there = np.clip(there[0], 0, rows - 1), np.clip(there[1], 0, columns - 1)
-        hidden |= height_px[there] > ray + k * rise + _LEVEL_PX
+        hidden |= height_px[there] > ray + k * rise + LEVEL_PX
     return hidden

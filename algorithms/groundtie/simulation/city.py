@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from .blocks import QUARTERS, Building, Quarter
-from .canvas import BOTH, Acquisition, Canvas, Changes, Labels, Standing, Tree
+from .canvas import BOTH, Acquisition, Canvas, Changes, Labels, Standing
 from .cover import Cover, ParcelBook
 from .polygons import (
     Point,
     Polygon,
     area,
     main_frame,
-    points_along,
+    moved,
     rectangle,
     strip_along,
     subdivide,
@@ -37,7 +37,9 @@ _PARKED_SHARE = 0.45
 _TREE_PITCH_M = 14.0
 _KINDS = 10
 _WINDOW_M = (2.8, 4.5)
-_PROBES_PER_SIDE = 6
+
+# Of the box around a block, the share that trees stand in.
+_PLANTED = 0.92
 
 
 @dataclass(frozen=True)
@@ -74,15 +76,12 @@ class CityLayout(Canvas):
         super().__init__(shape, px_per_m, generator, book, changes)
         self._traffic = traffic
         self._buildings: list[Building] = []
-        self._trees: list[Point] = []
 
     def draw(self) -> tuple[Labels, Labels]:
         """Draw the whole city; see `Canvas.images`."""
         self.labels[:] = self._add(Cover.PAVEMENT)
-        height, width = self.labels.shape
-        half = math.hypot(height, width) / 2
-        outline = rectangle((width / 2, height / 2), (half, half), self._uniform(0, math.pi / 2))
-        boulevard = self._uniform(*_BOULEVARD_M) * self._scale
+        outline = self._rotated_outline()
+        boulevard = self._random.uniform(*_BOULEVARD_M) * self._scale
         parts = subdivide(outline, _DISTRICT_M2 * self._scale**2, boulevard, self._random)
         streets: list[_Street] = []
         for district in parts.cells:
@@ -93,7 +92,7 @@ class CityLayout(Canvas):
         trains = self._draw_railway()
         boulevards = [_Street(lane, boulevard / 2, True) for lane in parts.lanes]
         self._draw_streets(boulevards)
-        self._plant_trees()
+        self._plant_trees(_KINDS, 11, 1.6, (Cover.WATER, Cover.ASPHALT, Cover.RAIL))
         self._put_up_buildings()
         self._park_cars(streets + boulevards)
         self._things += trains
@@ -102,7 +101,7 @@ class CityLayout(Canvas):
     def _draw_district(self, district: Polygon) -> list[_Street]:
         shares = np.cumsum([quarter.share for quarter in QUARTERS])
         quarter = QUARTERS[int(np.searchsorted(shares, self._random.random() * shares[-1]))]
-        street = self._uniform(*quarter.street_m) * self._scale
+        street = self._random.uniform(*quarter.street_m) * self._scale
         parts = subdivide(district, quarter.block_m2 * self._scale**2, street, self._random)
         for block in parts.cells:
             if self._random.random() < _OPEN_BLOCK_SHARE:
@@ -115,13 +114,13 @@ class CityLayout(Canvas):
     def _draw_open_block(self, block: Polygon) -> None:
         park = self._random.random() < 0.6
         self._fill(block, self._add(Cover.GRASS if park else Cover.PAVEMENT))
-        self._scatter_trees(block, 1 / 300 if park else 1 / 1500)
+        self._scatter_over(block, 1 / 300 if park else 1 / 1500)
 
     def _draw_block(self, block: Polygon, quarter: Quarter) -> None:
         green = self._random.random() < 0.3
         self._fill(block, self._add(Cover.GRASS if green else quarter.ground))
         self._buildings += quarter.build(block, self._scale, self._random)
-        self._scatter_trees(block, quarter.trees_per_m2)
+        self._scatter_over(block, quarter.trees_per_m2)
 
     def _draw_streets(self, streets: list[_Street]) -> None:
         """Draw pavements, then carriageways, so that no pavement runs across a junction."""
@@ -137,8 +136,7 @@ class CityLayout(Canvas):
 
     def _draw_river(self) -> None:
         if self._random.random() < _RIVER_CHANCE:
-            height, width = self.labels.shape
-            quay, water = self._river(height, width, (14, 28), 8)
+            quay, water = self._river((14, 28), 8)
             self._fill(quay, self._add(Cover.PAVEMENT), convex=False)
             self._fill(water, self._add(Cover.WATER), convex=False)
 
@@ -147,9 +145,10 @@ class CityLayout(Canvas):
         if self._random.random() >= _RAILWAY_CHANCE:
             return []
         height, width = self.labels.shape
-        angle, half_width = self._uniform(0, math.pi), self._uniform(12, 26) * self._scale
-        aside = self._uniform(-0.35, 0.35) * min(height, width)
-        centre = (width / 2 - aside * math.sin(angle), height / 2 + aside * math.cos(angle))
+        angle = self._random.uniform(0, math.pi)
+        half_width = self._random.uniform(12, 26) * self._scale
+        aside = self._random.uniform(-0.35, 0.35) * min(height, width)
+        centre = moved((width / 2, height / 2), 0.0, aside, angle)
         tracks = rectangle(centre, (math.hypot(height, width), half_width), angle)
         self._fill(tracks, self._add(Cover.RAIL, rows_rad=angle + math.pi / 2))
         coach = self._add(Cover.CAR, 4.0)
@@ -158,33 +157,22 @@ class CityLayout(Canvas):
             for _ in range(_TRAINS):
                 along, across = self._traffic.uniform(-1, 1, 2).tolist()
                 u, v = along * width / 2, across * (half_width - 3 * self._scale)
-                cos, sin = math.cos(angle), math.sin(angle)
-                place = (centre[0] + u * cos - v * sin, centre[1] + u * sin + v * cos)
-                train = rectangle(place, (70 * self._scale, 1.5 * self._scale), angle)
+                half_train = (70 * self._scale, 1.5 * self._scale)
+                train = rectangle(moved(centre, u, v, angle), half_train, angle)
                 trains.append(Standing(train, coach, (when,)))
         return trains
-
-    def _plant_trees(self) -> None:
-        kinds = [self._add(Cover.FOREST, self._uniform(4, 11)) for _ in range(_KINDS)]
-        keep_off = (Cover.WATER, Cover.ASPHALT, Cover.RAIL)
-        for place in self._trees:
-            kind, size = self._random.random(2).tolist()
-            radius = (1.6 + 2.4 * size) * self._scale
-            if radius >= 1:
-                crown = self._blob(place, radius)
-                self._stand(Tree(crown, kinds[int(kind * _KINDS)], place, keep_off))
 
     def _put_up_buildings(self) -> None:
         keep_off = (Cover.WATER, Cover.RAIL, Cover.ASPHALT)
         for building in self._buildings:
             outline, _ = building.parts[0]
-            if any(self._cover_at(p) in keep_off for p in points_along(outline, _PROBES_PER_SIDE)):
+            if self._touches(outline, keep_off):
                 continue
             when = self._changes.draw()
-            window_m = self._uniform(*_WINDOW_M)
+            window_m = self._random.uniform(*_WINDOW_M)
             for part, height_m in building.parts:
                 roof = self._add(Cover.BUILDING, height_m, window_m=window_m)
-                self._stand(Standing(part, roof, when))
+                self._things.append(Standing(part, roof, when))
 
     def _park_cars(self, streets: list[_Street]) -> None:
         """Put cars along the kerbs and on the lanes, others in each image."""
@@ -205,7 +193,7 @@ class CityLayout(Canvas):
                         drawn, kind = self._traffic.random(2).tolist()
                         if drawn < _PARKED_SHARE and self._cover_at(place) == Cover.ASPHALT:
                             car = rectangle(place, half_car, angle)
-                            self._stand(Standing(car, kinds[int(kind * _KINDS)], (when,)))
+                            self._things.append(Standing(car, kinds[int(kind * _KINDS)], (when,)))
 
     def _places(self, lane: Polygon, offset: float, pitch_m: float) -> list[Point]:
         """Places in the scene at even distances along a lane."""
@@ -217,9 +205,5 @@ class CityLayout(Canvas):
         inside = (x > 0) & (x < width - 1) & (y > 0) & (y < height - 1)
         return list(zip(x[inside].tolist(), y[inside].tolist(), strict=True))
 
-    def _scatter_trees(self, block: Polygon, per_m2: float) -> None:
-        centre, half, angle = main_frame(block)
-        cos, sin = math.cos(angle), math.sin(angle)
-        for _ in range(int(self._random.poisson(area(block) / self._scale**2 * per_m2))):
-            u, v = self._uniform(-0.92, 0.92) * half[0], self._uniform(-0.92, 0.92) * half[1]
-            self._trees.append((centre[0] + u * cos - v * sin, centre[1] + u * sin + v * cos))
+    def _scatter_over(self, block: Polygon, per_m2: float) -> None:
+        self._scatter_trees(block, area(block) / self._scale**2 * per_m2, _PLANTED)

@@ -8,15 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-from rasterio.io import MemoryFile
 
 from ..geometry.models import DEGREE, TERRAIN
 from ..rasters.atomic import Outputs, make_folder, write_csv, write_json, writing
-from ..rasters.grid import FloatArray, Grid
-from ..runs import RUN_TAG, run_tags
-from ..sensor.rpc import RPC
-from ..sensor.rpc_tags import rpc_to_tags
+from ..rasters.grid import FloatArray
+from ..rasters.whole import write_raster
 from .metadata import optical_item, sar_item
 from .pair import SAR, SimulatedPair, scene_grid
 
@@ -113,49 +109,12 @@ def truth_json(pair: SimulatedPair) -> dict[str, Any]:
     return values
 
 
-def _matrix(
-    function: Callable[[FloatArray], FloatArray], centre: FloatArray, step: float = 1000.0
-) -> list[list[float]]:
+def _matrix(function: Callable[[FloatArray], FloatArray], centre: FloatArray) -> list[list[float]]:
     """Return the 2×3 matrix of an affine function of the plane, from its values at the centre."""
+    step = 1000.0
     base, along_x, along_y = function(centre + [[0, 0], [step, 0], [0, step]])
     linear = np.column_stack([along_x - base, along_y - base]) / step
     return np.column_stack([linear, base - linear @ centre]).tolist()
-
-
-def write_raster(
-    path: Path,
-    image: npt.NDArray[Any],
-    grid: Grid,
-    band_names: Sequence[str],
-    rpc: RPC | None = None,
-) -> None:
-    """Write bands, shape (bands, rows, columns), as GeoTIFF, with RPCs if there are any."""
-    profile = {
-        "driver": "GTiff",
-        "count": len(image),
-        "height": grid.height,
-        "width": grid.width,
-        "dtype": image.dtype,
-        "tiled": True,
-        "blockxsize": 256,
-        "blockysize": 256,
-        "compress": "deflate",
-        "predictor": 3 if image.dtype.kind == "f" else 2,
-        "bigtiff": "if_safer",
-    }
-    if grid.is_georeferenced:
-        profile |= {"crs": grid.crs, "transform": grid.transform}
-    # In memory: a full disk is no exception within GDAL (see `rasters.tiff`).
-    with MemoryFile() as memory:
-        with memory.open(**profile) as raster:
-            raster.write(image)
-            raster.update_tags(**run_tags(RUN_TAG))
-            for band, name in enumerate(band_names, start=1):
-                raster.set_band_description(band, name)
-            if rpc is not None:
-                raster.update_tags(ns="RPC", **rpc_to_tags(rpc))
-        with writing(path, len(memory.getbuffer())):
-            path.write_bytes(memory.getbuffer())
 
 
 def _check_points(pair: SimulatedPair) -> FloatArray:

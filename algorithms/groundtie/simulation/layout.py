@@ -11,14 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .canvas import NO_CHANGES, Canvas, Changes, Labels, Standing, Tree
+from .canvas import Canvas, Changes, Labels, Standing
 from .cover import Cover, ParcelBook
 from .polygons import (
-    Point,
     Polygon,
     fitted_rectangle,
     main_frame,
-    points_along,
+    moved,
     rectangle,
     subdivide,
 )
@@ -55,8 +54,9 @@ _DISTRICT_M2 = 70000
 _ARTERIAL_M = {"rural": 7.0, "suburban": 12.0, "urban": 18.0}
 _FARMSTEAD_CHANCE = 0.5
 _LAKE_M2 = 400_000
-_TREE_KINDS = 8
-_PROBES_PER_SIDE = 6
+
+# Of the box around a lot, the share that trees stand in.
+_PLANTED = 0.9
 
 
 def highest_object_m(density: str) -> float:
@@ -82,20 +82,16 @@ class Layout(Canvas):
         density: str,
         generator: np.random.Generator,
         book: ParcelBook,
-        changes: Changes = NO_CHANGES,
+        changes: Changes,
     ) -> None:
         super().__init__(shape, px_per_m, generator, book, changes)
         self._density = density
         self._buildings: list[tuple[Polygon, float]] = []
-        self._trees: list[Point] = []
 
     def draw(self) -> tuple[Labels, Labels]:
         """Draw the whole scene; see `Canvas.images`."""
         self.labels[:] = self._add(Cover.GRASS)
-        height, width = self.labels.shape
-        # Streets follow the rotated outline, which reaches beyond the scene on all sides.
-        half = math.hypot(height, width) / 2
-        outline = rectangle((width / 2, height / 2), (half, half), self._uniform(0, math.pi / 2))
+        outline = self._rotated_outline()
         arterial = _ARTERIAL_M[self._density] * self._scale
         districts = subdivide(outline, _DISTRICT_M2 * self._scale**2, arterial, self._random)
         for district in districts.cells:
@@ -105,7 +101,7 @@ class Layout(Canvas):
         for lane in districts.lanes:
             self._fill(lane, self._add(Cover.ROAD))
         self._draw_buildings()
-        self._draw_trees()
+        self._plant_trees(8, 12, 1.5, (Cover.WATER, Cover.ROAD, Cover.BUILDING))
         return self.images()
 
     def _draw_district(self, district: Polygon) -> None:
@@ -128,10 +124,10 @@ class Layout(Canvas):
     def _draw_open_block(self, block: Polygon, use: Use) -> None:
         _, half, angle = main_frame(block)
         if use is FOREST:
-            self._fill(block, self._add(Cover.FOREST, self._uniform(*CANOPY_M)))
+            self._fill(block, self._add(Cover.FOREST, self._random.uniform(*CANOPY_M)))
         elif use is PARK:
             self._fill(block, self._add(Cover.GRASS))
-            self._scatter_trees(block, half[0] * half[1] / (120 * self._scale**2))
+            self._scatter_trees(block, half[0] * half[1] / (120 * self._scale**2), _PLANTED)
         else:
             self._fill(block, self._add(Cover.FIELD, rows_rad=angle + math.pi / 2))
 
@@ -141,36 +137,35 @@ class Layout(Canvas):
         for lot in subdivide(block, use.lot_m2 * self._scale**2, 0.0, self._random).cells:
             if ground is Cover.GRASS:
                 self._fill(lot, self._add(Cover.GRASS))
-            fill = (self._uniform(*use.fill), self._uniform(*use.fill))
+            fill = (self._random.uniform(*use.fill), self._random.uniform(*use.fill))
             footprint = fitted_rectangle(lot, fill)
             if footprint is not None:
                 # Squared and more: many low buildings, few towers.
                 share = self._random.random() ** 2.5
                 low, high = use.height_m
                 self._buildings.append((footprint, low + (high - low) * share))
-            self._scatter_trees(lot, use.trees_per_lot)
+            self._scatter_trees(lot, use.trees_per_lot, _PLANTED)
 
     def _place_farmstead(self, field: Polygon) -> None:
         centre, half, angle = main_frame(field)
-        cos, sin = math.cos(angle), math.sin(angle)
         for k in range(3):
             u, v = (0.55 - 0.3 * k) * half[0], (0.6 - 0.2 * (k % 2)) * half[1]
-            place = (centre[0] + u * cos - v * sin, centre[1] + u * sin + v * cos)
+            place = moved(centre, u, v, angle)
             size = (
-                self._uniform(6, 12) * self._scale,
-                self._uniform(4, 7) * self._scale,
+                self._random.uniform(6, 12) * self._scale,
+                self._random.uniform(4, 7) * self._scale,
             )
-            self._buildings.append((rectangle(place, size, angle), self._uniform(4, 8)))
+            self._buildings.append((rectangle(place, size, angle), self._random.uniform(4, 8)))
             self._trees.append((place[0] + 1.4 * size[0], place[1] + 1.6 * size[1]))
 
     def _draw_waters(self) -> None:
         """Draw all banks, then all waters, so that no bank runs through another water."""
         height, width = self.labels.shape
-        shores = [self._river(height, width, (6, 14), 5)]
+        shores = [self._river((6, 14), 5)]
         area_m2 = height * width / self._scale**2
         for _ in range(int(self._random.poisson(area_m2 / _LAKE_M2))):
-            centre = (self._uniform(0, width), self._uniform(0, height))
-            radius = self._uniform(20, 70) * self._scale
+            centre = (self._random.uniform(0, width), self._random.uniform(0, height))
+            radius = self._random.uniform(20, 70) * self._scale
             shores.append((self._blob(centre, radius * 1.15), self._blob(centre, radius)))
         for bank, _ in shores:
             self._fill(bank, self._add(Cover.GRASS), convex=False)
@@ -179,24 +174,6 @@ class Layout(Canvas):
 
     def _draw_buildings(self) -> None:
         for footprint, height_m in self._buildings:
-            outline = points_along(footprint, _PROBES_PER_SIDE)
-            if not any(self._cover_at(point) == Cover.WATER for point in outline):
+            if not self._touches(footprint, (Cover.WATER,)):
                 building = self._add(Cover.BUILDING, height_m)
-                self._stand(Standing(footprint, building, self._changes.draw()))
-
-    def _draw_trees(self) -> None:
-        kinds = [self._add(Cover.FOREST, self._uniform(4, 12)) for _ in range(_TREE_KINDS)]
-        keep_off = (Cover.WATER, Cover.ROAD, Cover.BUILDING)
-        for place in self._trees:
-            kind, size = self._random.random(2).tolist()
-            radius_px = (1.5 + 2.5 * size) * self._scale
-            if radius_px >= 1:
-                crown = self._blob(place, radius_px)
-                self._stand(Tree(crown, kinds[int(kind * _TREE_KINDS)], place, keep_off))
-
-    def _scatter_trees(self, polygon: Polygon, mean_count: float) -> None:
-        centre, half, angle = main_frame(polygon)
-        cos, sin = math.cos(angle), math.sin(angle)
-        for _ in range(int(self._random.poisson(mean_count))):
-            u, v = self._uniform(-0.9, 0.9) * half[0], self._uniform(-0.9, 0.9) * half[1]
-            self._trees.append((centre[0] + u * cos - v * sin, centre[1] + u * sin + v * cos))
+                self._things.append(Standing(footprint, building, self._changes.draw()))

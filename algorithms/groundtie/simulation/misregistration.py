@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -125,80 +126,65 @@ def needed_margin(model: Model, reference: Grid, nominal: Grid) -> int:
 
 
 @dataclass(frozen=True)
-class SourcePositions:
-    """Where the pixels of the input lie on the pixels of the scene.
-
-    The exact inverse of the truth is taken at nodes; a bicubic spline through them returns any
-    affine map exactly and gentle polynomials to far below a thousandth of a pixel.
-    """
-
-    columns: RectBivariateSpline
-    rows: RectBivariateSpline
-    width: int
-
-    @classmethod
-    def of(cls, truth: Transform, scene_grid: Grid) -> SourcePositions:
-        """Return the positions of all pixels of the truth's input."""
-        width, height = truth.input_grid.width, truth.input_grid.height
-        node_row, node_column = _nodes(height), _nodes(width)
-        column, row = np.meshgrid(node_column, node_row)
-        px = scene_grid.map_to_pixel(truth.inverse(np.stack([column, row], axis=-1).reshape(-1, 2)))
-        return cls(
-            RectBivariateSpline(node_row, node_column, px[:, 0].reshape(column.shape)),
-            RectBivariateSpline(node_row, node_column, px[:, 1].reshape(column.shape)),
-            width,
-        )
-
-    def strip(self, start: int, stop: int) -> npt.NDArray[np.float64]:
-        """Return scene (row, column), shape (2, stop − start, width), of some rows."""
-        row, column = np.arange(start, stop), np.arange(self.width)
-        return np.stack([self.rows(row, column), self.columns(row, column)])
-
-
-@dataclass(frozen=True)
-class ExactPositions:
-    """Where the pixels of the input lie on the pixels of the scene, one by one: terrain is rough.
+class Positions:
+    """Where the pixels of an image lie on the pixels of the scene.
 
     Attributes
     ----------
-    truth : Transform
-        Reference map position -> input pixel.
-    scene_grid : Grid
-        The scene.
+    shape : tuple of int
+        Rows and columns of the image.
+    strip : function
+        From the first row and the one after the last to scene (row, column) of the pixels between,
+        shape (2, rows, columns).
     """
 
-    truth: Transform
-    scene_grid: Grid
+    shape: tuple[int, int]
+    strip: Callable[[int, int], npt.NDArray[np.float64]]
 
-    @property
-    def width(self) -> int:
-        """Width of the image in pixels."""
-        return self.truth.input_grid.width
+    @classmethod
+    def interpolated(cls, truth: Transform, scene_grid: Grid) -> Positions:
+        """Return the positions of all pixels of the truth's input.
 
-    def strip(self, start: int, stop: int) -> npt.NDArray[np.float64]:
-        """Return scene (row, column), shape (2, stop − start, width), of some rows."""
-        column, row = np.meshgrid(np.arange(self.width), np.arange(start, stop))
-        xy = self.truth.inverse(np.stack([column, row], axis=-1).reshape(-1, 2))
-        px = self.scene_grid.map_to_pixel(xy).reshape(*column.shape, 2)
-        return np.ascontiguousarray(px.transpose(2, 0, 1)[::-1])
+        The exact inverse of the truth is taken at nodes; a bicubic spline through them returns any
+        affine map exactly and gentle polynomials to far below a thousandth of a pixel.
+        """
+        width, height = truth.input_grid.width, truth.input_grid.height
+        nodes = _nodes(height), _nodes(width)
+        places = _on_scene(truth, scene_grid, *nodes)
+        rows, columns = (RectBivariateSpline(*nodes, place) for place in places)
+
+        def strip(start: int, stop: int) -> npt.NDArray[np.float64]:
+            row, column = np.arange(start, stop), np.arange(width)
+            return np.stack([rows(row, column), columns(row, column)])
+
+        return cls((height, width), strip)
+
+    @classmethod
+    def exact(cls, truth: Transform, scene_grid: Grid) -> Positions:
+        """Return the same, taken one by one: terrain is rough."""
+        width, height = truth.input_grid.width, truth.input_grid.height
+
+        def strip(start: int, stop: int) -> npt.NDArray[np.float64]:
+            return _on_scene(truth, scene_grid, np.arange(start, stop), np.arange(width))
+
+        return cls((height, width), strip)
 
 
-class Positions(Protocol):
-    """Where the pixels of an image lie on the pixels of the scene."""
+def _on_scene(
+    truth: Transform, scene_grid: Grid, rows: npt.NDArray[Any], columns: npt.NDArray[Any]
+) -> npt.NDArray[np.float64]:
+    """Return scene (row, column) of a lattice of input pixels, shape (2, rows, columns)."""
+    column, row = np.meshgrid(columns, rows)
+    xy = truth.inverse(np.stack([column, row], axis=-1).reshape(-1, 2))
+    px = scene_grid.map_to_pixel(xy).reshape(*column.shape, 2)
+    return np.ascontiguousarray(px.transpose(2, 0, 1)[::-1])
 
-    @property
-    def width(self) -> int:
-        """Width of the image in pixels."""
 
-    def strip(self, start: int, stop: int) -> npt.NDArray[np.float64]:
-        """Return scene (row, column), shape (2, stop − start, width), of some rows."""
-
-
-def resample(image: FloatImage, positions: Positions, height: int) -> FloatImage:
-    """Interpolate an image (rows, columns) at the pixels of the input by cubic B-splines."""
+def resample(image: FloatImage, positions: Positions) -> FloatImage:
+    """Interpolate a scene's image (rows, columns) at the pixels of another by cubic B-splines."""
     coefficients = spline_filter(image, order=3, output=np.float32, mode="mirror")
-    result = np.empty((height, positions.width), np.float32)
-    for _, start, stop in strips(height):
+    result = np.empty(positions.shape, np.float32)
+    for _, start, stop in strips(len(result)):
         map_coordinates(
             coefficients,
             positions.strip(start, stop),

@@ -97,9 +97,7 @@ def render_radiance(scene: Scene, options: OpticalOptions) -> FloatImage:
     image = np.empty((len(band_index), rows, columns), np.float32)
     highest_px = float(scene.object_m.max()) / scene.pixel_size_m
     reach = math.ceil(highest_px * max(options.lean, options.shadow)) + 2
-    generator = random_stream(scene.seed, Stream.OPTICAL_PATCHES)
-    cell_px = max(_PATCHES_M / scene.pixel_size_m, 3.0)
-    patches = SmoothNoise.draw((rows, columns), cell_px, generator)
+    patches = scene.patches(Stream.OPTICAL_PATCHES, _PATCHES_M)
     for index, start, stop in strips(rows):
         context = slice(max(start - reach, 0), min(stop + reach, rows))
         inside = slice(start - context.start, stop - context.start)

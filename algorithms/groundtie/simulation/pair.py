@@ -18,13 +18,11 @@ from ..geometry.terrain_model import TerrainModel
 from ..geometry.transform import Transform
 from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
-from .check_points import InputImage, RoofPoints, Scenes, ground_points, roof_points
+from .check_points import InputImage, RoofPoints, ground_points, roof_points
 from .held import PAIR_BYTES, require_memory
 from .misregistration import (
     DistortionOptions,
-    ExactPositions,
     Positions,
-    SourcePositions,
     draw_misregistration,
     needed_margin,
     resample,
@@ -90,9 +88,7 @@ class PairOptions:
     def sight(self) -> tuple[float, float]:
         """How far east and north the input shows a place for each metre that it is higher."""
         if self.input == SAR:
-            return (
-                -self.sar.cot_incidence if self.sar.orbit == "ascending" else self.sar.cot_incidence
-            ), 0.0
+            return self.sar.towards_radar * self.sar.cot_incidence, 0.0
         east, south = direction(self.optical.view_azimuth_deg)
         return -east * self.optical.lean, south * self.optical.lean
 
@@ -161,14 +157,14 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
     margin = in_steps(needed_margin(model, reference_grid, nominal) + reach)
     around = scene_grid(reference_grid, margin)
     require_memory(around, nominal, PAIR_BYTES)
-    scenes = Scenes(*generate_scenes(scene_options, margin))
+    scenes = generate_scenes(scene_options, margin)
     assumed_m = _assumed_terrain(scenes.radar, options)
     truth = Transform(model, reference_grid.crs, nominal)
-    positions: Positions = SourcePositions.of(truth, around)
+    positions = Positions.interpolated(truth, around)
     if options.terrain_error_m:
         displaced = _displaced(model, scenes.radar.terrain_m, assumed_m, around, options)
         truth = Transform(displaced, reference_grid.crs, nominal)
-        positions = ExactPositions(truth, around)
+        positions = Positions.exact(truth, around)
     progress.update(0.25, "looking with the radar")
     is_radar = options.input == SAR
     radar = _radar_image(scenes.radar, options, positions if is_radar else None)
@@ -197,8 +193,7 @@ def _radar_image(
     if positions is None:
         return render_sar(scene, options.sar)[None]
     power = sar_power(replace(scene, margin_px=0), options.sar)
-    height = map_grid(options.scene).scaled(options.pixel_ratio).height
-    seen = np.maximum(resample(power, positions, height), power.min())
+    seen = np.maximum(resample(power, positions), power.min())
     speckle = random_stream(options.scene.seed, Stream.SPECKLE)
     return quantise_amplitude(add_speckle(seen, options.sar.looks, speckle), options.sar)[None]
 
@@ -209,14 +204,13 @@ def _camera_image(
     """Return the camera's image, (bands, rows, columns): as it is, or as the input shows it."""
     radiance = render_radiance(scene, options.optical)
     rows, columns = scene.window
-    height = map_grid(options.scene).scaled(options.pixel_ratio).height
     image = []
     for band, light in enumerate(radiance):
         progress.update(0.5 + 0.5 * band / len(radiance), "resampling the optical image")
         # Below 0.6 px the cubic kernel could not follow the scene any more.
         ratio = 1.0 if positions is None else options.pixel_ratio
         blur(light, max(options.optical.psf_sigma_px * ratio, 0.6))
-        seen = light[rows, columns] if positions is None else resample(light, positions, height)
+        seen = light[rows, columns] if positions is None else resample(light, positions)
         noise = random_stream(options.scene.seed, Stream.OPTICAL_NOISE, band)
         image.append(quantise(seen, options.optical, noise))
     return np.stack(image)

@@ -59,17 +59,16 @@ def points_along(polygon: Polygon, per_side: int) -> list[Point]:
     ]
 
 
+def moved(place: Point, along: float, across: float, angle_rad: float) -> Point:
+    """Return a place moved along a direction, at an angle to the first axis, and across it."""
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    return place[0] + along * cos - across * sin, place[1] + along * sin + across * cos
+
+
 def rectangle(centre: Point, half: Point, angle_rad: float) -> Polygon:
     """Return the rectangle of half side lengths `half`, rotated by an angle."""
-    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
-    return [
-        (
-            centre[0] + i * half[0] * cos - j * half[1] * sin,
-            centre[1] + i * half[0] * sin + j * half[1] * cos,
-        )
-        for i, j in corners
-    ]
+    return [moved(centre, i * half[0], j * half[1], angle_rad) for i, j in corners]
 
 
 def main_frame(polygon: Polygon) -> tuple[Point, Point, float]:
@@ -129,7 +128,7 @@ def _split(
     longer = 0 if half[0] >= half[1] else 1
     across = angle + longer * math.pi / 2
     offset = (2 * share - 1) * half[longer]
-    point = (centre[0] + offset * math.cos(across), centre[1] + offset * math.sin(across))
+    point = moved(centre, offset, 0.0, across)
     direction = across + turn * _ANGLE_JITTER_RAD
     normal = (math.cos(direction), math.sin(direction))
     opposite = (-normal[0], -normal[1])
@@ -173,5 +172,4 @@ def strip_along(polygon: Polygon, offset: float, half_width: float, longer: floa
         How much further than the polygon the strip reaches at both ends.
     """
     centre, half, angle = main_frame(polygon)
-    shifted = (centre[0] - offset * math.sin(angle), centre[1] + offset * math.cos(angle))
-    return rectangle(shifted, (half[0] + longer, half_width), angle)
+    return rectangle(moved(centre, 0.0, offset, angle), (half[0] + longer, half_width), angle)

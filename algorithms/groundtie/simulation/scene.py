@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -136,13 +137,26 @@ class Scene:
         """Return the class (`Cover`) of the pixels of some rows."""
         return self.parcels.cover[self.parcel[rows]]
 
+    def patches(self, stream: Stream, size_m: float) -> SmoothNoise:
+        """Return how parcels vary within themselves: a field that is smooth over some metres."""
+        shape = (self.parcel.shape[0], self.parcel.shape[1])
+        cell_px = max(size_m / self.pixel_size_m, 3.0)
+        return SmoothNoise.draw(shape, cell_px, random_stream(self.seed, stream))
+
+
+class Scenes(NamedTuple):
+    """A scene when the radar and when the camera took its image."""
+
+    radar: Scene
+    camera: Scene
+
 
 def generate_scene(options: SceneOptions, margin_px: int = 0) -> Scene:
     """Generate a scene as it is at the radar's acquisition; see `generate_scenes`."""
-    return generate_scenes(options, margin_px)[0]
+    return generate_scenes(options, margin_px).radar
 
 
-def generate_scenes(options: SceneOptions, margin_px: int = 0) -> tuple[Scene, Scene]:
+def generate_scenes(options: SceneOptions, margin_px: int = 0) -> Scenes:
     """Generate a scene as it is at the radar's and at the camera's acquisition.
 
     Parameters
@@ -154,7 +168,7 @@ def generate_scenes(options: SceneOptions, margin_px: int = 0) -> tuple[Scene, S
 
     Returns
     -------
-    two Scenes
+    Scenes
         One and the same if nothing has changed.
     """
     width, height = (size + 2 * margin_px for size in options.size_px)
@@ -170,7 +184,7 @@ def generate_scenes(options: SceneOptions, margin_px: int = 0) -> tuple[Scene, S
         return Scene(pixel_m, margin_px, seed, terrain_m, objects_m, parcel, parcels)
 
     radar = scene(labels[0])
-    return radar, radar if labels[1] is labels[0] else scene(labels[1])
+    return Scenes(radar, radar if labels[1] is labels[0] else scene(labels[1]))
 
 
 def _layout(options: SceneOptions, shape: tuple[int, int], book: ParcelBook) -> Layout | CityLayout:
@@ -178,8 +192,7 @@ def _layout(options: SceneOptions, shape: tuple[int, int], book: ParcelBook) -> 
     enlargement = max(options.pixel_size_m / _COARSEST_FULL_SIZE_M, 1.0)
     scale = enlargement / options.pixel_size_m
     generator = random_stream(options.seed, Stream.LAYOUT)
-    changing = random_stream(options.seed, Stream.CHANGES) if options.changed > 0 else None
-    changes = Changes(options.changed, changing)
+    changes = Changes(options.changed, random_stream(options.seed, Stream.CHANGES))
     if options.density == CITY:
         traffic = random_stream(options.seed, Stream.TRAFFIC)
         return CityLayout(shape, scale, generator, book, changes, traffic)

@@ -10,8 +10,10 @@ import numpy as np
 
 from ..rasters.atomic import Outputs, make_folder, write_json, writing
 from ..rasters.grid import PIXEL_COORDINATES, Grid
+from ..rasters.whole import write_raster
 from ..sensor.rpc_files import write_rpc
-from .files import write_raster, write_table
+from ..sensor.rpc_tags import rpc_to_tags
+from .files import write_table
 from .metadata import optical_item, sar_item
 from .sensor_image import FloatArray, SensorImage
 
@@ -53,11 +55,12 @@ def write_sensor_image(made: SensorImage, folder: str | Path) -> dict[str, Path]
     paths = {key: Path(folder) / name for key, name in NAMES.items()}
     make_folder(Path(folder))
     bands = [band.capitalize() for band in made.options.optical.bands]
+    rpc_tags = rpc_to_tags(made.delivered.rpc)
     own = Grid(PIXEL_COORDINATES, None, made.image.shape[2], made.image.shape[1])
     with Outputs() as outputs, writing(folder):
         staged = {key: outputs.stage(path) for key, path in paths.items()}
         write_raster(staged["reference"], made.reference[None], made.reference_grid, ["Amplitude"])
-        write_raster(staged["image"], made.image, own, bands, made.delivered.rpc)
+        write_raster(staged["image"], made.image, own, bands, rpc_tags=rpc_tags)
         heights = ["Height of ground above the ellipsoid (m)"]
         write_raster(staged["dem"], made.terrain_m[None], made.terrain_grid, heights)
         surface = ["Height of surface above the ellipsoid (m)"]

@@ -15,9 +15,9 @@ from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, FloatArray, Grid, reproje
 from ..sensor.rpc_fit import RPCFit, fit_rpc
 from .attitude import AttitudeError, AttitudeOptions
 from .camera import PushBroom
-from .check_points import InputImage, RoofPoints, Scenes, ground_points, roof_points
+from .check_points import InputImage, RoofPoints, ground_points, roof_points
 from .held import SENSOR_BYTES, require_memory
-from .misregistration import resample
+from .misregistration import Positions, resample
 from .noise import Stream, random_stream, strips
 from .optical import OpticalOptions, blur, quantise, render_radiance
 from .pair import in_steps, map_grid, object_reach_px, scene_grid
@@ -61,6 +61,11 @@ class SensorOptions:
         """Refuse what cannot be simulated."""
         if self.optical.off_nadir_deg > 45:
             raise ParameterError("the camera must look down by 45° or more steeply")
+
+    @property
+    def hills_m(self) -> float:
+        """How far hills rise and fall: up to a half beyond the range over most of the scene."""
+        return 1.5 * self.scene.relief_m
 
 
 @dataclass(frozen=True)
@@ -145,21 +150,6 @@ class Terrain:
         return xy
 
 
-@dataclass(frozen=True)
-class _Seen:
-    """Where the pixels of the image lie on the pixels of the scene, (2, rows, columns)."""
-
-    places: FloatArray
-
-    @property
-    def width(self) -> int:
-        return self.places.shape[2]
-
-    def strip(self, start: int, stop: int) -> FloatArray:
-        """Return scene (row, column), shape (2, stop − start, width), of some rows."""
-        return self.places[:, start:stop]
-
-
 def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -> SensorImage:
     """Simulate a sensor image; the same options give the same image.
 
@@ -181,7 +171,7 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
     margin = _margin_px(options, grid, camera, error)
     around = scene_grid(grid, margin)
     require_memory(around, grid, SENSOR_BYTES)
-    scenes = Scenes(*generate_scenes(scene_options, margin))
+    scenes = generate_scenes(scene_options, margin)
     terrain = Terrain(scenes.radar.terrain_m + np.float32(GROUND_M), around)
     progress.update(0.25, "looking with the radar")
     reference = render_sar(scenes.radar, options.sar)
@@ -193,7 +183,7 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
         progress.update(0.5 + 0.5 * band / len(radiance), "resampling the optical image")
         blur(light, view.psf_sigma_px)
         noise = random_stream(scene_options.seed, Stream.OPTICAL_NOISE, band)
-        image[band] = quantise(resample(light, seen, size[1]), view, noise)
+        image[band] = quantise(resample(light, seen), view, noise)
     exact, delivered = _rpcs(options, camera, error, grid)
     optical = InputImage(
         lambda px: camera.project(terrain.under(grid.pixel_to_map(px))),
@@ -236,12 +226,10 @@ def _margin_px(options: SensorOptions, grid: Grid, camera: PushBroom, error: Att
     All that the image shows, in truth and by its RPCs, has heights and objects.
     """
     outline = Grid(PIXEL_COORDINATES, None, *options.scene.size_px).outline()
-    # Hills rise up to a half above and below the range that they have over most of the scene.
-    reach_m = 1.5 * options.scene.relief_m
     seen = [
         grid.map_to_pixel(camera.localise(px, GROUND_M + height_m))
         for px in (outline, error.inverse()(outline))
-        for height_m in (-reach_m, reach_m)
+        for height_m in (-options.hills_m, options.hills_m)
     ]
     px = np.concatenate(seen)
     beyond = np.maximum(-px, px - [grid.width - 1, grid.height - 1]).max()
@@ -249,7 +237,7 @@ def _margin_px(options: SensorOptions, grid: Grid, camera: PushBroom, error: Att
     return in_steps(max(math.ceil(float(beyond)), 0) + reach)
 
 
-def _seen(camera: PushBroom, terrain: Terrain, size: tuple[int, int]) -> _Seen:
+def _seen(camera: PushBroom, terrain: Terrain, size: tuple[int, int]) -> Positions:
     """Return where the scene's pixels are that the image's pixels see."""
     places = np.empty((2, size[1], size[0]))
     for _, start, stop in strips(size[1]):
@@ -257,7 +245,7 @@ def _seen(camera: PushBroom, terrain: Terrain, size: tuple[int, int]) -> _Seen:
         px = np.stack([column, row], axis=-1).reshape(-1, 2).astype(float)
         place = terrain.grid.map_to_pixel(terrain.seen_by(camera, px))
         places[:, start:stop] = place[:, ::-1].T.reshape(2, stop - start, size[0])
-    return _Seen(places)
+    return Positions((size[1], size[0]), lambda start, stop: places[:, start:stop])
 
 
 def _rpcs(
@@ -265,7 +253,7 @@ def _rpcs(
 ) -> tuple[RPCFit, RPCFit]:
     """Return the RPCs of the camera, and those with the error, over the image's own range."""
     width, height = options.scene.size_px
-    reach_m = 1.5 * options.scene.relief_m + _RPC_REACH_M
+    reach_m = options.hills_m + _RPC_REACH_M
     axes = (
         np.linspace(-0.5, width - 0.5, _RPC_NODES),
         np.linspace(-0.5, height - 0.5, _RPC_NODES),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +19,8 @@ from .objective import BinnedPair, bin_pair
 
 # A point of the space that is searched; see `PoseSpace`.
 Place = tuple[float, ...]
-Climb = Callable[["Counted", "PoseSpace", Place, np.random.Generator], Place]
-
-_NOMINAL = Pose()
+Similarity = Callable[[Place], float]
+Climb = Callable[[Similarity, "PoseSpace", Place, np.random.Generator], Place]
 
 # Peaks nearer than this are the same candidate, in pixels; so many are returned.
 _SAME_PX = 4.0
@@ -36,36 +36,14 @@ class Effort:
 
     Parameters
     ----------
-    start
-        Where the first climb starts.
     restarts
         How often it may start again, at places drawn evenly from within the limits.
     agreeing
         After so many climbs have ended at the best place, there are no more.
     """
 
-    start: Pose = _NOMINAL
     restarts: int = 31
     agreeing: int = 3
-
-
-class Counted:
-    """A function that is evaluated once at every place, and counts how often."""
-
-    def __init__(self, function: Callable[[Place], float]) -> None:
-        self._function = function
-        self._values: dict[Place, float] = {}
-
-    def __call__(self, place: Place) -> float:
-        """Return the value at a place."""
-        if place not in self._values:
-            self._values[place] = self._function(place)
-        return self._values[place]
-
-    @property
-    def evaluations(self) -> int:
-        """At how many places it was evaluated."""
-        return len(self._values)
 
 
 @dataclass(frozen=True)
@@ -150,18 +128,10 @@ def spread_px(shape: tuple[int, ...]) -> float:
     return float(np.hypot(height, width) / np.sqrt(12))
 
 
-@dataclass(frozen=True)
-class Climbed:
-    """Where climbs ended, in their order, and the similarity at all starts they might have had."""
-
-    ends: tuple[Place, ...]
-    background: tuple[float, ...]
-
-
 def climb_often(
-    similarity: Counted, space: PoseSpace, climb: Climb, effort: Effort, seed: int
-) -> Climbed:
-    """Climb from a start and from drawn ones, until enough climbs end at the best place.
+    similarity: Similarity, space: PoseSpace, climb: Climb, effort: Effort, seed: int
+) -> tuple[list[Place], list[float]]:
+    """Climb from the nominal pose and from drawn ones, until enough end at the best place.
 
     Parameters
     ----------
@@ -172,21 +142,25 @@ def climb_often(
     climb
         Returns the best place it found from a start.
     effort
-        Where and how often to start.
+        How often to start.
     seed
         Of everything that is drawn.
+
+    Returns
+    -------
+    Where climbs ended, in their order, and the similarity at all starts they might have had.
     """
     rng = np.random.default_rng(seed)
     same_px = _SAME_END_PX if space.origin is None else 0.0
     starts = [space.draw(rng) for _ in range(effort.restarts)]
-    background = tuple(similarity(start) for start in starts)
+    background = [similarity(start) for start in starts]
     ends: list[Place] = []
-    for start in [space.place(effort.start), *starts]:
+    for start in [space.place(Pose()), *starts]:
         ends.append(climb(similarity, space, start, rng))
         best = max(ends, key=similarity)
         if sum(_apart_px(end, best) <= same_px for end in ends) >= effort.agreeing:
             break
-    return Climbed(tuple(ends), background)
+    return ends, background
 
 
 def search_by_climbing(
@@ -198,22 +172,24 @@ def search_by_climbing(
     are those of the whole search, starts included: before its end, no candidate is known as such.
     """
 
-    def at(place: Place) -> float:
+    @cache
+    def similarity(place: Place) -> float:
         pose = space.pose(place)
         return pair.under(pose) if space.origin is None else pair.aligned(pose.shift_px)
 
-    similarity = Counted(at)
-    climbed = climb_often(similarity, space, climb, effort, seed)
-    level, spread = _background(climbed.background)
+    ends, background = climb_often(similarity, space, climb, effort, seed)
+    level, spread = _background(background)
     found: list[Place] = []
-    for end in sorted(climbed.ends, key=similarity, reverse=True):
+    for end in sorted(ends, key=similarity, reverse=True):
         distinct = all(_apart_px(end, other) > _SAME_PX for other in found)
         if distinct and similarity(end) != pair.nothing:
             found.append(end)
-    heights = [(similarity(end) - level) / spread if spread > 0 else 0.0 for end in found]
+    evaluations = similarity.cache_info().misses
     return [
-        PoseFound(space.pose(end), height, similarity.evaluations)
-        for end, height in zip(found[:_CANDIDATES], heights, strict=False)
+        PoseFound(
+            space.pose(end), (similarity(end) - level) / spread if spread > 0 else 0.0, evaluations
+        )
+        for end in found[:_CANDIDATES]
     ]
 
 
@@ -226,7 +202,7 @@ class ClimbingSearch:
     climb
         Returns the best place it found from a start.
     effort
-        Where and how often to start.
+        How often to start.
     on_grid
         Whether only shifts of whole pixels between the windows' pixels are searched for. Where
         their sizes are even in one and odd in the other, the shift of their centres ends in a

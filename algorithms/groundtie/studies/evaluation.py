@@ -17,9 +17,8 @@ from ..geometry.models import PARAMETERS
 from ..matching.keypoints import lying_in
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask
-from .filtering import filter_matches
 from .gradients import GRADIENTS
-from .matching import match
+from .matching import filter_matches, match
 from .repeatability import CLASS_NAMES, Repeatability, classes, overlap_error, repeatability
 from .sift_variants import DETECTORS, SiftVariantDescriptor, sift_detector
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import scipy.fft
@@ -23,10 +22,17 @@ from ..rasters.kernels import interpolate
 from ..rasters.patch import Patch, reduced_patch
 from ..similarity.peaks import highest_peaks
 from ..similarity.surface import SimilaritySettings, Surface, normalise
-from .phase_correlation import gaussian_peak, remaining_shift, shifts_at, whitened
-from .polar import ANGLE_STEP_DEG, ANGLES, evened, half_turns, log_power
+from .phase_correlation import remaining_shift, shifts_at
+from .spectra import (
+    ANGLE_STEP_DEG,
+    ANGLES,
+    correlation,
+    evened,
+    gaussian_peak,
+    half_turns,
+    log_power,
+)
 from .spectral_windows import (
-    CORRECTIONS,
     RETURNED,
     SAME_DEG,
     SAME_LOG_SCALE,
@@ -112,10 +118,7 @@ def correlate_spectra(reference: Image, input: Image) -> Surface:
     # The reference at a bin further on looks like the input: an input that is rotated
     # counter-clockwise has its spectrum at smaller angles, a larger one at lower frequencies.
     first, second = (scipy.fft.fft2(s * fading, shape) for s in (reference, input))
-    down, across = (np.exp(-(scipy.fft.fftfreq(n) ** 2) / (2 * _BAND**2)) for n in shape)
-    weights = (down[:, None] * across).astype(np.float32)
-    cross = whitened(first * second.conj(), _WHITENING) * weights
-    return normalise(scipy.fft.fftshift(scipy.fft.ifft2(cross).real).astype(np.float32))
+    return normalise(correlation(first * second.conj(), _BAND, _WHITENING).astype(np.float32))
 
 
 def rotations(surface: Surface, limits: SearchLimits, count: int) -> Iterator[Pose]:
@@ -203,8 +206,7 @@ def fourier_mellin(
     found = try_poses(reference, input, tried, limits, settings)[:RETURNED]
 
     def align(one: PoseFound) -> PoseFound:
-        steps = [partial(remaining_pose, settings=settings)] * CORRECTIONS
-        shift = partial(remaining_shift, settings=settings)
-        return aligned(reference, input, one, limits, *steps, shift)
+        steps = remaining_pose, remaining_pose, remaining_shift
+        return aligned(reference, input, one, limits, settings, *steps)
 
     return distinct(context.quiet().map(align, found))

@@ -69,13 +69,7 @@ def average_before(image: FloatImage, decay: float, axis: int) -> FloatImage:
     axis
         0: along rows, 1: along columns.
     """
-    # Late: few features need it, and this package takes long to import.
-    from scipy.signal import lfilter
-
-    first = np.take(image, [0], axis=axis)
-    numerator, denominator = (np.array(c, image.dtype) for c in ([1 - decay], [1, -decay]))
-    start = first * image.dtype.type(decay)
-    return np.asarray(lfilter(numerator, denominator, image, axis=axis, zi=start)[0])
+    return _recursive(image, np.array([1 - decay]), np.array([1, -decay]), axis)
 
 
 def average_after(image: FloatImage, decay: float, axis: int) -> FloatImage:
@@ -123,25 +117,28 @@ def _two_passes(
     axis: int,
 ) -> FloatImage:
     """Return `sign`·(what the pixels before give) + (what the pixels after give), second order."""
-    # Late: few features need it, and this package takes long to import.
-    from scipy.signal import lfilter
-
     decay = np.exp(-_ALPHA)
-    recursion = np.array([1, -2 * decay, decay**2], np.float32)
-
-    def one(source: FloatImage, weights: NDArray[np.float64]) -> FloatImage:
-        # The first pixel goes on forever before the image.
-        steady = weights.sum() / recursion.sum()
-        start = np.array([steady - weights[0], weights[2] - recursion[2] * steady], np.float32)
-        shape = (2, 1) if axis == 0 else (1, 2)
-        edge = np.take(source, [0], axis=axis) * start.reshape(shape)
-        return np.asarray(
-            lfilter(weights.astype(np.float32), recursion, source, axis=axis, zi=edge)[0]
-        )
-
-    causal = one(image, before)
-    anticausal = np.flip(one(np.flip(image, axis), after), axis)
+    recursion = np.array([1, -2 * decay, decay**2])
+    causal = _recursive(image, before, recursion, axis)
+    anticausal = np.flip(_recursive(np.flip(image, axis), after, recursion, axis), axis)
     return np.asarray(np.float32(sign) * causal + anticausal)
+
+
+def _recursive(
+    image: FloatImage, weights: NDArray[np.float64], recursion: NDArray[np.float64], axis: int
+) -> FloatImage:
+    """Return what a recursive filter makes of each pixel and all before it along an axis.
+
+    The first pixel goes on forever before the image.
+    """
+    # Late: few features need it, and this package takes long to import.
+    from scipy.signal import lfilter, lfilter_zi
+
+    shape = (-1, 1) if axis == 0 else (1, -1)
+    steady = lfilter_zi(weights, recursion).astype(np.float32).reshape(shape)
+    start = np.take(image, [0], axis=axis) * steady
+    weights, recursion = weights.astype(np.float32), recursion.astype(np.float32)
+    return np.asarray(lfilter(weights, recursion, image, axis=axis, zi=start)[0])
 
 
 # What each estimator is called, and whether it needs positive grey values.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..features.keypoints import Keypoints
-from ..features.sampling import lattice_around, unit_rows
+from ..features.sampling import lattice_around, square_lattice, unit_rows
 from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress
@@ -30,10 +30,10 @@ _WINDOW_SCALES = 3.3
 # Half the side of the wavelets in scales: of the descriptor, and of the orientation.
 _HALF_SCALES, _ORIENTATION_HALF_SCALES = 1.0, 2.0
 
-# Orientation: reach and width of its window in scales; bins, and how many of them are summed: a
-# sector of 60°.
+# Orientation: reach and width of its window in scales; bins, of which a sector of 60° is summed.
 _REACH_SCALES, _ORIENTATION_WINDOW_SCALES = 6, 2.0
-_BINS, _SECTOR_BINS = 72, 12
+_BINS = 72
+_SECTOR_BINS = _BINS // 6
 
 # So many features are described at a time.
 _BLOCK = 512
@@ -146,9 +146,7 @@ def _wavelets(
 
 def _described(sums: _Sums, points: Keypoints) -> FloatImage:
     """Return the descriptors of features, shape (n, 64)."""
-    side = np.arange(CELLS * _SAMPLES) - (CELLS * _SAMPLES - 1) / 2
-    x, y = np.meshgrid(side, side)
-    lattice = np.column_stack([x.ravel(), y.ravel()])
+    lattice = square_lattice(CELLS * _SAMPLES / 2, CELLS * _SAMPLES)
     window = np.exp(-(lattice**2).sum(axis=1) / (2 * _WINDOW_SCALES**2)).astype(np.float32)
     both = [window * part for part in _wavelets(sums, points, lattice, _HALF_SCALES)]
     parts = np.stack([*both, *map(np.abs, both)], axis=-1)
@@ -158,9 +156,7 @@ def _described(sums: _Sums, points: Keypoints) -> FloatImage:
 
 def _orientations(sums: _Sums, points: Keypoints) -> FloatArray:
     """Return the direction in which most wavelets of a sector of 60° point, shape (n,)."""
-    side = np.arange(-_REACH_SCALES, _REACH_SCALES + 1)
-    x, y = np.meshgrid(side, side)
-    lattice = np.column_stack([x.ravel(), y.ravel()]).astype(float)
+    lattice = square_lattice(_REACH_SCALES + 0.5, 2 * _REACH_SCALES + 1)
     squared = (lattice**2).sum(axis=1)
     lattice, squared = lattice[squared < _REACH_SCALES**2], squared[squared < _REACH_SCALES**2]
     window = np.exp(-squared / (2 * _ORIENTATION_WINDOW_SCALES**2)).astype(np.float32)

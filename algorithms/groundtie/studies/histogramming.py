@@ -1,12 +1,10 @@
 """The joint histogram of a template and an image under any affine transform ([Suri2010] 3.4.2).
 
-* Two-step estimators interpolate the image at each template pixel's place and count one entry; but
-  for nearest neighbour, interpolation smooths the image between its pixels and not on them, which
-  gives similarity false maxima.
-* One-step estimators spread each template pixel over the bins of the image pixels around its
-  place, with the weights of a B-spline: generalised partial volume estimation (GPVE;
-  [Chen2003], [Suri2010] eq 3.34). Order 2 is partial volume interpolation (PVI [Maes1997]), which
-  has false maxima of its own; from order 4 on there are none.
+In one step: each template pixel is spread over the bins of the image pixels around its place, with
+the weights of a B-spline: generalised partial volume estimation (GPVE; [Chen2003], [Suri2010] eq
+3.34). Order 2 is partial volume interpolation (PVI [Maes1997]), which has false maxima; from order
+4 on there are none. Two steps, which interpolate the image and count one entry, have them too:
+interpolation smooths the image between its pixels and not on them.
 
 For shifts alone `joint_histogram` counts many transforms at once.
 """
@@ -27,7 +25,6 @@ from ..errors import ParameterError
 from ..rasters.grid import FloatArray
 from ..rasters.kernels import bspline_weights
 from ..rasters.patch import Patch
-from ..rasters.warping import resample
 from ..similarity.binning import MASKED, bin_edges
 from ..similarity.joint_histogram import ORDER, count_joint_histograms, reach
 from ..similarity.measures import HistogramMeasure
@@ -85,7 +82,6 @@ def joint_histogram_under(
     counts: tuple[int, int],
     order: int = ORDER,
     seed: int = 0,
-    sample: NDArray[np.int_] | None = None,
 ) -> FloatArray:
     """Return the joint histogram of a template and an image under an affine transform, one step.
 
@@ -109,14 +105,12 @@ def joint_histogram_under(
         Order of the B-spline, 2 (partial volume interpolation) to 7; 1 is nearest neighbour.
     seed
         Of the random offsets.
-    sample
-        Flat indices of the template pixels that take part; None: all.
 
     Returns
     -------
     Histogram, shape `counts`. Weights that fall outside the image or on masked pixels drop out.
     """
-    own, x, y = _places(template, to_image, sample)
+    own, x, y = _places(template, to_image)
     if order > 1 and own.size > _EXACT_PIXELS:
         dx, dy = _offsets(order - 1, seed, own.size)
         x, y, order = x + dx, y + dy, 1
@@ -139,7 +133,7 @@ def sparse_joint_histogram_under(
     -------
     scipy.sparse.csr_matrix, shape `counts`.
     """
-    own, x, y = _places(template, to_image, None)
+    own, x, y = _places(template, to_image)
     total = scipy.sparse.csr_matrix(counts)
     for pairs, weights in _contributions(own, image, x, y, counts, order):
         rows, cols = np.divmod(pairs, counts[1] + 1)
@@ -148,46 +142,6 @@ def sparse_joint_histogram_under(
         cells = values[counted], (rows[counted], cols[counted])
         total = total + scipy.sparse.csr_matrix(cells, counts)
     return total
-
-
-def two_step_histogram(
-    template: Bins,
-    image: Patch,
-    to_image: Affine,
-    edges: NDArray[np.float32],
-    template_bins: int,
-    interpolation: str,
-) -> FloatArray:
-    """Return the joint histogram of a template and an image under a transform, in two steps.
-
-    Parameters
-    ----------
-    template
-        Bins, shape (h, w), with `binning.MASKED` where a pixel does not count.
-    image
-        Grey values, shape (H, W).
-    to_image
-        From template to image pixels (col, row), pixel centres at integers.
-    edges
-        Inner edges between the image's bins, as from `binning.bin_edges`.
-    template_bins
-        Number of bins of the template.
-    interpolation
-        "nearest", "bilinear", "cubic" or "lanczos".
-
-    Returns
-    -------
-    Histogram, shape (template bins, edges + 1). Pixels whose nearest image pixel is masked or
-    outside drop out.
-    """
-    _, x, y = _places(template, to_image, None)
-    places = np.stack([x, y]).reshape(2, *template.shape)
-    values, valid = resample(image.values, image.valid, places, interpolation)
-    valid = valid & (template < template_bins)
-    pairs = template[valid].astype(np.intp) * (len(edges) + 1)
-    pairs += np.searchsorted(edges, values[valid], side="right")
-    shape = template_bins, len(edges) + 1
-    return np.bincount(pairs, minlength=shape[0] * shape[1]).reshape(shape).astype(float)
 
 
 def measure_surface(
@@ -240,16 +194,10 @@ def measure_surface(
     return np.array(list(rows), np.float32)
 
 
-def _places(
-    template: Bins, to_image: Affine, sample: NDArray[np.int_] | None
-) -> tuple[Bins, FloatArray, FloatArray]:
+def _places(template: Bins, to_image: Affine) -> tuple[Bins, FloatArray, FloatArray]:
     """Return bins and image positions (x, y) of template pixels, flat."""
     t = to_image
     height, width = template.shape
-    if sample is not None:
-        rows, cols = np.divmod(sample, width)
-        x, y = (p * cols + q * rows + r for p, q, r in ((t.a, t.b, t.c), (t.d, t.e, t.f)))
-        return template.ravel()[sample], x, y
     rows, cols = np.arange(height)[:, None], np.arange(width)
     x, y = (p * cols + r + q * rows for p, q, r in ((t.a, t.b, t.c), (t.d, t.e, t.f)))
     return template.ravel(), x.ravel(), y.ravel()

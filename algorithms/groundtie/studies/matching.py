@@ -1,17 +1,25 @@
-"""Which keypoints belong together by their descriptors alone, wherever they lie."""
+"""Which keypoints belong together by their descriptors alone, and filtered by a model."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..features.matching import Descriptors, FloatArray, Indices, Matches, Nearest
+from ..geometry.fitting import fit_model
+from ..geometry.models import PARAMETERS
 
 METHODS = ("exact", "kd-tree")
 
 # The forest of k-d trees, and how many leaves are looked at (best bin first; [Beis1997]).
 _TREES = 4
 _CHECKS = 64
+
+# Filtered matching: largest residual in standard deviations of all residuals; smaller ones than
+# the second are rounding.
+_SIGMAS = 2.0
+_ROUNDING_PX = 1e-6
 
 # So many distances are held in memory at a time.
 _BLOCK = 4_000_000
@@ -44,6 +52,39 @@ def match(
         return found
     back = _nearest(second, first, method).index
     return found.take(back[found.second] == found.first)
+
+
+def filter_matches(
+    px: FloatArray, partner_px: FloatArray, kind: str = "affine"
+) -> NDArray[np.bool_]:
+    """Return which matches remain when the worst is dropped until none is far off.
+
+    Filtered matching, [Suri2010] 3.4.4 and 6.7.1: a model is fitted to all, the match with the
+    largest residual is dropped, the model is fitted again, until all residuals are below so many
+    of their standard deviations. It needs more right than wrong matches to start from.
+
+    Parameters
+    ----------
+    px, partner_px
+        Positions that belong together, shape (n, 2).
+    kind
+        One of `models.KINDS`.
+
+    Returns
+    -------
+    Shape (n,); all False if there are too few matches for the model.
+    """
+    kept = np.ones(len(px), bool)
+    fewest = PARAMETERS[kind] // 2 + 1
+    while kept.sum() >= fewest:
+        model = fit_model(kind, px, partner_px, kept.astype(float))
+        residuals = np.hypot(*(partner_px - model(px)).T)
+        spread = np.sqrt(np.mean(residuals[kept] ** 2))
+        worst = int(np.argmax(np.where(kept, residuals, -1.0)))
+        if residuals[worst] <= max(_SIGMAS * spread, _ROUNDING_PX):
+            return kept
+        kept[worst] = False
+    return np.zeros(len(px), bool)
 
 
 def _nearest(first: Descriptors, second: Descriptors, method: str) -> Nearest:

@@ -18,6 +18,7 @@ from ..pose.pose import Pose, PoseFound
 from ..rasters.patch import Patch
 from ..similarity.peaks import highest_peaks
 from ..similarity.surface import SimilaritySettings, Surface, normalise
+from .spectra import correlation, gaussian_peak
 from .spectral_windows import (
     SAME_PX,
     Field,
@@ -38,10 +39,7 @@ _SAME = np.ones((2 * int(SAME_PX) + 1,) * 2, bool)
 
 # Frequencies beyond this (standard deviation, in cycles per pixel) hold noise and what resampling
 # has left; without them the peak is a Gaussian of 0.8 px.
-_BAND = 0.2
-
-# Magnitudes below this share of their mean are rounding; their phases are, too.
-_ROUNDING = 0.05
+BAND = 0.2
 
 # How far a shift can be corrected once the windows have been cut to what they share.
 CORRECTION_PX = 8.0
@@ -101,13 +99,6 @@ class PhaseSurface:
         )
 
 
-def whitened(spectrum: Field, exponent: float = 1.0) -> Field:
-    """Return a cross-power spectrum divided by a power of its magnitude, where it is not 0."""
-    size = np.abs(spectrum)
-    divisor = (size + _ROUNDING * size.mean()) ** exponent
-    return np.divide(spectrum, divisor, out=np.zeros_like(spectrum), where=divisor > 0)
-
-
 def phase_surface(
     reference: Image | Field, input: Image | Field, wrap: bool = False
 ) -> PhaseSurface:
@@ -124,25 +115,9 @@ def phase_surface(
     sides = [max(pair) if wrap else sum(pair) for pair in pairs]
     shape = [scipy.fft.next_fast_len(side) for side in sides]
     cross = scipy.fft.fft2(reference, shape).conj() * scipy.fft.fft2(input, shape)
-    across, down = (np.exp(-(scipy.fft.fftfreq(n) ** 2) / (2 * _BAND**2)) for n in shape[::-1])
-    weights = (down[:, None] * across).astype(np.float32)
-    values = scipy.fft.fftshift(scipy.fft.ifft2(whitened(cross) * weights).real)
+    values = correlation(cross, BAND)
     shifts = [np.arange(n) - n // 2 - (b - a) / 2 for n, (a, b) in zip(shape, pairs, strict=True)]
     return PhaseSurface(normalise(values.astype(np.float32)), shifts[1], shifts[0])
-
-
-def gaussian_peak(values: NDArray[np.floating], index: int) -> float:
-    """Return how far the peak of a sampled Gaussian lies from its highest sample, -0.5 to 0.5.
-
-    The samples are periodic, as surfaces made by FFT are.
-    """
-    around = np.array([values[index - 1], values[index], values[(index + 1) % len(values)]])
-    top = float(around[1])
-    before, middle, after = np.log(np.maximum(around / top, 1e-3)) if top > 0 else (0.0, 0.0, 0.0)
-    bend = before - 2 * middle + after
-    if bend >= 0:
-        return 0.0
-    return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5))
 
 
 def shifts_at(
@@ -218,6 +193,6 @@ def phase_correlation(
     found = shifts_at(fixed, input, pose, limits.radius, settings, CANDIDATES)
 
     def align(one: PoseFound) -> PoseFound:
-        return aligned(reference, input, one, limits, lambda both: remaining_shift(both, settings))
+        return aligned(reference, input, one, limits, settings, remaining_shift)
 
     return distinct(context.quiet().map(align, found))

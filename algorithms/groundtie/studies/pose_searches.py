@@ -11,6 +11,7 @@ from ..pose.pose import PoseFound
 from ..pose.search import find_poses
 from ..rasters.patch import Patch
 from ..similarity.surface import SimilaritySettings
+from .climbing import ClimbingSearch
 from .fourier_mellin import fourier_mellin
 from .phase_correlation import phase_correlation
 from .radon import radon
@@ -18,9 +19,6 @@ from .simplex import nelder_mead, powell
 from .spsa import discrete_spsa, spsa, spsa_second_order
 
 DEFAULT_SEARCH = "rotation-steps"
-
-# Those that climb a joint histogram; all others correlate orientation fields or grey values.
-HISTOGRAM_SEARCHES = frozenset({"spsa", "spsa2", "discrete-spsa", "powell", "nelder-mead"})
 
 
 class PoseSearch(Protocol):
@@ -66,4 +64,9 @@ SEARCHES = MappingProxyType[str, PoseSearch](
         "powell": powell,
         "nelder-mead": nelder_mead,
     }
+)
+
+# Those that climb a joint histogram; all others correlate orientation fields or grey values.
+HISTOGRAM_SEARCHES = frozenset(
+    name for name, search in SEARCHES.items() if isinstance(search, ClimbingSearch)
 )

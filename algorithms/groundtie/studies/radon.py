@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 
 import cv2
 import numpy as np
@@ -25,10 +24,17 @@ from ..pose.pose import Pose, PoseFound
 from ..rasters.patch import Patch, reduced
 from ..similarity.peaks import highest_peaks
 from ..similarity.surface import SimilaritySettings, normalise
-from .phase_correlation import CORRECTION_PX, gaussian_peak, whitened
-from .polar import ANGLE_STEP_DEG, ANGLES, evened, half_turns, log_power
+from .phase_correlation import BAND, CORRECTION_PX
+from .spectra import (
+    ANGLE_STEP_DEG,
+    ANGLES,
+    correlation,
+    evened,
+    gaussian_peak,
+    half_turns,
+    log_power,
+)
 from .spectral_windows import (
-    CORRECTIONS,
     RETURNED,
     SAME_DEG,
     WORTH_ALIGNING,
@@ -51,10 +57,8 @@ _SIDE_PX = 192
 # Frequencies of the projections that are compared, in cycles per pixel.
 _RANGE = (0.02, 0.4)
 
-# Detail of the correlations that is kept, as standard deviations: in cycles per bin of the angle,
-# in cycles per pixel of the shift.
+# Detail of the angles' correlation that is kept: standard deviation, in cycles per bin.
 _ANGLE_BAND = 0.15
-_SHIFT_BAND = 0.2
 
 # How many rotations are tried, and which bins of the angle are the same peak.
 CANDIDATES = 5
@@ -125,9 +129,7 @@ def rotations(spectra: list[Image], limits: SearchLimits, count: int) -> Iterato
     """
     # As with Fourier–Mellin, the reference further on along the angle is the input.
     first, second = (scipy.fft.fft(spectrum, axis=0) for spectrum in spectra)
-    cross = (first * second.conj()).sum(axis=1)
-    weights = np.exp(-(scipy.fft.fftfreq(ANGLES) ** 2) / (2 * _ANGLE_BAND**2))
-    values = scipy.fft.fftshift(scipy.fft.ifft(whitened(cross, 0.5) * weights).real)
+    values = correlation((first * second.conj()).sum(axis=1), _ANGLE_BAND, 0.5)
     rotation = (np.arange(ANGLES) - ANGLES // 2) * ANGLE_STEP_DEG
     allowed = np.abs(rotation) <= limits.rotation_deg + ANGLE_STEP_DEG / 2
     searched = np.where(allowed, values, 0)
@@ -155,9 +157,7 @@ def shift_along(
     sizes = len(reference), len(input)
     count = scipy.fft.next_fast_len(max(sizes) if wrap else sum(sizes))
     cross = scipy.fft.fft(reference, count).conj() * scipy.fft.fft(input, count)
-    weights = np.exp(-(scipy.fft.fftfreq(count) ** 2) / (2 * _SHIFT_BAND**2))
-    line = scipy.fft.fftshift(scipy.fft.ifft(whitened(cross) * weights).real)
-    values = normalise(line[None])[0]
+    values = normalise(correlation(cross, BAND)[None])[0]
     shifts = np.arange(count) - count // 2 - (sizes[1] - sizes[0]) / 2
     best = int(np.where(np.abs(shifts) <= reach_px + 0.5, values, -np.inf).argmax())
     return float(shifts[best] + gaussian_peak(values, best)), float(values[best])
@@ -212,9 +212,8 @@ def radon(
     ]
 
     def align(one: PoseFound) -> PoseFound:
-        steps = [partial(remaining_pose, settings=settings)] * CORRECTIONS
-        shift = partial(remaining_shift, settings=settings)
-        one = aligned(reference, input, one, own, *steps, shift)
+        steps = remaining_pose, remaining_pose, remaining_shift
+        one = aligned(reference, input, one, own, settings, *steps)
         right, down = (scale * shift for shift in one.pose.shift_px)
         return replace(one, pose=Pose(one.pose.rotation_deg, scale, (right, down)))
 

@@ -19,28 +19,25 @@ from ..rasters.grid import FloatArray
 CLASS_LIMITS = (0.1, 0.2, 0.3, 0.4)
 CLASS_NAMES = ("0–10 %", "10–20 %", "20–30 %", "30–40 %", "> 40 %")
 
-NORMAL_RADIUS_PX = 30.0
+_RADIUS_PX = 30.0
 
 # Circles whose centres are further apart, in radii, overlap by less than any limit allows.
 _REACH = 0.5
 
 
-def overlap_error(
-    first: Keypoints, second: Keypoints, radius_px: float = NORMAL_RADIUS_PX
-) -> FloatArray:
+def overlap_error(first: Keypoints, second: Keypoints) -> FloatArray:
     """Return 1 − intersection / union of the circles of paired features, shape (n,).
 
     Parameters
     ----------
     first, second
-        n features each, in the pixels of the first image.
-    radius_px
-        Radius to which the first circle is scaled, and the second with it.
+        n features each, in the pixels of the first image. Circles are scaled together until the
+        first has a radius of 30 pixels.
     """
-    grow = radius_px / first.scale_px
+    grow = _RADIUS_PX / first.scale_px
     # Positions keep their distance: only the regions are normalised, as in [Mikolajczyk2005].
     apart = np.hypot(*(second.position_px - first.position_px).T)
-    a, b = np.full(len(first), radius_px), second.scale_px * grow
+    a, b = np.full(len(first), _RADIUS_PX), second.scale_px * grow
     shared = _lens(a, b, apart)
     return np.asarray(1 - shared / (np.pi * (a**2 + b**2) - shared))
 
@@ -97,7 +94,7 @@ def repeatability(first: Keypoints, second: Keypoints) -> Repeatability:
     if possible == 0:
         return Repeatability(np.zeros(len(CLASS_NAMES), int), 0)
     pairs = cKDTree(first.position_px).query_ball_tree(
-        cKDTree(second.position_px), _REACH * NORMAL_RADIUS_PX
+        cKDTree(second.position_px), _REACH * _RADIUS_PX
     )
     one = np.repeat(np.arange(len(first)), [len(p) for p in pairs])
     other = np.concatenate([np.asarray(p, int) for p in pairs])

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import scipy.optimize
 
-from .climbing import ClimbingSearch, Counted, Place, PoseSpace
+from .climbing import ClimbingSearch, Place, PoseSpace, Similarity
 
 POWELL, NELDER_MEAD = "Powell", "Nelder-Mead"
 
@@ -27,7 +27,7 @@ _LONGEST = 400
 
 
 def climb(
-    similarity: Counted, space: PoseSpace, start: Place, rng: np.random.Generator, method: str
+    similarity: Similarity, space: PoseSpace, start: Place, rng: np.random.Generator, method: str
 ) -> Place:
     """Return the best place found from a start by a method of scipy; nothing is drawn."""
     options: dict[str, Any] = {"maxfev": _LONGEST}

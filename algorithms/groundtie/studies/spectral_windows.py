@@ -38,9 +38,6 @@ SAME_PX = 6.0
 RETURNED = 2
 WORTH_ALIGNING = 0.5
 
-# How often rotation and scale are corrected on what both windows show.
-CORRECTIONS = 2
-
 # A resampled pixel counts if the weights of all pixels it is made of sum up to this.
 _ALL_VALID = 0.999
 
@@ -56,8 +53,11 @@ def texture(window: Patch, settings: SimilaritySettings) -> Image:
     """
     if settings.similarity != "ncc":
         return compress(window)
-    fill = np.float32(window.values[window.valid].mean()) if window.valid.any() else np.float32(0)
-    return np.where(window.valid, window.values, fill)
+    return np.where(window.valid, window.values, _mean(window))
+
+
+def _mean(window: Patch) -> np.float32:
+    return np.float32(window.values[window.valid].mean()) if window.valid.any() else np.float32(0)
 
 
 def structure(window: Patch, settings: SimilaritySettings) -> Image | Field:
@@ -122,7 +122,7 @@ def resampled(input: Patch, pose: Pose, shape: tuple[int, int], kernel: str) -> 
     to_input = pose.between(shape, input.values.shape)
     rows, cols = np.indices(shape, float)
     px = np.stack([x * cols + y * rows + start for x, y, start in (to_input[:3], to_input[3:6])])
-    fill = np.float32(input.values[input.valid].mean()) if input.valid.any() else np.float32(0)
+    fill = _mean(input)
     values = np.where(input.valid, input.values - fill, np.float32(0))
     if pose.scale > 1:
         # The input is finer: what the result's pixels cannot show is smoothed away.
@@ -182,7 +182,8 @@ def aligned(
     input: Patch,
     found: PoseFound,
     limits: SearchLimits,
-    *remaining: Callable[[Shared], PoseFound | None],
+    settings: SimilaritySettings,
+    *remaining: Callable[[Shared, SimilaritySettings], PoseFound | None],
 ) -> PoseFound:
     """Return a candidate corrected by what is left between the parts that both windows show.
 
@@ -197,13 +198,15 @@ def aligned(
         The candidate.
     limits
         Within which the result stays.
+    settings
+        How similarity is measured.
     remaining
         Each corrects what those before have left: returns the pose of one part against the
         other, None if it has none.
     """
     for correct in remaining:
         both = shared(reference, input, found.pose)
-        correction = None if both is None else correct(both)
+        correction = None if both is None else correct(both, settings)
         if both is not None and correction is not None:
             pose = corrected(found.pose, correction.pose, both.offset_px)
             found = PoseFound(within(pose, limits), correction.height)

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from ..rasters.grid import FloatArray
-from .climbing import ClimbingSearch, Counted, Effort, Place, PoseSpace
+from .climbing import ClimbingSearch, Effort, Place, PoseSpace, Similarity
 
 Measure = Callable[[FloatArray], float]
 
@@ -88,7 +88,7 @@ class _Slopes:
 
 
 def climb_first_order(
-    similarity: Counted, space: PoseSpace, start: Place, rng: np.random.Generator, gains: Gains
+    similarity: Similarity, space: PoseSpace, start: Place, rng: np.random.Generator, gains: Gains
 ) -> Place:
     """Return the best place found from a start by SPSA of first order.
 
@@ -107,7 +107,7 @@ def climb_first_order(
 
 
 def climb_second_order(
-    similarity: Counted, space: PoseSpace, start: Place, rng: np.random.Generator, gains: Gains
+    similarity: Similarity, space: PoseSpace, start: Place, rng: np.random.Generator, gains: Gains
 ) -> Place:
     """Return the best place found from a start by SPSA of second order: four looks a step."""
 
@@ -129,7 +129,7 @@ def climb_second_order(
 
 
 def _climb(
-    similarity: Counted,
+    similarity: Similarity,
     space: PoseSpace,
     start: Place,
     rng: np.random.Generator,

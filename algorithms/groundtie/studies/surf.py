@@ -20,7 +20,8 @@ from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .box_hessian import FloatImage, determinants, integral_image, sigma_of
 
-# Sides of an octave's four filters. Features lie between the first and the last; octaves overlap.
+# Filters of an octave, and how often the size of blobs is doubled ([Bay2008] 3.2). Features lie
+# between the first filter and the last; octaves overlap.
 _LAYERS = 4
 _OCTAVES = 3
 
@@ -37,13 +38,9 @@ class SurfDetector:
     threshold
         Least determinant of the Hessian of a feature, on grey values from 0 to 1 ([Patel2017]:
         0.0005 to 0.002).
-    octaves
-        How often the size of blobs is doubled: the largest is as large as 2 ^ octaves times the
-        smallest.
     """
 
     threshold: float = 0.0004
-    octaves: int = _OCTAVES
 
     def detect(self, window: Patch, context: Context | None = None) -> Keypoints:
         """Return the features of an image window, upright.
@@ -65,7 +62,7 @@ class SurfDetector:
         """Return the features of an image with grey values from 0 to 1, shape (h, w)."""
         integral = integral_image(image)
         tables = [Keypoints.none()]
-        for octave in range(self.octaves):
+        for octave in range(_OCTAVES):
             sides = octave_sides(octave)
             if max(sides) > min(image.shape):
                 break

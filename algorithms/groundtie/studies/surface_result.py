@@ -7,14 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from rasterio.io import MemoryFile
 
 from ..context import Context
 from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.grid import Grid
-from ..rasters.tiff import BLOCK
-from ..runs import RUN_TAG, run_tags
+from ..rasters.whole import write_raster
 from ..similarity.peak import Peak, find_peak
 from ..similarity.surface import Surface
 from .window_surface import SurfaceSettings, Window, second_peak
@@ -81,7 +78,9 @@ class SurfaceResult:
         """Write all files."""
         with Outputs() as outputs:
             staged = {name: outputs.stage(Path(path)) for name, path in self.files.items()}
-            _write(staged["output"], self)
+            bands = np.stack([self.values, self.deviations])
+            names = self.similarity, "robust standard deviations"
+            write_raster(staged["output"], bands, self.grid, names, nodata=float("nan"))
             if "picture" in staged:
                 _draw(staged["picture"], self)
             if "numbers" in staged:
@@ -144,32 +143,6 @@ class SurfaceResult:
                 f"{self.second_ratio:.2f} of the first's height"
             )
         return [*lines, *(f"{name}: {path}" for name, path in self.files.items())]
-
-
-def _write(path: Path, result: SurfaceResult) -> None:
-    """Write a surface as a GeoTIFF: the values of the measure, and the deviations."""
-    bands: NDArray[np.float32] = np.stack([result.values, result.deviations])
-    with MemoryFile() as memory:
-        with memory.open(
-            driver="GTiff",
-            count=len(bands),
-            height=result.grid.height,
-            width=result.grid.width,
-            dtype="float32",
-            nodata=float("nan"),
-            crs=result.grid.crs,
-            transform=result.grid.transform,
-            tiled=True,
-            blockxsize=BLOCK,
-            blockysize=BLOCK,
-            compress="deflate",
-        ) as dataset:
-            dataset.write(bands)
-            dataset.update_tags(**run_tags(RUN_TAG))
-            dataset.set_band_description(1, result.similarity)
-            dataset.set_band_description(2, "robust standard deviations")
-        with writing(path):
-            path.write_bytes(memory.read())
 
 
 def _draw(path: Path, result: SurfaceResult) -> None:
