@@ -14,8 +14,7 @@ from ..assessment.accuracy import Assessment
 from ..assessment.comparison import Comparison, compare
 from ..assessment.evidence import AssessmentFiles
 from ..assessment.point_errors import PointErrors
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, tool
 from ..errors import NotRegisteredError
 from ..geometry.models import KINDS
 from ..geometry.tie_point_files import SUFFIXES
@@ -89,12 +88,12 @@ def _transform_in(label: str, help: str, advanced: bool = True) -> FileIn:
     title="Assess a registration",
     group="Quality",
     outputs=(
-        ResultOutput("CHECK_RMSE_PX", "Error at check points (px)", "check_points.rmse_px"),
-        ResultOutput("CHECK_CE90_M", "CE90 at check points (m)", "check_points.ce90_m"),
-        ResultOutput("TEST_RMSE_PX", "Error at test points (px)", "test_points.rmse_px"),
-        ResultOutput("CONTROL_RMSE_PX", "Error at control points (px)", "control_points.rmse_px"),
-        ResultOutput("TWO_WAY_RMSE_PX", "Two-way consistency (px)", "two_way.rmse_px"),
-        ResultOutput("THREE_WAY_RMSE_PX", "Three-way consistency (px)", "three_way.rmse_px"),
+        Output("CHECK_RMSE_PX", "Error at check points (px)", "check_points.rmse_px"),
+        Output("CHECK_CE90_M", "CE90 at check points (m)", "check_points.ce90_m"),
+        Output("TEST_RMSE_PX", "Error at test points (px)", "test_points.rmse_px"),
+        Output("CONTROL_RMSE_PX", "Error at control points (px)", "control_points.rmse_px"),
+        Output("TWO_WAY_RMSE_PX", "Two-way consistency (px)", "two_way.rmse_px"),
+        Output("THREE_WAY_RMSE_PX", "Three-way consistency (px)", "three_way.rmse_px"),
     ),
 )
 def assess(

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..assessment.sensor_accuracy import SensorErrors, draw_vectors, table_lines, write_table
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, tool
 from ..errors import TooFewPointsError
 from ..kinds import GEOTIFF, FileIn, FileOut
 from ..progress import SILENT, Progress
@@ -59,9 +58,9 @@ class SensorAssessment:
     title="Assess RPCs",
     group="Quality",
     outputs=(
-        ResultOutput("POINTS", "Number of check points", "points"),
-        ResultOutput("BEFORE_RMSE_M", "Error before (m)", "before.rmse_m"),
-        ResultOutput("BEFORE_CE90_M", "CE90 before (m)", "before.ce90_m"),
+        Output("POINTS", "Number of check points", "points"),
+        Output("BEFORE_RMSE_M", "Error before (m)", "before.rmse_m"),
+        Output("BEFORE_CE90_M", "CE90 before (m)", "before.ce90_m"),
     ),
 )
 def assess_sensor(

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..context import threads
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, tool
 from ..errors import NotRegisteredError, ParameterError
 from ..geometry.transform import Transform
 from ..kinds import Choice, Distance, FileOut, Number
@@ -95,15 +94,13 @@ class RotationResult:
     title="Estimate rotation and scale",
     group="Registration",
     outputs=(
-        ResultOutput("ROTATION", "Rotation (°)", "rotation_deg"),
-        ResultOutput("SCALE", "Scale", "scale"),
-        ResultOutput("RIGHT", "Shift to the right", "shift.right"),
-        ResultOutput("DOWN", "Shift downwards", "shift.down"),
-        ResultOutput("HEIGHT", "Height over chance", "verdict.height"),
-        ResultOutput(
-            "RIVAL_RATIO", "Height over that of the best elsewhere", "verdict.rival_ratio"
-        ),
-        ResultOutput("CE90_PX", "CE90 of the pose (px)", "verdict.check_ce90_px"),
+        Output("ROTATION", "Rotation (°)", "rotation_deg"),
+        Output("SCALE", "Scale", "scale"),
+        Output("RIGHT", "Shift to the right", "shift.right"),
+        Output("DOWN", "Shift downwards", "shift.down"),
+        Output("HEIGHT", "Height over chance", "verdict.height"),
+        Output("RIVAL_RATIO", "Height over that of the best elsewhere", "verdict.rival_ratio"),
+        Output("CE90_PX", "CE90 of the pose (px)", "verdict.check_ce90_px"),
     ),
 )
 def estimate_rotation(

@@ -7,8 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..kinds import VectorOut
 from ..masks.choice import AUTO
@@ -22,8 +21,8 @@ from .parameters import general, registration, sensor
     title="Extract ground control",
     group="Sensor models",
     outputs=(
-        ResultOutput("POINTS", "Number of points that are used", "points_used"),
-        ResultOutput("CHECK_RMSE_PX", "Error at check points (px)", "verdict.check_rmse_px"),
+        Output("POINTS", "Number of points that are used", "points_used"),
+        Output("CHECK_RMSE_PX", "Error at check points (px)", "verdict.check_rmse_px"),
     ),
 )
 def extract_gcps(

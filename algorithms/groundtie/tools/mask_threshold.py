@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, tool
 from ..masks.scene import Scene, write_mask
 from ..masks.threshold import HIGH_PERCENT, Threshold
 from ..progress import SILENT, Progress
@@ -18,7 +17,7 @@ from .written_mask import WrittenMask
 @tool(
     title="Mask by thresholds",
     group="Radar",
-    outputs=(ResultOutput("SHARE", "Share of the pixels that take part", "share"),),
+    outputs=(Output("SHARE", "Share of the pixels that take part", "share"),),
 )
 def mask_threshold(
     input: general.Radar,

@@ -7,8 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..kinds import GEOTIFF, REPORT_FORMAT, Choice, FileIn, FileOut, RasterIn, VectorOut
 from ..masks.choice import AUTO as AUTO_MASK
@@ -24,10 +23,10 @@ from .parameters import general, registration, sensor
     title="Refine RPCs",
     group="Sensor models",
     outputs=(
-        ResultOutput("CHECK_RMSE_PX", "Error at held-out points (px)", "verdict.check_rmse_px"),
-        ResultOutput("BEFORE_RMSE_PX", "Error before (px)", "verdict.before.rmse_px"),
-        ResultOutput("MODEL", "Model of the bias", "bias.model", text=True),
-        ResultOutput("REASON", "Reason of the verdict", "verdict.reason", text=True),
+        Output("CHECK_RMSE_PX", "Error at held-out points (px)", "verdict.check_rmse_px"),
+        Output("BEFORE_RMSE_PX", "Error before (px)", "verdict.before.rmse_px"),
+        Output("MODEL", "Model of the bias", "bias.model", text=True),
+        Output("REASON", "Reason of the verdict", "verdict.reason", text=True),
     ),
 )
 def refine_rpc(

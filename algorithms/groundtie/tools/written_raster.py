@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..declaration import Output as ResultOutput
+from ..declaration import Output
 from ..kinds import Distance, RasterIn
 from ..rasters.grid import Grid
 
 SIZE_OUTPUTS = (
-    ResultOutput("WIDTH", "Width of the result in pixels", "width"),
-    ResultOutput("HEIGHT", "Height of the result in pixels", "height"),
+    Output("WIDTH", "Width of the result in pixels", "width"),
+    Output("HEIGHT", "Height of the result in pixels", "height"),
 )
 
 
