@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arrays import Raster
 from ..context import threads
+from ..declaration import file_lines
 from ..errors import NotRegisteredError
 from ..geometry.estimation import Estimate
 from ..geometry.tie_points import TiePoints
@@ -229,7 +230,7 @@ class Registration:
                 f"check points that agree: {v.check_points_agreeing} of {v.check_points}; by "
                 f"chance 1 in 10^{-v.log10_chance:.0f}",
             ]
-        return lines + [f"{name}: {path}" for name, path in self.files.items()]
+        return lines + file_lines(self.files)
 
     def close(self) -> None:
         """Close the rasters; what was computed stays."""

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..declaration import file_lines
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid
 from ..report.page import plain, versions
@@ -267,4 +268,4 @@ class Series:
             )
         reused = f", {self.reused_pairs} taken over" if self.reused_pairs else ""
         lines.append(f"registrations of two dates: {self.registered_pairs} done{reused}")
-        return lines + [f"{name}: {path}" for name, path in self.files.items()]
+        return lines + file_lines(self.files)

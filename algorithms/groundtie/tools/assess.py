@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any
 
 from ..assessment.accuracy import Assessment
 from ..assessment.comparison import Comparison, compare
 from ..assessment.evidence import AssessmentFiles
 from ..assessment.point_errors import PointErrors
-from ..declaration import Output, tool
+from ..declaration import NO_VALUES, Output, Values, file_lines, given_files, tool
 from ..errors import NotRegisteredError
 from ..geometry.models import KINDS
 from ..geometry.tie_point_files import SUFFIXES
@@ -61,7 +59,7 @@ class AssessmentResult:
         for name, errors in self.assessment.parts().items():
             if len(errors):
                 lines += _lines(PART_LABELS[name], errors)
-        return lines + [f"{name}: {path}" for name, path in self.files.items()]
+        return lines + file_lines(self.files)
 
 
 def _lines(label: str, errors: PointErrors) -> list[str]:
@@ -205,7 +203,7 @@ def assess(
         ),
     ] = "affine",
     progress: Progress = SILENT,
-    parameters: Mapping[str, Any] = MappingProxyType({}),
+    parameters: Values = NO_VALUES,
 ) -> AssessmentResult:
     """Measure how good a registration is that was made before, by points, consistency and by eye.
 
@@ -254,5 +252,5 @@ def assess(
             page.write(outputs, report)
     if verdict is not None and not verdict.accepted:
         raise NotRegisteredError(f"{subject} is refused: {verdict.reason}", verdict)
-    written = {} if report is None else {"report": str(report)}
+    written = given_files({"report": report})
     return AssessmentResult(assessment, verdict, found, page.summary(), written)

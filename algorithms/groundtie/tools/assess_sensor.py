@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..assessment.sensor_accuracy import SensorErrors, draw_vectors, table_lines, write_table
-from ..declaration import Output, tool
+from ..declaration import Output, file_lines, given_files, tool
 from ..errors import TooFewPointsError
 from ..kinds import GEOTIFF, FileIn, FileOut
 from ..progress import SILENT, Progress
@@ -48,10 +48,7 @@ class SensorAssessment:
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
-        return [
-            *table_lines(self.errors),
-            *(f"{name}: {path}" for name, path in self.files.items()),
-        ]
+        return [*table_lines(self.errors), *file_lines(self.files)]
 
 
 @tool(
@@ -118,14 +115,12 @@ def assess_sensor(
         errors = {BEFORE: SensorErrors.of(sensor.rpc, points)}
         if refined is not None:
             errors[AFTER] = SensorErrors.of(_refined(refined, stack), points)
-        written = {"table": table, "picture": picture}
         with Outputs() as outputs:
             if table is not None:
                 write_table(outputs.stage(table), points, errors)
             if picture is not None:
                 draw_vectors(outputs.stage(picture), points, errors, sensor.size)
-    files = {name: str(path) for name, path in written.items() if path is not None}
-    return SensorAssessment(errors, len(points), files)
+    return SensorAssessment(errors, len(points), given_files({"table": table, "picture": picture}))
 
 
 def _refined(path: Path, stack: ExitStack) -> RPC:

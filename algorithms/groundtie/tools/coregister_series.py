@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from concurrent.futures import Executor
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any
 
-from ..declaration import Output, tool
+from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..kinds import Choice, FolderOut, Number, RasterIn, RastersIn, Text
 from ..matching.alignment import LINEAR_CANDIDATES
@@ -96,7 +94,7 @@ def coregister_series(
     scheduler: general.Scheduler = None,
     progress: Progress = SILENT,
     executor: Executor | None = None,
-    parameters: Mapping[str, Any] = MappingProxyType({}),
+    parameters: Values = NO_VALUES,
 ) -> Series:
     """Register the dates of a series to one reference, or to each other.
 

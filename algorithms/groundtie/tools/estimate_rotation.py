@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..context import threads
-from ..declaration import Output, tool
+from ..declaration import Output, file_lines, given_files, tool
 from ..errors import NotRegisteredError, ParameterError
 from ..geometry.transform import Transform
 from ..kinds import Choice, Distance, FileOut, Number
@@ -86,7 +86,7 @@ class RotationResult:
             f"accepted: {self.verdict.reason}; height {self.evidence.height:.1f}, "
             f"{self.evidence.rival_ratio:.2f} times that of the best elsewhere",
             self.verdict.accuracy_line(),
-            *(f"{name}: {path}" for name, path in self.files.items()),
+            *file_lines(self.files),
         ]
 
 
@@ -258,5 +258,5 @@ def _result(
         "m" if windows.is_georeferenced else "px",
         windows.transform(pose),
         search,
-        {name: str(path) for name, path in files.items() if path is not None},
+        given_files(files),
     )

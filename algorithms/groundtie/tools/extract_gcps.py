@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated
 
-from ..declaration import Output, tool
+from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..kinds import VectorOut
 from ..masks.choice import AUTO
@@ -57,7 +55,7 @@ def extract_gcps(
     matching_pixel_size: general.MatchingPixelSize = None,
     workers: general.Workers = None,
     progress: Progress = SILENT,
-    parameters: Mapping[str, Any] = MappingProxyType({}),
+    parameters: Values = NO_VALUES,
 ) -> GcpResult:
     """Extract ground control for an image with RPCs from a reference image and a terrain model.
 

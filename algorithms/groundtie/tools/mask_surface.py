@@ -19,7 +19,7 @@ from ..rasters.reading import bounded_cache, open_raster
 from ..registration.specification import StatedSurface
 from ..registration.surface_masks import fitted_ground
 from .parameters import general, registration
-from .written_mask import WrittenMask
+from .results import WrittenMask
 
 
 @tool(

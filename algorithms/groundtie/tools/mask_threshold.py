@@ -11,7 +11,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from .parameters import general
-from .written_mask import WrittenMask
+from .results import WrittenMask
 
 
 @tool(

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated
 
-from ..declaration import Output, tool
+from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..kinds import GEOTIFF, REPORT_FORMAT, Choice, FileIn, FileOut, RasterIn, VectorOut
 from ..masks.choice import AUTO as AUTO_MASK
@@ -107,7 +105,7 @@ def refine_rpc(
     matching_pixel_size: general.MatchingPixelSize = None,
     workers: general.Workers = None,
     progress: Progress = SILENT,
-    parameters: Mapping[str, Any] = MappingProxyType({}),
+    parameters: Values = NO_VALUES,
 ) -> RefinedRpc:
     """Refine the RPCs of an image by ground control, given or matched in a reference image.
 

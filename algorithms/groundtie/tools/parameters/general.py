@@ -162,3 +162,14 @@ TransformOut = Annotated[
         suffixes=(".json",),
     ),
 ]
+
+
+def like_reference(otherwise: str) -> RasterIn:
+    """Return the kind of the raster whose grid the result gets."""
+    help = "The result gets exactly the grid of this raster, so that the two stack. By default the "
+    return RasterIn(label="Reference image", help=f"{help}result covers all of the {otherwise}.")
+
+
+def pixel_size_of_result(otherwise: str) -> Distance:
+    """Return the kind of the result's pixel size."""
+    return Distance(label="Pixel size", help=f"Pixel size of the result{otherwise}.", minimum=1e-6)
