@@ -111,7 +111,7 @@ class RefinementFiles:
             None if found is None else _compared(refinement, found),
             None if found is None else found.registration.mask,
             title=f"RPCs of {Path(refinement.image.source.path).name}, refined",
-            parameters={k: v for k, v in self.parameters.items() if v is not None},
+            parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
         )
 

@@ -27,7 +27,7 @@ from ..rasters.delivery import warp_to_array
 from ..rasters.pair import ImagePair
 from ..rasters.reading import open_raster
 from ..report.correction import Correction
-from ..report.parts import Parts
+from ..report.details import extremes
 from ..report.report import Report
 from ..similarity.surface import Surface
 from .evidence import RegistrationEvidence
@@ -189,8 +189,8 @@ class Registration:
             points=self.tie_points,
             transform=self.transform,
             surfaces=self.extreme_surfaces() if with_surfaces else (),
-            parts=None if self.survey is None else Parts(self.survey),
-            parameters={k: v for k, v in self.parameters.items() if v is not None},
+            survey=self.survey,
+            parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
         )
 
@@ -200,11 +200,8 @@ class Registration:
             return ()
         used = np.flatnonzero(self.check.points.used)
         residuals = self.check.points.take(used).residual_px(self.estimate.transform)
-        order = used[np.hypot(*residuals.T).argsort()]
-        best, worst = order[:_EXTREMES], order[_EXTREMES:][-_EXTREMES:]
-        labels = ["best check point"] * len(best) + ["worst check point"] * len(worst)
-        picked = np.concatenate([best, worst])
-        return tuple(zip(labels, self.check.surfaces[picked], strict=True))
+        found = extremes(np.hypot(*residuals.T), _EXTREMES)
+        return tuple((label, self.check.surfaces[used[k]]) for label, k in found)
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""

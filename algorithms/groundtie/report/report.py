@@ -11,14 +11,14 @@ from ..assessment.point_errors import PointErrors
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..masks.choice import MaskUsed
+from ..matching.survey import Survey
 from ..rasters.pair import ImagePair
 from ..registration.verdict import Verdict
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
-from . import details, figures, pictures
+from . import details, figures, parts, pictures
 from .correction import Correction
 from .page import Page
-from .parts import Parts
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class Report(Page):
         Which mask was used; None: no question of one.
     scene
         Facts about the images by their names; None: none were found.
-    parts
-        Where neighbouring chips agree on another place than the transform has; None: not looked at.
+    survey
+        What chips all over the overlap show of parts that lie elsewhere; None: not looked at.
     """
 
     verdict: Verdict
@@ -52,7 +52,7 @@ class Report(Page):
     surfaces: tuple[tuple[str, Surface], ...]
     mask: MaskUsed | None = None
     scene: Mapping[str, Any] | None = None
-    parts: Parts | None = None
+    survey: Survey | None = None
     template: ClassVar[str] = "report.html.j2"
 
     def numbers(self) -> dict[str, Any]:
@@ -64,7 +64,7 @@ class Report(Page):
             "transform": None if self.transform is None else self.transform.to_json(),
             "mask": None if self.mask is None else self.mask.summary(),
             **({} if self.scene is None else {"scene": dict(self.scene)}),
-            **({} if self.parts is None else {"parts": self.parts.summary()}),
+            **({} if self.survey is None else {"parts": parts.summary(self.survey)}),
         }
 
     def correction(self) -> Correction | None:
@@ -86,7 +86,7 @@ class Report(Page):
             "surfaces": [_shown_surface(label, surface) for label, surface in self.surfaces],
             "scene": self.scene or {},
             "details": self._details(),
-            "parts": None if self.parts is None else self.parts.shown(),
+            "parts": None if self.survey is None else parts.shown(self.survey),
         }
 
     def _details(self) -> list[dict[str, Any]]:
@@ -103,16 +103,13 @@ class Report(Page):
             return {"map": figures.svg_uri(figures.point_map(points, grid)), "errors": False}
         errors = PointErrors.on_grid(points, self.transform, grid)
         shown: dict[str, Any] = {
-            "map": figures.svg_uri(figures.residual_map(errors, grid)),
-            "exaggeration": figures.residual_arrows(errors, grid).exaggeration,
+            **figures.shown_residuals(errors, grid),
             "errors": bool(errors.check.any()),
         }
         if shown["errors"]:
             reach = figures.error_reach_px(errors, verdict)
-            histogram = figures.error_histogram(errors, verdict, grid.metres_per_pixel)
             shown |= {
-                "histogram": figures.svg_uri(histogram),
-                "scatter": figures.svg_uri(figures.error_scatter(errors, verdict)),
+                **figures.shown_errors(errors, verdict, grid.metres_per_pixel),
                 "measured": int(errors.check.sum()),
                 "reach_px": reach,
                 "beyond": int((errors.length_px[errors.check] > reach).sum()),

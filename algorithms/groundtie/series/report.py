@@ -9,7 +9,7 @@ import numpy as np
 
 from ..geometry.transform import Transform
 from ..report import figures, pictures
-from ..report.page import Page
+from ..report.page import Page, made
 from .series import Series, SeriesDate
 
 if TYPE_CHECKING:
@@ -49,14 +49,13 @@ class SeriesReport(Page):
     @classmethod
     def of(cls, series: Series) -> SeriesReport:
         """Return the report on a series."""
-        given = {name: value for name, value in series.parameters.items() if value is not None}
         title = f"Series of {len(series.dates)} dates, registered {series.datum}"
-        return cls(series, title=title, parameters=given, seconds=series.seconds)
+        return cls(series, title=title, parameters=series.parameters, seconds=series.seconds)
 
     def numbers(self) -> dict[str, Any]:
         """Return what was measured, by name."""
-        made = ("parameters", "versions", "seconds", "files")
-        return {name: value for name, value in self.series.summary().items() if name not in made}
+        left_out = {*made(self.parameters, self.seconds), "files"}
+        return {k: v for k, v in self.series.summary().items() if k not in left_out}
 
     def values(self) -> dict[str, Any]:
         """Return what the template shows."""

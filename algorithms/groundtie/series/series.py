@@ -12,7 +12,7 @@ import numpy as np
 from ..declaration import file_lines
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid
-from ..report.page import plain, versions
+from ..report.page import made, plain
 from .dates import Date
 from .frame import SeriesFrame, rms_px, sigma_px
 from .inputs import Listed
@@ -218,9 +218,7 @@ class Series:
             "rejected_pairs": rejected,
             "registered_pairs": self.registered_pairs,
             "reused_pairs": self.reused_pairs,
-            "parameters": {k: v for k, v in self.parameters.items() if v is not None},
-            "versions": versions(),
-            "seconds": self.seconds,
+            **made(self.parameters, self.seconds),
             "files": {name: str(path) for name, path in self.files.items()},
         }
         found: dict[str, Any] = plain(values)

@@ -236,14 +236,13 @@ def assess(
             if files.is_nominal:  # nothing was registered: there is no before and after
                 comparison = replace(comparison, registered=None)
     subject = str(transform or tie_points or input)
-    given = {name: value for name, value in parameters.items() if value is not None}
     page = AssessmentReport(
         assessment,
         verdict,
         found,
         comparison,
         title=f"Assessment of {Path(subject).name}",
-        parameters=given,
+        parameters=parameters,
         seconds=time.perf_counter() - started,
     )
     progress.update(0.8, "writing")
