@@ -188,11 +188,11 @@ def _register_files(
 ) -> PairResult:
     enter_worker()
     with threads(1) as context, ExitStack() as stack:
-        opened = open_dates(listed, band, stack, context)
-        if opened.failures:
-            reason = "; ".join(opened.failures.values())
+        dates, failures = open_dates(listed, band, stack, context)
+        if failures:
+            reason = "; ".join(failures.values())
             return PairResult(listed[0].name, listed[1].name, key, False, "", reason)
-        first, second = opened.dates
+        first, second = dates
         return replace(register_pair(PairTask(first, second, *bare), context), key=key)
 
 
