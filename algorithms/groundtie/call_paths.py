@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import OutputError, SameFileError
-from .kinds import FileOut, FolderOut, InputKind, Kind, OutputKind, PathKind, RastersIn, plainly
+from .kinds import FileOut, FolderOut, InputKind, Kind, RastersIn, WrittenKind, plainly
 from .raster_names import identity
 from .strict_json import read_json
 
@@ -40,13 +40,10 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
         the place of the numbers of a report.
     """
     taken: dict[Hashable, str] = {}
-    outputs: list[tuple[str, PathKind, Path]] = []
+    outputs: list[tuple[str, WrittenKind, Path]] = []
     for name, kind, value in values:
-        if value is None:
-            continue
-        if isinstance(kind, (InputKind, RastersIn)):
-            taken |= dict.fromkeys(map(_identity, inputs_of(kind, value)), name)
-        elif isinstance(kind, (OutputKind, FolderOut)):
+        taken |= dict.fromkeys(map(_identity, inputs_of(kind, value)), name)
+        if isinstance(kind, WrittenKind) and value is not None:
             outputs.append((name, kind, value))
     made = {path.resolve() for _, kind, path in outputs if isinstance(kind, FolderOut)}
     for name, kind, path in outputs:

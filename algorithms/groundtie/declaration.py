@@ -19,7 +19,7 @@ from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 from .call_paths import check_different, check_paths
 from .errors import MemoryLimitError, ParameterError
-from .kinds import FolderOut, Kind, OutputKind, RasterIn
+from .kinds import Kind, RasterIn, WrittenKind
 from .runs import run_of_call, running
 
 
@@ -143,7 +143,7 @@ class Tool:
         inputs = {
             p.name: checked[p.name]
             for p in self.parameters
-            if p.name not in _WHERE_IT_RUNS and not isinstance(p.kind, (OutputKind, FolderOut))
+            if p.name not in _WHERE_IT_RUNS and not isinstance(p.kind, WrittenKind)
         }
         return run_of_call(self.name, inputs)
 

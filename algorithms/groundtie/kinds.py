@@ -55,10 +55,6 @@ class PathKind(Kind):
         _mode(name, path)  # so that whatever cannot be a name is found here
         return path
 
-    def also_written(self, path: Path) -> tuple[Path, ...]:
-        """Return the files that are written because of an output `path` besides this itself."""
-        return ()
-
 
 class InputKind(PathKind):
     """A file that is read; neither a pipe, which may never end, nor a device."""
@@ -82,8 +78,16 @@ class InputKind(PathKind):
         return InputKind.check_named(self, name, raster_of_item(_named(name, value)))
 
 
+class WrittenKind(PathKind):
+    """A file or a folder that is written."""
+
+    def also_written(self, path: Path) -> tuple[Path, ...]:
+        """Return the files that are written because of an output `path` besides this itself."""
+        return ()
+
+
 @dataclass(frozen=True, kw_only=True)
-class OutputKind(PathKind):
+class OutputKind(WrittenKind):
     """A file that is written; `suffixes` are the endings it may have, the usual one first.
 
     What is `shown` can be looked at: dialogs have it made even if it is not asked for.
@@ -183,7 +187,7 @@ class FileOut(OutputKind):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FolderOut(PathKind):
+class FolderOut(WrittenKind):
     """A folder that is written into, made if it is missing.
 
     Of what comes into it, rasters of the names `shows` can be looked at: the first on top. A tool

@@ -17,12 +17,13 @@ from ..errors import NotRegisteredError
 from ..geometry.models import KINDS
 from ..geometry.tie_point_files import SUFFIXES
 from ..geometry.transform import Transform
-from ..kinds import REPORT_FORMAT, Choice, FileIn, FileOut, Number, RasterIn
+from ..kinds import Choice, FileIn, Number, RasterIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.verdict import Verdict
 from ..report.assessment_report import PART_LABELS, AssessmentReport
+from .parameters import general
 
 
 @dataclass(frozen=True)
@@ -160,13 +161,9 @@ def assess(
     ] = None,
     report: Annotated[
         Path | None,
-        FileOut(
-            label="Report",
-            help="A page with the errors and, if both images are given, swipe and checkerboard; "
+        general.report_page(
+            "A page with the errors and, if both images are given, swipe and checkerboard; "
             "its numbers are put beside it as JSON. It is written for a refusal, too.",
-            suffixes=(".html",),
-            numbers=REPORT_FORMAT,
-            shown=True,
         ),
     ] = None,
     onward_transform: Annotated[

@@ -18,7 +18,7 @@ from ..registration.sensor_input import Ground, open_oriented_image, open_sensor
 from ..sensor.control_points import READ_SUFFIXES, read_control_points
 from ..sensor.rpc import RPC
 from ..sensor.rpc_files import read_rpc
-from .parameters import sensor
+from .parameters import general, sensor
 
 BEFORE, AFTER = "before", "after"
 
@@ -87,7 +87,7 @@ def assess_sensor(
     ] = None,
     picture: Annotated[
         Path | None,
-        FileOut(label="Picture", help="The errors as arrows in the image.", suffixes=(".png",)),
+        general.picture("The errors as arrows in the image."),
     ] = None,
     height: sensor.Height = None,
     geoid: sensor.Geoid = None,
@@ -102,9 +102,9 @@ def assess_sensor(
     ground = Ground(dem, dem_datum, geoid, height)
     with ExitStack() as stack:
         stack.enter_context(bounded_cache())
-        sensor = open_oriented_image(image, rpc, ground, None, stack, progress)
+        oriented = open_oriented_image(image, rpc, ground, None, stack, progress)
         points = read_control_points(
-            check_points, sensor.orientation, sensor.source.grid, sensor.source.path
+            check_points, oriented.orientation, oriented.source.grid, oriented.source.path
         )
         which = points.points.used
         if (which & points.points.is_check).any():
@@ -112,14 +112,14 @@ def assess_sensor(
         points = points.take(which)
         if len(points) == 0:
             raise TooFewPointsError(f"{check_points} holds no points that are used")
-        errors = {BEFORE: SensorErrors.of(sensor.rpc, points)}
+        errors = {BEFORE: SensorErrors.of(oriented.rpc, points)}
         if refined is not None:
             errors[AFTER] = SensorErrors.of(_refined(refined, stack), points)
         with Outputs() as outputs:
             if table is not None:
                 write_table(outputs.stage(table), points, errors)
             if picture is not None:
-                draw_vectors(outputs.stage(picture), points, errors, sensor.size)
+                draw_vectors(outputs.stage(picture), points, errors, oriented.size)
     return SensorAssessment(errors, len(points), given_files({"table": table, "picture": picture}))
 
 

@@ -104,11 +104,7 @@ def detector_repeatability(
     ] = 0.8,
     picture: Annotated[
         Path | None,
-        FileOut(
-            label="Picture",
-            help="Repeatability and matches by class of overlap error, to look at.",
-            suffixes=(".png",),
-        ),
+        general.picture("Repeatability and matches by class of overlap error, to look at."),
     ] = None,
     numbers: Annotated[
         Path | None,

@@ -12,7 +12,7 @@ from ..context import threads
 from ..declaration import Output, file_lines, given_files, tool
 from ..errors import NotRegisteredError, ParameterError
 from ..geometry.transform import Transform
-from ..kinds import Choice, Distance, FileOut, Number
+from ..kinds import Choice, Distance, Number
 from ..pose.pose import Pose
 from ..pose.rotation_windows import PoseWindows, read_windows
 from ..progress import SILENT, Progress
@@ -159,11 +159,9 @@ def estimate_rotation(
     transform: general.TransformOut = None,
     picture: Annotated[
         Path | None,
-        FileOut(
-            label="Picture",
-            help="How well all poses match, and the images on one another; it is drawn for a "
+        general.picture(
+            "How well all poses match, and the images on one another; it is drawn for a "
             "refused pose, too.",
-            suffixes=(".png",),
         ),
     ] = None,
     similarity: Annotated[

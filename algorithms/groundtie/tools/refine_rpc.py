@@ -7,7 +7,7 @@ from typing import Annotated
 
 from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
-from ..kinds import GEOTIFF, REPORT_FORMAT, Choice, FileIn, FileOut, RasterIn, VectorOut
+from ..kinds import GEOTIFF, Choice, FileIn, FileOut, RasterIn, VectorOut
 from ..masks.choice import AUTO as AUTO_MASK
 from ..progress import SILENT, Progress
 from ..registration.sensor_jobs import RefinedRpc, refine
@@ -80,14 +80,10 @@ def refine_rpc(
     ] = None,
     report: Annotated[
         Path | None,
-        FileOut(
-            label="Report",
-            help="A page that shows errors before and after and how far to trust them; its numbers "
+        general.report_page(
+            "A page that shows errors before and after and how far to trust them; its numbers "
             "are put beside it as JSON. It is written for refused RPCs, too.",
-            suffixes=(".html",),
-            numbers=REPORT_FORMAT,
             advanced=True,
-            shown=True,
         ),
     ] = None,
     height: sensor.Height = None,

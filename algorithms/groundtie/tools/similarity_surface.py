@@ -89,9 +89,7 @@ def similarity_surface(
     ] = "fused",
     picture: Annotated[
         Path | None,
-        FileOut(
-            label="Picture", help="The surface with its peaks, to look at.", suffixes=(".png",)
-        ),
+        general.picture("The surface with its peaks, to look at."),
     ] = None,
     numbers: Annotated[
         Path | None,

@@ -6,7 +6,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from ...kinds import Band, Choice, Distance, FileOut, Number, RasterIn, RasterOut, Text
+from ...kinds import (
+    REPORT_FORMAT,
+    Band,
+    Choice,
+    Distance,
+    FileOut,
+    Number,
+    RasterIn,
+    RasterOut,
+    Text,
+)
 from ...rasters.warping import METHODS
 
 Reference = Annotated[
@@ -162,6 +172,23 @@ TransformOut = Annotated[
         suffixes=(".json",),
     ),
 ]
+
+
+def report_page(help: str, *, advanced: bool = False) -> FileOut:
+    """Return the kind of a report, beside which its numbers are put."""
+    return FileOut(
+        label="Report",
+        help=help,
+        suffixes=(".html",),
+        numbers=REPORT_FORMAT,
+        advanced=advanced,
+        shown=True,
+    )
+
+
+def picture(help: str) -> FileOut:
+    """Return the kind of a picture to look at."""
+    return FileOut(label="Picture", help=help, suffixes=(".png",))
 
 
 def like_reference(otherwise: str) -> RasterIn:
