@@ -106,10 +106,8 @@ def assess_sensor(
         points = read_control_points(
             check_points, oriented.orientation, oriented.source.grid, oriented.source.path
         )
-        which = points.points.used
-        if (which & points.points.is_check).any():
-            which = which & points.points.is_check
-        points = points.take(which)
+        check = points.points.check
+        points = points.take(check if check.any() else points.points.used)
         if len(points) == 0:
             raise TooFewPointsError(f"{check_points} holds no points that are used")
         errors = {BEFORE: SensorErrors.of(oriented.rpc, points)}
