@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import OutputError, SameFileError
-from .kinds import FileOut, FolderOut, InputKind, Kind, RastersIn, WrittenKind, plainly
+from .kinds import FileOut, FolderOut, InputKind, Kind, RastersIn, WrittenKind, shown_name
 from .raster_names import identity
 from .strict_json import read_json
 
@@ -20,7 +20,7 @@ def check_different(rasters: Mapping[str, Any]) -> None:
     for name, raster in rasters.items():
         other = taken.setdefault(_identity(raster), name)
         if other != name:
-            raise SameFileError(f"{name} is the same raster as {other}: {plainly(raster)}")
+            raise SameFileError(f"{name} is the same raster as {other}: {shown_name(raster)}")
 
 
 def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:

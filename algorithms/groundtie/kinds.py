@@ -338,7 +338,7 @@ def _in_memory(name: str, value: Any) -> Any:
     return held
 
 
-def plainly(value: Any) -> Any:
+def shown_name(value: Any) -> Any:
     """Return a checked value as reports show it: rasters in memory by what they are called."""
     in_memory = not isinstance(value, (str, os.PathLike)) and hasattr(value, "crs")
     return value.name if in_memory else value

@@ -18,7 +18,7 @@ import scipy
 
 from ..call_paths import check_numbers
 from ..geometry.judging import TOLERANCE_PX
-from ..kinds import REPORT_FORMAT, plainly
+from ..kinds import REPORT_FORMAT, shown_name
 from ..rasters.atomic import Outputs, write_json, writing
 from ..runs import RUN, run_tags
 from ..version import __version__
@@ -118,7 +118,7 @@ def plain(value: Any) -> Any:
         return plain(value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, (bool, int, str)) else str(plainly(value))
+    return value if value is None or isinstance(value, (bool, int, str)) else str(shown_name(value))
 
 
 @cache
