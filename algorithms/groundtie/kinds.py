@@ -14,6 +14,9 @@ from .errors import GroundTieError, ParameterError
 from .raster_names import raster_name
 from .stac_items import raster_of_item
 
+# The choice, of a model or a mask as of anything else, that the data decide.
+AUTO = "auto"
+
 # Endings of a GeoTIFF.
 GEOTIFF = (".tif", ".tiff")
 

@@ -16,7 +16,7 @@ from ..errors import CancelledError, GroundTieError, WorkerLostError
 from ..executors import enter_worker
 from ..geometry.estimation import jackknife_deviations
 from ..geometry.models import Model
-from ..masks.choice import AUTO
+from ..kinds import AUTO
 from ..matching.alignment import LINEAR_CANDIDATES
 from ..rasters.grid import Grid, reproject
 from ..rasters.reading import bounded_cache

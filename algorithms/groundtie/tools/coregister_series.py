@@ -8,9 +8,8 @@ from typing import Annotated, Any
 
 from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
-from ..kinds import Choice, FolderOut, Number, RasterIn, RastersIn, Text
+from ..kinds import AUTO, Choice, FolderOut, Number, RasterIn, RastersIn, Text
 from ..matching.alignment import LINEAR_CANDIDATES
-from ..matching.surface_fit import AUTO
 from ..progress import SILENT, Progress
 from ..series.call import SeriesCall
 from ..series.delivery import TABLE_CSV, TABLE_GPKG

@@ -12,7 +12,7 @@ from ..context import threads
 from ..declaration import Output, file_lines, given_files, tool
 from ..errors import NotRegisteredError, ParameterError
 from ..geometry.transform import Transform
-from ..kinds import Choice, Distance, Number
+from ..kinds import AUTO, Choice, Distance, Number
 from ..pose.pose import Pose
 from ..pose.rotation_windows import PoseWindows, read_windows
 from ..progress import SILENT, Progress
@@ -26,8 +26,6 @@ from ..report.rotation_picture import draw_rotation
 from ..similarity.surface import SimilaritySettings
 from ..studies.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
 from .parameters import general
-
-_AUTO = "auto"
 
 
 @dataclass(frozen=True)
@@ -171,10 +169,10 @@ def estimate_rotation(
             help="What is compared; auto takes what fits the search: mutual information where "
             "it climbs, else the orientation of edges. The search rotation-steps always takes "
             "the latter; ncc compares grey values.",
-            choices=(_AUTO, "orientation", "ncc", "nmi"),
+            choices=(AUTO, "orientation", "ncc", "nmi"),
             advanced=True,
         ),
-    ] = _AUTO,
+    ] = AUTO,
     reference_band: general.ReferenceBand = None,
     input_band: general.InputBand = None,
     workers: general.Workers = None,
@@ -233,7 +231,7 @@ def estimate_rotation(
 
 
 def _similarity(search: str, wanted: str) -> str:
-    if wanted == _AUTO:
+    if wanted == AUTO:
         return "nmi" if search in HISTOGRAM_SEARCHES else "orientation"
     if search in HISTOGRAM_SEARCHES and wanted != "nmi":
         raise ParameterError(f"the search {search} needs the similarity nmi")

@@ -7,8 +7,7 @@ from typing import Annotated
 
 from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
-from ..kinds import VectorOut
-from ..masks.choice import AUTO
+from ..kinds import AUTO, VectorOut
 from ..progress import SILENT, Progress
 from ..registration.sensor_jobs import GcpResult, extract_control
 from ..sensor.control_points import SUFFIXES

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..declaration import NO_VALUES, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
-from ..matching.surface_fit import AUTO
+from ..kinds import AUTO
 from ..progress import SILENT, Progress
 from ..registration.delivery import register_as
 from ..registration.registration import Registration

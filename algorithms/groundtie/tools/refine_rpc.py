@@ -7,11 +7,9 @@ from typing import Annotated
 
 from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
-from ..kinds import GEOTIFF, Choice, FileIn, FileOut, RasterIn, VectorOut
-from ..masks.choice import AUTO as AUTO_MASK
+from ..kinds import AUTO, GEOTIFF, Choice, FileIn, FileOut, RasterIn, VectorOut
 from ..progress import SILENT, Progress
 from ..registration.sensor_jobs import RefinedRpc, refine
-from ..sensor.adjustment import AUTO
 from ..sensor.bias import KINDS
 from ..sensor.control_points import READ_SUFFIXES, SUFFIXES
 from .parameters import general, registration, sensor
@@ -95,7 +93,7 @@ def refine_rpc(
     reference_band: general.ReferenceBand = None,
     reference_mask: registration.ReferenceMask = None,
     mask_values: registration.MaskValues = None,
-    mask: registration.Mask = AUTO_MASK,
+    mask: registration.Mask = AUTO,
     surface_model: registration.SurfaceModel = None,
     views: registration.SurfaceViews = None,
     matching_pixel_size: general.MatchingPixelSize = None,

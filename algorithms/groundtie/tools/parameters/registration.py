@@ -9,6 +9,7 @@ from ...declaration import Output
 from ...geometry.models import KINDS
 from ...geometry.tie_point_files import SUFFIXES
 from ...kinds import (
+    AUTO,
     Choice,
     Distance,
     MaskIn,
@@ -19,7 +20,6 @@ from ...kinds import (
     VectorOut,
 )
 from ...masks.choice import MASKS
-from ...matching.surface_fit import AUTO
 from ...registration.registered_output import OUTPUT_GRIDS
 from .general import MASK_HELP, report_page
 
