@@ -117,7 +117,7 @@ def test_the_json_is_the_summary(variants: list[Variant]) -> None:
     for variant in variants:
         assert variant.numbers == {"format": REPORT_FORMAT, **variant.report.summary()}
         assert list(variant.numbers) == [
-            *("format", "verdict", "correction", "transform", "mask"),
+            *("format", "verdict", "correction", "transform", "mask", "scene"),
             *("parameters", "versions", "seconds"),
         ]
         assert variant.numbers["verdict"] == variant.report.verdict.summary()

@@ -38,9 +38,9 @@ class Report(Page):
     surfaces
         Labels and similarity surfaces, shape (2 r + 1, 2 r + 1), of remarkable points.
     mask
-        Which mask was used; None: no question of one.
+        Which mask was used.
     scene
-        Facts about the images by their names; None: none were found.
+        Facts about the images by their names.
     survey
         What chips all over the overlap show of parts that lie elsewhere; None: not looked at.
     """
@@ -50,9 +50,9 @@ class Report(Page):
     points: TiePoints | None
     transform: Transform | None
     surfaces: tuple[tuple[str, Surface], ...]
-    mask: MaskUsed | None = None
-    scene: Mapping[str, Any] | None = None
-    survey: Survey | None = None
+    mask: MaskUsed
+    scene: Mapping[str, Any]
+    survey: Survey | None
     template: ClassVar[str] = "report.html.j2"
 
     def numbers(self) -> dict[str, Any]:
@@ -62,8 +62,8 @@ class Report(Page):
             "verdict": self.verdict.summary(),
             "correction": None if moved is None else moved.summary(),
             "transform": None if self.transform is None else self.transform.to_json(),
-            "mask": None if self.mask is None else self.mask.summary(),
-            **({} if self.scene is None else {"scene": dict(self.scene)}),
+            "mask": self.mask.summary(),
+            "scene": dict(self.scene),
             **({} if self.survey is None else {"parts": parts.summary(self.survey)}),
         }
 
@@ -77,14 +77,14 @@ class Report(Page):
         return {
             "verdict": self.verdict,
             "grid": grid,
-            "notes": [*self.pair.notes(), *([] if self.mask is None else [self.mask.line()])],
+            "notes": [*self.pair.notes(), self.mask.line()],
             "metres": grid.metres_per_pixel,
             "model": None if found is None else found.model.kind,
             "correction": self.correction(),
             "pictures": Comparison.of(self.pair, found),
             "residuals": None if self.points is None else self._residual_figures(self.points),
             "surfaces": [_shown_surface(label, surface) for label, surface in self.surfaces],
-            "scene": self.scene or {},
+            "scene": self.scene,
             "details": self._details(),
             "parts": None if self.survey is None else parts.shown(self.survey),
         }
