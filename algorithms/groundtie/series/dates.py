@@ -27,6 +27,7 @@ from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import RasterSource, open_raster
 from ..registration.user_masks import UserMask
+from ..report.pictures import overview_grid
 from ..runs import digest
 from .date_masks import DateMask, draw_mask
 from .inputs import Listed
@@ -101,8 +102,7 @@ class Date:
     def footprint(self, crs: CRS | None) -> Any:
         """Return the outline of its valid pixels as a shapely polygon on a map."""
         grid = self.matched.grid
-        factor = max(grid.width, grid.height) / _FOOTPRINT_PX
-        small = grid.scaled(factor) if factor > 1 else grid
+        small = overview_grid(grid, _FOOTPRINT_PX)
         _, valid = self.matched.read(
             self.matched.window, self._matched_band, (small.height, small.width)
         )

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 _THUMBNAIL_PX = 360
 _MOST_SHOWN = 100
 
-# Dates that are not registered stand first, then those with the widest loops.
-_FIRST = float("inf")
-
 
 @dataclass(frozen=True)
 class Thumbnail:
@@ -98,10 +95,10 @@ class SeriesReport(Page):
         return found
 
 
-def _badness(row: dict[str, Any]) -> tuple[float, float]:
-    if row["state"] == "left out":
-        return -_FIRST, 0.0
-    return -(row["worst_loop_px"] or 0.0), -(row["sigma_px"] or 0.0)
+def _badness(row: dict[str, Any]) -> tuple[bool, float, float]:
+    """Return what rows are sorted by: those left out stand first, then those of wide loops."""
+    stays = row["state"] != "left out"
+    return stays, -(row["worst_loop_px"] or 0.0), -(row["sigma_px"] or 0.0)
 
 
 def shift_figure(series: Series) -> Figure:
