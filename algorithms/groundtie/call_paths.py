@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from .errors import OutputError, SameFileError
-from .kinds import FileOut, FolderOut, InputKind, Kind, RastersIn, WrittenKind, shown_name
+from .kinds import (
+    REPORT_FORMAT,
+    FileOut,
+    FolderOut,
+    InputKind,
+    Kind,
+    RastersIn,
+    WrittenKind,
+    shown_name,
+)
 from .raster_names import identity
 from .strict_json import read_json
 
@@ -62,15 +71,15 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
             if other != own:
                 raise SameFileError(f"{name} would also write {more}, which is {other}")
             if isinstance(kind, FileOut):
-                check_numbers(name, more, kind.numbers)
+                check_numbers(name, more)
 
 
-def check_numbers(name: str, path: Path, wanted: str) -> None:
-    """Raise `OutputError` if the numbers of the output `name` would replace something else.
+def check_numbers(name: str, path: Path) -> None:
+    """Raise `OutputError` if the numbers of the report `name` would replace something else.
 
     That may be a file that is read without being named, as the STAC item of an image.
     """
-    if path.exists() and _format(path) != wanted:
+    if path.exists() and _format(path) != REPORT_FORMAT:
         raise OutputError(
             f"{name} would also write {path}, which is something else: remove it, or give {name} "
             "another name"

@@ -180,9 +180,9 @@ class VectorOut(OutputKind):
 
 @dataclass(frozen=True, kw_only=True)
 class FileOut(OutputKind):
-    """Any other file that is written; `numbers` is the format of JSON that is put beside it."""
+    """Any other file that is written; a report has its `numbers` put beside it as JSON."""
 
-    numbers: str = ""
+    numbers: bool = False
 
     def also_written(self, path: Path) -> tuple[Path, ...]:
         """Return the JSON beside the file."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Raster
 from ..context import threads
-from ..declaration import file_lines
+from ..declaration import file_lines, given_files
 from ..errors import NotRegisteredError
 from ..geometry.estimation import Estimate
 from ..geometry.tie_points import TiePoints
@@ -208,7 +208,7 @@ class Registration:
         values = {
             **self.page(with_surfaces=False).summary(),
             "scene": self.scene.summary(),
-            "files": {name: str(path) for name, path in self.files.items()},
+            "files": given_files(self.files),
         }
         return values | ({"tried": list(self.tried)} if self.tried else {})
 

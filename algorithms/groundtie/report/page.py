@@ -81,7 +81,7 @@ class Page:
         template = _environment().get_template(self.template)
         page = template.render(title=self.title, run=run, **how, **self.values())
         beside = path.with_suffix(".json")
-        check_numbers(path.name, beside, REPORT_FORMAT)
+        check_numbers(path.name, beside)
         numbers = {"format": REPORT_FORMAT, **plain(dict(item)), **summary}
         write_json(outputs.stage(beside), numbers)
         staged = outputs.stage(path)

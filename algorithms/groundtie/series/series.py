@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..declaration import file_lines
+from ..declaration import file_lines, given_files
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid
 from ..report.page import made, plain
@@ -219,7 +219,7 @@ class Series:
             "registered_pairs": self.registered_pairs,
             "reused_pairs": self.reused_pairs,
             **made(self.parameters, self.seconds),
-            "files": {name: str(path) for name, path in self.files.items()},
+            "files": given_files(self.files),
         }
         found: dict[str, Any] = plain(values)
         return found

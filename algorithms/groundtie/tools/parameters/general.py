@@ -6,17 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from ...kinds import (
-    REPORT_FORMAT,
-    Band,
-    Choice,
-    Distance,
-    FileOut,
-    Number,
-    RasterIn,
-    RasterOut,
-    Text,
-)
+from ...kinds import Band, Choice, Distance, FileOut, Number, RasterIn, RasterOut, Text
 from ...rasters.warping import METHODS
 
 Reference = Annotated[
@@ -180,7 +170,7 @@ def report_page(help: str, *, advanced: bool = False) -> FileOut:
         label="Report",
         help=help,
         suffixes=(".html",),
-        numbers=REPORT_FORMAT,
+        numbers=True,
         advanced=advanced,
         shown=True,
     )
