@@ -17,6 +17,7 @@ from raster_files import utm_grid, wave_image, write_raster
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
+from groundtie.masks.choice import NONE, MaskUsed
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.rasters.pair import Image, ImagePair, make_pair
@@ -149,6 +150,9 @@ def report_of(pair: ImagePair, **changes: Any) -> Report:
             ("best check point", peak_surface(1, -2)),
             ("worst check point", peak_surface(6, 3, 4.0)),
         ),
+        mask=MaskUsed(NONE, None, 1.0, "none was asked for"),
+        scene={},
+        survey=None,
         parameters={"similarity": "fused", "max_error": 3.0},
         seconds=4.56,
     )

@@ -27,7 +27,7 @@ TEXTS: dict[str, Any] = {"label": "Label", "help": "Help."}
 RASTER = RasterIn(**TEXTS)
 RASTER_OUT = RasterOut(**TEXTS)
 HTML_OUT = FileOut(**TEXTS, suffixes=(".html", ".htm"))
-REPORT = FileOut(**TEXTS, suffixes=(".html",), numbers=REPORT_FORMAT)
+REPORT = FileOut(**TEXTS, suffixes=(".html",), numbers=True)
 JSON_OUT = FileOut(**TEXTS, suffixes=(".json",))
 SERIES = FolderOut(**TEXTS, writes=("series.json",))
 
@@ -109,7 +109,7 @@ def test_rasters_that_must_differ(tmp_path: Path) -> None:
         (FileIn(**TEXTS, suffixes=(".json",)), "r.json"),
         (MaskIn(**TEXTS), "r.json"),
         (JSON_OUT, "r.json"),
-        (FileOut(**TEXTS, suffixes=(".htm",), numbers=REPORT_FORMAT), "r.htm"),
+        (FileOut(**TEXTS, suffixes=(".htm",), numbers=True), "r.htm"),
     ],
 )
 @pytest.mark.parametrize("is_first", [True, False])

@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from .errors import OutputError, SameFileError
-from .kinds import FileOut, FolderOut, InputKind, Kind, OutputKind, PathKind, RastersIn, plainly
+from .kinds import (
+    REPORT_FORMAT,
+    FileOut,
+    FolderOut,
+    InputKind,
+    Kind,
+    RastersIn,
+    WrittenKind,
+    shown_name,
+)
 from .raster_names import identity
 from .strict_json import read_json
 
@@ -20,7 +29,7 @@ def check_different(rasters: Mapping[str, Any]) -> None:
     for name, raster in rasters.items():
         other = taken.setdefault(_identity(raster), name)
         if other != name:
-            raise SameFileError(f"{name} is the same raster as {other}: {plainly(raster)}")
+            raise SameFileError(f"{name} is the same raster as {other}: {shown_name(raster)}")
 
 
 def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
@@ -40,13 +49,10 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
         the place of the numbers of a report.
     """
     taken: dict[Hashable, str] = {}
-    outputs: list[tuple[str, PathKind, Path]] = []
+    outputs: list[tuple[str, WrittenKind, Path]] = []
     for name, kind, value in values:
-        if value is None:
-            continue
-        if isinstance(kind, (InputKind, RastersIn)):
-            taken |= dict.fromkeys(map(_identity, inputs_of(kind, value)), name)
-        elif isinstance(kind, (OutputKind, FolderOut)):
+        taken |= dict.fromkeys(map(_identity, inputs_of(kind, value)), name)
+        if isinstance(kind, WrittenKind) and value is not None:
             outputs.append((name, kind, value))
     made = {path.resolve() for _, kind, path in outputs if isinstance(kind, FolderOut)}
     for name, kind, path in outputs:
@@ -65,15 +71,15 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
             if other != own:
                 raise SameFileError(f"{name} would also write {more}, which is {other}")
             if isinstance(kind, FileOut):
-                check_numbers(name, more, kind.numbers)
+                check_numbers(name, more)
 
 
-def check_numbers(name: str, path: Path, wanted: str) -> None:
-    """Raise `OutputError` if the numbers of the output `name` would replace something else.
+def check_numbers(name: str, path: Path) -> None:
+    """Raise `OutputError` if the numbers of the report `name` would replace something else.
 
     That may be a file that is read without being named, as the STAC item of an image.
     """
-    if path.exists() and _format(path) != wanted:
+    if path.exists() and _format(path) != REPORT_FORMAT:
         raise OutputError(
             f"{name} would also write {path}, which is something else: remove it, or give {name} "
             "another name"

@@ -319,7 +319,7 @@ def _click_parameter(parameter: Parameter) -> click.Parameter:
     if parameter.positional and isinstance(parameter.kind, RastersIn):
         files = KindType(parameter).shell_complete
         return click.Argument(
-            *([name], True), type=str, nargs=-1, metavar=f"{flag}…", shell_complete=files
+            [name], required=True, nargs=-1, type=str, metavar=f"{flag}…", shell_complete=files
         )
     if parameter.positional:
         return click.Argument([name], type=KindType(parameter), metavar=flag)

@@ -13,11 +13,13 @@ import operator
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 from .call_paths import check_different, check_paths
 from .errors import MemoryLimitError, ParameterError
-from .kinds import FolderOut, Kind, OutputKind, RasterIn
+from .kinds import Kind, RasterIn, WrittenKind
 from .runs import run_of_call, running
 
 
@@ -34,8 +36,22 @@ class ToolResult(Protocol):
         """Return the result as lines of text."""
 
 
+def given_files(asked: Mapping[str, Path | None]) -> dict[str, str]:
+    """Return the files that were asked for, by name; None: not asked for."""
+    return {name: str(path) for name, path in asked.items() if path is not None}
+
+
+def file_lines(files: Mapping[str, Path | str]) -> list[str]:
+    """Return a line of text for each file of a result, by name."""
+    return [f"{name}: {path}" for name, path in files.items()]
+
+
 P = ParamSpec("P")
 R = TypeVar("R", bound=ToolResult)
+
+# Values of a tool's parameters by their names, and what its keyword `parameters` has by default.
+Values = Mapping[str, Any]
+NO_VALUES: Values = MappingProxyType({})
 
 # Parameters that decide where a call runs, and nothing of what it makes.
 _WHERE_IT_RUNS = ("workers", "scheduler")
@@ -127,7 +143,7 @@ class Tool:
         inputs = {
             p.name: checked[p.name]
             for p in self.parameters
-            if p.name not in _WHERE_IT_RUNS and not isinstance(p.kind, (OutputKind, FolderOut))
+            if p.name not in _WHERE_IT_RUNS and not isinstance(p.kind, WrittenKind)
         }
         return run_of_call(self.name, inputs)
 

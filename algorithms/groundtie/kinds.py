@@ -14,6 +14,9 @@ from .errors import GroundTieError, ParameterError
 from .raster_names import raster_name
 from .stac_items import raster_of_item
 
+# The choice, of a model or a mask as of anything else, that the data decide.
+AUTO = "auto"
+
 # Endings of a GeoTIFF.
 GEOTIFF = (".tif", ".tiff")
 
@@ -55,10 +58,6 @@ class PathKind(Kind):
         _mode(name, path)  # so that whatever cannot be a name is found here
         return path
 
-    def also_written(self, path: Path) -> tuple[Path, ...]:
-        """Return the files that are written because of an output `path` besides this itself."""
-        return ()
-
 
 class InputKind(PathKind):
     """A file that is read; neither a pipe, which may never end, nor a device."""
@@ -82,8 +81,16 @@ class InputKind(PathKind):
         return InputKind.check_named(self, name, raster_of_item(_named(name, value)))
 
 
+class WrittenKind(PathKind):
+    """A file or a folder that is written."""
+
+    def also_written(self, path: Path) -> tuple[Path, ...]:
+        """Return the files that are written because of an output `path` besides this itself."""
+        return ()
+
+
 @dataclass(frozen=True, kw_only=True)
-class OutputKind(PathKind):
+class OutputKind(WrittenKind):
     """A file that is written; `suffixes` are the endings it may have, the usual one first.
 
     What is `shown` can be looked at: dialogs have it made even if it is not asked for.
@@ -173,9 +180,9 @@ class VectorOut(OutputKind):
 
 @dataclass(frozen=True, kw_only=True)
 class FileOut(OutputKind):
-    """Any other file that is written; `numbers` is the format of JSON that is put beside it."""
+    """Any other file that is written; a report has its `numbers` put beside it as JSON."""
 
-    numbers: str = ""
+    numbers: bool = False
 
     def also_written(self, path: Path) -> tuple[Path, ...]:
         """Return the JSON beside the file."""
@@ -183,7 +190,7 @@ class FileOut(OutputKind):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FolderOut(PathKind):
+class FolderOut(WrittenKind):
     """A folder that is written into, made if it is missing.
 
     Of what comes into it, rasters of the names `shows` can be looked at: the first on top. A tool
@@ -334,7 +341,7 @@ def _in_memory(name: str, value: Any) -> Any:
     return held
 
 
-def plainly(value: Any) -> Any:
+def shown_name(value: Any) -> Any:
     """Return a checked value as reports show it: rasters in memory by what they are called."""
     in_memory = not isinstance(value, (str, os.PathLike)) and hasattr(value, "crs")
     return value.name if in_memory else value

@@ -70,13 +70,17 @@ PACKAGES = (
     Package("numpy", "1.24"),
     Package("scipy", "1.10"),
     Package("rasterio", "1.3"),
-    Package("opencv-python-headless", "4.6", "cv2", "python3-opencv"),
+    Package("opencv-python-headless", "4.6", module="cv2", debian="python3-opencv"),
     Package("click", "8.1", use="the command line"),
     Package("fiona", "1.9", tools=("coregister_series",), files=(".gpkg",)),
     Package("jinja2", "3.1", files=(".html",)),
     Package("matplotlib", "3.6", files=(".html", ".png")),
     Package(
-        *("scikit-learn", "1.2", "sklearn", "python3-sklearn"), tools=("train_feature_classifier",)
+        "scikit-learn",
+        "1.2",
+        module="sklearn",
+        debian="python3-sklearn",
+        tools=("train_feature_classifier",),
     ),
     Package("shapely", "1.8", tools=("coregister_series",)),
     Package("xarray", "2022.11", use="rasters as xarray's", extra="xarray"),
@@ -84,7 +88,7 @@ PACKAGES = (
     Package("geopandas", "0.12", use="tie points as a GeoDataFrame", extra="geopandas"),
     Package("dask", "2022.12", use="batch on a Dask cluster", extra="cluster"),
     Package("distributed", "2022.12", use="batch on a Dask cluster", extra="cluster"),
-    Package("pyyaml", "6.0", "yaml", use="tables of batch in YAML", extra="yaml"),
+    Package("pyyaml", "6.0", module="yaml", use="tables of batch in YAML", extra="yaml"),
 )
 
 

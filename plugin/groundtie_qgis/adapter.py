@@ -187,8 +187,7 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         written = {
             qgis_name(parameter.name): str(values[parameter.name])
             for parameter in self._tool.parameters
-            if isinstance(parameter.kind, (kinds.OutputKind, kinds.FolderOut))
-            and values[parameter.name] is not None
+            if isinstance(parameter.kind, kinds.WrittenKind) and values[parameter.name] is not None
         }
         given = {qgis_name(output.name): output.value(summary) for output in self._tool.outputs}
         return written | {name: value for name, value in given.items() if value is not None}

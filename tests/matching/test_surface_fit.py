@@ -12,9 +12,10 @@ from groundtie.context import Context
 from groundtie.errors import TooFewPointsError
 from groundtie.geometry.estimation import jackknife_spread
 from groundtie.geometry.models import KINDS, Model
+from groundtie.kinds import AUTO
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.held_out import HeldOut
-from groundtie.matching.surface_fit import AUTO, SurfaceFit
+from groundtie.matching.surface_fit import SurfaceFit
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.similarity.surface import SimilaritySettings

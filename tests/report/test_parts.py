@@ -11,15 +11,16 @@ from known_reports import Page, report_of, written
 from matplotlib.quiver import Quiver
 
 from groundtie.rasters.pair import ImagePair
+from groundtie.report import parts
 from groundtie.report.figures import FIT_COLOUR
-from groundtie.report.parts import COLOURS, Parts, parts_map
+from groundtie.report.parts import COLOURS, parts_map
 
 # Chips of the two upper rows lie 9 px to the right and 5 px up, of 10 m each.
-TWO_ROWS = Parts(survey(35, part=14))
+TWO_ROWS = survey(35, part=14)
 
 
 def test_a_part_is_named_by_place_distance_and_direction() -> None:
-    (line,) = TWO_ROWS.lines()
+    (line,) = parts.lines(TWO_ROWS)
     assert line.startswith(
         "upper: 14 neighbouring chips lie 10.3 px off (90.0 m east, 50.0 m north)"
     )
@@ -27,7 +28,7 @@ def test_a_part_is_named_by_place_distance_and_direction() -> None:
 
 
 def test_numbers_of_a_part() -> None:
-    (part,) = TWO_ROWS.summary()
+    (part,) = parts.summary(TWO_ROWS)
     assert part["shift_px"] == (9.0, -5.0)
     assert part["distance_px"] == pytest.approx(np.hypot(9, 5))
     assert (part["chips"], part["confirming"]) == (14, 0)
@@ -35,13 +36,13 @@ def test_numbers_of_a_part() -> None:
 
 
 def test_chips_that_fell_anywhere_are_no_part() -> None:
-    parts = Parts(survey(30))
-    assert parts.shown() is None
-    assert parts.summary() == []
+    anywhere = survey(30)
+    assert parts.shown(anywhere) is None
+    assert parts.summary(anywhere) == []
 
 
 def test_the_map_has_an_arrow_for_every_chip_of_a_part_in_its_colour() -> None:
-    axes = parts_map(TWO_ROWS.survey).axes[0]
+    axes = parts_map(TWO_ROWS).axes[0]
     arrows, scale = (c for c in axes.collections if isinstance(c, Quiver))
     assert (arrows.N, scale.N) == (14, 1)
     drawn = np.column_stack([arrows.U, arrows.V])
@@ -54,8 +55,8 @@ def test_the_map_has_an_arrow_for_every_chip_of_a_part_in_its_colour() -> None:
 
 @pytest.mark.slow
 def test_a_page_shows_parts_whatever_the_verdict(pair: ImagePair, tmp_path: Path) -> None:
-    page: Page = written(report_of(pair, parts=TWO_ROWS), tmp_path)
+    page: Page = written(report_of(pair, survey=TWO_ROWS), tmp_path)
     assert "Parts that lie elsewhere" in [e.text for e in page.all("h2")]
     assert "Upper: 14 neighbouring chips lie 10.3 px off" in page.text
-    without = written(report_of(pair, parts=Parts(survey(49))), tmp_path)
+    without = written(report_of(pair, survey=survey(49)), tmp_path)
     assert "Parts that lie elsewhere" not in [e.text for e in without.all("h2")]

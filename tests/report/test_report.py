@@ -101,7 +101,7 @@ def test_parameters_and_versions_are_shown(pair: ImagePair, tmp_path: Path) -> N
     rows = dict(
         zip((e.text for e in page.all("th")), (e.text for e in page.all("td")), strict=True)
     )
-    assert rows == {"bins": "–", "seed": "7", **versions(), "time": "4.6 s"}
+    assert rows == {"seed": "7", **versions(), "time": "4.6 s"}
     assert [e.text for e in page.all("caption")] == ["Parameters", "Versions and time"]
 
 
@@ -117,7 +117,7 @@ def test_the_json_is_the_summary(variants: list[Variant]) -> None:
     for variant in variants:
         assert variant.numbers == {"format": REPORT_FORMAT, **variant.report.summary()}
         assert list(variant.numbers) == [
-            *("format", "verdict", "correction", "transform", "mask"),
+            *("format", "verdict", "correction", "transform", "mask", "scene"),
             *("parameters", "versions", "seconds"),
         ]
         assert variant.numbers["verdict"] == variant.report.verdict.summary()

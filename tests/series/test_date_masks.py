@@ -67,9 +67,9 @@ def opened(folder: Path, mask: UserMask | None, stack: ExitStack, context: Conte
     for name, one in (("a", None), ("b", mask)):
         path = write_raster(folder / f"{name}.tif", texture(SIZE, SIZE).astype(np.float32), GRID)
         listed.append(Listed(name, path, None, one))
-    found = open_dates(listed, None, stack, context)
-    assert not found.failures
-    return list(found.dates)
+    dates, failures = open_dates(listed, None, stack, context)
+    assert not failures
+    return dates
 
 
 @pytest.mark.parametrize("kind", ["zeros", "scl", "layer"])
@@ -119,6 +119,6 @@ def test_a_damaged_mask_costs_its_date_alone(tmp_path: Path, one_thread: Context
     path = write_raster(tmp_path / "a.tif", texture(SIZE, SIZE).astype(np.float32), GRID)
     listed = [Listed("a", path, None), Listed("b", path, None, UserMask(tmp_path / "broken.tif"))]
     with ExitStack() as stack:
-        found = open_dates(listed, None, stack, one_thread)
-    assert [date.name for date in found.dates] == ["a"]
-    assert "broken.tif" in found.failures["b"]
+        dates, failures = open_dates(listed, None, stack, one_thread)
+    assert [date.name for date in dates] == ["a"]
+    assert "broken.tif" in failures["b"]

@@ -11,7 +11,7 @@ from typing import Any
 from ..call_paths import inputs_of
 from ..declaration import Parameter, Tool
 from ..errors import GroundTieError, OutputError, ParameterError, SameFileError
-from ..kinds import Flag, FolderOut, InputKind, OutputKind, RastersIn, Text
+from ..kinds import Flag, InputKind, OutputKind, RastersIn, Text, WrittenKind
 from ..raster_names import raster_name
 from ..rasters.atomic import make_folder
 from ..runs import digest
@@ -140,7 +140,7 @@ def _located(value: Any, inputs: Path) -> Any:
 
 
 def _is_output(parameter: Parameter) -> bool:
-    return isinstance(parameter.kind, (OutputKind, FolderOut))
+    return isinstance(parameter.kind, WrittenKind)
 
 
 def _output(parameter: Parameter, value: Any, name: str, folder: Path) -> Path | None:
@@ -160,7 +160,7 @@ def _files(tool: Tool, call: Call) -> Iterator[Path]:
     """Yield all that a call writes, also what lies beside its outputs."""
     for name, path in call.outputs.items():
         kind = tool.parameter(name).kind
-        assert isinstance(kind, (OutputKind, FolderOut))
+        assert isinstance(kind, WrittenKind)
         yield from (path, *kind.also_written(path))
 
 

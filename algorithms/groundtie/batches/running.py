@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
-from contextlib import contextmanager
-from functools import partial
 from queue import Empty, SimpleQueue
 
 from ..declaration import Tool
@@ -37,36 +35,23 @@ def run_calls(
     check
         Called again and again; what it raises ends the work.
     """
-    ended: SimpleQueue[tuple[Call, Future[Outcome]]] = SimpleQueue()
-    with _cancelling() as futures:
+    ended: SimpleQueue[Future[Outcome]] = SimpleQueue()
+    waiting: dict[Future[Outcome], Call] = {}
+    try:
         for call in calls:
             task = Task(load, tool, call.values, tuple(call.outputs.values()))
-            futures.append(executor.submit(task.run))
-            futures[-1].add_done_callback(partial(_put, ended, call))
-        waiting = len(calls)
+            future = executor.submit(task.run)
+            waiting[future] = call
+            future.add_done_callback(ended.put)
         while waiting:
             check()
             try:
-                call, future = ended.get(timeout=POLL_SECONDS)
+                future = ended.get(timeout=POLL_SECONDS)
             except Empty:
                 continue
-            waiting -= 1
-            yield call, _outcome(future)
-
-
-def _put(
-    ended: SimpleQueue[tuple[Call, Future[Outcome]]], call: Call, future: Future[Outcome]
-) -> None:
-    ended.put((call, future))
-
-
-@contextmanager
-def _cancelling() -> Iterator[list[Future[Outcome]]]:
-    futures: list[Future[Outcome]] = []
-    try:
-        yield futures
+            yield waiting.pop(future), _outcome(future)
     finally:
-        for future in futures:
+        for future in waiting:
             future.cancel()
 
 

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from ..kinds import AUTO
 from ..rasters.patch import is_logarithmic
 from . import threshold
 from .regions import GroundRegions
 from .scene import Scene
 
-NONE, THRESHOLD, REGIONS, AUTO = "none", "threshold", "regions", "auto"
+NONE, THRESHOLD, REGIONS = "none", "threshold", "regions"
 MASKS = (NONE, THRESHOLD, REGIONS, AUTO)
 
 # Block means above this many times their median are strong scatterers, and scenes with more than

@@ -21,11 +21,10 @@ from ..geometry.model_choice import (
 )
 from ..geometry.models import PARAMETERS, Model
 from ..geometry.robust import Mixture, distances, find_consensus, fit_robustly
+from ..kinds import AUTO
 from ..rasters.grid import apply_affine
 
 FloatArray = NDArray[np.float64]
-
-AUTO = "auto"
 
 # What "auto" chooses from. What bends between radar images of other incidence angles are mostly
 # forests and cities, by their relief displacement, and not the ground.

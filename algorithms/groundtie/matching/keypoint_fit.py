@@ -22,9 +22,10 @@ from ..geometry.models import PARAMETERS, Model
 from ..geometry.robust import fit_mixture
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
+from ..kinds import AUTO
 from ..rasters.grid import Grid, apply_affine
 from .chips import ChipMatcher
-from .feature_fit import AUTO, Fit, fit_matches, require_no_rival
+from .feature_fit import Fit, fit_matches, require_no_rival
 from .frames import on_grid, on_map
 from .keypoints import KeypointMatcher
 from .matcher import Correspondences, Places

@@ -14,6 +14,7 @@ import numpy as np
 from ..context import Context
 from ..errors import TooFewPointsError
 from ..geometry.models import Model
+from ..kinds import AUTO
 from ..rasters.colours import Colours
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch, middle_window
@@ -131,7 +132,7 @@ class PooledHistogramMatcher:
 
     def kind_of(self, kind: str) -> str:
         """Return the kind of model that is fitted where one is asked for."""
-        return _AUTO_KIND if kind == "auto" else kind
+        return _AUTO_KIND if kind == AUTO else kind
 
     def is_settled(self, expected_px: FloatArray) -> bool:
         """Whether matching again is in vain: never.

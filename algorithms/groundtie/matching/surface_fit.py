@@ -16,6 +16,7 @@ from ..geometry.terrain import Terrain
 from ..geometry.terrain_model import TerrainModel
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
+from ..kinds import AUTO
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..similarity.peak import Peak, find_peak, find_peak_near
@@ -25,8 +26,6 @@ from .families import Positions
 from .frames import on_grid, on_map
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, Places
-
-AUTO = "auto"
 
 # A tie point of the fit is the peak within this distance from the aligned model.
 _NEAR_PX = 3

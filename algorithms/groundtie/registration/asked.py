@@ -9,8 +9,8 @@ from typing import Any
 
 from ..errors import ParameterError
 from ..geometry.views import View, parse_view, split_views
+from ..kinds import AUTO
 from ..masks.choice import NONE
-from ..matching.surface_fit import AUTO
 from ..rasters.rendered import LIGHTS, RADAR, SUN, Light
 from .registered_output import grid_of_output, model_for_grid
 from .specification import BOTH, Specification, StatedSurface

@@ -14,7 +14,7 @@ from typing import Any
 
 from ..context import Context, threads
 from ..errors import GeoreferencingError, ParameterError
-from ..masks.choice import AUTO
+from ..kinds import AUTO
 from ..progress import Progress
 from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster

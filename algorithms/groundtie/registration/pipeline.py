@@ -12,7 +12,8 @@ import numpy as np
 
 from ..context import Context
 from ..errors import NoOverlapError, NothingFoundError, TooFewPointsError
-from ..masks.choice import AUTO, NONE, MaskUsed
+from ..kinds import AUTO
+from ..masks.choice import NONE, MaskUsed
 from ..rasters.reading import bounded_cache
 from .evidence import Exchanged, RegistrationEvidence, SearchEvidence
 from .masks import Masked, with_ground_mask

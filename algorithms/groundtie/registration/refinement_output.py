@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..assessment.comparison import Comparison
+from ..declaration import given_files
 from ..kinds import GEOTIFF
 from ..progress import Progress
 from ..rasters.atomic import Outputs
@@ -46,8 +47,9 @@ class RefinementFiles:
 
     def written(self) -> dict[str, str]:
         """Return what is written, by name."""
-        named = {"output": self.output, "residuals": self.residuals, "report": self.report}
-        return {name: str(path) for name, path in named.items() if path is not None}
+        return given_files(
+            {"output": self.output, "residuals": self.residuals, "report": self.report}
+        )
 
     def points_or_report(self, found: GroundControl) -> ControlPoints:
         """Return matched points; if they are refused, write the report on that and raise.
@@ -109,7 +111,7 @@ class RefinementFiles:
             None if found is None else _compared(refinement, found),
             None if found is None else found.registration.mask,
             title=f"RPCs of {Path(refinement.image.source.path).name}, refined",
-            parameters={k: v for k, v in self.parameters.items() if v is not None},
+            parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
         )
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..context import Context
 from ..errors import ParameterError
 from ..geometry.transform import FloatArray, Transform
-from ..matching.surface_fit import AUTO
+from ..kinds import AUTO
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster, write_with_geotransform
 from ..rasters.grid import Grid, reproject

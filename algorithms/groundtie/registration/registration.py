@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arrays import Raster
 from ..context import threads
+from ..declaration import file_lines, given_files
 from ..errors import NotRegisteredError
 from ..geometry.estimation import Estimate
 from ..geometry.tie_points import TiePoints
@@ -26,7 +27,7 @@ from ..rasters.delivery import warp_to_array
 from ..rasters.pair import ImagePair
 from ..rasters.reading import open_raster
 from ..report.correction import Correction
-from ..report.parts import Parts
+from ..report.details import extremes
 from ..report.report import Report
 from ..similarity.surface import Surface
 from .evidence import RegistrationEvidence
@@ -188,8 +189,8 @@ class Registration:
             points=self.tie_points,
             transform=self.transform,
             surfaces=self.extreme_surfaces() if with_surfaces else (),
-            parts=None if self.survey is None else Parts(self.survey),
-            parameters={k: v for k, v in self.parameters.items() if v is not None},
+            survey=self.survey,
+            parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
         )
 
@@ -199,18 +200,15 @@ class Registration:
             return ()
         used = np.flatnonzero(self.check.points.used)
         residuals = self.check.points.take(used).residual_px(self.estimate.transform)
-        order = used[np.hypot(*residuals.T).argsort()]
-        best, worst = order[:_EXTREMES], order[_EXTREMES:][-_EXTREMES:]
-        labels = ["best check point"] * len(best) + ["worst check point"] * len(worst)
-        picked = np.concatenate([best, worst])
-        return tuple(zip(labels, self.check.surfaces[picked], strict=True))
+        found = extremes(np.hypot(*residuals.T), _EXTREMES)
+        return tuple((label, self.check.surfaces[used[k]]) for label, k in found)
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
         values = {
             **self.page(with_surfaces=False).summary(),
             "scene": self.scene.summary(),
-            "files": {name: str(path) for name, path in self.files.items()},
+            "files": given_files(self.files),
         }
         return values | ({"tried": list(self.tried)} if self.tried else {})
 
@@ -229,7 +227,7 @@ class Registration:
                 f"check points that agree: {v.check_points_agreeing} of {v.check_points}; by "
                 f"chance 1 in 10^{-v.log10_chance:.0f}",
             ]
-        return lines + [f"{name}: {path}" for name, path in self.files.items()]
+        return lines + file_lines(self.files)
 
     def close(self) -> None:
         """Close the rasters; what was computed stays."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from ..kinds import AUTO
 from ..masks.choice import (
     INPUT,
     REFERENCE,
@@ -21,7 +22,7 @@ from ..rasters.patch import Patch
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import Window
 from ..sensor.orientation import SensorGrid
-from .specification import AUTO, BOTH, NEITHER
+from .specification import BOTH, NEITHER
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..context import Context, threads
+from ..declaration import file_lines
 from ..errors import ParameterError
 from ..masks.choice import MaskUsed
 from ..progress import Progress
@@ -144,7 +145,7 @@ class RefinedRpc:
             self.ground,
             *(() if self.mask is None else (self.mask.line(),)),
             *(f"warning: {line}" for line in self.heights.warnings()),
-            *(f"{name}: {path}" for name, path in self.files.items()),
+            *file_lines(self.files),
         ]
 
 

@@ -16,7 +16,8 @@ import scipy.fft
 from ..context import Context
 from ..errors import ParameterError
 from ..geometry.views import View
-from ..masks.choice import AUTO, NONE, REFERENCE, SURFACE, MaskUsed
+from ..kinds import AUTO
+from ..masks.choice import NONE, REFERENCE, SURFACE, MaskUsed
 from ..masks.object_heights import RasterModel, SurfaceModel, read_footprints
 from ..masks.scene import Scene
 from ..masks.surface_model import SurfaceGround, write_image

@@ -63,11 +63,11 @@ class AssessmentReport(Page):
             "metres": any(errors.error_m is not None for errors in parts.values()),
             "model": self.transform.model.kind,
             "pictures": self.comparison,
-            "map": self._error_map(),
+            "residuals": self._residuals(),
         }
 
-    def _error_map(self) -> dict[str, Any] | None:
-        """Return the figure of the errors at all points, over the input."""
+    def _residuals(self) -> dict[str, Any] | None:
+        """Return what is shown of the errors at all points, over the input; None: nothing."""
         measured = self.assessment
         fit = measured.control_points
         parts = (
@@ -80,9 +80,4 @@ class AssessmentReport(Page):
         if not errors.used.any():
             return None
         grid = self.transform.input_grid
-        return {
-            "uri": figures.svg_uri(figures.residual_map(errors, grid)),
-            "exaggeration": figures.residual_arrows(errors, grid).exaggeration,
-            "width": grid.width,
-            "height": grid.height,
-        }
+        return {**figures.shown_residuals(errors, grid), "grid": grid}

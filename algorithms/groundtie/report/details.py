@@ -21,15 +21,20 @@ _EXTREMES = 2
 _CORNERS = ("upper left", "upper right", "lower left", "lower right")
 
 
+def extremes(error_px: FloatArray, most: int) -> list[tuple[str, int]]:
+    """Return labels and indices of the best and worst of check points, `most` of each."""
+    order = error_px.argsort()
+    best, worst = order[:most], order[most:][-most:]
+    labels = ["best check point"] * len(best) + ["worst check point"] * len(worst)
+    return list(zip(labels, [*best, *worst], strict=True))
+
+
 def places(errors: PointErrors, grid: Grid) -> list[tuple[str, FloatArray]]:
     """Return labels and positions (col, row): best and worst check points, and the corners."""
     check = np.flatnonzero(errors.check)
-    order = check[errors.length_px[check].argsort()]
-    best, worst = order[:_EXTREMES], order[_EXTREMES:][-_EXTREMES:]
     found = [
-        (f"{name} check point", errors.position_px[k])
-        for name, some in (("best", best), ("worst", worst))
-        for k in some
+        (label, errors.position_px[check[k]])
+        for label, k in extremes(errors.length_px[check], _EXTREMES)
     ]
     half = min(SIDE_PX, grid.width, grid.height) / 2
     corners = mesh((half, grid.width - half), (half, grid.height - half))

@@ -114,6 +114,24 @@ def svg_uri(figure: Figure) -> str:
     return data_uri("image/svg+xml", buffer.getvalue())
 
 
+def shown_residuals(errors: PointErrors, grid: Grid) -> dict[str, Any]:
+    """Return what a page shows of residuals: their map, and how exaggerated its arrows are."""
+    return {
+        "map": svg_uri(residual_map(errors, grid)),
+        "exaggeration": residual_arrows(errors, grid).exaggeration,
+    }
+
+
+def shown_errors(
+    errors: PointErrors, verdict: Verdict, metres_per_px: float | None
+) -> dict[str, str]:
+    """Return what a page shows of the errors at check points; see `error_histogram`."""
+    return {
+        "histogram": svg_uri(error_histogram(errors, verdict, metres_per_px)),
+        "scatter": svg_uri(error_scatter(errors, verdict)),
+    }
+
+
 def residual_map(errors: PointErrors, grid: Grid) -> Figure:
     """Draw the points and their exaggerated residuals; the figure's edges are the grid's."""
     arrows = residual_arrows(errors, grid)

@@ -18,7 +18,7 @@ import scipy
 
 from ..call_paths import check_numbers
 from ..geometry.judging import TOLERANCE_PX
-from ..kinds import REPORT_FORMAT, plainly
+from ..kinds import REPORT_FORMAT, shown_name
 from ..rasters.atomic import Outputs, write_json, writing
 from ..runs import RUN, run_tags
 from ..version import __version__
@@ -37,14 +37,14 @@ class Page:
     title
         Heading of the page.
     parameters
-        What the tool was called with.
+        What the tool was called with; None: by default.
     seconds
         How long it took.
     """
 
     template: ClassVar[str]
     title: str
-    parameters: dict[str, Any]
+    parameters: Mapping[str, Any]
     seconds: float
 
     def numbers(self) -> dict[str, Any]:
@@ -57,8 +57,8 @@ class Page:
 
     def summary(self) -> dict[str, Any]:
         """Return the numbers as values that strict JSON can carry."""
-        made = {"parameters": self.parameters, "versions": versions(), "seconds": self.seconds}
-        return {name: plain(value) for name, value in (self.numbers() | made).items()}
+        found: dict[str, Any] = plain(self.numbers() | made(self.parameters, self.seconds))
+        return found
 
     def write(
         self,
@@ -76,17 +76,23 @@ class Page:
             A file cannot be written.
         """
         summary = self.summary()
-        shared = {name: summary[name] for name in ("parameters", "versions", "seconds")}
+        how = plain(made(self.parameters, self.seconds))
         run = run_tags().get(RUN)
         template = _environment().get_template(self.template)
-        page = template.render(title=self.title, run=run, **shared, **self.values())
+        page = template.render(title=self.title, run=run, **how, **self.values())
         beside = path.with_suffix(".json")
-        check_numbers(path.name, beside, REPORT_FORMAT)
+        check_numbers(path.name, beside)
         numbers = {"format": REPORT_FORMAT, **plain(dict(item)), **summary}
         write_json(outputs.stage(beside), numbers)
         staged = outputs.stage(path)
         with writing(staged):
             staged.write_text(page, encoding="utf-8")
+
+
+def made(parameters: Mapping[str, Any], seconds: float) -> dict[str, Any]:
+    """Return how a result was made: the parameters that were given, versions and time."""
+    given = {name: value for name, value in parameters.items() if value is not None}
+    return {"parameters": given, "versions": versions(), "seconds": seconds}
 
 
 def versions() -> dict[str, str]:
@@ -112,7 +118,7 @@ def plain(value: Any) -> Any:
         return plain(value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, (bool, int, str)) else str(plainly(value))
+    return value if value is None or isinstance(value, (bool, int, str)) else str(shown_name(value))
 
 
 @cache

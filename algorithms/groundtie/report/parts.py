@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,49 +17,39 @@ if TYPE_CHECKING:
 COLOURS = ("#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 
 
-@dataclass(frozen=True)
-class Parts:
-    """What chips all over an overlap show of parts that lie elsewhere.
-
-    Parameters
-    ----------
-    survey
-        Where the chips match.
-    """
-
-    survey: Survey
-
-    def summary(self) -> list[dict[str, Any]]:
-        """Return the parts as values that JSON can carry."""
-        return [
-            {
-                "where": part.where,
-                "distance_px": part.distance_px,
-                "shift_px": part.shift_px,
-                "chips": part.chips,
-                "confirming": confirming(self.survey, part),
-                "height": part.height,
-                "model_height": part.model_height,
-            }
-            for part in self.survey.parts
-        ]
-
-    def lines(self) -> list[str]:
-        """Return each part in words: where it lies, and how far off."""
-        return [_in_words(part, self.survey) for part in self.survey.parts]
-
-    def shown(self) -> dict[str, Any] | None:
-        """Return what a page shows of the parts; None: there are none."""
-        parts = self.survey.parts
-        if not parts:
-            return None
-        colours = [COLOURS[k % len(COLOURS)] for k in range(len(parts))]
-        return {
-            "map": figures.svg_uri(parts_map(self.survey)),
-            "rows": list(zip(colours, self.lines(), parts, strict=True)),
-            "chips": len(self.survey.centres),
-            "confirming": self.survey.confirming,
+def summary(survey: Survey) -> list[dict[str, Any]]:
+    """Return the parts that a survey shows as values that JSON can carry."""
+    return [
+        {
+            "where": part.where,
+            "distance_px": part.distance_px,
+            "shift_px": part.shift_px,
+            "chips": part.chips,
+            "confirming": confirming(survey, part),
+            "height": part.height,
+            "model_height": part.model_height,
         }
+        for part in survey.parts
+    ]
+
+
+def lines(survey: Survey) -> list[str]:
+    """Return each part in words: where it lies, and how far off."""
+    return [_in_words(part, survey) for part in survey.parts]
+
+
+def shown(survey: Survey) -> dict[str, Any] | None:
+    """Return what a page shows of the parts; None: there are none."""
+    parts = survey.parts
+    if not parts:
+        return None
+    colours = [COLOURS[k % len(COLOURS)] for k in range(len(parts))]
+    return {
+        "map": figures.svg_uri(parts_map(survey)),
+        "rows": list(zip(colours, lines(survey), parts, strict=True)),
+        "chips": len(survey.centres),
+        "confirming": survey.confirming,
+    }
 
 
 def parts_map(survey: Survey) -> Figure:

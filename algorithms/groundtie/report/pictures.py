@@ -24,6 +24,8 @@ BACKDROP_PX = 600
 LARGEST_JPEG_BYTES = 330_000
 
 _JPEG_QUALITIES = (85, 75, 60, 45, 30, 15)
+
+# Grey of pixels without data, and contrast of what is drawn on: both a matter of looks.
 _NO_DATA_GREY = 226
 _BACKDROP_STRENGTH = 0.4
 

@@ -55,7 +55,6 @@ class RefinementReport(Page):
         )
         residuals, grid, bias = found.residuals(), found.grid, found.adjustment.bias
         measured = {"before": evidence.before, "after": evidence.after}
-        histogram = figures.error_histogram(residuals, verdict, evidence.pixel_m)
         return {
             "verdict": verdict,
             "held_out": evidence.held_out.name,
@@ -67,10 +66,8 @@ class RefinementReport(Page):
             "shift": list(zip(("column", "row"), *bias.shift_px(), strict=True)),
             "facts": self._facts(),
             "warnings": self.heights.warnings(),
-            "map": figures.svg_uri(figures.residual_map(residuals, grid)),
-            "histogram": figures.svg_uri(histogram),
-            "scatter": figures.svg_uri(figures.error_scatter(residuals, verdict)),
-            "exaggeration": figures.residual_arrows(residuals, grid).exaggeration,
+            **figures.shown_residuals(residuals, grid),
+            **figures.shown_errors(residuals, verdict, evidence.pixel_m),
             "grid": grid,
             "pictures": self.comparison,
         }

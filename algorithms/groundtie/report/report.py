@@ -11,14 +11,14 @@ from ..assessment.point_errors import PointErrors
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..masks.choice import MaskUsed
+from ..matching.survey import Survey
 from ..rasters.pair import ImagePair
 from ..registration.verdict import Verdict
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
-from . import details, figures, pictures
+from . import details, figures, parts, pictures
 from .correction import Correction
 from .page import Page
-from .parts import Parts
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,11 @@ class Report(Page):
     surfaces
         Labels and similarity surfaces, shape (2 r + 1, 2 r + 1), of remarkable points.
     mask
-        Which mask was used; None: no question of one.
+        Which mask was used.
     scene
-        Facts about the images by their names; None: none were found.
-    parts
-        Where neighbouring chips agree on another place than the transform has; None: not looked at.
+        Facts about the images by their names.
+    survey
+        What chips all over the overlap show of parts that lie elsewhere; None: not looked at.
     """
 
     verdict: Verdict
@@ -50,9 +50,9 @@ class Report(Page):
     points: TiePoints | None
     transform: Transform | None
     surfaces: tuple[tuple[str, Surface], ...]
-    mask: MaskUsed | None = None
-    scene: Mapping[str, Any] | None = None
-    parts: Parts | None = None
+    mask: MaskUsed
+    scene: Mapping[str, Any]
+    survey: Survey | None
     template: ClassVar[str] = "report.html.j2"
 
     def numbers(self) -> dict[str, Any]:
@@ -62,9 +62,9 @@ class Report(Page):
             "verdict": self.verdict.summary(),
             "correction": None if moved is None else moved.summary(),
             "transform": None if self.transform is None else self.transform.to_json(),
-            "mask": None if self.mask is None else self.mask.summary(),
-            **({} if self.scene is None else {"scene": dict(self.scene)}),
-            **({} if self.parts is None else {"parts": self.parts.summary()}),
+            "mask": self.mask.summary(),
+            "scene": dict(self.scene),
+            **({} if self.survey is None else {"parts": parts.summary(self.survey)}),
         }
 
     def correction(self) -> Correction | None:
@@ -77,16 +77,16 @@ class Report(Page):
         return {
             "verdict": self.verdict,
             "grid": grid,
-            "notes": [*self.pair.notes(), *([] if self.mask is None else [self.mask.line()])],
+            "notes": [*self.pair.notes(), self.mask.line()],
             "metres": grid.metres_per_pixel,
             "model": None if found is None else found.model.kind,
             "correction": self.correction(),
             "pictures": Comparison.of(self.pair, found),
             "residuals": None if self.points is None else self._residual_figures(self.points),
             "surfaces": [_shown_surface(label, surface) for label, surface in self.surfaces],
-            "scene": self.scene or {},
+            "scene": self.scene,
             "details": self._details(),
-            "parts": None if self.parts is None else self.parts.shown(),
+            "parts": None if self.survey is None else parts.shown(self.survey),
         }
 
     def _details(self) -> list[dict[str, Any]]:
@@ -103,16 +103,13 @@ class Report(Page):
             return {"map": figures.svg_uri(figures.point_map(points, grid)), "errors": False}
         errors = PointErrors.on_grid(points, self.transform, grid)
         shown: dict[str, Any] = {
-            "map": figures.svg_uri(figures.residual_map(errors, grid)),
-            "exaggeration": figures.residual_arrows(errors, grid).exaggeration,
+            **figures.shown_residuals(errors, grid),
             "errors": bool(errors.check.any()),
         }
         if shown["errors"]:
             reach = figures.error_reach_px(errors, verdict)
-            histogram = figures.error_histogram(errors, verdict, grid.metres_per_pixel)
             shown |= {
-                "histogram": figures.svg_uri(histogram),
-                "scatter": figures.svg_uri(figures.error_scatter(errors, verdict)),
+                **figures.shown_errors(errors, verdict, grid.metres_per_pixel),
                 "measured": int(errors.check.sum()),
                 "reach_px": reach,
                 "beyond": int((errors.length_px[errors.check] > reach).sum()),

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from ..geometry.transform import Transform
+from ..kinds import GEOTIFF
 from ..raster_names import file_name
 from ..rasters.grid import LON_LAT, Grid, reproject
 from ..rasters.reading import RasterSource
 from ..rasters.writing import COG_SUFFIXES
 from ..registration.verdict import Verdict
-from ..stac_items import RASTER_SUFFIXES, time_of
+from ..stac_items import time_of
 
 VERSION = "1.0.0"
 EXTENSIONS = (
@@ -114,5 +115,5 @@ def _asset(output: Path, folder: Path) -> dict[str, Any]:
     if output.name.lower().endswith(COG_SUFFIXES):
         return asset | {"type": f"{_TIFF}; profile=cloud-optimized"}
     # The media type of others is none that readers know.
-    is_tiff = output.suffix.lower() in RASTER_SUFFIXES[:2]
+    is_tiff = output.suffix.lower() in GEOTIFF
     return asset | {"type": _TIFF} if is_tiff else asset

@@ -16,10 +16,9 @@ from ..geometry.model_choice import (
     left_out_blocks,
 )
 from ..geometry.robust import find_consensus, fit_mixture
+from ..kinds import AUTO
 from ..rasters.grid import FloatArray
 from .bias import KINDS, TERMS, Bias, design
-
-AUTO = "auto"
 
 # Standard deviation that inliers may have beyond their own, in pixels.
 _SIGMA_RANGE_PX = (0.1, 2.5)

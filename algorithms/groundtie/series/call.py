@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from ..rasters.reading import bounded_cache
 from ..registration.registered_output import model_for_grid
 from ..registration.series_evidence import DateEvidence
 from ..registration.user_masks import UserMask
-from .dates import Date, Footprints, OpenDates, open_dates
+from .dates import Date, Footprints, open_dates
 from .delivery import SeriesFiles
 from .frame import SeriesFrame
 from .inputs import Listed, list_dates
@@ -28,7 +29,7 @@ from .pairs import Settings
 from .registering import Matching
 from .series import Series, SeriesDate
 from .settling import DateVerdict, settle
-from .stored import UNFINISHED, StoredSeries, Unfinished, read_series
+from .stored import UNFINISHED, StoredSeries, keep_unfinished, read_series
 
 
 @dataclass(frozen=True)
@@ -100,8 +101,11 @@ class SeriesCall:
                 executor = stack.enter_context(open_executor(1, given["scheduler"]))
             stack.enter_context(bounded_cache())
             opened = open_dates(self.listed, given["band"], stack, context.part(0.0, 0.05))
+            dates, failures = _on_one_map(*opened, self.reference)
             try:
-                series = self._registered(opened, stored, context.part(0.05, 0.8), executor)
+                series = self._registered(
+                    dates, failures, stored, context.part(0.05, 0.8), executor
+                )
                 series = replace(series, seconds=time.perf_counter() - started)
                 return self.files.write(series, stored, context.part(0.8, 1.0))
             except CancelledError as error:
@@ -113,12 +117,12 @@ class SeriesCall:
 
     def _registered(
         self,
-        opened: OpenDates,
+        dates: Sequence[Date],
+        failures: Mapping[str, str],
         stored: StoredSeries,
         context: Context,
         executor: Executor | None,
     ) -> Series:
-        dates, failures = _on_one_map(opened, self.reference)
         hub = next((k for k, date in enumerate(dates) if date.name == self.reference), None)
         home = dates[hub or 0]
         key = None if hub is None else home.key
@@ -134,7 +138,7 @@ class SeriesCall:
             stored.pairs,
             context,
             executor,
-            Unfinished(self.files.folder, key, frame).keep,
+            partial(keep_unfinished, self.files.folder, key, frame),
         )
         if hub is None:
             hub, datum = matching.freely(), "to each other (mean displacement zero)"
@@ -202,8 +206,8 @@ def _require_apart(listed: tuple[Listed, ...], folder: Path) -> None:
 
 
 def _on_one_map(
-    opened: OpenDates, reference: str | None
-) -> tuple[tuple[Date, ...], dict[str, str]]:
+    opened: Sequence[Date], failures: Mapping[str, str], reference: str | None
+) -> tuple[list[Date], dict[str, str]]:
     """Return the dates that have a place on the reference's map, and why others have none.
 
     Raises
@@ -211,23 +215,23 @@ def _on_one_map(
     ParameterError
         The reference cannot be opened, or fewer than two dates are left.
     """
-    failures = dict(opened.failures)
+    failures = dict(failures)
     if reference in failures:
         raise ParameterError(failures[reference])
-    with_crs = [date.source.grid.crs is not None for date in opened.dates]
+    with_crs = [date.source.grid.crs is not None for date in opened]
     wanted = 2 * sum(with_crs) >= len(with_crs)
-    for date, has_crs in zip(opened.dates, with_crs, strict=True):
+    for date, has_crs in zip(opened, with_crs, strict=True):
         if date.name == reference:
             wanted = has_crs
     dates = []
-    for date, has_crs in zip(opened.dates, with_crs, strict=True):
+    for date, has_crs in zip(opened, with_crs, strict=True):
         if has_crs == wanted:
             dates.append(date)
         else:
             failures[date.name] = f"{date.source.path} has {'a' if has_crs else 'no'} CRS"
     if len(dates) < 2:
         raise ParameterError("; ".join(failures.values()))
-    return tuple(dates), failures
+    return dates, failures
 
 
 def _judged(date: Date, verdict: DateVerdict, frame: SeriesFrame, is_reference: bool) -> SeriesDate:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,6 @@ from rasterio.crs import CRS
 from rasterio.features import shapes
 from shapely.geometry import Polygon, shape
 from shapely.ops import unary_union
-from shapely.strtree import STRtree
 
 from ..context import Context
 from ..errors import CancelledError, GroundTieError
@@ -28,6 +27,7 @@ from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import RasterSource, open_raster
 from ..registration.user_masks import UserMask
+from ..report.pictures import overview_grid
 from ..runs import digest
 from .date_masks import DateMask, draw_mask
 from .inputs import Listed
@@ -102,8 +102,7 @@ class Date:
     def footprint(self, crs: CRS | None) -> Any:
         """Return the outline of its valid pixels as a shapely polygon on a map."""
         grid = self.matched.grid
-        factor = max(grid.width, grid.height) / _FOOTPRINT_PX
-        small = grid.scaled(factor) if factor > 1 else grid
+        small = overview_grid(grid, _FOOTPRINT_PX)
         _, valid = self.matched.read(
             self.matched.window, self._matched_band, (small.height, small.width)
         )
@@ -118,26 +117,12 @@ class Date:
         return unary_union(sound)
 
 
-@dataclass(frozen=True)
-class OpenDates:
-    """All dates that could be opened, and why the others could not.
-
-    Parameters
-    ----------
-    dates
-        The dates.
-    failures
-        What is wrong with the others, by name.
-    """
-
-    dates: tuple[Date, ...]
-    failures: dict[str, str] = field(default_factory=dict)
-
-
 def open_dates(
     listed: Sequence[Listed], band: int | None, stack: ExitStack, context: Context
-) -> OpenDates:
+) -> tuple[list[Date], dict[str, str]]:
     """Open the rasters of a series; one that cannot be read is left out.
+
+    Returns the dates that could be opened, and what is wrong with the others, by name.
 
     Parameters
     ----------
@@ -170,7 +155,7 @@ def open_dates(
             raise
         except GroundTieError as error:
             failures[one.name] = error.one_line()
-    return OpenDates(tuple(dates), failures)
+    return dates, failures
 
 
 @dataclass(frozen=True)
@@ -193,21 +178,11 @@ class Footprints:
     @cached_property
     def shares(self) -> dict[frozenset[int], float]:
         """Share of the smaller footprint that two dates have in common; 0 is left out."""
-        with warnings.catch_warnings():
-            # That its query changed in shapely 2: see below.
-            warnings.filterwarnings("ignore", message="STRtree will be changed")
-            tree = STRtree(self.polygons)
-        number = {id(polygon): index for index, polygon in enumerate(self.polygons)}
         found = {}
-        for first, polygon in enumerate(self.polygons):
-            for hit in tree.query(polygon):
-                # Polygons before shapely 2, their numbers since.
-                second = number[id(hit)] if id(hit) in number else int(hit)
-                if second > first:
-                    common = polygon.intersection(self.polygons[second]).area
-                    smaller = min(polygon.area, self.polygons[second].area)
-                    if common > 0:
-                        found[frozenset((first, second))] = float(common / smaller)
+        for (first, one), (second, other) in combinations(enumerate(self.polygons), 2):
+            common = one.intersection(other).area
+            if common > 0:
+                found[frozenset((first, second))] = float(common / min(one.area, other.area))
         return found
 
     def share(self, first: int, second: int) -> float:

@@ -17,6 +17,7 @@ Move = Callable[[FloatArray], FloatArray]
 # Parameters of a displacement: shift, and rise along both axes, (x, y) each.
 PARAMETERS = 6
 
+# Positions a side of the square at which a move is sampled: a plane needs two, bends average out.
 _LATTICE = 5
 
 # A displacement with less of a linear part, at the frame's border, is a shift.

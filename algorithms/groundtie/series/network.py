@@ -28,7 +28,11 @@ SCATTER_RANGE_PX = (0.03, 0.3)
 # A link that the others control by less than this is not tested.
 _LEAST_REDUNDANCY = 0.01
 
+# Halvings of the range of the scatter: to less than 0.0001 px.
 _BISECTIONS = 12
+
+# Steps of Gauss and Newton, and the step that is the last: displacements are nearly linear, so that
+# it is one of the first.
 _STEPS = 10
 _PRECISION_PX = 1e-9
 

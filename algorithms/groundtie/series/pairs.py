@@ -16,7 +16,7 @@ from ..errors import CancelledError, GroundTieError, WorkerLostError
 from ..executors import enter_worker
 from ..geometry.estimation import jackknife_deviations
 from ..geometry.models import Model
-from ..masks.choice import AUTO
+from ..kinds import AUTO
 from ..matching.alignment import LINEAR_CANDIDATES
 from ..rasters.grid import Grid, reproject
 from ..rasters.reading import bounded_cache
@@ -188,11 +188,11 @@ def _register_files(
 ) -> PairResult:
     enter_worker()
     with threads(1) as context, ExitStack() as stack:
-        opened = open_dates(listed, band, stack, context)
-        if opened.failures:
-            reason = "; ".join(opened.failures.values())
+        dates, failures = open_dates(listed, band, stack, context)
+        if failures:
+            reason = "; ".join(failures.values())
             return PairResult(listed[0].name, listed[1].name, key, False, "", reason)
-        first, second = opened.dates
+        first, second = dates
         return replace(register_pair(PairTask(first, second, *bare), context), key=key)
 
 

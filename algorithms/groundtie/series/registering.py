@@ -25,13 +25,12 @@ _LEAST_SHARE = 0.1
 # A date that the next one in time overlaps less than another by this is matched with that, too.
 _MUCH_MORE = 0.2
 
-# How many dates are tried until one reaches a date that the hub does not, or confirms one in doubt;
-# and how many links each date should have: two make a loop.
+# Any date may be under clouds: as many are tried until one reaches a date that the hub does not, or
+# confirms one in doubt, or is the hub where there is no reference.
 _MOST_TRIES = 3
-_WANTED_LINKS = 2
 
-# Without a reference the first hub may be under clouds: as many are tried.
-_MOST_HUBS = 3
+# How many links each date should have: two make a loop.
+_WANTED_LINKS = 2
 
 
 def _forget(_: PairResult) -> None:
@@ -120,7 +119,7 @@ class Matching:
         tried: list[int] = []
         for hub in order:
             reached = set().union(*(self.placed(one) for one in tried))
-            if len(tried) == _MOST_HUBS or len(reached) > len(self.dates) / 2:
+            if len(tried) == _MOST_TRIES or len(reached) > len(self.dates) / 2:
                 break
             if hub not in reached or not tried:
                 self.from_hub(hub)

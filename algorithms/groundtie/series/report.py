@@ -9,7 +9,7 @@ import numpy as np
 
 from ..geometry.transform import Transform
 from ..report import figures, pictures
-from ..report.page import Page
+from ..report.page import Page, made
 from .series import Series, SeriesDate
 
 if TYPE_CHECKING:
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 # Longer side of a thumbnail, and how many dates are shown at most: 100 take 3 MB.
 _THUMBNAIL_PX = 360
 _MOST_SHOWN = 100
-
-# Dates that are not registered stand first, then those with the widest loops.
-_FIRST = float("inf")
 
 
 @dataclass(frozen=True)
@@ -49,14 +46,13 @@ class SeriesReport(Page):
     @classmethod
     def of(cls, series: Series) -> SeriesReport:
         """Return the report on a series."""
-        given = {name: value for name, value in series.parameters.items() if value is not None}
         title = f"Series of {len(series.dates)} dates, registered {series.datum}"
-        return cls(series, title=title, parameters=given, seconds=series.seconds)
+        return cls(series, title=title, parameters=series.parameters, seconds=series.seconds)
 
     def numbers(self) -> dict[str, Any]:
         """Return what was measured, by name."""
-        made = ("parameters", "versions", "seconds", "files")
-        return {name: value for name, value in self.series.summary().items() if name not in made}
+        left_out = {*made(self.parameters, self.seconds), "files"}
+        return {k: v for k, v in self.series.summary().items() if k not in left_out}
 
     def values(self) -> dict[str, Any]:
         """Return what the template shows."""
@@ -99,10 +95,10 @@ class SeriesReport(Page):
         return found
 
 
-def _badness(row: dict[str, Any]) -> tuple[float, float]:
-    if row["state"] == "left out":
-        return -_FIRST, 0.0
-    return -(row["worst_loop_px"] or 0.0), -(row["sigma_px"] or 0.0)
+def _badness(row: dict[str, Any]) -> tuple[bool, float, float]:
+    """Return what rows are sorted by: those left out stand first, then those of wide loops."""
+    stays = row["state"] != "left out"
+    return stays, -(row["worst_loop_px"] or 0.0), -(row["sigma_px"] or 0.0)
 
 
 def shift_figure(series: Series) -> Figure:

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from ..declaration import file_lines, given_files
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid
-from ..report.page import plain, versions
+from ..report.page import made, plain
 from .dates import Date
 from .frame import SeriesFrame, rms_px, sigma_px
 from .inputs import Listed
@@ -217,10 +218,8 @@ class Series:
             "rejected_pairs": rejected,
             "registered_pairs": self.registered_pairs,
             "reused_pairs": self.reused_pairs,
-            "parameters": {k: v for k, v in self.parameters.items() if v is not None},
-            "versions": versions(),
-            "seconds": self.seconds,
-            "files": {name: str(path) for name, path in self.files.items()},
+            **made(self.parameters, self.seconds),
+            "files": given_files(self.files),
         }
         found: dict[str, Any] = plain(values)
         return found
@@ -267,4 +266,4 @@ class Series:
             )
         reused = f", {self.reused_pairs} taken over" if self.reused_pairs else ""
         lines.append(f"registrations of two dates: {self.registered_pairs} done{reused}")
-        return lines + [f"{name}: {path}" for name, path in self.files.items()]
+        return lines + file_lines(self.files)

@@ -79,9 +79,10 @@ class StoredSeries:
     dates: Mapping[str, StoredDate] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Unfinished:
-    """Keeps each registration as soon as it is done, until the series is written.
+def keep_unfinished(
+    folder: Path, reference: str | None, frame: SeriesFrame, pair: PairResult
+) -> None:
+    """Keep a registration as soon as it is done, until the series is written.
 
     Parameters
     ----------
@@ -91,40 +92,30 @@ class Unfinished:
         Key of the reference's file; None: there is none.
     frame
         The series' frame.
+    pair
+        The registration.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
     """
-
-    folder: Path
-    reference: str | None
-    frame: SeriesFrame
-
-    def keep(self, pair: PairResult) -> None:
-        """Write a registration.
-
-        Raises
-        ------
-        OutputError
-            The file cannot be written.
-        """
-        values = {
-            "reference_key": self.reference,
-            "frame": self.frame.to_json(),
-            "pair": pair.to_json(),
-        }
-        path = self.folder / UNFINISHED
-        make_folder(self.folder)
-        is_first = not path.exists()
-        try:
-            with writing(path), path.open("a", encoding="utf-8") as file:
-                # The newline first: the line before may have been cut off with its run.
-                file.write("\n" + json.dumps(values))
-        except OutputError:
-            if is_first:
-                remove(path)
-            raise
+    values = {"reference_key": reference, "frame": frame.to_json(), "pair": pair.to_json()}
+    path = folder / UNFINISHED
+    make_folder(folder)
+    is_first = not path.exists()
+    try:
+        with writing(path), path.open("a", encoding="utf-8") as file:
+            # The newline first: the line before may have been cut off with its run.
+            file.write("\n" + json.dumps(values))
+    except OutputError:
+        if is_first:
+            remove(path)
+        raise
 
 
 def forget_unfinished(folder: Path) -> None:
-    """Remove what `Unfinished` wrote."""
+    """Remove what `keep_unfinished` wrote."""
     path = folder / UNFINISHED
     if path.exists():
         with writing(path):

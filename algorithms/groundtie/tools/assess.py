@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any
 
 from ..assessment.accuracy import Assessment
 from ..assessment.comparison import Comparison, compare
 from ..assessment.evidence import AssessmentFiles
 from ..assessment.point_errors import PointErrors
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import NO_VALUES, Output, Values, file_lines, given_files, tool
 from ..errors import NotRegisteredError
 from ..geometry.models import KINDS
 from ..geometry.tie_point_files import SUFFIXES
 from ..geometry.transform import Transform
-from ..kinds import REPORT_FORMAT, Choice, FileIn, FileOut, Number, RasterIn
+from ..kinds import Choice, FileIn, Number, RasterIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.verdict import Verdict
 from ..report.assessment_report import PART_LABELS, AssessmentReport
+from .parameters import general
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ class AssessmentResult:
         for name, errors in self.assessment.parts().items():
             if len(errors):
                 lines += _lines(PART_LABELS[name], errors)
-        return lines + [f"{name}: {path}" for name, path in self.files.items()]
+        return lines + file_lines(self.files)
 
 
 def _lines(label: str, errors: PointErrors) -> list[str]:
@@ -89,12 +87,12 @@ def _transform_in(label: str, help: str, advanced: bool = True) -> FileIn:
     title="Assess a registration",
     group="Quality",
     outputs=(
-        ResultOutput("CHECK_RMSE_PX", "Error at check points (px)", "check_points.rmse_px"),
-        ResultOutput("CHECK_CE90_M", "CE90 at check points (m)", "check_points.ce90_m"),
-        ResultOutput("TEST_RMSE_PX", "Error at test points (px)", "test_points.rmse_px"),
-        ResultOutput("CONTROL_RMSE_PX", "Error at control points (px)", "control_points.rmse_px"),
-        ResultOutput("TWO_WAY_RMSE_PX", "Two-way consistency (px)", "two_way.rmse_px"),
-        ResultOutput("THREE_WAY_RMSE_PX", "Three-way consistency (px)", "three_way.rmse_px"),
+        Output("CHECK_RMSE_PX", "Error at check points (px)", "check_points.rmse_px"),
+        Output("CHECK_CE90_M", "CE90 at check points (m)", "check_points.ce90_m"),
+        Output("TEST_RMSE_PX", "Error at test points (px)", "test_points.rmse_px"),
+        Output("CONTROL_RMSE_PX", "Error at control points (px)", "control_points.rmse_px"),
+        Output("TWO_WAY_RMSE_PX", "Two-way consistency (px)", "two_way.rmse_px"),
+        Output("THREE_WAY_RMSE_PX", "Three-way consistency (px)", "three_way.rmse_px"),
     ),
 )
 def assess(
@@ -163,13 +161,9 @@ def assess(
     ] = None,
     report: Annotated[
         Path | None,
-        FileOut(
-            label="Report",
-            help="A page with the errors and, if both images are given, swipe and checkerboard; "
+        general.report_page(
+            "A page with the errors and, if both images are given, swipe and checkerboard; "
             "its numbers are put beside it as JSON. It is written for a refusal, too.",
-            suffixes=(".html",),
-            numbers=REPORT_FORMAT,
-            shown=True,
         ),
     ] = None,
     onward_transform: Annotated[
@@ -206,7 +200,7 @@ def assess(
         ),
     ] = "affine",
     progress: Progress = SILENT,
-    parameters: Mapping[str, Any] = MappingProxyType({}),
+    parameters: Values = NO_VALUES,
 ) -> AssessmentResult:
     """Measure how good a registration is that was made before, by points, consistency and by eye.
 
@@ -239,14 +233,13 @@ def assess(
             if files.is_nominal:  # nothing was registered: there is no before and after
                 comparison = replace(comparison, registered=None)
     subject = str(transform or tie_points or input)
-    given = {name: value for name, value in parameters.items() if value is not None}
     page = AssessmentReport(
         assessment,
         verdict,
         found,
         comparison,
         title=f"Assessment of {Path(subject).name}",
-        parameters=given,
+        parameters=parameters,
         seconds=time.perf_counter() - started,
     )
     progress.update(0.8, "writing")
@@ -255,5 +248,5 @@ def assess(
             page.write(outputs, report)
     if verdict is not None and not verdict.accepted:
         raise NotRegisteredError(f"{subject} is refused: {verdict.reason}", verdict)
-    written = {} if report is None else {"report": str(report)}
+    written = given_files({"report": report})
     return AssessmentResult(assessment, verdict, found, page.summary(), written)

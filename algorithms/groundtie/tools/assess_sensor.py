@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..assessment.sensor_accuracy import SensorErrors, draw_vectors, table_lines, write_table
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, file_lines, given_files, tool
 from ..errors import TooFewPointsError
 from ..kinds import GEOTIFF, FileIn, FileOut
 from ..progress import SILENT, Progress
@@ -19,7 +18,7 @@ from ..registration.sensor_input import Ground, open_oriented_image, open_sensor
 from ..sensor.control_points import READ_SUFFIXES, read_control_points
 from ..sensor.rpc import RPC
 from ..sensor.rpc_files import read_rpc
-from .parameters import sensor
+from .parameters import general, sensor
 
 BEFORE, AFTER = "before", "after"
 
@@ -49,19 +48,16 @@ class SensorAssessment:
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
-        return [
-            *table_lines(self.errors),
-            *(f"{name}: {path}" for name, path in self.files.items()),
-        ]
+        return [*table_lines(self.errors), *file_lines(self.files)]
 
 
 @tool(
     title="Assess RPCs",
     group="Quality",
     outputs=(
-        ResultOutput("POINTS", "Number of check points", "points"),
-        ResultOutput("BEFORE_RMSE_M", "Error before (m)", "before.rmse_m"),
-        ResultOutput("BEFORE_CE90_M", "CE90 before (m)", "before.ce90_m"),
+        Output("POINTS", "Number of check points", "points"),
+        Output("BEFORE_RMSE_M", "Error before (m)", "before.rmse_m"),
+        Output("BEFORE_CE90_M", "CE90 before (m)", "before.ce90_m"),
     ),
 )
 def assess_sensor(
@@ -91,7 +87,7 @@ def assess_sensor(
     ] = None,
     picture: Annotated[
         Path | None,
-        FileOut(label="Picture", help="The errors as arrows in the image.", suffixes=(".png",)),
+        general.picture("The errors as arrows in the image."),
     ] = None,
     height: sensor.Height = None,
     geoid: sensor.Geoid = None,
@@ -106,27 +102,23 @@ def assess_sensor(
     ground = Ground(dem, dem_datum, geoid, height)
     with ExitStack() as stack:
         stack.enter_context(bounded_cache())
-        sensor = open_oriented_image(image, rpc, ground, None, stack, progress)
+        oriented = open_oriented_image(image, rpc, ground, None, stack, progress)
         points = read_control_points(
-            check_points, sensor.orientation, sensor.source.grid, sensor.source.path
+            check_points, oriented.orientation, oriented.source.grid, oriented.source.path
         )
-        which = points.points.used
-        if (which & points.points.is_check).any():
-            which = which & points.points.is_check
-        points = points.take(which)
+        check = points.points.check
+        points = points.take(check if check.any() else points.points.used)
         if len(points) == 0:
             raise TooFewPointsError(f"{check_points} holds no points that are used")
-        errors = {BEFORE: SensorErrors.of(sensor.rpc, points)}
+        errors = {BEFORE: SensorErrors.of(oriented.rpc, points)}
         if refined is not None:
             errors[AFTER] = SensorErrors.of(_refined(refined, stack), points)
-        written = {"table": table, "picture": picture}
         with Outputs() as outputs:
             if table is not None:
                 write_table(outputs.stage(table), points, errors)
             if picture is not None:
-                draw_vectors(outputs.stage(picture), points, errors, sensor.size)
-    files = {name: str(path) for name, path in written.items() if path is not None}
-    return SensorAssessment(errors, len(points), files)
+                draw_vectors(outputs.stage(picture), points, errors, oriented.size)
+    return SensorAssessment(errors, len(points), given_files({"table": table, "picture": picture}))
 
 
 def _refined(path: Path, stack: ExitStack) -> RPC:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Any
-
-from ..declaration import tool
+from ..declaration import NO_VALUES, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
-from ..matching.surface_fit import AUTO
+from ..kinds import AUTO
 from ..progress import SILENT, Progress
 from ..registration.delivery import register_as
 from ..registration.registration import Registration
@@ -43,7 +39,7 @@ def coregister(
     output_grid: registration.OutputGrid = "reference",
     workers: general.Workers = None,
     progress: Progress = SILENT,
-    parameters: Mapping[str, Any] = MappingProxyType({}),
+    parameters: Values = NO_VALUES,
 ) -> Registration:
     """Co-register two images of the same place, above all a SAR and an optical one.
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from concurrent.futures import Executor
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any
 
-from ..declaration import Output, tool
+from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
-from ..kinds import Choice, FolderOut, Number, RasterIn, RastersIn, Text
+from ..kinds import AUTO, Choice, FolderOut, Number, RasterIn, RastersIn, Text
 from ..matching.alignment import LINEAR_CANDIDATES
-from ..matching.surface_fit import AUTO
 from ..progress import SILENT, Progress
 from ..series.call import SeriesCall
 from ..series.delivery import TABLE_CSV, TABLE_GPKG
@@ -96,7 +93,7 @@ def coregister_series(
     scheduler: general.Scheduler = None,
     progress: Progress = SILENT,
     executor: Executor | None = None,
-    parameters: Mapping[str, Any] = MappingProxyType({}),
+    parameters: Values = NO_VALUES,
 ) -> Series:
     """Register the dates of a series to one reference, or to each other.
 

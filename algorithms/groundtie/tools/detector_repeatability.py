@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..context import threads
-from ..declaration import tool
+from ..declaration import file_lines, given_files, tool
 from ..errors import ParameterError
 from ..geometry.transform import Transform, load_transform
 from ..kinds import Choice, FileIn, FileOut, Number, Text
@@ -59,7 +59,7 @@ class RepeatabilityResult:
                 f"{one.detecting_s + one.matching_s:.2f} s"
                 for one in self.evaluations
             ),
-            *(f"{name}: {path}" for name, path in self.files.items()),
+            *file_lines(self.files),
         ]
 
 
@@ -104,11 +104,7 @@ def detector_repeatability(
     ] = 0.8,
     picture: Annotated[
         Path | None,
-        FileOut(
-            label="Picture",
-            help="Repeatability and matches by class of overlap error, to look at.",
-            suffixes=(".png",),
-        ),
+        general.picture("Repeatability and matches by class of overlap error, to look at."),
     ] = None,
     numbers: Annotated[
         Path | None,
@@ -183,9 +179,7 @@ def detector_repeatability(
         progress.update(0.1 + 0.8 * i / len(chosen), f"trying {variant.name}")
         evaluations.append(evaluate(variant, *patches, ratio, method, parts))
     files = {"output": output, "picture": picture, "numbers": numbers}
-    result = RepeatabilityResult(
-        tuple(evaluations), {name: str(path) for name, path in files.items() if path is not None}
-    )
+    result = RepeatabilityResult(tuple(evaluations), given_files(files))
     progress.update(0.9, "writing")
     rows = [_row(one) for one in evaluations]
     with Outputs() as outputs:

@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..context import threads
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, file_lines, given_files, tool
 from ..errors import NotRegisteredError, ParameterError
 from ..geometry.transform import Transform
-from ..kinds import Choice, Distance, FileOut, Number
+from ..kinds import AUTO, Choice, Distance, Number
 from ..pose.pose import Pose
 from ..pose.rotation_windows import PoseWindows, read_windows
 from ..progress import SILENT, Progress
@@ -27,8 +26,6 @@ from ..report.rotation_picture import draw_rotation
 from ..similarity.surface import SimilaritySettings
 from ..studies.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
 from .parameters import general
-
-_AUTO = "auto"
 
 
 @dataclass(frozen=True)
@@ -87,7 +84,7 @@ class RotationResult:
             f"accepted: {self.verdict.reason}; height {self.evidence.height:.1f}, "
             f"{self.evidence.rival_ratio:.2f} times that of the best elsewhere",
             self.verdict.accuracy_line(),
-            *(f"{name}: {path}" for name, path in self.files.items()),
+            *file_lines(self.files),
         ]
 
 
@@ -95,15 +92,13 @@ class RotationResult:
     title="Estimate rotation and scale",
     group="Registration",
     outputs=(
-        ResultOutput("ROTATION", "Rotation (°)", "rotation_deg"),
-        ResultOutput("SCALE", "Scale", "scale"),
-        ResultOutput("RIGHT", "Shift to the right", "shift.right"),
-        ResultOutput("DOWN", "Shift downwards", "shift.down"),
-        ResultOutput("HEIGHT", "Height over chance", "verdict.height"),
-        ResultOutput(
-            "RIVAL_RATIO", "Height over that of the best elsewhere", "verdict.rival_ratio"
-        ),
-        ResultOutput("CE90_PX", "CE90 of the pose (px)", "verdict.check_ce90_px"),
+        Output("ROTATION", "Rotation (°)", "rotation_deg"),
+        Output("SCALE", "Scale", "scale"),
+        Output("RIGHT", "Shift to the right", "shift.right"),
+        Output("DOWN", "Shift downwards", "shift.down"),
+        Output("HEIGHT", "Height over chance", "verdict.height"),
+        Output("RIVAL_RATIO", "Height over that of the best elsewhere", "verdict.rival_ratio"),
+        Output("CE90_PX", "CE90 of the pose (px)", "verdict.check_ce90_px"),
     ),
 )
 def estimate_rotation(
@@ -162,11 +157,9 @@ def estimate_rotation(
     transform: general.TransformOut = None,
     picture: Annotated[
         Path | None,
-        FileOut(
-            label="Picture",
-            help="How well all poses match, and the images on one another; it is drawn for a "
+        general.picture(
+            "How well all poses match, and the images on one another; it is drawn for a "
             "refused pose, too.",
-            suffixes=(".png",),
         ),
     ] = None,
     similarity: Annotated[
@@ -176,10 +169,10 @@ def estimate_rotation(
             help="What is compared; auto takes what fits the search: mutual information where "
             "it climbs, else the orientation of edges. The search rotation-steps always takes "
             "the latter; ncc compares grey values.",
-            choices=(_AUTO, "orientation", "ncc", "nmi"),
+            choices=(AUTO, "orientation", "ncc", "nmi"),
             advanced=True,
         ),
-    ] = _AUTO,
+    ] = AUTO,
     reference_band: general.ReferenceBand = None,
     input_band: general.InputBand = None,
     workers: general.Workers = None,
@@ -238,7 +231,7 @@ def estimate_rotation(
 
 
 def _similarity(search: str, wanted: str) -> str:
-    if wanted == _AUTO:
+    if wanted == AUTO:
         return "nmi" if search in HISTOGRAM_SEARCHES else "orientation"
     if search in HISTOGRAM_SEARCHES and wanted != "nmi":
         raise ParameterError(f"the search {search} needs the similarity nmi")
@@ -261,5 +254,5 @@ def _result(
         "m" if windows.is_georeferenced else "px",
         windows.transform(pose),
         search,
-        {name: str(path) for name, path in files.items() if path is not None},
+        given_files(files),
     )

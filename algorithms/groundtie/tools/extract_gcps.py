@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated
 
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
-from ..kinds import VectorOut
-from ..masks.choice import AUTO
+from ..kinds import AUTO, VectorOut
 from ..progress import SILENT, Progress
 from ..registration.sensor_jobs import GcpResult, extract_control
 from ..sensor.control_points import SUFFIXES
@@ -22,8 +18,8 @@ from .parameters import general, registration, sensor
     title="Extract ground control",
     group="Sensor models",
     outputs=(
-        ResultOutput("POINTS", "Number of points that are used", "points_used"),
-        ResultOutput("CHECK_RMSE_PX", "Error at check points (px)", "verdict.check_rmse_px"),
+        Output("POINTS", "Number of points that are used", "points_used"),
+        Output("CHECK_RMSE_PX", "Error at check points (px)", "verdict.check_rmse_px"),
     ),
 )
 def extract_gcps(
@@ -58,7 +54,7 @@ def extract_gcps(
     matching_pixel_size: general.MatchingPixelSize = None,
     workers: general.Workers = None,
     progress: Progress = SILENT,
-    parameters: Mapping[str, Any] = MappingProxyType({}),
+    parameters: Values = NO_VALUES,
 ) -> GcpResult:
     """Extract ground control for an image with RPCs from a reference image and a terrain model.
 

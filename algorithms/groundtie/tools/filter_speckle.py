@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..context import threads
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, tool
 from ..errors import ParameterError
 from ..kinds import Choice, Number, RasterOut
 from ..progress import SILENT, Progress
@@ -44,8 +43,8 @@ class SpeckleResult:
     title="Filter speckle",
     group="Radar",
     outputs=(
-        ResultOutput("LOOKS", "Equivalent number of looks", "looks"),
-        ResultOutput("LOOKS_AFTER", "Equivalent number of looks of the result", "looks_after"),
+        Output("LOOKS", "Equivalent number of looks", "looks"),
+        Output("LOOKS_AFTER", "Equivalent number of looks of the result", "looks_after"),
     ),
 )
 def filter_speckle(

@@ -6,8 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, tool
 from ..kinds import RasterOut
 from ..masks.choice import is_dense, share_of_strong_scatterers
 from ..masks.regions import HIGH_PERCENT, WIDTH_M, find_ground
@@ -16,15 +15,15 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from .parameters import general
-from .written_mask import WrittenMask
+from .results import WrittenMask
 
 
 @tool(
     title="Mask by regions",
     group="Radar",
     outputs=(
-        ResultOutput("SHARE", "Share of the pixels that take part", "share"),
-        ResultOutput("SKELETON_M", "Length of the skeleton (m)", "skeleton_m"),
+        Output("SHARE", "Share of the pixels that take part", "share"),
+        Output("SKELETON_M", "Length of the skeleton (m)", "skeleton_m"),
     ),
 )
 def mask_regions(

@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, tool
 from ..errors import ParameterError
 from ..geometry.views import View, split_views, stated_view
 from ..kinds import RasterOut
@@ -19,15 +18,15 @@ from ..rasters.reading import bounded_cache, open_raster
 from ..registration.specification import StatedSurface
 from ..registration.surface_masks import fitted_ground
 from .parameters import general, registration
-from .written_mask import WrittenMask
+from .results import WrittenMask
 
 
 @tool(
     title="Mask by a surface model",
     group="Radar",
     outputs=(
-        ResultOutput("SHARE", "Share of the pixels that take part", "share"),
-        ResultOutput("CORRELATION", "Correlation with the surface model", "correlation"),
+        Output("SHARE", "Share of the pixels that take part", "share"),
+        Output("CORRELATION", "Correlation with the surface model", "correlation"),
     ),
 )
 def mask_surface(

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, tool
 from ..masks.scene import Scene, write_mask
 from ..masks.threshold import HIGH_PERCENT, ThresholdMask
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from .parameters import general
-from .written_mask import WrittenMask
+from .results import WrittenMask
 
 
 @tool(
     title="Mask by thresholds",
     group="Radar",
-    outputs=(ResultOutput("SHARE", "Share of the pixels that take part", "share"),),
+    outputs=(Output("SHARE", "Share of the pixels that take part", "share"),),
 )
 def mask_threshold(
     input: general.Radar,

@@ -21,7 +21,7 @@ from ..rasters.reading import bounded_cache, open_raster
 from ..registration.orthorectification import write_orthoimage
 from ..registration.sensor_input import Ground, open_sensor_image, utm_of
 from .parameters import general, sensor
-from .written_raster import SIZE_OUTPUTS, WrittenRaster, like_reference, pixel_size_of_result
+from .results import SIZE_OUTPUTS, WrittenRaster
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,9 @@ def orthorectify(
     ],
     dem: sensor.Dem = None,
     dem_datum: sensor.DemDatum = None,
-    reference: Annotated[Path | None, like_reference("image")] = None,
+    reference: Annotated[Path | None, general.like_reference("image")] = None,
     pixel_size: Annotated[
-        float | None, pixel_size_of_result("; by default that of the image on the ground")
+        float | None, general.pixel_size_of_result("; by default that of the image on the ground")
     ] = None,
     crs: Annotated[
         str | None,

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated
 
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
-from ..kinds import GEOTIFF, REPORT_FORMAT, Choice, FileIn, FileOut, RasterIn, VectorOut
-from ..masks.choice import AUTO as AUTO_MASK
+from ..kinds import AUTO, GEOTIFF, Choice, FileIn, FileOut, RasterIn, VectorOut
 from ..progress import SILENT, Progress
 from ..registration.sensor_jobs import RefinedRpc, refine
-from ..sensor.adjustment import AUTO
 from ..sensor.bias import KINDS
 from ..sensor.control_points import READ_SUFFIXES, SUFFIXES
 from .parameters import general, registration, sensor
@@ -24,10 +19,10 @@ from .parameters import general, registration, sensor
     title="Refine RPCs",
     group="Sensor models",
     outputs=(
-        ResultOutput("CHECK_RMSE_PX", "Error at held-out points (px)", "verdict.check_rmse_px"),
-        ResultOutput("BEFORE_RMSE_PX", "Error before (px)", "verdict.before.rmse_px"),
-        ResultOutput("MODEL", "Model of the bias", "bias.model", text=True),
-        ResultOutput("REASON", "Reason of the verdict", "verdict.reason", text=True),
+        Output("CHECK_RMSE_PX", "Error at held-out points (px)", "verdict.check_rmse_px"),
+        Output("BEFORE_RMSE_PX", "Error before (px)", "verdict.before.rmse_px"),
+        Output("MODEL", "Model of the bias", "bias.model", text=True),
+        Output("REASON", "Reason of the verdict", "verdict.reason", text=True),
     ),
 )
 def refine_rpc(
@@ -83,14 +78,10 @@ def refine_rpc(
     ] = None,
     report: Annotated[
         Path | None,
-        FileOut(
-            label="Report",
-            help="A page that shows errors before and after and how far to trust them; its numbers "
+        general.report_page(
+            "A page that shows errors before and after and how far to trust them; its numbers "
             "are put beside it as JSON. It is written for refused RPCs, too.",
-            suffixes=(".html",),
-            numbers=REPORT_FORMAT,
             advanced=True,
-            shown=True,
         ),
     ] = None,
     height: sensor.Height = None,
@@ -102,13 +93,13 @@ def refine_rpc(
     reference_band: general.ReferenceBand = None,
     reference_mask: registration.ReferenceMask = None,
     mask_values: registration.MaskValues = None,
-    mask: registration.Mask = AUTO_MASK,
+    mask: registration.Mask = AUTO,
     surface_model: registration.SurfaceModel = None,
     views: registration.SurfaceViews = None,
     matching_pixel_size: general.MatchingPixelSize = None,
     workers: general.Workers = None,
     progress: Progress = SILENT,
-    parameters: Mapping[str, Any] = MappingProxyType({}),
+    parameters: Values = NO_VALUES,
 ) -> RefinedRpc:
     """Refine the RPCs of an image by ground control, given or matched in a reference image.
 

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Any
-
-from ..declaration import tool
+from ..declaration import NO_VALUES, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..progress import SILENT, Progress
 from ..registration.automatic import OrthorectifiedRpc, register_anything
@@ -35,7 +31,7 @@ def register(
     mask_values: registration.MaskValues = None,
     workers: general.Workers = None,
     progress: Progress = SILENT,
-    parameters: Mapping[str, Any] = MappingProxyType({}),
+    parameters: Values = NO_VALUES,
 ) -> Registration | OrthorectifiedRpc:
     """Register an image to another one of the same place; the images decide how.
 

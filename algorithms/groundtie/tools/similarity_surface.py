@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from ..context import threads
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, tool
 from ..kinds import Choice, Distance, FileOut, Number, RasterOut
 from ..progress import SILENT, Progress
 from ..rasters.reading import bounded_cache
@@ -30,10 +29,10 @@ from .parameters import general, registration
     title="Similarity surface",
     group="Quality",
     outputs=(
-        ResultOutput("PEAK_RIGHT_PX", "Peak to the right (px)", "peak.right_px"),
-        ResultOutput("PEAK_DOWN_PX", "Peak downwards (px)", "peak.down_px"),
-        ResultOutput("PEAK_HEIGHT", "Height of the peak (standard deviations)", "peak.height"),
-        ResultOutput("SECOND_RATIO", "Second peak's share of the height", "second_ratio"),
+        Output("PEAK_RIGHT_PX", "Peak to the right (px)", "peak.right_px"),
+        Output("PEAK_DOWN_PX", "Peak downwards (px)", "peak.down_px"),
+        Output("PEAK_HEIGHT", "Height of the peak (standard deviations)", "peak.height"),
+        Output("SECOND_RATIO", "Second peak's share of the height", "second_ratio"),
     ),
 )
 def similarity_surface(
@@ -90,9 +89,7 @@ def similarity_surface(
     ] = "fused",
     picture: Annotated[
         Path | None,
-        FileOut(
-            label="Picture", help="The surface with its peaks, to look at.", suffixes=(".png",)
-        ),
+        general.picture("The surface with its peaks, to look at."),
     ] = None,
     numbers: Annotated[
         Path | None,

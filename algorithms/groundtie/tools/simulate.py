@@ -14,19 +14,8 @@ from ..simulation.optical import OpticalOptions
 from ..simulation.pair import INPUTS, OPTICAL, PairOptions, simulate_pair
 from ..simulation.sar import SarOptions
 from ..simulation.scene import SceneOptions
-from .parameters import general
-from .simulated import (
-    Changed,
-    Density,
-    Incidence,
-    Looks,
-    OffNadir,
-    Orbit,
-    PixelSize,
-    SimulationResult,
-    Size,
-    ViewAzimuth,
-)
+from .parameters import general, simulated
+from .results import SimulatedScene
 
 
 @tool(title="Simulate a SAR–optical pair", group="Simulation")
@@ -41,8 +30,8 @@ def simulate(
             shows=("input.tif", "reference.tif"),
         ),
     ],
-    size: Size = 1000,
-    density: Density = "suburban",
+    size: simulated.Size = 1000,
+    density: simulated.Density = "suburban",
     distortion: Annotated[
         str,
         Choice(
@@ -61,10 +50,10 @@ def simulate(
             maximum=2000,
         ),
     ] = 8.0,
-    looks: Looks = 1.0,
-    changed: Changed = 0.0,
+    looks: simulated.Looks = 1.0,
+    changed: simulated.Changed = 0.0,
     seed: general.Seed = 0,
-    pixel_size: PixelSize = 1.0,
+    pixel_size: simulated.PixelSize = 1.0,
     input_pixel_size: Annotated[
         float | None,
         Distance(
@@ -108,10 +97,10 @@ def simulate(
             advanced=True,
         ),
     ] = OPTICAL,
-    incidence: Incidence = 35.0,
-    orbit: Orbit = "ascending",
-    off_nadir: OffNadir = 12.0,
-    view_azimuth: ViewAzimuth = 250.0,
+    incidence: simulated.Incidence = 35.0,
+    orbit: simulated.Orbit = "ascending",
+    off_nadir: simulated.OffNadir = 12.0,
+    view_azimuth: simulated.ViewAzimuth = 250.0,
     rotation: Annotated[
         float,
         Number(
@@ -145,7 +134,7 @@ def simulate(
         ),
     ] = 4.0,
     progress: Progress = SILENT,
-) -> SimulationResult:
+) -> SimulatedScene:
     """Simulate a SAR–optical pair whose misregistration is known exactly.
 
     The scene has terrain, fields, roads, water and buildings. The SAR image has layover, shadow,
@@ -162,4 +151,4 @@ def simulate(
         input=input,
         terrain_error_m=terrain_error,
     )
-    return SimulationResult(write_pair(simulate_pair(options, progress), folder))
+    return SimulatedScene(write_pair(simulate_pair(options, progress), folder))

@@ -14,19 +14,8 @@ from ..simulation.sar import SarOptions
 from ..simulation.scene import SceneOptions
 from ..simulation.sensor_files import write_sensor_image
 from ..simulation.sensor_image import SensorOptions, simulate_sensor_image
-from .parameters import general
-from .simulated import (
-    Changed,
-    Density,
-    Incidence,
-    Looks,
-    OffNadir,
-    Orbit,
-    PixelSize,
-    SimulationResult,
-    Size,
-    ViewAzimuth,
-)
+from .parameters import general, simulated
+from .results import SimulatedScene
 
 
 @tool(title="Simulate a sensor image", group="Simulation")
@@ -41,8 +30,8 @@ def simulate_sensor(
             shows=("reference.tif",),
         ),
     ],
-    size: Size = 1000,
-    density: Density = "suburban",
+    size: simulated.Size = 1000,
+    density: simulated.Density = "suburban",
     relief: Annotated[
         float, Distance(label="Relief", help="Range of the terrain's heights.", maximum=1000)
     ] = 60.0,
@@ -74,14 +63,14 @@ def simulate_sensor(
             maximum=1,
         ),
     ] = 0.0,
-    off_nadir: OffNadir = 20.0,
-    looks: Looks = 1.0,
-    changed: Changed = 0.0,
+    off_nadir: simulated.OffNadir = 20.0,
+    looks: simulated.Looks = 1.0,
+    changed: simulated.Changed = 0.0,
     seed: general.Seed = 0,
-    pixel_size: PixelSize = 1.0,
-    incidence: Incidence = 35.0,
-    orbit: Orbit = "ascending",
-    view_azimuth: ViewAzimuth = 250.0,
+    pixel_size: simulated.PixelSize = 1.0,
+    incidence: simulated.Incidence = 35.0,
+    orbit: simulated.Orbit = "ascending",
+    view_azimuth: simulated.ViewAzimuth = 250.0,
     heading: Annotated[
         float,
         Number(
@@ -94,7 +83,7 @@ def simulate_sensor(
         ),
     ] = 193.0,
     progress: Progress = SILENT,
-) -> SimulationResult:
+) -> SimulatedScene:
     """Simulate an optical image in sensor geometry, with RPCs whose errors are known exactly.
 
     A push-broom camera in orbit looks at a scene with terrain and buildings; its image is not
@@ -109,4 +98,4 @@ def simulate_sensor(
         heading_deg=heading,
     )
     made = simulate_sensor_image(options, progress)
-    return SimulationResult(write_sensor_image(made, folder))
+    return SimulatedScene(write_sensor_image(made, folder))

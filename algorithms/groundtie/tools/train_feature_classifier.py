@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..context import threads
-from ..declaration import Output as ResultOutput
-from ..declaration import tool
+from ..declaration import Output, tool
 from ..errors import ParameterError
 from ..features.classifier import KERNELS
 from ..features.classifier_training import left_out_accuracy, train_classifier
@@ -65,7 +64,7 @@ class TrainingResult:
 @tool(
     title="Train a feature classifier",
     group="Registration",
-    outputs=(ResultOutput("ACCURACY", "Mean accuracy of both classes", "accuracy"),),
+    outputs=(Output("ACCURACY", "Mean accuracy of both classes", "accuracy"),),
 )
 def train_feature_classifier(
     input: Annotated[

@@ -23,7 +23,7 @@ from ..rasters.vrt import write_vrt
 from ..registration.registered_output import moved_grid
 from ..registration.stored_transform import TiePointFit, load_stored, transform_of
 from .parameters import general
-from .written_raster import SIZE_OUTPUTS, WrittenRaster, like_reference, pixel_size_of_result
+from .results import SIZE_OUTPUTS, WrittenRaster
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,11 @@ def warp(
         ),
     ],
     reference: Annotated[
-        Path | None, like_reference("input with pixels of the input's size")
+        Path | None, general.like_reference("input with pixels of the input's size")
     ] = None,
     pixel_size: Annotated[
         float | None,
-        pixel_size_of_result(", where it does not get the reference's grid"),
+        general.pixel_size_of_result(", where it does not get the reference's grid"),
     ] = None,
     model: Annotated[
         str,

@@ -162,3 +162,31 @@ TransformOut = Annotated[
         suffixes=(".json",),
     ),
 ]
+
+
+def report_page(help: str, *, advanced: bool = False) -> FileOut:
+    """Return the kind of a report, beside which its numbers are put."""
+    return FileOut(
+        label="Report",
+        help=help,
+        suffixes=(".html",),
+        numbers=True,
+        advanced=advanced,
+        shown=True,
+    )
+
+
+def picture(help: str) -> FileOut:
+    """Return the kind of a picture to look at."""
+    return FileOut(label="Picture", help=help, suffixes=(".png",))
+
+
+def like_reference(otherwise: str) -> RasterIn:
+    """Return the kind of the raster whose grid the result gets."""
+    help = "The result gets exactly the grid of this raster, so that the two stack. By default the "
+    return RasterIn(label="Reference image", help=f"{help}result covers all of the {otherwise}.")
+
+
+def pixel_size_of_result(otherwise: str) -> Distance:
+    """Return the kind of the result's pixel size."""
+    return Distance(label="Pixel size", help=f"Pixel size of the result{otherwise}.", minimum=1e-6)

@@ -9,10 +9,9 @@ from ...declaration import Output
 from ...geometry.models import KINDS
 from ...geometry.tie_point_files import SUFFIXES
 from ...kinds import (
-    REPORT_FORMAT,
+    AUTO,
     Choice,
     Distance,
-    FileOut,
     MaskIn,
     Number,
     RasterIn,
@@ -21,9 +20,8 @@ from ...kinds import (
     VectorOut,
 )
 from ...masks.choice import MASKS
-from ...matching.surface_fit import AUTO
 from ...registration.registered_output import OUTPUT_GRIDS
-from .general import MASK_HELP
+from .general import MASK_HELP, report_page
 
 Model = Annotated[
     str,
@@ -67,13 +65,9 @@ DisplacementOut = Annotated[
 ]
 ReportOut = Annotated[
     Path | None,
-    FileOut(
-        label="Report",
-        help="A page that shows the result and how far to trust it; its numbers are put "
+    report_page(
+        "A page that shows the result and how far to trust it; its numbers are put "
         "beside it as JSON. It is written for a refused registration, too.",
-        suffixes=(".html",),
-        numbers=REPORT_FORMAT,
-        shown=True,
     ),
 ]
 SearchRadius = Annotated[

@@ -1,14 +1,12 @@
-"""What the simulators share: parameters of scenes and of views of them, and the result."""
+"""Parameters of simulated scenes and of views of them, declared once."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from ..kinds import Choice, Distance, Number
-from ..simulation.sar import ORBITS
-from ..simulation.scene import DENSITY_NAMES
+from ...kinds import Choice, Distance, Number
+from ...simulation.sar import ORBITS
+from ...simulation.scene import DENSITY_NAMES
 
 Size = Annotated[
     int,
@@ -96,18 +94,3 @@ ViewAzimuth = Annotated[
         advanced=True,
     ),
 ]
-
-
-@dataclass(frozen=True)
-class SimulationResult:
-    """The files of a simulated scene, by name."""
-
-    files: dict[str, Path]
-
-    def summary(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry."""
-        return {"files": {name: str(path) for name, path in self.files.items()}}
-
-    def lines(self) -> list[str]:
-        """Return the result as lines of text."""
-        return [f"{name}: {path}" for name, path in self.files.items()]
