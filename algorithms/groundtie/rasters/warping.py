@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .bands import working_dtype
 from .grid import FloatArray, Grid, PointFunction
 from .kernels import REACH, interpolate
 from .lattice import ON_PIXELS, DenseMap, lattice, row_strips
+from .metadata import working_dtype
 from .reading import FloatImage, RasterSource
 from .windows import Mask, Window
 

@@ -145,7 +145,7 @@ def write_raster(
     }
     if grid.is_georeferenced:
         profile |= {"crs": grid.crs, "transform": grid.transform}
-    # In memory: a full disk is no exception within GDAL (see `rasters.tiff`).
+    # In memory: a full disk is no exception within GDAL (see `rasters.tiff_directories`).
     with MemoryFile() as memory:
         with memory.open(**profile) as raster:
             raster.write(image)

@@ -13,7 +13,7 @@ from rasterio.io import MemoryFile
 from ..context import Context
 from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.grid import Grid
-from ..rasters.tiff import BLOCK
+from ..rasters.tiff_directories import BLOCK
 from ..runs import RUN_TAG, run_tags
 from ..similarity.peak import Peak, find_peak
 from ..similarity.surface import Surface
