@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -128,14 +128,6 @@ class ImagePair:
         """Return the input on a grid; `to_input_px` takes map positions to input pixels."""
         return self.input.read_onto(grid, to_input_px)
 
-    def reference_bands(self, grid: Grid) -> FloatImage:
-        """Return all bands of the reference on a grid in its CRS, shape (bands, h, w)."""
-        return self.reference.bands_onto(grid, self.reference.source.grid.map_to_pixel)
-
-    def input_bands(self, grid: Grid, to_input_px: PointFunction) -> FloatImage:
-        """Return all bands of the input on a grid; `to_input_px` as `input_patch` takes it."""
-        return self.input.bands_onto(grid, to_input_px)
-
     def exchanged(self) -> ImagePair:
         """Return the pair with the roles of its images exchanged, searched as far."""
         limits = self.limits
@@ -214,23 +206,23 @@ def make_pair(
     factor = wanted / ref.grid.pixel_size_m
     grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
     radius = default_radius_m(grid) if search_radius_m is None else search_radius_m
-    is_shift = SearchLimits(radius, rotation_deg, (1 / scale, scale)).is_shift
+    limits = SearchLimits(radius, rotation_deg, (1 / scale, scale))
     outline = _nominal_pixels(inp.grid, ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
     nominal = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
-    if not is_shift and not ref.grid.is_georeferenced:
+    if not limits.is_shift and not ref.grid.is_georeferenced:
         outline = outline + np.subtract(ref.grid.centre_px, inp.grid.centre_px)
     outline = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
     overlap = _box(grid, outline, 0.0)
     if overlap is None:
         raise NoOverlapError(f"{ref.path} and {inp.path} do not overlap")
-    if not is_shift:
+    if not limits.is_shift:
         outline = _rotated(outline, rotation_deg, scale)
-    radius = min(radius, _farthest_px(grid, outline) * grid.pixel_size_m)
-    limits = SearchLimits(radius, rotation_deg, (1 / scale, scale))
-    reach = _box(grid, outline, radius / grid.pixel_size_m)
+    limits = replace(limits, radius=min(radius, _farthest_px(grid, outline) * grid.pixel_size_m))
+    radius_px = limits.radius / grid.pixel_size_m
+    reach = _box(grid, outline, radius_px)
     assert reach is not None
     matching, overlap_px = grid.window(*reach), (overlap.width, overlap.height)
-    around = _surroundings(reach, radius / grid.pixel_size_m, None if is_shift else nominal)
+    around = _surroundings(reach, radius_px, None if limits.is_shift else nominal)
     return ImagePair(reference, input, matching, overlap_px, grid.window(*around), limits)
 
 

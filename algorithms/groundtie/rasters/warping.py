@@ -111,10 +111,9 @@ def _validity(valid: Mask, nearest: NDArray[Any], reach: int) -> tuple[Mask, Mas
 
 
 def _lies_inside(px: NDArray[Any], width: int, height: int, margin: int) -> Mask:
-    low, high = np.array([[margin, margin], [width - 1 - margin, height - 1 - margin]], px.dtype)
     cols, rows = px
-    inside: Mask = (cols >= low[0]) & (cols <= high[0]) & (rows >= low[1]) & (rows <= high[1])
-    return inside
+    inside: Mask = (cols >= margin) & (cols <= width - 1 - margin)
+    return inside & (rows >= margin) & (rows <= height - 1 - margin)
 
 
 def _are_inside(px: NDArray[Any], shape: tuple[int, ...], margin: int) -> bool:
