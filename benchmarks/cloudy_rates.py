@@ -142,8 +142,8 @@ def _clear(case: RealCase) -> list[Clear]:
     with aligned(case) as pair:
         images = pair.images
         bands = (
-            images.reference_bands(images.grid),
-            images.input_bands(images.grid, pair.to_input_px),
+            images.reference.bands_onto(images.grid, images.reference.source.grid.map_to_pixel),
+            images.input.bands_onto(images.grid, pair.to_input_px),
         )
         return [Clear(*both) for both in zip(patches(pair), bands, strict=True)]
 

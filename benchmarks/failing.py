@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from groundtie.errors import OutputError
-from groundtie.rasters import tiled_file
+from groundtie.rasters import tiff_file
 
 # Nothing here takes more than seconds on an idle machine; a busy one may be twenty times slower.
 _TIME_LIMIT_S = 300
@@ -110,7 +110,7 @@ class Steps:
         for owner, name in ((os, "replace"), (os, "link"), (os, "fsync"), (Path, "unlink")):
             kept.append((owner, name, getattr(owner, name)))
             setattr(owner, name, self._before(getattr(owner, name)))
-        for owner, name in ((Path, "write_text"), (Path, "write_bytes"), (tiled_file, "_write")):
+        for owner, name in ((Path, "write_text"), (Path, "write_bytes"), (tiff_file, "_write")):
             kept.append((owner, name, getattr(owner, name)))
             setattr(owner, name, self._by_half(getattr(owner, name)))
         try:

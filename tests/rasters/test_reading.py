@@ -16,8 +16,8 @@ from rasterio.enums import ColorInterp
 
 from groundtie.errors import BandError, GeoreferencingError, RasterOpenError
 from groundtie.rasters import averaging
-from groundtie.rasters.bands import BandInfo, stated
 from groundtie.rasters.grid import PIXEL_COORDINATES
+from groundtie.rasters.metadata import BandInfo, stated
 from groundtie.rasters.reading import Window, open_raster
 
 pytestmark = pytest.mark.filterwarnings("ignore::rasterio.errors.NotGeoreferencedWarning")

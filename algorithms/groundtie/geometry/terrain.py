@@ -23,8 +23,8 @@ from ..rasters.grid import (
     reproject,
     require_both_or_none,
 )
+from ..rasters.height_surfaces import RasterSurface, surface_around
 from ..rasters.reading import open_raster
-from ..rasters.surfaces import RasterSurface, surface_around
 from .models import FloatArray
 
 # Places a side at which heights must be known.

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from ..progress import SILENT, Progress
 from ..rasters.averaging import area_average
-from ..rasters.grid import FloatArray, Grid, reproject, require_workable
+from ..rasters.grid import FloatArray, Grid, reproject
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask, RasterSource, Window
-from ..rasters.tiling import tile_count, tiles
+from ..rasters.tiling import require_workable, tile_count, tiles
 from ..rasters.warping import sample
 from ..rasters.writing import create_like, one_band
 

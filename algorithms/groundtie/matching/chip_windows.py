@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..context import Context
 from ..geometry.models import Model, shift_model
 from ..rasters.grid import Grid
-from ..rasters.held import held_onto
+from ..rasters.held_images import held_onto
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from .matcher import MaskOf, Places

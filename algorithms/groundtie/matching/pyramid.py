@@ -11,7 +11,7 @@ from ..errors import AmbiguousPlaceError, NothingFoundError
 from ..geometry.limits import SearchLimits
 from ..geometry.models import Model
 from ..rasters.grid import Grid
-from ..rasters.held import held_on_level
+from ..rasters.held_images import held_on_level
 from .chips import ChipMatcher
 from .coarse_shift import Candidate, coarse_candidates, level_factor
 from .level_fit import CoarseModel, fit_level, fit_level_pooled

@@ -14,17 +14,15 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from ..errors import GroundTieError, OutputError, raised_by
 from ..runs import has_written, run_tags, will_make
-from .leftovers import Claim, hidden_name, new_token, remove
+from .hidden_files import Claim, final_name, hidden_name, new_token, remove
 
 # What GDAL and SQLite put beside a file, appended to its whole name.
 SIDECARS = (".aux.xml", ".ovr", ".msk", "-wal", "-shm", "-journal")
 
-_HIDDEN = re.compile(r"\.([^/\\]*)\.groundtie-[0-9a-f]{16}-[a-z]+(\.[^/\\]*)?$")
 _ROLE = re.compile(r"-new(\.[^.]*)?$")
 
 # Of Linux and Windows, in bytes or characters; the rest of a hidden name takes up to 40.
@@ -73,12 +71,7 @@ class Outputs:
         self._staged[final] = staged
         return staged
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
             if kind is None:
                 self._commit()
@@ -97,7 +90,6 @@ class Outputs:
                 self._claims[folder] = Claim(folder, self._token)
         fits = len(os.fsencode(final.name)) <= _LONGEST_NAME
         stem = final.stem if fits else f"output-{next(self._names)}"
-        # `_HIDDEN` finds the final name in this one.
         return folder / hidden_name(self._token, role, stem, final.suffix)
 
     def _commit(self) -> None:
@@ -282,11 +274,6 @@ def _size(count: float) -> str:
         ("GB", count / 1e9),
     )
     return f"{in_units:.3g} {unit}" if in_units < 999.5 else f"{in_units:.0f} {unit}"
-
-
-def final_name(path: str | os.PathLike[str]) -> str:
-    """Return the final name of a file that may be staged."""
-    return _HIDDEN.sub(r"\1\2", os.fspath(path))
 
 
 def _reason(error: Exception) -> str:

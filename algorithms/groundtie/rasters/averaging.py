@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .metadata import working_dtype
 from .windows import Mask, Window
 
 if TYPE_CHECKING:
@@ -124,6 +125,7 @@ def average_window(
         edges = row_edges[first : first + lines + 1]
         start, stop = int(np.floor(edges[0])), int(np.ceil(edges[-1]))
         values, valid = read(level, Window(left, top + start, width, stop - start))
+        values = values.astype(working_dtype(values.dtype), copy=False)
         pairs = zip(values, valid, strict=True)
         strips.append([area_average(v, ok, edges - start, col_edges) for v, ok in pairs])
     bands = [zip(*band, strict=True) for band in zip(*strips, strict=True)]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatImage = NDArray[np.float32]
+from .windows import FloatImage, Mask
 
 # Equally frequent levels of brightness and of colour.
 _BRIGHTNESS, _HUES = 12, 4
@@ -48,7 +48,7 @@ class Colours:
     darkest: float
 
     @classmethod
-    def of(cls, bands: FloatImage, valid: NDArray[np.bool_]) -> Colours:
+    def of(cls, bands: FloatImage, valid: Mask) -> Colours:
         """Return the classes of an image.
 
         Parameters

@@ -19,7 +19,7 @@ from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 from rasterio.crs import CRS
 
-from ..errors import GeoreferencingError, GridSizeError, raised_by
+from ..errors import GeoreferencingError, raised_by
 
 FloatArray = NDArray[np.float64]
 
@@ -40,10 +40,6 @@ POSITION_ERROR_PX = 1e-3
 
 # GDAL counts the pixels of a side in 32 bits.
 MOST_PX = 2**31 - 1
-
-# Pixels that are worked through one by one: a day at 10 million a second. A file of a map service
-# may state more of them than there are bytes on Earth; parts of it are no worse than of any other.
-_MOST_PIXELS = 1e12
 
 # Geotransform of images without georeferencing: map positions are then pixel coordinates.
 PIXEL_COORDINATES = Affine.translation(-0.5, -0.5)
@@ -210,22 +206,6 @@ def is_invertible(transform: Affine) -> bool:
     if not np.isfinite(transform[:6]).all() or transform.is_degenerate:
         return False
     return bool(np.isfinite((~transform)[:6]).all())
-
-
-def require_workable(grid: Grid, what: str) -> Grid:
-    """Return a grid whose pixels can be worked through one by one.
-
-    Raises
-    ------
-    GridSizeError
-        They are too many; `what` is what the message calls the grid.
-    """
-    if grid.width * grid.height > _MOST_PIXELS:
-        raise GridSizeError(
-            f"{what} has {grid.width} × {grid.height} pixels, more than can be worked through: "
-            "take a part (gdal_translate -projwin) or larger pixels"
-        )
-    return grid
 
 
 def require_map(crs: CRS | None) -> CRS | None:

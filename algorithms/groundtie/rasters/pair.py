@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 
 from ..errors import GeoreferencingError, NoOverlapError, SameFileError
 from ..geometry.limits import SearchLimits
 from .colours import Colours
 from .grid import FloatArray, Grid, PointFunction, finite, reproject
-from .kernels import REACH
-from .patch import Patch
+from .patch import Patch, empty_areas
 from .reading import FloatImage, Mask, RasterSource, Window
 from .warping import sample, sample_bands
-
-# Areas of zeros from this side on hold no data.
-_EMPTY_PX = 9
 
 # Rotated images are tried at angles this far apart for what they reach.
 _ANGLE_STEP_DEG = 5.0
@@ -79,7 +74,7 @@ class Image:
             # Before anything is inferred from the values: nothing may be inferred from these.
             values, valid = np.where(hidden, np.float32(0), values), valid & ~hidden
         if not self.source.says_what_is_valid:
-            valid = valid & ~_empty_areas(values, valid)
+            valid = valid & ~empty_areas(values, valid)
         if self.mask is not None:
             valid = valid & self.shown_on(grid, to_px)
         return Patch(values, valid)
@@ -132,14 +127,6 @@ class ImagePair:
     def input_patch(self, grid: Grid, to_input_px: PointFunction) -> Patch:
         """Return the input on a grid; `to_input_px` takes map positions to input pixels."""
         return self.input.read_onto(grid, to_input_px)
-
-    def reference_bands(self, grid: Grid) -> FloatImage:
-        """Return all bands of the reference on a grid in its CRS, shape (bands, h, w)."""
-        return self.reference.bands_onto(grid, self.reference.source.grid.map_to_pixel)
-
-    def input_bands(self, grid: Grid, to_input_px: PointFunction) -> FloatImage:
-        """Return all bands of the input on a grid; `to_input_px` as `input_patch` takes it."""
-        return self.input.bands_onto(grid, to_input_px)
 
     def exchanged(self) -> ImagePair:
         """Return the pair with the roles of its images exchanged, searched as far."""
@@ -219,23 +206,23 @@ def make_pair(
     factor = wanted / ref.grid.pixel_size_m
     grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
     radius = default_radius_m(grid) if search_radius_m is None else search_radius_m
-    is_shift = SearchLimits(radius, rotation_deg, (1 / scale, scale)).is_shift
+    limits = SearchLimits(radius, rotation_deg, (1 / scale, scale))
     outline = _nominal_pixels(inp.grid, ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
     nominal = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
-    if not is_shift and not ref.grid.is_georeferenced:
+    if not limits.is_shift and not ref.grid.is_georeferenced:
         outline = outline + np.subtract(ref.grid.centre_px, inp.grid.centre_px)
     outline = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
     overlap = _box(grid, outline, 0.0)
     if overlap is None:
         raise NoOverlapError(f"{ref.path} and {inp.path} do not overlap")
-    if not is_shift:
+    if not limits.is_shift:
         outline = _rotated(outline, rotation_deg, scale)
-    radius = min(radius, _farthest_px(grid, outline) * grid.pixel_size_m)
-    limits = SearchLimits(radius, rotation_deg, (1 / scale, scale))
-    reach = _box(grid, outline, radius / grid.pixel_size_m)
+    limits = replace(limits, radius=min(radius, _farthest_px(grid, outline) * grid.pixel_size_m))
+    radius_px = limits.radius / grid.pixel_size_m
+    reach = _box(grid, outline, radius_px)
     assert reach is not None
     matching, overlap_px = grid.window(*reach), (overlap.width, overlap.height)
-    around = _surroundings(reach, radius / grid.pixel_size_m, None if is_shift else nominal)
+    around = _surroundings(reach, radius_px, None if limits.is_shift else nominal)
     return ImagePair(reference, input, matching, overlap_px, grid.window(*around), limits)
 
 
@@ -279,23 +266,6 @@ def _surroundings(reach: Window, radius_px: float, nominal_px: FloatArray | None
     return Window.between(low, high)
 
 
-def _empty_areas(values: FloatImage, valid: Mask) -> Mask:
-    """Return the pixels of areas that are 0 throughout, and their margin.
-
-    What is invalid is 0, too, so that narrow borders are found, but has no margin of its own.
-
-    Many rasters fill what they do not cover with 0 without declaring it. The borders of such areas
-    would be the strongest edges of the image, and the same in images of different places.
-    """
-    zero = (values == 0).astype(np.uint8)
-    if not zero.any():
-        return zero > 0
-    areas = cv2.morphologyEx(zero, cv2.MORPH_OPEN, np.ones((_EMPTY_PX, _EMPTY_PX), np.uint8))
-    areas[~valid] = 0
-    # As far as interpolation reaches around them.
-    return cv2.dilate(areas, np.ones((2 * REACH["cubic"] + 1,) * 2, np.uint8)) > 0
-
-
 def default_radius_m(grid: Grid) -> float:
     """Return the search radius for a matching grid: 100 m or 20 pixels, whichever is larger."""
     usual = 100.0 if grid.crs is not None else 0.0
@@ -304,9 +274,7 @@ def default_radius_m(grid: Grid) -> float:
 
 def coarser_m(reference: Grid, input: Grid) -> float:
     """Return the pixel size of the coarser of two grids, in metres."""
-    if reference.crs is not None or not input.is_georeferenced:
-        return max(reference.pixel_size_m, input.pixel_size_m if input.is_georeferenced else 0.0)
-    return max(reference.pixel_size_m, input.pixel_size_m)
+    return max(reference.pixel_size_m, input.pixel_size_m if input.is_georeferenced else 0.0)
 
 
 def _nominal_pixels(source: Grid, target: Grid) -> PointFunction:

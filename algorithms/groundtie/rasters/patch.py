@@ -11,7 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .grid import Grid
-from .windows import Window
+from .kernels import REACH
+from .windows import FloatImage, Mask, Window
+
+# Areas of zeros from this side on hold no data.
+_EMPTY_PX = 9
 
 # More negative values than this do not come from resampling, whose kernels undershoot at edges.
 _NEGATIVE_SHARE = 0.02
@@ -24,8 +28,8 @@ class Patch:
     A stack of patches of one size is one, too: its arrays have the shape (n, h, w).
     """
 
-    values: NDArray[np.float32]
-    valid: NDArray[np.bool_]
+    values: FloatImage
+    valid: Mask
 
     @property
     def all_valid(self) -> bool:
@@ -73,7 +77,24 @@ def reduced_patch(window: Patch, factor: int) -> Patch:
     return Patch(reduced(np.where(window.valid, window.values, 0), factor), ~masked)
 
 
-def is_logarithmic(known: NDArray[np.float32]) -> bool:
+def empty_areas(values: FloatImage, valid: Mask) -> Mask:
+    """Return the pixels of areas that are 0 throughout, and their margin.
+
+    What is invalid is 0, too, so that narrow borders are found, but has no margin of its own.
+
+    Many rasters fill what they do not cover with 0 without declaring it. The borders of such areas
+    would be the strongest edges of the image, and the same in images of different places.
+    """
+    zero = (values == 0).astype(np.uint8)
+    if not zero.any():
+        return zero > 0
+    areas = cv2.morphologyEx(zero, cv2.MORPH_OPEN, np.ones((_EMPTY_PX, _EMPTY_PX), np.uint8))
+    areas[~valid] = 0
+    # As far as interpolation reaches around them.
+    return cv2.dilate(areas, np.ones((2 * REACH["cubic"] + 1,) * 2, np.uint8)) > 0
+
+
+def is_logarithmic(known: FloatImage) -> bool:
     """Return whether valid grey values, of any shape, are in decibels: many are negative."""
     return bool(np.count_nonzero(known < 0) > _NEGATIVE_SHARE * known.size)
 

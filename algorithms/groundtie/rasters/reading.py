@@ -6,7 +6,6 @@ import os
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -21,17 +20,22 @@ from ..errors import BandError, RasterOpenError
 from ..memory import cache_bytes
 from ..raster_names import is_remote, raster_name
 from .averaging import average_window
-from .bands import MOST_BANDS, BandInfo, colormap, numpy_dtype, stated, tags_of, working_dtype
-from .georeferencing import grid_of
 from .grid import PIXEL_COORDINATES, Grid
 from .handles import ArrayHandles, FileHandles, Handles, OpenDataset
-from .levels import Levels
-from .windows import Mask, Window, read_window
+from .metadata import (
+    MOST_BANDS,
+    BandInfo,
+    colormap,
+    grid_of,
+    numpy_dtype,
+    stated,
+    tags_of,
+)
+from .remote_overviews import RemoteOverviews
+from .windows import FloatImage, Mask, Window, read_window
 
 # Images without georeferencing are a supported case, see `Grid.is_georeferenced`.
 warnings.filterwarnings("ignore", category=NotGeoreferencedWarning)
-
-FloatImage = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -64,24 +68,19 @@ class RasterSource:
     colormap: dict[int, tuple[int, ...]] | None
     tags: dict[str, dict[str, str]]
     _handles: Handles = field(repr=False, compare=False)
-    _levels: Levels | None = field(repr=False, compare=False, default=None)
+    _overviews: RemoteOverviews | None = field(repr=False, compare=False, default=None)
 
     def __enter__(self) -> RasterSource:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
         """Close the file; reading opens it again. What the caller has opened stays open."""
         self._handles.close()
-        if self._levels is not None:
-            self._levels.close()
+        if self._overviews is not None:
+            self._overviews.close()
 
     def is_same_as(self, other: RasterSource) -> bool:
         """Return whether both read one and the same raster."""
@@ -179,9 +178,9 @@ class RasterSource:
             values, valid = grey(self, window)
         else:
             level = self
-            if self._levels is not None:
+            if self._overviews is not None:
                 reduction = min(window.height / out_shape[0], window.width / out_shape[1])
-                level = self._levels.coarsest(self, reduction)
+                level = self._overviews.coarsest(self, reduction)
             values, valid = average_window(grey, self, level, window, out_shape)
         grey_values = np.where(valid[0], values[0], np.float32(0)).astype(np.float32)
         return grey_values, valid[0]
@@ -209,12 +208,7 @@ class RasterSource:
 
         if out_shape is None:
             return native(self, window)
-
-        def floating(source: RasterSource, part: Window) -> tuple[NDArray[Any], Mask]:
-            values, valid = native(source, part)
-            return values.astype(working_dtype(values.dtype), copy=False), valid
-
-        return average_window(floating, self, self, window, out_shape)
+        return average_window(native, self, self, window, out_shape)
 
     def read_untouched(self, window: Window) -> tuple[NDArray[Any], NDArray[np.uint8]]:
         """Read all bands, shape (bands, h, w), and the mask, (h, w), of a window inside as stored.
@@ -246,7 +240,7 @@ def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSou
     RasterOpenError
         There is no such file, it cannot be read, or it has too many bands.
     GeoreferencingError
-        See `georeferencing.grid_of`.
+        See `metadata.grid_of`.
     """
     held = in_memory(value)
     if isinstance(held, Raster):
@@ -274,7 +268,9 @@ def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSou
                 ns: tags_of(dataset, ns=ns or None) for ns in ("", *stated(dataset.tag_namespaces))
             },
             _handles=handles,
-            _levels=Levels(len(dataset.overviews(1))) if is_remote(name) and held is None else None,
+            _overviews=RemoteOverviews(len(dataset.overviews(1)))
+            if is_remote(name) and held is None
+            else None,
         )
 
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .bands import BandInfo
 from .grid import Grid
+from .metadata import BandInfo
 from .reading import FloatImage, RasterSource, Window
 
 SUN, RADAR = "sun", "radar"

@@ -16,8 +16,8 @@ from .grid import (
     finite,
     is_invertible,
     metres_per_unit_at,
-    require_workable,
 )
+from .tiling import require_workable
 from .windows import Window
 
 # A registered raster has a diagonal of so many times as many pixels as the input has. The largest

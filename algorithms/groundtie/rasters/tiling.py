@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future
 from typing import TypeVar
 
+from ..errors import GridSizeError
 from .grid import Grid
 from .reading import RasterSource
-from .tiff import BLOCK
+from .tiff_directories import BLOCK
 from .windows import Window
 
 # Tiles are blocks of the file, small enough for those of a small raster to be worked side by side.
@@ -18,8 +19,28 @@ _TILE = BLOCK
 # What a worker may hold of the result at a time; rasters with many bands are worked in groups.
 _TILE_BYTES = 32_000_000
 
+# Pixels that are worked through one by one: a day at 10 million a second. A file of a map service
+# may state more of them than there are bytes on Earth; parts of it are no worse than of any other.
+_MOST_PIXELS = 1e12
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+
+def require_workable(grid: Grid, what: str) -> Grid:
+    """Return a grid whose pixels can be worked through one by one.
+
+    Raises
+    ------
+    GridSizeError
+        They are too many; `what` is what the message calls the grid.
+    """
+    if grid.width * grid.height > _MOST_PIXELS:
+        raise GridSizeError(
+            f"{what} has {grid.width} × {grid.height} pixels, more than can be worked through: "
+            "take a part (gdal_translate -projwin) or larger pixels"
+        )
+    return grid
 
 
 def tiles(grid: Grid, side: int | None = None) -> Iterator[Window]:

@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .bands import working_dtype
 from .grid import FloatArray, Grid, PointFunction
 from .kernels import REACH, interpolate
 from .lattice import ON_PIXELS, DenseMap, lattice, row_strips
+from .metadata import working_dtype
 from .reading import FloatImage, RasterSource
 from .windows import Mask, Window
 
@@ -111,10 +111,9 @@ def _validity(valid: Mask, nearest: NDArray[Any], reach: int) -> tuple[Mask, Mas
 
 
 def _lies_inside(px: NDArray[Any], width: int, height: int, margin: int) -> Mask:
-    low, high = np.array([[margin, margin], [width - 1 - margin, height - 1 - margin]], px.dtype)
     cols, rows = px
-    inside: Mask = (cols >= low[0]) & (cols <= high[0]) & (rows >= low[1]) & (rows <= high[1])
-    return inside
+    inside: Mask = (cols >= margin) & (cols <= width - 1 - margin)
+    return inside & (rows >= margin) & (rows <= height - 1 - margin)
 
 
 def _are_inside(px: NDArray[Any], shape: tuple[int, ...], margin: int) -> bool:

@@ -9,11 +9,12 @@ import numpy as np
 import rasterio.windows
 from numpy.typing import NDArray
 
-from .bands import fits
+from .metadata import fits
 
 if TYPE_CHECKING:
     from .reading import RasterSource
 
+FloatImage = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 

@@ -18,14 +18,15 @@ from rasterio.io import MemoryFile
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
 from ..runs import RUN_TAG, run_tags
-from .atomic import final_name, scratch_file, scratch_folder, writing
-from .bands import BandInfo, fits
-from .blocks import PixelType
+from .atomic import scratch_file, scratch_folder, writing
 from .grid import Grid
-from .overviews import Reduced, before_level
+from .hidden_files import final_name
+from .metadata import BandInfo, fits
 from .reading import RasterSource
-from .tiff import BLOCK, base_image
-from .tiled_file import Level, TiledFile, require_space
+from .tiff_blocks import PixelType
+from .tiff_directories import BLOCK, base_image
+from .tiff_file import Level, TiledFile, require_space
+from .tiff_overviews import Reduced, before_level
 from .tiling import in_order
 
 # Metadata that belong to the file, or locate the pixels, of the input only.

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from affine import Affine
 
-from ..rasters.bands import BandInfo
 from ..rasters.grid import FloatArray, Grid, compose, mesh
 from ..rasters.lattice import lattice
+from ..rasters.metadata import BandInfo
 from ..rasters.reading import RasterSource
 from ..rasters.writing import create_like, one_band
 from .evidence import RegistrationEvidence

@@ -208,8 +208,8 @@ def _scene_classifier(pair: ImagePair, name: str, scene: Scene, path: Path) -> C
     def bands(window: Window) -> FloatImage:
         piece = scene.grid.window(*window)
         if name == REFERENCE:
-            return pair.reference_bands(piece)
-        return pair.input_bands(piece, pair.nominal_px)
+            return pair.reference.bands_onto(piece, pair.reference.source.grid.map_to_pixel)
+        return pair.input.bands_onto(piece, pair.nominal_px)
 
     return ClassifiedScene(scene, bands, classifier)
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
 from ..rasters.grid import LON_LAT, POSITION_ERROR_PX, FloatArray, Grid, reproject
+from ..rasters.height_surfaces import RasterSurface, SurfacePiece, surface_around
 from ..rasters.lattice import Lattice
 from ..rasters.reading import FloatImage, RasterSource
-from ..rasters.surfaces import RasterSurface, SurfacePiece, surface_around
 from .geoids import GEOID_GRIDS
 from .smooth_map import Positions, smooth_map
 

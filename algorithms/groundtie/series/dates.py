@@ -22,7 +22,7 @@ from ..errors import CancelledError, GroundTieError
 from ..masks.radar import LEAST_VARIATION2, variation2_of
 from ..memory import dates_bytes
 from ..rasters.grid import Grid, reproject
-from ..rasters.held import held_grey
+from ..rasters.held_images import held_grey
 from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import RasterSource, open_raster

@@ -18,7 +18,7 @@ from rasterio.errors import CRSError
 from ..errors import GroundTieError, OutputError, ParameterError, RasterOpenError
 from ..geometry.transform import Transform
 from ..rasters.atomic import make_folder, writing
-from ..rasters.leftovers import remove
+from ..rasters.hidden_files import remove
 from ..rasters.reading import open_raster
 from ..runs import RUN_TAG
 from ..strict_json import parse_json, read_json

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..errors import RasterContentError
-from ..rasters.grid import require_workable
 from ..rasters.patch import middle_window
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
-from ..rasters.tiling import in_order, tile_count, tiles
+from ..rasters.tiling import in_order, require_workable, tile_count, tiles
 from ..rasters.writing import create_like, fill_value
 from .filters import SpeckleFilter
 from .statistics import estimate_looks

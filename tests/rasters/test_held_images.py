@@ -9,7 +9,7 @@ import pytest
 from raster_files import utm_grid, write_raster
 
 from groundtie.context import threads
-from groundtie.rasters.held import held_grey, held_on_level, held_onto
+from groundtie.rasters.held_images import held_grey, held_on_level, held_onto
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 

@@ -17,9 +17,9 @@ from rasterio.env import env_ctx_if_needed
 from scipy import sparse
 
 from .averaging import overlaps, weighted_sums
-from .bands import numpy_dtype
 from .handles import OpenDataset
-from .tiled_file import Level
+from .metadata import numpy_dtype
+from .tiff_file import Level
 from .windows import Mask, Window
 
 # Files beside the one that is written are none of its own.

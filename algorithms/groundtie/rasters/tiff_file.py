@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .atomic import free_bytes, no_space, writing
-from .blocks import PixelType, encoded_mask
-from .tiff import AROUND_COG_BLOCK, Image, header, needs_big
+from .tiff_blocks import PixelType, encoded_mask
+from .tiff_directories import AROUND_COG_BLOCK, Image, header, needs_big
 from .windows import Window
 
 # Deflate makes no more than this out of a byte: two bits for 258 of them, [Deutsch1996] 3.2.5.

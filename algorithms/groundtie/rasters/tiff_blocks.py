@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .tiff import BLOCK
+from .tiff_directories import BLOCK
 from .windows import Mask
 
 _NO_PREDICTOR, _DIFFERENCES, _FLOATS = 1, 2, 3

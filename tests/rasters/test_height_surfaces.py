@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import lil_matrix
 from scipy.sparse.linalg import spsolve
 
-from groundtie.rasters.surfaces import fill_voids
+from groundtie.rasters.height_surfaces import fill_voids
 
 
 def ramp(height: int, width: int) -> np.ndarray:

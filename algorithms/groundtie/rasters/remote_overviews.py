@@ -28,7 +28,7 @@ _PLACES = (0.75, 0.5, 0.25)
 
 
 @dataclass
-class Levels:
+class RemoteOverviews:
     """The overviews of one raster file.
 
     Parameters
@@ -92,7 +92,7 @@ def _overview(source: RasterSource, number: int) -> RasterSource | None:
     larger = Affine.scale(source.grid.width / width, source.grid.height / height)
     transform = compose(source.grid.transform, larger)
     grid = replace(source.grid, transform=transform, width=width, height=height)
-    return replace(source, grid=grid, _handles=handles, _levels=None)
+    return replace(source, grid=grid, _handles=handles, _overviews=None)
 
 
 def _is_mean_of(level: RasterSource, before: RasterSource) -> bool:

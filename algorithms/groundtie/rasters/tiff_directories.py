@@ -1,7 +1,7 @@
 """The directories of a TIFF file: which blocks of which image lie where.
 
 GDAL makes the tags, all but size and blocks (see `tags_of`); the pixels are written by Python (see
-`tiled_file`), where a full disk is an exception. Within GDAL it is met by libtiff: that may end the
+`tiff_file`), where a full disk is an exception. Within GDAL it is met by libtiff: that may end the
 process, or write a file that lacks pixels and says nothing.
 
 Source: [Adobe1992], [OGC2023].

@@ -21,6 +21,7 @@ from typing import IO
 if sys.platform != "win32":
     import fcntl
 
+_HIDDEN = re.compile(r"\.([^/\\]*)\.groundtie-[0-9a-f]{16}-[a-z]+(\.[^/\\]*)?$")
 _LOCK = re.compile(r"\.groundtie-([0-9a-f]{16})\.lock")
 
 
@@ -32,6 +33,11 @@ def new_token() -> str:
 def hidden_name(token: str, role: str, stem: str, suffix: str = "") -> str:
     """Return the name of a run's hidden file; `stem` and `suffix` are the final name's."""
     return f".{stem}.groundtie-{token}-{role}{suffix}"
+
+
+def final_name(path: str | os.PathLike[str]) -> str:
+    """Return the final name of a file that may be staged."""
+    return _HIDDEN.sub(r"\1\2", os.fspath(path))
 
 
 class Claim:

@@ -11,9 +11,9 @@ from affine import Affine
 from ..arrays import Raster
 from ..context import Context
 from .averaging import HELD_PIXELS
-from .bands import BandInfo
 from .grid import Grid, PointFunction, compose
 from .handles import ArrayHandles
+from .metadata import BandInfo
 from .pair import Image, ImagePair
 from .reading import FloatImage, Mask, RasterSource
 from .tiling import tiles
@@ -132,5 +132,5 @@ def _held(source: RasterSource, grid: Grid, values: FloatImage, valid: Mask) -> 
         has_mask_band=False,
         colormap=None,
         _handles=ArrayHandles(Raster(values)),
-        _levels=None,
+        _overviews=None,
     )
