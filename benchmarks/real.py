@@ -5,7 +5,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 
 from .accuracy import CORRECT, SILENTLY_WRONG
@@ -19,7 +18,7 @@ from .cases import (
     search_radius_m,
     write_case,
 )
-from .suites import Goal, Settings, SuiteResult, run_cases
+from .suites import Goal, Settings, SuiteResult, by_group, none_wrong, run_cases
 from .tables import accuracy_table
 
 LARGEST_SHIFT_PX = 20.0
@@ -78,14 +77,13 @@ def run(settings: Settings) -> SuiteResult:
 
 def by_kind(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
     """Return outcomes by their group."""
-    ordered = sorted(outcomes, key=lambda outcome: KINDS.index(outcome.group))
-    return {kind: list(group) for kind, group in groupby(ordered, lambda o: o.group)}
+    return by_group(sorted(outcomes, key=lambda outcome: KINDS.index(outcome.group)))
 
 
 def goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
     """Return the suite's goals, which are on SAR–optical pairs, and what was found."""
     sar_optical = [outcome for outcome in outcomes if outcome.group == SAR_OPTICAL]
-    correct, wrong = (count(sar_optical, verdict) for verdict in (CORRECT, SILENTLY_WRONG))
+    correct = count(sar_optical, CORRECT)
     all_wrong = count(outcomes, SILENTLY_WRONG)
     enough = correct * _WANTED_OF >= _WANTED * len(sar_optical)
     return (
@@ -95,12 +93,7 @@ def goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
             f"{correct} of {len(sar_optical)}",
             enough,
         ),
-        Goal(
-            "SAR–optical pairs silently wrong",
-            "none",
-            f"{wrong} of {len(sar_optical)}",
-            wrong == 0,
-        ),
+        none_wrong("SAR–optical pairs silently wrong", sar_optical),
         Goal(
             "Real pairs of all kinds silently wrong",
             "reported",

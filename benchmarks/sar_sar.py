@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from . import feature_counts
-from .accuracy import CORRECT, REFUSED, SILENTLY_WRONG
+from .accuracy import CORRECT, REFUSED
 from .attempt import Outcome, Pair, accepted, attempt, count
 from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
 from .crossings import Crossing, crossings
 from .real import LARGEST_SHIFT_PX, SHIFTS
 from .sar_pairs import CHANGED_BUILDINGS, INCIDENCES_DEG, SarPair
-from .suites import Case, Goal, Settings, SuiteResult, Table, run_cases
+from .suites import Case, Goal, Settings, SuiteResult, Table, by_group, none_wrong, run_cases
 from .tables import accuracy_table
 
 TOOL = "match_sar_sar"
@@ -95,7 +95,7 @@ def _group(opposite: bool, mask: str) -> str:
     return f"{'opposite orbits' if opposite else 'same orbit'}, {mask}"
 
 
-def simulations(seeds: int) -> list[SarPair]:
+def simulations(seeds: range) -> list[SarPair]:
     """Return pairs of both kinds of orbits; density and looks go round with the seed."""
     return [
         SarPair(
@@ -106,7 +106,7 @@ def simulations(seeds: int) -> list[SarPair]:
             opposite,
         )
         for opposite in (False, True)
-        for seed in range(1, seeds + 1)
+        for seed in seeds
     ]
 
 
@@ -126,7 +126,7 @@ def run(settings: Settings) -> SuiteResult:
     ]
     simulated: list[Case] = [
         SimulatedAttempt(simulation, mask, settings.cache)
-        for simulation in simulations(1 if settings.quick else settings.seeds)
+        for simulation in simulations(settings.seed_numbers())
         for mask in MASKS
     ]
     outcomes = {
@@ -141,9 +141,8 @@ def run(settings: Settings) -> SuiteResult:
     large = SimulatedAttempt(SarPair(_LARGE_PX, "rural", 1, 4, True), _GROUND, settings.cache)
     large.simulation.pair(settings.cache)
     outcomes["large"] = run_cases([large], 1)
-    groups = {_group(opposite, mask): [] for mask in MASKS for opposite in (False, True)}
-    for outcome in outcomes["simulated"]:
-        groups[outcome.group].append(outcome)
+    names = [_group(opposite, mask) for mask in MASKS for opposite in (False, True)]
+    groups = by_group(outcomes["simulated"], names)
     pairs = {
         name: [o for o in outcomes["real"] if o.name.split(" ")[0] == name]
         for name in (case.name for case in own)
@@ -198,7 +197,6 @@ def _counts(
 
 def real_goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
     """Return the goals on real pairs and what was found."""
-    wrong = count(outcomes, SILENTLY_WRONG)
     right, refused = count(outcomes, CORRECT), count(outcomes, REFUSED)
     free = [outcome for outcome in outcomes if outcome.group == _FREE]
     found = f"{right} of {len(outcomes)}, {refused} refused"
@@ -209,7 +207,7 @@ def real_goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
             found,
             right + refused == len(outcomes),
         ),
-        Goal("Real pairs: silently wrong", "none", str(wrong), wrong == 0),
+        none_wrong("Real pairs: silently wrong", outcomes),
         Goal(
             "Turned by 18°, without georeferencing: correct",
             "all",
@@ -240,12 +238,7 @@ def other_goals(
                 )
             )
         both = [*groups[_group(False, mask)], *groups[_group(True, mask)]]
-        wrong = count(both, SILENTLY_WRONG)
-        goals.append(
-            Goal(
-                f"Simulated, {mask}: silently wrong", "none", f"{wrong} of {len(both)}", wrong == 0
-            )
-        )
+        goals.append(none_wrong(f"Simulated, {mask}: silently wrong", both))
     goals.append(
         Goal(
             f"{_LARGE_PX}×{_LARGE_PX} px, end to end",
