@@ -25,10 +25,11 @@ from .cloudy_rates import (
 from .cloudy_registrations import TOOLS, CloudyRegistration
 from .crossings import counts_by_group, what_was_accepted
 from .match_rates import LIMITS_PX, METHODS, ClearCase, MatchRate
-from .optical_registrations import FreeCrossing, RegistrationCase, crossings
+from .optical_registrations import TOOL, FreeCrossing, RegistrationCase, crossings
 from .optical_speed import SOURCE, time_features, timing_goals, timing_table
+from .real import FreeCase
 from .rotated_pairs import crossed, rotated_cases
-from .suites import Goal, Settings, SuiteResult, Table, by_group, none_wrong, run_cases
+from .suites import Case, Goal, Settings, SuiteResult, Table, by_group, none_wrong, run_cases
 from .tables import accuracy_table
 
 KINDS = ("optical-optical", "optical-infrared", "day-night")
@@ -51,8 +52,8 @@ def run(settings: Settings) -> SuiteResult:
     cloudy = _rates(
         [CloudyCase(case, for_others(labels, case.name)) for case in cases], settings.jobs
     )
-    registrations = [RegistrationCase(case, True) for case in cases]
-    registrations += [RegistrationCase(case, False) for case in turned]
+    registrations: list[Case] = [RegistrationCase(case) for case in cases]
+    registrations += [FreeCase(case, TOOL, case.kind) for case in turned]
     outcomes = run_cases(registrations, settings.jobs)
     clouded = [
         CloudyRegistration(case, tool, classified)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .accuracy import CORRECT, SILENTLY_WRONG
-from .attempt import Outcome, attempt, count
+from .attempt import Outcome, Pair, attempt, count
 from .cases import (
     KINDS,
     SAR_OPTICAL,
@@ -36,6 +36,7 @@ class ShiftedCase:
     case: RealCase
     number: int
     largest_px: float = LARGEST_SHIFT_PX
+    tool: str = "coregister"
 
     def run(self, workers: int | None) -> Outcome:
         """Write the pair, register it and judge the result."""
@@ -46,8 +47,24 @@ class ShiftedCase:
                 self.case.kind,
                 write_case(self.case, shift, Path(folder)),
                 workers,
+                tool=self.tool,
                 search_radius=search_radius_m(self.largest_px),
             )
+
+
+@dataclass(frozen=True)
+class FreeCase:
+    """A real pair as it is, without georeferencing."""
+
+    case: RealCase
+    tool: str
+    group: str
+
+    def run(self, workers: int | None) -> Outcome:
+        """Register the pair and judge the result."""
+        case = self.case
+        pair = Pair(case.reference, case.input, *case.truths(), case.sigma_px)
+        return attempt(case.name, self.group, pair, workers, tool=self.tool)
 
 
 def run(settings: Settings) -> SuiteResult:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +11,10 @@ import numpy as np
 
 from . import feature_counts
 from .accuracy import CORRECT, REFUSED
-from .attempt import Outcome, Pair, accepted, attempt, count
-from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
+from .attempt import Outcome, accepted, attempt, count
+from .cases import RealCase, read_cases
 from .crossings import Crossing, crossings
-from .real import LARGEST_SHIFT_PX, SHIFTS
+from .real import SHIFTS, FreeCase, ShiftedCase
 from .sar_pairs import CHANGED_BUILDINGS, INCIDENCES_DEG, SarPair
 from .suites import Case, Goal, Settings, SuiteResult, Table, by_group, none_wrong, run_cases
 from .tables import accuracy_table
@@ -25,7 +24,7 @@ SAR_SAR = "sar-sar"
 
 # Cases whose images are turned by 18°: they are matched without georeferencing, too.
 _TURNED = ("ss-ponds", "ss-meander")
-_FREE = "without georeferencing"
+FREE = "without georeferencing"
 
 # Masks of simulated pairs: the simulator's ground, what the tool finds by itself, none.
 _GROUND, _REGIONS, _NO_MASK = "ground mask", "mask=regions", "no mask"
@@ -40,31 +39,6 @@ _QUICK_CROSSINGS = 20
 _WANTED_CORRECT = 0.95
 _LARGEST_ERROR_PX = {False: 1.0, True: 2.0}
 _LONGEST_S = 15.0
-
-
-@dataclass(frozen=True)
-class RealAttempt:
-    """A real pair: with a wrong shift of a number, or without georeferencing (None)."""
-
-    case: RealCase
-    number: int | None
-
-    def run(self, workers: int | None) -> Outcome:
-        """Register the pair and judge the result."""
-        case, number = self.case, self.number
-        if number is None:
-            pair = Pair(case.reference, case.input, *case.truths(), case.sigma_px)
-            return attempt(case.name, _FREE, pair, workers, tool=TOOL)
-        shift = draw_shift(case, LARGEST_SHIFT_PX, number)
-        with tempfile.TemporaryDirectory() as folder:
-            return attempt(
-                f"{case.name} ({shift[0]:+.1f}, {shift[1]:+.1f})",
-                SAR_SAR,
-                write_case(case, shift, Path(folder)),
-                workers,
-                tool=TOOL,
-                search_radius=search_radius_m(LARGEST_SHIFT_PX),
-            )
 
 
 @dataclass(frozen=True)
@@ -116,8 +90,12 @@ def run(settings: Settings) -> SuiteResult:
     own = [case for case in every if case.kind == SAR_SAR]
     detectors, chains, turns = _counts(own)
     real: list[Case] = [
-        *(RealAttempt(c, n) for c in own for n in range(1 if settings.quick else SHIFTS)),
-        *(RealAttempt(case, None) for case in own if case.name in _TURNED),
+        *(
+            ShiftedCase(case, number, tool=TOOL)
+            for case in own
+            for number in range(1 if settings.quick else SHIFTS)
+        ),
+        *(FreeCase(case, TOOL, FREE) for case in own if case.name in _TURNED),
     ]
     crossed = [
         Crossing(one.reference, one.input, TOOL)
@@ -198,7 +176,7 @@ def _counts(
 def real_goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
     """Return the goals on real pairs and what was found."""
     right, refused = count(outcomes, CORRECT), count(outcomes, REFUSED)
-    free = [outcome for outcome in outcomes if outcome.group == _FREE]
+    free = [outcome for outcome in outcomes if outcome.group == FREE]
     found = f"{right} of {len(outcomes)}, {refused} refused"
     return (
         Goal(

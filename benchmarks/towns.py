@@ -20,6 +20,7 @@ from groundtie.simulation import files
 
 from .accuracy import REFUSED, Truth
 from .attempt import Outcome, Pair, accepted, attempt, count, median_px
+from .cases import write_image
 from .city import WITHIN_PX, city, share_within
 from .simulations import Simulation
 from .suites import Case, Goal, Settings, SuiteResult, Table, by_group, none_wrong, run_cases
@@ -161,19 +162,10 @@ def rough(model: Path, is_reference: bool = False) -> Path:
         else:
             moved = compose(Affine.translation(*_MOVED_M), moved)
         scale = Affine.scale(fine.width / shape[1], fine.height / shape[0])
-        profile = {
-            "driver": "GTiff",
-            "count": 1,
-            "dtype": "float32",
-            "height": shape[0],
-            "width": shape[1],
-            "crs": fine.crs,
-            "transform": compose(moved, scale),
-        }
+        transform, crs = compose(moved, scale), fine.crs
     # Whole or not at all, also where two processes make it.
     made = path.with_name(f"{path.stem}-{np.random.default_rng().integers(2**31)}.tif")
-    with rasterio.open(made, "w", **profile) as raster:
-        raster.write(heights + np.float32(_NOISE_M) * noise, 1)
+    write_image((heights + np.float32(_NOISE_M) * noise)[None], transform, made, crs)
     made.rename(path)
     return path
 

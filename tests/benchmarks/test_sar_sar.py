@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from benchmark_outcomes import outcome
 
-from benchmarks import sar_sar
+from benchmarks import real
 from benchmarks.accuracy import CORRECT, REFUSED, SILENTLY_WRONG
 from benchmarks.cases import RealCase
+from benchmarks.real import FreeCase, ShiftedCase
 from benchmarks.sar_sar import (
+    FREE,
     MASKS,
-    RealAttempt,
+    TOOL,
     SimulatedAttempt,
     other_goals,
     real_goals,
@@ -37,9 +40,10 @@ def test_real_pairs_are_registered_by_the_tool(
         calls.append((name, group, more))
         return outcome()
 
-    monkeypatch.setattr(sar_sar, "attempt", attempt)
-    RealAttempt(cases["hills"], 0).run(1)
-    RealAttempt(cases["hills"], None).run(1)
+    monkeypatch.setattr(real, "attempt", attempt)
+    hills = replace(cases["hills"], kind="sar-sar")
+    ShiftedCase(hills, 0, tool=TOOL).run(1)
+    FreeCase(hills, TOOL, FREE).run(1)
     assert [call[1] for call in calls] == ["sar-sar", "without georeferencing"]
     assert all(call[2]["tool"] == "match_sar_sar" for call in calls)
     # Without georeferencing nothing is told of where the images lie.
