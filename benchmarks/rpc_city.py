@@ -45,6 +45,18 @@ class Run:
         given = self.parameters.items()
         return {name: scene / v if isinstance(v, Path) else v for name, v in given}
 
+    def call(self, scene: Path, output: Path, workers: int | None) -> Any:
+        """Return what the tool makes of the scene in a folder."""
+        return getattr(groundtie, self.tool)(
+            image=scene / "sensor.tif",
+            reference=scene / "reference.tif",
+            output=output,
+            dem=scene / "dem.tif",
+            dem_datum="ellipsoidal",
+            workers=workers,
+            **self.on(scene),
+        )
+
 
 _RPC = "refined_RPC.TXT"
 REFINED, MASKED, MODELLED, EXTRACTED = (
@@ -108,8 +120,9 @@ class CityCase:
         """Make the scene if need be, run the tool, and judge what it found by the truth."""
         scene, name = self.city.scene(self.cache), f"{self.what}, {self.city.name}"
         with tempfile.TemporaryDirectory() as folder:
-            output = Path(folder) / RUNS[self.what].output
-            one = tried(lambda: self._call(scene, output, workers))
+            wanted = RUNS[self.what]
+            output = Path(folder) / wanted.output
+            one = tried(lambda: wanted.call(scene, output, workers))
             if one.result is None:
                 return one.unregistered(name, self.group, 0.0)
             error_px = true_error_px(scene, output)
@@ -126,18 +139,6 @@ class CityCase:
             summary["verdict"]["check_rmse_px"],
             summary.get("bias", {}).get("model", "points"),
             summary["verdict"]["reason"],
-        )
-
-    def _call(self, scene: Path, output: Path, workers: int | None) -> Any:
-        run, files = RUNS[self.what], (scene / "sensor.tif", scene / "reference.tif")
-        return getattr(groundtie, run.tool)(
-            image=files[0],
-            reference=files[1],
-            output=output,
-            dem=scene / "dem.tif",
-            dem_datum="ellipsoidal",
-            workers=workers,
-            **run.on(scene),
         )
 
 

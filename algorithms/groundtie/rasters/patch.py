@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from .grid import Grid
 from .windows import Window
 
-# A mean over a block is valid if the weights of all its pixels sum up to this.
-_ALL_VALID = 0.999
+# What is made of several pixels is valid if the weights of its valid pixels sum up to this.
+ALL_VALID = 0.999
 
 # More negative values than this do not come from resampling, whose kernels undershoot at edges.
 _NEGATIVE_SHARE = 0.02
@@ -72,7 +72,7 @@ def reduced_patch(window: Patch, factor: int) -> Patch:
     """Return a window's means over blocks; blocks with any masked pixel are masked."""
     if factor == 1:
         return window
-    valid = reduced(window.valid.astype(np.float32), factor) > _ALL_VALID
+    valid = reduced(window.valid.astype(np.float32), factor) > ALL_VALID
     return Patch(reduced(np.where(window.valid, window.values, 0), factor), valid)
 
 
