@@ -6,10 +6,12 @@ import math
 import tempfile
 import time
 import traceback
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 import groundtie
 from groundtie.errors import NotRegisteredError
@@ -97,6 +99,46 @@ def for_json(values: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+@dataclass(frozen=True)
+class Try:
+    """What a call of a tool came to, before it is judged.
+
+    Parameters
+    ----------
+    result
+        What it returned; None if there is nothing to judge.
+    verdict, reason
+        Why there is nothing: `REFUSED` or `CRASHED`, and what was said; empty with a result.
+    seconds
+        Wall-clock time of the call.
+    """
+
+    result: Any
+    verdict: str
+    reason: str
+    seconds: float
+
+    def unregistered(self, name: str, group: str, sigma_px: float) -> Outcome:
+        """Return the outcome of a call without a result."""
+        return unregistered(self.verdict, name, group, sigma_px, self.seconds, self.reason)
+
+
+def tried(call: Callable[[], Any]) -> Try:
+    """Call a tool, which may refuse or crash."""
+    started = time.perf_counter()
+    result, verdict, reason = None, "", ""
+    try:
+        result = call()
+    except NotRegisteredError as refusal:
+        verdict = REFUSED
+        reason = str(refusal) if refusal.verdict is None else refusal.verdict.reason
+    except Exception as error:
+        # A finding like any other: it is counted, and `run.py` exits with 1.
+        traceback.print_exc()
+        verdict, reason = CRASHED, repr(error)
+    return Try(result, verdict, reason, time.perf_counter() - started)
+
+
 def attempt(
     name: str,
     group: str,
@@ -112,23 +154,17 @@ def attempt(
     With a specification, the pair is registered as it asks, whatever the tool.
     """
     with tempfile.TemporaryDirectory() as folder:
-        started = time.perf_counter()
-        try:
-            files = pair.reference, pair.input, Path(folder) / "registered.tif"
+        files = pair.reference, pair.input, Path(folder) / "registered.tif"
+
+        def call() -> Any:
             if spec is not None:
-                result = register_specified(spec, *files, workers=workers)
-            else:
-                result = getattr(groundtie, tool)(*files, workers=workers, **parameters)
-        except NotRegisteredError as refusal:
-            seconds = time.perf_counter() - started
-            reason = str(refusal) if refusal.verdict is None else refusal.verdict.reason
-            return unregistered(REFUSED, name, group, pair.sigma_px, seconds, reason)
-        except Exception as error:
-            # A finding like any other: it is counted, and `run.py` exits with 1.
-            traceback.print_exc()
-            seconds = time.perf_counter() - started
-            return unregistered(CRASHED, name, group, pair.sigma_px, seconds, repr(error))
-        seconds = time.perf_counter() - started
+                return register_specified(spec, *files, workers=workers)
+            return getattr(groundtie, tool)(*files, workers=workers, **parameters)
+
+        one = tried(call)
+    if one.result is None:
+        return one.unregistered(name, group, pair.sigma_px)
+    result = one.result
     found = on_pixels(result.transform, pair.reference)
     errors = [
         math.inf if truth is None else truth.error_px(found) for truth in (pair.truth, pair.lattice)
@@ -141,7 +177,7 @@ def attempt(
         errors[0],
         errors[1],
         pair.sigma_px,
-        seconds,
+        one.seconds,
         result.verdict.check_rmse_px,
         result.transform.model.kind,
         result.verdict.reason,
@@ -172,6 +208,12 @@ def unregistered(
 def accepted(outcomes: Iterable[Outcome]) -> list[Outcome]:
     """Return the outcomes of the registrations that the tool accepted."""
     return [outcome for outcome in outcomes if outcome.verdict not in (REFUSED, CRASHED)]
+
+
+def median_px(outcomes: Sequence[Outcome]) -> float:
+    """Return the median error of what was accepted; NaN if nothing was."""
+    errors = [outcome.error_px for outcome in accepted(outcomes)]
+    return float(np.median(errors)) if errors else float("nan")
 
 
 def count(outcomes: Iterable[Outcome], verdict: str, on_lattice: bool = False) -> int:

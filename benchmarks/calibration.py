@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import math
 import tempfile
-import time
-import traceback
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 import groundtie
-from groundtie.errors import NotRegisteredError
 
-from .accuracy import CRASHED, REFUSED, FloatArray, Truth
-from .attempt import Pair, on_pixels
+from .accuracy import FloatArray, Truth
+from .attempt import Pair, on_pixels, tried
 from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
 from .optical_pairs import OpticalPair
 from .real import LARGEST_SHIFT_PX
 from .sar_pairs import SarPair
 from .simulations import Simulation
-from .suites import Goal, Settings, SuiteResult, Table, run_cases
+from .suites import Goal, Settings, SuiteResult, Table, by_group, run_cases
 
 ACCEPTED = "accepted"
 SAID = {"ce50_px": 0.5, "ce90_px": 0.9, "ce95_px": 0.95}
@@ -142,18 +140,12 @@ def compare(
     name: str, group: str, tool: str, pair: Pair, radius_m: float, workers: int | None
 ) -> CalibrationRun:
     """Register a pair and compare its errors over the reference with the radii of the verdict."""
-    started = time.perf_counter()
-    try:
-        files = pair.reference, pair.input
-        found = getattr(groundtie, tool)(*files, search_radius=radius_m, workers=workers)
-    except NotRegisteredError as refusal:
-        reason = str(refusal) if refusal.verdict is None else refusal.verdict.reason
-        return CalibrationRun(name, group, REFUSED, reason)
-    except Exception as error:
-        # A finding like any other: it is counted, and `run.py` exits with 1.
-        traceback.print_exc()
-        return CalibrationRun(name, group, CRASHED, repr(error))
-    seconds = time.perf_counter() - started
+    files = pair.reference, pair.input
+    call = partial(getattr(groundtie, tool), *files, search_radius=radius_m, workers=workers)
+    one = tried(call)
+    if one.result is None:
+        return CalibrationRun(name, group, one.verdict, one.reason)
+    found = one.result
     assert pair.truth is not None
     errors = errors_px(
         pair.truth, on_pixels(found.transform, pair.reference)(pair.truth.reference_px)
@@ -172,7 +164,7 @@ def compare(
             float(np.mean(errors <= with_truth_px(radius, said, pair.sigma_px)))
             for radius, said in zip(radii, SAID.values(), strict=True)
         ),
-        seconds,
+        one.seconds,
     )
 
 
@@ -199,9 +191,7 @@ def wilson(held: float, count: int) -> tuple[float, float]:
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
     runs: Sequence[CalibrationRun] = run_cases(cases(settings), settings.jobs)
-    groups = {
-        name: [r for r in runs if r.group == name] for name in dict.fromkeys(r.group for r in runs)
-    }
+    groups = by_group(runs)
     return SuiteResult(
         "Calibration: said and true errors",
         [goal(name, group) for name, group in groups.items()],
@@ -219,10 +209,7 @@ def run(settings: Settings) -> SuiteResult:
 def cases(settings: Settings) -> list[SimulatedCase | RealPairCase]:
     """Return the cases, class by class for each seed, so that any part of a run is a sample."""
     found: list[SimulatedCase | RealPairCase] = []
-    seeds = range(
-        settings.first_seed, settings.first_seed + (1 if settings.quick else settings.seeds)
-    )
-    for seed in seeds:
+    for seed in settings.seed_numbers():
         sizes = (_SMALL_PX, _LARGE_PX) if seed % _LARGE_EVERY == 0 else (_SMALL_PX,)
         for size in sizes[: 1 if settings.quick else 2]:
             found += _simulated(seed, size, settings.cache)

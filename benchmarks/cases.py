@@ -155,8 +155,14 @@ def read_image(path: Path) -> NDArray[Any]:
             return np.asarray(source.read())
 
 
-def write_image(image: NDArray[Any], transform: Affine, path: Path) -> Path:
-    """Write bands with a geotransform; three or four bands of bytes become RGB and RGBA."""
+def write_image(
+    image: NDArray[Any],
+    transform: Affine | None,
+    path: Path,
+    crs: Any = CRS,
+    nodata: float | None = None,
+) -> Path:
+    """Write bands, where they lie; three or four bands of bytes become RGB and RGBA."""
     bands, height, width = image.shape
     with rasterio.open(
         path,
@@ -166,8 +172,9 @@ def write_image(image: NDArray[Any], transform: Affine, path: Path) -> Path:
         height=height,
         width=width,
         dtype=image.dtype,
-        crs=CRS,
+        crs=crs,
         transform=transform,
+        nodata=nodata,
     ) as target:
         target.write(image)
     return path

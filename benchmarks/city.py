@@ -11,15 +11,14 @@ import numpy as np
 from groundtie.registration.specification import COREGISTER, Specification
 
 from .accuracy import REFUSED, SILENTLY_WRONG
-from .attempt import Outcome, accepted, attempt, count
+from .attempt import Outcome, accepted, attempt, count, median_px
 from .simulations import Simulation
-from .suites import Goal, Settings, SuiteResult, Table, run_cases
+from .suites import Goal, Settings, SuiteResult, Table, by_group, none_wrong, run_cases
 from .tables import accuracy_table
 
 SIZE_PX = 1000
 CHANGED_PERCENT = 10.0
 WITHIN_PX = 1.0
-_QUICK_SEEDS = 1
 
 
 @dataclass(frozen=True)
@@ -82,13 +81,13 @@ def city(seed: int, changed_percent: float = CHANGED_PERCENT) -> Simulation:
 
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
-    seeds = range(1, 1 + (_QUICK_SEEDS if settings.quick else settings.seeds))
+    seeds = settings.seed_numbers()
     # Seed by seed, so that processes do not make the same pair at the same time.
     for seed in seeds:
         city(seed).pair(settings.cache)
     cases = [CityCase(seed, setting, settings.cache) for seed in seeds for setting in SETTINGS]
     outcomes = run_cases(cases, settings.jobs)
-    groups = {s: [o for o in outcomes if o.group == s] for s in SETTINGS}
+    groups = by_group(outcomes, SETTINGS)
     return SuiteResult(
         f"Simulated dense city, {SIZE_PX}×{SIZE_PX} px",
         [goal for name, group in groups.items() for goal in goals(name, group)],
@@ -101,7 +100,6 @@ def run(settings: Settings) -> SuiteResult:
 def goals(name: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
     """Return the goals of one setting and what was found."""
     setting, median, share = SETTINGS[name], median_px(outcomes), share_within(outcomes)
-    wrong = count(outcomes, SILENTLY_WRONG)
     wanted, at_least = setting.median_px, setting.share_within
     return (
         Goal(
@@ -116,7 +114,7 @@ def goals(name: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
             f"{share:.0%}",
             None if at_least is None else share >= at_least,
         ),
-        Goal(f"{name}: silently wrong", "none", f"{wrong} of {len(outcomes)}", wrong == 0),
+        none_wrong(f"{name}: silently wrong", outcomes),
     )
 
 
@@ -135,12 +133,6 @@ def ground_table(groups: Mapping[str, Sequence[Outcome]]) -> Table:
         for name, group in groups.items()
     ]
     return Table("On the ground", head, rows)
-
-
-def median_px(outcomes: Sequence[Outcome]) -> float:
-    """Return the median error of what was accepted; NaN if nothing was."""
-    errors = [outcome.error_px for outcome in accepted(outcomes)]
-    return float(np.median(errors)) if errors else float("nan")
 
 
 def share_within(outcomes: Sequence[Outcome]) -> float:

@@ -18,7 +18,7 @@ import groundtie
 from .attempt import Outcome, Pair, attempt
 from .cases import RealCase, draw_shift, read_image, search_radius_m, write_case, write_image
 from .clouds import Clouds, clouds_over
-from .optical_registrations import LARGEST_SHIFT_PX
+from .real import LARGEST_SHIFT_PX
 
 TOOLS = ("match_optical", "coregister")
 

@@ -30,7 +30,7 @@ from .cases import (
     write_image,
 )
 from .real import LARGEST_SHIFT_PX
-from .suites import Goal, Settings, SuiteResult, Table, run_cases
+from .suites import Goal, Settings, SuiteResult, Table, by_group, run_cases
 
 CROSSING = "another place"
 SPECKLE = {"reference": "reference is speckle", "input": "input is speckle"}
@@ -149,17 +149,15 @@ def goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
 
 def counts_by_group(outcomes: Sequence[Outcome]) -> Table:
     """Return how many were accepted, by what does not belong together."""
-    names = dict.fromkeys(outcome.group for outcome in outcomes)
-    groups = [[o for o in outcomes if o.group == name] for name in names]
     rows = [
         [
-            group[0].group,
+            name,
             str(len(group)),
             str(len(accepted(group))),
             str(count(group, CRASHED)),
             f"{np.median([o.seconds for o in group]):.1f}",
         ]
-        for group in groups
+        for name, group in by_group(outcomes).items()
     ]
     return Table("By what is wrong", ("images", "pairs", "accepted", "crashed", "median s"), rows)
 

@@ -36,7 +36,6 @@ from .towns import rough, seen_by_radar, to_model
 
 # How many echoes it adds for each pixel of the wall's height; 0: without.
 WEIGHTS = (0.0, 1.0, DOUBLE_BOUNCE, 10.0)
-_QUICK_SEEDS = 1
 
 
 @dataclass(frozen=True)
@@ -119,8 +118,7 @@ def write_rendered(model: Path, view: View, weight: float, path: Path) -> None:
 
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
-    seeds = _QUICK_SEEDS if settings.quick else settings.seeds
-    numbers = range(settings.first_seed, settings.first_seed + seeds)
+    numbers = settings.seed_numbers()
     for seed in numbers:
         seen_by_radar(seed).pair(settings.cache)
     cases = [BounceCase(seed, weight, settings.cache) for seed in numbers for weight in WEIGHTS]

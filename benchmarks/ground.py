@@ -63,9 +63,8 @@ class FoundGround:
 
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
-    count = 1 if settings.quick else settings.seeds
     found = []
-    for seed in range(settings.first_seed, settings.first_seed + count):
+    for seed in settings.seed_numbers():
         found.append(of_seed(seed, settings.cache))
         print(f"city, seed {seed}: {found[-1].share:.0%} of the image", flush=True)
     return SuiteResult(

@@ -27,7 +27,7 @@ from groundtie.sensor.rpc import RPC
 from groundtie.sensor.rpc_files import read_rpc
 from groundtie.sensor.rpc_tags import rpc_from_tags, rpc_to_tags
 
-from .cases import RealCase, read_cases
+from .cases import RealCase, read_cases, write_image
 
 FloatArray = NDArray[np.float64]
 
@@ -136,7 +136,7 @@ def make_scene(
     rows, cols = sar.shape[1:]
     corner = np.round(centre + [-cols / 2 * pixel_m, rows / 2 * pixel_m])
     grid = Grid(Affine(pixel_m, 0, corner[0], 0, -pixel_m, corner[1]), crs, cols, rows)
-    reference = _write(folder / "reference.tif", sar, crs=crs, transform=grid.transform)
+    reference = write_image(sar, grid.transform, folder / "reference.tif", crs)
     dem = _write_terrain(folder / "dem.tif", grid, height, 0.0)
     with open_raster(dem) as source:
         lon_lat = reproject(grid.pixel_to_map(grid.outline()), crs, LON_LAT)
@@ -151,7 +151,7 @@ def make_scene(
         orientation = Orientation(truth, heights, crs, exact)
         bands = _sensor_image(optical, case, grid, orientation, size)
     delivered = fold(truth, bias_of(number, size)).rpc
-    image = _write(folder / "image.tif", bands, nodata=0)
+    image = write_image(bands, None, folder / "image.tif", None, nodata=0)
     with rasterio.open(image, "r+") as dataset:
         dataset.rpcs = rasterio.rpc.RPC.from_gdal(rpc_to_tags(delivered))
     if datum_error_m:
@@ -177,7 +177,7 @@ def _write_terrain(path: Path, grid: Grid, height_m: float, offset_m: float) -> 
     hills = cv2.GaussianBlur(noise, (0, 0), 8.0)
     hills = _RELIEF_M / 2 * hills / np.abs(hills).max()
     heights = (height_m + offset_m + hills).astype(np.float32)
-    return _write(path, heights[None], crs=grid.crs, transform=transform)
+    return write_image(heights[None], transform, path, grid.crs)
 
 
 def _sensor_image(
@@ -204,11 +204,3 @@ def _sensor_image(
             found = np.clip(np.rint(found), 1, 255)
             band[top : top + 64] = np.where(inside.reshape(found.shape), found, 0)
     return bands
-
-
-def _write(path: Path, bands: NDArray[np.generic], **place: object) -> Path:
-    profile = {"driver": "GTiff", "count": len(bands), "dtype": bands.dtype}
-    height, width = bands.shape[1:]
-    with rasterio.open(path, "w", width=width, height=height, **profile, **place) as dataset:
-        dataset.write(bands)
-    return path

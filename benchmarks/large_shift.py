@@ -14,7 +14,7 @@ from .attempt import Outcome, attempt, count
 from .cases import SAR_OPTICAL, RealCase, image_size, read_cases
 from .real import ShiftedCase
 from .simulations import Simulation
-from .suites import Case, Goal, Settings, SuiteResult, run_cases
+from .suites import Case, Goal, Settings, SuiteResult, by_group, run_cases
 from .tables import accuracy_table
 
 REAL_SHIFT_PX = 75.0
@@ -76,7 +76,7 @@ def run(settings: Settings) -> SuiteResult:
         small = Simulation(SIMULATED_SIZE_PX // 4, "rural", 1, SIMULATED_SHIFT_PX / 4)
         cases = [*cases[: 2 * REAL_SHIFTS : REAL_SHIFTS], FarSimulation(small, settings.cache)]
     outcomes = run_cases(cases, settings.jobs)
-    groups = {g: [o for o in outcomes if o.group == g] for g in (SAR_OPTICAL, _SIMULATED)}
+    groups = by_group(outcomes, (SAR_OPTICAL, _SIMULATED))
     return SuiteResult(
         "Large initial errors",
         [goal for group, members in groups.items() for goal in goals(group, members)],

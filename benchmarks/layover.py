@@ -55,7 +55,6 @@ _GROUND_RADIUS_PX, _GROUND_CHIP_PX = 10, 80
 # as its joint histogram gets the better the nearer it is.
 _START_PX, _ROUNDS = (2.0, 2.0), 3
 _CHIP_PX = 901
-_QUICK_SEEDS = 1
 
 
 @dataclass(frozen=True)
@@ -198,8 +197,8 @@ def height_line(seed: int) -> tuple[float, float]:
 
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
-    seeds = range(1, 1 + (_QUICK_SEEDS if settings.quick else settings.seeds))
-    found = run_cases([LayoverCase(seed, settings.cache) for seed in seeds], settings.jobs)
+    cases = [LayoverCase(seed, settings.cache) for seed in settings.seed_numbers()]
+    found = run_cases(cases, settings.jobs)
     records = [record for peaks in found for record in peaks.records]
     return SuiteResult(
         "Layover in a simulated dense city",

@@ -73,7 +73,7 @@ class Found:
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
     found: list[Found] = []
-    for seed in range(1, 1 + (1 if settings.quick else settings.seeds)):
+    for seed in settings.seed_numbers():
         found += of_seed(seed, settings.cache)
         print(f"city, seed {seed}: {len(found)} peaks", flush=True)
     cells = {

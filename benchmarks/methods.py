@@ -97,7 +97,7 @@ def choose_scenes(settings: Settings) -> list[Scene]:
     simulations = [
         Simulation(SIZE_PX, density, seed)
         for density in _DENSITIES
-        for seed in range(1, min(settings.seeds, _MOST_SEEDS) + 1)
+        for seed in settings.seed_numbers(_MOST_SEEDS)
     ]
     return [Scene(source, settings.cache) for source in (*cases, *simulations)]
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .accuracy import CORRECT, REFUSED, SILENTLY_WRONG
+from .accuracy import CORRECT, REFUSED
 from .attempt import Outcome, accepted, count
 from .cases import read_cases
 from .cloudy_rates import (
@@ -25,10 +25,11 @@ from .cloudy_rates import (
 from .cloudy_registrations import TOOLS, CloudyRegistration
 from .crossings import counts_by_group, what_was_accepted
 from .match_rates import LIMITS_PX, METHODS, ClearCase, MatchRate
-from .optical_registrations import FreeCrossing, RegistrationCase, crossings
+from .optical_registrations import TOOL, FreeCrossing, RegistrationCase, crossings
 from .optical_speed import SOURCE, time_features, timing_goals, timing_table
+from .real import FreeCase
 from .rotated_pairs import crossed, rotated_cases
-from .suites import Goal, Settings, SuiteResult, Table, run_cases
+from .suites import Case, Goal, Settings, SuiteResult, Table, by_group, none_wrong, run_cases
 from .tables import accuracy_table
 
 KINDS = ("optical-optical", "optical-infrared", "day-night")
@@ -51,8 +52,8 @@ def run(settings: Settings) -> SuiteResult:
     cloudy = _rates(
         [CloudyCase(case, for_others(labels, case.name)) for case in cases], settings.jobs
     )
-    registrations = [RegistrationCase(case, True) for case in cases]
-    registrations += [RegistrationCase(case, False) for case in turned]
+    registrations: list[Case] = [RegistrationCase(case) for case in cases]
+    registrations += [FreeCase(case, TOOL, case.kind) for case in turned]
     outcomes = run_cases(registrations, settings.jobs)
     clouded = [
         CloudyRegistration(case, tool, classified)
@@ -70,15 +71,15 @@ def run(settings: Settings) -> SuiteResult:
         "Optical images by features",
         (
             *goals(clear, cloudy, outcomes, crossed_outcomes),
-            clouded_goal(clouded_outcomes),
+            none_wrong(f"{CLOUDED}: silently wrong", clouded_outcomes),
             *timing_goals(timings),
         ),
         (
             mean_table(clear),
             pair_table("Correct-match rate within 5 px, by pair (%)", clear, list(METHODS)),
             cloud_table(cloudy),
-            accuracy_table("Registrations by match_optical", _by_group(outcomes)),
-            accuracy_table(CLOUDED, _by_group(clouded_outcomes)),
+            accuracy_table("Registrations by match_optical", by_group(outcomes)),
+            accuracy_table(CLOUDED, by_group(clouded_outcomes)),
             outcome_table(outcomes),
             counts_by_group(crossed_outcomes),
             what_was_accepted(crossed_outcomes),
@@ -94,20 +95,6 @@ def run(settings: Settings) -> SuiteResult:
             "for both images.",
         ),
     )
-
-
-def _by_group(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
-    """Return outcomes by their groups, in their order."""
-    groups: dict[str, list[Outcome]] = {}
-    for outcome in outcomes:
-        groups.setdefault(outcome.group, []).append(outcome)
-    return groups
-
-
-def clouded_goal(outcomes: Sequence[Outcome]) -> Goal:
-    """Return the goal of registrations under clouds, with and without a classifier."""
-    wrong = count(outcomes, SILENTLY_WRONG)
-    return Goal(f"{CLOUDED}: silently wrong", "none", f"{wrong} of {len(outcomes)}", wrong == 0)
 
 
 def _rates(cases: Sequence[ClearCase | CloudyCase], jobs: int) -> list[MatchRate]:
@@ -129,8 +116,7 @@ def goals(
         _mean((r for r in clear if r.method == "HOG-81"), lambda r: r.rates[0])
         - _mean((r for r in clear if r.method == "SURF-64"), lambda r: r.rates[0])
     )
-    right, wrong = count(outcomes, CORRECT), count(outcomes, SILENTLY_WRONG)
-    refused, total = count(outcomes, REFUSED), len(outcomes)
+    right, refused, total = count(outcomes, CORRECT), count(outcomes, REFUSED), len(outcomes)
     return (
         Goal("HOG-81 above SURF-64, mean", "at least 5 points", f"{gain:+.1f} points", gain >= 5),
         *(
@@ -143,7 +129,7 @@ def goals(
             f"{right} of {total}, {refused} refused",
             right >= _WANTED_SHARE * total,
         ),
-        Goal("silently wrong", "none", f"{wrong} of {total}", wrong == 0),
+        none_wrong("silently wrong", outcomes),
         Goal(
             "different places: accepted",
             "none",

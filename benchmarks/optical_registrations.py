@@ -10,27 +10,22 @@ from pathlib import Path
 from .attempt import Outcome, Pair, attempt
 from .cases import RealCase, draw_shift, search_radius_m, write_case
 from .crossings import Crossing
+from .real import LARGEST_SHIFT_PX
 from .rotated_pairs import STRIDES, RotatedCase
 
 TOOL = "match_optical"
-LARGEST_SHIFT_PX = 20.0
 FREE_CROSSING = "another place, without georeferencing"
 
 
 @dataclass(frozen=True)
 class RegistrationCase:
-    """A pair that match_optical registers: georeferenced with a wrong shift, or not at all."""
+    """A pair that match_optical registers: georeferenced with a wrong shift."""
 
     case: RealCase
-    georeferenced: bool
 
     def run(self, workers: int | None) -> Outcome:
         """Register the pair and judge the result."""
         case = self.case
-        if not self.georeferenced:
-            truth, lattice = case.truths()
-            pair = Pair(case.reference, case.input, truth, lattice, case.sigma_px)
-            return attempt(case.name, case.kind, pair, workers, tool=TOOL)
         with tempfile.TemporaryDirectory() as folder:
             return attempt(
                 case.name,

@@ -20,11 +20,10 @@ from groundtie.simulation.scene import SceneOptions, generate_scene
 from groundtie.speckle.statistics import estimate_looks, local_statistics
 
 from .cases import read_cases
-from .suites import Settings, SuiteResult, Table
+from .suites import Settings, SuiteResult, Table, by_group
 
 SIZE_PX = 600
 _MARGIN_PX = 192
-_QUICK_SEEDS = 1
 
 # Window of the texture, lags of the autocorrelation, and the step that is an edge between the means
 # of blocks, where the speckle of one look has 1.4 dB.
@@ -178,8 +177,7 @@ def simulated_images(seeds: Iterable[int]) -> Iterator[Likeness]:
 
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
-    seeds = range(1, 1 + (_QUICK_SEEDS if settings.quick else min(settings.seeds, 3)))
-    found = [*real_images(settings.data), *simulated_images(seeds)]
+    found = [*real_images(settings.data), *simulated_images(settings.seed_numbers(3))]
     return SuiteResult(
         "How simulated radar images are like real ones",
         (),
@@ -210,11 +208,8 @@ _COLUMNS: tuple[tuple[str, Callable[[Likeness], float], str], ...] = (
 
 def likeness_table(found: Iterable[Likeness]) -> Table:
     """Return a table with a row for each group of images."""
-    groups: dict[str, list[Likeness]] = {}
-    for one in found:
-        groups.setdefault(one.group, []).append(one)
     rows = []
-    for name, group in groups.items():
+    for name, group in by_group(found).items():
         cells = []
         for _, of, form in _COLUMNS:
             values = np.array([of(one) for one in group])

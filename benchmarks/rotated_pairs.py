@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
-import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +10,10 @@ from pathlib import Path
 import numpy as np
 
 import groundtie
-from groundtie.errors import NotRegisteredError
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 
-from .accuracy import CORRECT, CRASHED, REFUSED, SILENTLY_WRONG
-from .attempt import Outcome, count, unregistered
+from .accuracy import CORRECT, REFUSED, SILENTLY_WRONG
+from .attempt import Outcome, count, tried
 from .cases import RealCase, image_size
 from .suites import Case, Goal, Settings, SuiteResult, run_cases
 from .tables import accuracy_table
@@ -51,20 +48,11 @@ class RotatedCase:
         case, crossed = self.case, self.input is not None
         name = case.name if self.input is None else f"{case.name} × {self.input.stem}"
         group = _CROSSED if crossed else case.kind
-        started = time.perf_counter()
-        try:
-            found = groundtie.estimate_rotation(
-                case.reference, self.input or case.input, workers=workers
-            )
-        except NotRegisteredError as refusal:
-            seconds = time.perf_counter() - started
-            return unregistered(REFUSED, name, group, case.sigma_px, seconds, str(refusal))
-        except Exception as error:
-            # A finding like any other: it is counted, and `run.py` exits with 1.
-            traceback.print_exc()
-            seconds = time.perf_counter() - started
-            return unregistered(CRASHED, name, group, case.sigma_px, seconds, repr(error))
-        seconds = time.perf_counter() - started
+        files = case.reference, self.input or case.input
+        one = tried(lambda: groundtie.estimate_rotation(*files, workers=workers))
+        if one.result is None:
+            return one.unregistered(name, group, case.sigma_px)
+        found = one.result
         size = image_size(case.reference)
         plain = Grid(PIXEL_COORDINATES, None, *size)
         error_px = case.truths()[1].error_px(lambda px: found.transform(plain.pixel_to_map(px)))
@@ -84,7 +72,7 @@ class RotatedCase:
             unknown if crossed else error_px,
             unknown if crossed else error_px,
             case.sigma_px,
-            seconds,
+            one.seconds,
             unknown,
             "similarity",
             reason,

@@ -8,6 +8,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,6 @@ from rasterio.crs import CRS
 from rasterio.errors import NotGeoreferencedWarning
 
 import groundtie
-from groundtie.errors import NotRegisteredError
 from groundtie.rasters.grid import LON_LAT, reproject
 from groundtie.sensor.bias import Bias, fold
 from groundtie.sensor.rpc import RPC
@@ -24,9 +24,9 @@ from groundtie.sensor.rpc_files import read_rpc
 from groundtie.sensor.rpc_tags import rpc_to_tags
 
 from .accuracy import CORRECT, CORRECT_PX, REFUSED, FloatArray, classify
-from .attempt import Outcome, count, unregistered
+from .attempt import Outcome, count, tried
 from .half_real import BIASES, PLACES, SENSORS, bias_of, make_scene, place_case, sensor_rpc
-from .suites import Case, Goal, Settings, SuiteResult, run_cases
+from .suites import Case, Goal, Settings, SuiteResult, by_group, run_cases
 from .tables import accuracy_table
 
 HALF_REAL, ROUND_TRIP, BLUNDERS = "half real", "round trip", "blunders"
@@ -80,24 +80,20 @@ class HalfRealCase:
                 Path(folder),
             )
             output, table = Path(folder) / "refined_RPC.TXT", Path(folder) / "points.csv"
-            started = time.perf_counter()
-            try:
-                result = groundtie.refine_rpc(
-                    scene.image,
-                    output,
-                    reference=scene.reference,
-                    dem=scene.dem,
-                    dem_datum="ellipsoidal",
-                    mask=MASKS.get(self.group, "none"),
-                    residuals=table,
-                    workers=workers,
-                )
-            except NotRegisteredError as refusal:
-                seconds = time.perf_counter() - started
-                return unregistered(
-                    REFUSED, self.name, self.group, scene.sigma_px, seconds, str(refusal)
-                )
-            seconds = time.perf_counter() - started
+            refine = partial(
+                groundtie.refine_rpc,
+                scene.image,
+                output,
+                reference=scene.reference,
+                dem=scene.dem,
+                dem_datum="ellipsoidal",
+                mask=MASKS.get(self.group, "none"),
+                residuals=table,
+                workers=workers,
+            )
+            one = tried(refine)
+            if one.result is None:
+                return one.unregistered(self.name, self.group, scene.sigma_px)
             error = scene.error_px(read_rpc(output))
             kept = misses(scene.truth, table, crs_of(scene.reference))
         verdict = classify(True, error, scene.sigma_px)
@@ -109,9 +105,9 @@ class HalfRealCase:
             error,
             error,
             scene.sigma_px,
-            seconds,
-            result.verdict.check_rmse_px,
-            result.adjustment.bias.kind,
+            one.seconds,
+            one.result.verdict.check_rmse_px,
+            one.result.adjustment.bias.kind,
             near_the_truth(kept),
         )
 
@@ -140,23 +136,21 @@ class SimulatedCase:
                 drift=random.uniform(0, 4),
                 seed=self.seed,
             )
-            started = time.perf_counter()
-            try:
-                result = groundtie.refine_rpc(
-                    scene / "sensor.tif",
-                    scene / "refined_RPC.TXT",
-                    reference=scene / "reference.tif",
-                    dem=scene / "dem.tif",
-                    dem_datum="ellipsoidal",
-                    search_radius=1.1 * _LARGEST_SHIFT_M,
-                    mask=MASKS.get(self.group, "none"),
-                    residuals=scene / "points.csv",
-                    workers=workers,
-                )
-            except NotRegisteredError as refusal:
-                seconds = time.perf_counter() - started
-                return unregistered(REFUSED, self.name, self.group, 0.0, seconds, str(refusal))
-            seconds = time.perf_counter() - started
+            refine = partial(
+                groundtie.refine_rpc,
+                scene / "sensor.tif",
+                scene / "refined_RPC.TXT",
+                reference=scene / "reference.tif",
+                dem=scene / "dem.tif",
+                dem_datum="ellipsoidal",
+                search_radius=1.1 * _LARGEST_SHIFT_M,
+                mask=MASKS.get(self.group, "none"),
+                residuals=scene / "points.csv",
+                workers=workers,
+            )
+            one = tried(refine)
+            if one.result is None:
+                return one.unregistered(self.name, self.group, 0.0)
             crs = crs_of(scene / "reference.tif")
             error = rms(
                 misses(read_rpc(scene / "refined_RPC.TXT"), scene / "check_points.csv", crs)
@@ -170,9 +164,9 @@ class SimulatedCase:
             error,
             error,
             0.0,
-            seconds,
-            result.verdict.check_rmse_px,
-            result.adjustment.bias.kind,
+            one.seconds,
+            one.result.verdict.check_rmse_px,
+            one.result.adjustment.bias.kind,
             near_the_truth(kept),
         )
 
@@ -317,14 +311,10 @@ def run(settings: Settings) -> SuiteResult:
         for sensor in SENSORS
         for number in range(1 if settings.quick else BIASES)
     ]
-    cases += [
-        SimulatedCase(group, seed)
-        for group in DENSITY
-        for seed in range(1, (1 if settings.quick else settings.seeds) + 1)
-    ]
+    cases += [SimulatedCase(group, seed) for group in DENSITY for seed in settings.seed_numbers()]
     outcomes = run_cases(cases, settings.jobs)
     kinds = (HALF_REAL, HALF_REAL_MASKED, ROUND_TRIP, BLUNDERS, *DENSITY)
-    groups = {kind: [o for o in outcomes if o.group == kind] for kind in kinds}
+    groups = by_group(outcomes, kinds)
     return SuiteResult(
         "RPCs",
         (

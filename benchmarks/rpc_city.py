@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-import time
-import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
@@ -14,14 +12,14 @@ from typing import Any
 import numpy as np
 
 import groundtie
-from groundtie.errors import NotRegisteredError
 from groundtie.sensor.rpc_files import read_rpc
 
 from .accuracy import CORRECT, CRASHED, INACCURATE, REFUSED, SILENTLY_WRONG, FloatArray
-from .attempt import Outcome, accepted, count, unregistered
+from .attempt import Outcome, count, tried
 from .rpc import crs_of, image_positions, misses, rms
 from .simulations import kept, simulator_version
-from .suites import Goal, Settings, SuiteResult, Table, run_cases
+from .suites import Goal, Settings, SuiteResult, Table, by_group, run_cases
+from .tables import error_cells
 
 SIZES_PX = (700, 1000)
 LOOKS = (1.0, 4.0)
@@ -46,6 +44,18 @@ class Run:
         """Return the parameters for the scene in a folder."""
         given = self.parameters.items()
         return {name: scene / v if isinstance(v, Path) else v for name, v in given}
+
+    def call(self, scene: Path, output: Path, workers: int | None) -> Any:
+        """Return what the tool makes of the scene in a folder."""
+        return getattr(groundtie, self.tool)(
+            image=scene / "sensor.tif",
+            reference=scene / "reference.tif",
+            output=output,
+            dem=scene / "dem.tif",
+            dem_datum="ellipsoidal",
+            workers=workers,
+            **self.on(scene),
+        )
 
 
 _RPC = "refined_RPC.TXT"
@@ -110,22 +120,13 @@ class CityCase:
         """Make the scene if need be, run the tool, and judge what it found by the truth."""
         scene, name = self.city.scene(self.cache), f"{self.what}, {self.city.name}"
         with tempfile.TemporaryDirectory() as folder:
-            output = Path(folder) / RUNS[self.what].output
-            started = time.perf_counter()
-            try:
-                result = self._call(scene, output, workers)
-            except NotRegisteredError as refusal:
-                seconds = time.perf_counter() - started
-                reason = str(refusal) if refusal.verdict is None else refusal.verdict.reason
-                return unregistered(REFUSED, name, self.group, 0.0, seconds, reason)
-            except Exception as error:
-                # A finding like any other: it is counted, and `run.py` exits with 1.
-                traceback.print_exc()
-                seconds = time.perf_counter() - started
-                return unregistered(CRASHED, name, self.group, 0.0, seconds, repr(error))
-            seconds = time.perf_counter() - started
+            wanted = RUNS[self.what]
+            output = Path(folder) / wanted.output
+            one = tried(lambda: wanted.call(scene, output, workers))
+            if one.result is None:
+                return one.unregistered(name, self.group, 0.0)
             error_px = true_error_px(scene, output)
-        verdict, summary = judge(error_px), result.summary()
+        verdict, summary = judge(error_px), one.result.summary()
         return Outcome(
             name,
             self.group,
@@ -134,22 +135,10 @@ class CityCase:
             error_px,
             error_px,
             0.0,
-            seconds,
+            one.seconds,
             summary["verdict"]["check_rmse_px"],
             summary.get("bias", {}).get("model", "points"),
             summary["verdict"]["reason"],
-        )
-
-    def _call(self, scene: Path, output: Path, workers: int | None) -> Any:
-        run, files = RUNS[self.what], (scene / "sensor.tif", scene / "reference.tif")
-        return getattr(groundtie, run.tool)(
-            image=files[0],
-            reference=files[1],
-            output=output,
-            dem=scene / "dem.tif",
-            dem_datum="ellipsoidal",
-            workers=workers,
-            **run.on(scene),
         )
 
 
@@ -193,8 +182,7 @@ def judge(error_px: float) -> str:
 
 def cases(settings: Settings) -> list[CityCase]:
     """Return the cases, city by city."""
-    seeds = 1 if settings.quick else min(settings.seeds, SEEDS)
-    numbers = range(settings.first_seed, settings.first_seed + seeds)
+    numbers = settings.seed_numbers(SEEDS)
     cities = [City(*values) for values in product(SIZES_PX, LOOKS, numbers)]
     cities = cities[:1] if settings.quick else cities
     return [CityCase(city, what, settings.cache) for city in cities for what in RUNS]
@@ -207,11 +195,9 @@ def run(settings: Settings) -> SuiteResult:
     for city in dict.fromkeys(case.city for case in wanted):
         city.scene(settings.cache)
     outcomes = run_cases(wanted, settings.jobs)
-    kinds: dict[str, list[Outcome]] = {what: [] for what in RUNS}
-    groups: dict[str, list[Outcome]] = {}
+    groups, kinds = by_group(outcomes), {what: list[Outcome]() for what in RUNS}
     for case, outcome in zip(wanted, outcomes, strict=True):
         kinds[case.what].append(outcome)
-        groups.setdefault(outcome.group, []).append(outcome)
     return SuiteResult(
         "RPCs and ground control in dense cities",
         goals(kinds),
@@ -234,7 +220,7 @@ def goals(kinds: Mapping[str, Sequence[Outcome]]) -> tuple[Goal, ...]:
             f"{what}: accepted though more than {WRONG_PX:g} px wrong",
             "reported" if what == MASKED else "none",
             f"{count(outcomes, SILENTLY_WRONG)} of {len(outcomes)}, "
-            f"largest error {_largest(outcomes)} px",
+            f"largest error {error_cells(outcomes)[1]} px",
             None if what == MASKED else not count(outcomes, SILENTLY_WRONG),
         )
         for what, outcomes in kinds.items()
@@ -259,20 +245,9 @@ def verdict_table(
             name,
             str(len(outcomes)),
             *(str(count(outcomes, verdict)) for verdict in verdicts),
-            _median(outcomes),
-            _largest(outcomes),
+            *error_cells(outcomes),
         ]
         for name, outcomes in groups.items()
     ]
     head = ("", "cities", *verdicts, "median error (px)", "largest (px)")
     return Table(title, head, rows)
-
-
-def _median(outcomes: Sequence[Outcome]) -> str:
-    errors = [outcome.error_px for outcome in accepted(outcomes)]
-    return f"{np.median(errors):.2f}" if errors else "–"
-
-
-def _largest(outcomes: Sequence[Outcome]) -> str:
-    errors = [outcome.error_px for outcome in accepted(outcomes)]
-    return f"{max(errors):.2f}" if errors else "–"

@@ -62,7 +62,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--seeds",
         type=_seeds,
         default=(1, 20),
-        help="simulated pairs of each kind; for many suites also a range, A-B",
+        help="simulated pairs of each kind, or a range of their seeds, A-B",
     )
     parser.add_argument(
         "--jobs",

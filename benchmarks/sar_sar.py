@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from . import feature_counts
-from .accuracy import CORRECT, REFUSED, SILENTLY_WRONG
-from .attempt import Outcome, Pair, accepted, attempt, count
-from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
+from .accuracy import CORRECT, REFUSED
+from .attempt import Outcome, accepted, attempt, count
+from .cases import RealCase, read_cases
 from .crossings import Crossing, crossings
-from .real import LARGEST_SHIFT_PX, SHIFTS
+from .real import SHIFTS, FreeCase, ShiftedCase
 from .sar_pairs import CHANGED_BUILDINGS, INCIDENCES_DEG, SarPair
-from .suites import Case, Goal, Settings, SuiteResult, Table, run_cases
+from .suites import Case, Goal, Settings, SuiteResult, Table, by_group, none_wrong, run_cases
 from .tables import accuracy_table
 
 TOOL = "match_sar_sar"
@@ -25,7 +24,7 @@ SAR_SAR = "sar-sar"
 
 # Cases whose images are turned by 18°: they are matched without georeferencing, too.
 _TURNED = ("ss-ponds", "ss-meander")
-_FREE = "without georeferencing"
+FREE = "without georeferencing"
 
 # Masks of simulated pairs: the simulator's ground, what the tool finds by itself, none.
 _GROUND, _REGIONS, _NO_MASK = "ground mask", "mask=regions", "no mask"
@@ -40,31 +39,6 @@ _QUICK_CROSSINGS = 20
 _WANTED_CORRECT = 0.95
 _LARGEST_ERROR_PX = {False: 1.0, True: 2.0}
 _LONGEST_S = 15.0
-
-
-@dataclass(frozen=True)
-class RealAttempt:
-    """A real pair: with a wrong shift of a number, or without georeferencing (None)."""
-
-    case: RealCase
-    number: int | None
-
-    def run(self, workers: int | None) -> Outcome:
-        """Register the pair and judge the result."""
-        case, number = self.case, self.number
-        if number is None:
-            pair = Pair(case.reference, case.input, *case.truths(), case.sigma_px)
-            return attempt(case.name, _FREE, pair, workers, tool=TOOL)
-        shift = draw_shift(case, LARGEST_SHIFT_PX, number)
-        with tempfile.TemporaryDirectory() as folder:
-            return attempt(
-                f"{case.name} ({shift[0]:+.1f}, {shift[1]:+.1f})",
-                SAR_SAR,
-                write_case(case, shift, Path(folder)),
-                workers,
-                tool=TOOL,
-                search_radius=search_radius_m(LARGEST_SHIFT_PX),
-            )
 
 
 @dataclass(frozen=True)
@@ -95,7 +69,7 @@ def _group(opposite: bool, mask: str) -> str:
     return f"{'opposite orbits' if opposite else 'same orbit'}, {mask}"
 
 
-def simulations(seeds: int) -> list[SarPair]:
+def simulations(seeds: range) -> list[SarPair]:
     """Return pairs of both kinds of orbits; density and looks go round with the seed."""
     return [
         SarPair(
@@ -106,7 +80,7 @@ def simulations(seeds: int) -> list[SarPair]:
             opposite,
         )
         for opposite in (False, True)
-        for seed in range(1, seeds + 1)
+        for seed in seeds
     ]
 
 
@@ -116,8 +90,12 @@ def run(settings: Settings) -> SuiteResult:
     own = [case for case in every if case.kind == SAR_SAR]
     detectors, chains, turns = _counts(own)
     real: list[Case] = [
-        *(RealAttempt(c, n) for c in own for n in range(1 if settings.quick else SHIFTS)),
-        *(RealAttempt(case, None) for case in own if case.name in _TURNED),
+        *(
+            ShiftedCase(case, number, tool=TOOL)
+            for case in own
+            for number in range(1 if settings.quick else SHIFTS)
+        ),
+        *(FreeCase(case, TOOL, FREE) for case in own if case.name in _TURNED),
     ]
     crossed = [
         Crossing(one.reference, one.input, TOOL)
@@ -126,7 +104,7 @@ def run(settings: Settings) -> SuiteResult:
     ]
     simulated: list[Case] = [
         SimulatedAttempt(simulation, mask, settings.cache)
-        for simulation in simulations(1 if settings.quick else settings.seeds)
+        for simulation in simulations(settings.seed_numbers())
         for mask in MASKS
     ]
     outcomes = {
@@ -141,9 +119,8 @@ def run(settings: Settings) -> SuiteResult:
     large = SimulatedAttempt(SarPair(_LARGE_PX, "rural", 1, 4, True), _GROUND, settings.cache)
     large.simulation.pair(settings.cache)
     outcomes["large"] = run_cases([large], 1)
-    groups = {_group(opposite, mask): [] for mask in MASKS for opposite in (False, True)}
-    for outcome in outcomes["simulated"]:
-        groups[outcome.group].append(outcome)
+    names = [_group(opposite, mask) for mask in MASKS for opposite in (False, True)]
+    groups = by_group(outcomes["simulated"], names)
     pairs = {
         name: [o for o in outcomes["real"] if o.name.split(" ")[0] == name]
         for name in (case.name for case in own)
@@ -198,9 +175,8 @@ def _counts(
 
 def real_goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
     """Return the goals on real pairs and what was found."""
-    wrong = count(outcomes, SILENTLY_WRONG)
     right, refused = count(outcomes, CORRECT), count(outcomes, REFUSED)
-    free = [outcome for outcome in outcomes if outcome.group == _FREE]
+    free = [outcome for outcome in outcomes if outcome.group == FREE]
     found = f"{right} of {len(outcomes)}, {refused} refused"
     return (
         Goal(
@@ -209,7 +185,7 @@ def real_goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
             found,
             right + refused == len(outcomes),
         ),
-        Goal("Real pairs: silently wrong", "none", str(wrong), wrong == 0),
+        none_wrong("Real pairs: silently wrong", outcomes),
         Goal(
             "Turned by 18°, without georeferencing: correct",
             "all",
@@ -240,12 +216,7 @@ def other_goals(
                 )
             )
         both = [*groups[_group(False, mask)], *groups[_group(True, mask)]]
-        wrong = count(both, SILENTLY_WRONG)
-        goals.append(
-            Goal(
-                f"Simulated, {mask}: silently wrong", "none", f"{wrong} of {len(both)}", wrong == 0
-            )
-        )
+        goals.append(none_wrong(f"Simulated, {mask}: silently wrong", both))
     goals.append(
         Goal(
             f"{_LARGE_PX}×{_LARGE_PX} px, end to end",

@@ -116,10 +116,9 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def _simulated(settings: Settings) -> list[Run]:
-    seeds = 1 if settings.quick else min(settings.seeds, _MOST_SEEDS)
     count, bad = (7, (2, 4)) if settings.quick else (_DATES, _BAD)
     runs = []
-    for seed in range(settings.first_seed, settings.first_seed + seeds):
+    for seed in settings.seed_numbers(_MOST_SEEDS):
         with tempfile.TemporaryDirectory() as folder:
             series = simulate_series(Path(folder) / "dates", settings.cache, seed, count, bad)
             for reference in (series.files[0], None):

@@ -6,18 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
-from .accuracy import CORRECT, SILENTLY_WRONG
-from .attempt import Outcome, accepted, attempt, count
+from .accuracy import CORRECT
+from .attempt import Outcome, attempt, count, median_px
 from .city import city
 from .sar_pairs import SarPair
 from .simulations import Simulation
-from .suites import Case, Goal, Settings, SuiteResult, run_cases
+from .suites import Case, Goal, Settings, SuiteResult, by_group, none_wrong, run_cases
 from .tables import accuracy_table
 
 SIZE_PX = 1000
-_QUICK_SEEDS = 1
 
 _WANTED_CORRECT = 0.95
 
@@ -68,15 +65,14 @@ def changes(seeds: range, cache: Path) -> list[Case]:
 
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
-    seeds = range(1, 1 + (_QUICK_SEEDS if settings.quick else settings.seeds))
+    seeds = settings.seed_numbers()
     cases: list[Case] = [
         SimulatedCase(Simulation(SIZE_PX, density, seed), density, settings.cache)
         for density in _MEDIAN_ERROR_PX
         for seed in seeds
     ]
     outcomes = run_cases(cases + changes(seeds, settings.cache), settings.jobs)
-    names = dict.fromkeys(outcome.group for outcome in outcomes)
-    groups = {name: [o for o in outcomes if o.group == name] for name in names}
+    groups = by_group(outcomes)
     return SuiteResult(
         f"Simulated pairs, {SIZE_PX}×{SIZE_PX} px",
         [goal for name, group in groups.items() for goal in goals(name, group)],
@@ -88,9 +84,7 @@ def run(settings: Settings) -> SuiteResult:
 
 def goals(name: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
     """Return the goals for one density, or one kind of change, and what was found."""
-    correct, wrong = count(outcomes, CORRECT), count(outcomes, SILENTLY_WRONG)
-    errors = [outcome.error_px for outcome in accepted(outcomes)]
-    median = float(np.median(errors)) if errors else float("nan")
+    correct, median = count(outcomes, CORRECT), median_px(outcomes)
     largest = _MEDIAN_ERROR_PX.get(name)
     title = name.capitalize()
     share = f"{correct} of {len(outcomes)} ({correct / len(outcomes):.0%})"
@@ -107,5 +101,5 @@ def goals(name: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
             f"{median:.2f} px",
             None if largest is None else median <= largest,
         ),
-        Goal(f"{title}: silently wrong", "none", f"{wrong} of {len(outcomes)}", wrong == 0),
+        none_wrong(f"{title}: silently wrong", outcomes),
     )

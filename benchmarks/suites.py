@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import cv2
 
-from .attempt import Outcome
+from .accuracy import SILENTLY_WRONG
+from .attempt import Outcome, count
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,11 @@ class Settings:
         Folder of the real image pairs.
     cache
         Folder of simulated pairs, which take long to make.
-    first_seed, sample, classes, named, save
-        The first of the seeds, of attacks, calibration and towns; of attacks alone: how many cases,
-        of all classes; which classes; which by their names; a folder for the images.
+    first_seed
+        The first of the seeds.
+    sample, classes, named, save
+        Of attacks alone: how many cases, of all classes; which classes; which by their names; a
+        folder for the images.
     """
 
     quick: bool
@@ -46,6 +49,11 @@ class Settings:
     classes: tuple[str, ...] = ()
     named: tuple[str, ...] = ()
     save: Path | None = None
+
+    def seed_numbers(self, most: int | None = None) -> range:
+        """Return the seeds, at most so many; quickly, it is one."""
+        number = min(self.seeds, most or self.seeds)
+        return range(self.first_seed, self.first_seed + (1 if self.quick else number))
 
 
 class Case(Protocol):
@@ -71,6 +79,31 @@ class Goal:
     wanted: str
     found: str
     reached: bool | None
+
+
+def none_wrong(what: str, outcomes: Sequence[Outcome]) -> Goal:
+    """Return the goal that no registration is silently wrong, and what was found."""
+    wrong = count(outcomes, SILENTLY_WRONG)
+    return Goal(what, "none", f"{wrong} of {len(outcomes)}", wrong == 0)
+
+
+class Grouped(Protocol):
+    """What is counted with others."""
+
+    @property
+    def group(self) -> str:
+        """Name of the cases that are counted together."""
+
+
+G = TypeVar("G", bound=Grouped)
+
+
+def by_group(found: Iterable[G], names: Iterable[str] = ()) -> dict[str, list[G]]:
+    """Return what was found by its groups: those that are named first, then as they come."""
+    groups: dict[str, list[G]] = {name: [] for name in names}
+    for one in found:
+        groups.setdefault(one.group, []).append(one)
+    return groups
 
 
 @dataclass(frozen=True)

@@ -36,20 +36,24 @@ def accuracy_table(title: str, groups: Mapping[str, Sequence[Outcome]]) -> Table
 
 def _accuracy_row(name: str, outcomes: Sequence[Outcome]) -> list[str]:
     sigmas = sorted({outcome.sigma_px for outcome in outcomes})
-    errors = [o.error_px for o in accepted(outcomes)]
     lattice_errors = [o.lattice_error_px for o in accepted(outcomes)]
     return [
         name,
         "–".join(f"{sigma:g}" for sigma in dict.fromkeys((sigmas[0], sigmas[-1]))),
         str(len(outcomes)),
         *(str(count(outcomes, verdict)) for verdict in VERDICTS),
-        f"{np.median(errors):.2f}" if errors else "–",
-        f"{max(errors):.2f}" if errors else "–",
+        *error_cells(outcomes),
         str(count(outcomes, CORRECT, on_lattice=True)),
         str(count(outcomes, SILENTLY_WRONG, on_lattice=True)),
         f"{np.median(lattice_errors):.2f}" if lattice_errors else "–",
         f"{np.median([o.seconds for o in outcomes]):.1f}",
     ]
+
+
+def error_cells(outcomes: Sequence[Outcome]) -> tuple[str, str]:
+    """Return the median and the largest error of what was accepted."""
+    errors = [outcome.error_px for outcome in accepted(outcomes)]
+    return (f"{np.median(errors):.2f}", f"{max(errors):.2f}") if errors else ("–", "–")
 
 
 def goals_table(goals: Sequence[Goal]) -> Table:

@@ -17,7 +17,7 @@ from groundtie.rasters.grid import Grid
 
 from ..accuracy import FloatArray, lattice
 from ..accuracy import Mapping as PixelMapping
-from ..cases import CRS, REFERENCE_TRANSFORM
+from ..cases import CRS, REFERENCE_TRANSFORM, write_image
 
 Image = NDArray[np.uint8]
 Change = Callable[[Image], Image]
@@ -215,20 +215,7 @@ class Pair:
             ("i.tif", self.input, self.input_transform, self.input_crs),
         )
         for name, image, transform, crs in images:
-            bands, rows, columns = image.shape
-            with rasterio.open(
-                folder / name,
-                "w",
-                driver="GTiff",
-                count=bands,
-                height=rows,
-                width=columns,
-                dtype=image.dtype,
-                crs=crs,
-                transform=transform,
-                nodata=NODATA,
-            ) as target:
-                target.write(image)
+            write_image(image, transform, folder / name, crs, NODATA)
 
 
 def pixels(size: tuple[int, int]) -> FloatArray:

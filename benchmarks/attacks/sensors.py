@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import math
 import tempfile
-import time
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from shutil import copytree
-from typing import Any
 
 import numpy as np
 import rasterio
@@ -147,21 +145,10 @@ class SensorCase:
         """Make the scene, let the tool try, and judge what it wrote."""
         with tempfile.TemporaryDirectory() as temporary:
             scene, moved = self.make(Path(temporary) / "scene")
-            output = Path(temporary) / RUNS[self.tool].output
-            started = time.perf_counter()
-
-            def call() -> Any:
-                return getattr(groundtie, self.tool)(
-                    image=scene / "sensor.tif",
-                    reference=scene / "reference.tif",
-                    output=output,
-                    dem=scene / "dem.tif",
-                    dem_datum="ellipsoidal",
-                    workers=workers,
-                )
-
+            wanted = RUNS[self.tool]
+            output = Path(temporary) / wanted.output
+            call = partial(wanted.call, scene, output, workers)
             result, outcome = attempted(self, "rpc", 0.0, "", call)
-            outcome = replace(outcome, seconds=time.perf_counter() - started)
             if result is None:
                 return outcome
             off = np.hypot(*errors_px(scene, output, moved).T)

@@ -62,7 +62,7 @@ def test_shifted_cases_are_drawn_and_registered_with_their_radius(
     real.ShiftedCase(cases["hills"], 3, 75.0).run(2)
     ((name, group, workers, parameters),) = calls
     assert name.startswith("hills (") and (group, workers) == ("sar-optical", 2)
-    assert parameters == {"search_radius": search_radius_m(75.0)}
+    assert parameters == {"tool": "coregister", "search_radius": search_radius_m(75.0)}
 
 
 @pytest.mark.parametrize(

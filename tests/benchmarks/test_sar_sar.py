@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from benchmark_outcomes import outcome
 
-from benchmarks import sar_sar
+from benchmarks import real
 from benchmarks.accuracy import CORRECT, REFUSED, SILENTLY_WRONG
 from benchmarks.cases import RealCase
+from benchmarks.real import FreeCase, ShiftedCase
 from benchmarks.sar_sar import (
+    FREE,
     MASKS,
-    RealAttempt,
+    TOOL,
     SimulatedAttempt,
     other_goals,
     real_goals,
@@ -21,7 +24,7 @@ from benchmarks.sar_sar import (
 
 
 def test_simulations_go_through_densities_and_looks_for_both_orbits() -> None:
-    made = simulations(20)
+    made = simulations(range(1, 21))
     assert len(made) == 40 == len({one.name for one in made})
     assert {one.looks for one in made} == {1, 2, 3, 4}
     assert {one.density for one in made} == {"rural", "suburban"}
@@ -37,9 +40,10 @@ def test_real_pairs_are_registered_by_the_tool(
         calls.append((name, group, more))
         return outcome()
 
-    monkeypatch.setattr(sar_sar, "attempt", attempt)
-    RealAttempt(cases["hills"], 0).run(1)
-    RealAttempt(cases["hills"], None).run(1)
+    monkeypatch.setattr(real, "attempt", attempt)
+    hills = replace(cases["hills"], kind="sar-sar")
+    ShiftedCase(hills, 0, tool=TOOL).run(1)
+    FreeCase(hills, TOOL, FREE).run(1)
     assert [call[1] for call in calls] == ["sar-sar", "without georeferencing"]
     assert all(call[2]["tool"] == "match_sar_sar" for call in calls)
     # Without georeferencing nothing is told of where the images lie.
@@ -59,7 +63,7 @@ def test_goals_on_simulated_pairs_count_errors_by_orbit() -> None:
             SimulatedAttempt(one, mask, Path()).group: [
                 outcome(CORRECT, opposite_px if one.opposite else same_px)
             ]
-            for one in simulations(1)
+            for one in simulations(range(1, 2))
             for mask in MASKS
         }
         assert len(simulated) == 2 * len(MASKS)

@@ -17,7 +17,6 @@ Labels = npt.NDArray[np.int32]
 
 _SUBPIXEL_BITS = 4
 _PROBES_PER_SIDE = 6
-_CROWN_M = 4.0
 
 
 class Acquisition(IntEnum):
@@ -154,7 +153,7 @@ class Canvas:
         """Whether the ground along an outline is of certain covers."""
         return any(self._cover_at(p) in covers for p in points_along(outline, _PROBES_PER_SIDE))
 
-    def _scatter_trees(self, polygon: Polygon, mean_count: float, share: float) -> None:
+    def _scatter_trees(self, polygon: Polygon, mean_count: float, share: float = 0.9) -> None:
         """Draw places of trees in the middle share of the box around a polygon."""
         centre, half, angle = main_frame(polygon)
         for _ in range(int(self._random.poisson(mean_count))):
@@ -164,13 +163,13 @@ class Canvas:
     def _plant_trees(
         self, kinds: int, highest_m: float, crown_m: float, keep_off: tuple[Cover, ...]
     ) -> None:
-        """Let trees grow in their places, with crowns of `crown_m` to `_CROWN_M` in radius."""
+        """Let trees grow in their places, with crowns of `crown_m` to 4 m in radius."""
         parcels = [
             self._add(Cover.FOREST, self._random.uniform(4, highest_m)) for _ in range(kinds)
         ]
         for place in self._trees:
             kind, size = self._random.random(2).tolist()
-            radius = (crown_m + (_CROWN_M - crown_m) * size) * self._scale
+            radius = (crown_m + (4.0 - crown_m) * size) * self._scale
             if radius >= 1:
                 crown = self._blob(place, radius)
                 self._things.append(Tree(crown, parcels[int(kind * kinds)], place, keep_off))

@@ -38,9 +38,6 @@ _TREE_PITCH_M = 14.0
 _KINDS = 10
 _WINDOW_M = (2.8, 4.5)
 
-# Of the box around a block, the share that trees stand in.
-_PLANTED = 0.92
-
 
 @dataclass(frozen=True)
 class _Street:
@@ -206,4 +203,4 @@ class CityLayout(Canvas):
         return list(zip(x[inside].tolist(), y[inside].tolist(), strict=True))
 
     def _scatter_over(self, block: Polygon, per_m2: float) -> None:
-        self._scatter_trees(block, area(block) / self._scale**2 * per_m2, _PLANTED)
+        self._scatter_trees(block, area(block) / self._scale**2 * per_m2, 0.92)

@@ -55,9 +55,6 @@ _ARTERIAL_M = {"rural": 7.0, "suburban": 12.0, "urban": 18.0}
 _FARMSTEAD_CHANCE = 0.5
 _LAKE_M2 = 400_000
 
-# Of the box around a lot, the share that trees stand in.
-_PLANTED = 0.9
-
 
 def highest_object_m(density: str) -> float:
     """Return the greatest height that a building or a canopy of a scene can have."""
@@ -127,7 +124,7 @@ class Layout(Canvas):
             self._fill(block, self._add(Cover.FOREST, self._random.uniform(*CANOPY_M)))
         elif use is PARK:
             self._fill(block, self._add(Cover.GRASS))
-            self._scatter_trees(block, half[0] * half[1] / (120 * self._scale**2), _PLANTED)
+            self._scatter_trees(block, half[0] * half[1] / (120 * self._scale**2))
         else:
             self._fill(block, self._add(Cover.FIELD, rows_rad=angle + math.pi / 2))
 
@@ -144,7 +141,7 @@ class Layout(Canvas):
                 share = self._random.random() ** 2.5
                 low, high = use.height_m
                 self._buildings.append((footprint, low + (high - low) * share))
-            self._scatter_trees(lot, use.trees_per_lot, _PLANTED)
+            self._scatter_trees(lot, use.trees_per_lot)
 
     def _place_farmstead(self, field: Polygon) -> None:
         centre, half, angle = main_frame(field)

@@ -15,16 +15,22 @@ from scipy.ndimage import gaussian_filter
 
 from ..rasters.reading import FloatImage
 
+# Points of each pixel's surface; the least height of a wall; the width of the Gaussian that heights
+# are smoothed by for the walls' direction; and how far below a ray is rounding.
 _SAMPLES_PER_PIXEL = 2
 _MIN_WALL_PX = 0.5
 _NORMAL_SIGMA_PX = 1.5
 LEVEL_PX = 0.05
+
+# Power of a square metre of wall that faces the radar, and of a corner at its foot for each pixel
+# of its height, which falls off within some degrees.
 _WALL_BACKSCATTER = 0.3
+_DOUBLE_BOUNCE_PER_PX = 1.2
+_CORNER_WIDTH_COS = math.cos(math.radians(12))
+
 # Share of a wall's power that comes from the corners of its windows, and where in a storey.
 _GLITTER_SHARE = 0.7
 _SILL = 0.3
-_DOUBLE_BOUNCE_PER_PX = 1.2
-_CORNER_WIDTH_COS = math.cos(math.radians(12))
 
 
 @dataclass(frozen=True)

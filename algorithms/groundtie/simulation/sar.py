@@ -25,6 +25,8 @@ from .scene import Scene
 
 ORBITS = ("ascending", "descending")
 
+# How like real radar images all this is, `benchmarks/run.py --only radar_likeness` measures.
+
 # Standard deviation of the fine texture of each class in dB, in the order of Cover.
 _TEXTURE_DB = np.array([0.3, 0.6, 0.8, 2.0, 0.3, 2.5, 2.5, 2.0, 2.0, 0.3], np.float32)
 _PATCH_DB = 0.7

@@ -22,8 +22,11 @@ Place = tuple[float, ...]
 Similarity = Callable[[Place], float]
 Climb = Callable[[Similarity, "PoseSpace", Place, np.random.Generator], Place]
 
-# Peaks nearer than this are the same candidate, in pixels; so many are returned.
-_SAME_PX = 4.0
+# About as wide is a peak of the similarity, in pixels; so exact a place is wanted.
+PEAK_PX = 4.0
+PRECISION_PX = 0.05
+
+# So many candidates are returned at most.
 _CANDIDATES = 4
 
 # Ends of climbs that are the same place, in pixels; on aligned grids they are exact.
@@ -181,7 +184,7 @@ def search_by_climbing(
     level, spread = _background(background)
     found: list[Place] = []
     for end in sorted(ends, key=similarity, reverse=True):
-        distinct = all(_apart_px(end, other) > _SAME_PX for other in found)
+        distinct = all(_apart_px(end, other) > PEAK_PX for other in found)
         if distinct and similarity(end) != pair.nothing:
             found.append(end)
     evaluations = similarity.cache_info().misses

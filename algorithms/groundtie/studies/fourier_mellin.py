@@ -26,6 +26,7 @@ from .phase_correlation import remaining_shift, shifts_at
 from .spectra import (
     ANGLE_STEP_DEG,
     ANGLES,
+    WHITENING,
     correlation,
     evened,
     gaussian_peak,
@@ -53,10 +54,6 @@ _LOG_STEP = float(np.log(_RANGE[1] / _RANGE[0]) / (_FREQUENCIES - 1))
 
 # Detail of the correlation that is kept: standard deviation, in cycles per bin.
 _BAND = 0.1
-
-# Magnitudes of the cross-power spectrum are raised to 1 less this: 1 is phase correlation, which
-# is exact, 0 a plain correlation, which tolerates more difference between the images.
-_WHITENING = 0.5
 
 # Candidates of rotation and scale: how many are tried.
 CANDIDATES = 20
@@ -118,7 +115,7 @@ def correlate_spectra(reference: Image, input: Image) -> Surface:
     # The reference at a bin further on looks like the input: an input that is rotated
     # counter-clockwise has its spectrum at smaller angles, a larger one at lower frequencies.
     first, second = (scipy.fft.fft2(s * fading, shape) for s in (reference, input))
-    return normalise(correlation(first * second.conj(), _BAND, _WHITENING).astype(np.float32))
+    return normalise(correlation(first * second.conj(), _BAND, WHITENING).astype(np.float32))
 
 
 def rotations(surface: Surface, limits: SearchLimits, count: int) -> Iterator[Pose]:

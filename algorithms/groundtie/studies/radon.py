@@ -28,6 +28,7 @@ from .phase_correlation import BAND, CORRECTION_PX
 from .spectra import (
     ANGLE_STEP_DEG,
     ANGLES,
+    WHITENING,
     correlation,
     evened,
     gaussian_peak,
@@ -129,7 +130,7 @@ def rotations(spectra: list[Image], limits: SearchLimits, count: int) -> Iterato
     """
     # As with Fourier–Mellin, the reference further on along the angle is the input.
     first, second = (scipy.fft.fft(spectrum, axis=0) for spectrum in spectra)
-    values = correlation((first * second.conj()).sum(axis=1), _ANGLE_BAND, 0.5)
+    values = correlation((first * second.conj()).sum(axis=1), _ANGLE_BAND, WHITENING)
     rotation = (np.arange(ANGLES) - ANGLES // 2) * ANGLE_STEP_DEG
     allowed = np.abs(rotation) <= limits.rotation_deg + ANGLE_STEP_DEG / 2
     searched = np.where(allowed, values, 0)

@@ -21,9 +21,6 @@ CLASS_NAMES = ("0–10 %", "10–20 %", "20–30 %", "30–40 %", "> 40 %")
 
 _RADIUS_PX = 30.0
 
-# Circles whose centres are further apart, in radii, overlap by less than any limit allows.
-_REACH = 0.5
-
 
 def overlap_error(first: Keypoints, second: Keypoints) -> FloatArray:
     """Return 1 − intersection / union of the circles of paired features, shape (n,).
@@ -93,9 +90,8 @@ def repeatability(first: Keypoints, second: Keypoints) -> Repeatability:
     possible = min(len(first), len(second))
     if possible == 0:
         return Repeatability(np.zeros(len(CLASS_NAMES), int), 0)
-    pairs = cKDTree(first.position_px).query_ball_tree(
-        cKDTree(second.position_px), _REACH * _RADIUS_PX
-    )
+    # Circles whose centres are a radius apart overlap by less than any limit allows.
+    pairs = cKDTree(first.position_px).query_ball_tree(cKDTree(second.position_px), _RADIUS_PX)
     one = np.repeat(np.arange(len(first)), [len(p) for p in pairs])
     other = np.concatenate([np.asarray(p, int) for p in pairs])
     errors = overlap_error(first.take(one), second.take(other))

@@ -11,16 +11,12 @@ from typing import Any
 import numpy as np
 import scipy.optimize
 
-from .climbing import ClimbingSearch, Place, PoseSpace, Similarity
+from .climbing import PEAK_PX, PRECISION_PX, ClimbingSearch, Place, PoseSpace, Similarity
 
 POWELL, NELDER_MEAD = "Powell", "Nelder-Mead"
 
-# How exact places and similarities are wanted: NMI changes by some thousandths.
-_PLACE_PX = 0.05
+# How exact similarities are wanted: NMI changes by some thousandths.
 _SIMILARITY = 1e-6
-
-# Sides of the first simplex: about as wide as a peak of the similarity.
-_SIMPLEX_PX = 4.0
 
 # A climb ends after so many evaluations.
 _LONGEST = 400
@@ -32,9 +28,13 @@ def climb(
     """Return the best place found from a start by a method of scipy; nothing is drawn."""
     options: dict[str, Any] = {"maxfev": _LONGEST}
     if method == POWELL:
-        options |= {"xtol": _PLACE_PX, "ftol": _SIMILARITY}
+        options |= {"xtol": PRECISION_PX, "ftol": _SIMILARITY}
     else:
-        options |= {"xatol": _PLACE_PX, "fatol": np.inf, "initial_simplex": _simplex(space, start)}
+        options |= {
+            "xatol": PRECISION_PX,
+            "fatol": np.inf,
+            "initial_simplex": _simplex(space, start),
+        }
     found = scipy.optimize.minimize(
         lambda values: -similarity(space.settle(values)),
         start,
@@ -46,8 +46,8 @@ def climb(
 
 
 def _simplex(space: PoseSpace, start: Place) -> list[Place]:
-    """Return the start and a place beside it in every dimension, towards the farther limit."""
-    towards = np.where(space.bounds.mean(axis=1) < start, -_SIMPLEX_PX, _SIMPLEX_PX)
+    """Return the start and a place a peak's width away in each dimension, towards the far limit."""
+    towards = np.where(space.bounds.mean(axis=1) < start, -PEAK_PX, PEAK_PX)
     return [start, *(space.settle(start + side) for side in np.diag(towards))]
 
 

@@ -16,6 +16,10 @@ from .spectral_windows import Field, Image, within
 # Magnitudes below this share of their mean are rounding; their phases are, too.
 _ROUNDING = 0.05
 
+# For rotation, cross-power spectra are divided by this power of their magnitude: 1 is phase
+# correlation, which is exact, 0 a plain correlation, which tolerates more difference.
+WHITENING = 0.5
+
 # A spectrum is given at these angles over half a turn, from straight up, clockwise; the other
 # half is the same.
 ANGLES = 360

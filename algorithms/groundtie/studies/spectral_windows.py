@@ -1,4 +1,7 @@
-"""Windows as spectra need them: apodised, resampled by a pose, cut to what they share."""
+"""Windows as spectra need them: apodised, resampled by a pose, cut to what they share.
+
+What the constants of these methods come to, `benchmarks/run.py --only rotation` measures.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,8 @@ from ..geometry.limits import SearchLimits
 from ..pose.pose import Pose, PoseFound
 from ..rasters.grid import FloatArray
 from ..rasters.kernels import interpolate
-from ..rasters.patch import Patch
-from ..similarity.orientation import compress, squared_gradients
+from ..rasters.patch import ALL_VALID, Patch
+from ..similarity.orientation import SCALES_PX, compress, squared_gradients
 from ..similarity.surface import SimilaritySettings
 
 Image = NDArray[np.float32]
@@ -24,9 +27,6 @@ AnyImage = TypeVar("AnyImage", Image, Field)
 
 # Images fade out towards their borders and masked pixels over this share of their shorter side.
 _FADING_SHARE = 0.15
-
-# Standard deviation of the orientation field's Gaussian derivatives, in pixels.
-_FIELD_SCALE_PX = 1.2
 
 # Poses nearer to one another than all of these are the same.
 SAME_DEG = 3.0
@@ -37,9 +37,6 @@ SAME_PX = 6.0
 # they have at least.
 RETURNED = 2
 WORTH_ALIGNING = 0.5
-
-# A resampled pixel counts if the weights of all pixels it is made of sum up to this.
-_ALL_VALID = 0.999
 
 # Windows that share less than this of the reference's pixels are not compared.
 MINIMUM_SHARED = 0.05
@@ -68,7 +65,7 @@ def structure(window: Patch, settings: SimilaritySettings) -> Image | Field:
     image = texture(window, settings)
     if settings.similarity == "ncc":
         return apodise(image, window.valid)
-    return apodise(squared_gradients(image, window.valid, (_FIELD_SCALE_PX,))[0], window.valid)
+    return apodise(squared_gradients(image, window.valid, SCALES_PX[1:2])[0], window.valid)
 
 
 def apodise(image: AnyImage, valid: NDArray[np.bool_], disc: bool = False) -> AnyImage:
@@ -127,7 +124,7 @@ def resampled(input: Patch, pose: Pose, shape: tuple[int, int], kernel: str) -> 
     if pose.scale > 1:
         # The input is finer: what the result's pixels cannot show is smoothed away.
         values[...] = cv2.GaussianBlur(values, (0, 0), 0.5 * np.sqrt(pose.scale**2 - 1) + 1e-3)
-    valid = interpolate(input.valid.astype(np.float32), px, "bilinear") > _ALL_VALID
+    valid = interpolate(input.valid.astype(np.float32), px, "bilinear") > ALL_VALID
     return Patch(interpolate(values, px, kernel) + fill, valid)
 
 

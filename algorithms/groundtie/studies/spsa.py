@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from ..rasters.grid import FloatArray
-from .climbing import ClimbingSearch, Effort, Place, PoseSpace, Similarity
+from .climbing import PRECISION_PX, ClimbingSearch, Effort, Place, PoseSpace, Similarity
 
 Measure = Callable[[FloatArray], float]
 
@@ -23,9 +23,8 @@ Measure = Callable[[FloatArray], float]
 ALPHA, GAMMA = 0.602, 0.101
 
 # A climb ends after so many evaluations without a change: without more than what the usual slope
-# rises in so many pixels ([Suri2010], section 4.4.1).
+# rises in `PRECISION_PX` ([Suri2010], section 4.4.1).
 PATIENCE = 40
-_CHANGE_PX = 0.05
 
 
 @dataclass(frozen=True)
@@ -152,7 +151,7 @@ def _climb(
         value = similarity(place)
         best = max(best, place, key=similarity)
         waited += 1
-        if value > mark + _CHANGE_PX * slopes.usual:
+        if value > mark + PRECISION_PX * slopes.usual:
             mark, waited = value, 0
         return value
 

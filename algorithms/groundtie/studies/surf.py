@@ -20,13 +20,8 @@ from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .box_hessian import FloatImage, determinants, integral_image, sigma_of
 
-# Filters of an octave, and how often the size of blobs is doubled ([Bay2008] 3.2). Features lie
-# between the first filter and the last; octaves overlap.
-_LAYERS = 4
+# How often the size of blobs is doubled ([Bay2008] 3.2).
 _OCTAVES = 3
-
-# Further than this from a lattice position, in its steps, a peak belongs to another one or none.
-_FARTHEST = 1.0
 
 
 @dataclass(frozen=True)
@@ -74,10 +69,13 @@ class SurfDetector:
 
 
 def octave_sides(octave: int) -> tuple[int, ...]:
-    """Return the sides of an octave's filters: 9, 15, 21, 27, then 15, 27, 39, 51 and so on."""
+    """Return the sides of an octave's four filters: 9, 15, 21, 27, then 15, 27, 39, 51 and so on.
+
+    Features lie between the first and the last; octaves overlap.
+    """
     spacing = 6 * 2**octave
     first = 3 + spacing
-    return tuple(first + spacing * layer for layer in range(_LAYERS))
+    return tuple(first + spacing * layer for layer in range(4))
 
 
 def _peaks(
@@ -91,7 +89,8 @@ def _peaks(
     inside = (rows > 0) & (cols > 0) & (rows < at.shape[0] - 1) & (cols < at.shape[1] - 1)
     rows, cols = rows[inside], cols[inside]
     offset, height = _vertices(layers, rows, cols)
-    near = np.abs(offset).max(axis=1, initial=0.0) < _FARTHEST
+    # Further than a step from its lattice position, a peak belongs to another one or none.
+    near = np.abs(offset).max(axis=1, initial=0.0) < 1
     offset, height, rows, cols = offset[near], height[near], rows[near], cols[near]
     position = 2**octave * (np.column_stack([cols, rows]) + offset[:, :2])
     side = sides[middle] + offset[:, 2] * (sides[1] - sides[0])
