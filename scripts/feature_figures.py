@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 import groundtie
-from groundtie.masks.surface_model import Seen
+from groundtie.masks.surface_model import Reason
 from groundtie.rasters.patch import Patch
 from groundtie.studies.sift_variants import sift_detector
 from scripts.drawing import BLUE, GREY, ORANGE, FloatArray, Scenes, canvas, read_band, stretched
@@ -90,8 +90,8 @@ def surface_model(scenes: Scenes) -> Figure:
     shown = greys[0], greys[0], greys[1], greys[1] * taken
     tints = (
         (),
-        ((Seen.RADAR_SHADOW, (0.0, 0.45, 0.7)), (Seen.LAYOVER, (0.84, 0.37, 0.0))),
-        ((Seen.CAST_SHADOW, (0.0, 0.45, 0.7)), (Seen.HIDDEN, (0.84, 0.37, 0.0))),
+        ((Reason.RADAR_SHADOW, (0.0, 0.45, 0.7)), (Reason.LAYOVER, (0.84, 0.37, 0.0))),
+        ((Reason.CAST_SHADOW, (0.0, 0.45, 0.7)), (Reason.HIDDEN, (0.84, 0.37, 0.0))),
         (),
     )
     titles = (

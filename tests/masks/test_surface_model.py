@@ -18,7 +18,7 @@ from groundtie.errors import NoOverlapError, VectorLayerError
 from groundtie.geometry.views import View
 from groundtie.masks.object_heights import FootprintModel, RasterModel, read_footprints
 from groundtie.masks.scene import Scene
-from groundtie.masks.surface_model import Seen, SurfaceGround
+from groundtie.masks.surface_model import Reason, SurfaceGround
 from groundtie.rasters.grid import Grid, compose
 from groundtie.rasters.reading import Window, open_raster
 from groundtie.simulation import optical
@@ -58,7 +58,7 @@ def test_a_house_on_a_slope_is_found_and_the_slope_is_not(tmp_path: Path) -> Non
     np.testing.assert_allclose(
         heights.ground_m[:, :150], house(slope=0.1, height_m=0)[:, :150], atol=0.5
     )
-    raised = (ground.seen(ground.scene.whole)[:, :150] & Seen.RAISED) > 0
+    raised = (ground.reasons(ground.scene.whole)[:, :150] & Reason.RAISED) > 0
     assert raised[HOUSE].all() and raised.sum() == 32 * 32
 
 
@@ -80,17 +80,17 @@ def test_the_rims_of_voids_are_no_walls(tmp_path: Path) -> None:
 
 
 def test_each_reason_lies_where_geometry_puts_it(tmp_path: Path) -> None:
-    seen = ground_of(tmp_path, house()).seen(Window(0, 0, 200, 180))
+    seen = ground_of(tmp_path, house()).reasons(Window(0, 0, 200, 180))
     layover_px = 12 / math.tan(math.radians(40))
     shadow_px = 12 * math.tan(math.radians(40))
     before, behind = seen[95, :89], seen[95, 121:]
     # One pixel of the margin lies on the house's own.
-    assert np.sum((before & Seen.LAYOVER) > 0) == pytest.approx(layover_px, abs=1)
-    assert np.sum((behind & Seen.RADAR_SHADOW) > 0) == pytest.approx(shadow_px, abs=1)
-    assert not (before & Seen.RADAR_SHADOW).any() and not (behind & Seen.LAYOVER).any()
+    assert np.sum((before & Reason.LAYOVER) > 0) == pytest.approx(layover_px, abs=1)
+    assert np.sum((behind & Reason.RADAR_SHADOW) > 0) == pytest.approx(shadow_px, abs=1)
+    assert not (before & Reason.RADAR_SHADOW).any() and not (behind & Reason.LAYOVER).any()
     # The camera stands in the west-south-west, the sun in the south-south-east.
-    assert seen[94, 122] & Seen.HIDDEN and not seen[94, 87] & Seen.HIDDEN
-    assert seen[74, 98] & Seen.CAST_SHADOW and not seen[116, 98] & Seen.CAST_SHADOW
+    assert seen[94, 122] & Reason.HIDDEN and not seen[94, 87] & Reason.HIDDEN
+    assert seen[74, 98] & Reason.CAST_SHADOW and not seen[116, 98] & Reason.CAST_SHADOW
     assert (seen[1:60, 1:-1] == 0).all()
 
 
@@ -135,8 +135,8 @@ def test_tiles_are_those_of_the_whole(tmp_path: Path) -> None:
 def test_windows_join(tmp_path: Path) -> None:
     ground = ground_of(tmp_path, house())
     whole, windows = Window(0, 0, 200, 180), [Window(0, 0, 87, 180), Window(87, 0, 113, 180)]
-    parts = np.hstack([ground.seen(window) for window in windows])
-    np.testing.assert_array_equal(ground.seen(whole), parts)
+    parts = np.hstack([ground.reasons(window) for window in windows])
+    np.testing.assert_array_equal(ground.reasons(whole), parts)
     for view in (RADAR, CAMERA, replace(RADAR, azimuth_deg=251.0)):
         ground = replace(ground, views=(view,))
         parts = np.hstack([ground.image(window, view) for window in windows])
@@ -168,9 +168,9 @@ def test_an_offset_moves_what_stands(tmp_path: Path) -> None:
     ground = ground_of(tmp_path, house())
     window = Window(50, 50, 100, 100)
     # By whole cells of the ground; oblique rays are those of the map, so that borders may differ.
-    moved = replace(ground, offset_px=(8, -4)).seen(window)
-    there = ground.seen(Window(42, 54, 100, 100))
-    straight = Seen.RAISED | Seen.LAYOVER | Seen.RADAR_SHADOW | Seen.UNKNOWN
+    moved = replace(ground, offset_px=(8, -4)).reasons(window)
+    there = ground.reasons(Window(42, 54, 100, 100))
+    straight = Reason.RAISED | Reason.LAYOVER | Reason.RADAR_SHADOW | Reason.UNKNOWN
     np.testing.assert_array_equal(moved & straight, there & straight)
     inside, around = (cv2.erode(there, np.ones((3, 3))), cv2.dilate(there, np.ones((3, 3))))
     assert np.all((inside <= moved) & (moved <= around))
@@ -185,8 +185,8 @@ def test_directions_follow_the_map_not_the_pixels(tmp_path: Path) -> None:
         200,
         180,
     )
-    seen = ground_of(tmp_path, house(), grid).seen(Window(0, 0, 200, 180))
-    rows, cols = np.nonzero((seen & Seen.RADAR_SHADOW) > 0)
+    seen = ground_of(tmp_path, house(), grid).reasons(Window(0, 0, 200, 180))
+    rows, cols = np.nonzero((seen & Reason.RADAR_SHADOW) > 0)
     lonlat = grid.pixel_to_map(np.column_stack([cols, rows]))
     east = (lonlat[:, 0] - grid.pixel_to_map([[104.5, 94.5]])[0, 0]) / side
     assert east.max() == pytest.approx(15 + 12 * math.tan(math.radians(40)), abs=2)

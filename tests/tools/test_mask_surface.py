@@ -8,7 +8,7 @@ import rasterio
 
 import groundtie
 from groundtie.errors import ParameterError
-from groundtie.masks.surface_model import Seen
+from groundtie.masks.surface_model import Reason
 from groundtie.registration.surface_masks import CLEAR_CORRELATION
 
 CAMERA = "camera azimuth=250 incidence=12 sun-azimuth=155 sun-elevation=48"
@@ -36,7 +36,7 @@ def test_what_has_a_reason_takes_no_part(city: Path, tmp_path: Path) -> None:
     assert found.share == pytest.approx(np.mean(read(mask)), abs=1e-6)
     assert found.numbers["correlation"] > CLEAR_CORRELATION
     assert found.files == {"mask": str(mask), "reasons": str(reasons)}
-    assert all((read(reasons) & reason).any() for reason in Seen if reason != Seen.UNKNOWN)
+    assert all((read(reasons) & reason).any() for reason in Reason if reason != Reason.UNKNOWN)
 
 
 @pytest.mark.slow
@@ -57,7 +57,7 @@ def test_without_the_other_view_only_the_references_own_is_masked(
     found = groundtie.mask_surface(
         city / "reference.tif", city / "dsm.tif", tmp_path / "mask.tif", reasons=reasons
     )
-    camera = Seen.HIDDEN | Seen.CAST_SHADOW
+    camera = Reason.HIDDEN | Reason.CAST_SHADOW
     assert not (read(reasons) & camera).any()
     assert found.summary()["share"] > 0.1 and "take part" in found.lines()[0]
 

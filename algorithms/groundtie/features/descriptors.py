@@ -20,18 +20,19 @@ from .keypoints import Keypoints
 from .sampling import sampled_gradient, square_lattice, unit_rows
 from .scale_space import Gradient, describe_at_scales
 
+# Cells a side, and directions of each ([Lowe2004] 6.1).
 CELLS = 4
 DIRECTIONS = 8
 LENGTH = CELLS * CELLS * DIRECTIONS
 
-# Side of a cell, and width of the Gaussian window in cells.
+# Side of a cell, and width of the Gaussian window in cells: half the descriptor's ([Lowe2004] 6.1).
 _CELL_SCALES = 3.0
 _WINDOW_CELLS = CELLS / 2
 
 # Samples along a cell's side: they lie closer than a scale, by which the image is blurred.
 _SAMPLES = 4
 
-# The longest a component may be before the descriptor is normalised again.
+# The longest a component may be before the descriptor is normalised again ([Lowe2004] 6.1).
 _LARGEST_COMPONENT = 0.2
 
 

@@ -24,6 +24,7 @@ from .scale_space import FIRST_SCALE_PX, IMAGE_BLUR_PX, LAYERS
 
 ByteImage = NDArray[np.uint8]
 
+# Largest ratio of the principal curvatures of a keypoint ([Lowe2004] 4.1).
 _EDGE_RATIO = 10.0
 
 # OpenCV enlarges its image so that positions come out a quarter of a pixel too far.

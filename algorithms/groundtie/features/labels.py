@@ -30,7 +30,7 @@ KEPT, LEFT_OUT, UNKNOWN = 1, 0, -1
 
 
 # A keypoint's descriptor sees its whole patch: matches are rarely right if more of it than this is
-# to be left out.
+# to be left out (reasoned, not tuned).
 _LARGEST_SHARE = 0.25
 
 

@@ -14,7 +14,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
-from ..rasters.reading import Mask
+from ..rasters.reading import FloatImage, Mask
 
 # Dark and bright are the outer parts of the histogram.
 _OUTER_PERCENT = 15.0
@@ -44,16 +44,26 @@ def shadow_azimuth_deg(
     level = cv2.GaussianBlur(patch.values, (0, 0), 1.0)
     low, high = np.percentile(level[patch.valid], [outer_percent, 100 - outer_percent])
     dark, bright = (level <= low) & patch.valid, (level >= high) & patch.valid
-    size = [scipy.fft.next_fast_len(n + far_px, real=True) for n in level.shape]
-    spectra = [scipy.fft.rfft2(m.astype(np.float32), size, workers=2) for m in (bright, dark)]
     # How many dark pixels lie at an offset from bright ones.
-    counts = scipy.fft.irfft2(np.conj(spectra[0]) * spectra[1], size, workers=2)
+    counts = products_at_shifts(bright.astype(np.float32), dark.astype(np.float32), far_px)
     y, x = np.mgrid[-far_px : far_px + 1, -far_px : far_px + 1]
     distance = np.hypot(x, y)
     near = (distance > _NEAR_PX) & (distance <= far_px)
-    weight = counts[y[near], x[near]] / distance[near]
+    weight = counts[near] / distance[near]
     right, up = (weight * x[near]).sum(), -(weight * y[near]).sum()
     return float(np.degrees(np.arctan2(right, up)) % 360)
+
+
+def products_at_shifts(image: FloatImage, other: FloatImage, reach_px: int) -> FloatImage:
+    """Return sums of products of an image's pixels with those of another at an offset from them.
+
+    Shape (2 r + 1, 2 r + 1): offsets along rows and columns of up to `reach_px` pixels.
+    """
+    size = [scipy.fft.next_fast_len(n + reach_px, real=True) for n in image.shape]
+    here, there = (scipy.fft.rfft2(one, size, workers=2) for one in (image, other))
+    sums = scipy.fft.irfft2(np.conj(here) * there, size, workers=2)
+    shifts = np.arange(-reach_px, reach_px + 1)
+    return np.asarray(sums[np.ix_(shifts, shifts)])
 
 
 def out_of_shadow(ground: Mask, azimuth_deg: float, pixel_m: float) -> Mask:

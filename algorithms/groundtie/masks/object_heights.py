@@ -6,7 +6,7 @@ import math
 import os
 import re
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import cv2
 import numpy as np
@@ -39,13 +39,6 @@ _STEP_M = 1 / 1024
 
 _HEIGHT_FIELDS = ("height", "height_m", "hoehe", "z_height", "measuredheight")
 _NUMBER = re.compile(r"\s*(\d+(?:\.\d+)?)\s*m?\s*")
-
-
-class SurfaceModel(Protocol):
-    """Heights over a map."""
-
-    def heights(self, piece: Grid) -> tuple[Heights, Mask]:
-        """Return heights on a grid, and where they are known, shape (h, w)."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +86,9 @@ class FootprintModel:
         """Return heights on a grid, and that all are known."""
         surface = drawn_onto(piece, self.buildings, np.float32, all_touched=True)
         return Heights(surface, np.zeros_like(surface)), np.ones(surface.shape, bool)
+
+
+SurfaceModel = RasterModel | FootprintModel
 
 
 def read_footprints(path: str | os.PathLike[str], grid: Grid) -> FootprintModel:

@@ -89,14 +89,14 @@ def hidden_ground(heights: Heights, sight: LineOfSight) -> Mask:
 
 
 def radar_echoes(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
-    """Return how many things that stand a radar shows together with each pixel's ground, (h, w).
+    """Return how many echoes of elevated objects a radar shows over each pixel's ground, (h, w).
 
-    They are imaged nearer to the radar than their feet, over the ground at the same range: nearer
-    by h / tan(incidence) on level ground. Each pixel of a roof is one, and each of the wall before
-    it, as far down as the radar sees it; what it does not see is none.
+    Roofs and walls are imaged nearer to the radar than their feet, over the ground at the same
+    range: nearer by h / tan(incidence) on level ground. Each pixel of a roof is one echo, and each
+    of the wall before it, as far down as the radar sees it; what it does not see is none.
     """
     # Pixels of level ground by which a metre of height is laid over.
-    lean_px = 1 / (sight.pixel_m * sight.tangent)
+    layover_px = 1 / (sight.pixel_m * sight.tangent)
 
     def echoes(surface: _Lines, ground: _Lines) -> NDArray[np.int32]:
         lowest = np.maximum(_lowest_sight_m(surface, ground, sight.rise_m), ground)
@@ -106,8 +106,8 @@ def radar_echoes(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
         foot = np.clip(before, lowest[row, col], roof)
         # Ranges, in pixels of level ground and rising away from the radar; a wall stands at the
         # near side of its pixel, of which the roof is one long.
-        own = np.arange(ground.shape[1]) - ground * lean_px
-        far, near = (col - 0.5 - height * lean_px for height in (foot, roof))
+        own = np.arange(ground.shape[1]) - ground * layover_px
+        far, near = (col - 0.5 - height * layover_px for height in (foot, roof))
         first = math.floor(min(float(own.min()), float(near.min(initial=0)))) - 1
         last = math.ceil(max(float(own.max()), float(far.max(initial=0)))) + 1
         # Pixels whose centres lie in between.

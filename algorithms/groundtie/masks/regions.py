@@ -34,6 +34,7 @@ HIGH_PERCENT = 10.0
 # Larger scenes are reduced to larger pixels.
 _MOST_PIXELS = 24_000_000
 
+# Window of the speckle filter.
 _FILTER_PX = 7
 
 # Seeds vary little more than speckle alone, in the windows in which looks are estimated; a region

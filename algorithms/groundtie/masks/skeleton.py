@@ -62,7 +62,7 @@ def skeleton(mask: Mask) -> Mask:
 def pruned(skeleton: Mask, length_px: int) -> Mask:
     """Return a skeleton whose lines are shorter by some pixels at their free ends.
 
-    Twigs up to this length, which every unevenness of a border makes, disappear.
+    Spurs up to this length, which every unevenness of a border makes, disappear.
     """
     lines = _Lines.of(skeleton)
     left = np.nonzero(lines.image)[0]

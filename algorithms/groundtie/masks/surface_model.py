@@ -37,7 +37,7 @@ DOUBLE_BOUNCE = 3.0
 _GROWN_PX = 1
 
 
-class Seen(IntFlag):
+class Reason(IntFlag):
     """Why a pixel of the map takes no part; 0: both images show its ground."""
 
     RAISED = 1
@@ -72,18 +72,18 @@ class SurfaceGround:
     def select(self, window: Window) -> Selection:
         """Return which pixels of a window take part."""
         valid = self.scene.read(window).valid
-        return Selection(valid & (self.seen(window) == 0), valid)
+        return Selection(valid & (self.reasons(window) == 0), valid)
 
-    def seen(self, window: Window) -> NDArray[np.uint8]:
-        """Return what of a window's ground is not seen, and why: bits of `Seen`, shape (h, w)."""
+    def reasons(self, window: Window) -> NDArray[np.uint8]:
+        """Return why pixels of a window take no part: bits of `Reason`, shape (h, w)."""
         heights, known, inside = self._around(window)
-        found = [(Seen.RAISED, heights.surface_m > heights.ground_m), (Seen.UNKNOWN, ~known)]
+        found = [(Reason.RAISED, heights.surface_m > heights.ground_m), (Reason.UNKNOWN, ~known)]
         for view in self.views:
             found += _not_shown(heights, view, self.scene.grid)
-        seen = np.zeros(known.shape, np.uint8)
-        for why, where in found:
-            seen[grown(where, _GROWN_PX)] |= np.uint8(why)
-        return seen[inside]
+        reasons = np.zeros(known.shape, np.uint8)
+        for reason, where in found:
+            reasons[grown(where, _GROWN_PX)] |= np.uint8(reason)
+        return reasons[inside]
 
     def level(self, window: Window, view: View) -> FloatImage:
         """Return the logarithm of what an image from a view may show in a window, shape (h, w).
@@ -95,7 +95,7 @@ class SurfaceGround:
             shown = self._echoes(heights, view).astype(np.float32)
         else:
             found = dict(_not_shown(heights, view, self.scene.grid))
-            dark = found.get(Seen.CAST_SHADOW, np.zeros((), bool)) & ~found[Seen.HIDDEN]
+            dark = found.get(Reason.CAST_SHADOW, np.zeros((), bool)) & ~found[Reason.HIDDEN]
             shown = np.asarray(~dark, np.float32)
         return np.log(shown[inside] + _SHADOW)
 
@@ -126,7 +126,7 @@ class SurfaceGround:
         return self._piece(window, (self._highest_m or 0.0) * longest)
 
     def _piece(self, window: Window, reach_m: float) -> tuple[Heights, Mask, tuple[slice, slice]]:
-        """Return heights of what stands so far around, where they are known, and the window."""
+        """Return heights with objects so far around, where they are known, and the window."""
         # Ground is found in cells: they are the same in every window.
         cell = ground_cell_px(self.scene.grid.pixel_size_m)
         around = (reach_m + GROUND_REACH_M) / self.scene.grid.pixel_size_m
@@ -136,8 +136,8 @@ class SurfaceGround:
         moved = piece._replace(col=piece.col - right, row=piece.row - down)
         heights, known = self.model.heights(self.scene.grid.window(*moved))
         # What counts as ground hides nothing.
-        stands = heights.surface_m - heights.ground_m > LOWEST_M
-        surface = np.where(stands, heights.surface_m, heights.ground_m)
+        is_raised = heights.surface_m - heights.ground_m > LOWEST_M
+        surface = np.where(is_raised, heights.surface_m, heights.ground_m)
         first_px = piece.col, piece.row
         return Heights(surface, heights.ground_m, first_px), known, window.slices_in(piece)
 
@@ -177,18 +177,18 @@ def _longest(view: View) -> float:
     return max(tangents)
 
 
-def _not_shown(heights: Heights, view: View, grid: Grid) -> list[tuple[Seen, Mask]]:
+def _not_shown(heights: Heights, view: View, grid: Grid) -> list[tuple[Reason, Mask]]:
     """Return what of the ground an image from a view does not show, and why."""
     sight = _sight(view, grid)
     hidden = hidden_ground(heights, sight)
     if view.sensor == RADAR:
         laid_over = radar_echoes(heights, sight) > 0
-        return [(Seen.RADAR_SHADOW, hidden), (Seen.LAYOVER, np.asarray(laid_over))]
-    found = [(Seen.HIDDEN, hidden)]
+        return [(Reason.RADAR_SHADOW, hidden), (Reason.LAYOVER, np.asarray(laid_over))]
+    found = [(Reason.HIDDEN, hidden)]
     if view.sun_azimuth_deg is not None and view.sun_elevation_deg is not None:
         towards_sun = _on_pixels(view.sun_azimuth_deg, grid)
         sunlight = LineOfSight.from_vertical(towards_sun, 90 - view.sun_elevation_deg)
-        found.append((Seen.CAST_SHADOW, hidden_ground(heights, sunlight)))
+        found.append((Reason.CAST_SHADOW, hidden_ground(heights, sunlight)))
     return found
 
 

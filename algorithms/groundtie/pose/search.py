@@ -18,6 +18,7 @@ from ..context import Context
 from ..geometry.limits import SearchLimits
 from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
+from ..similarity.correlation import MINIMUM_OVERLAP
 from ..similarity.surface import Surface
 from .pose import Pose, PoseFound
 from .rotation_fields import Template
@@ -26,22 +27,17 @@ from .rotation_levels import HEIGHT, Climber, Level
 # Side of the small images on which all is tried, in pixels: the geometric mean of both images'.
 _COARSE_SIDE_PX = 96
 
-# Larger images do not change the result.
-_FINE_SIDE_PX = 384
+# How many candidates are tried again on each finer level, of half the pixel size. More levels do
+# not change the result.
+_KEPT = (32, 8)
 
 # A step of rotation moves what lies a quarter of the side off the centre by this, in pixels; with a
 # third more, fine structure slips through. Fields are less sensitive to scale by a quarter.
 _STEP_PX = 1.7
 _SCALE_STEP = 1.25
 
-# How many candidates are tried again on each finer level.
-_KEPT = (32, 8, 4)
-
 # Poses are the same if they move the reference's corners by less than this share of its side.
 _SAME_SHARE = 0.06
-
-# Least share of the smaller image's side that overlaps.
-_LEAST_OVERLAP = 0.3
 
 # Radius of the surface whose spread is the height of chance, in pixels of the finest level; even.
 _BACKGROUND_PX = 32
@@ -142,7 +138,7 @@ class _Search:
     @property
     def fine_px(self) -> float:
         """Pixel size of the largest images, in reference pixels."""
-        return max(self.side_px / _FINE_SIDE_PX, 1.0)
+        return max(self.side_px / (_COARSE_SIDE_PX * 2 ** len(_KEPT)), 1.0)
 
     @property
     def whole_circle(self) -> bool:
@@ -231,7 +227,7 @@ class _Search:
     def radius(self, level: Level, scale: float) -> int:
         """Return the radius in pixels of a level that covers all shifts at a scale; even."""
         own, other = max(self.reference.values.shape), max(self.input.values.shape) / scale
-        useful = (own + other) / 2 - _LEAST_OVERLAP * min(own, other)
+        useful = (own + other) / 2 - MINIMUM_OVERLAP * min(own, other)
         # The limits are along the input's rows and columns, which may lie across.
         across = np.radians(min(self.limits.rotation_deg, 45.0))
         wanted = self.limits.radius / scale * (np.cos(across) + np.sin(across))

@@ -17,9 +17,6 @@ from .windows import FloatImage, Mask, Window
 # Areas of zeros from this side on hold no data.
 _EMPTY_PX = 9
 
-# What is made of several pixels is valid if the weights of its valid pixels sum up to this.
-ALL_VALID = 0.999
-
 # More negative values than this do not come from resampling, whose kernels undershoot at edges.
 _NEGATIVE_SHARE = 0.02
 

@@ -11,12 +11,12 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.fft
 
 from ..context import Context
 from ..errors import ParameterError
 from ..geometry.views import View
 from ..kinds import AUTO
+from ..masks.cast_shadow import products_at_shifts
 from ..masks.choice import NONE, REFERENCE, SURFACE, MaskUsed
 from ..masks.object_heights import RasterModel, SurfaceModel, read_footprints
 from ..masks.scene import Scene
@@ -213,8 +213,5 @@ def _centred(values: FloatImage, patch: Patch) -> FloatImage:
 
 def _correlation(model: FloatImage, image: FloatImage) -> FloatImage:
     """Return the correlation of an image with a model that is moved, (2 r + 1, 2 r + 1)."""
-    size = [scipy.fft.next_fast_len(n + _REACH_PX, real=True) for n in model.shape]
-    product = np.conj(scipy.fft.rfft2(model, size)) * scipy.fft.rfft2(image, size)
-    shifts = np.arange(-_REACH_PX, _REACH_PX + 1)
     energy = max(float(np.linalg.norm(model) * np.linalg.norm(image)), 1e-12)
-    return np.asarray(scipy.fft.irfft2(product, size)[np.ix_(shifts, shifts)] / energy)
+    return products_at_shifts(model, image, _REACH_PX) / energy

@@ -77,9 +77,6 @@ def local_statistics(intensity: FloatImage, valid: Mask, window_px: int) -> Loca
 
 def window_counts(valid: Mask, window_px: int) -> FloatImage:
     """Return the number of valid pixels in the window around each pixel, float32 (h, w)."""
-    if valid.all():
-        rows, cols = (_inside(size, window_px) for size in valid.shape)
-        return np.asarray(np.outer(rows, cols), np.float32)
     return np.asarray(
         cv2.boxFilter(
             valid.astype(np.float32),
@@ -89,14 +86,6 @@ def window_counts(valid: Mask, window_px: int) -> FloatImage:
             borderType=cv2.BORDER_CONSTANT,
         )
     )
-
-
-def _inside(size: int, window_px: int) -> FloatImage:
-    """Return how much of a window along one axis lies inside, for each position."""
-    half = window_px // 2
-    position = np.arange(size)
-    inside = np.minimum(position, half) + np.minimum(size - 1 - position, half) + 1
-    return inside.astype(np.float32)
 
 
 def estimate_looks(intensity: FloatImage, valid: Mask) -> float:

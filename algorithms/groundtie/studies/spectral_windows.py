@@ -17,7 +17,7 @@ from ..geometry.limits import SearchLimits
 from ..pose.pose import Pose, PoseFound
 from ..rasters.grid import FloatArray
 from ..rasters.kernels import interpolate
-from ..rasters.patch import ALL_VALID, Patch
+from ..rasters.patch import Patch
 from ..similarity.orientation import SCALES_PX, compress, squared_gradients
 from ..similarity.surface import SimilaritySettings
 
@@ -37,6 +37,9 @@ SAME_PX = 6.0
 # they have at least.
 RETURNED = 2
 WORTH_ALIGNING = 0.5
+
+# Resampled pixels are valid if the weights of valid pixels sum up to this.
+_ALL_VALID = 0.999
 
 # Windows that share less than this of the reference's pixels are not compared.
 MINIMUM_SHARED = 0.05
@@ -124,7 +127,7 @@ def resampled(input: Patch, pose: Pose, shape: tuple[int, int], kernel: str) -> 
     if pose.scale > 1:
         # The input is finer: what the result's pixels cannot show is smoothed away.
         values[...] = cv2.GaussianBlur(values, (0, 0), 0.5 * np.sqrt(pose.scale**2 - 1) + 1e-3)
-    valid = interpolate(input.valid.astype(np.float32), px, "bilinear") > ALL_VALID
+    valid = interpolate(input.valid.astype(np.float32), px, "bilinear") > _ALL_VALID
     return Patch(interpolate(values, px, kernel) + fill, valid)
 
 

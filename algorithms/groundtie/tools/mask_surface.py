@@ -65,7 +65,7 @@ def mask_surface(
         with Outputs() as outputs:
             share = write_mask(scene, outputs.stage(output), ground.select, progress.part(0.1, 0.6))
             if reasons is not None:
-                write_tiles(scene, outputs.stage(reasons), ground.seen, progress.part(0.6, 1.0))
+                write_tiles(scene, outputs.stage(reasons), ground.reasons, progress.part(0.6, 1.0))
     if fit is None:
         unknown = {"correlation": None, "offset_px": None}
         return WrittenMask(share, unknown, "nothing is expected of the image", files)
