@@ -17,7 +17,7 @@ from ..geometry.model_choice import (
 )
 from ..geometry.robust import find_consensus, fit_mixture
 from ..rasters.grid import FloatArray
-from .bias import KINDS, TERMS, Bias, design
+from .bias import KINDS, SHIFT, TERMS, Bias, design
 
 AUTO = "auto"
 
@@ -197,7 +197,7 @@ def _adjust(control: Control, kind: str) -> Adjustment:
 
 def _without_improbable(control: Control, kind: str) -> tuple[NDArray[np.bool_], float]:
     """Return which points are more probably inliers than blunders, and the spread of these."""
-    first = "translation" if kind == "shift" else "affine"
+    first = "translation" if kind == SHIFT else "affine"
     start = find_consensus(control.expected_px, control.found_px, _CONSENSUS_PX, first)
     residuals = control.found_px - start(control.expected_px)
     reach = max(float(np.abs(residuals).max()), LEAST_REACH_PX)

@@ -127,14 +127,13 @@ def check_heights(
     heights = orientation.heights.at(seen)
     heights = heights[np.isfinite(heights)]
     low, high = (float(np.quantile(heights, tail)) for tail in (_TAIL, 1 - _TAIL))
-    reach = abs(rpc.scale[2])
     offset = sigma = None
     if control is not None and adjustment is not None:
         offset, sigma = _offset(orientation, control, adjustment)
     constant = isinstance(orientation.heights, ConstantHeight)
     return HeightCheck(
         (low, high),
-        (rpc.offset[2] - reach, rpc.offset[2] + reach),
+        rpc.height_range_m,
         None if constant else _geoid(seen),
         offset,
         sigma,

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError, NoOverlapError
-from ..rasters.grid import LON_LAT, FloatArray, Grid, mesh, reproject
+from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject
 from ..rasters.reading import RasterSource
 from .heights import ConstantHeight, Heights, terrain_heights
-from .rpc import RPC
+from .rpc import RPC, ground_lattice
 from .smooth_map import Positions, smooth_map
 
 # Heights found by intersecting a line of sight with the terrain are right to this, in metres.
@@ -176,8 +176,7 @@ def orient(
         See `terrain_heights`.
     """
     size = source.grid.width, source.grid.height
-    low, high = (rpc.offset[2] + sign * abs(rpc.scale[2]) for sign in (-1, 1))
-    extremes = np.vstack([seen_at(rpc, size, height) for height in (low, high)])
+    extremes = np.vstack([seen_at(rpc, size, height) for height in rpc.height_range_m])
     heights: Heights
     if dem is None:
         heights = ConstantHeight(rpc.offset[2] if height_m is None else height_m)
@@ -208,8 +207,7 @@ def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODE
     GeoreferencingError
         The RPCs see no ground: they are not the image's.
     """
-    px = mesh(*(np.linspace(-0.5, side - 0.5, nodes) for side in size))
-    lon_lat = rpc.localise(px, height_m)
+    lon_lat, _ = ground_lattice(rpc, size, [height_m], nodes)
     seen = lon_lat[np.isfinite(lon_lat).all(axis=1)]
     if not len(seen):
         raise GeoreferencingError("the RPCs lead no pixel of the image to the ground")

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..rasters.grid import FloatArray
-from .polynomials import TERMS, derivative, fill_terms, in_blocks
+from .polynomials import TERMS, blocks, derivative, fill_terms
 
 # The inverse has arrived when it misses the image position by less, in pixels.
 _PRECISION_PX = 1e-7
@@ -83,7 +83,7 @@ class RPC:
         by_lon, by_lat, by_height = (derivative(self._coefficients, axis) for axis in range(3))
         return by_lon, by_lat, by_height
 
-    def project(self, lon_lat: ArrayLike, height_m: ArrayLike, workers: int = 1) -> FloatArray:
+    def project(self, lon_lat: ArrayLike, height_m: ArrayLike) -> FloatArray:
         """Return the image positions (col, row), shape (n, 2), of ground positions.
 
         Parameters
@@ -92,18 +92,13 @@ class RPC:
             Longitude and latitude in degrees (WGS 84), shape (n, 2).
         height_m
             Height above the ellipsoid, shape (n,) or one for all.
-        workers
-            Number of threads.
         """
         lon_lat = np.asarray(lon_lat, float)
         height = np.broadcast_to(np.asarray(height_m, float), len(lon_lat))
         px = np.empty((len(lon_lat), 2))
-
-        def work(part: slice, terms: FloatArray) -> None:
+        for part, terms in blocks(len(px)):
             fill_terms(self._normalised(lon_lat[part], height[part]), terms)
             px[part] = self._image_position(self._coefficients @ terms)
-
-        in_blocks(work, len(px), workers)
         return px
 
     def derivatives(self, lon_lat: ArrayLike, height_m: ArrayLike) -> FloatArray:
@@ -115,18 +110,15 @@ class RPC:
         lon_lat = np.asarray(lon_lat, float)
         height = np.broadcast_to(np.asarray(height_m, float), len(lon_lat))
         slopes = np.empty((len(lon_lat), 2, 3))
-
-        def work(part: slice, terms: FloatArray) -> None:
+        for part, terms in blocks(len(slopes)):
             fill_terms(self._normalised(lon_lat[part], height[part]), terms)
             values = self._coefficients @ terms
             for axis, coefficients in enumerate(self._derivatives):
                 slope = _quotient_slope(values, coefficients @ terms[: coefficients.shape[1]])
                 slopes[part, :, axis] = (slope / self.scale[axis]).T * self.image_scale
-
-        in_blocks(work, len(slopes), 1)
         return slopes
 
-    def localise(self, px: ArrayLike, height_m: ArrayLike, workers: int = 1) -> FloatArray:
+    def localise(self, px: ArrayLike, height_m: ArrayLike) -> FloatArray:
         """Return longitude and latitude, shape (n, 2), of image positions at given heights.
 
         By Newton's method with the analytic Jacobian, to 1e-7 px; NaN where it finds nothing.
@@ -137,25 +129,25 @@ class RPC:
             Image positions (col, row), shape (n, 2).
         height_m
             Height above the ellipsoid, shape (n,) or one for all.
-        workers
-            Number of threads.
         """
         px = np.asarray(px, float)
         height = np.broadcast_to(np.asarray(height_m, float), len(px))
         found = np.empty((len(px), 2))
-        start = self._start
-
-        def work(part: slice, terms: FloatArray) -> None:
+        for part, terms in blocks(len(px)):
             target = ((px[part] - self.image_offset) / self.image_scale).T
             lph = np.empty_like(terms[:3])
             lph[2] = (height[part] - self.offset[2]) / self.scale[2]
-            lph[:2] = start(target, lph[2], terms)
+            lph[:2] = self._start(target, lph[2], terms)
             with np.errstate(all="ignore"):
                 self._newton(lph, target, terms)
             found[part] = lph[:2].T * self.scale[:2] + self.offset[:2]
-
-        in_blocks(work, len(px), workers)
         return found
+
+    @property
+    def height_range_m(self) -> tuple[float, float]:
+        """Lowest and highest height that the coefficients were made for."""
+        reach = abs(self.scale[2])
+        return self.offset[2] - reach, self.offset[2] + reach
 
     def is_valid(self, lon_lat: ArrayLike, height_m: ArrayLike) -> NDArray[np.bool_]:
         """Return which ground positions lie where the coefficients may be used, shape (n,).
@@ -207,7 +199,7 @@ class RPC:
     @property
     def is_regular(self) -> bool:
         """Whether no denominator vanishes within the scales, and the ground has an image there."""
-        values = np.array(self._polynomials) @ _lattice_terms()[1]
+        values = self._coefficients @ _lattice_terms()[1]
         low, high = values[2:].min(axis=1), values[2:].max(axis=1)
         if not (low * high > 0).all():
             return False
@@ -217,6 +209,32 @@ class RPC:
     @cached_property
     def _start(self) -> _Start:
         return _Start.of(self)
+
+
+def ground_lattice(
+    rpc: RPC, size: tuple[int, int], heights_m: ArrayLike, nodes: int = 21
+) -> tuple[FloatArray, FloatArray]:
+    """Return ground positions seen all over an image at several heights.
+
+    Parameters
+    ----------
+    rpc
+        The image's model.
+    size
+        Width and height of the image in pixels; the lattice reaches to its corners.
+    heights_m
+        Heights above the ellipsoid.
+    nodes
+        Nodes along each side of the image.
+
+    Returns
+    -------
+    lon_lat, height_m
+        Shapes (n, 2) and (n,).
+    """
+    axes = [np.linspace(-0.5, side - 0.5, nodes) for side in size]
+    cols, rows, heights = (x.ravel() for x in np.meshgrid(*axes, np.asarray(heights_m, float)))
+    return rpc.localise(np.column_stack([cols, rows]), heights), heights
 
 
 @dataclass(frozen=True)

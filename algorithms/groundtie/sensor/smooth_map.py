@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..rasters.grid import FloatArray
-from .polynomials import in_blocks
+from .polynomials import blocks, fill_terms
 
 Positions = Callable[[FloatArray], FloatArray]
 
@@ -16,13 +16,13 @@ _DEGREE = 5
 _NODES = 12
 _CHECKS = 400
 
-# Each term is one of lower degree times u (0) or v (1), by rising degree.
+# Each term of degree above 1 is one of lower degree times u (0) or v (1), by rising degree.
 _PRODUCTS = tuple(
     (total * (total - 1) // 2 + max(j - 1, 0), int(j > 0))
-    for total in range(1, _DEGREE + 1)
+    for total in range(2, _DEGREE + 1)
     for j in range(total + 1)
 )
-_TERMS = len(_PRODUCTS) + 1
+_TERMS = len(_PRODUCTS) + 3
 
 
 @dataclass(frozen=True)
@@ -44,14 +44,11 @@ class SmoothMap:
     def __call__(self, xy: FloatArray) -> FloatArray:
         """Return the other positions, shape (n, 2), of positions (n, 2)."""
         moved = np.empty((len(xy), 2))
-
-        def work(part: slice, terms: FloatArray) -> None:
+        for part, terms in blocks(len(xy), _TERMS):
             unit = self._unit(xy[part])
-            _fill(unit, terms)
+            fill_terms(unit, terms, _PRODUCTS)
             moved[part] = (self.coefficients @ terms).T
             moved[part][(np.abs(unit) > 1 + 1e-9).any(axis=0)] = np.nan
-
-        in_blocks(work, len(xy), 1, _TERMS)
         return moved
 
     def _unit(self, xy: FloatArray) -> FloatArray:
@@ -74,7 +71,7 @@ def smooth_map(exact: Positions, low: FloatArray, high: FloatArray, tolerance: f
     unit = np.stack(np.meshgrid(nodes, nodes)).reshape(2, -1)
     checks = np.random.default_rng(0).uniform(-1, 1, (2, _CHECKS))
     terms = np.empty((_TERMS, unit.shape[1]))
-    _fill(unit, terms)
+    fill_terms(unit, terms, _PRODUCTS)
     values = exact((low + high) / 2 + unit.T * (high - low) / 2)
     if not np.isfinite(values).all():
         return exact
@@ -83,9 +80,3 @@ def smooth_map(exact: Positions, low: FloatArray, high: FloatArray, tolerance: f
     places = (low + high) / 2 + checks.T * (high - low) / 2
     error = np.abs(fitted(places) - exact(places)).max()
     return fitted if error < tolerance else exact
-
-
-def _fill(unit: FloatArray, terms: FloatArray) -> None:
-    terms[0] = 1.0
-    for term, (factor, coordinate) in enumerate(_PRODUCTS, start=1):
-        np.multiply(terms[factor], unit[coordinate], out=terms[term])
