@@ -18,7 +18,6 @@ from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import NothingFoundError, TooFewPointsError
-from .geometry.georeferencer import unmeasured
 from .geometry.model_choice import left_out_blocks
 from .geometry.models import KINDS, PARAMETERS
 from .geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
@@ -32,7 +31,7 @@ from .rasters.reading import open_raster
 from .registration.sensor_input import Ground, open_oriented_image
 from .registration.tie_point_evidence import TiePointEvidence
 from .registration.verdict import decide
-from .sensor.control_points import HEIGHT
+from .sensor.control_formats import HEIGHT
 from .sensor.orientation import sensor_grid
 from .similarity.description import BORDER_PX
 from .similarity.peak import Peak, find_peak
@@ -153,7 +152,7 @@ class Review:
     def add(self, reference_xy: ArrayLike, input_px: ArrayLike, score: float = np.nan) -> Review:
         """Return the review with one more point, the last."""
         xy, px = (np.asarray(place, float).reshape(1, 2) for place in (reference_xy, input_px))
-        point = unmeasured(xy, px, [USED], self.points.crs)
+        point = TiePoints.unmeasured(xy, px, self.points.crs)
         more = {name: np.full(1, np.nan) for name in self.points.more} | {EDITED: np.ones(1)}
         point = replace(point, score=np.array([score]), more=more)
         mine = replace(self.points, more=self._columns)
