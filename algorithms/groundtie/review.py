@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import NothingFoundError, TooFewPointsError
 from .geometry.model_choice import left_out_blocks
-from .geometry.models import KINDS, PARAMETERS
+from .geometry.models import KINDS, fewest_points
 from .geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
 from .geometry.tie_points import USED, TiePoints
 from .geometry.transform import Transform
@@ -216,10 +216,9 @@ class Review:
         taken = np.flatnonzero(self.points.fit)
         if kind == "tps" and len(taken) > MOST_SPLINE_POINTS:
             return None
-        needed = -(-PARAMETERS[kind] // 2)
         errors = np.full(len(taken), np.nan)
         for block in left_out_blocks(self.points.reference_xy[taken]):
-            if (~block).sum() < max(needed, 3):
+            if (~block).sum() < max(fewest_points(kind), 3):
                 return None
             seen = TiePointEvidence(self.points.take(taken[~block]), kind, self.input_grid)
             left = self.points.take(taken[block])

@@ -16,9 +16,6 @@ from .robust import fit_robustly
 from .tie_points import TiePoints
 from .transform import Transform
 
-# Standard deviation that inliers may have, in matching pixels.
-SIGMA_RANGE_PX = (0.2, 2.5)
-
 
 @dataclass(frozen=True)
 class Estimate:
@@ -121,6 +118,6 @@ def fit_thin_plate(
         raise TooFewPointsError(f"only {len(used)} points were matched")
     variances = np.trace(used.covariance_px2, axis1=1, axis2=2) / 2
     area = (2 * radius_px + 1) ** 2
-    model, mixture = fit_robustly("tps", px, nominal_px, variances, start, area, SIGMA_RANGE_PX)
+    model, mixture = fit_robustly("tps", px, nominal_px, variances, start, area)
     weights = np.where(mixture.inliers, 1 / (mixture.sigma**2 + variances), 0.0)
     return model, fit_without_blocks("tps", px, nominal_px, weights)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..context import Context
 from ..errors import TooFewPointsError
-from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate
+from ..geometry.estimation import Estimate, fit_thin_plate
 from ..geometry.models import DEGREE, PARAMETERS, TERRAIN, Model
 from ..geometry.robust import fit_mixture
 from ..geometry.terrain import Terrain
@@ -228,7 +228,7 @@ def _without_outliers(points: TiePoints, transform: Transform, pair: ImagePair) 
     """Reject the points of the fit that more likely fell by chance than near the model."""
     used = points.used
     residuals = points.take(used).residual_on(pair.grid, transform)
-    mixture = fit_mixture(residuals, (2 * _NEAR_PX + 1) ** 2, SIGMA_RANGE_PX)
+    mixture = fit_mixture(residuals, (2 * _NEAR_PX + 1) ** 2)
     outliers = np.zeros(len(points), bool)
     outliers[used] = ~mixture.inliers
     return points.reject(outliers, "disagrees with the model")

@@ -11,11 +11,10 @@ from ..errors import TooFewPointsError
 from ..geometry.estimation import jackknife_sigma, jackknife_spread
 from ..geometry.model_choice import (
     CONTROL_PER_PARAMETER,
-    Candidate,
     choose_simplest,
     left_out_blocks,
 )
-from ..geometry.robust import find_consensus, fit_mixture
+from ..geometry.robust import densities, find_consensus, fit_mixture
 from ..rasters.grid import FloatArray
 from .bias import KINDS, SHIFT, TERMS, Bias, design
 
@@ -129,9 +128,9 @@ def adjust(control: Control, kind: str = AUTO) -> Adjustment:
     if kind != AUTO:
         return _adjust(control, kind)
 
-    def fit(each: str) -> Candidate[Adjustment]:
+    def fit(each: str) -> tuple[Adjustment, FloatArray]:
         tried = _adjust(control, each)
-        return Candidate(each, tried, _log_likelihoods(tried))
+        return tried, _log_likelihoods(tried)
 
     def is_held(tried: Adjustment, chosen: Adjustment) -> bool:
         return _is_carried(tried, control) and _is_significant(tried, chosen)
@@ -164,10 +163,10 @@ def _is_significant(tried: Adjustment, chosen: Adjustment) -> bool:
 def _log_likelihoods(adjustment: Adjustment) -> FloatArray:
     """Return the logarithm of the density of each point, inlier or blunder, shape (n,)."""
     squared = (adjustment.left_out_px**2).sum(axis=1)
-    share = float(np.clip(adjustment.used.mean(), 0.02, 0.98))
     variance = max(float(squared[adjustment.used].mean()) / 2, _SIGMA_RANGE_PX[0] ** 2)
-    inlier = share * np.exp(-squared / (2 * variance)) / (2 * np.pi * variance)
-    return np.asarray(np.log(inlier + (1 - share) / (2 * LEAST_REACH_PX) ** 2))
+    share, area = float(adjustment.used.mean()), (2 * LEAST_REACH_PX) ** 2
+    inlier, blunder = densities(squared, variance, share, area)
+    return np.asarray(np.log(inlier + blunder))
 
 
 def _adjust(control: Control, kind: str) -> Adjustment:
