@@ -26,6 +26,7 @@ _NEIGHBOUR_SPACINGS = 1.5
 # A quantile of so many draws at each place is good to 1 or 2 %.
 _DRAWS = 1000
 
+# Fewer inliers than this, by their weights, are none.
 _LEAST_WEIGHT = 1e-9
 
 # The interval holds the true figure with this probability.

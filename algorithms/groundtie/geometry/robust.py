@@ -14,6 +14,7 @@ from ..rasters.grid import FloatArray
 from .fitting import fit_model
 from .models import Frame, Model, PolynomialModel, fewest_points, monomials
 
+# Where a fifth of the pairs is right, so many samples of three hold a right one with 99 %.
 _SAMPLES = 600
 
 # Pairs times samples that are looked at together, 16 MB of residuals: large scenes have 50 000

@@ -11,9 +11,6 @@ import numpy as np
 
 from ..rasters.grid import FloatArray
 
-TERMS = 20
-_QUADRATIC = 10
-
 # Exponents of longitude L, latitude P and height H in the order of RPC00B (STDI-0002, E.2.4):
 # 1, L, P, H, LP, LH, PH, L², P², H², PLH, L³, LP², LH², L²P, P³, PH², L²H, P²H, H³.
 EXPONENTS = (
@@ -21,6 +18,9 @@ EXPONENTS = (
     (2, 0, 0), (0, 2, 0), (0, 0, 2), (1, 1, 1), (3, 0, 0), (1, 2, 0), (1, 0, 2),
     (2, 1, 0), (0, 3, 0), (0, 1, 2), (2, 0, 1), (0, 2, 1), (0, 0, 3),
 )  # fmt: skip
+
+TERMS = len(EXPONENTS)
+_QUADRATIC = sum(sum(term) <= 2 for term in EXPONENTS)
 
 # Their terms of degree above 1 as products: of which earlier term, and of which coordinate.
 RPC_PRODUCTS = (
