@@ -9,7 +9,7 @@ of them is left where the ground is not known for sure.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -17,6 +17,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from ..rasters.grid import FloatArray
+from ..rasters.surfaces import Positions
 from .estimation import jackknife_deviations
 from .judging import CE90_FACTOR
 
@@ -154,7 +155,7 @@ class Common:
 
 
 def predict_accuracy(
-    fold_models: Sequence[Callable[[FloatArray], FloatArray]],
+    fold_models: Sequence[Positions],
     places_px: FloatArray,
     check: CheckResiduals,
     common: Common,
@@ -217,7 +218,7 @@ def predict_accuracy(
 
 
 def standard_deviation_px(
-    fold_models: Sequence[Callable[[FloatArray], FloatArray]],
+    fold_models: Sequence[Positions],
     places_px: FloatArray,
     check: CheckResiduals,
     common: Common,
@@ -236,15 +237,11 @@ def standard_deviation_px(
     return np.asarray(np.sqrt(variance + alike))
 
 
-def _deviations(
-    fold_models: Sequence[Callable[[FloatArray], FloatArray]], px: FloatArray
-) -> FloatArray:
+def _deviations(fold_models: Sequence[Positions], px: FloatArray) -> FloatArray:
     return jackknife_deviations([model(px) for model in fold_models])
 
 
-def _block_variance_px2(
-    fold_models: Sequence[Callable[[FloatArray], FloatArray]], check: CheckResiduals
-) -> float:
+def _block_variance_px2(fold_models: Sequence[Positions], check: CheckResiduals) -> float:
     """Return the mean variance along an axis that blocks of points leave at the check points."""
     return float((_deviations(fold_models, check.px) ** 2).sum(axis=0).mean())
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import TooFewPointsError
 from ..rasters.grid import FloatArray, Grid
+from ..rasters.surfaces import Positions
 from .fitting import fit_model
 from .model_choice import left_out_blocks
 from .models import Frame, Model
@@ -34,12 +35,10 @@ class Estimate:
 
     transform: Transform
     points: TiePoints
-    fold_models: tuple[Callable[[FloatArray], FloatArray], ...]
+    fold_models: tuple[Positions, ...]
 
 
-def jackknife_spread(
-    fold_models: Sequence[Callable[[FloatArray], FloatArray]], at_px: FloatArray
-) -> FloatArray:
+def jackknife_spread(fold_models: Sequence[Positions], at_px: FloatArray) -> FloatArray:
     """Return the standard deviation of predictions, shape (n,), at positions, shape (n, 2).
 
     Infinite for fewer than two models, each of which was fitted without one block of neighbouring

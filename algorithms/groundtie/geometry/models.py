@@ -45,8 +45,10 @@ PARAMETERS = {
 # Models of the plane alone.
 KINDS = tuple(kind for kind in PARAMETERS if kind != TERRAIN)
 
+# The inverse has arrived when it misses by less, as a share of the frame; the most steps until
+# then.
+_INVERSE_PRECISION = 1e-12
 _INVERSE_STEPS = 20
-_INVERSE_PRECISION = 1e-12  # of the frame
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,8 @@ AUTO = "auto"
 
 # Standard deviation that inliers may have beyond their own, in pixels.
 _SIGMA_RANGE_PX = (0.1, 2.5)
+
+# Fits and separations of blunders take turns until the same points are used, at most so often.
 _STEPS = 30
 
 # No image is measured better than this.

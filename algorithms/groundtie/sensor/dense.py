@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from ..rasters.grid import FloatArray, Grid, mesh
 from ..rasters.lattice import Lattice, fine_lattice, row_strips
 from ..rasters.reading import FloatImage
-from ..rasters.surfaces import TOLERANCE_PX
+from ..rasters.surfaces import TOLERANCE_PX, Positions
 from ..rasters.warping import NOWHERE
 from .orientation import Orientation
-from .smooth_map import Positions
 
 # Heights are enclosed by planes at least so far apart, in metres.
 _LEAST_RANGE_M = 10.0

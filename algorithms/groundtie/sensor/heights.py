@@ -13,8 +13,14 @@ from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
 from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject
 from ..rasters.lattice import Lattice
 from ..rasters.reading import FloatImage, RasterSource
-from ..rasters.surfaces import TOLERANCE_PX, RasterSurface, SurfacePiece, surface_around
-from .smooth_map import Positions, smooth_map
+from ..rasters.surfaces import (
+    TOLERANCE_PX,
+    Positions,
+    RasterSurface,
+    SurfacePiece,
+    surface_around,
+)
+from .smooth_map import smooth_map
 
 # Takes a smooth function of longitude and latitude, (n, 2) → (n, k), and its largest error; returns
 # its values for all pixels of a grid.

@@ -12,12 +12,15 @@ from rasterio.crs import CRS
 from ..errors import GeoreferencingError, NoOverlapError
 from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject
 from ..rasters.reading import RasterSource
+from ..rasters.surfaces import Positions
 from .heights import ConstantHeight, Heights, terrain_heights
 from .rpc import RPC, ground_lattice
-from .smooth_map import Positions, smooth_map
+from .smooth_map import smooth_map
 
 # Heights found by intersecting a line of sight with the terrain are right to this, in metres.
 _PRECISION_M = 1e-4
+
+# The most steps until then; what needs more is taken for lost.
 _STEPS = 60
 
 # Longitudes and latitudes from map positions may be wrong by this: 0.1 mm.
@@ -26,6 +29,7 @@ _TOLERANCE_DEG = 1e-9
 # The map around the image that can be projected into it, as a share of the image's side.
 _AROUND = 0.5
 
+# Places a side of an image whose ground gives the extent of the map.
 _NODES = 9
 
 # The share of an image whose heights are known is counted at so many places a side: to 1 %.

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..rasters.grid import FloatArray
+from ..rasters.surfaces import Positions
 from .polynomials import blocks, fill_terms
 
-Positions = Callable[[FloatArray], FloatArray]
-
 _DEGREE = 5
-_NODES = 12
+
+# Nodes a side: twice as many as the polynomial has coefficients along one.
+_NODES = 2 * (_DEGREE + 1)
+
+# Random places at which the polynomial is compared with what it stands for.
 _CHECKS = 400
 
 # Each term of degree above 1 is one of lower degree times u (0) or v (1), by rising degree.
