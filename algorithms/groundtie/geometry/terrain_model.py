@@ -131,9 +131,8 @@ class TerrainModel(Model):
         TransformFileError
             A terrain model is not there, or another one.
         """
-        paths = [
-            None if values[name] is None else str(values[name]) for name in ("dem", "input_dem")
-        ]
+        stored_paths = values["dem"], values["input_dem"]
+        paths = [None if path is None else str(path) for path in stored_paths]
         left, bottom, right, top = (float(bound) for bound in values["region"])
         dem, input_dem = (None if path is None else _found(path, folder) for path in paths)
         coefficients = np.asarray(values["coefficients"], float).reshape(4, 2)

@@ -20,7 +20,7 @@ from .polynomials import TERMS, blocks, derivative, fill_terms
 # The inverse has arrived when it misses the image position by less, in pixels.
 _PRECISION_PX = 1e-7
 
-# The most steps until then: one is enough where the polynomials are the sensor's.
+# The most steps until then: usually it is one (see `_Start`).
 _STEPS = 12
 
 # Beyond this multiple of their scales ground positions are none of the image's.

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from ..assessment.accuracy import Assessment
 from ..assessment.comparison import Comparison, compare
-from ..assessment.evidence import AssessmentFiles
+from ..assessment.measuring import AssessmentFiles
 from ..assessment.point_errors import PointErrors
 from ..declaration import Output as ResultOutput
 from ..declaration import tool
