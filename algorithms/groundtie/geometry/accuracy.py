@@ -22,7 +22,7 @@ from .estimation import jackknife_deviations
 from .judging import CE90_FACTOR
 
 # Points at a side or a corner of each other are neighbours: √2 spacings are the farthest.
-_NEIGHBOUR_SPACINGS = 1.5
+NEIGHBOUR_SPACINGS = 1.5
 
 # A quantile of so many draws at each place is good to 1 or 2 %.
 _DRAWS = 1000
@@ -123,7 +123,7 @@ class CheckResiduals:
             return np.zeros((len(self.px),) * 2)
         apart = np.hypot(*(self.px[:, None] - self.px).transpose(2, 0, 1))
         np.fill_diagonal(apart, np.inf)
-        reach = _NEIGHBOUR_SPACINGS * np.median(apart.min(axis=1))
+        reach = NEIGHBOUR_SPACINGS * np.median(apart.min(axis=1))
         return np.asarray(np.outer(self.weights, self.weights) * (apart <= reach))
 
     @property

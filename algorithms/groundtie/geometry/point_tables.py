@@ -19,6 +19,9 @@ NOMINAL = ("nominal_x", "nominal_y")
 INPUT = ("input_x", "input_y")
 PIXEL = ("input_col", "input_row")
 
+# Standard deviations of a match.
+SIGMA = ("sigma_x_px", "sigma_y_px")
+
 # No position on a map of the Earth, in any unit, nor in an image is farther off.
 _FARTHEST = 1e10
 

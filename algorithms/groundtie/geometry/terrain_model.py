@@ -25,7 +25,7 @@ _STEPS = 15
 
 # Where a line of sight meets the ground at less than this slope between both, per metre, it meets
 # it more than once nearby (layover): there steps are no larger than from such a slope.
-_LEAST_SLOPE = 0.2
+LEAST_SLOPE = 0.2
 
 # Places a side at which heights are compared with those that a stored transform was made with, in
 # metres.
@@ -171,7 +171,7 @@ def _settled(risen: Callable[[FloatArray], FloatArray], size: int) -> FloatArray
             break
         with np.errstate(invalid="ignore", divide="ignore"):
             slope = (still - missed) / (rise - before)
-        slope = np.where(slope > _LEAST_SLOPE, slope, np.where(slope <= 0, 1.0, _LEAST_SLOPE))
+        slope = np.where(slope > LEAST_SLOPE, slope, np.where(slope <= 0, 1.0, LEAST_SLOPE))
         before, missed = rise, still
         rise = rise - still / slope
     return rise

@@ -26,6 +26,7 @@ from .point_tables import (
     NOMINAL,
     PIXEL,
     REFERENCE,
+    SIGMA,
     Row,
     columns,
     numbers,
@@ -217,7 +218,7 @@ def _from_rows(
     """Return the points of a table."""
     # A drawn line has empty columns.
     states = [str(row.get("state") or USED) for row in rows]
-    sigma = np.column_stack([numbers(rows, f"sigma_{axis}_px") for axis in "xy"])
+    sigma = columns(rows, *SIGMA)
     points = TiePoints.unmeasured(
         require_places(positions(rows, *REFERENCE)),
         require_places(_input_px(rows, input_grid, crs)),

@@ -12,6 +12,7 @@ import numpy as np
 from rasterio.crs import CRS
 
 from ..errors import TransformFileError
+from ..geometry.point_tables import SIGMA
 from ..geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
 from ..geometry.tie_point_files import SUFFIXES as TIE_POINT_SUFFIXES
 from ..geometry.tie_points import USED, TiePoints
@@ -25,7 +26,6 @@ from .orientation import Orientation, SensorGrid
 from .rpc import RPC
 
 CORRELATION = "sigma_correlation"
-_SIGMAS = ("sigma_x_px", "sigma_y_px")
 
 # Standard deviation, in pixels, of points that come without one.
 _USUAL_SIGMA_PX = 1.0
@@ -143,7 +143,7 @@ def read_control_points(
     if stored is None:
         # Map positions are the image's pixels, wherever the image nominally is.
         own_pixels = replace(grid, crs=None, transform=PIXEL_COORDINATES)
-        stored = read_tie_points(path, own_pixels, (HEIGHT, CORRELATION, *_SIGMAS))
+        stored = read_tie_points(path, own_pixels, (HEIGHT, CORRELATION, *SIGMA))
     if len(stored) == 0:
         raise TransformFileError(f"{path} holds no points")
     crs = stored.crs or orientation.crs
@@ -153,7 +153,7 @@ def read_control_points(
     state = np.where(stored.used, USED, "rejected: in the file").astype(object)
     state[stored.used & ~np.isfinite(height)] = "rejected: no height"
     unknown = np.full(len(stored), np.nan)
-    spread = (stored.more.get(name, unknown) for name in (*_SIGMAS, CORRELATION))
+    spread = (stored.more.get(name, unknown) for name in (*SIGMA, CORRELATION))
     points = replace(
         TiePoints.unmeasured(stored.reference_xy, stored.input_px, None, state.tolist()),
         covariance_px2=_covariances(*spread),

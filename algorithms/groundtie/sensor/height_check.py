@@ -39,7 +39,7 @@ _TAIL = 0.01
 
 @dataclass(frozen=True)
 class HeightCheck:
-    """What indicates the heights' zero.
+    """What indicates the vertical datum of the heights.
 
     Parameters
     ----------

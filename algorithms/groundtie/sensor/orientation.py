@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError, NoOverlapError
+from ..geometry.terrain_model import LEAST_SLOPE
 from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject
 from ..rasters.reading import RasterSource
 from ..rasters.surfaces import Positions
@@ -106,8 +107,10 @@ class Orientation:
                 if np.nanmax(np.abs(above), initial=0.0) < _PRECISION_M:
                     break
                 slope = (above - previous_above) / (height - previous)
-                # Steep slopes towards the sensor make the plain step overshoot.
-                step = np.where(np.isfinite(slope) & (slope < -0.2), -above / slope, above / 2)
+                # Steep slopes towards the sensor (layover) make the plain step overshoot.
+                step = np.where(
+                    np.isfinite(slope) & (slope < -LEAST_SLOPE), -above / slope, above / 2
+                )
                 step = np.where(np.abs(above) < _PRECISION_M, 0.0, step)
                 previous, previous_above, height = height, above, height + step
         lost = ~(np.abs(above) < _PRECISION_M)
