@@ -20,7 +20,7 @@ _RELATIVE, _ABSOLUTE = 1e-9, 1e-7
 def line_ends(geometries: Sequence[Any]) -> FloatArray:
     """Return the first and the last position of lines, shape (n, 2, 2).
 
-    NaN stands for what is no line, such as a row without a geometry.
+    NaN stands for what is no line, such as a row without a geometry, or an empty one.
 
     Parameters
     ----------
@@ -29,23 +29,22 @@ def line_ends(geometries: Sequence[Any]) -> FloatArray:
 
     Raises
     ------
-    ValueError
-        A line has several parts.
+    TypeError, ValueError
+        A line has several parts, or a position has not two numbers.
     """
     ends = np.full((len(geometries), 2, 2), np.nan)
     for end, geometry in zip(ends, geometries, strict=True):
-        kind = "" if geometry is None else geometry["type"]
-        if kind.endswith("LineString"):
-            end[:] = _ends(geometry["coordinates"], kind.startswith("Multi"))
-    return ends
-
-
-def _ends(coordinates: Any, several: bool) -> FloatArray:
-    if several:
-        if len(coordinates) != 1:
+        kind = "" if geometry is None else str(geometry["type"])
+        if not kind.endswith("LineString"):
+            continue
+        coordinates = geometry["coordinates"]
+        parts = coordinates if kind.startswith("Multi") else [coordinates]
+        parts = [part for part in parts if len(part)]
+        if len(parts) > 1:
             raise ValueError("a line has several parts: draw one line for each point")
-        (coordinates,) = coordinates
-    return np.array([coordinates[0][:2], coordinates[-1][:2]], float)
+        for part in parts:
+            end[:] = np.array([part[0][:2], part[-1][:2]], float).reshape(2, 2)
+    return ends
 
 
 def follow_lines(

@@ -57,7 +57,15 @@ def read_others(path: Path, image: str) -> TiePoints | None:
             require_places(points.reference_xy)
             require_places(points.input_px)
         return points
-    except (GroundTieError, OSError, ValueError, KeyError, TypeError, OverflowError) as error:
+    except (
+        GroundTieError,
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        OverflowError,
+    ) as error:
         raise TransformFileError(f"cannot read the ground control {path}: {error}") from error
 
 
