@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -167,12 +166,3 @@ def _covariances(x: FloatArray, y: FloatArray, correlation: FloatArray) -> Float
     x, y = (np.where(np.isfinite(sigma), sigma, _USUAL_SIGMA_PX) for sigma in (x, y))
     covariance = np.where(np.isfinite(correlation), correlation, 0.0) * x * y
     return np.stack([np.stack([x**2, covariance], -1), np.stack([covariance, y**2], -1)], -2)
-
-
-def joined(parts: Sequence[ControlPoints]) -> ControlPoints:
-    """Return the rows of several tables of one map, one after the other."""
-    return ControlPoints(
-        TiePoints.concatenate([part.points for part in parts]),
-        np.concatenate([part.height_m for part in parts]),
-        parts[0].crs,
-    )

@@ -79,10 +79,9 @@ class Orientation:
     def to_map(self, px: ArrayLike) -> FloatArray:
         """Return the map positions, shape (n, 2), that image positions see.
 
-        The height at which the line of sight meets the ground is found by the secant method; NaN
-        where it does not meet it.
+        NaN where the line of sight does not meet the ground.
         """
-        xy = reproject(self.to_ground(px)[0], LON_LAT, self.crs)
+        xy = reproject(self._ground(np.asarray(px, float)), LON_LAT, self.crs)
         return np.where(np.isfinite(xy), xy, np.nan)
 
     def to_nominal_map(self, px: ArrayLike) -> FloatArray:
@@ -95,9 +94,11 @@ class Orientation:
             xy[lost] = reproject(level, LON_LAT, self.crs)
         return np.where(np.isfinite(xy), xy, np.nan)
 
-    def to_ground(self, px: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return longitude and latitude, (n, 2), and height, (n,), that image positions see."""
-        px = np.asarray(px, float)
+    def _ground(self, px: FloatArray) -> FloatArray:
+        """Return longitude and latitude, (n, 2), that image positions see; NaN: none.
+
+        The height at which the line of sight meets the ground is found by the secant method.
+        """
         height = np.full(len(px), self.heights.typical_m)
         lon_lat, above = self._above(px, height)
         previous, previous_above, height = height, above, height + above
@@ -113,9 +114,8 @@ class Orientation:
                 )
                 step = np.where(np.abs(above) < _PRECISION_M, 0.0, step)
                 previous, previous_above, height = height, above, height + step
-        lost = ~(np.abs(above) < _PRECISION_M)
-        lon_lat[lost], height = np.nan, np.where(lost, np.nan, height)
-        return lon_lat, height
+        lon_lat[~(np.abs(above) < _PRECISION_M)] = np.nan
+        return lon_lat
 
     def _above(self, px: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return where lines of sight have a height, and how far the ground lies above them."""

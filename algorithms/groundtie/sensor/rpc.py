@@ -100,7 +100,10 @@ class RPC:
         px = np.empty((len(lon_lat), 2))
         for part, terms in blocks(len(px)):
             fill_terms(self._normalised(lon_lat[part], height[part]), terms)
-            px[part] = self._image_position(self._coefficients @ terms)
+            values = self._coefficients @ terms
+            with np.errstate(all="ignore"):
+                ratio = values[:2] / values[2:]
+            px[part] = ratio.T * self.image_scale + self.image_offset
         return px
 
     def derivatives(self, lon_lat: ArrayLike, height_m: ArrayLike) -> FloatArray:
@@ -174,11 +177,6 @@ class RPC:
             np.subtract(values, self.offset[axis], out=lph[axis])
             lph[axis] *= 1 / self.scale[axis]
         return lph
-
-    def _image_position(self, values: FloatArray) -> FloatArray:
-        with np.errstate(all="ignore"):
-            ratio = values[:2] / values[2:]
-        return np.asarray(ratio.T * self.image_scale + self.image_offset)
 
     def _newton(self, lph: FloatArray, target: FloatArray, terms: FloatArray) -> None:
         """Move normalised positions, (3, n), in place until they project to targets, (2, n)."""
