@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..rasters.grid import FloatArray
-from .polynomials import TERMS, blocks, derivative, fill_terms
+from .polynomials import TERMS, derivative, fill_terms, in_blocks
 
 # The inverse has arrived when it misses the image position by less, in pixels.
 _PRECISION_PX = 1e-7
@@ -85,7 +85,7 @@ class RPC:
         by_lon, by_lat, by_height = (derivative(self._coefficients, axis) for axis in range(3))
         return by_lon, by_lat, by_height
 
-    def project(self, lon_lat: ArrayLike, height_m: ArrayLike) -> FloatArray:
+    def project(self, lon_lat: ArrayLike, height_m: ArrayLike, workers: int = 1) -> FloatArray:
         """Return the image positions (col, row), shape (n, 2), of ground positions.
 
         Parameters
@@ -94,16 +94,21 @@ class RPC:
             Longitude and latitude in degrees (WGS 84), shape (n, 2).
         height_m
             Height above the ellipsoid, shape (n,) or one for all.
+        workers
+            Number of threads.
         """
         lon_lat = np.asarray(lon_lat, float)
         height = np.broadcast_to(np.asarray(height_m, float), len(lon_lat))
         px = np.empty((len(lon_lat), 2))
-        for part, terms in blocks(len(px)):
+
+        def work(part: slice, terms: FloatArray) -> None:
             fill_terms(self._normalised(lon_lat[part], height[part]), terms)
             values = self._coefficients @ terms
             with np.errstate(all="ignore"):
                 ratio = values[:2] / values[2:]
             px[part] = ratio.T * self.image_scale + self.image_offset
+
+        in_blocks(work, len(px), workers)
         return px
 
     def derivatives(self, lon_lat: ArrayLike, height_m: ArrayLike) -> FloatArray:
@@ -115,15 +120,18 @@ class RPC:
         lon_lat = np.asarray(lon_lat, float)
         height = np.broadcast_to(np.asarray(height_m, float), len(lon_lat))
         slopes = np.empty((len(lon_lat), 2, 3))
-        for part, terms in blocks(len(slopes)):
+
+        def work(part: slice, terms: FloatArray) -> None:
             fill_terms(self._normalised(lon_lat[part], height[part]), terms)
             values = self._coefficients @ terms
             for axis, coefficients in enumerate(self._derivatives):
                 slope = _quotient_slope(values, coefficients @ terms[: coefficients.shape[1]])
                 slopes[part, :, axis] = (slope / self.scale[axis]).T * self.image_scale
+
+        in_blocks(work, len(slopes))
         return slopes
 
-    def localise(self, px: ArrayLike, height_m: ArrayLike) -> FloatArray:
+    def localise(self, px: ArrayLike, height_m: ArrayLike, workers: int = 1) -> FloatArray:
         """Return longitude and latitude, shape (n, 2), of image positions at given heights.
 
         By Newton's method with the analytic Jacobian, to 1e-7 px; NaN where it finds nothing.
@@ -132,20 +140,24 @@ class RPC:
         ----------
         px
             Image positions (col, row), shape (n, 2).
-        height_m
-            Height above the ellipsoid, shape (n,) or one for all.
+        height_m, workers
+            As `project` has them.
         """
         px = np.asarray(px, float)
         height = np.broadcast_to(np.asarray(height_m, float), len(px))
         found = np.empty((len(px), 2))
-        for part, terms in blocks(len(px)):
+        start = self._start
+
+        def work(part: slice, terms: FloatArray) -> None:
             target = ((px[part] - self.image_offset) / self.image_scale).T
             lph = np.empty_like(terms[:3])
             lph[2] = (height[part] - self.offset[2]) / self.scale[2]
-            lph[:2] = self._start(target, lph[2], terms)
+            lph[:2] = start(target, lph[2], terms)
             with np.errstate(all="ignore"):
                 self._newton(lph, target, terms)
             found[part] = lph[:2].T * self.scale[:2] + self.offset[:2]
+
+        in_blocks(work, len(px), workers)
         return found
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..rasters.grid import FloatArray
 from ..rasters.surfaces import Positions
-from .polynomials import blocks, fill_terms
+from .polynomials import fill_terms, in_blocks
 
 _DEGREE = 5
 
@@ -46,11 +46,14 @@ class SmoothMap:
     def __call__(self, xy: FloatArray) -> FloatArray:
         """Return the other positions, shape (n, 2), of positions (n, 2)."""
         moved = np.empty((len(xy), 2))
-        for part, terms in blocks(len(xy), _TERMS):
+
+        def work(part: slice, terms: FloatArray) -> None:
             unit = self._unit(xy[part])
             fill_terms(unit, terms, _PRODUCTS)
             moved[part] = (self.coefficients @ terms).T
             moved[part][(np.abs(unit) > 1 + 1e-9).any(axis=0)] = np.nan
+
+        in_blocks(work, len(xy), terms=_TERMS)
         return moved
 
     def _unit(self, xy: FloatArray) -> FloatArray:
