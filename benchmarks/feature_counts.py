@@ -38,7 +38,6 @@ _OFF_PX = np.array([1.5, -1.5])
 
 # Wrong matches fall this near a model by chance; RANSAC keeps what does.
 _RANSAC_PX = 3.0
-_SIGMAS_PX = (0.2, 2.5)
 
 # The whole chain of each detector is timed so often, and the shortest time counts.
 _REPEATS = 3
@@ -149,7 +148,7 @@ def count_chain(case: RealCase) -> ChainCount:
     px = one.position_px, other.position_px
     start = find_consensus(*px, _RANSAC_PX, "similarity")
     area = float(np.pi * GATE_PX**2)
-    model, _ = fit_robustly("affine", *px, np.zeros(len(near)), start, area, _SIGMAS_PX)
+    model, _ = fit_robustly("affine", *px, np.zeros(len(near)), start, area)
     hybrid = _counts(one, other, model, limit)
     return ChainCount(
         case.name,

@@ -18,9 +18,8 @@ from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import NothingFoundError, TooFewPointsError
-from .geometry.georeferencer import unmeasured
 from .geometry.model_choice import left_out_blocks
-from .geometry.models import KINDS, PARAMETERS
+from .geometry.models import KINDS, fewest_points
 from .geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
 from .geometry.tie_points import USED, TiePoints
 from .geometry.transform import Transform
@@ -32,7 +31,7 @@ from .rasters.reading import open_raster
 from .registration.sensor_input import Ground, open_oriented_image
 from .registration.tie_point_evidence import TiePointEvidence
 from .registration.verdict import decide
-from .sensor.control_points import HEIGHT
+from .sensor.control_formats import HEIGHT
 from .sensor.orientation import sensor_grid
 from .similarity.description import BORDER_PX
 from .similarity.peak import Peak, find_peak
@@ -153,7 +152,7 @@ class Review:
     def add(self, reference_xy: ArrayLike, input_px: ArrayLike, score: float = np.nan) -> Review:
         """Return the review with one more point, the last."""
         xy, px = (np.asarray(place, float).reshape(1, 2) for place in (reference_xy, input_px))
-        point = unmeasured(xy, px, [USED], self.points.crs)
+        point = TiePoints.unmeasured(xy, px, self.points.crs)
         more = {name: np.full(1, np.nan) for name in self.points.more} | {EDITED: np.ones(1)}
         point = replace(point, score=np.array([score]), more=more)
         mine = replace(self.points, more=self._columns)
@@ -217,10 +216,9 @@ class Review:
         taken = np.flatnonzero(self.points.fit)
         if kind == "tps" and len(taken) > MOST_SPLINE_POINTS:
             return None
-        needed = -(-PARAMETERS[kind] // 2)
         errors = np.full(len(taken), np.nan)
         for block in left_out_blocks(self.points.reference_xy[taken]):
-            if (~block).sum() < max(needed, 3):
+            if (~block).sum() < max(fewest_points(kind), 3):
                 return None
             seen = TiePointEvidence(self.points.take(taken[~block]), kind, self.input_grid)
             left = self.points.take(taken[block])

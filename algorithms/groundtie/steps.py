@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from .arrays import Raster
 from .context import Context, threads
 from .errors import ParameterError, TooFewPointsError
-from .geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_without_blocks
+from .geometry.estimation import Estimate, fit_without_blocks
 from .geometry.models import DEGREE, KINDS, Model, PolynomialModel
 from .geometry.robust import find_consensus, fit_robustly
 from .geometry.tie_points import TiePoints
@@ -195,7 +195,6 @@ def fit_model(
         np.full(len(px), _USUAL_SIGMA_PX**2),
         start,
         (2 * radius_px + 1) ** 2,
-        SIGMA_RANGE_PX,
     )
     return Fit(model.on_map(Affine.scale(pixel_size)), mixture.inliers, mixture.sigma * pixel_size)
 

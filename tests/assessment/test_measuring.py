@@ -10,7 +10,7 @@ from known_errors import DEGREES, GRID, PLAIN, shifted
 from raster_files import UTM
 from rasterio.crs import CRS
 
-from groundtie.assessment.evidence import measure_check_points, measure_tie_points
+from groundtie.assessment.measuring import measure_check_points, measure_tie_points
 from groundtie.errors import GeoreferencingError, TooFewPointsError, TransformFileError
 from groundtie.geometry.tie_point_files import write_tie_points
 from groundtie.geometry.tie_points import TiePoints

@@ -193,6 +193,40 @@ def test_a_line_of_several_parts_is_refused(tmp_path: Path) -> None:
         read_tie_points(path, GRID)
 
 
+@pytest.mark.parametrize(
+    ("kind", "coordinates"),
+    [("LineString", []), ("MultiLineString", []), ("MultiLineString", [[]])],
+)
+def test_an_empty_line_is_none(tmp_path: Path, kind: str, coordinates: list[Any]) -> None:
+    path = tmp_path / "a.geojson"
+    points = write(path)
+    collection = json.loads(path.read_text())
+    collection["features"][0]["geometry"] = {"type": kind, "coordinates": coordinates}
+    path.write_text(json.dumps(collection))
+    found = read_tie_points(path, GRID)
+    np.testing.assert_array_equal(found.reference_xy, points.reference_xy)
+    assert not found.more[EDITED].any()
+
+
+def test_an_empty_line_of_a_geopackage_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "a.gpkg"
+    points = write(path)
+    edit(path, lambda features: features[0]["geometry"].update(coordinates=[]))
+    found = read_tie_points(path, GRID)
+    np.testing.assert_array_equal(found.reference_xy, points.reference_xy)
+    assert not found.more[EDITED].any()
+
+
+def test_positions_of_one_number_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.geojson"
+    write(path)
+    collection = json.loads(path.read_text())
+    collection["features"][0]["geometry"]["coordinates"] = [[5], [6]]
+    path.write_text(json.dumps(collection))
+    with pytest.raises(TransformFileError, match="cannot read the tie points"):
+        read_tie_points(path, GRID)
+
+
 def test_points_count_by_their_columns(tmp_path: Path) -> None:
     """Points on the reference, or anywhere: which of both images they lie in is not known."""
     path = tmp_path / "a.geojson"

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from groundtie.errors import TooFewPointsError
 from groundtie.geometry.model_choice import (
-    Candidate,
     block_folds,
     choose_simplest,
     left_out_blocks,
@@ -22,11 +21,11 @@ NOISE = np.random.default_rng(1).normal(0, 1, 200)
 def choose(gains: dict[str, float | None], **options: object) -> tuple[str, list[str]]:
     """Choose among kinds that score so much on average; None: their fit fails."""
 
-    def fit(kind: str) -> Candidate[str]:
+    def fit(kind: str) -> tuple[str, np.ndarray]:
         gain = gains[kind]
         if gain is None:
             raise TooFewPointsError(f"too few points for {kind}")
-        return Candidate(kind, kind, gain + 0.01 * (NOISE if kind == "affine" else -NOISE))
+        return kind, gain + 0.01 * (NOISE if kind == "affine" else -NOISE)
 
     return choose_simplest(list(gains), fit, PX, **options)  # type: ignore[arg-type]
 

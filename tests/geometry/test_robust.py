@@ -176,7 +176,7 @@ def test_a_robust_fit_among_forty_percent_wrong_matches(kind: str, seed: int) ->
     px, found, right = matches(kind, 200, 0.4, seed)
     start = find_consensus(px, found, 3.0, "affine", seed)
     variances = np.full(len(px), 0.05)
-    model, mixture = fit_robustly(kind, px, found, variances, start, AREA, (0.2, 2.5))
+    model, mixture = fit_robustly(kind, px, found, variances, start, AREA)
     assert model.kind == kind
     # A spline sways with its knots' noise, less than each of them; polynomials average over it.
     assert error_px(model, kind) < (0.4 * np.sqrt(2) if kind == "tps" else 0.2)
@@ -195,7 +195,7 @@ def test_uncertain_matches_weigh_less() -> None:
         for _ in range(20):
             found = px + [1, 1] + rng.normal(size=px.shape) * sigmas[:, None]
             start = fit_model("translation", px, found)
-            fitted = fit_robustly("translation", px, found, variances, start, AREA, (0.2, 2.5))
+            fitted = fit_robustly("translation", px, found, variances, start, AREA)
             gaps.append(fitted[0](px[:1])[0] - px[0] - [1, 1])
         errors.append(np.sqrt(np.mean(np.square(gaps))))
     assert errors[0] < 0.75 * errors[1]
@@ -205,4 +205,4 @@ def test_too_few_right_matches_for_the_model() -> None:
     px, found, _ = matches("translation", 8, 0.0, 0)
     start = find_consensus(px, found, 3.0, "translation")
     with pytest.raises(TooFewPointsError, match="polynomial3"):
-        fit_robustly("polynomial3", px, found, np.zeros(8), start, AREA, (0.2, 2.5))
+        fit_robustly("polynomial3", px, found, np.zeros(8), start, AREA)

@@ -33,7 +33,7 @@ from evidences import (
     two_thirds,
 )
 
-from groundtie.assessment.assessed_points import AssessmentEvidence
+from groundtie.assessment.accuracy import AssessmentEvidence
 from groundtie.assessment.point_errors import PointErrors
 from groundtie.errors import (
     AmbiguousPlaceError,

@@ -233,6 +233,8 @@ class TestFormatsOfOthers:
             ("a.pts", "1 2 three 4\n", "could not convert"),
             ("a.geojson", '{"features": [{"properties": {"ji": [1]}}]}', "cannot read the ground"),
             ("a.tif", "no raster", "cannot read the ground control"),
+            ("a.json", '{"features": [1]}', "cannot read the ground control"),
+            ("a.json", '{"features": [{"properties": ["ji"]}]}', "cannot read the ground control"),
         ],
     )
     def test_what_cannot_be_understood(

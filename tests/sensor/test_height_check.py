@@ -12,8 +12,8 @@ from groundtie.rasters.reading import open_raster
 from groundtie.sensor.adjustment import Control, adjust
 from groundtie.sensor.height_check import HeightCheck, check_heights
 from groundtie.sensor.orientation import orient
-from groundtie.sensor.rpc import RPC
-from groundtie.sensor.rpc_fit import fit_rpc, ground_lattice
+from groundtie.sensor.rpc import RPC, ground_lattice
+from groundtie.sensor.rpc_fit import fit_rpc
 
 SIZE = (600, 500)
 UTM = CRS.from_epsg(32632)

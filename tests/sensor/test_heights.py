@@ -13,8 +13,8 @@ from scipy.interpolate import RegularGridInterpolator
 from groundtie.errors import GeoreferencingError, NoOverlapError, RasterContentError
 from groundtie.rasters.grid import LON_LAT, Grid, reproject
 from groundtie.rasters.reading import open_raster
-from groundtie.sensor.geoids import find_geoid
-from groundtie.sensor.heights import ConstantHeight, declared_datum, surface_over, terrain_heights
+from groundtie.sensor.geoids import declared_datum, find_geoid
+from groundtie.sensor.heights import ConstantHeight, surface_over, terrain_heights
 
 REGION = np.array([[8.998, 45.148], [9.002, 45.152]])
 PLACES = np.random.default_rng(0).uniform(*REGION, (400, 2))

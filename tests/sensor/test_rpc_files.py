@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,8 +29,9 @@ def write_image(path: Path, rpc: RPC | None = None) -> Path:
 
 
 def flat(rpc: RPC) -> np.ndarray:
+    values = [getattr(rpc, field.name) for field in fields(rpc)]
     return np.concatenate(
-        [np.atleast_1d(np.array(value, float)) for value in vars(rpc).values() if value is not None]
+        [np.atleast_1d(np.array(value, float)) for value in values if value is not None]
     )
 
 

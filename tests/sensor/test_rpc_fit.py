@@ -7,9 +7,9 @@ import pytest
 from rpc_models import DIMAP, REAL, camera, real_tags
 
 from groundtie.errors import TooFewPointsError
-from groundtie.sensor.rpc import RPC
+from groundtie.sensor.rpc import RPC, ground_lattice
 from groundtie.sensor.rpc_files import read_rpc
-from groundtie.sensor.rpc_fit import fit_rpc, ground_lattice
+from groundtie.sensor.rpc_fit import fit_rpc
 from groundtie.sensor.rpc_tags import rpc_from_tags
 
 AFFINE = np.array([[1.0008, 0.0005], [-0.0007, 0.9994]])

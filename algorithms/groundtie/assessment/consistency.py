@@ -118,16 +118,15 @@ def _entering(leg: Leg, xy: FloatArray, crs: CRS | None, name: str) -> FloatArra
     return reproject(xy, crs, leg.start_crs)
 
 
-def lattice(grid: Grid, places: int = _PLACES) -> FloatArray:
+def lattice(grid: Grid) -> FloatArray:
     """Return pixel positions (col, row) spread evenly over a grid, from border to border, (n, 2).
 
-    `places` is their number along the longer side; no pixel is taken twice.
+    No pixel is taken twice.
     """
-    step = max(max(grid.width, grid.height) / places, 1.0)
-    # In the middles of equal parts, as pixels lie in a grid.
-    axes = [
-        (np.arange(count) + 0.5) * side / count - 0.5
-        for side in (grid.width, grid.height)
-        for count in (max(round(side / step), 1),)
-    ]
+    step = max(max(grid.width, grid.height) / _PLACES, 1.0)
+    axes = []
+    for side in (grid.width, grid.height):
+        count = max(round(side / step), 1)
+        # In the middles of equal parts, as pixels lie in a grid.
+        axes.append((np.arange(count) + 0.5) * side / count - 0.5)
     return mesh(*axes)

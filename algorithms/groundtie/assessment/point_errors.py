@@ -13,12 +13,13 @@ from ..geometry.judging import TOLERANCE_PX, USUAL_MAX_ERROR_PX, sigma_range_px
 from ..geometry.robust import fit_mixture
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
+from ..matching.check import CHECK_RADIUS_PX
 from ..rasters.grid import FloatArray, Grid, metres_per_unit_at
 from ..rasters.reading import Mask
 from .statistics import Statistics
 
 # Search window of held-out points, in pixels², if residuals do not show a larger one.
-_WINDOW_AREA_PX2 = 25.0**2
+_WINDOW_AREA_PX2 = (2 * CHECK_RADIUS_PX + 1) ** 2
 
 
 @dataclass(frozen=True)

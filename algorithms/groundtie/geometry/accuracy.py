@@ -9,23 +9,24 @@ of them is left where the ground is not known for sure.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from scipy.special import gammaincinv
 
-from ..rasters.grid import FloatArray
+from ..rasters.grid import FloatArray, PointFunction
 from .estimation import jackknife_deviations
 from .judging import CE90_FACTOR
 
 # Points at a side or a corner of each other are neighbours: √2 spacings are the farthest.
-_NEIGHBOUR_SPACINGS = 1.5
+NEIGHBOUR_SPACINGS = 1.5
 
 # A quantile of so many draws at each place is good to 1 or 2 %.
 _DRAWS = 1000
 
+# Fewer inliers than this, by their weights, are none.
 _LEAST_WEIGHT = 1e-9
 
 # The interval holds the true figure with this probability.
@@ -121,7 +122,7 @@ class CheckResiduals:
             return np.zeros((len(self.px),) * 2)
         apart = np.hypot(*(self.px[:, None] - self.px).transpose(2, 0, 1))
         np.fill_diagonal(apart, np.inf)
-        reach = _NEIGHBOUR_SPACINGS * np.median(apart.min(axis=1))
+        reach = NEIGHBOUR_SPACINGS * np.median(apart.min(axis=1))
         return np.asarray(np.outer(self.weights, self.weights) * (apart <= reach))
 
     @property
@@ -153,7 +154,7 @@ class Common:
 
 
 def predict_accuracy(
-    fold_models: Sequence[Callable[[FloatArray], FloatArray]],
+    fold_models: Sequence[PointFunction],
     places_px: FloatArray,
     check: CheckResiduals,
     common: Common,
@@ -216,7 +217,7 @@ def predict_accuracy(
 
 
 def standard_deviation_px(
-    fold_models: Sequence[Callable[[FloatArray], FloatArray]],
+    fold_models: Sequence[PointFunction],
     places_px: FloatArray,
     check: CheckResiduals,
     common: Common,
@@ -235,15 +236,11 @@ def standard_deviation_px(
     return np.asarray(np.sqrt(variance + alike))
 
 
-def _deviations(
-    fold_models: Sequence[Callable[[FloatArray], FloatArray]], px: FloatArray
-) -> FloatArray:
+def _deviations(fold_models: Sequence[PointFunction], px: FloatArray) -> FloatArray:
     return jackknife_deviations([model(px) for model in fold_models])
 
 
-def _block_variance_px2(
-    fold_models: Sequence[Callable[[FloatArray], FloatArray]], check: CheckResiduals
-) -> float:
+def _block_variance_px2(fold_models: Sequence[PointFunction], check: CheckResiduals) -> float:
     """Return the mean variance along an axis that blocks of points leave at the check points."""
     return float((_deviations(fold_models, check.px) ** 2).sum(axis=0).mean())
 

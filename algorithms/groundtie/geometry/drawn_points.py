@@ -10,26 +10,17 @@ from numpy.typing import NDArray
 from rasterio.crs import CRS
 
 from ..rasters.grid import FloatArray, Grid, reproject
-
-Row = dict[str, Any]
+from .point_tables import INPUT, NOMINAL, PIXEL, REFERENCE, Row, columns
 
 # GeoJSON is usually written with 7 decimals of a degree (RFC 7946, section 11.2), doubles have 15
 # digits: what differs by no more was not moved.
 _RELATIVE, _ABSOLUTE = 1e-9, 1e-7
 
-# Where a row states the place in the input: on the reference map, on its own map, and its pixel.
-NOMINAL, INPUT, PIXEL = (
-    ("nominal_x", "nominal_y"),
-    ("input_x", "input_y"),
-    ("input_col", "input_row"),
-)
-_REFERENCE = ("reference_x", "reference_y")
-
 
 def line_ends(geometries: Sequence[Any]) -> FloatArray:
     """Return the first and the last position of lines, shape (n, 2, 2).
 
-    NaN stands for what is no line, such as a row without a geometry.
+    NaN stands for what is no line, such as a row without a geometry, or an empty one.
 
     Parameters
     ----------
@@ -38,23 +29,22 @@ def line_ends(geometries: Sequence[Any]) -> FloatArray:
 
     Raises
     ------
-    ValueError
-        A line has several parts.
+    TypeError, ValueError
+        A line has several parts, or a position has not two numbers.
     """
     ends = np.full((len(geometries), 2, 2), np.nan)
     for end, geometry in zip(ends, geometries, strict=True):
-        kind = "" if geometry is None else geometry["type"]
-        if kind.endswith("LineString"):
-            end[:] = _ends(geometry["coordinates"], kind.startswith("Multi"))
-    return ends
-
-
-def _ends(coordinates: Any, several: bool) -> FloatArray:
-    if several:
-        if len(coordinates) != 1:
+        kind = "" if geometry is None else str(geometry["type"])
+        if not kind.endswith("LineString"):
+            continue
+        coordinates = geometry["coordinates"]
+        parts = coordinates if kind.startswith("Multi") else [coordinates]
+        parts = [part for part in parts if len(part)]
+        if len(parts) > 1:
             raise ValueError("a line has several parts: draw one line for each point")
-        (coordinates,) = coordinates
-    return np.array([coordinates[0][:2], coordinates[-1][:2]], float)
+        for part in parts:
+            end[:] = np.array([part[0][:2], part[-1][:2]], float).reshape(2, 2)
+    return ends
 
 
 def follow_lines(
@@ -85,7 +75,7 @@ def follow_lines(
     ValueError
         A nominal position on the map has no place in an input without georeferencing.
     """
-    stated = np.stack([columns(rows, *NOMINAL), columns(rows, *_REFERENCE)], axis=1)
+    stated = np.stack([columns(rows, *NOMINAL), columns(rows, *REFERENCE)], axis=1)
     drawn = np.asarray(np.isfinite(ends).all(axis=(1, 2)))
     moved = drawn[:, None] & ~_same(ends, _projected(stated, crs, layer_crs))
     # A table that locates its points in the input otherwise has no nominal positions to compare.
@@ -100,7 +90,7 @@ def follow_lines(
         )
     nominal = PIXEL if is_lattice else NOMINAL
     found = [dict(row) for row in rows]
-    for end, names in enumerate((nominal, _REFERENCE)):
+    for end, names in enumerate((nominal, REFERENCE)):
         for index in np.flatnonzero(moved[:, end]):
             found[index] |= zip(names, on_map[index, end].tolist(), strict=True)
     return found, np.asarray(moved.any(axis=1))
@@ -115,17 +105,6 @@ def _is_lattice(rows: list[Row], nominal: FloatArray) -> bool:
 
 def _same(one: FloatArray, other: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(np.isclose(one, other, _RELATIVE, _ABSOLUTE).all(-1))
-
-
-def columns(rows: list[Row], x: str, y: str) -> FloatArray:
-    """Return the positions in two columns, shape (n, 2); NaN where there is none."""
-    return np.column_stack([numbers(rows, x), numbers(rows, y)])
-
-
-def numbers(rows: list[Row], name: str) -> FloatArray:
-    """Return a column of numbers, shape (n,); NaN where there is none."""
-    values = [row.get(name) for row in rows]
-    return np.array([np.nan if value in (None, "") else float(value) for value in values], float)
 
 
 def _projected(places: FloatArray, source: CRS | None, target: CRS | None) -> FloatArray:

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import TooFewPointsError
-from ..rasters.grid import FloatArray, Grid
+from ..rasters.grid import FloatArray, Grid, PointFunction
 from .fitting import fit_model
 from .model_choice import left_out_blocks
 from .models import Frame, Model
 from .robust import fit_robustly
 from .tie_points import TiePoints
 from .transform import Transform
-
-# Standard deviation that inliers may have, in matching pixels.
-SIGMA_RANGE_PX = (0.2, 2.5)
 
 
 @dataclass(frozen=True)
@@ -37,12 +34,10 @@ class Estimate:
 
     transform: Transform
     points: TiePoints
-    fold_models: tuple[Callable[[FloatArray], FloatArray], ...]
+    fold_models: tuple[PointFunction, ...]
 
 
-def jackknife_spread(
-    fold_models: Sequence[Callable[[FloatArray], FloatArray]], at_px: FloatArray
-) -> FloatArray:
+def jackknife_spread(fold_models: Sequence[PointFunction], at_px: FloatArray) -> FloatArray:
     """Return the standard deviation of predictions, shape (n,), at positions, shape (n, 2).
 
     Infinite for fewer than two models, each of which was fitted without one block of neighbouring
@@ -121,6 +116,6 @@ def fit_thin_plate(
         raise TooFewPointsError(f"only {len(used)} points were matched")
     variances = np.trace(used.covariance_px2, axis1=1, axis2=2) / 2
     area = (2 * radius_px + 1) ** 2
-    model, mixture = fit_robustly("tps", px, nominal_px, variances, start, area, SIGMA_RANGE_PX)
+    model, mixture = fit_robustly("tps", px, nominal_px, variances, start, area)
     weights = np.where(mixture.inliers, 1 / (mixture.sigma**2 + variances), 0.0)
     return model, fit_without_blocks("tps", px, nominal_px, weights)

@@ -8,11 +8,11 @@ from ..errors import TooFewPointsError
 from ..rasters.grid import FloatArray
 from .models import (
     DEGREE,
-    PARAMETERS,
     Frame,
     Model,
     PolynomialModel,
     ThinPlateSpline,
+    fewest_points,
     monomials,
     thin_plate_kernel,
 )
@@ -49,8 +49,8 @@ def fit_model(
     """
     weights = np.ones(len(xy)) if weights is None else weights
     taken = weights > 0
-    if taken.sum() < PARAMETERS[kind] / 2:
-        needed = -(-PARAMETERS[kind] // 2)
+    needed = fewest_points(kind)
+    if taken.sum() < needed:
         raise TooFewPointsError(
             f"the {kind} model needs at least {needed} points; there are {taken.sum()}"
         )

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from affine import Affine
 from rasterio.crs import CRS
 
-from ..rasters.grid import FloatArray, Grid, require_map
+from ..rasters.grid import Grid, require_map
+from .point_tables import positions, require_places, table_rows
 from .tie_points import USED, TiePoints
 from .transform import Transform
-
-Row = dict[str, Any]
-
-# No position on a map of the Earth, in any unit, nor in an image is farther off.
-_FARTHEST = 1e10
 
 # It counts pixels from the image's corner, and rows downwards from 0.
 _PIXELS = Grid(Affine.scale(1, -1), None, 1, 1)
@@ -55,54 +48,7 @@ def read_georeferencer(path: Path, input_grid: Grid) -> TiePoints:
     enabled = [(row.get("enable") or "1").strip() for row in rows]
     states = ["rejected: disabled" if word == "0" else USED for word in enabled]
     reference_xy = require_places(positions(rows, "mapX", "mapY"))
-    return unmeasured(reference_xy, input_px, states, crs)
-
-
-def table_rows(lines: Iterable[str]) -> list[Row]:
-    """Return the rows of a CSV table by the names of its columns.
-
-    Fields beyond those of the first line are left out.
-    """
-    rows = [dict(row) for row in csv.DictReader(lines)]
-    for row in rows:
-        row.pop(None, None)
-    return rows
-
-
-def unmeasured(
-    reference_xy: FloatArray, input_px: FloatArray, states: list[str], crs: CRS | None
-) -> TiePoints:
-    """Return points of a fit whose places and states are all that is known."""
-    count = len(states)
-    return TiePoints(
-        reference_xy,
-        input_px,
-        np.full(count, np.nan),
-        np.full((count, 2, 2), np.nan),
-        np.full(count, np.nan),
-        np.zeros(count, bool),
-        np.array(states, str),
-        crs,
-    )
-
-
-def positions(rows: Iterable[Row], x: str, y: str) -> FloatArray:
-    """Return the positions in two columns of a table, shape (n, 2)."""
-    return np.array([[float(row[x]), float(row[y])] for row in rows], float).reshape(-1, 2)
-
-
-def require_places(places: FloatArray) -> FloatArray:
-    """Return positions, shape (n, 2), that a file holds.
-
-    Raises
-    ------
-    ValueError
-        One is so far off that it lies on no map, or is not finite.
-    """
-    lost = int((~(np.abs(places) < _FARTHEST)).any(axis=1).sum())
-    if lost:
-        raise ValueError(f"{lost} of {len(places)} positions are not finite, or on no map")
-    return places
+    return TiePoints.unmeasured(reference_xy, input_px, crs, states)
 
 
 def _source_grid(input_grid: Grid) -> Grid:

@@ -7,8 +7,7 @@ and what a more flexible model gains is measured against its scatter between blo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,31 +36,13 @@ CHIPS_PER_PARAMETER = 2
 MATCHES_PER_PARAMETER = 3
 CONTROL_PER_PARAMETER = 1.5
 
+# As is usual ([Hastie2009] 7.10).
 _FOLDS = 5
-
-
-@dataclass(frozen=True)
-class Candidate(Generic[T]):
-    """A model that may be chosen.
-
-    Parameters
-    ----------
-    kind
-        One of `models.PARAMETERS` or of `bias.KINDS`.
-    fitted
-        The model, in whatever form its caller has it.
-    scores
-        How well points are predicted without them, larger is better, shape (n,).
-    """
-
-    kind: str
-    fitted: T
-    scores: FloatArray
 
 
 def choose_simplest(
     kinds: Iterable[str],
-    fit: Callable[[str], Candidate[T]],
+    fit: Callable[[str], tuple[T, FloatArray]],
     px: FloatArray,
     baseline: FloatArray | None = None,
     asked: Mapping[str, float] = STANDARD_ERRORS,
@@ -74,7 +55,9 @@ def choose_simplest(
     kinds
         From simple to flexible.
     fit
-        Fits a kind; raises TooFewPointsError where the points are too few for it or disagree.
+        Fits a kind, one of `models.PARAMETERS` or of `bias.KINDS`. Returns the model, in whatever
+        form, and how well points are predicted without them: larger is better, shape (n,). Raises
+        TooFewPointsError where the points are too few for it or disagree.
     px
         Where the points lie, shape (n, 2).
     baseline
@@ -99,16 +82,16 @@ def choose_simplest(
     failure: TooFewPointsError | None = None
     for kind in kinds:
         try:
-            tried = fit(kind)
+            tried, left_out = fit(kind)
         except TooFewPointsError as error:
             failure = failure or error
             continue
-        fitted.append(tried.fitted)
+        fitted.append(tried)
         if scores is not None:
-            gains = standard_errors(tried.scores - scores, px) > asked.get(kind, 0.0)
-            if not gains or (chosen is not None and not is_held(tried.fitted, chosen)):
+            gains = standard_errors(left_out - scores, px) > asked.get(kind, 0.0)
+            if not gains or (chosen is not None and not is_held(tried, chosen)):
                 continue
-        chosen, scores = tried.fitted, tried.scores
+        chosen, scores = tried, left_out
     if chosen is None:
         raise failure or TooFewPointsError(f"too few of {len(px)} points agree with a model")
     return chosen, fitted

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from typing import Self  # Python 3.11; annotations alone need it
 
 
-# Degree of the polynomial, and fewest points, from the simplest model to the most flexible.
+# Model that needs heights (see `terrain`).
+TERRAIN = "terrain"
+
+# Degree of the polynomial, and number of parameters, from the simplest model to the most flexible.
 DEGREE = {
     "translation": 0,
     "rigid": 1,
@@ -37,14 +40,15 @@ PARAMETERS = {
     "polynomial2": 12,
     "polynomial3": 20,
     "tps": 20,
+    TERRAIN: 8,
 }
-# Models of the plane alone, and the one that needs heights (see `terrain`).
-KINDS = tuple(PARAMETERS)
-TERRAIN = "terrain"
-PARAMETERS[TERRAIN] = 8
+# Models of the plane alone.
+KINDS = tuple(kind for kind in PARAMETERS if kind != TERRAIN)
 
+# The inverse has arrived when it misses by less, as a share of the frame; the most steps until
+# then.
+_INVERSE_PRECISION = 1e-12
 _INVERSE_STEPS = 20
-_INVERSE_PRECISION = 1e-12  # of the frame
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,11 @@ class Frame:
     def leave(self, uv: FloatArray) -> FloatArray:
         """Return positions of this frame on the map."""
         return apply_affine(self.to_map, uv)
+
+
+def fewest_points(kind: str) -> int:
+    """Return how many points, of two coordinates each, determine a model."""
+    return -(-PARAMETERS[kind] // 2)
 
 
 def monomials(uv: FloatArray, degree: int) -> FloatArray:

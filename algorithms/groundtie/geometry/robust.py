@@ -12,15 +12,26 @@ from numpy.typing import NDArray
 
 from ..rasters.grid import FloatArray
 from .fitting import fit_model
-from .models import PARAMETERS, Frame, Model, PolynomialModel, monomials
+from .models import Frame, Model, PolynomialModel, fewest_points, monomials
 
+# Where a fifth of the pairs is right, so many samples of three hold a right one with 99 %.
 _SAMPLES = 600
 
 # Pairs times samples that are looked at together, 16 MB of residuals: large scenes have 50 000
 # pairs of features.
 _TOGETHER = 1_000_000
+
+# After so many steps a mixture changes no more: between 10 and 300 points by less than 1e-13.
 _MIXTURE_STEPS = 40
+
+# Fits and mixtures take turns until the model moves no point any more, at most so often.
 _FIT_STEPS = 15
+
+# Standard deviation that inliers may have, in pixels.
+_SIGMA_RANGE_PX = (0.2, 2.5)
+
+# Share that inliers may have: with none, or with all, nothing would change any more.
+_SHARE_RANGE = (0.02, 0.98)
 
 # Inliers are first thought to scatter by this, in pixels; starting wide would take a second cluster
 # of outliers, as layover makes, for the tail of the inliers.
@@ -52,7 +63,9 @@ class Mixture:
 
 
 def fit_mixture(
-    residuals: FloatArray, window_area: float, sigma_range: tuple[float, float]
+    residuals: FloatArray,
+    window_area: float,
+    sigma_range: tuple[float, float] = _SIGMA_RANGE_PX,
 ) -> Mixture:
     """Separate inliers from outliers by expectation maximisation.
 
@@ -75,13 +88,34 @@ def fit_mixture(
     variance, share = min(max(_FIRST_SIGMA, lowest), highest) ** 2, 0.5
     probability = np.full(len(residuals), share)
     for _ in range(_MIXTURE_STEPS):
-        inlier = share * np.exp(-squared / (2 * variance)) / (2 * np.pi * variance)
-        probability = inlier / (inlier + (1 - share) / window_area)
+        inlier, outlier = densities(squared, variance, share, window_area)
+        probability = inlier / (inlier + outlier)
         total = max(float(probability.sum()), 1e-9)
         variance = float((probability * squared).sum() / (2 * total))
         variance = float(np.clip(variance, lowest**2, highest**2))
-        share = float(np.clip(total / len(residuals), 0.02, 0.98))
+        share = total / len(residuals)
     return Mixture(probability, float(np.sqrt(variance)))
+
+
+def densities(
+    squared: FloatArray, variance: float, share: float, window_area: float
+) -> tuple[FloatArray, float]:
+    """Return the density of inliers, shape (n,), and that of outliers.
+
+    Parameters
+    ----------
+    squared
+        Squared lengths of residuals, shape (n,).
+    variance
+        Of inliers along an axis.
+    share
+        Of inliers; neither all nor none are believed to be.
+    window_area
+        Area that outliers fall on.
+    """
+    share = float(np.clip(share, *_SHARE_RANGE))
+    inlier = share * np.exp(-squared / (2 * variance)) / (2 * np.pi * variance)
+    return np.asarray(inlier), (1 - share) / window_area
 
 
 def find_consensus(
@@ -117,7 +151,7 @@ def find_consensus(
     best: Model = PolynomialModel("affine", frame, candidates[cost.argmin()])
     for _ in range(3):
         agree = distances(best, xy, nominal_xy) < tolerance
-        if agree.sum() < -(-PARAMETERS[kind] // 2) + 1:
+        if agree.sum() <= fewest_points(kind):
             break
         best = fit_model(kind, xy, nominal_xy, agree.astype(float), frame)
     return best
@@ -135,7 +169,6 @@ def fit_robustly(
     variances: FloatArray,
     start: Model,
     window_area: float,
-    sigma_range: tuple[float, float],
 ) -> tuple[Model, Mixture]:
     """Fit a model to pairs of which many may be outliers.
 
@@ -155,8 +188,6 @@ def fit_robustly(
         Model to start from, usually `find_consensus`.
     window_area
         Area of the matches' search window, px².
-    sigma_range
-        Smallest and largest standard deviation of inliers, pixels.
 
     Raises
     ------
@@ -165,13 +196,13 @@ def fit_robustly(
     """
     model = start
     for _ in range(_FIT_STEPS):
-        mixture = fit_mixture(nominal_xy - model(xy), window_area, sigma_range)
+        mixture = fit_mixture(nominal_xy - model(xy), window_area)
         weights = np.where(mixture.inliers, mixture.probability, 0.0)
         weights = weights * mixture.sigma**2 / (mixture.sigma**2 + variances)
         previous, model = model, fit_model(kind, xy, nominal_xy, weights, Frame.around(xy))
-        if np.abs(model(xy) - previous(xy)).max() < 1e-4 * sigma_range[0]:
+        if np.abs(model(xy) - previous(xy)).max() < 1e-4 * _SIGMA_RANGE_PX[0]:
             break
-    return model, fit_mixture(nominal_xy - model(xy), window_area, sigma_range)
+    return model, fit_mixture(nominal_xy - model(xy), window_area)
 
 
 def _parts(samples: int, pairs: int) -> list[slice]:

@@ -19,17 +19,17 @@ from .terrain import Terrain
 
 # Heights are found along the line of sight to this, in metres: far below what displaces a pixel.
 _PRECISION_M = 0.01
+
+# The most steps until then.
 _STEPS = 15
 
 # Where a line of sight meets the ground at less than this slope between both, per metre, it meets
 # it more than once nearby (layover): there steps are no larger than from such a slope.
-_LEAST_SLOPE = 0.2
+LEAST_SLOPE = 0.2
 
 # Places a side at which heights are compared with those that a stored transform was made with, in
 # metres.
 _COMPARED, _SAME_M = 3, 0.05
-
-_FILES = ("dem", "input_dem")
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,8 @@ class TerrainModel(Model):
         TransformFileError
             A terrain model is not there, or another one.
         """
-        paths = [None if values[name] is None else str(values[name]) for name in _FILES]
+        stored_paths = values["dem"], values["input_dem"]
+        paths = [None if path is None else str(path) for path in stored_paths]
         left, bottom, right, top = (float(bound) for bound in values["region"])
         dem, input_dem = (None if path is None else _found(path, folder) for path in paths)
         coefficients = np.asarray(values["coefficients"], float).reshape(4, 2)
@@ -170,7 +171,7 @@ def _settled(risen: Callable[[FloatArray], FloatArray], size: int) -> FloatArray
             break
         with np.errstate(invalid="ignore", divide="ignore"):
             slope = (still - missed) / (rise - before)
-        slope = np.where(slope > _LEAST_SLOPE, slope, np.where(slope <= 0, 1.0, _LEAST_SLOPE))
+        slope = np.where(slope > LEAST_SLOPE, slope, np.where(slope <= 0, 1.0, LEAST_SLOPE))
         before, missed = rise, still
         rise = rise - still / slope
     return rise

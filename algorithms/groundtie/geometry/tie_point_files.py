@@ -19,19 +19,25 @@ from ..rasters.atomic import write_csv, write_json, writing
 from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject, require_map
 from ..runs import run_tags
 from ..strict_json import read_json
-from .drawn_points import INPUT, NOMINAL, PIXEL, Row, columns, follow_lines, line_ends, numbers
-from .georeferencer import (
+from .drawn_points import follow_lines, line_ends
+from .georeferencer import read_georeferencer, write_georeferencer
+from .point_tables import (
+    INPUT,
+    NOMINAL,
+    PIXEL,
+    REFERENCE,
+    SIGMA,
+    Row,
+    columns,
+    numbers,
     positions,
-    read_georeferencer,
     require_places,
     table_rows,
-    unmeasured,
-    write_georeferencer,
 )
 from .tie_point_frames import NUMBERS, TEXTS, tie_point_columns
 from .tie_points import USED, TiePoints
 from .transform import Transform
-from .vector_layers import read_vector_layer
+from .vector_layers import read_vector_layer, write_vector_layer
 
 _LOG = logging.getLogger(__name__)
 SUFFIXES = (".gpkg", ".geojson", ".csv", ".points")
@@ -154,7 +160,7 @@ def _rows(points: TiePoints, transform: Transform) -> list[Row]:
 
 def _features(rows: list[Row], crs: CRS | None, target: CRS | None) -> list[dict[str, Any]]:
     """Return rows as GeoJSON's features: lines from nominal to reference positions in a CRS."""
-    ends = [positions(rows, f"{name}_x", f"{name}_y") for name in ("nominal", "reference")]
+    ends = [positions(rows, *names) for names in (NOMINAL, REFERENCE)]
     lines = np.stack([reproject(end, crs, target) for end in ends], axis=1)
     return [
         {
@@ -167,10 +173,8 @@ def _features(rows: list[Row], crs: CRS | None, target: CRS | None) -> list[dict
 
 
 def _write_gpkg(path: Path, rows: list[Row], names: Sequence[str], crs: CRS | None) -> None:
-    from .geopackage import write_layer  # heavy
-
     properties = dict.fromkeys(names, "float") | dict.fromkeys((*_TEXTS, *run_tags()), "str")
-    write_layer(path, _LAYER, _features(rows, crs, crs), properties, crs)
+    write_vector_layer(path, _LAYER, _features(rows, crs, crs), properties, crs)
 
 
 def _read_rows(path: Path, suffix: str) -> tuple[list[Row], FloatArray, CRS | None]:
@@ -214,12 +218,12 @@ def _from_rows(
     """Return the points of a table."""
     # A drawn line has empty columns.
     states = [str(row.get("state") or USED) for row in rows]
-    sigma = np.column_stack([numbers(rows, f"sigma_{axis}_px") for axis in "xy"])
-    points = unmeasured(
-        require_places(positions(rows, "reference_x", "reference_y")),
+    sigma = columns(rows, *SIGMA)
+    points = TiePoints.unmeasured(
+        require_places(positions(rows, *REFERENCE)),
         require_places(_input_px(rows, input_grid, crs)),
-        states,
         crs,
+        states,
     )
     return replace(
         points,

@@ -7,24 +7,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .point_tables import NOMINAL, PIXEL, REFERENCE, SIGMA
 from .tie_points import TiePoints
 from .transform import Transform
 
 # What is a number, in the order of the columns; what is text comes after.
 NUMBERS = (
-    "reference_x",
-    "reference_y",
-    "nominal_x",
-    "nominal_y",
-    "input_col",
-    "input_row",
+    *REFERENCE,
+    *NOMINAL,
+    *PIXEL,
     "residual_px",
     "dx_px",
     "dy_px",
     "score",
     "forward_backward_error_px",
-    "sigma_x_px",
-    "sigma_y_px",
+    *SIGMA,
 )
 TEXTS = ("role", "state")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -96,12 +97,31 @@ class TiePoints:
         return replace(self, **columns, more=more)
 
     @classmethod
+    def unmeasured(
+        cls,
+        reference_xy: FloatArray,
+        input_px: FloatArray,
+        crs: CRS | None,
+        states: Sequence[str] | None = None,
+    ) -> TiePoints:
+        """Return points of a fit whose places and states (None: used) are all that is known."""
+        count = len(reference_xy)
+        unknown = np.full(count, np.nan)
+        return cls(
+            reference_xy,
+            input_px,
+            unknown,
+            np.full((count, 2, 2), np.nan),
+            unknown,
+            np.zeros(count, bool),
+            np.full(count, USED) if states is None else np.array(states, str),
+            crs,
+        )
+
+    @classmethod
     def none(cls) -> TiePoints:
         """Return a table without rows."""
-        zero = np.zeros(0)
-        place = np.zeros((0, 2))
-        nothing = np.zeros(0, bool)
-        return cls(place, place, zero, np.zeros((0, 2, 2)), zero, nothing, nothing.astype(str))
+        return cls.unmeasured(np.zeros((0, 2)), np.zeros((0, 2)), None)
 
     @classmethod
     def concatenate(cls, tables: list[TiePoints]) -> TiePoints:

@@ -1,4 +1,4 @@
-"""Vector layers, read where a damaged file cannot take the job down.
+"""Vector layers: written as GeoPackages, and read where a damaged file cannot take the job down.
 
 GDAL's vector drivers, or fiona around them, may crash on damaged files: a GeoPackage of 144 kB ends
 the interpreter by fiona 1.10. SQLite could check a GeoPackage beforehand, but that reads all of it,
@@ -99,6 +99,51 @@ def read_vector_layer(path: str | os.PathLike[str]) -> VectorLayer:
     except (CRSError, GeoreferencingError) as error:
         raise VectorLayerError(f"the CRS of {name} cannot be understood: {error}") from error
     return VectorLayer(name, crs, tuple(found["fields"]), tuple(found["features"]))
+
+
+def write_vector_layer(
+    path: Path,
+    name: str,
+    records: list[dict[str, Any]],
+    properties: dict[str, str],
+    crs: CRS | None,
+) -> None:
+    """Write features with lines as geometries to a GeoPackage.
+
+    Parameters
+    ----------
+    path, name
+        The file, and the layer's name.
+    records
+        The features as GeoJSON has them.
+    properties
+        Types of the properties, by name.
+    crs
+        Of the geometries; None: unknown.
+
+    Raises
+    ------
+    OSError
+        Not everything could be written.
+    """
+    from fiona.io import MemoryFile  # slow to load
+
+    try:
+        # In memory: SQLite may meet a full disk in silence.
+        with MemoryFile(ext=".gpkg") as memory:
+            with memory.open(
+                driver="GPKG",
+                layer=name,
+                crs_wkt="" if crs is None else crs.to_wkt(),
+                schema={"geometry": "LineString", "properties": properties},
+            ) as layer:
+                layer.writerecords(records)
+            content = bytes(memory.getbuffer())
+    except Exception as error:
+        if not raised_by(error, "fiona"):
+            raise
+        raise OSError(str(error)) from error
+    path.write_bytes(content)
 
 
 def _read_apart(name: str) -> dict[str, Any] | None:

@@ -18,17 +18,16 @@ from numpy.typing import NDArray
 from ..errors import TooFewPointsError
 from ..geometry.model_choice import (
     CHIPS_PER_PARAMETER,
-    Candidate,
     choose_simplest,
     left_out_blocks,
     left_out_scores,
 )
 from ..geometry.models import PARAMETERS, TERRAIN, Model
 from ..geometry.terrain import Terrain
-from ..rasters.grid import apply_affine
+from ..rasters.grid import PointFunction, apply_affine
 from ..rasters.kernels import bspline_weights
 from .belief_propagation import Surfaces
-from .families import Family, Positions, coefficients_of
+from .families import Family, coefficients_of
 
 FloatArray = NDArray[np.float64]
 
@@ -126,7 +125,7 @@ class Prior:
         Nominal pixels for each pixel, shape (2, 2): what is common to all places.
     """
 
-    to_nominal: Positions
+    to_nominal: PointFunction
     linear: FloatArray
 
     @classmethod
@@ -145,7 +144,7 @@ def align(
     px: NDArray[np.int_],
     surfaces: Surfaces,
     prior: Prior,
-    start: Positions,
+    start: PointFunction,
     terrain: Terrain | None = None,
 ) -> Alignment:
     """Fit a model to surfaces.
@@ -166,14 +165,14 @@ def align(
     terrain
         Heights at the grid's pixels, for the model that needs them.
     """
-    return _align(kind, _fields(px, surfaces, prior), start, terrain).fitted
+    return _align(kind, _fields(px, surfaces, prior), start, terrain)[0]
 
 
 def choose_alignment(
     px: NDArray[np.int_],
     surfaces: Surfaces,
     prior: Prior,
-    start: Positions,
+    start: PointFunction,
     candidates: Sequence[str] = CANDIDATES,
     terrain: Terrain | None = None,
 ) -> Alignment:
@@ -184,7 +183,7 @@ def choose_alignment(
     """
     fields = _fields(px, surfaces, prior)
 
-    def fit(kind: str) -> Candidate[Alignment]:
+    def fit(kind: str) -> tuple[Alignment, FloatArray]:
         if kind != candidates[0] and len(px) < CHIPS_PER_PARAMETER * PARAMETERS[kind]:
             raise TooFewPointsError(f"{len(px)} chips are too few for the {kind} model")
         return _align(kind, fields, start, terrain)
@@ -195,8 +194,9 @@ def choose_alignment(
 
 
 def _align(
-    kind: str, fields: list[_Field], start: Positions, terrain: Terrain | None
-) -> Candidate[Alignment]:
+    kind: str, fields: list[_Field], start: PointFunction, terrain: Terrain | None
+) -> tuple[Alignment, FloatArray]:
+    """Return the model and the scores of left-out chips."""
     sharp = fields[-1]
     family = Family.of(kind, sharp.px, start, terrain)
     parameters = family.starting(start)
@@ -216,7 +216,7 @@ def _align(
 
     scores = left_out_scores(sharp.px, models, score)
     mean = float(scores.sum()) / len(scores)
-    return Candidate(kind, Alignment(family.model(parameters), models, {kind: mean}), scores)
+    return Alignment(family.model(parameters), models, {kind: mean}), scores
 
 
 def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Prior) -> list[_Field]:

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
+from ..geometry.accuracy import NEIGHBOUR_SPACINGS
 from ..geometry.models import DEGREE, Model
 from ..geometry.robust import find_consensus
+from ..rasters.grid import PointFunction
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.description import BORDER_PX, Description
@@ -23,7 +25,6 @@ from ..similarity.surface import (
     normalise,
     similarity_surface,
 )
-from .alignment import Positions
 from .belief_propagation import Surfaces, propagate
 from .chip_windows import ChipWindows, Resampled, of_kept
 from .layout import ChipLayout
@@ -43,9 +44,6 @@ _LEAST_VALID, LEAST_VALID_MASKED = 0.4, 0.1
 
 # The background alone reaches about this many robust standard deviations.
 _LEAST_HEIGHT = 3.0
-
-# Neighbours within this many spacings exchange beliefs.
-_NEIGHBOUR_SPACINGS = 1.5
 
 # Chips agree with a first model of degree 1 within this, in pixels; local distortion beyond it is
 # left to the alignment.
@@ -120,10 +118,10 @@ class ChipMatcher:
 
     def first_model(
         self, surfaces: ChipSurfaces, layout: ChipLayout, kind: str, seed: int
-    ) -> Positions:
+    ) -> PointFunction:
         """Return a first model of degree 1: the consensus of peaks after belief propagation."""
         px = surfaces.centres.astype(float)
-        reach = _NEIGHBOUR_SPACINGS * layout.spacing_px
+        reach = NEIGHBOUR_SPACINGS * layout.spacing_px
         supported = propagate(surfaces.combined, surfaces.centres, reach)
         shifts = np.array([find_peak(surface).shift_px for surface in supported])
         first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"

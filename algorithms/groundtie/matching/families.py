@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,9 +12,9 @@ from ..errors import TooFewPointsError
 from ..geometry.models import DEGREE, TERRAIN, Frame, Model, PolynomialModel, monomials
 from ..geometry.terrain import Terrain
 from ..geometry.terrain_model import TerrainModel
+from ..rasters.grid import PointFunction
 
 FloatArray = NDArray[np.float64]
-Positions = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Family:
     scale_m: float = 1.0
 
     @classmethod
-    def of(cls, kind: str, px: FloatArray, start: Positions, terrain: Terrain | None) -> Family:
+    def of(cls, kind: str, px: FloatArray, start: PointFunction, terrain: Terrain | None) -> Family:
         """Return the family of a kind; `start` states where the input has the chips."""
         plain = cls(kind, Frame.around(px), px, None, np.zeros((len(px), 0)))
         if kind != TERRAIN:
@@ -71,7 +70,7 @@ class Family:
         scaled = np.vstack([coefficients[:-1], coefficients[-1] / self.scale_m])
         return TerrainModel(self.kind, self.frame, scaled, self.terrain, self.origin_m)
 
-    def starting(self, start: Positions) -> FloatArray:
+    def starting(self, start: PointFunction) -> FloatArray:
         """Return the parameters of the model that is nearest to another one."""
         kind, px = self.kind, self.px
         target = (start(px) - px) / self.frame.to_map.a

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from ..errors import NothingFoundError, TooFewPointsError
 from ..geometry.chance import log10_false_alarms
-from ..geometry.estimation import SIGMA_RANGE_PX, fit_without_blocks
+from ..geometry.estimation import fit_without_blocks
 from ..geometry.fitting import fit_model
 from ..geometry.model_choice import (
     MATCHES_PER_PARAMETER,
-    Candidate,
     choose_simplest,
     left_out_blocks,
     left_out_scores,
@@ -160,7 +159,7 @@ def _fit(
     kind: str, px: FloatArray, nominal_px: FloatArray, start: Model, window_area: float
 ) -> tuple[Model, Mixture]:
     none = np.zeros(len(px))
-    return fit_robustly(kind, px, nominal_px, none, start, window_area, SIGMA_RANGE_PX)
+    return fit_robustly(kind, px, nominal_px, none, start, window_area)
 
 
 def _choose(px: FloatArray, nominal_px: FloatArray, start: Model, window_area: float) -> str:
@@ -169,7 +168,7 @@ def _choose(px: FloatArray, nominal_px: FloatArray, start: Model, window_area: f
     Its score is minus the squared distance from a model without the match, at most an outlier's.
     """
 
-    def fit(kind: str) -> Candidate[str]:
+    def fit(kind: str) -> tuple[str, FloatArray]:
         models = [
             _fit(kind, px[~block], nominal_px[~block], start, window_area)[0]
             for block in left_out_blocks(px)
@@ -180,6 +179,6 @@ def _choose(px: FloatArray, nominal_px: FloatArray, start: Model, window_area: f
         agreeing = int((distance < _FAR_PX).sum())
         if agreeing < MATCHES_PER_PARAMETER * PARAMETERS[kind]:
             raise TooFewPointsError(f"only {agreeing} of {len(px)} features agree with a model")
-        return Candidate(kind, kind, -(np.minimum(distance, _FAR_PX) ** 2))
+        return kind, -(np.minimum(distance, _FAR_PX) ** 2)
 
     return choose_simplest(_KINDS, fit, px, np.full(len(px), -(_FAR_PX**2)))[0]

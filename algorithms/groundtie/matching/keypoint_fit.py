@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from ..context import Context
 from ..errors import TooFewPointsError
 from ..features.matching import GATE_PX
-from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate, jackknife_spread
+from ..geometry.estimation import Estimate, fit_thin_plate, jackknife_spread
 from ..geometry.fitting import fit_model
 from ..geometry.models import PARAMETERS, Model
 from ..geometry.robust import fit_mixture
@@ -151,7 +151,7 @@ class KeypointFit:
         for _ in range(_ROUNDS):
             first = fit.model
             residuals = nominal_px - first(matches.px)
-            inliers = fit_mixture(residuals, matches.window_area_px2, SIGMA_RANGE_PX).inliers
+            inliers = fit_mixture(residuals, matches.window_area_px2).inliers
             if 2 * inliers.sum() <= PARAMETERS["affine"]:
                 raise TooFewPointsError(f"only {inliers.sum()} of {len(inliers)} features agree")
             px, score = matches.px[inliers], matches.score[inliers]

@@ -16,12 +16,12 @@ from ..errors import TooFewPointsError
 from ..geometry.models import Model
 from ..kinds import AUTO
 from ..rasters.colours import Colours
+from ..rasters.grid import PointFunction
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch, middle_window
 from ..rasters.reading import FloatImage
 from ..similarity.pooled import PooledHistogram, smooth
 from ..similarity.surface import SimilaritySettings, Surface, normalise
-from .alignment import Positions
 from .belief_propagation import Surfaces
 from .chip_windows import ChipWindows, Resampled, of_kept, singly
 from .layout import ChipLayout
@@ -125,7 +125,7 @@ class PooledHistogramMatcher:
 
     def first_model(
         self, surfaces: ChipSurfaces, layout: ChipLayout, kind: str, seed: int
-    ) -> Positions:
+    ) -> PointFunction:
         """Return a first model: the shift with the highest sum over all chips."""
         shift = surfaces.common_shift_px
         return lambda px: px + shift

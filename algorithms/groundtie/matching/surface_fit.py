@@ -9,7 +9,7 @@ import numpy as np
 
 from ..context import Context
 from ..errors import TooFewPointsError
-from ..geometry.estimation import SIGMA_RANGE_PX, Estimate, fit_thin_plate
+from ..geometry.estimation import Estimate, fit_thin_plate
 from ..geometry.models import DEGREE, PARAMETERS, TERRAIN, Model
 from ..geometry.robust import fit_mixture
 from ..geometry.terrain import Terrain
@@ -17,12 +17,11 @@ from ..geometry.terrain_model import TerrainModel
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..kinds import AUTO
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, PointFunction
 from ..rasters.pair import ImagePair
 from ..similarity.peak import Peak, find_peak, find_peak_near
 from .alignment import CANDIDATES, Alignment, Prior, align, choose_alignment
 from .belief_propagation import Surfaces
-from .families import Positions
 from .frames import on_grid, on_map
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, FloatArray, Places
@@ -51,7 +50,7 @@ class SurfaceMatcher(Protocol):
 
     def first_model(
         self, surfaces: ChipSurfaces, layout: ChipLayout, kind: str, seed: int
-    ) -> Positions: ...
+    ) -> PointFunction: ...
 
     def kind_of(self, kind: str) -> str: ...
 
@@ -227,7 +226,7 @@ def _without_outliers(points: TiePoints, transform: Transform, pair: ImagePair) 
     """Reject the points of the fit that more likely fell by chance than near the model."""
     used = points.used
     residuals = points.take(used).residual_on(pair.grid, transform)
-    mixture = fit_mixture(residuals, (2 * _NEAR_PX + 1) ** 2, SIGMA_RANGE_PX)
+    mixture = fit_mixture(residuals, (2 * _NEAR_PX + 1) ** 2)
     outliers = np.zeros(len(points), bool)
     outliers[used] = ~mixture.inliers
     return points.reject(outliers, "disagrees with the model")

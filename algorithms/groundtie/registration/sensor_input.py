@@ -12,8 +12,7 @@ from rasterio.crs import CRS
 from ..errors import NoOverlapError, ParameterError
 from ..progress import Progress
 from ..rasters.reading import RasterSource, open_raster
-from ..sensor.geoids import DATUMS, find_geoid
-from ..sensor.heights import declared_datum
+from ..sensor.geoids import DATUMS, declared_datum, find_geoid
 from ..sensor.orientation import Orientation, orient, seen_at
 from ..sensor.rpc import RPC
 from ..sensor.rpc_files import rpc_of

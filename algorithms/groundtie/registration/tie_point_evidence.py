@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import TooFewPointsError
 from ..geometry.chance import log10_false_alarms
 from ..geometry.fitting import fit_model
-from ..geometry.models import DEGREE, PARAMETERS, Frame, monomials
+from ..geometry.models import DEGREE, Frame, fewest_points, monomials
 from ..geometry.tie_point_files import EDITED
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
@@ -111,7 +111,7 @@ class TiePointEvidence:
     @property
     def needed(self) -> int:
         """How many points determine the model."""
-        return -(-PARAMETERS[self.kind] // 2)
+        return fewest_points(self.kind)
 
     @cached_property
     def taken(self) -> NDArray[np.bool_]:
@@ -173,7 +173,7 @@ class TiePointEvidence:
         """
         if self.count <= self.needed:
             return None
-        sample = -(-PARAMETERS[self.judged_by] // 2)
+        sample = fewest_points(self.judged_by)
         residuals = self.residuals_px(self._fitted(self.judged_by))[self.taken]
         radii = np.nan_to_num(np.sort(residuals)[sample:], nan=np.inf)
         area = self.input_grid.width * self.input_grid.height

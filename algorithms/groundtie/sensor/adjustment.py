@@ -11,17 +11,18 @@ from ..errors import TooFewPointsError
 from ..geometry.estimation import jackknife_sigma, jackknife_spread
 from ..geometry.model_choice import (
     CONTROL_PER_PARAMETER,
-    Candidate,
     choose_simplest,
     left_out_blocks,
 )
-from ..geometry.robust import find_consensus, fit_mixture
+from ..geometry.robust import densities, find_consensus, fit_mixture
 from ..kinds import AUTO
 from ..rasters.grid import FloatArray
-from .bias import KINDS, TERMS, Bias, design
+from .bias import KINDS, SHIFT, TERMS, Bias, design
 
 # Standard deviation that inliers may have beyond their own, in pixels.
 _SIGMA_RANGE_PX = (0.1, 2.5)
+
+# Fits and separations of blunders take turns until the same points are used, at most so often.
 _STEPS = 30
 
 # No image is measured better than this.
@@ -128,9 +129,9 @@ def adjust(control: Control, kind: str = AUTO) -> Adjustment:
     if kind != AUTO:
         return _adjust(control, kind)
 
-    def fit(each: str) -> Candidate[Adjustment]:
+    def fit(each: str) -> tuple[Adjustment, FloatArray]:
         tried = _adjust(control, each)
-        return Candidate(each, tried, _log_likelihoods(tried))
+        return tried, _log_likelihoods(tried)
 
     def is_held(tried: Adjustment, chosen: Adjustment) -> bool:
         return _is_carried(tried, control) and _is_significant(tried, chosen)
@@ -163,10 +164,10 @@ def _is_significant(tried: Adjustment, chosen: Adjustment) -> bool:
 def _log_likelihoods(adjustment: Adjustment) -> FloatArray:
     """Return the logarithm of the density of each point, inlier or blunder, shape (n,)."""
     squared = (adjustment.left_out_px**2).sum(axis=1)
-    share = float(np.clip(adjustment.used.mean(), 0.02, 0.98))
     variance = max(float(squared[adjustment.used].mean()) / 2, _SIGMA_RANGE_PX[0] ** 2)
-    inlier = share * np.exp(-squared / (2 * variance)) / (2 * np.pi * variance)
-    return np.asarray(np.log(inlier + (1 - share) / (2 * LEAST_REACH_PX) ** 2))
+    share, area = float(adjustment.used.mean()), (2 * LEAST_REACH_PX) ** 2
+    inlier, blunder = densities(squared, variance, share, area)
+    return np.asarray(np.log(inlier + blunder))
 
 
 def _adjust(control: Control, kind: str) -> Adjustment:
@@ -196,7 +197,7 @@ def _adjust(control: Control, kind: str) -> Adjustment:
 
 def _without_improbable(control: Control, kind: str) -> tuple[NDArray[np.bool_], float]:
     """Return which points are more probably inliers than blunders, and the spread of these."""
-    first = "translation" if kind == "shift" else "affine"
+    first = "translation" if kind == SHIFT else "affine"
     start = find_consensus(control.expected_px, control.found_px, _CONSENSUS_PX, first)
     residuals = control.found_px - start(control.expected_px)
     reach = max(float(np.abs(residuals).max()), LEAST_REACH_PX)

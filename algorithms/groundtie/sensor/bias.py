@@ -14,15 +14,15 @@ from numpy.typing import ArrayLike
 
 from ..geometry.models import monomials
 from ..rasters.grid import FloatArray
-from .rpc import RPC
-from .rpc_fit import RPCFit, fit_rpc, ground_lattice
+from .rpc import RPC, ground_lattice
+from .rpc_fit import RPCFit, fit_rpc
 
 # Terms of each model, an axis, from the simplest to the most flexible.
 SHIFT = "shift"
 TERMS = {SHIFT: 1, "shift_drift": 2, "affine": 3}
 KINDS = tuple(TERMS)
 
-# Heights between which RPCs are fitted again: their own range, so that they hold there as before.
+# Heights, over the range of the RPCs, at which they are fitted again: they hold there as before.
 _HEIGHTS = 7
 
 
@@ -94,10 +94,10 @@ def fold(rpc: RPC, bias: Bias) -> RPCFit:
     A shift moves the offsets, which is exact; other models are taken up by a new fit to a lattice
     over the image and the RPCs' range of heights.
     """
-    if bias.kind == "shift":
+    if bias.kind == SHIFT:
         return RPCFit(rpc.shifted(bias.coefficients[0]), 0.0, 0.0)
-    low, high = (rpc.offset[2] + sign * abs(rpc.scale[2]) for sign in (-1, 1))
-    lon_lat, height = ground_lattice(rpc, bias.size, np.linspace(low, high, _HEIGHTS))
+    heights_m = np.linspace(*rpc.height_range_m, _HEIGHTS)
+    lon_lat, height = ground_lattice(rpc, bias.size, heights_m)
     seen = np.isfinite(lon_lat).all(axis=1)
     lon_lat, height = lon_lat[seen], height[seen]
     px = rpc.project(lon_lat, height)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from rasterio.crs import CRS
 
 from ..errors import GroundTieError, TransformFileError
-from ..geometry.georeferencer import require_places
+from ..geometry.point_tables import require_places
+from ..geometry.tie_points import TiePoints
 from ..kinds import GEOTIFF
 from ..rasters.grid import LON_LAT, FloatArray
 from ..rasters.handles import FileHandles
@@ -22,25 +24,17 @@ RASTERS = (*GEOTIFF, ".vrt")
 ENVI = ".pts"
 SUFFIXES = (*RASTERS, ENVI)
 
-# GDAL counts pixels from the first one's corner; ENVI, too, and that corner is 1.
-_GDAL_FIRST, _ENVI_FIRST = 0.5, 1.5
+# The first pixel's centre: GDAL counts from that pixel's corner; ENVI, too, and that corner is 1.
+GDAL_FIRST, _ENVI_FIRST = 0.5, 1.5
+
+# The column of heights above the ellipsoid; NaN where one is not known.
+HEIGHT = "height_m"
 
 
-class Places(NamedTuple):
-    """Control as others know it: no sigmas, no states.
-
-    `xy` on the map, (n, 2); `px` in the image, (n, 2), pixel centres at integers; `height_m` above
-    the ellipsoid, (n,), NaN if unknown.
-    """
-
-    xy: FloatArray
-    px: FloatArray
-    height_m: FloatArray
-    crs: CRS
-
-
-def read_places(path: Path, image: str) -> Places | None:
+def read_others(path: Path, image: str) -> TiePoints | None:
     """Read ground control of another program; None if the file has one of our own formats.
+
+    Points have the column `HEIGHT`, and no sigmas.
 
     Parameters
     ----------
@@ -58,16 +52,24 @@ def read_places(path: Path, image: str) -> Places | None:
     if read is None:
         return None
     try:
-        places = read(path, image)
-        if places is not None:
-            require_places(places.xy)
-            require_places(places.px)
-        return places
-    except (GroundTieError, OSError, ValueError, KeyError, TypeError, OverflowError) as error:
+        points = read(path, image)
+        if points is not None:
+            require_places(points.reference_xy)
+            require_places(points.input_px)
+        return points
+    except (
+        GroundTieError,
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        OverflowError,
+    ) as error:
         raise TransformFileError(f"cannot read the ground control {path}: {error}") from error
 
 
-def _reader(path: Path) -> Callable[[Path, str], Places | None] | None:
+def _reader(path: Path) -> Callable[[Path, str], TiePoints | None] | None:
     suffix = path.suffix.lower()
     if suffix in (".geojson", ".json"):
         return _read_orthority
@@ -76,7 +78,11 @@ def _reader(path: Path) -> Callable[[Path, str], Places | None] | None:
     return _read_gdal if suffix in RASTERS else None
 
 
-def _read_orthority(path: Path, image: str) -> Places | None:
+def _points(xy: FloatArray, px: FloatArray, height_m: FloatArray, crs: CRS) -> TiePoints:
+    return replace(TiePoints.unmeasured(xy, px, crs), more={HEIGHT: height_m})
+
+
+def _read_orthority(path: Path, image: str) -> TiePoints | None:
     """Read points in WGS 84 with their pixel in the property `ji` (column and row)."""
     collection = read_json(path)
     features = collection.get("features", []) if isinstance(collection, dict) else []
@@ -90,7 +96,7 @@ def _read_orthority(path: Path, image: str) -> Places | None:
             raise ValueError(f"it has points of {', '.join(sorted(names))}, none of {image}")
     coordinates = [point["geometry"]["coordinates"] for point in points]
     height = [place[2] if len(place) > 2 else np.nan for place in coordinates]
-    return Places(
+    return _points(
         np.array([place[:2] for place in coordinates], float).reshape(-1, 2),
         np.array([point["properties"]["ji"] for point in points], float).reshape(-1, 2),
         np.array(height, float),
@@ -102,7 +108,7 @@ def _stem(feature: dict[str, Any]) -> str:
     return Path(str(feature["properties"].get("filename") or "")).stem
 
 
-def _read_gdal(path: Path, image: str) -> Places:
+def _read_gdal(path: Path, image: str) -> TiePoints:
     """Read the GCPs of a raster; heights of 0 everywhere are none."""
     with FileHandles(str(path)).borrow() as dataset:
         points, crs = dataset.gcps
@@ -111,15 +117,15 @@ def _read_gdal(path: Path, image: str) -> Places:
     if crs is None:
         raise ValueError("its GCPs have no CRS")
     height = np.array([point.z or 0.0 for point in points], float)
-    return Places(
+    return _points(
         np.array([[point.x, point.y] for point in points], float),
-        np.array([[point.col, point.row] for point in points], float) - _GDAL_FIRST,
+        np.array([[point.col, point.row] for point in points], float) - GDAL_FIRST,
         height if height.any() else np.full(len(points), np.nan),
         crs,
     )
 
 
-def _read_envi(path: Path, image: str) -> Places:
+def _read_envi(path: Path, image: str) -> TiePoints:
     """Read map and image positions, in four columns; comments begin with a semicolon."""
     lines = path.read_text(encoding="utf-8-sig").splitlines()
     comments = [line for line in lines if line.lstrip().startswith(";")]
@@ -128,7 +134,7 @@ def _read_envi(path: Path, image: str) -> Places:
         raise ValueError("it must hold lines of map x, y and image x, y")
     numbers = np.array([row[:4] for row in rows], float)
     crs = _envi_crs(" ".join(comments))
-    return Places(numbers[:, :2], numbers[:, 2:] - _ENVI_FIRST, np.full(len(rows), np.nan), crs)
+    return _points(numbers[:, :2], numbers[:, 2:] - _ENVI_FIRST, np.full(len(rows), np.nan), crs)
 
 
 def _envi_crs(comments: str) -> CRS:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,28 +11,28 @@ import numpy as np
 from rasterio.crs import CRS
 
 from ..errors import TransformFileError
-from ..geometry.georeferencer import unmeasured
+from ..geometry.point_tables import SIGMA
 from ..geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
+from ..geometry.tie_point_files import SUFFIXES as TIE_POINT_SUFFIXES
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..rasters.atomic import writing
 from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, FloatArray, Grid, reproject
 from .adjustment import Control
+from .control_formats import GDAL_FIRST, HEIGHT, read_others
 from .control_formats import SUFFIXES as OTHER_SUFFIXES
-from .control_formats import Places, read_places
 from .orientation import Orientation, SensorGrid
 from .rpc import RPC
 
-HEIGHT, CORRELATION = "height_m", "sigma_correlation"
-_SIGMAS = ("sigma_x_px", "sigma_y_px")
+CORRELATION = "sigma_correlation"
 
 # Standard deviation, in pixels, of points that come without one.
 _USUAL_SIGMA_PX = 1.0
 
 # What GDAL takes as `gdal_translate --optfile`.
 GDAL_SUFFIX = ".txt"
-SUFFIXES = (".gpkg", ".geojson", ".csv", ".points", GDAL_SUFFIX)
-READ_SUFFIXES = (*SUFFIXES[:-1], *OTHER_SUFFIXES)
+SUFFIXES = (*TIE_POINT_SUFFIXES, GDAL_SUFFIX)
+READ_SUFFIXES = (*TIE_POINT_SUFFIXES, *OTHER_SUFFIXES)
 
 
 @dataclass(frozen=True)
@@ -108,11 +107,11 @@ class ControlPoints:
         """Return the used points of the fit as options of gdal_translate."""
         kept = self.take(self.points.fit)
         lines = [f"-a_srs {self.crs.to_string()}"]
+        px = kept.points.input_px + GDAL_FIRST
         for (col, row), (x, y), height in zip(
-            kept.points.input_px, kept.points.reference_xy, kept.height_m, strict=True
+            px, kept.points.reference_xy, kept.height_m, strict=True
         ):
-            # GDAL counts pixels from the corner of the first one.
-            lines.append(f"-gcp {col + 0.5:.6f} {row + 0.5:.6f} {x:.17g} {y:.17g} {height:.4f}")
+            lines.append(f"-gcp {col:.6f} {row:.6f} {x:.17g} {y:.17g} {height:.4f}")
         return "\n".join(lines) + "\n"
 
 
@@ -139,52 +138,31 @@ def read_control_points(
     TransformFileError
         The file cannot be read or understood, or holds no points.
     """
-    names = (HEIGHT, CORRELATION, *_SIGMAS)
-    places = read_places(path, image)
-    if places is None:
+    stored = read_others(path, image)
+    if stored is None:
         # Map positions are the image's pixels, wherever the image nominally is.
         own_pixels = replace(grid, crs=None, transform=PIXEL_COORDINATES)
-        stored = read_tie_points(path, own_pixels, names)
-    else:
-        stored = _points_of(places, names)
-    if len(stored.reference_xy) == 0:
+        stored = read_tie_points(path, own_pixels, (HEIGHT, CORRELATION, *SIGMA))
+    if len(stored) == 0:
         raise TransformFileError(f"{path} holds no points")
     crs = stored.crs or orientation.crs
     height = stored.more[HEIGHT]
     lon_lat = reproject(stored.reference_xy, crs, LON_LAT)
     height = np.where(np.isfinite(height), height, orientation.heights.at(lon_lat))
-    count = len(height)
     state = np.where(stored.used, USED, "rejected: in the file").astype(object)
-    state[np.array(stored.used) & ~np.isfinite(height)] = "rejected: no height"
-    points = TiePoints(
-        reference_xy=stored.reference_xy,
-        input_px=stored.input_px,
-        score=np.full(count, np.nan),
-        covariance_px2=_covariances(*(stored.more[name] for name in (*_SIGMAS, CORRELATION))),
-        forward_backward_error_px=np.full(count, np.nan),
+    state[stored.used & ~np.isfinite(height)] = "rejected: no height"
+    unknown = np.full(len(stored), np.nan)
+    spread = (stored.more.get(name, unknown) for name in (*SIGMA, CORRELATION))
+    points = replace(
+        TiePoints.unmeasured(stored.reference_xy, stored.input_px, None, state.tolist()),
+        covariance_px2=_covariances(*spread),
         is_check=stored.is_check,
-        state=state.astype(str),
         more={EDITED: stored.more[EDITED]} if EDITED in stored.more else {},
     )
     return ControlPoints(points, np.where(np.isfinite(height), height, 0.0), crs)
-
-
-def _points_of(places: Places, names: Sequence[str]) -> TiePoints:
-    unknown = np.full(len(places.xy), np.nan)
-    points = unmeasured(places.xy, places.px, [USED] * len(unknown), places.crs)
-    return replace(points, more={**dict.fromkeys(names, unknown), HEIGHT: places.height_m})
 
 
 def _covariances(x: FloatArray, y: FloatArray, correlation: FloatArray) -> FloatArray:
     x, y = (np.where(np.isfinite(sigma), sigma, _USUAL_SIGMA_PX) for sigma in (x, y))
     covariance = np.where(np.isfinite(correlation), correlation, 0.0) * x * y
     return np.stack([np.stack([x**2, covariance], -1), np.stack([covariance, y**2], -1)], -2)
-
-
-def joined(parts: Sequence[ControlPoints]) -> ControlPoints:
-    """Return the rows of several tables of one map, one after the other."""
-    return ControlPoints(
-        TiePoints.concatenate([part.points for part in parts]),
-        np.concatenate([part.height_m for part in parts]),
-        parts[0].crs,
-    )

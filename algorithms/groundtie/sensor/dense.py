@@ -12,18 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.grid import FloatArray, Grid
+from ..rasters.grid import POSITION_ERROR_PX, FloatArray, Grid, PointFunction, mesh
 from ..rasters.lattice import NOWHERE, Lattice, fine_lattice, row_strips
 from ..rasters.reading import FloatImage
 from .orientation import Orientation
-from .smooth_map import Positions
-
-# Interpolation between the nodes of the lattice may be wrong by this, in image pixels.
-_TOLERANCE_PX = 1e-3
 
 # Heights are enclosed by planes at least so far apart, in metres.
 _LEAST_RANGE_M = 10.0
-
 
 # Of terrain models that are finer than the image, so many pixels a side are held in memory.
 _LARGEST_PX = 4096
@@ -44,10 +39,10 @@ class DenseOrientation:
         orientation = self.orientation
         px = np.empty((2, grid.height, grid.width))
 
-        def on_nodes(function: Positions, tolerance: float) -> Lattice:
+        def on_nodes(function: PointFunction, tolerance: float) -> Lattice:
             return fine_lattice(grid, lambda xy: function(orientation.to_lon_lat(xy)), tolerance)
 
-        heights = orientation.heights.on_grid(on_nodes)
+        heights = orientation.heights.on_grid(grid, on_nodes)
         if heights is None:
             px.fill(NOWHERE)
             return px
@@ -67,7 +62,7 @@ class DenseOrientation:
             )
             return np.hstack([level, (above - below) / 2, (above + below) / 2 - level])
 
-        parabolas = _Parabolas.at_nodes(on_nodes(expansion, _TOLERANCE_PX))
+        parabolas = _Parabolas.at_nodes(on_nodes(expansion, POSITION_ERROR_PX))
         everywhere = self._holds_everywhere(grid, (low, high))
         for rows in row_strips(grid.height, grid.width):
             height = heights.lines(rows)
@@ -87,8 +82,7 @@ class DenseOrientation:
 
     def _lost(self, grid: Grid, height: FloatImage, rows: slice) -> NDArray[np.bool_]:
         """Return at which pixels of some rows the RPCs do not hold."""
-        px = np.meshgrid(np.arange(grid.width), np.arange(grid.height)[rows])
-        xy = grid.pixel_to_map(np.stack(px, axis=-1).reshape(-1, 2))
+        xy = grid.pixel_to_map(mesh(np.arange(grid.width), np.arange(grid.height)[rows]))
         lon_lat = self.orientation.to_lon_lat(xy)
         return ~self.orientation.rpc.is_valid(lon_lat, height.ravel()).reshape(height.shape)
 
@@ -115,7 +109,7 @@ class _Parabolas:
         """Return the parabolas of a lattice of a, b and c, each a column and a row."""
         known = nodes.values[:2, np.isfinite(nodes.values).all(axis=0)]
         origin = known.mean(axis=1) if known.size else np.zeros(2)
-        bent = np.nanmax(np.abs(nodes.values[4:]), initial=0.0) > _TOLERANCE_PX
+        bent = np.nanmax(np.abs(nodes.values[4:]), initial=0.0) > POSITION_ERROR_PX
         kept = replace(nodes, values=nodes.values[: 6 if bent else 4])
         return cls(origin, kept.minus(np.append(origin, np.zeros(len(kept.values) - 2))))
 

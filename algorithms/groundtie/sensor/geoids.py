@@ -1,4 +1,4 @@
-"""Where PROJ's grids of the geoids lie, by which heights above sea level are used."""
+"""Vertical datums: which one a terrain model declares, and where PROJ's grids of the geoids lie."""
 
 from __future__ import annotations
 
@@ -9,15 +9,25 @@ from pathlib import Path
 import rasterio
 
 from ..errors import GeoreferencingError
+from ..rasters.reading import RasterSource
 
 ELLIPSOIDAL = "ellipsoidal"
 
 # PROJ's grids of the geoids' heights above the ellipsoid, by the names that it had and has.
-GEOID_GRIDS = {
+_GRIDS = {
     "EGM96": ("us_nga_egm96_15.tif", "egm96_15.gtx"),
     "EGM2008": ("us_nga_egm08_25.tif", "egm08_25.gtx"),
 }
-DATUMS = (ELLIPSOIDAL, *GEOID_GRIDS)
+DATUMS = (ELLIPSOIDAL, *_GRIDS)
+
+
+def declared_datum(dem: RasterSource) -> str | None:
+    """Return the vertical datum that a terrain model's compound CRS names, if it is a known one."""
+    crs = dem.grid.crs
+    text = "" if crs is None else str(crs.to_wkt()).upper().replace(" ", "")
+    if "VERT_CS" not in text and "VERTCRS" not in text:
+        return None
+    return next((name for name in _GRIDS if name in text), None)
 
 
 def find_geoid(datum: str) -> Path | None:
@@ -30,7 +40,7 @@ def find_geoid(datum: str) -> Path | None:
     """
     if datum == ELLIPSOIDAL:
         return None
-    names = GEOID_GRIDS[datum]
+    names = _GRIDS[datum]
     for folder in _proj_folders():
         for name in names:
             if (folder / name).is_file():

@@ -21,13 +21,16 @@ from .geoids import find_geoid
 from .heights import ConstantHeight, surface_over
 from .orientation import FloatArray, Orientation, seen_at
 
-# Ground beyond the RPCs' range of heights by more gets a warning: metres, and share of the scale.
-_BEYOND_M, _BEYOND_SHARE = 10.0, 0.05
-
-# A height offset is reported if it is larger than so many standard deviations, and than this, and
-# if the largest offset of a vertical datum would be larger than so many, too.
-_SIGMAS = 4.0
+# Heights that are off by more get a warning, in metres: terrain models err by a few, geoids lie
+# tens from the ellipsoid.
 _OFFSET_M = 10.0
+
+# Ground beyond the RPCs' range of heights must be so, too, by more than this share of its half.
+_BEYOND_SHARE = 0.05
+
+# An offset by residuals is reported if it is larger than so many standard deviations, and if the
+# largest offset of a vertical datum (EGM96: 107 m) would be larger than so many, too.
+_SIGMAS = 4.0
 _LARGEST_DATUM_M = 110.0
 
 # Shares of the ground that are left out at both ends of its range.
@@ -36,7 +39,7 @@ _TAIL = 0.01
 
 @dataclass(frozen=True)
 class HeightCheck:
-    """What indicates the heights' zero.
+    """What indicates the vertical datum of the heights.
 
     Parameters
     ----------
@@ -75,7 +78,7 @@ class HeightCheck:
         """Return in words what indicates wrong heights."""
         found = []
         scale = (self.range_m[1] - self.range_m[0]) / 2
-        if abs(self.beyond_m) > max(_BEYOND_M, _BEYOND_SHARE * scale):
+        if abs(self.beyond_m) > max(_OFFSET_M, _BEYOND_SHARE * scale):
             geoid = (
                 "" if self.geoid_m is None else f" (EGM96 is {self.geoid_m:.0f} m above it here)"
             )
@@ -127,14 +130,13 @@ def check_heights(
     heights = orientation.heights.at(seen)
     heights = heights[np.isfinite(heights)]
     low, high = (float(np.quantile(heights, tail)) for tail in (_TAIL, 1 - _TAIL))
-    reach = abs(rpc.scale[2])
     offset = sigma = None
     if control is not None and adjustment is not None:
         offset, sigma = _offset(orientation, control, adjustment)
     constant = isinstance(orientation.heights, ConstantHeight)
     return HeightCheck(
         (low, high),
-        (rpc.offset[2] - reach, rpc.offset[2] + reach),
+        rpc.height_range_m,
         None if constant else _geoid(seen),
         offset,
         sigma,

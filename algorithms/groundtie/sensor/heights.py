@@ -10,16 +10,15 @@ from typing import ClassVar
 import numpy as np
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
-from ..rasters.grid import LON_LAT, POSITION_ERROR_PX, FloatArray, Grid, reproject
+from ..rasters.grid import LON_LAT, POSITION_ERROR_PX, FloatArray, Grid, PointFunction, reproject
 from ..rasters.height_surfaces import RasterSurface, SurfacePiece, surface_around
 from ..rasters.lattice import Lattice
 from ..rasters.reading import FloatImage, RasterSource
-from .geoids import GEOID_GRIDS
-from .smooth_map import Positions, smooth_map
+from .smooth_map import smooth_map
 
 # Takes a smooth function of longitude and latitude, (n, 2) → (n, k), and its largest error; returns
 # its values for all pixels of a grid.
-OnNodes = Callable[[Positions, float], Lattice]
+OnNodes = Callable[[PointFunction, float], Lattice]
 
 # Interpolation between nodes may be wrong by this, in metres.
 _TOLERANCE_M = 1e-3
@@ -43,9 +42,9 @@ class ConstantHeight:
         """Return heights in metres, shape (n,)."""
         return np.full(len(lon_lat), self.height_m)
 
-    def on_grid(self, on_nodes: OnNodes) -> HeightsOnGrid | None:
+    def on_grid(self, grid: Grid, on_nodes: OnNodes) -> HeightsOnGrid | None:
         """Return the height at all pixels of a grid."""
-        return _ConstantOnGrid(self.height_m, on_nodes(np.zeros_like, _TOLERANCE_M).grid)
+        return _ConstantOnGrid(self.height_m, grid)
 
 
 @dataclass(frozen=True)
@@ -93,7 +92,7 @@ class TerrainHeights:
             heights = heights + self.geoid.at(lon_lat)
         return heights
 
-    def on_grid(self, on_nodes: OnNodes) -> HeightsOnGrid | None:
+    def on_grid(self, grid: Grid, on_nodes: OnNodes) -> HeightsOnGrid | None:
         """Return the heights at all pixels of a grid; None if none is known."""
         place = on_nodes(self.terrain.to_px, POSITION_ERROR_PX)
         geoid = None
@@ -143,8 +142,9 @@ class _TerrainOnGrid:
     @property
     def bounds_m(self) -> tuple[float, float]:
         """Bounds that no height exceeds."""
-        image, geoid = self._piece.image, self.geoid
-        low, high = (0.0, 0.0) if geoid is None else _range(geoid.values)
+        image = self._piece.image
+        geoid = np.zeros(1) if self.geoid is None else self.geoid.values
+        low, high = float(np.nanmin(geoid)), float(np.nanmax(geoid))
         return float(image.min()) + low, float(image.max()) + high
 
     def lines(self, rows: slice) -> FloatImage:
@@ -153,10 +153,6 @@ class _TerrainOnGrid:
         if self.geoid is not None:
             height += self.geoid.lines(rows)[0]
         return height
-
-
-def _range(values: FloatArray) -> tuple[float, float]:
-    return float(np.nanmin(values)), float(np.nanmax(values))
 
 
 Heights = ConstantHeight | TerrainHeights
@@ -190,15 +186,6 @@ def terrain_heights(
         return TerrainHeights(terrain, replace(surface_over(geoid, lon_lat), margin_px=_WHOLE_PX))
     except (GeoreferencingError, NoOverlapError, RasterContentError) as error:
         raise type(error)(f"the geoid cannot be used: {error}") from error
-
-
-def declared_datum(dem: RasterSource) -> str | None:
-    """Return the vertical datum that a terrain model's compound CRS names, if it is a known one."""
-    crs = dem.grid.crs
-    text = "" if crs is None else str(crs.to_wkt()).upper().replace(" ", "")
-    if "VERT_CS" not in text and "VERTCRS" not in text:
-        return None
-    return next((name for name in GEOID_GRIDS if name in text), None)
 
 
 def surface_over(source: RasterSource, lon_lat: FloatArray) -> RasterSurface:

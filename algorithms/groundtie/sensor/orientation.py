@@ -10,14 +10,17 @@ from numpy.typing import ArrayLike
 from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError, NoOverlapError
-from ..rasters.grid import LON_LAT, FloatArray, Grid, mesh, reproject
+from ..geometry.terrain_model import LEAST_SLOPE
+from ..rasters.grid import LON_LAT, FloatArray, Grid, PointFunction, reproject
 from ..rasters.reading import RasterSource
 from .heights import ConstantHeight, Heights, terrain_heights
-from .rpc import RPC
-from .smooth_map import Positions, smooth_map
+from .rpc import RPC, ground_lattice
+from .smooth_map import smooth_map
 
 # Heights found by intersecting a line of sight with the terrain are right to this, in metres.
 _PRECISION_M = 1e-4
+
+# The most steps until then; what needs more is taken for lost.
 _STEPS = 60
 
 # Longitudes and latitudes from map positions may be wrong by this: 0.1 mm.
@@ -26,6 +29,7 @@ _TOLERANCE_DEG = 1e-9
 # The map around the image that can be projected into it, as a share of the image's side.
 _AROUND = 0.5
 
+# Places a side of an image whose ground gives the extent of the map.
 _NODES = 9
 
 # The share of an image whose heights are known is counted at so many places a side: to 1 %.
@@ -53,7 +57,7 @@ class Orientation:
     rpc: RPC
     heights: Heights
     crs: CRS
-    to_lon_lat: Positions
+    to_lon_lat: PointFunction
     known_share: float = 1.0
 
     def to_px(self, xy: ArrayLike) -> FloatArray:
@@ -74,10 +78,9 @@ class Orientation:
     def to_map(self, px: ArrayLike) -> FloatArray:
         """Return the map positions, shape (n, 2), that image positions see.
 
-        The height at which the line of sight meets the ground is found by the secant method; NaN
-        where it does not meet it.
+        NaN where the line of sight does not meet the ground.
         """
-        xy = reproject(self.to_ground(px)[0], LON_LAT, self.crs)
+        xy = reproject(self._ground(np.asarray(px, float)), LON_LAT, self.crs)
         return np.where(np.isfinite(xy), xy, np.nan)
 
     def to_nominal_map(self, px: ArrayLike) -> FloatArray:
@@ -90,9 +93,11 @@ class Orientation:
             xy[lost] = reproject(level, LON_LAT, self.crs)
         return np.where(np.isfinite(xy), xy, np.nan)
 
-    def to_ground(self, px: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return longitude and latitude, (n, 2), and height, (n,), that image positions see."""
-        px = np.asarray(px, float)
+    def _ground(self, px: FloatArray) -> FloatArray:
+        """Return longitude and latitude, (n, 2), that image positions see; NaN: none.
+
+        The height at which the line of sight meets the ground is found by the secant method.
+        """
         height = np.full(len(px), self.heights.typical_m)
         lon_lat, above = self._above(px, height)
         previous, previous_above, height = height, above, height + above
@@ -102,13 +107,14 @@ class Orientation:
                 if np.nanmax(np.abs(above), initial=0.0) < _PRECISION_M:
                     break
                 slope = (above - previous_above) / (height - previous)
-                # Steep slopes towards the sensor make the plain step overshoot.
-                step = np.where(np.isfinite(slope) & (slope < -0.2), -above / slope, above / 2)
+                # Steep slopes towards the sensor (layover) make the plain step overshoot.
+                step = np.where(
+                    np.isfinite(slope) & (slope < -LEAST_SLOPE), -above / slope, above / 2
+                )
                 step = np.where(np.abs(above) < _PRECISION_M, 0.0, step)
                 previous, previous_above, height = height, above, height + step
-        lost = ~(np.abs(above) < _PRECISION_M)
-        lon_lat[lost], height = np.nan, np.where(lost, np.nan, height)
-        return lon_lat, height
+        lon_lat[~(np.abs(above) < _PRECISION_M)] = np.nan
+        return lon_lat
 
     def _above(self, px: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return where lines of sight have a height, and how far the ground lies above them."""
@@ -176,8 +182,7 @@ def orient(
         See `terrain_heights`.
     """
     size = source.grid.width, source.grid.height
-    low, high = (rpc.offset[2] + sign * abs(rpc.scale[2]) for sign in (-1, 1))
-    extremes = np.vstack([seen_at(rpc, size, height) for height in (low, high)])
+    extremes = np.vstack([seen_at(rpc, size, height) for height in rpc.height_range_m])
     heights: Heights
     if dem is None:
         heights = ConstantHeight(rpc.offset[2] if height_m is None else height_m)
@@ -208,8 +213,7 @@ def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODE
     GeoreferencingError
         The RPCs see no ground: they are not the image's.
     """
-    px = mesh(*(np.linspace(-0.5, side - 0.5, nodes) for side in size))
-    lon_lat = rpc.localise(px, height_m)
+    lon_lat, _ = ground_lattice(rpc, size, [height_m], nodes)
     seen = lon_lat[np.isfinite(lon_lat).all(axis=1)]
     if not len(seen):
         raise GeoreferencingError("the RPCs lead no pixel of the image to the ground")

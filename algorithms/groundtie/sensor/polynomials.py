@@ -1,21 +1,18 @@
-"""The cubic polynomials of RPCs, evaluated block by block so that all intermediates stay in cache.
+"""Polynomials of positions, evaluated block by block so that all intermediates stay in cache.
 
-The twenty terms of a block form a matrix; one product with the coefficients gives all polynomials.
+The terms of a block form a matrix; one product with the coefficients gives all polynomials.
 numpy releases the interpreter's lock for both, so that blocks can be worked side by side.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 from ..rasters.grid import FloatArray
-
-TERMS = 20
-_QUADRATIC = 10
 
 # Exponents of longitude L, latitude P and height H in the order of RPC00B (STDI-0002, E.2.4):
 # 1, L, P, H, LP, LH, PH, L², P², H², PLH, L³, LP², LH², L²P, P³, PH², L²H, P²H, H³.
@@ -25,22 +22,37 @@ EXPONENTS = (
     (2, 1, 0), (0, 3, 0), (0, 1, 2), (2, 0, 1), (0, 2, 1), (0, 0, 3),
 )  # fmt: skip
 
-# Terms of degree above 1 as products: of which earlier term, and of which coordinate.
-_PRODUCTS = (
-    (4, 1, 1), (5, 1, 2), (6, 2, 2), (7, 1, 0), (8, 2, 1), (9, 3, 2), (10, 4, 2), (11, 7, 0),
-    (12, 8, 0), (13, 9, 0), (14, 7, 1), (15, 8, 1), (16, 9, 1), (17, 7, 2), (18, 8, 2), (19, 9, 2),
+TERMS = len(EXPONENTS)
+_QUADRATIC = sum(sum(term) <= 2 for term in EXPONENTS)
+
+# Their terms of degree above 1 as products: of which earlier term, and of which coordinate.
+RPC_PRODUCTS = (
+    (1, 1), (1, 2), (2, 2), (1, 0), (2, 1), (3, 2), (4, 2), (7, 0),
+    (8, 0), (9, 0), (7, 1), (8, 1), (9, 1), (7, 2), (8, 2), (9, 2),
 )  # fmt: skip
 
 # Points whose terms fit into the cache of a core.
 BLOCK = 4096
 
 
-def fill_terms(lph: FloatArray, terms: FloatArray) -> None:
-    """Write the terms, (20, n), of normalised positions L, P, H, (3, n)."""
+def fill_terms(
+    positions: FloatArray, terms: FloatArray, products: Sequence[tuple[int, int]] = RPC_PRODUCTS
+) -> None:
+    """Write the terms of a polynomial: 1, the coordinates, and the products.
+
+    Parameters
+    ----------
+    positions
+        Shape (k, n); of RPCs normalised longitude, latitude and height.
+    terms
+        Is written, shape (1 + k + products, n).
+    products
+        The terms of degree above 1: of which earlier term, and of which coordinate.
+    """
     terms[0] = 1.0
-    terms[1:4] = lph
-    for term, factor, coordinate in _PRODUCTS:
-        np.multiply(terms[factor], lph[coordinate], out=terms[term])
+    terms[1 : 1 + len(positions)] = positions
+    for term, (factor, coordinate) in enumerate(products, start=1 + len(positions)):
+        np.multiply(terms[factor], positions[coordinate], out=terms[term])
 
 
 def derivative(coefficients: FloatArray, coordinate: int) -> FloatArray:
@@ -65,7 +77,7 @@ def derivative(coefficients: FloatArray, coordinate: int) -> FloatArray:
 
 
 def in_blocks(
-    work: Callable[[slice, FloatArray], None], count: int, workers: int, terms: int = TERMS
+    work: Callable[[slice, FloatArray], None], count: int, workers: int = 1, terms: int = TERMS
 ) -> None:
     """Call `work` for all blocks of `count` points, with a matrix for the terms of each.
 

@@ -19,6 +19,8 @@ from .polynomials import TERMS, derivative, fill_terms, in_blocks
 
 # The inverse has arrived when it misses the image position by less, in pixels.
 _PRECISION_PX = 1e-7
+
+# The most steps until then: usually it is one (see `_Start`).
 _STEPS = 12
 
 # Beyond this multiple of their scales ground positions are none of the image's.
@@ -101,7 +103,10 @@ class RPC:
 
         def work(part: slice, terms: FloatArray) -> None:
             fill_terms(self._normalised(lon_lat[part], height[part]), terms)
-            px[part] = self._image_position(self._coefficients @ terms)
+            values = self._coefficients @ terms
+            with np.errstate(all="ignore"):
+                ratio = values[:2] / values[2:]
+            px[part] = ratio.T * self.image_scale + self.image_offset
 
         in_blocks(work, len(px), workers)
         return px
@@ -123,7 +128,7 @@ class RPC:
                 slope = _quotient_slope(values, coefficients @ terms[: coefficients.shape[1]])
                 slopes[part, :, axis] = (slope / self.scale[axis]).T * self.image_scale
 
-        in_blocks(work, len(slopes), 1)
+        in_blocks(work, len(slopes))
         return slopes
 
     def localise(self, px: ArrayLike, height_m: ArrayLike, workers: int = 1) -> FloatArray:
@@ -135,10 +140,8 @@ class RPC:
         ----------
         px
             Image positions (col, row), shape (n, 2).
-        height_m
-            Height above the ellipsoid, shape (n,) or one for all.
-        workers
-            Number of threads.
+        height_m, workers
+            As `project` has them.
         """
         px = np.asarray(px, float)
         height = np.broadcast_to(np.asarray(height_m, float), len(px))
@@ -156,6 +159,12 @@ class RPC:
 
         in_blocks(work, len(px), workers)
         return found
+
+    @property
+    def height_range_m(self) -> tuple[float, float]:
+        """Lowest and highest height that the coefficients were made for."""
+        reach = abs(self.scale[2])
+        return self.offset[2] - reach, self.offset[2] + reach
 
     def is_valid(self, lon_lat: ArrayLike, height_m: ArrayLike) -> NDArray[np.bool_]:
         """Return which ground positions lie where the coefficients may be used, shape (n,).
@@ -181,11 +190,6 @@ class RPC:
             lph[axis] *= 1 / self.scale[axis]
         return lph
 
-    def _image_position(self, values: FloatArray) -> FloatArray:
-        with np.errstate(all="ignore"):
-            ratio = values[:2] / values[2:]
-        return np.asarray(ratio.T * self.image_scale + self.image_offset)
-
     def _newton(self, lph: FloatArray, target: FloatArray, terms: FloatArray) -> None:
         """Move normalised positions, (3, n), in place until they project to targets, (2, n)."""
         size = np.abs(np.array(self.image_scale))[:, None]
@@ -207,7 +211,7 @@ class RPC:
     @property
     def is_regular(self) -> bool:
         """Whether no denominator vanishes within the scales, and the ground has an image there."""
-        values = np.array(self._polynomials) @ _lattice_terms()[1]
+        values = self._coefficients @ _lattice_terms()[1]
         low, high = values[2:].min(axis=1), values[2:].max(axis=1)
         if not (low * high > 0).all():
             return False
@@ -217,6 +221,32 @@ class RPC:
     @cached_property
     def _start(self) -> _Start:
         return _Start.of(self)
+
+
+def ground_lattice(
+    rpc: RPC, size: tuple[int, int], heights_m: ArrayLike, nodes: int = 21
+) -> tuple[FloatArray, FloatArray]:
+    """Return ground positions seen all over an image at several heights.
+
+    Parameters
+    ----------
+    rpc
+        The image's model.
+    size
+        Width and height of the image in pixels; the lattice reaches to its corners.
+    heights_m
+        Heights above the ellipsoid.
+    nodes
+        Nodes along each side of the image.
+
+    Returns
+    -------
+    lon_lat, height_m
+        Shapes (n, 2) and (n,).
+    """
+    axes = [np.linspace(-0.5, side - 0.5, nodes) for side in size]
+    cols, rows, heights = (x.ravel() for x in np.meshgrid(*axes, np.asarray(heights_m, float)))
+    return rpc.localise(np.column_stack([cols, rows]), heights), heights
 
 
 @dataclass(frozen=True)

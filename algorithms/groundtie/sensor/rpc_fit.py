@@ -43,7 +43,7 @@ def fit_rpc(lon_lat: ArrayLike, height_m: ArrayLike, px: ArrayLike, **stated: An
     ----------
     lon_lat
         Longitude and latitude in degrees, shape (n, 2); usually a lattice over the scene at
-        several heights (see `ground_lattice`).
+        several heights (see `rpc.ground_lattice`).
     height_m
         Height above the ellipsoid, shape (n,).
     px
@@ -79,33 +79,6 @@ def fit_rpc(lon_lat: ArrayLike, height_m: ArrayLike, px: ArrayLike, **stated: An
     )
     miss = np.hypot(*(rpc.project(ground[:, :2], ground[:, 2]) - px).T)
     return RPCFit(rpc, float(miss.max()), float(np.sqrt(np.mean(miss**2))))
-
-
-def ground_lattice(
-    rpc: RPC, size: tuple[int, int], heights_m: ArrayLike, nodes: int = 21
-) -> tuple[FloatArray, FloatArray]:
-    """Return ground positions seen all over an image at several heights.
-
-    Parameters
-    ----------
-    rpc
-        The image's model.
-    size
-        Width and height of the image in pixels; the lattice reaches to its corners.
-    heights_m
-        Heights above the ellipsoid.
-    nodes
-        Nodes along each side of the image.
-
-    Returns
-    -------
-    lon_lat, height_m
-        Shapes (n, 2) and (n,).
-    """
-    along = [np.linspace(-0.5, side - 0.5, nodes) for side in size]
-    cols, rows, heights = np.meshgrid(*along, np.asarray(heights_m, float))
-    px = np.column_stack([cols.ravel(), rows.ravel()])
-    return rpc.localise(px, heights.ravel()), heights.ravel()
 
 
 def _frame(values: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -8,14 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..errors import GeoreferencingError
+from ..rasters.grid import MOST_PX
 from .polynomials import TERMS
 from .rpc import RPC
-
-# Bounds of offsets and scales: all round the Earth, the height of its atmosphere, and the pixels
-# that GDAL counts along a side.
-_LARGEST_DEG = 360.0
-_LARGEST_M = 1e5
-_LARGEST_PX = 2.0**31
 
 
 def rpc_from_tags(tags: Mapping[str, str], name: str) -> RPC:
@@ -63,12 +58,16 @@ def rpc_from_tags(tags: Mapping[str, str], name: str) -> RPC:
 
 
 def _require_earthly(rpc: RPC) -> None:
-    """Raise ValueError for RPCs that are of no image of the Earth."""
+    """Raise ValueError for RPCs that are of no image of the Earth.
+
+    Offsets and scales are bounded by all round the Earth, the height of its atmosphere, and the
+    pixels that GDAL counts along a side.
+    """
     for name, largest, numbers in (
-        ("longitude", _LARGEST_DEG, (rpc.offset[0], rpc.scale[0])),
-        ("latitude", _LARGEST_DEG / 4, (rpc.offset[1], rpc.scale[1])),
-        ("height", _LARGEST_M, (rpc.offset[2], rpc.scale[2])),
-        ("pixel", _LARGEST_PX, (*rpc.image_offset, *rpc.image_scale)),
+        ("longitude", 360.0, (rpc.offset[0], rpc.scale[0])),
+        ("latitude", 90.0, (rpc.offset[1], rpc.scale[1])),
+        ("height", 1e5, (rpc.offset[2], rpc.scale[2])),
+        ("pixel", MOST_PX, (*rpc.image_offset, *rpc.image_scale)),
     ):
         if max(map(abs, numbers)) > largest:
             raise ValueError(f"{max(numbers, key=abs):g} is the {name} of no image")

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..rasters.grid import FloatArray
-from .polynomials import in_blocks
-
-Positions = Callable[[FloatArray], FloatArray]
+from ..rasters.grid import FloatArray, PointFunction
+from .polynomials import fill_terms, in_blocks
 
 _DEGREE = 5
-_NODES = 12
+
+# Nodes a side: twice as many as the polynomial has coefficients along one.
+_NODES = 2 * (_DEGREE + 1)
+
+# Random places at which the polynomial is compared with what it stands for.
 _CHECKS = 400
 
-# Each term is one of lower degree times u (0) or v (1), by rising degree.
+# Each term of degree above 1 is one of lower degree times u (0) or v (1), by rising degree.
 _PRODUCTS = tuple(
     (total * (total - 1) // 2 + max(j - 1, 0), int(j > 0))
-    for total in range(1, _DEGREE + 1)
+    for total in range(2, _DEGREE + 1)
     for j in range(total + 1)
 )
-_TERMS = len(_PRODUCTS) + 1
+_TERMS = len(_PRODUCTS) + 3
 
 
 @dataclass(frozen=True)
@@ -47,18 +48,20 @@ class SmoothMap:
 
         def work(part: slice, terms: FloatArray) -> None:
             unit = self._unit(xy[part])
-            _fill(unit, terms)
+            fill_terms(unit, terms, _PRODUCTS)
             moved[part] = (self.coefficients @ terms).T
             moved[part][(np.abs(unit) > 1 + 1e-9).any(axis=0)] = np.nan
 
-        in_blocks(work, len(xy), 1, _TERMS)
+        in_blocks(work, len(xy), terms=_TERMS)
         return moved
 
     def _unit(self, xy: FloatArray) -> FloatArray:
         return np.asarray((2 * (xy - self.low) / (self.high - self.low) - 1).T)
 
 
-def smooth_map(exact: Positions, low: FloatArray, high: FloatArray, tolerance: float) -> Positions:
+def smooth_map(
+    exact: PointFunction, low: FloatArray, high: FloatArray, tolerance: float
+) -> PointFunction:
     """Return a polynomial that stands in for a function over a box; the function if none is exact.
 
     Parameters
@@ -74,7 +77,7 @@ def smooth_map(exact: Positions, low: FloatArray, high: FloatArray, tolerance: f
     unit = np.stack(np.meshgrid(nodes, nodes)).reshape(2, -1)
     checks = np.random.default_rng(0).uniform(-1, 1, (2, _CHECKS))
     terms = np.empty((_TERMS, unit.shape[1]))
-    _fill(unit, terms)
+    fill_terms(unit, terms, _PRODUCTS)
     values = exact((low + high) / 2 + unit.T * (high - low) / 2)
     if not np.isfinite(values).all():
         return exact
@@ -83,9 +86,3 @@ def smooth_map(exact: Positions, low: FloatArray, high: FloatArray, tolerance: f
     places = (low + high) / 2 + checks.T * (high - low) / 2
     error = np.abs(fitted(places) - exact(places)).max()
     return fitted if error < tolerance else exact
-
-
-def _fill(unit: FloatArray, terms: FloatArray) -> None:
-    terms[0] = 1.0
-    for term, (factor, coordinate) in enumerate(_PRODUCTS, start=1):
-        np.multiply(terms[factor], unit[coordinate], out=terms[term])

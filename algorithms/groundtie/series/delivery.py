@@ -12,6 +12,7 @@ from shapely.geometry import LineString, mapping
 
 from ..context import Context
 from ..errors import NotRegisteredError
+from ..geometry.vector_layers import write_vector_layer
 from ..rasters.atomic import Outputs, make_folder, write_csv, write_json, writing
 from ..rasters.grid import Grid
 from ..rasters.reading import open_raster
@@ -153,14 +154,12 @@ class SeriesFiles:
 
 def _write_layer(path: Path, series: Series) -> None:
     """Write the table with a line around each date, where it lies as registered."""
-    from ..geometry.geopackage import write_layer  # fiona is heavy
-
     records = [
         {"geometry": _outline(one), "properties": dict(row)}
         for one, row in zip(series.dates, series.rows(), strict=True)
     ]
     with writing(path):
-        write_layer(path, "series", records, TABLE_COLUMNS, series.frame.grid.crs)
+        write_vector_layer(path, "series", records, TABLE_COLUMNS, series.frame.grid.crs)
 
 
 def _outline(one: SeriesDate) -> Mapping[str, Any] | None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from ..assessment.accuracy import Assessment
 from ..assessment.comparison import Comparison, compare
-from ..assessment.evidence import AssessmentFiles
+from ..assessment.measuring import AssessmentFiles
 from ..assessment.point_errors import PointErrors
 from ..declaration import NO_VALUES, Output, Values, file_lines, given_files, tool
 from ..errors import NotRegisteredError

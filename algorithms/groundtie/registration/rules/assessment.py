@@ -9,7 +9,7 @@ from ..evidence import ASSESSMENT
 from .rule import Rule
 
 if TYPE_CHECKING:
-    from ...assessment.assessed_points import AssessmentEvidence
+    from ...assessment.accuracy import AssessmentEvidence
 
 
 def _not_placed(evidence: AssessmentEvidence) -> str | None:

@@ -1,0 +1,73 @@
+"""Tables of points that a file holds: rows by the names of columns, and positions in these."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from ..rasters.grid import FloatArray
+
+Row = dict[str, Any]
+
+REFERENCE = ("reference_x", "reference_y")
+
+# Where a row states the place in the input: on the reference map, on its own map, and its pixel.
+NOMINAL = ("nominal_x", "nominal_y")
+INPUT = ("input_x", "input_y")
+PIXEL = ("input_col", "input_row")
+
+# Standard deviations of a match.
+SIGMA = ("sigma_x_px", "sigma_y_px")
+
+# No position on a map of the Earth, in any unit, nor in an image is farther off.
+_FARTHEST = 1e10
+
+
+def table_rows(lines: Iterable[str]) -> list[Row]:
+    """Return the rows of a CSV table by the names of its columns.
+
+    Fields beyond those of the first line are left out.
+    """
+    rows = [dict(row) for row in csv.DictReader(lines)]
+    for row in rows:
+        row.pop(None, None)
+    return rows
+
+
+def columns(rows: list[Row], x: str, y: str) -> FloatArray:
+    """Return the positions in two columns, shape (n, 2); NaN where a row has none."""
+    return np.column_stack([numbers(rows, x), numbers(rows, y)])
+
+
+def numbers(rows: list[Row], name: str) -> FloatArray:
+    """Return a column of numbers, shape (n,); NaN where a row has none."""
+    values = [row.get(name) for row in rows]
+    return np.array([np.nan if value in (None, "") else float(value) for value in values], float)
+
+
+def positions(rows: Iterable[Row], x: str, y: str) -> FloatArray:
+    """Return the positions in two columns, shape (n, 2), which every row must have.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        A row has none.
+    """
+    return np.array([[float(row[x]), float(row[y])] for row in rows], float).reshape(-1, 2)
+
+
+def require_places(places: FloatArray) -> FloatArray:
+    """Return positions, shape (n, 2), that a file holds.
+
+    Raises
+    ------
+    ValueError
+        One is so far off that it lies on no map, or is not finite.
+    """
+    lost = int((~(np.abs(places) < _FARTHEST)).any(axis=1).sum())
+    if lost:
+        raise ValueError(f"{lost} of {len(places)} positions are not finite, or on no map")
+    return places
