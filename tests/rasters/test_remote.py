@@ -17,6 +17,7 @@ from raster_files import utm_grid, wave_image, write_raster
 from groundtie.errors import RasterOpenError
 from groundtie.rasters.reading import Window, open_raster
 from groundtie.rasters.remote import reason_of_server
+from groundtie.rasters.rendered import SUN, Light, rendered
 
 SIDE = 2048
 
@@ -67,6 +68,21 @@ def test_a_reduced_image_is_read_from_overviews(
     assert np.abs(values - means).max() < 1.5
     assert valid.all()
     assert server.sent["average.tif"] < 0.2 * averaged.stat().st_size
+
+
+@pytest.mark.parametrize("heights_first", [True, False])
+def test_what_is_rendered_of_heights_is_not_taken_for_heights(
+    server: Loopback, averaged: Path, heights_first: bool
+) -> None:
+    shape, light = (SIDE // 8, SIDE // 8), Light(SUN, 135.0)
+    with open_raster(f"{server.of(averaged)}?{heights_first}") as remote:
+        sources = [remote, rendered(remote, light)]
+        order = (0, 1) if heights_first else (1, 0)
+        found = {i: sources[i].read(remote.window, None, shape)[0] for i in order}
+    with open_raster(averaged) as local:
+        expected, _ = rendered(local, light).read(local.window, None, shape)
+    assert found[0].mean() > 100
+    np.testing.assert_array_equal(found[1], expected)
 
 
 @pytest.mark.slow

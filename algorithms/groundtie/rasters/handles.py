@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Hashable, Iterator, Sequence
-from typing import Any, Protocol
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import rasterio
@@ -15,7 +16,12 @@ from rasterio.env import env_ctx_if_needed
 from ..arrays import Raster
 from ..errors import RasterOpenError, raised_by
 from ..raster_names import identity, is_remote
+from .grid import Grid
+from .metadata import BandInfo
 from .remote import environment, reason_of_server
+
+if TYPE_CHECKING:
+    from .reading import RasterSource
 
 
 class Handles(Protocol):
@@ -142,6 +148,24 @@ class ArrayHandles:
         if isinstance(indexes, int):
             return part[indexes - 1]
         return part[[index - 1 for index in indexes]]
+
+
+def read_by(
+    source: RasterSource, handles: Handles, band: BandInfo, grid: Grid | None = None
+) -> RasterSource:
+    """Return a raster of a single band that other handles read; the rest is stated as before.
+
+    The raster's own overviews show none of it.
+    """
+    return replace(
+        source,
+        grid=grid or source.grid,
+        bands=(band,),
+        has_mask_band=False,
+        colormap=None,
+        _handles=handles,
+        _overviews=None,
+    )
 
 
 @contextlib.contextmanager

@@ -12,7 +12,7 @@ from ..arrays import Raster
 from ..context import Context
 from .averaging import HELD_PIXELS
 from .grid import Grid, PointFunction, compose
-from .handles import ArrayHandles
+from .handles import ArrayHandles, read_by
 from .metadata import BandInfo
 from .pair import Image, ImagePair
 from .reading import FloatImage, Mask, RasterSource
@@ -65,14 +65,7 @@ def held_onto(image: Image, grid: Grid, to_px: PointFunction, context: Context) 
         pass
     mask = None
     if image.mask is not None and shown is not None:
-        plain = (BandInfo.plain("uint8", None),)
-        mask = replace(
-            image.mask,
-            grid=grid,
-            bands=plain,
-            has_mask_band=False,
-            _handles=ArrayHandles(Raster(shown)),
-        )
+        mask = read_by(image.mask, ArrayHandles(Raster(shown)), BandInfo.plain("uint8"), grid)
     source = _held(image.source, grid, values, valid)
     return replace(image, source=source, band=1, mask=mask, colours=None)
 
@@ -125,12 +118,4 @@ def _held(source: RasterSource, grid: Grid, values: FloatImage, valid: Mask) -> 
     values[~valid] = np.nan
     # Whoever states nothing of what is valid must not seem to.
     nodata = float("nan") if source.says_what_is_valid else None
-    return replace(
-        source,
-        grid=grid,
-        bands=(BandInfo.plain("float32", nodata),),
-        has_mask_band=False,
-        colormap=None,
-        _handles=ArrayHandles(Raster(values)),
-        _overviews=None,
-    )
+    return read_by(source, ArrayHandles(Raster(values)), BandInfo.plain("float32", nodata), grid)

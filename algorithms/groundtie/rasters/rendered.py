@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .grid import Grid
+from .handles import read_by
 from .metadata import BandInfo
 from .reading import FloatImage, RasterSource, Window
 
@@ -87,14 +88,8 @@ def rendered(source: RasterSource, light: Light, band: int | None = None) -> Ras
     heights = source
     if isinstance(before, _Rendering):
         heights, band = before.heights, before.band
-    return replace(
-        heights,
-        bands=(BandInfo.plain("float32", float("nan")),),
-        has_mask_band=False,
-        colormap=None,
-        tags={},
-        _handles=_Rendering(heights, light, band or 1),
-    )
+    brightness = BandInfo.plain("float32", float("nan"))
+    return replace(read_by(heights, _Rendering(heights, light, band or 1), brightness), tags={})
 
 
 @dataclass(frozen=True)
