@@ -50,16 +50,19 @@ class Truth:
         px = lattice(size)
         return cls(px, mapping(px), linear)
 
-    def error_px(self, found: Mapping) -> float:
-        """Return the root mean square error, in reference pixels, of a mapping.
+    def off_px(self, found: Mapping) -> FloatArray:
+        """Return how far a mapping is off, in reference pixels, shape (n, 2).
 
         Parameters
         ----------
         found
             Function from reference pixels to input pixels, both shape (n, 2).
         """
-        off = (found(self.reference_px) - self.input_px) @ np.linalg.inv(self.linear).T
-        return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
+        return (found(self.reference_px) - self.input_px) @ np.linalg.inv(self.linear).T
+
+    def error_px(self, found: Mapping) -> float:
+        """Return the root mean square error, in reference pixels, of a mapping; see `off_px`."""
+        return float(np.sqrt(np.mean(np.sum(self.off_px(found) ** 2, axis=1))))
 
 
 def lattice(size: tuple[int, int]) -> FloatArray:

@@ -14,8 +14,7 @@ import numpy as np
 
 import groundtie
 
-from .accuracy import FloatArray, Truth
-from .attempt import Pair, on_pixels, tried
+from .attempt import Pair, for_json, on_pixels, tried
 from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
 from .optical_pairs import OpticalPair
 from .real import LARGEST_SHIFT_PX
@@ -89,9 +88,7 @@ class CalibrationRun:
 
     def record(self) -> dict[str, Any]:
         """Return the run as values that JSON can carry."""
-        values = asdict(self)
-        unknown = {k for k, v in values.items() if isinstance(v, float) and not math.isfinite(v)}
-        return {k: None if k in unknown else v for k, v in values.items()}
+        return for_json(asdict(self))
 
     def line(self) -> str:
         """Return the run as a line of text."""
@@ -147,9 +144,7 @@ def compare(
         return CalibrationRun(name, group, one.verdict, one.reason)
     found = one.result
     assert pair.truth is not None
-    errors = errors_px(
-        pair.truth, on_pixels(found.transform, pair.reference)(pair.truth.reference_px)
-    )
+    errors = np.hypot(*pair.truth.off_px(on_pixels(found.transform, pair.reference)).T)
     verdict = found.verdict
     radii = verdict.ce50_px, verdict.check_ce90_px, verdict.ce95_px
     return CalibrationRun(
@@ -166,11 +161,6 @@ def compare(
         ),
         one.seconds,
     )
-
-
-def errors_px(truth: Truth, found_px: FloatArray) -> FloatArray:
-    """Return the errors at the places of a truth, in reference pixels, shape (n,)."""
-    return np.hypot(*((found_px - truth.input_px) @ np.linalg.inv(truth.linear).T).T)
 
 
 def with_truth_px(radius_px: float, said: float, sigma_px: float) -> float:

@@ -7,6 +7,7 @@ import json
 import os
 import warnings
 import zlib
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -88,10 +89,10 @@ def data_folder() -> Path:
     return Path(os.environ.get("GROUNDTIE_DATA") or default)
 
 
-def read_cases(folder: Path) -> tuple[RealCase, ...]:
-    """Return the cases of `KINDS` in a folder: two images each, neither rotated nor with RPCs."""
+def read_cases(folder: Path, kinds: Collection[str] = KINDS) -> tuple[RealCase, ...]:
+    """Return the cases of some kinds in a folder: by default, neither rotated nor with RPCs."""
     listed = json.loads((folder / "cases.json").read_text(encoding="utf-8"))
-    return tuple(_case(folder, values) for values in listed if values["kind"] in KINDS)
+    return tuple(_case(folder, values) for values in listed if values["kind"] in kinds)
 
 
 def _case(folder: Path, values: dict[str, Any]) -> RealCase:

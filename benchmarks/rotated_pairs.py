@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 import groundtie
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 
 from .accuracy import CORRECT, REFUSED, SILENTLY_WRONG
 from .attempt import Outcome, count, tried
-from .cases import RealCase, image_size
-from .suites import Case, Goal, Settings, SuiteResult, run_cases
+from .cases import RealCase, image_size, read_cases
+from .suites import Case, Goal, Settings, SuiteResult, by_group, run_cases
 from .tables import accuracy_table
 
 # Largest error, in pixels of a reference that is 256 px wide.
@@ -81,19 +78,7 @@ class RotatedCase:
 
 def rotated_cases(folder: Path) -> list[RealCase]:
     """Return the cases of unknown rotation and scale in a folder."""
-    listed = json.loads((folder / "cases.json").read_text(encoding="utf-8"))
-    return [
-        RealCase(
-            values["id"],
-            values["kind"],
-            folder / values["reference"],
-            folder / values["input"],
-            float(values["truth"]["sigma_px"]),
-            np.array(values["truth"]["reference_to_input"], float),
-        )
-        for values in listed
-        if values["kind"] in LARGEST_ERROR_PX
-    ]
+    return list(read_cases(folder, LARGEST_ERROR_PX))
 
 
 def crossed(cases: Sequence[RealCase]) -> list[RotatedCase]:
@@ -117,9 +102,7 @@ def run(settings: Settings) -> SuiteResult:
     if settings.quick:
         cases = [*map(RotatedCase, real[:2]), *crossed(real)[:2]]
     outcomes = run_cases(cases, settings.jobs)
-    groups: dict[str, list[Outcome]] = {kind: [] for kind in (*LARGEST_ERROR_PX, _CROSSED)}
-    for outcome in outcomes:
-        groups[outcome.group].append(outcome)
+    groups = by_group(outcomes, (*LARGEST_ERROR_PX, _CROSSED))
     groups = {group: members for group, members in groups.items() if members}
     return SuiteResult(
         "Unknown rotation and scale",

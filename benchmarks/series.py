@@ -14,6 +14,7 @@ import numpy as np
 import groundtie
 from groundtie.errors import NotRegisteredError
 
+from .attempt import for_json
 from .processes import OUTPUT, measure
 from .series_scenes import SimulatedSeries, pairwise_px, simulate_series, write_moved
 from .suites import Goal, Settings, SuiteResult, Table
@@ -111,7 +112,7 @@ def run(settings: Settings) -> SuiteResult:
     head = ("series", "good", "registered", "silently wrong", "bad", "named", "largest (px)")
     head += ("median (px)", "loops that close", "median (px)", "largest (px)")
     table = Table("Series", head, [_row(one) for one in runs])
-    records = [{key: _finite(value) for key, value in asdict(one).items()} for one in runs]
+    records = [for_json(asdict(one)) for one in runs]
     return SuiteResult("Series", goals, (table,), records)
 
 
@@ -267,7 +268,3 @@ def _row(one: Run) -> list[str]:
 
 def _text(value: float) -> str:
     return f"{value:.2f}" if np.isfinite(value) else "–"
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not np.isfinite(value) else value

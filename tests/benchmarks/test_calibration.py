@@ -82,7 +82,7 @@ def test_a_truth_that_errs_widens_the_radii() -> None:
 def test_errors_are_measured_in_reference_pixels() -> None:
     places = lattice((100, 100))
     truth = Truth(places, 2 * places, 2 * np.eye(2))
-    np.testing.assert_allclose(calibration.errors_px(truth, 2 * places + [3.0, 4.0]), 2.5)
+    np.testing.assert_allclose(np.hypot(*truth.off_px(lambda px: 2 * px + [3.0, 4.0]).T), 2.5)
 
 
 @pytest.mark.parametrize(("held", "count"), [(0, 5), (18, 20), (20, 20), (50, 100)])
