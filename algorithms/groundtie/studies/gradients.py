@@ -13,8 +13,8 @@ from ..features.scale_space import Gradient, GradientOperator, differences
 from ..rasters.reading import FloatImage
 from ..speckle.isef import isef_along
 
-# Decay of the exponential averages, per pixel.
-_DECAY = 0.5
+# Decay of the exponential averages per pixel, [Suri2010] eq 6.2.
+DECAY = 0.5
 
 # Deriche's α: the reciprocal of the filter's width, per pixel.
 _ALPHA = 1.0
@@ -78,9 +78,9 @@ def average_after(image: FloatImage, decay: float, axis: int) -> FloatImage:
 
 
 def _log_ratio(image: FloatImage, axis: int) -> FloatImage:
-    across = isef_along(image, _DECAY, 1 - axis)
-    before = _shifted(average_before(across, _DECAY, axis), 1, axis)
-    after = _shifted(average_after(across, _DECAY, axis), -1, axis)
+    across = isef_along(image, DECAY, 1 - axis)
+    before = _shifted(average_before(across, DECAY, axis), 1, axis)
+    after = _shifted(average_after(across, DECAY, axis), -1, axis)
     return np.asarray(np.log(np.maximum(after, _TINY) / np.maximum(before, _TINY)))
 
 

@@ -15,16 +15,13 @@ from ..rasters.patch import Patch, is_logarithmic
 from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from ..speckle.isef import isef
-from .gradients import GRADIENTS, gradient_operator, needs_positive
+from .gradients import DECAY, GRADIENTS, gradient_operator, needs_positive
 from .orientation import oriented
 
 # Least contrast of the comparison of detectors. Without speckle's octave keypoints are weaker, and
 # inliers among them.
 _CONTRAST = {"sift": 0.04, "sift-oct": 0.075, "sift-isef-oct": 0.04}
 DETECTORS = tuple(_CONTRAST)
-
-# Decay of the ISEF per pixel, S eq 6.2.
-_ISEF_DECAY = 0.5
 
 # Amplitude in nepers, of which decibels are so many.
 _NEPER_PER_DB = np.log(10) / 20
@@ -48,7 +45,7 @@ class SiftIsefOctDetector(SiftOctDetector):
 
     def prepare(self, window: Patch) -> FloatImage:
         """Return the compressed grey values of a window, smoothed."""
-        return isef(super().prepare(window), _ISEF_DECAY**2)
+        return isef(super().prepare(window), DECAY**2)
 
 
 @dataclass(frozen=True)
