@@ -13,7 +13,8 @@ import numpy as np
 from groundtie.context import Context, threads
 from groundtie.matching.belief_propagation import Surfaces, propagate
 from groundtie.matching.chips import ChipMatcher
-from groundtie.matching.matcher import Places, ToPixel
+from groundtie.matching.matcher import Places
+from groundtie.rasters.grid import PointFunction
 from groundtie.similarity.peak import find_peak
 from groundtie.similarity.surface import SimilaritySettings
 
@@ -134,7 +135,7 @@ def wave(px: FloatArray) -> FloatArray:
     )
 
 
-def _distorting(pair: OffsetPair) -> ToPixel:
+def _distorting(pair: OffsetPair) -> PointFunction:
     """Return the function from the map to input pixels with the distortion injected."""
     grid = pair.images.grid
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from groundtie.rasters.grid import reproject
-from groundtie.rasters.pair import Image, ImagePair, ToPixel
+from groundtie.rasters.grid import PointFunction, reproject
+from groundtie.rasters.pair import Image, ImagePair
 from groundtie.rasters.reading import open_raster
 
 from .accuracy import FloatArray, Truth
@@ -71,12 +71,12 @@ class OffsetPair:
     offset_px: FloatArray
 
     @property
-    def to_input_px(self) -> ToPixel:
+    def to_input_px(self) -> PointFunction:
         """From map positions to input pixels."""
         grid = self.images.grid
         return lambda xy: apply_matrix(self.matrix, grid.map_to_pixel(xy) - self.offset_px)
 
-    def nominal(self, to_px: ToPixel | None = None) -> ToPixel:
+    def nominal(self, to_px: PointFunction | None = None) -> PointFunction:
         """Return what matchers take for a model: the nominal places of what lies at `to_px`.
 
         By default, as `to_input_px` has it.

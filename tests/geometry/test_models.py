@@ -74,6 +74,18 @@ def test_positions_that_are_not_finite_do_no_harm(kind: str) -> None:
     assert not np.isfinite(found[2:]).all(axis=1).any()
 
 
+def test_positions_that_nothing_leads_to_have_no_inverse() -> None:
+    """X + x² / 2 has no values below -1/2; from there on it leads back by √(1 + 2 x) - 1."""
+    bend = np.zeros((6, 2))
+    bend[3, 0] = 0.5
+    model = PolynomialModel("polynomial2", Frame(Affine.identity()), bend)
+    xy = np.array([[-2.0, 0.3], [-0.6, 0.0], [-0.4, -1.0], [1.5, 2.0]])
+    expected = np.column_stack([np.sqrt(np.maximum(1 + 2 * xy[2:, 0], 0)) - 1, xy[2:, 1]])
+    found = model.inverse(xy)
+    assert np.isnan(found[:2]).all()
+    np.testing.assert_allclose(found[2:], expected, atol=1e-6)
+
+
 @pytest.mark.parametrize("kind", ["affine", "polynomial2", "tps"])
 def test_the_inverse_of_a_map_to_pixels(kind: str) -> None:
     """Images without georeferencing claim pixels, far from map coordinates and upside down."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ..errors import NoOverlapError
 from ..geometry.transform import Transform
 from ..raster_names import file_name
-from ..rasters.grid import FloatArray, reproject, require_both_or_none
+from ..rasters.grid import FloatArray, PointFunction, reproject, require_both_or_none
 from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import RasterSource
@@ -46,7 +46,7 @@ class Comparison:
     masks: Mapping[str, str]
 
     @classmethod
-    def of(cls, pair: ImagePair, to_input_px: pictures.ToPixel | None) -> Comparison:
+    def of(cls, pair: ImagePair, to_input_px: PointFunction | None) -> Comparison:
         """Draw the images of a pair; `to_input_px` takes map positions to the input's pixels."""
         grid = pictures.overview_grid(pair.grid)
         bare = without_masks(pair)
@@ -55,7 +55,7 @@ class Comparison:
         masks = {}
         if pair.reference.mask is not None:
             masks["reference"] = _tint(reference, pair.reference_patch(grid))
-        ways: dict[str, pictures.ToPixel] = {"nominal": pair.nominal_px}
+        ways: dict[str, PointFunction] = {"nominal": pair.nominal_px}
         if to_input_px is not None:
             ways["registered"] = pictures.overview_positions(to_input_px, grid)
         for name, to_px in ways.items():

@@ -24,7 +24,6 @@ from ..similarity.surface import normalise
 from .belief_propagation import Surfaces
 
 FloatArray = NDArray[np.float64]
-ToPixel = Callable[[FloatArray], FloatArray]
 MaskOf = Callable[[Grid], NDArray[np.bool_]]
 
 

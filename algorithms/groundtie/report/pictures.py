@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.grid import FloatArray, Grid, mesh
+from ..rasters.grid import FloatArray, Grid, PointFunction, mesh
 from ..rasters.patch import Patch
 from ..similarity.surface import Surface
 
 Picture = NDArray[np.uint8]
-ToPixel = Callable[[FloatArray], FloatArray]
 
 # Longer side of the overviews, and of the faint one under the residuals.
 OVERVIEW_PX = 800
@@ -42,7 +40,7 @@ def overview_grid(grid: Grid, longest_px: int = OVERVIEW_PX) -> Grid:
     return grid.scaled(factor) if factor > 1 else grid
 
 
-def overview_positions(to_input_px: ToPixel, grid: Grid) -> ToPixel:
+def overview_positions(to_input_px: PointFunction, grid: Grid) -> PointFunction:
     """Return a fast stand-in for a transform, good to a fraction of an overview's pixel.
 
     A spline with hundreds of knots would take longer than all the rest of the report.
