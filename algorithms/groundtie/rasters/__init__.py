@@ -18,7 +18,8 @@ Heights
     radar shows it).
 Writing
     `delivery` (registered rasters), `writing` (a GeoTIFF like another raster), `tiff_file`,
-    `tiff_directories`, `tiff_blocks` and `tiff_overviews` (its bytes), `vrt` (virtual rasters),
+    `tiff_directories`, `tiff_blocks` and `tiff_overviews` (its bytes), `whole` (a GeoTIFF of what
+    memory holds anyway), `vrt` (virtual rasters),
     `atomic` (files that are whole or not there), `hidden_files` (until they are, and what dead runs
     left).
 """
