@@ -21,6 +21,7 @@ from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
     BEYOND_DEVIATIONS,
+    DRAWN_REST_HEIGHT,
     RIVAL_HEIGHT,
     WEAK_COPY_HEIGHT,
     WEAK_HEIGHT,
@@ -78,9 +79,14 @@ def _rival(evidence: RegistrationEvidence) -> float:
 
 def _rest_height(evidence: RegistrationEvidence) -> float:
     rest = evidence.rest
-    if rest is None or rest.is_explained:
+    if rest is None or rest.is_explained or rest.is_drawn:
         return math.nan
     return rest.survey.height
+
+
+def _drawn_height(evidence: RegistrationEvidence) -> float:
+    rest = evidence.rest
+    return rest.survey.height if rest is not None and rest.is_drawn else math.nan
 
 
 def _copy_height(evidence: RegistrationEvidence) -> float:
@@ -107,6 +113,7 @@ STATISTICS = (
     Statistic("second place: share of the height", RIVAL_HEIGHT, _rival),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),
     Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),
+    Statistic("pixel-locked content: height, drawn", DRAWN_REST_HEIGHT, _drawn_height, False),
     Statistic("pixel-locked content: height of copies", WEAK_COPY_HEIGHT, _copy_height, False),
     Statistic("pixel-locked content: copies", BEYOND_DEVIATIONS, _elsewhere),
     Statistic("band elsewhere: excess", LEAST_EXCESS, _in_bands),

@@ -173,6 +173,18 @@ def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
     assert replace(views, area=0.8, reduced_area=0.8, sharpness=DRAWN_SHARPNESS).is_copy
 
 
+def test_sharp_edges_on_whole_pixels_are_drawn(tmp_path: Path, context: Context) -> None:
+    locked = looked_at(tmp_path, sensed(1), sensed(2, place=9), context)
+    assert locked is not None
+    for sharpness, is_exact, is_drawn in (
+        (2.4, True, False),
+        (2.6, True, True),
+        (2.6, False, False),
+    ):
+        sameness = replace(locked.sameness, sharpness=sharpness, ground=0.0)
+        assert replace(locked, sameness=sameness, is_exact=is_exact).is_drawn == is_drawn
+
+
 def test_a_copy_is_explained_of_one_kind_of_sensor(tmp_path: Path, context: Context) -> None:
     locked = looked_at(tmp_path, sensed(1), sensed(1), context)
     assert locked is not None and locked.sameness.area > 0.99
@@ -180,6 +192,17 @@ def test_a_copy_is_explained_of_one_kind_of_sensor(tmp_path: Path, context: Cont
     assert replace(locked, sensors=Sensors.RADARS).is_explained
     assert not replace(locked, sensors=Sensors.DIFFERENT).is_explained
     assert not locked.sameness.is_finer_than_ground
+
+
+def test_a_copy_in_other_colours_is_not_drawn(tmp_path: Path, context: Context) -> None:
+    """Its edges are as sharp as a drawing's, but everywhere."""
+    copy = looked_at(tmp_path, sensed(1, 0.1), -1.5 * sensed(2, 0.1), context)
+    assert copy is not None and copy.sameness.sharpness > 5
+    assert not copy.is_drawn
+    drawn = drawn_into(sensed(1)), -drawn_into(sensed(2, place=9))
+    locked = looked_at(tmp_path, *drawn, context)
+    assert locked is not None and locked.sameness.sharpness > 5
+    assert locked.is_drawn
 
 
 def test_one_pattern_of_noise_over_different_ground_is_found(

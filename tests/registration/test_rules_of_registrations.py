@@ -150,6 +150,13 @@ def test_without_locked_content_another_place_must_not_match_better() -> None:
     assert refusing(found) == ["pixel-locked content"]
 
 
+@pytest.mark.parametrize(("height", "is_refused"), [(7.9, True), (8.1, False)])
+def test_what_is_drawn_leaves_pieces_that_match(height: float, is_refused: bool) -> None:
+    rest = Rest(survey(height=height), is_drawn=True)
+    found = evidence(GOOD, survey=survey(), rest=rest)
+    assert refusing(found) == ["pixel-locked content"] * is_refused
+
+
 def test_without_locked_content_no_part_must_match_elsewhere() -> None:
     found = evidence(GOOD, survey=survey(), rest=Rest(survey(part=10)))
     assert refusing(found) == ["pixel-locked content"]

@@ -110,6 +110,22 @@ def test_noise_within_a_fifth_of_what_varies_leaves_windows_the_same() -> None:
     assert Windows.of(patch(one), patch(other)).same.mean() > 0.95
 
 
+@pytest.mark.parametrize(("gain", "noise", "least", "most"), [(-1.5, 0.3, 0.9, 1), (1, 2, 0, 0.1)])
+def test_windows_are_related_as_far_as_one_explains_the_other(
+    gain: float, noise: float, least: float, most: float
+) -> None:
+    """Of what varies by 1, noise leaves 1 / (1 + noise² / gain²): 0.96 of it, and 0.2."""
+    rng = np.random.default_rng(4)
+    one = texture(120, 120)
+    other = 50 + gain * one + noise * rng.normal(size=one.shape)
+    assert least <= Windows.of(patch(one), patch(other)).related.mean() <= most
+
+
+def test_windows_of_two_places_are_rarely_related() -> None:
+    related = Windows.of(*(patch(texture(200, 200, seed)) for seed in (1, 2))).related
+    assert 0 < related.mean() < 0.25
+
+
 def test_invalid_pixels_are_no_part_of_windows() -> None:
     one = texture(60, 60)
     spoilt = one.copy()

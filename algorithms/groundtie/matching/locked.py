@@ -20,6 +20,8 @@ from ..rasters.grid import Grid, reproject
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.in_common import (
+    DRAWN_SHARPNESS,
+    LEAST_SHARPNESS,
     LOOK_REACH_PX,
     Look,
     Sameness,
@@ -100,6 +102,13 @@ class LockedContent:
             return False
         is_view = self.sensors is Sensors.CAMERAS and self.sameness.is_view
         return is_view or self.sameness.is_copy
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether it is sharper than ground in other colours, or sharp and on whole pixels."""
+        same = self.sameness
+        is_sharper = same.sharpness >= (LEAST_SHARPNESS if self.is_exact else DRAWN_SHARPNESS)
+        return is_sharper and not (self.is_explained or same.is_copy_in_other_colours)
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).

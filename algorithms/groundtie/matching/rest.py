@@ -29,6 +29,8 @@ class Rest:
         the transform moves the array by whole pixels; None elsewhere.
     chips
         How many chips there are; of some too little may be left.
+    is_drawn
+        Whether such content is drawn over the images (see `LockedContent`).
     has_sharp_edges
         Whether edges coincide more sharply than those of one ground.
     """
@@ -37,6 +39,7 @@ class Rest:
     is_explained: bool = False
     beyond: Survey | None = None
     chips: int = 0
+    is_drawn: bool = False
     has_sharp_edges: bool = False
 
 
@@ -76,7 +79,7 @@ def survey_rest(
     fused = replace(matcher, settings=SimilaritySettings())
     survey = survey_model(fused, transform.model, context, locked, places, elsewhere_px)
     chips, is_sharp = len(places.centres), locked.sameness.has_sharp_edges
-    rest = Rest(survey, locked.is_explained, None, chips, is_sharp)
+    rest = Rest(survey, locked.is_explained, None, chips, locked.is_drawn, is_sharp)
     if not (locked.is_explained and locked.is_whole):
         return rest
     # A copy may be blended into other ground, of which the same windows are no part.

@@ -76,6 +76,9 @@ class Sameness:
         The latter, of what does not vary alike in the images.
     windows
         How many windows of the reduced images do not overlap.
+    related
+        Share of the area where one is half a linear function of the other, in the images or in
+        reduced ones, whichever is smaller.
     """
 
     sharpness: float
@@ -83,6 +86,7 @@ class Sameness:
     reduced_area: float
     ground: float
     windows: float
+    related: float = 0.0
 
     @property
     def is_evident(self) -> bool:
@@ -104,6 +108,11 @@ class Sameness:
         return bool(self.reduced_area < self.area - _STANDARD_ERRORS * error)
 
     @property
+    def is_copy_in_other_colours(self) -> bool:
+        """Whether one image follows from the other nearly everywhere, as from its negative."""
+        return self.related >= _COPY_SHARE
+
+    @property
     def is_copy(self) -> bool:
         """Whether one image is a copy of the other: nearly everything is the same."""
         share = min(self.area, self.reduced_area)
@@ -120,7 +129,7 @@ class Sameness:
         return is_ground and self.sharpness < DRAWN_SHARPNESS
 
 
-_NO_WINDOWS = np.zeros((3, 2), int)
+_NO_WINDOWS = np.zeros((3, 3), int)
 
 
 @dataclass(frozen=True)
@@ -132,8 +141,8 @@ class Look:
     edges
         How many coincide, at each of `_OFFSETS`, shape (k, 2).
     windows
-        How many pixels are the same, and how many are valid (see `Windows`): of the images, of
-        reduced ones, and of these without what is the same in the images, shape (3, 2).
+        How many pixels are the same, related, and valid (see `Windows`): of the images, of reduced
+        ones, and of these without what is the same in the images, shape (3, 3).
     """
 
     edges: NDArray[np.int_]
@@ -153,13 +162,15 @@ def sameness_of(looks: Sequence[Look]) -> Sameness:
     counts = np.sum([one.edges for one in looks], axis=0)
     sharpness = _sharpness(counts) if looks else 0.0
     whole, smaller, left = np.sum([one.windows for one in looks], axis=0) if looks else _NO_WINDOWS
-    every = max(float(smaller[1]), 1.0)
+    every = max(float(smaller[2]), 1.0)
+    area, related = (float(count / max(whole[2], 1)) for count in whole[:2])
     return Sameness(
         sharpness,
-        area=float(whole[0] / max(whole[1], 1)),
+        area,
         reduced_area=float(smaller[0] / every),
-        ground=float(left[0] / max(left[1], _LEAST_LEFT * every)),
+        ground=float(left[0] / max(left[2], _LEAST_LEFT * every)),
         windows=every / WINDOW_PX**2,
+        related=min(related, float(smaller[1] / every)),
     )
 
 

@@ -70,9 +70,18 @@ class Windows:
         return self.valid & (self.differing <= _DIFFERING_SHARE * (self.one + self.other))
 
     @property
-    def counts(self) -> tuple[int, int]:
-        """How many pixels are the same, and how many are valid."""
-        return int(self.same.sum()), int(self.valid.sum())
+    def related(self) -> Mask:
+        """Around which pixels a linear function of one is half of the other.
+
+        As in copies, also those in other colours.
+        """
+        covariance = (self.one + self.other - self.differing) / 2
+        return self.valid & (covariance**2 >= (1 - _DIFFERING_SHARE) * self.one * self.other)
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """How many pixels are the same, related, and valid."""
+        return int(self.same.sum()), int(self.related.sum()), int(self.valid.sum())
 
 
 @dataclass(frozen=True)
