@@ -5,11 +5,15 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import rasterio
 
 from ..errors import GeoreferencingError
-from ..rasters.reading import RasterSource
+
+if TYPE_CHECKING:
+    # The tool doctor looks for geoids where OpenCV, which reading needs, is missing.
+    from ..rasters.reading import RasterSource
 
 ELLIPSOIDAL = "ellipsoidal"
 
