@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from groundtie.errors import ParameterError
@@ -57,9 +58,26 @@ def test_an_item_with_properties_of_a_sar_is_a_radars_and_has_no_sun(tmp_path: P
     assert read_view(item(tmp_path / "a.json", radar)) == View("radar", 90.0, 22.0)
 
 
-def test_without_an_incidence_angle_the_angle_at_the_sensor_is_taken(tmp_path: Path) -> None:
-    values = {key: STAC[key] for key in ("view:azimuth", "view:off_nadir")}
-    assert read_view(item(tmp_path / "a.json", values)) == View("camera", 280.0, 20.0)
+@pytest.mark.parametrize("height_km", [500, 600, 770])
+@pytest.mark.parametrize("off_nadir", [0.0, 12.0, 20.0, 30.0])
+def test_an_incidence_angle_follows_from_the_angle_off_nadir(
+    tmp_path: Path, off_nadir: float, height_km: float
+) -> None:
+    # Where the line of sight meets a sphere, from a satellite on the axis of z.
+    earth_km, along = 6371.0, np.deg2rad(off_nadir)
+    sensor, sight = np.array([0, earth_km + height_km]), np.array([np.sin(along), -np.cos(along)])
+    middle = -sensor @ sight
+    ground = sensor + (middle - np.sqrt(middle**2 - sensor @ sensor + earth_km**2)) * sight
+    expected = np.rad2deg(np.arccos(-sight @ ground / earth_km))
+
+    values = {"view:azimuth": 100.0, "view:off_nadir": off_nadir}
+    view = read_view(item(tmp_path / "a.json", values))
+    assert view.incidence_deg == pytest.approx(expected, abs=1e-9 if height_km == 600 else 1.0)
+
+
+def test_an_angle_off_nadir_that_misses_the_earth_is_no_view(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="must be 0 to 80"):
+        read_view(item(tmp_path / "a.json", {"view:azimuth": 100.0, "view:off_nadir": 80.0}))
 
 
 def test_the_item_beside_an_image_is_found(tmp_path: Path) -> None:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ..rasters.grid import FloatArray
 
@@ -100,6 +99,8 @@ def match_near(
 
 def _pairs_within(first: FloatArray, second: FloatArray, reach: float) -> Indices:
     """Return all pairs of positions within reach, row numbers of shape (p, 2)."""
+    from scipy.spatial import cKDTree  # takes 0.1 s to import; all tools import this module
+
     if len(first) == 0 or len(second) == 0:
         return np.zeros((0, 2), np.intp)
     near = cKDTree(second).query_ball_point(first, reach, return_sorted=True)

@@ -35,6 +35,10 @@ _RANGES = {
     "sun-azimuth": (-360.0, 360.0),
     "sun-elevation": (1.0, 90.0),
 }
+# Distance from the Earth's centre of a satellite that looks at the ground, 600 km high, over that
+# of the ground: what is 500 or 770 km high sees it at 1° more or less, 30° off nadir.
+_ORBIT_RADII = 1 + 600 / 6371
+
 # A radar that looks straight down has no range on the ground.
 _STEEPEST_RADAR_DEG = 5.0
 
@@ -134,7 +138,8 @@ def read_view(path: Path) -> View:
     """Return the view that a STAC item states.
 
     Its `view:azimuth` is that of the line of sight from the sensor to the ground. An item with any
-    property of the SAR extension is a radar's.
+    property of the SAR extension is a radar's. From an angle off nadir follows the incidence angle
+    of a satellite's line of sight, which is larger as the Earth is round.
 
     Raises
     ------
@@ -145,11 +150,13 @@ def read_view(path: Path) -> View:
         properties = read_json(path)["properties"]
         values = {
             "azimuth": properties["view:azimuth"] + 180.0,
-            "incidence": properties.get("view:incidence_angle", properties.get("view:off_nadir")),
+            "incidence": properties.get("view:incidence_angle"),
             "sun-azimuth": properties.get("view:sun_azimuth"),
             "sun-elevation": properties.get("view:sun_elevation"),
         }
         sensor = RADAR if any(key.startswith("sar:") for key in properties) else CAMERA
+        if values["incidence"] is None and "view:off_nadir" in properties:
+            values["incidence"] = _incidence_deg(float(properties["view:off_nadir"]))
         given = {name: float(value) for name, value in values.items() if value is not None}
     except (OSError, ValueError) as error:
         raise ParameterError(f"cannot read the view in {path}: {error}") from error
@@ -158,6 +165,11 @@ def read_view(path: Path) -> View:
     # The sun does not matter to a radar.
     wanted = given if sensor == CAMERA else {k: given[k] for k in given if "sun" not in k}
     return _view(sensor, {**wanted, "azimuth": wanted["azimuth"] % 360}, str(path))
+
+
+def _incidence_deg(off_nadir_deg: float) -> float:
+    """Return the angle from the vertical, on the ground, of what a satellite sees off nadir."""
+    return math.degrees(math.asin(min(_ORBIT_RADII * math.sin(math.radians(off_nadir_deg)), 1.0)))
 
 
 def _product_view(path: Path) -> View | None:

@@ -13,7 +13,6 @@ from itertools import combinations
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from ..context import Context
 from ..geometry.models import Model
@@ -101,6 +100,10 @@ def _bands_apart(image: Image) -> list[int]:
     # A chosen one was matched, and stands for those that coincide with it.
     bands = list(dict.fromkeys([*([image.band] if image.band else []), *(every[k] for k in at)]))
     edges = _coinciding(image.source, bands)
+    if edges[0, 1:].all():
+        return []
+    from scipy.sparse.csgraph import connected_components  # takes 0.1 s to import
+
     count, groups = connected_components(edges, directed=False)
     if count == 1:
         return []

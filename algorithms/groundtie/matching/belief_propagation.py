@@ -14,7 +14,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
-from scipy.spatial import cKDTree
 
 Surfaces = NDArray[np.float32]
 _Pairs = NDArray[np.intp]
@@ -56,7 +55,8 @@ def propagate(surfaces: Surfaces, centres: NDArray[np.int_], reach_px: float) ->
     """
     if len(surfaces) == 0:
         return surfaces
-    pairs = cKDTree(centres).query_pairs(reach_px, output_type="ndarray")
+    apart_px = np.hypot(*(centres.T[:, :, None] - centres.T[:, None]))
+    pairs = np.argwhere(np.triu(apart_px <= reach_px, 1))
     count, span = surfaces.shape[:2]
     prior = _log_evidence(surfaces.reshape(count, -1))
     beliefs: Surfaces = prior + _messages(prior, pairs, span)

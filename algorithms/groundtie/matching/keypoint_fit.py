@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ..context import Context
 from ..errors import TooFewPointsError
@@ -206,6 +205,8 @@ class KeypointFit:
 
 def far_from(px: FloatArray, others: NDArray[np.int_], reach_px: float) -> FloatArray:
     """Return those of other positions, shape (m, 2), from which all of `px` are further away."""
+    from scipy.spatial import cKDTree  # takes 0.1 s to import; all tools import this module
+
     distance, _ = cKDTree(px).query(others)
     return others[distance > reach_px].astype(float)
 

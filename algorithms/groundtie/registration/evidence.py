@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, Protocol
 
+import cv2
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import GroundTieError
 from ..geometry.accuracy import (
@@ -340,7 +340,7 @@ def mean_of_heights_px(
 
 def hull_share(px: FloatArray, size: tuple[int, int]) -> float:
     """Return the share of an image of a size, (width, height), that the hull of points covers."""
-    try:
-        return float(np.clip(ConvexHull(px).volume / (size[0] * size[1]), 0, 1))
-    except (QhullError, ValueError):
+    if len(px) < 3:
         return 0.0
+    area = cv2.contourArea(cv2.convexHull(px.astype(np.float32)))
+    return float(np.clip(area / (size[0] * size[1]), 0, 1))
