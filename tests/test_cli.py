@@ -343,6 +343,7 @@ sys.exit(main({[*GOOD.split(), "--json"]!r}, tools=[tool]))
 
 
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="finds GDAL in Linux's /proc")
+@pytest.mark.slow
 def test_libraries_are_silent() -> None:
     quiet = {k: v for k, v in ENVIRONMENT.items() if k not in ("CPL_LOG", "PYTHONWARNINGS")}
     done = subprocess.run(

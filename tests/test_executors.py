@@ -107,6 +107,7 @@ def test_threads_alone_run_inside_qgis(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class TestScheduler:
+    @pytest.mark.slow
     def test_one_that_is_not_there_is_one_line(self, monkeypatch: pytest.MonkeyPatch) -> None:
         pytest.importorskip("distributed", reason="the extra cluster is not installed")
         assert executors._CONNECT_SECONDS <= 5

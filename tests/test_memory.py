@@ -174,6 +174,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's heaps")
 @pytest.mark.parametrize("is_worker", [False, True])
+@pytest.mark.slow
 def test_a_dask_worker_does_not_give_back_each_array(is_worker: bool) -> None:
     """Dask's own setting costs a page fault for each 4 kB of each array of 1 MB."""
     done = subprocess.run(

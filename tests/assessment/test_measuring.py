@@ -42,6 +42,7 @@ class TestFiles:
 
     @pytest.mark.parametrize("suffix", [".gpkg", ".geojson", ".csv"])
     @pytest.mark.parametrize(("crs", "grid"), [(UTM, GRID), (UTM, DEGREES), (None, PLAIN)])
+    @pytest.mark.slow
     def test_roles_of_tie_points(
         self, tmp_path: Path, suffix: str, crs: CRS | None, grid: Grid
     ) -> None:

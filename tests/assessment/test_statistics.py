@@ -53,6 +53,7 @@ class TestStatistics:
     @given(
         hnp.arrays(float, st.tuples(st.integers(1, 30), st.just(2)), elements=st.floats(-1e3, 1e3))
     )
+    @pytest.mark.slow
     def test_relations_that_always_hold(self, errors: np.ndarray) -> None:
         found = Statistics.of(errors)
         total = sum(value**2 for value in (*found.bias, *found.std))

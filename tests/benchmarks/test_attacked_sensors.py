@@ -49,6 +49,7 @@ def test_rpcs_that_follow_what_moved_are_right(scene: Path, tmp_path: Path) -> N
     np.testing.assert_allclose(errors_px(scene, output, everywhere) - MOVE, 0, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_ground_control_that_follows_what_moved_is_right(scene: Path, tmp_path: Path) -> None:
     head, *rows = (scene / "check_points.csv").read_text().split()
     columns = [head.split(",").index(name) for name in ("input_col", "input_row")]

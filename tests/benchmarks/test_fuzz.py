@@ -54,6 +54,7 @@ def fail(path: Path) -> None:
 @pytest.mark.parametrize(
     ("reader", "outcome"), [(crash, CRASH), (hang, HANG), (fail, TRACEBACK), (len, TRACEBACK)]
 )
+@pytest.mark.slow
 def test_what_fails_is_found_and_kept_and_the_next_case_runs(
     reader: Callable[[Path], None],
     outcome: str,

@@ -21,6 +21,7 @@ def test_the_output_of_a_command_comes_back() -> None:
     assert (found.output.strip(), found.exit_code) == ("a result", 0)
 
 
+@pytest.mark.slow
 def test_peak_memory_is_that_of_the_command() -> None:
     megabytes = 200
     small = measure(python("pass"))

@@ -36,6 +36,7 @@ def suites(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[Settings]]:
 VERDICTS = {"crossings": SILENTLY_WRONG, "speed": CRASHED}
 
 
+@pytest.mark.slow
 def test_all_suites_run_by_default(suites: dict[str, list[Settings]], tmp_path: Path) -> None:
     run.main(["--results", str(tmp_path)])
     assert list(suites) == list(run.SUITES)

@@ -107,6 +107,7 @@ def test_the_ellipse_is_longest_along_what_heights_displace(angle_deg: float) ->
     assert accuracy.heights_px == pytest.approx(4.0)
 
 
+@pytest.mark.slow
 def test_the_ellipse_of_random_errors_holds_nine_in_ten() -> None:
     """A shift known to 0.5 / √64 px an axis from all points: 90 % in a circle of 2.146 times it."""
     axes = [run(seed, "translation", 0.5, 0.0)[0].ellipse for seed in range(RUNS)]
@@ -114,6 +115,7 @@ def test_the_ellipse_of_random_errors_holds_nine_in_ten() -> None:
     assert mean == pytest.approx(2.146 * 0.5 / math.sqrt(len(FIT)), rel=0.3)
 
 
+@pytest.mark.slow
 def test_the_interval_holds_the_true_radius_as_often_as_it_says() -> None:
     """For a shift of σ = 0.5 / √64 px an axis, with the interval's 90 %, or a little more."""
     true = 2.146 * 0.5 / math.sqrt(len(FIT))

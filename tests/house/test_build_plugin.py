@@ -158,6 +158,7 @@ def test_a_file_in_the_way_of_the_library_is_refused(tree: Path, tmp_path: Path)
         build_plugin.build(tree, tmp_path / "plugin.zip")
 
 
+@pytest.mark.slow
 def test_the_real_plugin_keeps_the_rules(tmp_path: Path) -> None:
     target = tmp_path / "groundtie_qgis.zip"
     command = [sys.executable, str(ROOT / "scripts/build_plugin.py"), str(target)]

@@ -23,6 +23,7 @@ def pages() -> dict[str, bytes]:
     return help_pages(DOCS)
 
 
+@pytest.mark.slow
 def test_every_tool_has_its_page_with_its_parameters(pages: dict[str, bytes]) -> None:
     for name in NAMES:
         page = pages[f"{name.replace('_', '-')}.html"].decode()

@@ -105,6 +105,7 @@ def test_errors_import_nothing(package: Path) -> None:
 
 
 @pytest.mark.parametrize("module", ["qgis.core", "processing", "PyQt5.QtCore"])
+@pytest.mark.slow
 def test_qgis_is_kept_out(package: Path, module: str) -> None:
     write(package, "tools/wrong.py", f"def run():\n    import {module}")
     done = lint(package)

@@ -82,6 +82,7 @@ def test_it_is_the_declared_one() -> None:
     assert f'requires-python = ">={OLDEST}"' in declared
 
 
+@pytest.mark.slow
 def test_it_can_read_library_and_plugin(oldest: str) -> None:
     paths = [*(ROOT / "algorithms").rglob("*.py"), *(ROOT / "plugin").rglob("*.py")]
     assert len(paths) > 300

@@ -125,6 +125,7 @@ def members(node: ast.ClassDef) -> dict[str, ast.stmt]:
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.stem)
+@pytest.mark.slow
 def test_pyqt6_has_every_name(path: Path) -> None:
     """Each class that is imported, and each enumeration and member that is named."""
     tree = tree_of(path)
@@ -144,6 +145,7 @@ def test_pyqt6_has_every_name(path: Path) -> None:
         assert member in members(scope), f"{first}.{enumeration}.{member}"
 
 
+@pytest.mark.slow
 def test_the_dock_runs_in_qt_6(tmp_path: Path) -> None:
     """Pages, table and points that are drawn, points switched off, the dialog that installs."""
     pytest.importorskip("PyQt6.QtWidgets", reason="PyQt6 or its libraries are missing")

@@ -73,6 +73,7 @@ def test_a_layer_in_another_crs_lies_where_it_should(scene: Scene, tmp_path: Pat
     assert chosen.part.sum() == pytest.approx(40 * 40, abs=90)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_a_mask_is_an_error(scene: Scene, tmp_path: Path) -> None:
     (tmp_path / "a.gpkg").write_text("nothing")
     with pytest.raises(VectorLayerError, match="cannot read the vector layer"):

@@ -132,6 +132,7 @@ def test_tiles_are_those_of_the_whole(tmp_path: Path) -> None:
         np.testing.assert_array_equal(ground.image(window, view), whole[window.slices])
 
 
+@pytest.mark.slow
 def test_windows_join(tmp_path: Path) -> None:
     ground = ground_of(tmp_path, house())
     whole, windows = Window(0, 0, 200, 180), [Window(0, 0, 87, 180), Window(87, 0, 113, 180)]
@@ -221,6 +222,7 @@ def test_the_simulators_radar_shows_nothing_else_with_it(
     assert np.mean(change_db[~part] > 1.0) > 0.6
 
 
+@pytest.mark.slow
 def test_the_simulators_camera_sees_it_in_the_sun(country: Country, part: np.ndarray) -> None:
     stands = country.cover() != Cover.CAR
     alone = replace(country, object_m=np.where(stands, country.object_m, 0).astype(np.float32))

@@ -92,6 +92,7 @@ def test_bands_that_match_nowhere_are_no_evidence(
     assert not any(one.survey.is_elsewhere for one in found)
 
 
+@pytest.mark.slow
 def test_of_many_bands_few_are_asked(tmp_path: Path, context: Context) -> None:
     bands = [place(seed=seed, noise_seed=seed) for seed in range(2, 9)]
     found = asked(tmp_path, [place()], bands, context)

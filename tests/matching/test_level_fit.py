@@ -43,6 +43,7 @@ def similarity(shift: tuple[float, float], degrees: float, growth: float = 1.0) 
 
 
 @pytest.mark.parametrize(("degrees", "growth"), [(0.0, 1.0), (2.0, 1.0), (-1.5, 1.02)])
+@pytest.mark.slow
 def test_a_level_corrects_a_model_that_is_off(
     tmp_path: Path, context: Context, degrees: float, growth: float
 ) -> None:

@@ -60,6 +60,7 @@ def sensed(seed: int, noise: float = 0.4, place: int = 1) -> np.ndarray:
 
 
 @pytest.mark.parametrize("offset", [(0, 0), (7, -3)])
+@pytest.mark.slow
 def test_lines_that_are_drawn_over_different_ground_are_found(
     tmp_path: Path, context: Context, offset: tuple[int, int]
 ) -> None:
@@ -94,6 +95,7 @@ def test_its_mask_covers_the_lines_and_their_surroundings_alone(
 
 @pytest.mark.parametrize("colours", [(8.0, 8.0), (-5.0, 8.0)])
 @pytest.mark.parametrize("width", [1, 3])
+@pytest.mark.slow
 def test_lines_are_masked_in_any_colour_over_any_ground(
     tmp_path: Path, context: Context, colours: tuple[float, float], width: int
 ) -> None:
@@ -117,6 +119,7 @@ def test_edges_of_what_is_drawn_are_masked(tmp_path: Path, context: Context) -> 
 
 
 @pytest.mark.parametrize("place", [1, 9])
+@pytest.mark.slow
 def test_views_without_anything_drawn_have_none(
     tmp_path: Path, context: Context, place: int
 ) -> None:
@@ -129,6 +132,7 @@ def test_views_without_anything_drawn_have_none(
     ("off_m", "exact_px", "is_evident"),
     [(0.3, EXACT_PX, True), (0.6, EXACT_PX, False), (1.9, 0.2, True), (2.1, 0.2, False)],
 )
+@pytest.mark.slow
 def test_a_transform_to_whole_pixels_is_evidence_itself(
     tmp_path: Path, context: Context, off_m: float, exact_px: float, is_evident: bool
 ) -> None:
@@ -142,6 +146,7 @@ def test_a_transform_to_whole_pixels_is_evidence_itself(
     assert (masked(tmp_path, locked).mean() > 0.1) == is_evident
 
 
+@pytest.mark.slow
 def test_one_sensors_views_of_one_ground_are_explained(tmp_path: Path, context: Context) -> None:
     """Most windows vary alike; so do those of reduced images where single pixels do not."""
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
@@ -194,6 +199,7 @@ def test_a_copy_is_explained_of_one_kind_of_sensor(tmp_path: Path, context: Cont
     assert not locked.sameness.is_finer_than_ground
 
 
+@pytest.mark.slow
 def test_a_copy_in_other_colours_is_not_drawn(tmp_path: Path, context: Context) -> None:
     """Its edges are as sharp as a drawing's, but everywhere."""
     copy = looked_at(tmp_path, sensed(1, 0.1), -1.5 * sensed(2, 0.1), context)

@@ -38,6 +38,7 @@ def error_m(model: Model, files: TexturedPair) -> float:
 
 
 @pytest.mark.parametrize("size", [(260, 240), (700, 200)])
+@pytest.mark.slow
 def test_from_the_coarse_shift_to_a_model(
     tmp_path: Path, context: Context, size: tuple[int, int]
 ) -> None:

@@ -60,6 +60,7 @@ def rest_of(
 
 @pytest.mark.parametrize("share", [0.35, 0.6])
 @pytest.mark.parametrize("offset", [(0, 0), (6, -4)])
+@pytest.mark.slow
 def test_ground_shows_that_a_copy_was_blended_into(
     share: float, offset: tuple[int, int], tmp_path: Path, context: Context
 ) -> None:
@@ -73,6 +74,7 @@ def test_ground_shows_that_a_copy_was_blended_into(
     assert deviations_elsewhere(rest) > BEYOND_DEVIATIONS
 
 
+@pytest.mark.slow
 def test_a_view_of_one_sensor_and_a_copy_show_nothing_elsewhere(
     tmp_path: Path, context: Context
 ) -> None:

@@ -80,6 +80,7 @@ def test_a_strict_forward_backward_limit_rejects_points(pair: ImagePair, context
     assert (strict.points.take(strict.points.used).forward_backward_error_px <= 0.05).all()
 
 
+@pytest.mark.slow
 def test_a_model_that_no_point_agrees_with_is_none(pair: ImagePair, context: Context) -> None:
     """No match back meets its start to the last digit."""
     with pytest.raises(TooFewPointsError, match="points agree"):

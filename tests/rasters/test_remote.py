@@ -71,6 +71,7 @@ def test_a_reduced_image_is_read_from_overviews(
 
 
 @pytest.mark.parametrize("heights_first", [True, False])
+@pytest.mark.slow
 def test_what_is_rendered_of_heights_is_not_taken_for_heights(
     server: Loopback, averaged: Path, heights_first: bool
 ) -> None:
@@ -132,6 +133,7 @@ def test_a_server_that_is_away() -> None:
     assert f"127.0.0.1:{port}/a.tif" in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_server_that_goes_away_while_pixels_are_read(
     tmp_path: Path, image: NDArray[np.uint8]
 ) -> None:

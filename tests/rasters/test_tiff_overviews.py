@@ -20,6 +20,7 @@ ODD, EVEN = (1101, 1337), (1536, 1040)
 
 @pytest.mark.parametrize("shape", [ODD, EVEN])
 @pytest.mark.parametrize("dtype", ["uint8", "int16", "uint16", "int32", "float32", "float64"])
+@pytest.mark.slow
 def test_pixels_of_an_overview_are_means_over_their_area(
     tmp_path: Path, dtype: str, shape: tuple[int, int]
 ) -> None:
@@ -31,6 +32,7 @@ def test_pixels_of_an_overview_are_means_over_their_area(
 
 @pytest.mark.parametrize("shape", [ODD, EVEN])
 @pytest.mark.parametrize("nodata", [None, 7])
+@pytest.mark.slow
 def test_what_is_invalid_has_no_weight(
     tmp_path: Path, shape: tuple[int, int], nodata: int | None
 ) -> None:
@@ -57,6 +59,7 @@ def test_one_pixel_that_is_not_a_number_spoils_no_other(tmp_path: Path) -> None:
     _assert_near(found, expected, "float32")
 
 
+@pytest.mark.slow
 def test_complex_pixels_are_0_where_nothing_is_valid(tmp_path: Path) -> None:
     image = (RNG.normal(size=(1, *ODD)) + 1j * RNG.normal(size=(1, *ODD))).astype(np.complex64)
     mask = np.ones(ODD, bool)

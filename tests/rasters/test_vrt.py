@@ -94,6 +94,7 @@ def test_an_array_is_no_file(tmp_path: Path) -> None:
         groundtie.warp(raster, tmp_path / "out/b.vrt", transform=stored(tmp_path / "t.json", SHIFT))
 
 
+@pytest.mark.slow
 def test_a_remote_file_stays_where_it_is(tmp_path: Path, image: Path) -> None:
     output = tmp_path / "out" / "b.vrt"
     with serving(tmp_path) as server:

@@ -136,6 +136,7 @@ def test_what_geotiff_cannot_hold_lies_beside_it(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("big", [False, True])
 @pytest.mark.parametrize("cog", [False, True])
+@pytest.mark.slow
 def test_large_files_are_big_tiffs(
     masked: Path, monkeypatch: pytest.MonkeyPatch, big: bool, cog: bool
 ) -> None:
@@ -199,6 +200,7 @@ def smooth() -> NDArray[np.uint16]:
 
 
 @pytest.mark.parametrize("share", [0.05, 0.74, 0.9])
+@pytest.mark.slow
 def test_a_full_disk_is_one_line_and_leaves_nothing(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], share: float
 ) -> None:
@@ -249,6 +251,7 @@ def test_what_cannot_fit_is_refused_before_anything_is_written(tmp_path: Path) -
 
 @pytest.mark.parametrize("share", [0.0, 0.7, 0.95])
 @pytest.mark.parametrize("cog", [False, True])
+@pytest.mark.slow
 def test_a_file_that_may_not_grow_is_one_line_and_leaves_nothing(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], share: float, cog: bool
 ) -> None:

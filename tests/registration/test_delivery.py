@@ -40,6 +40,7 @@ def files_in(folder: Path) -> RegistrationFiles:
     return RegistrationFiles(None, *names)
 
 
+@pytest.mark.slow
 def test_files_of_an_accepted_registration(
     registration: Registration, tmp_path: Path, context: Context
 ) -> None:

@@ -67,6 +67,7 @@ __all__ = ["context"]
 PRESETS = {"coregister": COREGISTER, "match_sar_sar": SAR_SAR, "match_optical": OPTICAL}
 
 
+@pytest.mark.slow
 def test_a_registration_has_a_transform_points_and_a_verdict(
     registration: Registration, textured: TexturedPair
 ) -> None:

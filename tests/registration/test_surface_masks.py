@@ -137,6 +137,7 @@ def test_a_view_from_the_other_side_is_not_the_references(city: Path, stack: Exi
     assert fits[0].correlation > 2 * fits[1].correlation
 
 
+@pytest.mark.slow
 def test_a_cameras_cast_shadows_show_where_the_model_lies(city: Path, stack: ExitStack) -> None:
     right = stated(city)
     turned = replace(right, views=right.views[::-1])

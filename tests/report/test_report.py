@@ -39,6 +39,7 @@ from groundtie.report.page import versions
 from groundtie.version import __version__
 
 
+@pytest.mark.slow
 def test_every_report_is_a_well_formed_page(variants: list[Variant]) -> None:
     for page in (variant.page for variant in variants):
         assert page.source.startswith('<!DOCTYPE html>\n<html lang="en">')
@@ -232,6 +233,7 @@ def test_the_page_is_small_even_for_large_noisy_images(tmp_path: Path) -> None:
     assert (tmp_path / "report.html").stat().st_size < 2_000_000
 
 
+@pytest.mark.slow
 def test_a_report_that_cannot_be_written(pair: ImagePair, tmp_path: Path) -> None:
     (tmp_path / "report.html").write_text("old")
     full = full_disk(2000)

@@ -76,6 +76,7 @@ def test_statistics_of_links_are_chi_squared() -> None:
 
 
 @pytest.mark.parametrize("wrong", [(0, 3), (3, 4), (0, 5)])
+@pytest.mark.slow
 def test_a_gross_error_is_found_and_does_no_harm(wrong: tuple[int, int]) -> None:
     true = truth(7)
     links = [

@@ -154,6 +154,7 @@ class TestPair:
         moved = city.reference_grid.pixel_to_map(roofs.px + lean)
         np.testing.assert_allclose(city.truth(moved), roofs.input_px, atol=1e-6)
 
+    @pytest.mark.slow
     def test_ground_and_roofs_disagree(self, city: SimulatedPair) -> None:
         """The ground's truth does not take a roof in the one image to that in the other."""
         roofs = city.roof_points

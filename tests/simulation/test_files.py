@@ -101,6 +101,7 @@ class TestRasters:
 
 class TestTruth:
     @pytest.mark.parametrize("kind", list(DISTORTIONS))
+    @pytest.mark.slow
     def test_loads_as_a_transform_that_agrees(self, kind: str, tmp_path: Path) -> None:
         pair = simulated(kind)
         truth = load_transform(write_pair(pair, tmp_path)["truth"])
@@ -108,6 +109,7 @@ class TestTruth:
         np.testing.assert_allclose(truth(xy), pair.truth(xy), atol=1e-9)
 
     @pytest.mark.parametrize("kind", ["shift", "rotation", "scale", "similarity", "affine"])
+    @pytest.mark.slow
     def test_matrices_agree_with_it(self, kind: str, tmp_path: Path) -> None:
         pair = simulated(kind)
         values = json.loads(write_pair(pair, tmp_path)["truth"].read_text(encoding="utf-8"))

@@ -35,6 +35,7 @@ class TestDensities:
     @pytest.mark.parametrize(
         ("density", "low", "high"), [("rural", 3, 8), ("suburban", 4, 12), ("urban", 10, 60)]
     )
+    @pytest.mark.slow
     def test_heights(self, density: str, low: float, high: float) -> None:
         _, table = laid_out(density, 1)
         heights = table.height_m[table.cover == Cover.BUILDING]

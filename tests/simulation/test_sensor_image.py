@@ -95,6 +95,7 @@ class TestRpcs:
             atol=1e-6,
         )
 
+    @pytest.mark.slow
     def test_bias_is_recovered_from_the_check_points(self, paths: dict[str, Path]) -> None:
         """An affine map fitted to what the delivered RPCs say is the truth's matrix."""
         lon_lat, height, px = check_points(paths["check_points"])

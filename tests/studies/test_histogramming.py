@@ -288,6 +288,7 @@ def test_two_steps_with_masks_and_outside(interpolation: str) -> None:
 
 @pytest.mark.parametrize("order", [2, 4, 7])
 @pytest.mark.parametrize("masked", [False, True])
+@pytest.mark.slow
 def test_surfaces_of_any_measure(monkeypatch: pytest.MonkeyPatch, order: int, masked: bool) -> None:
     """From the volume, shift by shift and from the definition."""
     radius, margin = 2, reach(order)
@@ -410,6 +411,7 @@ def test_no_artefacts_from_order_4_on(order: int, artefacts: dict[str | int, np.
         assert (found**2 < np.abs(artefacts[estimator]) ** 2 / 100).all()
 
 
+@pytest.mark.slow
 def test_artefacts_fall_with_the_order(artefacts: dict[str | int, np.ndarray]) -> None:
     means = [np.abs(artefacts[order]).mean() for order in (2, 3, 4, 5)]
     assert means == sorted(means, reverse=True)

@@ -48,6 +48,7 @@ def cosines(image: NDArray[np.uint8]) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize("name", _REAL)
+@pytest.mark.slow
 def test_differences_give_opencv_s_descriptor_on_real_images(name: str, real_data: Path) -> None:
     path = next(
         p

@@ -132,6 +132,7 @@ def test_a_worker_that_is_killed_loses_nothing(
     assert not [path for path in tmp_path.iterdir() if ".tif" in path.name and path.name[0] == "."]
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_one_line(
     images: Path,
     tmp_path: Path,

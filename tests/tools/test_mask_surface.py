@@ -50,6 +50,7 @@ def test_words_and_the_item_state_the_same_view(city: Path, tmp_path: Path) -> N
     assert shares[0] == shares[1]
 
 
+@pytest.mark.slow
 def test_without_the_other_view_only_the_references_own_is_masked(
     city: Path, tmp_path: Path
 ) -> None:

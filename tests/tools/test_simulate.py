@@ -53,6 +53,7 @@ def test_the_same_seed_gives_the_same_pair(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("size", [0.0, 5.0, 12.0])
+@pytest.mark.slow
 def test_the_shift_is_as_long_as_asked_for(tmp_path: Path, size: float) -> None:
     simulate(tmp_path, 96, distortion="shift", shift=size, pixel_size=2.0)
     truth = load_transform(tmp_path / "truth.json")
@@ -155,6 +156,7 @@ def test_cancelling_writes_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("is_there", [False, True])
 @pytest.mark.parametrize(("make", "free_bytes"), [(simulate, 4000), (simulate_sensor, 0)])
+@pytest.mark.slow
 def test_a_full_disk_leaves_nothing(
     tmp_path: Path, make: Callable[[Path, int], object], free_bytes: int, is_there: bool
 ) -> None:

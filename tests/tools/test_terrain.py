@@ -163,6 +163,7 @@ def test_a_surface_model_needs_the_view_of_a_radar(words: str, message: str) -> 
         asked_surface_view({"views": words, "input": "alone.tif"})
 
 
+@pytest.mark.slow
 def test_the_view_of_a_surface_model_is_stated_or_the_inputs_own(town: Path) -> None:
     input = town / "input.tif"
     for words in ("Surface radar azimuth=270, incidence=40", "surface radar"):

@@ -107,6 +107,7 @@ FILES = ("t.json", "t.gpkg", "t.geojson", "t.csv", "t.points")
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("georeferenced", [True, False])
 @pytest.mark.filterwarnings("ignore::rasterio.errors.NotGeoreferencedWarning")
+@pytest.mark.slow
 def test_the_distortion_is_taken_out(tmp_path: Path, name: str, georeferenced: bool) -> None:
     path = misregistered(tmp_path / "a.tif", georeferenced=georeferenced)
     transform = stored(tmp_path / name, GRID if georeferenced else PLAIN)
