@@ -320,6 +320,7 @@ def test_workers_that_cannot_be_are_one_line(
     assert capsys.readouterr().err == "groundtie: error: --workers must be 1 to 9, not 10\n"
 
 
+@pytest.mark.slow
 def test_a_tool_without_workers_ignores_those_before_its_name() -> None:
     assert main(["--workers", "2", "doctor", "--json"]) == 0
 

@@ -74,6 +74,7 @@ def test_a_raster_of_a_tool_carries_its_calls_id_and_not_its_inputs(call: Path) 
 
 
 @pytest.mark.parametrize("suffix", ["gpkg", "geojson", "csv"])
+@pytest.mark.slow
 def test_tie_points_carry_it_and_are_read_as_ever(tmp_path: Path, suffix: str) -> None:
     xy = GRID.pixel_to_map(np.array([[3.0, 4.0], [30.0, 40.0]]))
     nothing = TiePoints.none()

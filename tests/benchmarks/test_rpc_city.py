@@ -70,6 +70,7 @@ def test_a_scene_is_made_once(city: City, scene: Path, monkeypatch: pytest.Monke
     assert [path.name for path in scene.parent.iterdir()] == [scene.name]
 
 
+@pytest.mark.slow
 def test_rpcs_are_wrong_by_what_they_are_moved(scene: Path, tmp_path: Path) -> None:
     exact = read_rpc(scene / "exact_rpc.txt")
     refined = tmp_path / "refined_RPC.TXT"

@@ -53,6 +53,7 @@ def directly(values: NDArray[np.float32], x: int, y: int, directions: int) -> ND
 
 
 @pytest.mark.parametrize("directions", [9, 7])
+@pytest.mark.slow
 def test_values_are_those_of_the_definition(directions: int) -> None:
     values = image()
     descriptor = HogDescriptor(directions)

@@ -268,6 +268,7 @@ class TestFootprints:
         heights, _ = FootprintModel(((area, 5.0), (area, 9.0))).heights(GRID)
         assert heights.surface_m[20, 20] == 9
 
+    @pytest.mark.slow
     def test_no_field_or_no_height(self, tmp_path: Path) -> None:
         with pytest.raises(VectorLayerError, match="no field height"):
             read_footprints(footprints(tmp_path / "a.gpkg", ["3"], "levels"), GRID)

@@ -111,6 +111,7 @@ def test_lines_are_masked_in_any_colour_over_any_ground(
     assert masked(tmp_path, locked)[60::20].mean() > 0.95
 
 
+@pytest.mark.slow
 def test_edges_of_what_is_drawn_are_masked(tmp_path: Path, context: Context) -> None:
     """Beside a line, windows vary alike no more where the ground varies as much as the line."""
     reference, input = (drawn_into(3 * sensed(n, place=place)) for n, place in ((1, 1), (2, 9)))

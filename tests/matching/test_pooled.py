@@ -83,6 +83,7 @@ def with_colour(pair: ImagePair, folder: Path) -> ImagePair:
 
 
 @pytest.mark.parametrize("band", [None, 2], ids=["all bands", "a band that shows nothing"])
+@pytest.mark.slow
 def test_colour_is_matched_where_brightness_shows_nothing(
     tmp_path: Path, context: Context, band: int | None
 ) -> None:

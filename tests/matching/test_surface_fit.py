@@ -54,6 +54,7 @@ def test_every_model_is_fitted_from_a_coarse_one(
     assert jackknife_spread(estimate.fold_models, at)[0] < 1
 
 
+@pytest.mark.slow
 def test_tie_points_are_places_in_both_images(
     textured: TexturedPair, pair: ImagePair, context: Context
 ) -> None:
@@ -72,6 +73,7 @@ def test_tie_points_are_places_in_both_images(
     assert (right.score > 3).all()
 
 
+@pytest.mark.slow
 def test_a_strict_forward_backward_limit_rejects_points(pair: ImagePair, context: Context) -> None:
     strict = fit_of(pair, forward_backward_px=0.05).estimate(COARSE, "translation", context)
     rejected = strict.points.take(~strict.points.used)

@@ -146,6 +146,7 @@ def test_a_cameras_cast_shadows_show_where_the_model_lies(city: Path, stack: Exi
     assert fit.is_clear and 3 <= np.hypot(*fit.offset_px) <= 14
 
 
+@pytest.mark.slow
 def test_nothing_is_expected_of_a_camera_without_the_sun(
     city: Path, stack: ExitStack, context: Context
 ) -> None:

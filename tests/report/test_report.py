@@ -178,6 +178,7 @@ def test_refused_with_points_only(pair: ImagePair, tmp_path: Path) -> None:
     assert "Errors at check points" not in [e.text for e in page.all("h2")]
 
 
+@pytest.mark.slow
 def test_refused_with_a_transform(pair: ImagePair, tmp_path: Path) -> None:
     transform = transform_of(pair)
     page = written(refused(pair, points=points_of(pair, transform), transform=transform), tmp_path)

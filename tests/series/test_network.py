@@ -90,6 +90,7 @@ def test_a_gross_error_is_found_and_does_no_harm(wrong: tuple[int, int]) -> None
     assert np.abs(found.displacements - true)[:, :2].max() < 0.15
 
 
+@pytest.mark.slow
 def test_the_scatter_is_found_from_the_misclosures() -> None:
     true, scatter = truth(15), 0.15
     links = [link(a, b, true, 0.01, RNG.normal(0, scatter, 6)) for a, b in star_and_chain(15)]

@@ -64,6 +64,7 @@ class TestDensities:
 
 class TestParts:
     @pytest.mark.parametrize("density", list(DENSITIES))
+    @pytest.mark.slow
     def test_scene_has_roads_and_a_river_across(self, density: str) -> None:
         labels, table = laid_out(density, 3)
         assert share(labels, table, Cover.ROAD) > 0.02

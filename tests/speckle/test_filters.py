@@ -53,6 +53,7 @@ def by_the_formula(
 
 @pytest.mark.parametrize("window", [3, 7])
 @pytest.mark.parametrize("name", ADAPTIVE)
+@pytest.mark.slow
 def test_every_pixel_is_what_the_formula_says(name: str, window: int) -> None:
     power = np.ones((40, 44))
     power[:, 20:] = 9.0

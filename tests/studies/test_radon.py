@@ -72,6 +72,7 @@ def test_large_windows_are_reduced_for_the_rotation(context: Context) -> None:
     assert is_right(found[0], truth)
 
 
+@pytest.mark.slow
 def test_inverted_contrast(context: Context) -> None:
     truth = Pose(24.0, 1.0, (8.0, -5.0))
     input = window((160, 160), truth)
@@ -88,6 +89,7 @@ def test_a_known_scale(context: Context) -> None:
     assert is_right(found, truth)
 
 
+@pytest.mark.slow
 def test_noise(context: Context) -> None:
     truth = Pose(17.0, 1.0, (-7.0, 4.0))
     assert is_right(
@@ -95,6 +97,7 @@ def test_noise(context: Context) -> None:
     )
 
 
+@pytest.mark.slow
 def test_masked_pixels_do_not_count(context: Context) -> None:
     truth = Pose(15.0, 1.0, (6.0, -3.0))
     input = masked(window((160, 160), truth), slice(100, 130), slice(0, 30))

@@ -133,6 +133,7 @@ def test_rotation_and_scale_are_found_with_the_shift(
 
 
 @pytest.mark.parametrize("search", SEARCHES)
+@pytest.mark.slow
 def test_a_known_scale_is_kept(search: Callable[..., list], context: Context) -> None:
     truth = Pose(0.0, 1.1, (2.0, -1.0))
     found = replace(search, effort=LITTLE)(

@@ -180,6 +180,7 @@ def resumed(table: Path) -> tuple[list[str], list[bool]]:
 
 
 @pytest.mark.parametrize("gone", ["in/2.json", "in/2.html"])
+@pytest.mark.slow
 def test_a_report_without_its_numbers_is_written_again(tmp_path: Path, gone: str) -> None:
     files = written_files(tmp_path)
     table = files.path("assess.csv")
@@ -194,6 +195,7 @@ def test_a_report_without_its_numbers_is_written_again(tmp_path: Path, gone: str
     assert (tmp_path / gone).is_file()
 
 
+@pytest.mark.slow
 def test_a_folder_from_which_a_file_is_gone_is_written_again(tmp_path: Path) -> None:
     table = tmp_path / "pairs.csv"
     table.write_text("size,seed\n80,1\n80,2")

@@ -137,6 +137,7 @@ def test_deviations_are_those_of_matching(
     np.testing.assert_allclose(result.deviations, expected, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_files(textured: TexturedPair, tmp_path: Path) -> None:
     picture, numbers = tmp_path / "surface.png", tmp_path / "surface.json"
     result = surface_of(textured, tmp_path, similarity="nmi", picture=picture, numbers=numbers)

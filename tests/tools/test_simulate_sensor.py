@@ -90,6 +90,7 @@ def test_bad_parameters_write_nothing(
     assert [path.name for path in tmp_path.iterdir()] == ["a file"]
 
 
+@pytest.mark.slow
 def test_cancelling_writes_nothing(tmp_path: Path) -> None:
     said: list[float] = []
     progress = Progress(lambda fraction, _: said.append(fraction), lambda: len(said) > 2)
