@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,13 @@ from textured_pairs import shift_on_map, texture
 from groundtie.context import Context
 from groundtie.geometry.models import Frame, Model, PolynomialModel
 from groundtie.geometry.transform import Transform
-from groundtie.matching.locked import EXACT_PX, LockedContent, Sensors, find_locked_content
+from groundtie.matching.locked import (
+    EXACT_PX,
+    LockedContent,
+    Sensors,
+    exact_px_of,
+    find_locked_content,
+)
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
@@ -39,9 +46,8 @@ def looked_at(
     with open_raster(paths[0]) as one, open_raster(paths[1]) as other:
         pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
         transform = Transform(model or shift_on_map(0.0, 0.0), pair.grid.crs, other.grid)
-        return find_locked_content(
-            pair, transform, survey_places(pair.grid), context, exact_px=exact_px
-        )
+        places = survey_places(pair.grid)
+        return find_locked_content(pair, transform, places, Sensors.CAMERAS, exact_px, context)
 
 
 def drawn_into(values: np.ndarray, offset: tuple[int, int] = (0, 0)) -> np.ndarray:
@@ -127,6 +133,13 @@ def test_views_without_anything_drawn_have_none(
     """Noise blurs the edges of different sensors' views."""
     locked = looked_at(tmp_path, sensed(1, 0.8), -sensed(2, 0.8, place), context)
     assert locked is not None and not locked.sameness.is_evident
+
+
+def test_a_transform_lies_on_whole_pixels_as_exactly_as_it_is_known() -> None:
+    """To twice its standard deviation, within what copies of pixels are found to."""
+    assert exact_px_of(0.0) == EXACT_PX
+    assert exact_px_of(0.044) == pytest.approx(0.088)
+    assert exact_px_of(math.inf) == 0.125
 
 
 @pytest.mark.parametrize(
@@ -266,4 +279,6 @@ def test_arrays_that_are_resampled_have_none(
         model = turned if side_m == 10.0 else shift_on_map(0.0, 0.0)
         transform = Transform(model, pair.grid.crs, other.grid)
         places = survey_places(pair.grid)
-        assert find_locked_content(pair, transform, places, context) is None
+        assert (
+            find_locked_content(pair, transform, places, Sensors.CAMERAS, EXACT_PX, context) is None
+        )

@@ -38,9 +38,10 @@ _LARGEST_BEND_PX = 1.5
 _WHOLE_PX = 0.125
 
 # What is drawn lies on whole pixels all over; different sensors' views, by chance or on one grid,
-# no nearer than they can be matched. Measured (suite attacks): drawn up to 0.03; views that have no
-# more in common, from 0.05 on but for one, in whose rest the ground is found.
-EXACT_PX = 0.04
+# no nearer than they can be matched. Measured (suite attacks): drawn up to 0.03, and, where less
+# holds the transform, up to twice its standard deviation; views that have no more in common, from
+# 0.05 on but for one, in whose rest the ground is found.
+EXACT_PX, _STANDARD_DEVIATIONS = 0.04, 2.0
 
 _LATTICE = 9
 
@@ -140,13 +141,21 @@ class LockedContent:
         return shift_model(float(shift[0]), float(shift[1]))
 
 
+def exact_px_of(sigma_px: float) -> float:
+    """Return within what of whole pixels a transform of a standard deviation lies on them exactly.
+
+    Where it is farther off than copies of pixels are found, it does not.
+    """
+    return min(max(_STANDARD_DEVIATIONS * sigma_px, EXACT_PX), _WHOLE_PX)
+
+
 def find_locked_content(
     pair: ImagePair,
     transform: Transform,
     places: Places,
+    sensors: Sensors,
+    exact_px: float,
     context: Context,
-    sensors: Sensors = Sensors.CAMERAS,
-    exact_px: float = EXACT_PX,
 ) -> LockedContent | None:
     """Return what the images repeat where a transform puts the input's array.
 
@@ -158,12 +167,12 @@ def find_locked_content(
         What was found.
     places
         Where it is looked for.
-    context
-        Threads.
     sensors
         What the images may be.
     exact_px
         Within this of whole pixels, what was found lies on them as exactly as it is known.
+    context
+        Threads.
 
     Returns
     -------

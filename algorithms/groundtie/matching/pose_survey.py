@@ -119,7 +119,7 @@ def survey_pose(
     elsewhere_px = max(accuracy_share * max(level.width, level.height), POSE_TOLERANCE_PX)
     survey = survey_model(matcher, model, quiet, None, places, elsewhere_px)
     moved = Transform(model, transform.crs, transform.input_grid)
-    rest = survey_rest(matcher, moved, places, elsewhere_px, sensors, quiet, _EXACT_PX)
+    rest = survey_rest(matcher, moved, places, elsewhere_px, sensors, _EXACT_PX, quiet)
     bands = survey_bands(matcher, model, places, elsewhere_px, quiet)
     return PoseSurvey(kept, residuals, survey, rest, moved, fold_models, bands)
 

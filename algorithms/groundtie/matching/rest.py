@@ -9,7 +9,7 @@ from ..geometry.transform import Transform
 from ..similarity.surface import SimilaritySettings
 from ..similarity.unexplained import unexplained
 from .chips import ChipMatcher
-from .locked import EXACT_PX, Sensors, find_locked_content
+from .locked import Sensors, find_locked_content
 from .matcher import Places
 from .survey import Survey, survey_model, survey_places
 
@@ -49,8 +49,8 @@ def survey_rest(
     places: Places,
     elsewhere_px: float,
     sensors: Sensors,
+    exact_px: float,
     context: Context,
-    exact_px: float = EXACT_PX,
 ) -> Rest | None:
     """Return what chips show without content that is the same in both arrays; None: there is none.
 
@@ -66,13 +66,13 @@ def survey_rest(
         See `Survey`.
     sensors
         What the images may be.
-    context
-        Threads and progress.
     exact_px
         See `find_locked_content`.
+    context
+        Threads and progress.
     """
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
-    locked = find_locked_content(pair, transform, asked, context.quiet(), sensors, exact_px)
+    locked = find_locked_content(pair, transform, asked, sensors, exact_px, context.quiet())
     if locked is None or not locked.is_evident:
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
