@@ -135,11 +135,16 @@ def test_views_without_anything_drawn_have_none(
     assert locked is not None and not locked.sameness.is_evident
 
 
-def test_a_transform_lies_on_whole_pixels_as_exactly_as_it_is_known() -> None:
+@pytest.mark.parametrize(
+    ("sigma_px", "of_radars"), [(0.0, EXACT_PX), (0.044, 0.088), (math.inf, 0.125)]
+)
+def test_between_radar_images_whole_pixels_are_known_as_exactly_as_the_transform(
+    sigma_px: float, of_radars: float
+) -> None:
     """To twice its standard deviation, within what copies of pixels are found to."""
-    assert exact_px_of(0.0) == EXACT_PX
-    assert exact_px_of(0.044) == pytest.approx(0.088)
-    assert exact_px_of(math.inf) == 0.125
+    assert exact_px_of(sigma_px, Sensors.RADARS) == pytest.approx(of_radars)
+    assert exact_px_of(sigma_px, Sensors.CAMERAS) == EXACT_PX
+    assert exact_px_of(sigma_px, Sensors.DIFFERENT) == EXACT_PX
 
 
 @pytest.mark.parametrize(

@@ -133,10 +133,8 @@ class Stages:
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
         places, sensors = survey_places(pair.grid), scene.sensors
         survey = survey_model(chips, transform.model, context.part(0.0, 0.5))
-        exact_px, part = (
-            exact_px_of(estimate.spread_px(pair.grid.lattice())),
-            context.part(0.5, 0.9),
-        )
+        exact_px = exact_px_of(estimate.spread_px(pair.grid.lattice()), sensors)
+        part = context.part(0.5, 0.9)
         rest = survey_rest(chips, transform, places, ELSEWHERE_PX, sensors, exact_px, part)
         last = context.part(0.9, 1.0)
         return survey, rest, survey_bands(chips, transform.model, places, ELSEWHERE_PX, last)
