@@ -17,7 +17,6 @@ from benchmarks import calibration
 from benchmarks.accuracy import CRASHED, REFUSED, Truth, lattice
 from benchmarks.attempt import Pair, on_pixels
 from benchmarks.calibration import ACCEPTED, CalibrationRun, RealPairCase, SimulatedCase
-from benchmarks.cases import data_folder
 from benchmarks.optical_pairs import OpticalPair
 from benchmarks.suites import Settings
 from groundtie.errors import NotRegisteredError
@@ -120,8 +119,8 @@ def test_the_table_has_a_row_for_each_class_and_one_for_all_that_are_simulated()
     assert rows["all simulated"][1:3] == ["3", "2"]
 
 
-def test_every_class_and_size_is_drawn_for_the_seeds(tmp_path: Path) -> None:
-    settings = Settings(False, 5, 1, data_folder(), tmp_path, first_seed=200)
+def test_every_class_and_size_is_drawn_for_the_seeds(tmp_path: Path, real_data: Path) -> None:
+    settings = Settings(False, 5, 1, real_data, tmp_path, first_seed=200)
     found = [case for case in calibration.cases(settings) if isinstance(case, SimulatedCase)]
     small = [case for case in found if "large" not in case.group]
     assert len({case.group for case in small}) == 10

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Colours that people with any colour vision tell apart, but for those of points [Okabe2008].
-COLOURS = ("#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+COLOURS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 
 
 def summary(survey: Survey) -> list[dict[str, Any]]:
