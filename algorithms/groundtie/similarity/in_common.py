@@ -114,8 +114,11 @@ class Sameness:
 
     @property
     def is_copy(self) -> bool:
-        """Whether one image is a copy of the other: nearly everything is the same."""
-        share = min(self.area, self.reduced_area)
+        """Whether one image is a copy of the other: nearly everything is the same, and related.
+
+        What a copy was blended into varies alike where it is weak, but is no part of the copy.
+        """
+        share = min(self.area, self.reduced_area, self.related)
         return share >= _COPY_SHARE and not self.is_finer_than_ground
 
     @property
