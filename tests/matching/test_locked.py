@@ -194,7 +194,10 @@ def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
     views = replace(locked.sameness, sharpness=4.2, area=0.4, reduced_area=0.7, ground=0.4)
     assert views.is_view
     assert not replace(views, sharpness=DRAWN_SHARPNESS).is_view
-    assert replace(views, area=0.8, reduced_area=0.8, sharpness=DRAWN_SHARPNESS).is_copy
+    copies = replace(views, area=0.8, reduced_area=0.8, related=0.8, sharpness=DRAWN_SHARPNESS)
+    assert copies.is_copy
+    # Other ground, into which a copy was blended, is related less.
+    assert not replace(copies, related=0.7).is_copy
 
 
 def test_sharp_edges_on_whole_pixels_are_drawn(tmp_path: Path, context: Context) -> None:
