@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +17,6 @@ from groundtie.matching.locked import (
     EXACT_PX,
     LockedContent,
     Sensors,
-    exact_px_of,
     find_locked_content,
 )
 from groundtie.matching.survey import survey_places
@@ -136,18 +134,6 @@ def test_views_without_anything_drawn_have_none(
 
 
 @pytest.mark.parametrize(
-    ("sigma_px", "of_radars"), [(0.0, EXACT_PX), (0.044, 0.088), (math.inf, 0.125)]
-)
-def test_between_radar_images_whole_pixels_are_known_as_exactly_as_the_transform(
-    sigma_px: float, of_radars: float
-) -> None:
-    """To twice its standard deviation, within what copies of pixels are found to."""
-    assert exact_px_of(sigma_px, Sensors.RADARS) == pytest.approx(of_radars)
-    assert exact_px_of(sigma_px, Sensors.CAMERAS) == EXACT_PX
-    assert exact_px_of(sigma_px, Sensors.DIFFERENT) == EXACT_PX
-
-
-@pytest.mark.parametrize(
     ("off_m", "exact_px", "is_evident"),
     [(0.3, EXACT_PX, True), (0.6, EXACT_PX, False), (1.9, 0.2, True), (2.1, 0.2, False)],
 )
@@ -194,10 +180,7 @@ def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
     views = replace(locked.sameness, sharpness=4.2, area=0.4, reduced_area=0.7, ground=0.4)
     assert views.is_view
     assert not replace(views, sharpness=DRAWN_SHARPNESS).is_view
-    copies = replace(views, area=0.8, reduced_area=0.8, related=0.8, sharpness=DRAWN_SHARPNESS)
-    assert copies.is_copy
-    # Other ground, into which a copy was blended, is related less.
-    assert not replace(copies, related=0.7).is_copy
+    assert replace(views, area=0.8, reduced_area=0.8, sharpness=DRAWN_SHARPNESS).is_copy
 
 
 def test_sharp_edges_on_whole_pixels_are_drawn(tmp_path: Path, context: Context) -> None:

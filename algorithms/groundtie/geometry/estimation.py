@@ -36,10 +36,6 @@ class Estimate:
     points: TiePoints
     fold_models: tuple[PointFunction, ...]
 
-    def spread_px(self, at_px: FloatArray) -> float:
-        """Return the standard deviation of predictions at positions, (n, 2): root mean square."""
-        return float(np.sqrt(np.mean(jackknife_spread(self.fold_models, at_px) ** 2)))
-
 
 def jackknife_spread(fold_models: Sequence[PointFunction], at_px: FloatArray) -> FloatArray:
     """Return the standard deviation of predictions, shape (n,), at positions, shape (n, 2).

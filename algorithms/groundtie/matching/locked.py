@@ -39,10 +39,8 @@ _WHOLE_PX = 0.125
 
 # What is drawn lies on whole pixels all over; different sensors' views, by chance or on one grid,
 # no nearer than they can be matched. Measured (suite attacks): drawn up to 0.03; views that have no
-# more in common, from 0.05 on but for one, in whose rest the ground is found. Drawn over speckle,
-# up to twice the standard deviation; of cameras' dates on one grid, one in 40 lies there (suite
-# series).
-EXACT_PX, _STANDARD_DEVIATIONS = 0.04, 2.0
+# more in common, from 0.05 on but for one, in whose rest the ground is found.
+EXACT_PX = 0.04
 
 _LATTICE = 9
 
@@ -140,17 +138,6 @@ class LockedContent:
         at = own.pixel_to_map(pair.reference.source.grid.map_to_pixel(xy) + self.offset_px)
         shift = (reproject(at, own.crs, pair.grid.crs) - xy)[0]
         return shift_model(float(shift[0]), float(shift[1]))
-
-
-def exact_px_of(sigma_px: float, sensors: Sensors) -> float:
-    """Return within what of whole pixels a transform of a standard deviation lies on them exactly.
-
-    Of radar images as far as it is known, as speckle leaves it uncertain, but no farther than
-    copies of pixels are found.
-    """
-    if sensors is not Sensors.RADARS:
-        return EXACT_PX
-    return min(max(_STANDARD_DEVIATIONS * sigma_px, EXACT_PX), _WHOLE_PX)
 
 
 def find_locked_content(

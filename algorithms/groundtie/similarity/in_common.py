@@ -114,11 +114,8 @@ class Sameness:
 
     @property
     def is_copy(self) -> bool:
-        """Whether one image is a copy of the other: nearly everything is the same, and related.
-
-        What a copy was blended into varies alike where it is weak, but is no part of the copy.
-        """
-        share = min(self.area, self.reduced_area, self.related)
+        """Whether one image is a copy of the other: nearly everything is the same."""
+        share = min(self.area, self.reduced_area)
         return share >= _COPY_SHARE and not self.is_finer_than_ground
 
     @property
