@@ -37,8 +37,8 @@ WEAK_COPY_HEIGHT = 1.6
 _LEAST_CHIPS, _MANY_CHIPS = 0.25, 0.5
 
 # What the reference does not explain of a copy may not stand out elsewhere by so many robust
-# standard deviations of its surfaces, if it matches about as well there: right ones up to 4.3;
-# ground that shows through copies, clouds and labels from 6.1 on (suites margins and attacks).
+# standard deviations of its surfaces, if it is weak at the transform: right ones up to 4.3; ground
+# that shows through copies, clouds and labels from 6.1 on (suites margins and attacks).
 BEYOND_DEVIATIONS = 5.0
 
 
@@ -87,12 +87,13 @@ def least_height_of_copies(rest: Rest) -> float:
 def deviations_elsewhere(rest: Rest) -> float:
     """Return how far what a copy's reference does not explain stands out elsewhere.
 
-    In robust standard deviations; 0 where it matches much better where the transform has it.
+    In robust standard deviations; 0 where it is strong, or highest, where the transform has it.
     """
     left = rest.beyond
-    if left is None or not _has_many_chips(left, rest) or not _has_rival(left):
+    if left is None or not _has_many_chips(left, rest):
         return 0.0
-    return left.rival_deviations
+    is_elsewhere = left.height < WEAK_REST_HEIGHT and _has_rival(left)
+    return left.rival_deviations if is_elsewhere else 0.0
 
 
 def _locked(evidence: RegistrationEvidence) -> str | None:
