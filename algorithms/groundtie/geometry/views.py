@@ -155,8 +155,9 @@ def read_view(path: Path) -> View:
             "sun-elevation": properties.get("view:sun_elevation"),
         }
         sensor = RADAR if any(key.startswith("sar:") for key in properties) else CAMERA
-        if values["incidence"] is None and "view:off_nadir" in properties:
-            values["incidence"] = _incidence_deg(float(properties["view:off_nadir"]))
+        off_nadir = properties.get("view:off_nadir")
+        if values["incidence"] is None and off_nadir is not None:
+            values["incidence"] = _incidence_deg(float(off_nadir))
         given = {name: float(value) for name, value in values.items() if value is not None}
     except (OSError, ValueError) as error:
         raise ParameterError(f"cannot read the view in {path}: {error}") from error

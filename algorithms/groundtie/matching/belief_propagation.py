@@ -55,9 +55,14 @@ def propagate(surfaces: Surfaces, centres: NDArray[np.int_], reach_px: float) ->
     """
     if len(surfaces) == 0:
         return surfaces
-    apart_px = np.hypot(*(centres.T[:, :, None] - centres.T[:, None]))
-    pairs = np.argwhere(np.triu(apart_px <= reach_px, 1))
     count, span = surfaces.shape[:2]
+    # Chip by chip: a matrix of all distances grows with the square of their number.
+    later = [
+        k + 1 + np.flatnonzero(np.hypot(*(centres[k + 1 :] - centres[k]).T) <= reach_px)
+        for k in range(count)
+    ]
+    first = np.repeat(np.arange(count), [len(of) for of in later])
+    pairs = np.column_stack([first, np.concatenate(later)])
     prior = _log_evidence(surfaces.reshape(count, -1))
     beliefs: Surfaces = prior + _messages(prior, pairs, span)
     alone = np.bincount(pairs.ravel(), minlength=count) == 0

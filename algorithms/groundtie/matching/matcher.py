@@ -149,10 +149,13 @@ class ChipSurfaces:
 
     def with_neighbours(self, spacing_px: float) -> ChipSurfaces:
         """Return each chip's weighted sum with those around it, whose spacing is given."""
+        from scipy.spatial import cKDTree  # takes long to import; few scenes need it
+
         if len(self.centres) == 0:
             return self
-        apart_px = np.abs(self.centres[:, None] - self.centres).max(axis=2)
-        return self._sums(self.centres, [np.flatnonzero(of) for of in apart_px <= 1.5 * spacing_px])
+        reach = 1.5 * spacing_px
+        members = cKDTree(self.centres).query_ball_point(self.centres, reach, p=np.inf)
+        return self._sums(self.centres, [np.sort(of) for of in members])
 
     def _sums(self, centres: NDArray[np.int_], members: list[NDArray[np.int_]]) -> ChipSurfaces:
         """Return the weighted sums of chips, by number, for each of some centres."""

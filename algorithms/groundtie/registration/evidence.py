@@ -340,7 +340,7 @@ def mean_of_heights_px(
 
 def hull_share(px: FloatArray, size: tuple[int, int]) -> float:
     """Return the share of an image of a size, (width, height), that the hull of points covers."""
-    if len(px) < 3:
+    if len(px) < 3 or not np.isfinite(px).all():
         return 0.0
     area = cv2.contourArea(cv2.convexHull(px.astype(np.float32)))
     return float(np.clip(area / (size[0] * size[1]), 0, 1))
