@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
-from ..geometry.models import Model, shift_model
-from ..rasters.grid import Grid
+from ..geometry.models import Model
+from ..rasters.grid import Grid, PointFunction
 from ..rasters.held_images import held_onto
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
@@ -47,28 +47,33 @@ class Resampled:
     ----------
     pair
         The images.
-    model
-        The misregistration on the map that is left, by which the input is resampled.
+    to_input
+        Takes map positions, shape (n, 2), to the pixels of the input that are shown there.
     is_held
-        Whether they lie in memory on the grid of the chips, so that nothing is left.
+        Whether both lie in memory on the grid of the chips.
     """
 
     pair: ImagePair
-    model: Model
+    to_input: PointFunction
     is_held: bool = False
 
     @classmethod
-    def of(
+    def by_model(
         cls, pair: ImagePair, model: Model, grid: Grid, reach_px: int, context: Context
+    ) -> Resampled:
+        """Resample images by the misregistration on the map; parameters as `of`."""
+        return cls.of(pair, lambda xy: pair.nominal_px(model(xy)), grid, reach_px, context)
+
+    @classmethod
+    def of(
+        cls, pair: ImagePair, to_input: PointFunction, grid: Grid, reach_px: int, context: Context
     ) -> Resampled:
         """Resample images as a whole if they are small; of large ones chips show a part alone.
 
         Parameters
         ----------
-        pair
-            The images.
-        model
-            The misregistration on the map.
+        pair, to_input
+            See the class.
         grid
             The grid on which chips are matched.
         reach_px
@@ -78,21 +83,20 @@ class Resampled:
         """
         width, height = grid.width + 2 * reach_px, grid.height + 2 * reach_px
         if width * height > _HELD_PIXELS:
-            return cls(pair, model)
+            return cls(pair, to_input)
         around, quiet = grid.window(-reach_px, -reach_px, width, height), context.quiet()
         to_reference = pair.reference.source.grid.map_to_pixel
         held = replace(
             pair,
             reference=held_onto(pair.reference, around, to_reference, quiet),
-            input=held_onto(pair.input, around, lambda xy: pair.nominal_px(model(xy)), quiet),
+            input=held_onto(pair.input, around, to_input, quiet),
         )
-        return cls(held, shift_model(0.0, 0.0), is_held=True)
+        return cls(held, around.map_to_pixel, is_held=True)
 
-    def read(self, piece: Grid, hidden: MaskOf | None) -> tuple[Patch, Patch]:
+    def read(self, piece: Grid, hidden: MaskOf | None = None) -> tuple[Patch, Patch]:
         """Return both images on a piece of the grid, the reference without what is hidden."""
-        pair, model = self.pair, self.model
-        reference = pair.reference_patch(piece, None if hidden is None else hidden(piece))
-        return reference, pair.input_patch(piece, lambda xy: pair.nominal_px(model(xy)))
+        reference = self.pair.reference_patch(piece, None if hidden is None else hidden(piece))
+        return reference, self.pair.input_patch(piece, self.to_input)
 
 
 @dataclass(frozen=True)

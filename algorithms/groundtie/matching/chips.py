@@ -151,7 +151,7 @@ class ChipMatcher:
     ) -> tuple[NDArray[np.int_], Surfaces]:
         """Return the centres that could be matched and surfaces (n, ways, 2 r + 1, 2 r + 1)."""
         reach = radius_px + BORDER_PX
-        images = Resampled.of(self.pair, model, places.grid, reach, context)
+        images = Resampled.by_model(self.pair, model, places.grid, reach, context)
         windows = ChipWindows(images, places, reach, self.held_out)
 
         def surfaces(reference: Patch, input: Patch) -> Surfaces:

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from ..context import Context
 from ..geometry.models import Model, shift_model
 from ..geometry.transform import Transform
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import Grid, PointFunction, reproject
 from ..rasters.pair import ImagePair
-from ..rasters.patch import Patch
 from ..similarity.in_common import (
     DRAWN_SHARPNESS,
     LEAST_SHARPNESS,
@@ -29,6 +28,7 @@ from ..similarity.in_common import (
     sameness_of,
 )
 from ..similarity.sameness import REACH_PX, WINDOW_PX, Windows, covered
+from .chip_windows import Resampled
 from .matcher import FloatArray, Places
 
 # A transform that moves all of the overlap by whole pixels, but for this, may be content's.
@@ -120,7 +120,7 @@ class LockedContent:
         reach = 2 * REACH_PX
         size = piece.width + 2 * reach, piece.height + 2 * reach
         around = piece.window(-reach, -reach, *size)
-        patches = _patches(self.pair, around, self.offset_px)
+        patches = Resampled(self.pair, _to_input(self.pair, self.offset_px)).read(around)
         same = Windows.of(*patches).same
         if not self.is_explained:
             same = covered(same, WINDOW_PX)
@@ -177,12 +177,15 @@ def find_locked_content(
     if not np.abs(moved - offset).max() <= _LARGEST_BEND_PX:
         return None
     found = int(offset[0]), int(offset[1])
+    # Chips may end a pixel beyond the grid.
+    reach_px = LOOK_REACH_PX + 1
+    images = Resampled.of(pair, _to_input(pair, found), places.grid, reach_px, context)
 
     def look(centre: NDArray[np.int_]) -> Look:
         side = places.chip_px + 2 * LOOK_REACH_PX
         corner = centre - side // 2
         piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
-        return Look.of(*_patches(pair, piece, found))
+        return Look.of(*images.read(piece))
 
     sameness = sameness_of(list(context.map(look, list(places.centres))))
     is_whole = bool(np.abs(np.median(moved, axis=0) - offset).max() <= _WHOLE_PX)
@@ -190,14 +193,10 @@ def find_locked_content(
     return LockedContent(pair, found, sameness, is_whole, sensors, is_exact)
 
 
-def _patches(pair: ImagePair, piece: Grid, offset_px: tuple[int, int]) -> tuple[Patch, Patch]:
-    """Return both images' own pixels on a part of the grid, the input's moved by an offset."""
+def _to_input(pair: ImagePair, offset_px: tuple[int, int]) -> PointFunction:
+    """Return the function from map positions to the input's pixels at an offset in the array."""
     to_reference = pair.reference.source.grid.map_to_pixel
-
-    def to_input(xy: FloatArray) -> FloatArray:
-        return to_reference(xy) + offset_px
-
-    return pair.reference_patch(piece), pair.input_patch(piece, to_input)
+    return lambda xy: to_reference(xy) + offset_px
 
 
 def _moved_px(pair: ImagePair, transform: Transform) -> FloatArray | None:

@@ -94,7 +94,7 @@ class PooledHistogramMatcher:
         TooFewPointsError
             The mask leaves too few pixels.
         """
-        images = Resampled.of(self._coloured, model, places.grid, radius_px, context)
+        images = Resampled.by_model(self._coloured, model, places.grid, radius_px, context)
         tiles = Places.tiles(places.grid, self.pooled_chip_px)
         histogram = self._histogram(images, tiles, context)
         order = 1 if self._is_reference_masked else -1

@@ -61,8 +61,9 @@ class Windows:
     def of(cls, one: Patch, other: Patch) -> Windows:
         """Return the windows of two patches."""
         valid = one.valid & other.valid
+        share = np.maximum(_mean(valid.astype(np.float32)), np.finfo(np.float32).eps)
         images = one.values, other.values, one.values - other.values
-        return cls(valid, *(_variance(image, valid) for image in images))
+        return cls(valid, *(_variance(image, valid, share) for image in images))
 
     @property
     def same(self) -> Mask:
@@ -160,21 +161,26 @@ def edges_apart_px(one: Edges, other: Edges, shifts: NDArray[np.int_] = _NONE) -
     Shape (k, n), in the order of `np.nonzero(one.found)`, in pixels across the edges; infinite
     where there is none within a pixel or so.
     """
+    reach = int(np.abs(shifts).max()) + 1
+    width = one.found.shape[1] + 2 * reach
+    is_found = np.pad(other.found, reach).ravel()
     rows, cols = np.nonzero(one.found)
-    # All shifts, neighbours and edges at once, (k, 9, n).
-    neighbours = _NEIGHBOURS[None, :, :, None]
-    at = neighbours + shifts[:, None, :, None]
-    height, width = one.found.shape
-    near = np.clip(rows + at[:, :, 1], 0, height - 1), np.clip(cols + at[:, :, 0], 0, width - 1)
-    x, y, offset = one.x[rows, cols], one.y[rows, cols], one.offset[rows, cols]
+    # Of all shifts, neighbours and edges, (k, 9, n), those where the other has an edge: few.
+    step = (shifts[:, None] + _NEIGHBOURS) @ np.array([1, width])
+    at = step[..., None] + ((rows + reach) * width + cols + reach)
+    which, beside, edge = np.nonzero(is_found[at])
+    near = tuple(np.array(divmod(at[which, beside, edge], width)) - reach)
+    mine, (step_x, step_y) = (rows[edge], cols[edge]), _NEIGHBOURS[beside].T
+    x, y, offset = one.x[mine], one.y[mine], one.offset[mine]
     other_x, other_y, other_offset = other.x[near], other.y[near], other.offset[near]
-    right = neighbours[:, :, 0] + other_offset * other_x - offset * x
-    down = neighbours[:, :, 1] + other_offset * other_y - offset * y
+    right = step_x + other_offset * other_x - offset * x
+    down = step_y + other_offset * other_y - offset * y
     is_parallel = np.abs(x * other_x + y * other_y) >= _PARALLEL_COSINE
-    is_beside = np.abs(right * y - down * x) <= _ALONG_PX
-    is_pair = other.found[near] & is_parallel & is_beside
-    across = np.where(is_pair, np.abs(right * x + down * y), np.inf)
-    return np.asarray(across.min(axis=1), np.float32)
+    is_pair = is_parallel & (np.abs(right * y - down * x) <= _ALONG_PX)
+    across = np.full((len(shifts), len(rows)), np.inf, np.float32)
+    apart = np.abs(right * x + down * y).astype(np.float32)
+    np.minimum.at(across, (which[is_pair], edge[is_pair]), apart[is_pair])
+    return across
 
 
 def covered(middles: Mask, side_px: int) -> Mask:
@@ -202,14 +208,17 @@ def reduced(patch: Patch, factor: int) -> Patch:
     return Patch(means, share >= _LEAST_VALID)
 
 
-def _variance(values: FloatImage, valid: Mask) -> FloatImage:
-    """Return the variance of valid values in windows around pixels, shape (h, w)."""
+def _variance(values: FloatImage, valid: Mask, share: FloatImage) -> FloatImage:
+    """Return the variance of valid values in windows around pixels, shape (h, w).
 
-    def mean(of: FloatImage) -> FloatImage:
-        return np.asarray(cv2.blur(of, (WINDOW_PX, WINDOW_PX)), np.float32)
-
+    `share` is that of the windows' pixels that are valid.
+    """
     # About a middle: of squares of large values, small differences would lose digits.
     middle = median(values[valid]) if valid.any() else 0.0
     known = np.where(valid, values - middle, 0).astype(np.float32)
-    share = np.maximum(mean(valid.astype(np.float32)), np.finfo(np.float32).eps)
-    return np.asarray(mean(known**2) / share - (mean(known) / share) ** 2, np.float32)
+    return np.asarray(_mean(known**2) / share - (_mean(known) / share) ** 2, np.float32)
+
+
+def _mean(of: FloatImage) -> FloatImage:
+    """Return the mean in windows around pixels, shape (h, w)."""
+    return np.asarray(cv2.blur(of, (WINDOW_PX, WINDOW_PX)), np.float32)
