@@ -72,6 +72,24 @@ def test_a_place_is_shown_where_its_line_of_sight_meets_the_heights_assumed() ->
     assert np.hypot(*(shown - straight).T).max() > 10
 
 
+def test_in_layover_lines_of_sight_end_on_the_heights_too() -> None:
+    """A ridge so steep that they meet it more than once: the height is one of those."""
+
+    def ridge(xy: np.ndarray) -> np.ndarray:
+        return 300 * np.exp(-(((xy[:, 0] - CENTRE[0]) / 80.0) ** 2))
+
+    flat, steep = (
+        Raster(heights(of), GRID.transform, UTM) for of in (lambda xy: np.zeros(len(xy)), ridge)
+    )
+    found = model(Terrain.open(flat, steep, UTM, REGION))
+    xy = places(4000)
+    uv = found.frame.enter(xy)
+    shown = found(xy)
+    assert np.diff(np.sort(shown[:, 0])).max() > 50  # nothing is shown behind the ridge
+    rise = -3.0 - found.terrain.assumed_m(shown)
+    np.testing.assert_allclose(found.rise_m(uv), rise, atol=0.05)
+
+
 def test_heights_count_where_they_are_shown_not_where_they_are() -> None:
     """On a slope this differs from the heights' difference at one place by metres."""
     xy = places()

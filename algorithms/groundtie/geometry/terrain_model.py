@@ -20,11 +20,11 @@ from .terrain import Terrain
 # Heights are found along the line of sight to this, in metres: far below what displaces a pixel.
 _PRECISION_M = 0.01
 
-# The most steps until then.
-_STEPS = 15
+# The most steps until then; on a ridge that is steeper than any, 15 do not suffice (test_terrain).
+_STEPS = 30
 
 # Where a line of sight meets the ground at less than this slope between both, per metre, it meets
-# it more than once nearby (layover): there steps are no larger than from such a slope.
+# it more than once nearby (layover): there such a slope leads nowhere near.
 LEAST_SLOPE = 0.2
 
 # Places a side at which heights are compared with those that a stored transform was made with, in
@@ -161,19 +161,29 @@ class TerrainModel(Model):
 
 
 def _settled(risen: Callable[[FloatArray], FloatArray], size: int) -> FloatArray:
-    """Return what a function of a height, shapes (size,), returns unchanged; by secants."""
+    """Return what a function of a height, shapes (size,), returns unchanged.
+
+    By secants, kept between a height that is too low and one that is too high once both are known:
+    a continuous function has what is sought between them, wherever else it has it.
+    """
     before = np.zeros(size)
     rise = risen(before)
     missed = -rise
+    low, high = np.where(missed < 0, 0.0, -np.inf), np.where(missed < 0, np.inf, 0.0)
     for _ in range(_STEPS):
         still = rise - risen(rise)
         if not np.nanmax(np.abs(still), initial=0.0) > _PRECISION_M:
             break
+        low, high = np.where(still < 0, rise, low), np.where(still < 0, high, rise)
         with np.errstate(invalid="ignore", divide="ignore"):
-            slope = (still - missed) / (rise - before)
-        slope = np.where(slope > LEAST_SLOPE, slope, np.where(slope <= 0, 1.0, LEAST_SLOPE))
+            step = -still * (rise - before) / (still - missed)
+            is_steep = (still - missed) / (rise - before) > LEAST_SLOPE
+        # In layover: on towards the other side, twice as far each time.
+        step = np.where(is_steep, step, -np.sign(still) * 2 * np.abs(rise - before))
         before, missed = rise, still
-        rise = rise - still / slope
+        rise = rise + step
+        is_beyond = ((rise <= low) | (rise >= high)) & np.isfinite(high - low)
+        rise = np.where(is_beyond, (low + high) / 2, rise)
     return rise
 
 
