@@ -189,7 +189,8 @@ def find_locked_content(
 
     sameness = sameness_of(list(context.map(look, list(places.centres))))
     is_whole = bool(np.abs(np.median(moved, axis=0) - offset).max() <= _WHOLE_PX)
-    exact_px = exact_px if sensors is Sensors.CAMERAS else max(exact_px, _WHOLE_PX)
+    if sensors is Sensors.RADARS and not sameness.has_one_ground:
+        exact_px = max(exact_px, _WHOLE_PX)
     is_exact = bool(np.abs(moved - offset).max() <= exact_px)
     return LockedContent(pair, found, sameness, is_whole, sensors, is_exact)
 

@@ -122,11 +122,14 @@ class Sameness:
     def is_view(self) -> bool:
         """Whether both may be one camera's views of one ground.
 
-        What is not the same varies alike, too, and edges coincide no more sharply than those of
-        its bands.
+        Edges coincide no more sharply than those of its bands.
         """
-        is_ground = self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
-        return is_ground and self.sharpness < DRAWN_SHARPNESS
+        return self.has_one_ground and self.sharpness < DRAWN_SHARPNESS
+
+    @property
+    def has_one_ground(self) -> bool:
+        """Whether what is not the same varies alike, too, as one kind of sensor shows one ground."""
+        return self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
 
 
 _NO_WINDOWS = np.zeros((3, 3), int)
