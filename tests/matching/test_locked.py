@@ -34,6 +34,7 @@ def looked_at(
     context: Context,
     model: Model | None = None,
     exact_px: float = EXACT_PX,
+    sensors: Sensors = Sensors.CAMERAS,
 ) -> LockedContent | None:
     """Look for content that two arrays of one grid have in common under a model."""
     grid = utm_grid(SIDE, SIDE)
@@ -45,7 +46,7 @@ def looked_at(
         pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
         transform = Transform(model or shift_on_map(0.0, 0.0), pair.grid.crs, other.grid)
         places = survey_places(pair.grid)
-        return find_locked_content(pair, transform, places, Sensors.CAMERAS, exact_px, context)
+        return find_locked_content(pair, transform, places, sensors, exact_px, context)
 
 
 def drawn_into(values: np.ndarray, offset: tuple[int, int] = (0, 0)) -> np.ndarray:
@@ -149,6 +150,27 @@ def test_a_transform_to_whole_pixels_is_evidence_itself(
     assert locked.is_evident == is_evident
     # What is masked then is around edges, whatever they look like.
     assert (masked(tmp_path, locked).mean() > 0.1) == is_evident
+
+
+@pytest.mark.parametrize(
+    ("sensors", "place", "off_m", "is_exact"),
+    [
+        (Sensors.RADARS, 9, 1.2, True),
+        (Sensors.RADARS, 9, 1.3, False),
+        (Sensors.RADARS, 1, 1.2, False),
+        (Sensors.DIFFERENT, 9, 1.2, False),
+        (Sensors.CAMERAS, 9, 1.2, False),
+    ],
+)
+@pytest.mark.slow
+def test_radar_images_are_on_whole_pixels_to_an_eighth_unless_they_vary_as_one_ground(
+    tmp_path: Path, context: Context, sensors: Sensors, place: int, off_m: float, is_exact: bool
+) -> None:
+    """Pixels of 10 m. Radar images of one ground vary alike where speckle has averaged out."""
+    images, model = (sensed(1, 0.8), sensed(2, 0.8, place)), shift_on_map(off_m, 0.0)
+    locked = looked_at(tmp_path, *images, context, model, sensors=sensors)
+    assert locked is not None and locked.is_exact == is_exact
+    assert locked.sameness.has_one_ground == (place == 1)
 
 
 @pytest.mark.slow

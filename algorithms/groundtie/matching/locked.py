@@ -34,7 +34,10 @@ from .matcher import FloatArray, Places
 # A transform that moves all of the overlap by whole pixels, but for this, may be content's.
 _LARGEST_BEND_PX = 1.5
 
-# Copies of pixels are found within this of whole pixels; a quarter of what others lie within.
+# Copies of pixels are found within this of whole pixels, a quarter of what others lie within; so is
+# what is drawn over two radars' images, whose speckle moves it, over different ground by 0.04 to
+# 0.11. Of 57 radar pairs on one grid it refuses no further one (`--only attacks --classes "aligned
+# ground" --seeds 9700-9729 --sample 150`).
 _WHOLE_PX = 0.125
 
 # What is drawn lies on whole pixels all over; different sensors' views, by chance or on one grid,
@@ -161,7 +164,8 @@ def find_locked_content(
     sensors
         What the images may be.
     exact_px
-        Within this of whole pixels, what was found lies on them as exactly as it is known.
+        Within this of whole pixels, what was found lies on them as exactly as it is known; between
+        two radars' images that do not vary as one ground does, within `_WHOLE_PX` at least.
     context
         Threads.
 

@@ -128,7 +128,7 @@ class Sameness:
 
     @property
     def has_one_ground(self) -> bool:
-        """Whether what is not the same varies alike, too, as one kind of sensor shows one ground."""
+        """Whether what is not the same varies alike, too, as one sensor's views of one ground."""
         return self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
 
 
