@@ -8,6 +8,7 @@ import pytest
 import rasterio
 from numpy.typing import NDArray
 from raster_files import utm_grid, write_raster
+from rasterio.enums import ColorInterp
 
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.reading import open_raster
@@ -48,6 +49,24 @@ def test_what_is_invalid_has_no_weight(
     _assert_near(np.where(known, found, 0), np.where(known, expected, 0), "uint16")
 
 
+@pytest.mark.parametrize(("dtype", "nodata"), [("uint8", 7), ("float32", np.nan)])
+def test_a_nodata_value_counts_beside_an_alpha_band(
+    tmp_path: Path, dtype: str, nodata: float
+) -> None:
+    """As GDAL has it, without rasterio's warning that it does."""
+    image = RNG.integers(100, 200, (4, *ODD)).astype(dtype)
+    image[3] = 255
+    valid = np.ones(image.shape, bool)
+    valid[:3, 300:700, 200:900] = False
+    image[~valid] = nodata
+    colours = (ColorInterp.red, ColorInterp.green, ColorInterp.blue, ColorInterp.alpha)
+    found, _ = _overview(tmp_path, image, valid[0], nodata, colours)
+    expected, known = _means(np.where(valid, image, 0), valid)
+    is_nodata = np.isnan(found) if np.isnan(nodata) else found == nodata
+    np.testing.assert_array_equal(is_nodata, ~known)
+    _assert_near(np.where(known, found, 0), np.where(known, expected, 0), dtype)
+
+
 def test_one_pixel_that_is_not_a_number_spoils_no_other(tmp_path: Path) -> None:
     image = RNG.normal(size=(1, *ODD)).astype(np.float32)
     image[0, 600, 700] = np.nan
@@ -71,11 +90,15 @@ def test_complex_pixels_are_0_where_nothing_is_valid(tmp_path: Path) -> None:
 
 
 def _overview(
-    folder: Path, image: NDArray[Any], mask: NDArray[np.bool_], nodata: float | None
+    folder: Path,
+    image: NDArray[Any],
+    mask: NDArray[np.bool_],
+    nodata: float | None,
+    colours: tuple[ColorInterp, ...] | None = None,
 ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
     """Return the first overview of a file with an image, and what is valid in it."""
     grid = utm_grid(*image.shape[:0:-1])
-    source_file = write_raster(folder / "a.tif", image, grid, nodata=nodata)
+    source_file = write_raster(folder / "a.tif", image, grid, nodata=nodata, colorinterp=colours)
     masked = nodata is None and not mask.all()
     with open_raster(source_file) as source, Outputs() as outputs:
         staged = outputs.stage(folder / "b.tif")
@@ -86,7 +109,9 @@ def _overview(
                 if masked:
                     file.write_mask(mask[rows, cols], window=tile)
     with rasterio.open(folder / "b.tif", overview_level=0) as overview:
-        return overview.read(), overview.read_masks() > 0
+        values = overview.read()
+        # rasterio warns of masks beside an alpha band.
+        return values, np.ones(values.shape, bool) if colours else overview.read_masks() > 0
 
 
 def _means(image: NDArray[Any], valid: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[np.bool_]]:

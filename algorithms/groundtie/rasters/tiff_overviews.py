@@ -12,7 +12,7 @@ import numpy as np
 import rasterio
 import rasterio.windows
 from numpy.typing import NDArray
-from rasterio.enums import MaskFlags, Resampling
+from rasterio.enums import ColorInterp, MaskFlags, Resampling
 from rasterio.env import env_ctx_if_needed
 from scipy import sparse
 
@@ -164,7 +164,12 @@ def _masks(dataset: Any, bands: list[int], place: Any) -> list[Mask | None] | No
         keys.append(0 if {MaskFlags.per_dataset, MaskFlags.all_valid} & {*flags} else number)
         if keys[-1] in masks or MaskFlags.all_valid in flags:
             continue
-        mask = dataset.read_masks(number, window=place) == 255
+        if MaskFlags.nodata in flags and ColorInterp.alpha in dataset.colorinterp:
+            # As rasterio's masks, which warn that the nodata value counts, and not the alpha band.
+            values, nodata = dataset.read(number, window=place), dataset.nodata
+            mask = ~np.isnan(values) if np.isnan(nodata) else values != nodata
+        else:
+            mask = dataset.read_masks(number, window=place) == 255
         masks[keys[-1]] = None if mask.all() else mask
         if MaskFlags.alpha in flags and not mask.all():
             return None
