@@ -22,7 +22,7 @@ from groundtie.matching.locked import (
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.similarity.in_common import DRAWN_SHARPNESS
+from groundtie.similarity.in_common import DRAWN_SHARPNESS, Sameness
 
 SIDE = 320
 
@@ -171,6 +171,16 @@ def test_radar_images_are_on_whole_pixels_to_an_eighth_unless_they_vary_as_one_g
     locked = looked_at(tmp_path, *images, context, model, sensors=sensors)
     assert locked is not None and locked.is_exact == is_exact
     assert locked.sameness.has_one_ground == (place == 1)
+
+
+@pytest.mark.parametrize(
+    ("ground", "related", "is_ground"), [(0.3, 0.0, True), (0.0, 0.3, True), (0.1, 0.1, False)]
+)
+def test_ground_varies_alike_or_follows_in_other_colours(
+    ground: float, related: float, is_ground: bool
+) -> None:
+    """As of a negative, of which nothing varies alike."""
+    assert Sameness(1.0, 0.1, 0.2, ground, 300.0, related).varies_as_ground == is_ground
 
 
 @pytest.mark.slow

@@ -131,6 +131,11 @@ class Sameness:
         """Whether what is not the same varies alike, too, as one sensor's views of one ground."""
         return self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
 
+    @property
+    def varies_as_ground(self) -> bool:
+        """Whether as much as of one ground varies alike, or follows in other colours."""
+        return self.has_one_ground or self.related >= _GROUND_SHARE
+
 
 _NO_WINDOWS = np.zeros((3, 3), int)
 
