@@ -24,7 +24,7 @@ _PRECISION_M = 0.01
 _STEPS = 30
 
 # Where a line of sight meets the ground at less than this slope between both, per metre, it meets
-# it more than once nearby (layover): there such a slope leads nowhere near.
+# it more than once nearby (layover): there no step by the slope leads near.
 LEAST_SLOPE = 0.2
 
 # Places a side at which heights are compared with those that a stored transform was made with, in
@@ -176,10 +176,11 @@ def _settled(risen: Callable[[FloatArray], FloatArray], size: int) -> FloatArray
             break
         low, high = np.where(still < 0, rise, low), np.where(still < 0, high, rise)
         with np.errstate(invalid="ignore", divide="ignore"):
-            step = -still * (rise - before) / (still - missed)
-            is_steep = (still - missed) / (rise - before) > LEAST_SLOPE
+            slope = (still - missed) / (rise - before)
+            step = -still / slope
         # In layover: on towards the other side, twice as far each time.
-        step = np.where(is_steep, step, -np.sign(still) * 2 * np.abs(rise - before))
+        onward = -np.sign(still) * 2 * np.abs(rise - before)
+        step = np.where(slope > LEAST_SLOPE, step, onward)
         before, missed = rise, still
         rise = rise + step
         is_beyond = ((rise <= low) | (rise >= high)) & np.isfinite(high - low)
