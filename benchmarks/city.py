@@ -41,12 +41,9 @@ class Setting:
 
 
 SETTINGS: dict[str, Setting] = {
-    "NMI, no mask": Setting(replace(COREGISTER, similarity="nmi", mask="none")),
-    "orientation, no mask": Setting(replace(COREGISTER, similarity="orientation", mask="none")),
-    "fused, no mask": Setting(replace(COREGISTER, mask="none")),
-    "fused, threshold": Setting(replace(COREGISTER, mask="threshold"), median_px=1.5),
-    "fused, regions": Setting(replace(COREGISTER, mask="regions"), median_px=1.0, share_within=0.8),
-    "fused, auto": Setting(median_px=1.0, share_within=0.8),
+    "NMI": Setting(replace(COREGISTER, similarity="nmi")),
+    "orientation": Setting(replace(COREGISTER, similarity="orientation")),
+    "fused": Setting(median_px=1.0, share_within=0.8),
 }
 
 

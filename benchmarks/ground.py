@@ -1,4 +1,4 @@
-"""How much of a simulated city's ground `mask-regions` finds, and how much of that is ground."""
+"""How much of a simulated city's ground `mask-ground` finds, and how much of that is ground."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from groundtie.geometry.views import View
+from groundtie.masks.ground import find_ground
 from groundtie.masks.object_heights import RasterModel
-from groundtie.masks.regions import find_ground
 from groundtie.masks.scene import Scene
 from groundtie.masks.surface_model import SurfaceGround
 from groundtie.rasters.reading import Mask, open_raster
@@ -68,7 +68,7 @@ def run(settings: Settings) -> SuiteResult:
         found.append(of_seed(seed, settings.cache))
         print(f"city, seed {seed}: {found[-1].share:.0%} of the image", flush=True)
     return SuiteResult(
-        "Ground that regions find in simulated dense cities",
+        "Ground that is found in simulated dense cities",
         [goal(found)],
         (table(found),),
         [f.record() for f in found],
@@ -86,7 +86,7 @@ def of_seed(seed: int, cache: Path) -> FoundGround:
             for path in (pair.reference, pair.reference.parent / files.NAMES["dsm"])
         )
         scene = Scene.of(reference)
-        ground = find_ground(scene, is_town=True)
+        ground = find_ground(scene)
         radar, both = (
             SurfaceGround(scene, RasterModel(heights), tuple(v for v in seen if v is not None))
             for seen in (views[:1], views)

@@ -115,9 +115,9 @@ def _measured(words: list[str]) -> Measured:
 
 def jobs(settings: Settings, folder: Path) -> dict[str, list[str]]:
     """Return the words of the command line of each job; their inputs are made."""
-    small, large = (
+    small, large, open_land = (
         Simulation(size, density, _SEED).pair(settings.cache)
-        for size, density in ((500, "rural"), (1000, "suburban"))
+        for size, density in ((500, "rural"), (1000, "suburban"), (1000, "rural"))
     )
     groundtie.simulate_sensor(folder, size=_SENSOR_PX, seed=_SEED)
     image, reference, dem = (str(folder / f"{name}.tif") for name in ("sensor", "reference", "dem"))
@@ -130,9 +130,7 @@ def jobs(settings: Settings, folder: Path) -> dict[str, list[str]]:
         "help": ["--help"],
         "coregister, rural 500²": register(small),
         "coregister, affine, suburban 1000²": register(large, "--model", "affine"),
-        "coregister, affine, 1000², no mask": register(
-            large, "--model", "affine", "--mask", "none"
-        ),
+        "coregister, affine, rural 1000²": register(open_land, "--model", "affine"),
         "refine-rpc 500²": [
             *(
                 "refine-rpc",

@@ -19,9 +19,9 @@ import numpy as np
 import groundtie
 from groundtie.context import threads
 from groundtie.geometry.models import shift_model
-from groundtie.masks.cast_shadow import shadow_azimuth_deg
-from groundtie.masks.regions import HIGH_PERCENT, WIDTH_M, find_ground
+from groundtie.masks.ground import find_ground
 from groundtie.masks.scene import Scene
+from groundtie.masks.shadow_direction import shadow_azimuth_deg
 from groundtie.matching.matcher import Places
 from groundtie.matching.pooled import PooledHistogramMatcher
 from groundtie.rasters.grid import Grid
@@ -38,17 +38,8 @@ from .suites import Settings, SuiteResult, Table, run_cases
 SIMILARITIES = ("nmi", "orientation", "fused")
 RADIUS_PX = 40
 
-# The darkest of homogeneous regions are radar shadow of trees, cars and fences, which lies behind
-# what casts it.
-_LOW_PERCENT = 10.0
-
-# The ground alone: whether by colours, and how many percent of the darkest are left out.
-GROUND = {
-    "ground, grey levels, darkest too": (False, 0.0),
-    "ground, grey levels": (False, _LOW_PERCENT),
-    "ground, colours, darkest too": (True, 0.0),
-    "ground, colours": (True, _LOW_PERCENT),
-}
+# The ground alone, and whether it is matched by colours.
+GROUND = {"ground, grey levels": False, "ground, colours": True}
 _GROUND_RADIUS_PX, _GROUND_CHIP_PX = 10, 80
 
 # Where the search of the ground starts, right and down of the truth, and how often it is repeated,
@@ -144,11 +135,8 @@ def of_ground(seed: int, pair: Pair) -> tuple[list[Drawn], Directions]:
         scene = Scene.of(images.reference.source)
         camera = Scene.of(images.input.source)
         azimuths = [shadow_azimuth_deg(one.read(one.whole)) for one in (scene, camera)]
-        for name, (is_coloured, low) in GROUND.items():
-            ground = find_ground(
-                scene, WIDTH_M, HIGH_PERCENT, shadow_azimuth_deg=azimuths[1], low_percent=low
-            )
-            masked = masked_by(images, scene, ground.select, stack)
+        masked = masked_by(images, scene, find_ground(scene).select, stack)
+        for name, is_coloured in GROUND.items():
             matcher = PooledHistogramMatcher.of(masked, _GROUND_CHIP_PX, nothing_hidden)
             if not is_coloured:
                 matcher = replace(matcher, colours=None)

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from groundtie.geometry.transform import load_transform
-from groundtie.masks.regions import find_ground
+from groundtie.masks.ground import find_ground
+from groundtie.masks.regions import find_regions
 from groundtie.masks.scene import Scene, Select
 from groundtie.masks.threshold import ThresholdMask
 from groundtie.progress import SILENT
@@ -40,13 +41,14 @@ def by_threshold(percent: float) -> Callable[[Scene], Select]:
 
 def by_regions(width_m: float) -> Callable[[Scene], Select]:
     """Return what masks all of a scene but regions on the ground."""
-    return lambda scene: find_ground(scene, width_m).select
+    return lambda scene: find_regions(scene, width_m).select
 
 
 MASKS: dict[str, Callable[[Scene], Select] | None] = {
     PLAIN: None,
     **{f"brightest {p} %": by_threshold(p) for p in (5, 10, 20, 30, 40, 50)},
     **{f"regions, {w} m": by_regions(w) for w in (5, 11, 19)},
+    "ground": lambda scene: find_ground(scene).select,
 }
 
 

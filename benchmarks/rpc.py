@@ -31,11 +31,10 @@ from .tables import accuracy_table
 
 HALF_REAL, ROUND_TRIP, BLUNDERS = "half real", "round trip", "blunders"
 RURAL, URBAN = "simulated, hills", "simulated, town"
-# With masks in the reference: thresholds of [Suri2010], and what it has for dense towns.
-HALF_REAL_MASKED, URBAN_MASKED = "half real, thresholds", "simulated, town, regions"
-MASKS = {HALF_REAL_MASKED: "threshold", URBAN_MASKED: "regions"}
-DENSITY = {RURAL: "rural", URBAN: "urban", URBAN_MASKED: "urban"}
-GOAL_PX = {RURAL: 1.0, URBAN: 2.0, URBAN_MASKED: 2.0}
+# With the brightest part of the reference masked, as in [Suri2010] 4.5.
+HALF_REAL_MASKED = "half real, thresholds"
+DENSITY = {RURAL: "rural", URBAN: "urban"}
+GOAL_PX = {RURAL: 1.0, URBAN: 2.0}
 
 # Simulated RPCs are wrong by up to so much on the ground.
 _LARGEST_SHIFT_M = 300.0
@@ -80,6 +79,10 @@ class HalfRealCase:
                 Path(folder),
             )
             output, table = Path(folder) / "refined_RPC.TXT", Path(folder) / "points.csv"
+            mask = None
+            if self.group == HALF_REAL_MASKED:
+                mask = Path(folder) / "mask.tif"
+                groundtie.mask_threshold(scene.reference, mask)
             refine = partial(
                 groundtie.refine_rpc,
                 scene.image,
@@ -87,7 +90,7 @@ class HalfRealCase:
                 reference=scene.reference,
                 dem=scene.dem,
                 dem_datum="ellipsoidal",
-                mask=MASKS.get(self.group, "none"),
+                reference_mask=mask,
                 residuals=table,
                 workers=workers,
             )
@@ -144,7 +147,6 @@ class SimulatedCase:
                 dem=scene / "dem.tif",
                 dem_datum="ellipsoidal",
                 search_radius=1.1 * _LARGEST_SHIFT_M,
-                mask=MASKS.get(self.group, "none"),
                 residuals=scene / "points.csv",
                 workers=workers,
             )

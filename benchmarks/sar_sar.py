@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+import groundtie
 
 from . import feature_counts
 from .accuracy import CORRECT, REFUSED
@@ -26,9 +29,9 @@ SAR_SAR = "sar-sar"
 _TURNED = ("ss-ponds", "ss-meander")
 FREE = "without georeferencing"
 
-# Masks of simulated pairs: the simulator's ground, what the tool finds by itself, none.
-_GROUND, _REGIONS, _NO_MASK = "ground mask", "mask=regions", "no mask"
-MASKS = (_GROUND, _REGIONS, _NO_MASK)
+# Masks of simulated pairs: the simulator's ground, homogeneous regions of the reference, none.
+_TRUE, _REGIONS, _NO_MASK = "true ground", "mask_regions", "no mask"
+MASKS = (_TRUE, _REGIONS, _NO_MASK)
 
 _SIZE_PX = 800
 _LARGE_PX = 2000
@@ -58,11 +61,13 @@ class SimulatedAttempt:
         """Make the pair if need be, register it and judge the result."""
         pair = self.simulation.pair(self.cache)
         given: dict[str, Any] = {}
-        if self.mask == _GROUND:
+        if self.mask == _TRUE:
             given["reference_mask"] = self.simulation.ground(self.cache)
-        elif self.mask == _REGIONS:
-            given["mask"] = "regions"
-        return attempt(self.simulation.name, self.group, pair, workers, tool=TOOL, **given)
+        with tempfile.TemporaryDirectory() as folder:
+            if self.mask == _REGIONS:
+                given["reference_mask"] = Path(folder) / "mask.tif"
+                groundtie.mask_regions(pair.reference, given["reference_mask"])
+            return attempt(self.simulation.name, self.group, pair, workers, tool=TOOL, **given)
 
 
 def _group(opposite: bool, mask: str) -> str:
@@ -116,7 +121,7 @@ def run(settings: Settings) -> SuiteResult:
         "simulated": run_cases(simulated, settings.jobs),
     }
     # By itself: it is timed.
-    large = SimulatedAttempt(SarPair(_LARGE_PX, "rural", 1, 4, True), _GROUND, settings.cache)
+    large = SimulatedAttempt(SarPair(_LARGE_PX, "rural", 1, 4, True), _TRUE, settings.cache)
     large.simulation.pair(settings.cache)
     outcomes["large"] = run_cases([large], 1)
     names = [_group(opposite, mask) for mask in MASKS for opposite in (False, True)]

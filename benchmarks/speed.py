@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from groundtie.context import threads
 from groundtie.geometry.transform import Transform
-from groundtie.masks.regions import find_ground
+from groundtie.masks.ground import find_ground
 from groundtie.masks.scene import Scene
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import open_raster
@@ -55,10 +55,10 @@ _WANTED_RATIO = 60.0
 
 _LARGEST_SHIFT_PX = 20
 
-# A radar image, filtered and searched for regions on one core.
+# A radar image, filtered and searched for its ground on one core.
 RADAR_PX = 4000
 FILTER, FILTER_RATE = "speckle filter ", 20.0
-REGIONS, REGION_SECONDS = f"regions on the ground, {RADAR_PX}×{RADAR_PX} px", 10.0
+GROUND, GROUND_SECONDS = f"ground of a town, {RADAR_PX}×{RADAR_PX} px", 10.0
 
 _SEED = 1
 
@@ -207,7 +207,7 @@ def describe_found(program: str, output: str, pair: Pair) -> str:
 
 
 def time_radar(times: int) -> list[Record]:
-    """Time speckle filters and the search for regions, on one core."""
+    """Time speckle filters and the search for the ground, on one core."""
     generator = np.random.default_rng(_SEED)
     cells = generator.choice([1.0, 4.0, 20.0], (RADAR_PX // 80, RADAR_PX // 80))
     power = np.kron(cells, np.ones((80, 80))) * generator.standard_gamma(1, (RADAR_PX, RADAR_PX))
@@ -228,7 +228,7 @@ def time_radar(times: int) -> list[Record]:
                 written.write(np.sqrt(image), 1)
             with open_raster(path) as source:
                 seconds = _shortest(find_ground, times, Scene.of(source))
-        records.append(Record(REGIONS, OWN, seconds))
+        records.append(Record(GROUND, OWN, seconds))
     finally:
         cv2.setNumThreads(threads)
     return records
@@ -248,8 +248,8 @@ def radar_goals(records: Sequence[Record]) -> list[Goal]:
     """Return the goals for what radar images need and what was found."""
     goals = []
     for record in records:
-        if record.what == REGIONS:
-            wanted, reached = f"at most {REGION_SECONDS:g} s", record.seconds <= REGION_SECONDS
+        if record.what == GROUND:
+            wanted, reached = f"at most {GROUND_SECONDS:g} s", record.seconds <= GROUND_SECONDS
             found = f"{record.seconds:.1f} s"
         else:
             rate = RADAR_PX**2 / record.seconds / 1e6

@@ -59,7 +59,7 @@ def masks(scenes: Scenes) -> Figure:
     axes[0].set_title("radar image", fontsize=9)
     for each, tool, name in (
         (axes[1], groundtie.mask_threshold, "threshold"),
-        (axes[2], groundtie.mask_regions, "regions"),
+        (axes[2], groundtie.mask_ground, "ground"),
     ):
         path = scenes.folder / f"{name}.tif"
         tool(radar, path)

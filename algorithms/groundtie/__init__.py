@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .tools.estimate_rotation import estimate_rotation
     from .tools.extract_gcps import extract_gcps
     from .tools.filter_speckle import filter_speckle
+    from .tools.mask_ground import mask_ground
     from .tools.mask_regions import mask_regions
     from .tools.mask_surface import mask_surface
     from .tools.mask_threshold import mask_threshold
@@ -56,6 +57,7 @@ __all__ = [
     "extract_gcps",
     "filter_speckle",
     "load_transform",
+    "mask_ground",
     "mask_regions",
     "mask_surface",
     "mask_threshold",

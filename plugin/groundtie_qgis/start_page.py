@@ -29,7 +29,7 @@ from .run import Outcome, Run, new_file
 from .sensor_run import SensorImage, SensorRun
 from .start_files import has_rpcs, points_name
 from .translation import mark, tr
-from .tries import WITH_GROUND, BandRows, Tries, have_bands
+from .tries import BandRows, Tries, have_bands
 from .verdict_label import VerdictLabel, first_lines
 from .wording import choice_label
 
@@ -62,7 +62,6 @@ class StartPage(QWidget):
         self.sensor: SensorImage | None = None
         self.outcome: Outcome | None = None
         self._layers: tuple[Any, ...] = ()
-        self._masked = False
         self._build()
         self.propose()
 
@@ -97,7 +96,6 @@ class StartPage(QWidget):
         self.tries.wider.clicked.connect(self.search_farther)
         self.tries.turn.clicked.connect(self.allow_rotation)
         self.tries.bands.clicked.connect(self.choose_bands)
-        self.tries.ground.clicked.connect(self.match_ground)
         self.report.clicked.connect(self.open_report)
         self.pair.currentIndexChanged.connect(self._show_options)
         # Later: while layers are taken out of the project, some of them are gone already.
@@ -164,8 +162,8 @@ class StartPage(QWidget):
             widget.setToolTip("" if asked else tr("Choose what the images are to set the search."))
         self.rotated.setEnabled(asked and not sensor)
 
-    def start_or_cancel(self, masked: bool = False) -> None:
-        """Begin to register, on the ground alone if it is to be masked; or stop that."""
+    def start_or_cancel(self) -> None:
+        """Begin to register, or stop that."""
         if self._run is not None:
             self._run.cancel()
             return
@@ -175,7 +173,6 @@ class StartPage(QWidget):
             self._state(False, tr("Choose two raster layers."))
             return
         self._begin()
-        self._masked = masked
         if has_rpcs(input):
             self._start_sensor(input)
             return
@@ -185,8 +182,6 @@ class StartPage(QWidget):
         files = {name: new_file(file) for name, file in names.items()}
         tool = self.pair.currentData()
         values |= self.bands.values()
-        if masked:
-            values["MASK"] = "regions"
         if tool != "register":
             values |= {"SEARCH_RADIUS": self.radius.value()} if self.radius.value() else {}
             values |= {"SEARCH_ROTATION": _ANY_ROTATION_DEG} if self.rotated.isChecked() else {}
@@ -256,7 +251,6 @@ class StartPage(QWidget):
             tries.wider: True,
             tries.turn: not self.rotated.isChecked(),
             tries.bands: have_bands(self._layers) and self.bands.isHidden(),
-            tries.ground: self.pair.currentData() in WITH_GROUND and not self._masked,
         }
         return tuple(button for button, is_new in offered.items() if is_new)
 
@@ -264,11 +258,6 @@ class StartPage(QWidget):
         """Ask which bands are matched."""
         self.bands.show()
         self.tries.offer(self._worth_a_try())
-
-    def match_ground(self) -> None:
-        """Try again with the ground of the radar image alone."""
-        self._ask_for_a_search()
-        self.start_or_cancel(masked=True)
 
     def search_farther(self) -> None:
         """Try again with a radius twice as large."""

@@ -9,13 +9,10 @@ from qgis.PyQt.QtWidgets import QFormLayout, QGridLayout, QPushButton, QSizePoli
 
 from .translation import mark, tr
 
-# The tools that can mask all but the ground of a radar image; `register` leaves that to the images.
-WITH_GROUND = ("register", "coregister")
 _NAMES = (
     mark("Search farther"),
     mark("Allow any rotation"),
     mark("Other bands…"),
-    mark("Ground only"),
 )
 
 
@@ -24,13 +21,8 @@ class Tries(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.wider, self.turn, self.bands, self.ground = (
-            QPushButton(tr(name), self) for name in _NAMES
-        )
-        self.ground.setToolTip(
-            tr("Match only roads, waters and squares: high buildings are displaced by layover.")
-        )
-        self._all = (self.wider, self.turn, self.bands, self.ground)
+        self.wider, self.turn, self.bands = (QPushButton(tr(name), self) for name in _NAMES)
+        self._all = (self.wider, self.turn, self.bands)
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
         self.offer(())

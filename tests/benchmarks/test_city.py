@@ -51,7 +51,7 @@ def test_goals(errors: list[float], expected: list[bool]) -> None:
 
 
 def test_settings_without_goals_are_reported() -> None:
-    found = city.goals("fused, no mask", [outcome(error_px=2.0)])
+    found = city.goals("NMI", [outcome(error_px=2.0)])
     assert [goal.reached for goal in found] == [None, None, True]
 
 

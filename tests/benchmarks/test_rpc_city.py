@@ -14,7 +14,7 @@ from benchmark_outcomes import outcome
 import groundtie
 from benchmarks import rpc_city
 from benchmarks.accuracy import CORRECT, CRASHED, INACCURATE, REFUSED, SILENTLY_WRONG
-from benchmarks.rpc_city import EXTRACTED, MASKED, MODELLED, REFINED, RUNS, City, CityCase
+from benchmarks.rpc_city import EXTRACTED, MODELLED, REFINED, RUNS, City, CityCase
 from benchmarks.suites import Settings, SuiteResult
 from groundtie.errors import NotRegisteredError
 from groundtie.sensor.rpc_files import read_rpc, write_rpc
@@ -53,11 +53,10 @@ def test_at_least_forty_cities_by_default_and_few_of_them_quickly(tmp_path: Path
     assert len(rpc_city.cases(settings(tmp_path, quick=True))) == len(RUNS)
 
 
-def test_only_the_comparisons_set_a_mask_or_a_surface_model() -> None:
+def test_only_the_comparison_sets_a_surface_model() -> None:
     scene = Path("scene")
     assert [run.on(scene) for run in RUNS.values()] == [
         {},
-        {"mask": "regions"},
         {"surface_model": scene / "dsm.tif"},
         {},
     ]
@@ -128,13 +127,13 @@ def test_cases_call_the_tool_and_judge_what_it_writes(
         return SimpleNamespace(summary=lambda: SUMMARY)
 
     monkeypatch.setattr(groundtie, "refine_rpc", refine)
-    found = CityCase(city, MASKED, scene.parent).run(1)
+    found = CityCase(city, MODELLED, scene.parent).run(1)
     assert (found.verdict, found.model, found.reason) == (INACCURATE, "shift", "they agree")
-    assert found.group == "refine_rpc, mask=regions, 64 px, 4 looks"
+    assert found.group == "refine_rpc, surface model, 64 px, 4 looks"
     assert found.error_px == pytest.approx(2.5, abs=1e-3)
-    assert calls[0]["mask"] == "regions"
+    assert calls[0]["surface_model"] == scene / "dsm.tif"
     assert CityCase(city, REFINED, scene.parent).run(1).verdict == INACCURATE
-    assert "mask" not in calls[1]
+    assert "surface_model" not in calls[1]
 
 
 @pytest.mark.parametrize(
@@ -166,14 +165,13 @@ def suite(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, wrong: str) -> SuiteR
 @pytest.mark.parametrize(
     ("wrong", "reached"),
     [
-        (REFINED, [False, None, True, True, False]),
-        (MASKED, [True, None, True, True, True]),
-        (MODELLED, [True, None, False, True, True]),
-        (EXTRACTED, [True, None, True, False, True]),
+        (REFINED, [False, True, True]),
+        (MODELLED, [True, False, True]),
+        (EXTRACTED, [True, True, False]),
     ],
 )
 def test_goals(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, wrong: str, reached: list[bool | None]
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, wrong: str, reached: list[bool]
 ) -> None:
     result = suite(monkeypatch, tmp_path, wrong)
     assert [goal.reached for goal in result.goals] == reached

@@ -178,7 +178,12 @@ def test_bash_completes_the_installed_command(environment: Path) -> None:
         text=True,
         check=True,
     )
-    assert done.stdout.split() == ["mask-surface", "mask-threshold", "mask-regions"], done.stderr
+    assert done.stdout.split() == [
+        "mask-surface",
+        "mask-threshold",
+        "mask-ground",
+        "mask-regions",
+    ], done.stderr
 
 
 def build(tree: Path, hook: str, target: Path) -> None:

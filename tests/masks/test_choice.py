@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from raster_files import utm_grid, write_raster
 
-from groundtie.masks.choice import MaskUsed, choose, is_reliable, share_of_strong_scatterers
-from groundtie.masks.regions import GroundRegions
+from groundtie.masks.choice import MaskUsed, is_town, may_be_town, share_of_strong_scatterers
 from groundtie.masks.scene import Scene
 from groundtie.rasters.kernels import interpolate
 from groundtie.rasters.reading import open_raster
@@ -47,51 +46,25 @@ def test_a_kernel_that_undershoots_makes_no_decibels(tmp_path: Path) -> None:
     assert share_of_strong_scatterers(scene_of(tmp_path / "b.tif", decibels)) == 0
 
 
-def test_fields_need_no_mask(tmp_path: Path) -> None:
+def test_fields_are_no_town(tmp_path: Path) -> None:
     random = np.random.default_rng(0)
     fields = np.kron(random.uniform(200, 500, (20, 20)), np.ones((20, 20)))
     fields *= np.sqrt(random.gamma(1, 1, fields.shape))
     scene = scene_of(tmp_path / "a.tif", fields.astype(np.float32))
-    kind, reason = choose(share_of_strong_scatterers(scene), never)
-    assert kind == "none" and "too few" in reason
-
-
-def never() -> bool:
-    raise AssertionError("regions are not looked for")
+    assert not is_town(share_of_strong_scatterers(scene))
 
 
 @pytest.mark.parametrize(
-    ("strong_share", "has_ground", "expected"),
-    [(0.079, True, "none"), (0.081, True, "regions"), (0.081, False, "none")],
+    ("strong_share", "expected"),
+    [(0.079, (False, False)), (0.081, (False, True)), (0.111, (True, True))],
 )
-def test_suburbs_get_regions_where_they_are_reliable(
-    strong_share: float, has_ground: bool, expected: str
+def test_towns_are_where_strong_scatterers_stand(
+    strong_share: float, expected: tuple[bool, bool]
 ) -> None:
-    kind, reason = choose(strong_share, lambda: has_ground)
-    assert kind == expected
-    assert ("suburb" in reason) == (expected == "regions")
-
-
-@pytest.mark.parametrize(
-    ("share", "skeleton_m", "expected"),
-    [(0.3, 900.0, True), (0.3, 300.0, False), (0.03, 900.0, False)],
-)
-def test_dense_towns_get_regions_which_must_be_reliable(
-    tmp_path: Path, share: float, skeleton_m: float, expected: bool
-) -> None:
-    random = np.random.default_rng(0)
-    bright = np.kron(random.random((20, 20)) < 0.25, np.ones((20, 20)))
-    town = np.where(bright, 600, 100) * np.sqrt(random.gamma(1, 1, bright.shape))
-    scene = scene_of(tmp_path / "a.tif", town.astype(np.float32))
-    kind, reason = choose(share_of_strong_scatterers(scene), never)
-    assert kind == "regions" and "dense town" in reason
-    part = np.zeros(bright.shape, bool)
-    part[: round(share * 400)] = True
-    ground = GroundRegions(scene, 1, part, part, part, skeleton_m, -np.inf, np.inf, part.size)
-    assert is_reliable(ground) is expected
+    assert (is_town(strong_share), may_be_town(strong_share)) == expected
 
 
 def test_it_fits_in_a_line() -> None:
-    used = MaskUsed("threshold", "reference", 0.8, "it has the more speckle")
-    assert used.line() == "mask: threshold, 80% of the reference take part; it has the more speckle"
+    used = MaskUsed("layer", "reference", 0.8, "what roads.gpkg covers")
+    assert used.line() == "mask: layer, 80% of the reference take part; what roads.gpkg covers"
     assert MaskUsed("none", None, 1.0, "as asked for").line() == "mask: none, as asked for"

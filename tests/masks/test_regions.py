@@ -9,8 +9,8 @@ from raster_files import utm_grid, write_raster
 from scipy.ndimage import distance_transform_edt
 
 from groundtie.errors import RasterContentError
-from groundtie.masks import regions as regions_module
-from groundtie.masks.regions import GroundRegions, find_ground
+from groundtie.masks import reduced
+from groundtie.masks.regions import GroundRegions, find_regions
 from groundtie.masks.scene import Scene
 from groundtie.rasters.reading import Window, open_raster
 
@@ -27,7 +27,7 @@ def scene_of(path: Path, image: np.ndarray, **more: object) -> Scene:
 
 @pytest.fixture(scope="module")
 def ground(town: Town, tmp_path_factory: pytest.TempPathFactory) -> GroundRegions:
-    return find_ground(scene_of(tmp_path_factory.mktemp("town") / "a.tif", town.amplitude))
+    return find_regions(scene_of(tmp_path_factory.mktemp("town") / "a.tif", town.amplitude))
 
 
 def test_ground_is_found_and_roofs_and_shadows_are_not(town: Town, ground: GroundRegions) -> None:
@@ -40,7 +40,7 @@ def test_ground_is_found_and_roofs_and_shadows_are_not(town: Town, ground: Groun
 @pytest.mark.parametrize("looks", [1.0, 8.0])
 def test_it_holds_for_other_speckle(town: Town, tmp_path: Path, looks: float) -> None:
     other = draw_town(looks=looks, seed=3)
-    found = find_ground(scene_of(tmp_path / "a.tif", other.amplitude))
+    found = find_regions(scene_of(tmp_path / "a.tif", other.amplitude))
     assert found.regions[other.ground].mean() > 0.7
     assert found.regions[other.roofs | other.shadow].mean() < 0.05
 
@@ -58,7 +58,7 @@ def test_the_skeleton_is_broadened_by_the_window(town: Town, tmp_path: Path) -> 
     # Where nothing but the road is near.
     alone = distance_transform_edt(~(town.river | town.park)) > 40
     for width_m in (15.0, 19.0):
-        found = find_ground(scene, width_m)
+        found = find_regions(scene, width_m)
         away = distance_transform_edt(~found.skeleton)
         # Half the window, and a border of 3 m.
         assert found.part[away < width_m / 2 + 2].all()
@@ -70,45 +70,28 @@ def test_the_brightest_inside_take_no_part(town: Town, tmp_path: Path) -> None:
     scene = scene_of(tmp_path / "a.tif", town.amplitude)
     shares = []
     for percent in (0.0, 10.0, 30.0):
-        found = find_ground(scene, high_percent=percent)
+        found = find_regions(scene, high_percent=percent)
         shares.append(found.select(scene.whole).part.sum() / found.part.sum())
     np.testing.assert_allclose(shares, [1.0, 0.9, 0.7], atol=0.02)
 
 
-def test_the_radar_shadow_of_what_stands_on_the_ground_takes_no_part(
-    town: Town, tmp_path: Path
-) -> None:
-    river = find_ground(scene_of(tmp_path / "a.tif", town.amplitude)).part & town.river
-    image = town.amplitude.copy()
-    rows, cols = np.nonzero(river)
-    shadows = np.zeros_like(river)
-    for row, col in list(zip(rows, cols, strict=True))[:: len(rows) // 12]:
-        shadows[row : row + 5, col : col + 5] = True
-    image[shadows] *= 0.3
-    found = find_ground(scene_of(tmp_path / "b.tif", image), low_percent=10.0)
-    chosen = found.select(found.scene.whole).part
-    inner = shadows & found.part & river
-    assert inner.sum() > 100
-    assert chosen[inner].mean() < 0.3 < 0.6 < chosen[river & ~shadows].mean()
-
-
 def test_windows_are_cut_from_one_and_the_same_mask(ground: GroundRegions) -> None:
-    whole = ground.cut(ground.part, ground.scene.whole).part
+    whole = ground.image.select(ground.part, ground.image.scene.whole).part
     np.testing.assert_array_equal(whole, ground.part)
     window = Window(35, 120, 90, 77)
-    part = ground.cut(ground.part, window).part
+    part = ground.image.select(ground.part, window).part
     np.testing.assert_array_equal(part, whole[120:197, 35:125])
-    beyond = ground.cut(ground.part, Window(-20, 390, 50, 40)).part
+    beyond = ground.image.select(ground.part, Window(-20, 390, 50, 40)).part
     assert not beyond[:, :20].any() and not beyond[10:].any()
 
 
 def test_larger_scenes_are_looked_at_with_larger_pixels(
     town: Town, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(regions_module, "_MOST_PIXELS", 100 * 100 * 4)
-    found = find_ground(scene_of(tmp_path / "a.tif", town.amplitude))
-    assert found.factor == 2 and found.part.shape == (200, 200)
-    chosen = found.select(found.scene.whole)
+    monkeypatch.setattr(reduced, "_MOST_PIXELS", 100 * 100 * 4)
+    found = find_regions(scene_of(tmp_path / "a.tif", town.amplitude))
+    assert found.image.factor == 2 and found.part.shape == (200, 200)
+    chosen = found.select(found.image.scene.whole)
     assert chosen.part.shape == (400, 400)
     assert chosen.part[town.river].mean() > 0.5
     assert chosen.part[town.roofs].mean() < 0.1
@@ -118,33 +101,12 @@ def test_what_holds_no_data_takes_no_part(town: Town, tmp_path: Path) -> None:
     image = town.amplitude.copy()
     image[:, :100] = 0
     scene = scene_of(tmp_path / "a.tif", image, nodata=0)
-    assert not find_ground(scene).select(scene.whole).part[:, :100].any()
+    assert not find_regions(scene).select(scene.whole).part[:, :100].any()
     with pytest.raises(RasterContentError, match="no valid pixels"):
-        find_ground(scene_of(tmp_path / "b.tif", np.zeros_like(image), nodata=0))
+        find_regions(scene_of(tmp_path / "b.tif", np.zeros_like(image), nodata=0))
 
 
 def test_without_any_ground_nothing_takes_part(tmp_path: Path) -> None:
     noise = np.random.default_rng(0).lognormal(5, 1.5, (200, 200)).astype(np.float32)
-    found = find_ground(scene_of(tmp_path / "a.tif", noise))
+    found = find_regions(scene_of(tmp_path / "a.tif", noise))
     assert found.part.mean() < 0.02 and found.skeleton_m < 50
-
-
-def test_in_a_dense_town_bright_ground_between_shadow_and_layover_takes_part(
-    tmp_path: Path,
-) -> None:
-    # The radar looks to the right: rows of buildings, of which it shows layover, then shadow.
-    level_db = np.full((480, 480), 50.0)
-    for col in range(0, 480, 60):
-        level_db[:, col : col + 13] = 60
-        level_db[:, col + 13 : col + 28] = 35
-    level_db[::60] = 50
-    level_db[185:295, 240:255], level_db[185:295, 285:300] = 35, 60
-    level_db[185:295, 255:285] = 54.5
-    speckle = np.random.default_rng(1).gamma(4, 1 / 4, level_db.shape)
-    amplitude = np.sqrt(10 ** (level_db / 10) * speckle).astype(np.float32)
-    scene = scene_of(tmp_path / "a.tif", amplitude)
-    square, street = np.s_[190:290, 264:276], np.s_[70:170, 43:48]
-    assert find_ground(scene).part[square].mean() < 0.1
-    found = find_ground(scene, is_town=True).select(scene.whole).part
-    assert found[square].mean() > 0.9 and found[street].mean() > 0.9
-    assert found[level_db == 35].mean() < 0.01 and found[level_db == 60].mean() < 0.05

@@ -49,14 +49,6 @@ def test_check_surfaces_are_those_of_the_check_points(pair: ImagePair, context: 
     assert len(check.surfaces) == len(check.points)
 
 
-def test_all_check_chips_together_lie_where_the_truth_does(
-    pair: ImagePair, context: Context
-) -> None:
-    assert checked(pair, shift_on_map(70.0, -45.0), context).common_shift_px < 0.3
-    off = checked(pair, shift_on_map(70.0 + 30.0, -45.0 + 40.0), context)
-    assert abs(off.common_shift_px - 5.0) < 0.5
-
-
 def test_few_check_chips_with_content(
     textured: TexturedPair, tmp_path: Path, context: Context
 ) -> None:
@@ -69,5 +61,4 @@ def test_few_check_chips_with_content(
 
 
 def test_nothing_to_check_lies_nowhere(pair: ImagePair, context: Context) -> None:
-    none = checked(pair, shift_on_map(1e6, 0.0), context)
-    assert len(none.points) == 0 and none.common_shift_px == np.inf
+    assert len(checked(pair, shift_on_map(1e6, 0.0), context).points) == 0

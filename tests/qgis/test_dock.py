@@ -110,7 +110,7 @@ def test_a_refusal_says_why_and_what_to_try(desktop: Desktop, tmp_path: Path) ->
     assert "input was not registered to reference: " in start.verdict.text()
     assert start.report.isVisible()
     tries = start.tries
-    offered = (tries.wider, tries.turn, tries.bands, tries.ground)
+    offered = (tries.wider, tries.turn, tries.bands)
     assert [button.text() for button in offered if not button.isVisible()] == []
     assert "refused" in outcome.files["REPORT"].read_text(encoding="utf-8")
     desktop.picture("8_refused")
@@ -160,7 +160,7 @@ def test_what_a_refusal_offers_is_what_is_asked_for(
     desktop.register()
     tool, values = asked.pop()
     assert tool == "register"
-    assert not {"MASK", "SEARCH_RADIUS", "SEARCH_ROTATION", "INPUT_BAND"} & set(values)
+    assert not {"SEARCH_RADIUS", "SEARCH_ROTATION", "INPUT_BAND"} & set(values)
 
     assert tries.bands.isVisible()
     desktop.picture("12_what_to_try")
@@ -174,16 +174,10 @@ def test_what_a_refusal_offers_is_what_is_asked_for(
     assert "REFERENCE_BAND" not in values
     assert not tries.bands.isVisible()
 
-    tries.ground.click()
-    tool, values = asked.pop()
-    assert (tool, values["MASK"], values["INPUT_BAND"]) == ("coregister", "regions", 3)
-    assert not tries.ground.isVisible()
     tries.turn.click()
     tool, values = asked.pop()
-    assert (tool, values["SEARCH_ROTATION"]) == ("coregister", 180)
-    assert "MASK" not in values
+    assert (tool, values["SEARCH_ROTATION"], values["INPUT_BAND"]) == ("coregister", 180, 3)
     assert not tries.turn.isVisible()
-    assert tries.ground.isVisible()
 
     # Another input: its bands are not those that were set.
     start.input.setLayer(start.reference.currentLayer())

@@ -152,13 +152,12 @@ def test_a_tools_parameters_go_into_the_specification_and_the_report(
         "max_error": 2.5,
         "search_radius": 150.0,
         "search_rotation": None,
-        "mask": "none",
         "matching_pixel_size": None,
     }
     spec = specified(SAR_SAR, parameters)
     # Untouched pixels allow a shift only.
     assert (spec.model, spec.max_error_px, spec.search_radius_m) == ("translation", 2.5, 150.0)
-    assert (spec.rotation_deg, spec.scale, spec.mask) == (None, None, "none")
+    assert (spec.rotation_deg, spec.scale) == (None, None)
     assert (spec.matcher, spec.radar) == (SAR_SAR.matcher, SAR_SAR.radar)
     call = Call.of(parameters, delivery.SILENT)
     assert (call.bands, call.workers, call.parameters) == ((None, 1), 2, parameters)

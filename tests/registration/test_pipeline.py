@@ -117,7 +117,6 @@ def counting(monkeypatch: pytest.MonkeyPatch) -> Counter[tuple[str, object]]:
         "share_of_strong_scatterers": (scene_module, lambda scene: scene.like.path),
         "is_known_radar": (scene_module, lambda source: source.path),
         "find_ground": (masks, lambda scene: scene.like.path),
-        "shadow_azimuth_deg": (masks, lambda _: "shadow"),
     }
     for name, (module, key) in keys.items():
         function = getattr(module, name)
@@ -160,24 +159,17 @@ def test_each_fact_about_an_image_is_found_once(
         assert found == before
 
 
-@pytest.mark.parametrize("mask", ["none", "threshold", "regions"])
-def test_ground_is_found_once_whatever_takes_part_in_the_fit(
-    town: tuple[Path, Path], context: Context, monkeypatch: pytest.MonkeyPatch, mask: str
+def test_a_towns_ground_is_found_once_and_matched_by_one_joint_histogram(
+    town: tuple[Path, Path], context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    spec = replace(COREGISTER, mask=mask)
     found = counting(monkeypatch)
-    with open_pair(*town, spec, context) as pair:
-        scene = SceneInfo.of(pair.pair, spec.radar)
-        masked = mask_pair(pair, spec, scene, context)
-        assert masked.used.kind == mask
-        # What shows more than the ground is checked on the ground.
-        assert (masked.ground is None) == (mask == "regions")
+    with open_pair(*town, COREGISTER, context) as pair:
+        scene = SceneInfo.of(pair.pair, COREGISTER.radar)
+        masked = mask_pair(pair, COREGISTER, scene, context)
+        assert masked.used.kind == "ground" and masked.used.leaves_little
         assert Counter(name for name, _ in found)["find_ground"] == 1
-        stages = Stages.of(pair.images, masked, spec)
-        is_apart = stages.checker is not stages.matcher
-        assert is_apart == (mask != "regions")
-        is_pooled = is_apart or masked.used.leaves_little
-        assert isinstance(stages.checker, PooledHistogramMatcher) == is_pooled
+        stages = Stages.of(pair.images, masked, COREGISTER)
+        assert isinstance(stages.matcher, PooledHistogramMatcher)
 
 
 def test_matchers_are_put_together_by_name(textured: TexturedPair, context: Context) -> None:
@@ -189,7 +181,6 @@ def test_matchers_are_put_together_by_name(textured: TexturedPair, context: Cont
             stages = Stages.of(pair.images, masked, spec)
             assert isinstance(stages.fit, kind)
             assert isinstance(stages.matcher, ChipMatcher)
-            assert stages.checker is stages.matcher
             # All of them are blind to what is held out.
             assert stages.matcher.held_out is stages.held_out
 

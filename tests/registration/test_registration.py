@@ -32,7 +32,6 @@ def first_checks(registration: Registration, count: int) -> Registration:
     few = Check(
         check.points.take(slice(0, count)),  # type: ignore[arg-type]
         check.surfaces[:count],
-        check.common_shift_px,
     )
     return replace(registration, check=few)
 

@@ -43,7 +43,7 @@ from groundtie.errors import (
     TooFewPointsError,
 )
 from groundtie.geometry.estimation import Estimate
-from groundtie.masks.choice import REGIONS, SURFACE, MaskUsed
+from groundtie.masks.choice import GROUND, SURFACE, MaskUsed
 from groundtie.matching.rest import Rest
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
@@ -167,16 +167,12 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     ),
     "uncertain transform": (evidence(GOOD, loose(2.0)), evidence(GOOD, loose(1.0))),
     "too little ground": (
-        evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.08, "as in a dense town")),
-        evidence(GOOD, mask=MaskUsed(REGIONS, "reference", 0.12, "as in a dense town")),
+        evidence(GOOD, mask=MaskUsed(GROUND, "reference", 0.08, "as in a town")),
+        evidence(GOOD, mask=MaskUsed(GROUND, "reference", 0.12, "as in a town")),
     ),
     "surface model elsewhere": (
         evidence(GOOD, mask=MaskUsed(SURFACE, "reference", 0.3, "shows nothing", False)),
         evidence(GOOD, mask=MaskUsed(SURFACE, "reference", 0.3, "fits")),
-    ),
-    "ground elsewhere": (
-        evidence(GOOD, ground_shift_px=1.1),
-        evidence(GOOD, ground_shift_px=0.9),
     ),
     "despeckled town": (evidence(GOOD, scene=DESPECKLED), evidence(GOOD, scene=SPECKLED)),
     "town matched whole": (

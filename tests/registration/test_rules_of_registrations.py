@@ -27,7 +27,7 @@ from evidences import (
 )
 from scipy.stats import binom
 
-from groundtie.masks.choice import LAYER, REGIONS, SURFACE, THRESHOLD, MaskUsed
+from groundtie.masks.choice import GROUND, LAYER, SURFACE, MaskUsed
 from groundtie.matching.rest import Rest
 from groundtie.registration.evidence import Exchanged, RegistrationEvidence
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
@@ -56,7 +56,7 @@ def test_a_transform_whose_error_is_unknown_is_refused(folds: int) -> None:
 
 @pytest.mark.parametrize(
     ("more", "expected_px"),
-    [({}, 6.0), ({"mask": masked(REGIONS)}, 3.0), ({"layover_factor": 3.0}, 6.0 * math.sqrt(3))],
+    [({}, 6.0), ({"mask": masked(GROUND)}, 3.0), ({"layover_factor": 3.0}, 6.0 * math.sqrt(3))],
 )
 def test_heights_that_spread_evenly_displace_by_their_width(
     more: dict[str, Any], expected_px: float
@@ -68,14 +68,10 @@ def test_heights_that_spread_evenly_displace_by_their_width(
     assert abs(found @ RANGE) == pytest.approx(np.hypot(*found), rel=0.01)
 
 
-@pytest.mark.parametrize("kind", [REGIONS, LAYER, SURFACE])
+@pytest.mark.parametrize("kind", [GROUND, LAYER, SURFACE])
 def test_a_town_whose_ground_was_matched_is_not_suspected(kind: str) -> None:
     found = evidence(two_thirds(20), scene=PERHAPS, mask=masked(kind))
     assert "town matched whole" not in refusing(found)
-
-
-def test_a_town_whose_ground_confirms_is_not_suspected() -> None:
-    assert refusing(evidence(two_thirds(20), scene=PERHAPS, is_ground_checked=True)) == []
 
 
 def test_an_image_of_fields_is_not_suspected() -> None:
@@ -101,13 +97,11 @@ def test_the_input_shows_elevated_objects_where_the_surface_model_has_them(
     assert decided is None or (reason is not None and reason in decided[1])
 
 
-def test_ground_must_be_reliable_and_span_the_overlap() -> None:
-    regions = MaskUsed(REGIONS, "reference", 0.3, "as in a dense town")
-    assert refusing(evidence(GOOD, mask=regions)) == []
-    doubted = replace(regions, is_reliable=False)
-    assert refusing(evidence(GOOD, mask=doubted)) == ["too little ground"]
+def test_ground_must_span_the_overlap() -> None:
+    ground = MaskUsed(GROUND, "reference", 0.3, "as in a town")
+    assert refusing(evidence(GOOD, mask=ground)) == []
     narrow = estimated(fit_points(within=(0.6, 0.6)))
-    assert refusing(evidence(GOOD, narrow, mask=regions)) == ["too little ground"]
+    assert refusing(evidence(GOOD, narrow, mask=ground)) == ["too little ground"]
     assert refusing(evidence(GOOD, narrow)) == []
 
 
@@ -123,13 +117,13 @@ def test_ground_must_be_reliable_and_span_the_overlap() -> None:
 def test_an_oblique_view_without_colours_needs_more_check_points_on_the_ground(
     agreeing: int, has_colours: bool, expected: list[str]
 ) -> None:
-    regions = MaskUsed(REGIONS, "reference", 0.3, "as in a dense town")
+    ground = MaskUsed(GROUND, "reference", 0.3, "as in a town")
     camera = facts(is_in_sensor_geometry=True, has_colours=has_colours)
     oblique = scene(facts(variation2=0.25, strong_share=0.2), camera)
-    assert refusing(evidence(scatter(agreeing, 0.3), mask=regions, scene=oblique)) == expected
+    assert refusing(evidence(scatter(agreeing, 0.3), mask=ground, scene=oblique)) == expected
 
 
-@pytest.mark.parametrize("kind", [REGIONS, LAYER, SURFACE])
+@pytest.mark.parametrize("kind", [GROUND, LAYER, SURFACE])
 def test_little_ground_may_be_weakly_similar(kind: str) -> None:
     """A mask leaves little of each chip; other rules judge what it leaves."""
     weak = survey(height=1.9, rival=1.8)
@@ -233,11 +227,11 @@ def test_what_is_high_at_both_places_repeats() -> None:
 
 @pytest.mark.parametrize(
     ("kind", "expected"),
-    [(LAYER, []), (SURFACE, []), (REGIONS, ["despeckled town"]), (THRESHOLD, [])],
+    [(LAYER, []), (SURFACE, []), (GROUND, ["despeckled town"])],
 )
 def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list[str]) -> None:
-    """Regions of a camera's image that pass for a radar's are no ground."""
-    assert refusing(evidence(GOOD, scene=PERHAPS, mask=masked(kind))) == expected
+    despeckled = scene(facts(is_known_radar=True, strong_share=0.25))
+    assert refusing(evidence(GOOD, scene=despeckled, mask=masked(kind))) == expected
 
 
 @pytest.mark.parametrize(("agreeing", "is_needed"), [(5, True), (6, False), (9, False)])

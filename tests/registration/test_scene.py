@@ -27,9 +27,8 @@ from groundtie.registration.specification import BOTH, NEITHER
         (TOWN, FIELDS, True),
         (FIELDS, TOWN, True),
         (FIELDS, FIELDS, False),
-        # Filters dim a town; so less is enough for doubt than for a mask.
         (grey_values(0.1, 0.01), FIELDS, True),
-        (grey_values(0.08, 0.01), FIELDS, False),
+        (grey_values(0.06, 0.01), FIELDS, False),
         # Speckle shows which is the radar's: what the camera shows does not matter.
         (speckled(0.02), TOWN, False),
         (speckled(0.1), FIELDS, True),
@@ -40,7 +39,7 @@ def test_what_is_bright_may_be_a_town(
     tmp_path: Path, reference: np.ndarray, input: np.ndarray, expected: bool
 ) -> None:
     with opened(tmp_path, reference, input) as pair:
-        assert SceneInfo.of(pair).may_be_dense_town == expected
+        assert SceneInfo.of(pair).may_be_town == expected
 
 
 def test_whoever_names_the_radar_image_is_believed(tmp_path: Path) -> None:
@@ -48,36 +47,35 @@ def test_whoever_names_the_radar_image_is_believed(tmp_path: Path) -> None:
         for declared, is_town in ((REFERENCE, True), (INPUT, False)):
             info = SceneInfo.of(pair, declared)
             assert info.is_radar_and_camera and info.radar_name == declared
-            assert info.may_be_dense_town == is_town
+            assert info.may_be_town == is_town
             assert info.radar is info.of_name(declared) and info.other is not info.radar
         assert not SceneInfo.of(pair).is_radar_and_camera
         # Two images of a camera's hide no radar's.
-        assert not SceneInfo.of(pair, "neither").may_be_dense_town
+        assert not SceneInfo.of(pair, "neither").may_be_town
 
 
 @pytest.mark.parametrize(
-    ("reference", "declared", "by_regions", "expected"),
+    ("reference", "declared", "expected"),
     [
-        # Named, or the ground of it matched: it is a radar's, and has no speckle.
-        (TOWN, REFERENCE, False, True),
-        (TOWN, REFERENCE, True, True),
-        (TOWN, "auto", False, False),
-        (FIELDS, REFERENCE, False, False),
-        (speckled(0.25), "auto", True, False),
+        # Named, it is a radar's, and has no speckle.
+        (TOWN, REFERENCE, True),
+        (TOWN, "auto", False),
+        (FIELDS, REFERENCE, False),
+        (speckled(0.25), "auto", False),
     ],
 )
 def test_the_ground_of_a_town_is_found_by_its_speckle(
-    tmp_path: Path, reference: np.ndarray, declared: str, by_regions: bool, expected: bool
+    tmp_path: Path, reference: np.ndarray, declared: str, expected: bool
 ) -> None:
     with opened(tmp_path, reference, FIELDS) as pair:
-        assert SceneInfo.of(pair, declared).is_despeckled_town(by_regions) == expected
+        assert SceneInfo.of(pair, declared).is_despeckled_town == expected
 
 
 def test_a_users_mask_needs_no_speckle() -> None:
     town = facts(is_known_radar=True, strong_share=0.25)
     for has_mask in (False, True):
         info = SceneInfo(town, facts(), has_user_mask=has_mask)
-        assert info.is_despeckled_town(False) != has_mask
+        assert info.is_despeckled_town != has_mask
 
 
 @pytest.mark.parametrize("looks", [1, 4, 20])
@@ -143,8 +141,8 @@ def test_facts_are_found_when_asked_for_and_never_again(
         info = SceneInfo.of(pair)
         assert asked == [] and info.summary() == {} and info.facts() == {}
         for _ in range(2):
-            assert info.is_radar_and_camera and info.is_dense_town and info.may_be_dense_town
-            assert not info.is_despeckled_town(True) and not info.are_both_radar
+            assert info.is_radar_and_camera and info.is_town and info.may_be_town
+            assert not info.is_despeckled_town and not info.are_both_radar
     # Of both images; what is bright in the camera's does not matter.
     assert sorted(asked) == sorted(
         ["variation2_of"] * 2 + ["is_known_radar"] * 2 + ["share_of_strong_scatterers"]

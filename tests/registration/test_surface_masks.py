@@ -104,9 +104,9 @@ def test_a_model_that_lies_off_is_moved_to_where_the_reference_shows_it(
     city: Path, stack: ExitStack, tmp_path: Path, context: Context
 ) -> None:
     pair = pair_of(city, stack)
-    right = with_surface_mask(pair, stated(city), "auto", stack, context)
+    right = with_surface_mask(pair, stated(city), stack, context)
     model = moved(city / "dsm.tif", tmp_path / "moved.tif", 7.0, 4.0)
-    off = with_surface_mask(pair, stated(city, model), "auto", stack, context)
+    off = with_surface_mask(pair, stated(city, model), stack, context)
     assert (right.used.kind, right.used.image) == (SURFACE, REFERENCE)
     assert right.used.is_ground and right.used.is_reliable and right.used.leaves_little
     assert off.used.share == pytest.approx(right.used.share, abs=1e-3)
@@ -124,7 +124,7 @@ def test_a_model_of_another_city_is_not_found(
     city: Path, other_city: Path, stack: ExitStack, context: Context
 ) -> None:
     other = stated(city, other_city / "dsm.tif")
-    used = with_surface_mask(pair_of(city, stack), other, "none", stack, context).used
+    used = with_surface_mask(pair_of(city, stack), other, stack, context).used
     assert not used.is_reliable and "shows nothing" in used.reason
 
 
@@ -153,20 +153,18 @@ def test_nothing_is_expected_of_a_camera_without_the_sun(
     right, pair = stated(city), pair_of(city, stack, turned=True)
     camera = replace(right.views[1], sun_azimuth_deg=None, sun_elevation_deg=None)
     turned = replace(right, views=(camera, right.views[0]))
-    masked = with_surface_mask(pair, turned, "auto", stack, context)
+    masked = with_surface_mask(pair, turned, stack, context)
     assert masked.used.is_reliable and "moved" not in masked.used.reason
     assert masked.surface is not None and masked.surface.offset_px == (0, 0)
 
 
-def test_another_mask_or_a_model_of_nowhere_is_refused(
+def test_a_model_of_nowhere_is_refused(
     city: Path, stack: ExitStack, tmp_path: Path, context: Context
 ) -> None:
     pair = pair_of(city, stack)
-    with pytest.raises(ParameterError, match="either mask=regions or a surface model"):
-        with_surface_mask(pair, stated(city), "regions", stack, context)
     far = stated(city, moved(city / "dsm.tif", tmp_path / "far.tif", 50_000, 0))
     with pytest.raises(NoOverlapError, match="does not cover"):
-        with_surface_mask(pair, far, "auto", stack, context)
+        with_surface_mask(pair, far, stack, context)
 
 
 def test_views_tell_which_image_is_a_radars() -> None:

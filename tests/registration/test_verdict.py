@@ -23,6 +23,7 @@ from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.models import PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
+from groundtie.masks.choice import MaskUsed
 from groundtie.registration.evidence import (
     AGREEMENT,
     ERROR,
@@ -199,14 +200,15 @@ def test_a_refusal_names_its_rule_and_what_to_try() -> None:
 
 
 def test_the_first_rule_that_refuses_decides() -> None:
-    """Neither do these points agree, nor does the ground match; agreement is asked first."""
-    assert judge(evidence(fallen(72), ground_shift_px=9.0)).rule == "chance agreement"
+    """Neither do these points agree, nor is there enough ground; agreement is asked first."""
+    little = MaskUsed("ground", "reference", 0.05, "as in a town")
+    assert judge(evidence(fallen(72), mask=little)).rule == "chance agreement"
     errors = scatter(72, 0.3) + [1.2, 0.0]
-    found = judge(evidence(errors, max_error_px=1.0, ground_shift_px=9.0))
+    found = judge(evidence(errors, max_error_px=1.0, mask=little))
     assert found.rule == "error at held-out points"
     # What is refused for its error or its scene has figures all the same.
     assert found.check_rmse_px > 1
-    assert judge(evidence(errors, ground_shift_px=9.0)).check_rmse_px > 1
+    assert judge(evidence(errors, mask=little)).check_rmse_px > 1
 
 
 def test_a_search_that_failed_is_a_refusal_and_bad_input_is_not() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import fiona
@@ -15,7 +14,7 @@ from raster_files import write_raster
 from specified_runs import register_specified
 from tools.conftest import SimulatedFiles
 
-from groundtie.errors import NotRegisteredError, ParameterError
+from groundtie.errors import NotRegisteredError
 from groundtie.registration.specification import COREGISTER
 from groundtie.tools.coregister import coregister
 from groundtie.tools.filter_speckle import filter_speckle
@@ -23,35 +22,11 @@ from groundtie.tools.simulate import simulate
 
 
 @pytest.mark.slow
-def test_a_threshold_mask_is_used_and_reported(
+def test_fields_are_left_without_a_mask(
     simulated: Callable[[str], SimulatedFiles], tmp_path: Path
 ) -> None:
     pair = simulated("shift")
-    result = coregister(pair.reference, pair.input, tmp_path / "out.tif", mask="threshold")
-    mask = result.mask
-    assert (mask.kind, mask.image) == ("threshold", "reference")
-    assert mask.share == pytest.approx(0.8, abs=0.02)
-    assert pair.error_px(result.transform) < 0.5
-
-
-@pytest.mark.slow
-def test_either_image_can_be_masked(simulated: Callable[[str], SimulatedFiles]) -> None:
-    """The optical image is the reference here: the radar's is found all the same."""
-    pair = simulated("shift")
-    for image, expected in (("auto", "input"), ("reference", "reference")):
-        spec = replace(COREGISTER, mask="threshold", radar=image)
-        mask = register_specified(spec, pair.input, pair.reference).mask
-        assert mask.image == expected
-        assert mask.share == pytest.approx(0.8, abs=0.06)
-
-
-@pytest.mark.slow
-def test_fields_are_left_without_a_mask_by_auto(
-    simulated: Callable[[str], SimulatedFiles], tmp_path: Path
-) -> None:
-    pair = simulated("shift")
-    result = coregister(pair.reference, pair.input, tmp_path / "out.tif", mask="auto")
-    mask = result.mask
+    mask = coregister(pair.reference, pair.input, tmp_path / "out.tif").mask
     assert mask.kind == "none" and "too few buildings" in mask.reason
 
 
@@ -78,14 +53,6 @@ def test_a_layer_does_the_same_job(
     xy = result.tie_points.take(result.tie_points.used).reference_xy
     # Chips may lie across the border, but none beyond it.
     assert np.all(xy[:, 0] < right + 60)
-    with pytest.raises(ParameterError, match="either mask=threshold or a vector layer"):
-        coregister(
-            pair.reference,
-            pair.input,
-            tmp_path / "other.tif",
-            mask="threshold",
-            reference_mask=layer,
-        )
 
 
 @pytest.fixture(scope="module")
@@ -110,9 +77,15 @@ def test_a_dense_city_is_registered_by_its_ground(
 ) -> None:
     result = coregister(open_city.reference, open_city.input, tmp_path / "out.tif")
     mask = result.mask
-    assert (mask.kind, mask.image) == ("regions", "reference")
+    assert (mask.kind, mask.image) == ("ground", "reference")
     assert mask.share < 0.3
     assert open_city.error_px(result.transform) < 2
+
+
+@pytest.mark.slow
+def test_either_image_may_be_the_radars(open_city: SimulatedFiles) -> None:
+    mask = register_specified(COREGISTER, open_city.input, open_city.reference).mask
+    assert (mask.kind, mask.image) == ("ground", "input")
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +107,7 @@ def test_a_city_without_speckle_is_refused(open_city: SimulatedFiles, tmp_path: 
     with pytest.raises(NotRegisteredError, match="has no speckle"):
         coregister(filtered, open_city.input, tmp_path / "out.tif", report=report)
     told = json.loads(report.with_suffix(".json").read_text())
-    assert (told["mask"]["kind"], told["mask"]["image"]) == ("regions", "reference")
+    assert (told["mask"]["kind"], told["mask"]["image"]) == ("ground", "reference")
 
 
 @pytest.mark.slow
@@ -152,11 +125,3 @@ def test_where_nothing_tells_the_radar_few_who_agree_are_not_enough(
     # Both rules apply: what heights may displace, and the few who agree.
     assert told["verdict"]["rule"] in ("uncertain transform", "town matched whole")
     assert told["mask"]["kind"] == "none"
-
-
-@pytest.mark.slow
-def test_its_buildings_alone_are_refused(city: SimulatedFiles, tmp_path: Path) -> None:
-    """They agree with each other at check points, too: only the ground contradicts."""
-    with pytest.raises(NotRegisteredError):
-        coregister(city.reference, city.input, tmp_path / "out.tif", mask="none")
-    assert not (tmp_path / "out.tif").exists()

@@ -206,7 +206,7 @@ def test_damaged_files_are_named(
         ({"reference_band": 2}, BandError, "reference.tif has no band 2"),
         ({"input_band": 9}, BandError, "input.tif has no band 9"),
         ({"model": "affine", "output_grid": "untouched"}, ParameterError, "untouched"),
-        ({"mask": "best"}, ParameterError, "mask"),
+        ({"output_grid": "best"}, ParameterError, "best"),
         ({"max_error": 0}, ParameterError, "0.1 to 100"),
         ({"search_radius": -1}, ParameterError, "at least 0"),
         ({"tie_points": "points.shp"}, ParameterError, "points.shp"),

@@ -45,13 +45,6 @@ def test_points_lie_where_the_true_rpcs_see_them(scene: Scene, tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_a_mask_by_thresholds_can_be_asked_for(scene: Scene, tmp_path: Path) -> None:
-    result = call(scene, tmp_path / "gcps.csv", mask="threshold")
-    assert result.mask.kind == "threshold"
-    assert result.mask.share == pytest.approx(0.8, abs=0.02)
-
-
-@pytest.mark.slow
 def test_what_a_classifier_leaves_out_of_the_image_takes_no_part(
     scene: Scene, tmp_path: Path
 ) -> None:

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -99,22 +98,24 @@ def test_another_place_is_refused_and_leaves_its_report_only(tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("radar", "refused"), [(True, True), (False, False)])
-def test_a_radar_image_that_may_show_a_dense_town_is_in_doubt(
-    files: TexturedPair,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    radar: bool,
-    refused: bool,
+@pytest.mark.parametrize("is_radar", [True, False])
+def test_a_radar_image_that_may_show_a_town_is_in_doubt(
+    files: TexturedPair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_radar: bool
 ) -> None:
-    monkeypatch.setattr(SceneInfo, "is_radar_and_camera", radar)
-    # Too few strong scatterers for a mask of the ground, too many for a town to be ruled out.
+    """Refused as a whole, it is tried by its ground, which counts."""
+    monkeypatch.setattr(SceneInfo, "is_radar_and_camera", is_radar)
+    monkeypatch.setattr(SceneInfo, "is_despeckled_town", False)
+    # Too few strong scatterers for a town, too many for one to be ruled out.
     monkeypatch.setattr(ImageFacts, "strong_share", 0.1)
     monkeypatch.setattr(scene_rules, "_CLEAR_SHARE", 1.1)
-    expected = pytest.raises(NotRegisteredError, match="as roofs may") if refused else nullcontext()
-    with expected:
-        match_optical(files.reference, files.input, tmp_path / "out.tif")
-    assert (tmp_path / "out.tif").exists() == (not refused)
+    found = match_optical(files.reference, files.input, tmp_path / "out.tif")
+    expected = ("ground", 2) if is_radar else ("none", 1)
+    assert (found.mask.kind, found.spec.tries) == expected
+    if is_radar:
+        monkeypatch.setattr(scene_rules, "_LEAST_GROUND_SHARE", 1.1)
+        with pytest.raises(NotRegisteredError, match="as roofs may"):
+            match_optical(files.reference, files.input, tmp_path / "other.tif")
+        assert not (tmp_path / "other.tif").exists()
 
 
 @pytest.mark.slow

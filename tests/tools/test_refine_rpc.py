@@ -38,7 +38,6 @@ def test_a_reference_and_a_terrain_model_make_the_rpcs_right(scene: Scene, tmp_p
         scene.reference,
         dem=scene.dem,
         dem_datum="ellipsoidal",
-        mask="auto",
         residuals=tmp_path / "residuals.gpkg",
         report=tmp_path / "report.html",
     )
@@ -57,7 +56,7 @@ def test_a_reference_and_a_terrain_model_make_the_rpcs_right(scene: Scene, tmp_p
     numbers = json.loads((tmp_path / "report.json").read_text())
     assert numbers["verdict"]["check_rmse_px"] == result.verdict.check_rmse_px
     assert numbers["bias"]["model"] == result.adjustment.bias.kind
-    assert numbers["parameters"]["mask"] == "auto"
+    assert numbers["parameters"]["dem_datum"] == "ellipsoidal"
     import fiona
 
     with fiona.open(tmp_path / "residuals.gpkg") as layer:
@@ -119,7 +118,6 @@ def test_a_small_dense_town_is_right_by_colours_and_refused_without(tmp_path: Pa
             tmp_path / "sensor.tif",
             output,
             tmp_path / "reference.tif",
-            mask="regions",
             search_radius=60.0,
             dem=tmp_path / "dem.tif",
             dem_datum="ellipsoidal",

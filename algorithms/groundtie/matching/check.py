@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..context import Context
 from ..geometry.models import Model
 from ..geometry.tie_points import TiePoints
@@ -28,13 +26,10 @@ class Check:
         The check points, in the order of the surfaces.
     surfaces
         Their similarity surfaces, shape (n, 2 r + 1, 2 r + 1).
-    common_shift_px
-        Distance between the model and where all check chips together match best.
     """
 
     points: TiePoints
     surfaces: Surfaces
-    common_shift_px: float
 
 
 def check_model(
@@ -62,5 +57,4 @@ def check_model(
     matched = matcher.seeing_all().match(model, places, CHECK_RADIUS_PX, context)
     surfaces = matcher.for_check(matched, layout)
     points = check_points(matcher.pair, surfaces, model)
-    shift_px = float(np.hypot(*surfaces.common_shift_px)) if len(points) else np.inf
-    return Check(points, surfaces.combined, shift_px)
+    return Check(points, surfaces.combined)

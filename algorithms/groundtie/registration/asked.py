@@ -105,13 +105,12 @@ def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specifica
 
 
 def searched(preset: Specification, given: Mapping[str, Any], image: str) -> Specification:
-    """Return a preset with the limits, the mask and the surface model that a tool was given."""
+    """Return a preset with the limits and the surface model that a tool was given."""
     surface = asked_surface(given, image)
     return replace(
         preset if surface is None else preset.with_surface(surface),
         max_error_px=given["max_error"],
         search_radius_m=given["search_radius"],
-        mask=given["mask"],
         matching_pixel_size_m=given["matching_pixel_size"],
     )
 

@@ -157,12 +157,12 @@ def _first_accepted(
         ways = ways or plan(scene, is_georeferenced)
         if asked["dem"] is not None:
             ways = tuple(way for way in ways if way.spec.matcher == CHIPS)
-        found = []
+        found, tries = [], 0
         for number, way in enumerate(ways, start=1):
             part = context.part((number - 1) / len(ways), number / len(ways))
-            spec = replace(way.spec, **asked, tries=number)
+            spec = replace(way.spec, **asked, tries=tries + 1)
             found.append(run(call.with_limits(opened, spec, part), spec, part, scene))
-            verdict = found[-1].verdict
+            verdict, tries = found[-1].verdict, found[-1].spec.tries
             tried.append(_line(way.name, way.because, verdict))
             is_final = verdict.accepted or verdict.rule in _FINAL
             if is_final:
@@ -237,5 +237,4 @@ _RPC_DEFAULTS: Mapping[str, Any] = {
     **dict.fromkeys(("gcps", "geoid", "height", "rpc", "search_radius", "matching_pixel_size")),
     "dem_cover": 0.0,
     "model": AUTO,
-    "mask": AUTO,
 }

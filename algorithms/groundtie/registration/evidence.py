@@ -23,7 +23,7 @@ from ..geometry.estimation import Estimate, jackknife_spread
 from ..geometry.judging import CE90_FACTOR, LARGEST_LOG10_CHANCE, SMALLEST_INLIER_SHARE
 from ..geometry.misses import Misses
 from ..geometry.tie_points import TiePoints
-from ..masks.choice import NONE, REGIONS, MaskUsed
+from ..masks.choice import GROUND, NONE, MaskUsed
 from ..matching.bands import BandSurvey
 from ..matching.rest import Rest
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
@@ -40,7 +40,7 @@ SURVEY, REFINEMENT, SERIES = "survey", "refinement", "series"
 # Scatter along a line is that of heights unless chance explains it with more than 5 %, as usual.
 _LOG10_FIVE_PERCENT = math.log10(0.05)
 
-# The ground of a dense town that is found in its radar image holds some of what is elevated: it
+# The ground of a town that is found in its radar image holds some of what is elevated: it
 # displaces all points alike, by so many matching pixels along an axis (standard deviation), of
 # whatever size they are. Measured by the suite calibration, classes city, seeds 400 to 439.
 TOWN_GROUND_PX = 0.5
@@ -201,10 +201,6 @@ class RegistrationEvidence:
         Largest root mean square error at check points, in matching pixels.
     radius_px
         Radius of the search for check points.
-    ground_shift_px
-        How far off the ground alone matches better, where it did not take part alone in the fit.
-    is_ground_checked
-        Whether check points were matched on the ground of a dense town.
     layover_factor
         How many times what heights scatter matched points by, they displace the model; None: not
         two radar images.
@@ -230,8 +226,6 @@ class RegistrationEvidence:
     max_error_px: float
     radius_px: int
     tries: int = 1
-    ground_shift_px: float = 0.0
-    is_ground_checked: bool = False
     layover_factor: float | None = None
     scene: SceneInfo | None = None
     mask: MaskUsed = field(default_factory=lambda: MaskUsed(NONE, None, 1.0, ""))
@@ -304,9 +298,8 @@ class RegistrationEvidence:
 
     @property
     def common(self) -> Common:
-        """What displaces all points alike: heights, and what is no ground of a dense town's."""
-        is_town = self.mask.kind == REGIONS and self.scene is not None and self.scene.is_dense_town
-        return Common(self._heights_px, TOWN_GROUND_PX if is_town else 0.0)
+        """What displaces all points alike: heights, and what is no ground of a town's."""
+        return Common(self._heights_px, TOWN_GROUND_PX if self.mask.kind == GROUND else 0.0)
 
     @cached_property
     def _heights_px(self) -> FloatArray:

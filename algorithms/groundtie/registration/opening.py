@@ -14,7 +14,6 @@ from ..masks.choice import MaskUsed
 from ..rasters.pair import Image, ImagePair, coarser_m, make_pair
 from ..rasters.reading import open_raster
 from ..rasters.rendered import rendered
-from .masks import require_one_mask
 from .specification import Specification
 from .surface_masks import rendered_surface
 from .user_masks import named_masks, with_user_masks
@@ -125,7 +124,6 @@ def pair_images(
     for note in (*_reach_notes(images, radius_m), *images.notes()):
         context.update(0.0, note)
     pair, used = with_user_masks(images, named_masks(masks), stack, context.part(0.0, 0.02))
-    require_one_mask(spec.mask, used)
     return OpenPair(images, pair, used, stack, started)
 
 

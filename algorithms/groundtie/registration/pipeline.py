@@ -12,11 +12,10 @@ import numpy as np
 
 from ..context import Context
 from ..errors import NoOverlapError, NothingFoundError, TooFewPointsError
-from ..kinds import AUTO
 from ..masks.choice import NONE, MaskUsed
 from ..rasters.reading import bounded_cache
 from .evidence import Exchanged, RegistrationEvidence, SearchEvidence
-from .masks import Masked, with_ground_mask
+from .masks import Masked, of_ground, with_ground_mask
 from .opening import OpenPair
 from .registration import Registration
 from .scene import SceneInfo
@@ -52,19 +51,39 @@ def run(
 def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: Context) -> Masked:
     """Return the pair with all masks: the user's, and that of the radar image if one is needed."""
     if spec.surface is not None:
-        return with_surface_mask(opened.pair, spec.surface, spec.mask, opened.stack, context)
+        return with_surface_mask(opened.pair, spec.surface, opened.stack, context)
     if opened.user_mask is not None:
         return Masked(opened.pair, opened.user_mask)
-    if spec.surface_view is not None and spec.mask in (AUTO, NONE):
+    if spec.surface_view is not None:
         reason = "the surface model is rendered with the layover of the radar image"
         return Masked(opened.pair, MaskUsed(NONE, None, 1.0, reason))
-    return with_ground_mask(opened.pair, spec.mask, scene, opened.stack, context)
+    return with_ground_mask(opened.pair, scene, opened.stack, context)
 
 
 def register(
     opened: OpenPair, masked: Masked, scene: SceneInfo, spec: Specification, context: Context
 ) -> Registration:
-    """Register a pair whose masks and facts are found; parameters as `run` and its stages."""
+    """Register a pair whose masks and facts are found; parameters as `run` and its stages.
+
+    What may be a town, and is refused as a whole, is tried again by its ground.
+    """
+    found = _register_once(opened, masked, scene, spec, context)
+    if found.verdict.accepted or not _may_be_matched_by_ground(masked, scene, spec):
+        return found
+    ground = of_ground(opened.pair, scene, opened.stack, context.quiet())
+    spec = replace(spec, tries=spec.tries + 1)
+    again = _register_once(opened, ground, scene, spec, context.quiet())
+    return again if again.verdict.accepted else replace(found, spec=spec)
+
+
+def _may_be_matched_by_ground(masked: Masked, scene: SceneInfo, spec: Specification) -> bool:
+    is_whole = masked.used.kind == NONE and not scene.has_user_mask and not spec.is_rendered
+    return is_whole and scene.is_radar_and_camera and scene.may_be_town
+
+
+def _register_once(
+    opened: OpenPair, masked: Masked, scene: SceneInfo, spec: Specification, context: Context
+) -> Registration:
     stages = Stages.of(opened.images, masked, spec)
     result = Registration(masked.pair, spec, scene, masked.used, started=opened.started)
     try:

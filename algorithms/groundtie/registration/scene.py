@@ -10,8 +10,8 @@ from ..kinds import AUTO
 from ..masks.choice import (
     INPUT,
     REFERENCE,
-    is_dense,
-    is_perhaps_dense,
+    is_town,
+    may_be_town,
     share_of_strong_scatterers,
 )
 from ..masks.radar import LEAST_VARIATION2, LEAST_VARIATION2_RATIO, variation2_of
@@ -159,9 +159,9 @@ class SceneInfo:
         return Sensors.CAMERAS
 
     @property
-    def is_dense_town(self) -> bool:
-        """Whether the radar image of a pair with a camera's shows a dense town."""
-        return self.is_radar_and_camera and is_dense(self.radar.strong_share)
+    def is_town(self) -> bool:
+        """Whether the radar image of a pair with a camera's shows a town."""
+        return self.is_radar_and_camera and is_town(self.radar.strong_share)
 
     @property
     def is_grey_and_oblique(self) -> bool:
@@ -169,8 +169,8 @@ class SceneInfo:
         return self.input.is_in_sensor_geometry and not self.other.has_colours
 
     @property
-    def may_be_dense_town(self) -> bool:
-        """Whether an image may be a radar's of a dense town.
+    def may_be_town(self) -> bool:
+        """Whether an image may be a radar's of a town.
 
         Without its speckle a radar image cannot be distinguished from a camera's, with fewer
         strong scatterers; both images are checked then, unless they are declared to be a camera's.
@@ -178,30 +178,19 @@ class SceneInfo:
         if self.are_both_radar:
             return False
         if self.is_radar_and_camera:
-            return is_perhaps_dense(self.radar.strong_share)
+            return may_be_town(self.radar.strong_share)
         suspects = () if self.declared == NEITHER else (self.reference, self.input)
-        return any(is_perhaps_dense(one.strong_share) for one in suspects)
+        return any(may_be_town(one.strong_share) for one in suspects)
 
-    def is_despeckled_town(self, masked_by_regions: bool) -> bool:
-        """Whether a radar image of a dense town lacks the speckle that its ground is found by.
+    @property
+    def is_despeckled_town(self) -> bool:
+        """Whether a radar image that metadata name shows a town, and lacks speckle.
 
-        Speckle filters leave no number of looks that homogeneous areas are found by, and smooth
-        roofs, too.
-
-        Parameters
-        ----------
-        masked_by_regions
-            Whether regions of the radar image were taken for its ground.
+        Speckle filters leave no number of looks, and smooth roofs as they smooth the ground. A mask
+        of the user's needs no speckle.
         """
-        if self.has_user_mask:
-            return False
-        # Else a radar image is recognised by its very speckle.
-        is_named = self.declared in (REFERENCE, INPUT) or (
-            self.reference.is_known_radar or self.input.is_known_radar
-        )
-        if not masked_by_regions and not (is_named and self.is_radar_and_camera):
-            return False
-        return not self.radar.has_speckle and is_perhaps_dense(self.radar.strong_share)
+        is_despeckled = self.is_radar_and_camera and not self.radar.has_speckle
+        return is_despeckled and self.may_be_town and not self.has_user_mask
 
     def summary(self) -> dict[str, Any]:
         """Return the facts that were found, as values that JSON can carry; nothing is read."""

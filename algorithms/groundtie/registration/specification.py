@@ -100,8 +100,6 @@ class Specification:
         How far it may be rotated and scaled, either way; None: not at all, or as `free` has it.
     free
         What is searched where there is no georeferencing.
-    mask
-        One of `masks.choice.MASKS`.
     radar
         Which image is a radar's, "reference", "input", "both" or "neither", for tools that are
         made for such pairs; "auto": inferred from metadata and speckle.
@@ -135,7 +133,6 @@ class Specification:
     rotation_deg: float | None = None
     scale: float | None = None
     free: FreeSearch = FreeSearch()
-    mask: str = AUTO
     radar: str = AUTO
     surface: StatedSurface | None = None
     matching_pixel_size_m: float | None = None

@@ -60,9 +60,7 @@ class Stages:
     held_out
         What only check chips may see.
     matcher
-        Matches chips of the fit and, on reduced images, the coarse shift.
-    checker
-        Matches check chips: `matcher`, or another on the ground alone.
+        Matches chips of the fit, check chips and, on reduced images, the coarse shift.
     fit
         Fits the model.
     """
@@ -71,16 +69,12 @@ class Stages:
     spec: Specification
     held_out: HeldOut
     matcher: ChipMatcher | PooledHistogramMatcher
-    checker: ChipMatcher | PooledHistogramMatcher
     fit: Fit
 
     @classmethod
     def of(cls, images: ImagePair, masked: Masked, spec: Specification) -> Stages:
         """Put the stages together; `images` have no masks."""
         held_out = HeldOut.of(images)
-
-        def pooled(pair: ImagePair) -> PooledHistogramMatcher:
-            return PooledHistogramMatcher.of(pair, held_out.layout.chip_px, held_out)
 
         settings = SimilaritySettings(spec.similarity)
         chips = ChipMatcher(masked.pair, settings, held_out)
@@ -90,10 +84,13 @@ class Stages:
             and masked.used.leaves_little
             and spec.similarity in ("fused", "nmi")
         )
-        matcher = pooled(masked.pair) if is_pooled else chips
-        checker = matcher if masked.ground is None else pooled(masked.ground)
+        matcher = (
+            PooledHistogramMatcher.of(masked.pair, held_out.layout.chip_px, held_out)
+            if is_pooled
+            else chips
+        )
         fit = _fit(images, masked.pair, matcher, held_out, spec)
-        return cls(masked, spec, held_out, matcher, checker, fit)
+        return cls(masked, spec, held_out, matcher, fit)
 
     def checked(self, context: Context) -> tuple[Estimate, Check]:
         """Return the estimate and its check points.
@@ -118,7 +115,7 @@ class Stages:
     def check(self, estimate: Estimate, context: Context) -> Check:
         """Match the check chips around what an estimate predicts."""
         model = estimate.transform.model
-        return check_model(self.checker, self.held_out.layout, model, context)
+        return check_model(self.matcher, self.held_out.layout, model, context)
 
     def survey(self, estimate: Estimate, scene: SceneInfo, context: Context) -> Surveys:
         """Match chips all over the pair, with what its masks leave, around what was estimated.
@@ -146,7 +143,6 @@ class Stages:
         scene: SceneInfo,
     ) -> RegistrationEvidence:
         """Return what the rules look at."""
-        is_apart = self.checker is not self.matcher
         is_radar = self.spec.radar == BOTH or scene.are_both_radar
         factor = (
             KEYPOINTS_MEAN_OVER_SCATTER
@@ -160,8 +156,6 @@ class Stages:
             self.spec.largest_error_px,
             CHECK_RADIUS_PX,
             self.spec.tries,
-            check.common_shift_px if is_apart else 0.0,
-            is_apart,
             factor if is_radar else None,
             scene,
             self.masked.used,

@@ -13,13 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..context import Context
-from ..errors import ParameterError
 from ..geometry.views import View
-from ..kinds import AUTO
-from ..masks.cast_shadow import products_at_shifts
-from ..masks.choice import NONE, REFERENCE, SURFACE, MaskUsed
+from ..masks.choice import REFERENCE, SURFACE, MaskUsed
 from ..masks.object_heights import RasterModel, SurfaceModel, read_footprints
 from ..masks.scene import Scene
+from ..masks.shadow_direction import products_at_shifts
 from ..masks.surface_model import SurfaceGround, write_image
 from ..rasters.atomic import scratch_folder
 from ..rasters.pair import Image, ImagePair
@@ -47,7 +45,7 @@ _DARKEST = np.float32(0.01)
 
 
 def with_surface_mask(
-    pair: ImagePair, stated: StatedSurface, kind: str, stack: ExitStack, context: Context
+    pair: ImagePair, stated: StatedSurface, stack: ExitStack, context: Context
 ) -> Masked:
     """Return a pair with a mask of the ground that both images show.
 
@@ -57,8 +55,6 @@ def with_surface_mask(
         The images, with the masks that the user gave.
     stated
         The surface model and the views.
-    kind
-        The mask that was asked for besides: "auto" or "none".
     stack
         Keeps rasters until it is closed.
     context
@@ -66,13 +62,9 @@ def with_surface_mask(
 
     Raises
     ------
-    ParameterError
-        Another mask is asked for, too.
     NoOverlapError
         The surface model covers nothing of the reference.
     """
-    if kind not in (AUTO, NONE):
-        raise ParameterError(f"give either mask={kind} or a surface model")
     ground, fit = fitted_ground(scene_of(pair, REFERENCE), stated, stack)
     masked, share = with_mask(pair, REFERENCE, ground.scene, ground.select, stack, context)
     reason = f"ground that both images show by {stated.name}{fit.note if fit else ''}"

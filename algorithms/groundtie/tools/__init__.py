@@ -30,6 +30,7 @@ NAMES = (
     "filter_speckle",
     "mask_surface",
     "mask_threshold",
+    "mask_ground",
     "mask_regions",
     "simulate",
     "simulate_sensor",

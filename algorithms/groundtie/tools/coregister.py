@@ -30,7 +30,6 @@ def coregister(
     reference_mask: registration.ReferenceMask = None,
     input_mask: registration.InputMask = None,
     mask_values: registration.MaskValues = None,
-    mask: registration.Mask = AUTO,
     dem: registration.TerrainDem = None,
     input_dem: registration.InputDem = None,
     surface_model: registration.SurfaceModel = None,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
-from ..kinds import AUTO, VectorOut
+from ..kinds import VectorOut
 from ..progress import SILENT, Progress
 from ..registration.sensor_jobs import GcpResult, extract_control
 from ..sensor.control_points import SUFFIXES
@@ -48,7 +48,6 @@ def extract_gcps(
     reference_band: general.ReferenceBand = None,
     reference_mask: registration.ReferenceMask = None,
     mask_values: registration.MaskValues = None,
-    mask: registration.Mask = AUTO,
     surface_model: registration.SurfaceModel = None,
     views: registration.SurfaceViews = None,
     matching_pixel_size: general.MatchingPixelSize = None,

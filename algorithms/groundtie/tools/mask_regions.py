@@ -8,8 +8,7 @@ from typing import Annotated
 
 from ..declaration import Output, tool
 from ..kinds import RasterOut
-from ..masks.choice import is_dense, share_of_strong_scatterers
-from ..masks.regions import HIGH_PERCENT, WIDTH_M, find_ground
+from ..masks.regions import HIGH_PERCENT, WIDTH_M, find_regions
 from ..masks.scene import Scene, write_mask
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
@@ -42,7 +41,7 @@ def mask_regions(
         RasterOut(label="Skeleton", help="GeoTIFF that is 1 on the skeleton of long regions."),
     ] = None,
     mask_width: general.MaskWidth = WIDTH_M,
-    mask_high_percent: general.HighPercent = None,
+    mask_high_percent: general.HighPercent = HIGH_PERCENT,
     band: general.RadarBand = None,
     progress: Progress = SILENT,
 ) -> WrittenMask:
@@ -50,25 +49,17 @@ def mask_regions(
 
     Speckle is filtered, regions grow from homogeneous seeds, and those stay that are long or large
     and neither bright nor radar shadow. Long ones are thinned to their skeleton and broadened by a
-    window; strong scatterers inside are masked. The mask is for the registration of this
-    image; `coregister` makes the same one itself if asked for regions.
+    window; strong scatterers inside are masked. The mask is for the registration of this image.
     """
-    high = HIGH_PERCENT if mask_high_percent is None else mask_high_percent
     files = {"mask": output, "regions": regions, "skeleton": skeleton}
     with bounded_cache(), open_raster(input) as source:
         scene = Scene.of(source, band)
-        is_town = is_dense(share_of_strong_scatterers(scene))
-        searching = progress.part(0.0, 0.7)
-        ground = find_ground(scene, mask_width, high, searching, is_town=is_town)
+        found = find_regions(scene, mask_width, mask_high_percent, progress.part(0.0, 0.7))
         with Outputs() as outputs:
-            share = write_mask(scene, outputs.stage(output), ground.select, progress.part(0.7, 0.8))
-            for path, part in ((regions, ground.regions), (skeleton, ground.skeleton)):
+            share = write_mask(scene, outputs.stage(output), found.select, progress.part(0.7, 0.8))
+            for path, part in ((regions, found.regions), (skeleton, found.skeleton)):
                 if path is not None:
-                    write_mask(
-                        scene,
-                        outputs.stage(path),
-                        partial(ground.cut, part),
-                        progress.part(0.8, 1.0),
-                    )
-    words = f"{ground.skeleton_m:.0f} m of skeleton"
-    return WrittenMask(share, {"skeleton_m": ground.skeleton_m}, words, files)
+                    select = partial(found.image.select, part)
+                    write_mask(scene, outputs.stage(path), select, progress.part(0.8, 1.0))
+    words = f"{found.skeleton_m:.0f} m of skeleton"
+    return WrittenMask(share, {"skeleton_m": found.skeleton_m}, words, files)

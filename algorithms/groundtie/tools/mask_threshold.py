@@ -22,7 +22,7 @@ from .results import WrittenMask
 def mask_threshold(
     input: general.Radar,
     output: general.MaskOut,
-    mask_high_percent: general.HighPercent = None,
+    mask_high_percent: general.HighPercent = HIGH_PERCENT,
     mask_low_percent: general.LowPercent = 0.0,
     mask_growth: general.MaskGrowth = 0.0,
     band: general.RadarBand = None,
@@ -31,15 +31,13 @@ def mask_threshold(
     """Mask the strong scatterers of a radar image, as buildings are.
 
     The thresholds are percentiles of the means over blocks of 4 × 4 pixels; whole blocks take
-    part or do not. The mask is for the registration of this image; `coregister` makes the
-    same one itself if asked for threshold.
+    part or do not. The mask is for the registration of this image.
     """
     with bounded_cache(), open_raster(input) as source:
         scene = Scene.of(source, band)
         grow_px = round(mask_growth / source.grid.pixel_size_m)
-        high = HIGH_PERCENT if mask_high_percent is None else mask_high_percent
         searching = progress.part(0.0, 0.3)
-        mask = ThresholdMask.of(scene, high, mask_low_percent, grow_px, searching)
+        mask = ThresholdMask.of(scene, mask_high_percent, mask_low_percent, grow_px, searching)
         with Outputs() as outputs:
             share = write_mask(scene, outputs.stage(output), mask.select, progress.part(0.3, 1.0))
     limits = {"low": mask.low, "high": mask.high}

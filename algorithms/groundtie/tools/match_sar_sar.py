@@ -30,7 +30,6 @@ def match_sar_sar(
     reference_mask: registration.ReferenceMask = None,
     input_mask: registration.InputMask = None,
     mask_values: registration.MaskValues = None,
-    mask: registration.Mask = AUTO,
     matching_pixel_size: general.MatchingPixelSize = None,
     output_grid: registration.OutputGrid = "reference",
     workers: general.Workers = None,

@@ -93,7 +93,6 @@ def refine_rpc(
     reference_band: general.ReferenceBand = None,
     reference_mask: registration.ReferenceMask = None,
     mask_values: registration.MaskValues = None,
-    mask: registration.Mask = AUTO,
     surface_model: registration.SurfaceModel = None,
     views: registration.SurfaceViews = None,
     matching_pixel_size: general.MatchingPixelSize = None,

@@ -88,10 +88,6 @@
       <translation>Affin (Grad 1)</translation>
     </message>
     <message>
-      <source>All but strong scatterers</source>
-      <translation>Alles außer starken Streuern</translation>
-    </message>
-    <message>
       <source>All is installed. GroundTie's tools are ready.</source>
       <translation>Alles ist installiert. GroundTies Werkzeuge sind bereit.</translation>
     </message>
@@ -592,8 +588,8 @@
       <translation>Passpunkte</translation>
     </message>
     <message>
-      <source>Ground only</source>
-      <translation>Nur der Boden</translation>
+      <source>Ground lies apart from layover and radar shadow: behind the shadow of one building and before the layover of the next. The mask is for the registration of this image; `coregister` makes the same one itself of a town.</source>
+      <translation>Der Boden liegt abseits von Layover und Radarschatten: hinter dem Schatten des einen Gebäudes und vor dem Layover des nächsten. Die Maske ist für die Registrierung dieses Bildes; `coregister` macht dieselbe bei einer Stadt selbst.</translation>
     </message>
     <message>
       <source>GroundTie cannot use a Python package: {}</source>
@@ -670,10 +666,6 @@
     <message>
       <source>Histogram bins</source>
       <translation>Histogrammklassen</translation>
-    </message>
-    <message>
-      <source>Homogeneous ground alone</source>
-      <translation>Nur homogener Boden</translation>
     </message>
     <message>
       <source>How far off on the ground the RPCs are; the direction is drawn.</source>
@@ -924,12 +916,20 @@
       <translation>Alles von einem Radarbild maskieren außer homogenen Regionen am Boden: Straßen, Gewässern, Plätzen.</translation>
     </message>
     <message>
+      <source>Mask all of a radar image of a town but the ground between its buildings.</source>
+      <translation>Alles vom Radarbild einer Stadt maskieren außer dem Boden zwischen ihren Gebäuden.</translation>
+    </message>
+    <message>
       <source>Mask all of an image but the ground that a surface model and the views of images leave.</source>
       <translation>Alles von einem Bild maskieren außer dem Boden, den ein Oberflächenmodell und die Blickrichtungen der Bilder lassen.</translation>
     </message>
     <message>
       <source>Mask by a surface model</source>
       <translation>Maske aus einem Oberflächenmodell</translation>
+    </message>
+    <message>
+      <source>Mask by layover and shadow</source>
+      <translation>Maske nach Layover und Schatten</translation>
     </message>
     <message>
       <source>Mask by regions</source>
@@ -946,10 +946,6 @@
     <message>
       <source>Mask of the input</source>
       <translation>Maske der Eingabe</translation>
-    </message>
-    <message>
-      <source>Mask of the radar image</source>
-      <translation>Maske des Radarbildes</translation>
     </message>
     <message>
       <source>Mask of the reference</source>
@@ -970,10 +966,6 @@
     <message>
       <source>Match SAR with SAR</source>
       <translation>SAR mit SAR zuordnen</translation>
-    </message>
-    <message>
-      <source>Match only roads, waters and squares: high buildings are displaced by layover.</source>
-      <translation>Nur Straßen, Gewässer und Plätze vergleichen: Hohe Gebäude verschiebt das Layover.</translation>
     </message>
     <message>
       <source>Match optical images</source>
@@ -1046,10 +1038,6 @@
     <message>
       <source>Next worst point (N)</source>
       <translation>Nächstschlechtester Punkt (N)</translation>
-    </message>
-    <message>
-      <source>No mask</source>
-      <translation>Keine Maske</translation>
     </message>
     <message>
       <source>Normalised cross-correlation</source>
@@ -1612,8 +1600,8 @@
       <translation>Anteil des Radarbildes, der nicht teilnimmt, weil er dunkel ist: Radarschatten, aber auch Straßen und Wasser.</translation>
     </message>
     <message>
-      <source>Share that takes no part: strong scatterers as walls and corners; by default 20 % of the radar image with threshold, 10 % of what regions leave. Means over 4 × 4 pixels are compared.</source>
-      <translation>Anteil, der nicht teilnimmt: starke Streuer wie Wände und Ecken; ohne Angabe 20 % des Radarbildes bei Schwellen, 10 % dessen, was Regionen übrig lassen. Verglichen werden Mittel über 4 × 4 Pixel.</translation>
+      <source>Share that takes no part: strong scatterers as walls and corners. Means over 4 × 4 pixels are compared.</source>
+      <translation>Anteil, der nicht teilnimmt: starke Streuer wie Wände und Ecken. Verglichen werden Mittel über 4 × 4 Pixel.</translation>
     </message>
     <message>
       <source>Shift</source>
@@ -1716,8 +1704,8 @@
       <translation>Den Speckle eines Radarbildes glätten und seine Kanten erhalten.</translation>
     </message>
     <message>
-      <source>Speckle is filtered, regions grow from homogeneous seeds, and those stay that are long or large and neither bright nor radar shadow. Long ones are thinned to their skeleton and broadened by a window; strong scatterers inside are masked. The mask is for the registration of this image; `coregister` makes the same one itself if asked for regions.</source>
-      <translation>Der Speckle wird gefiltert, Regionen wachsen aus homogenen Keimen, und es bleiben die, die lang oder groß und weder hell noch Radarschatten sind. Lange werden zu ihrem Skelett verdünnt und um ein Fenster verbreitert; starke Streuer darin werden maskiert. Die Maske ist für die Registrierung dieses Bildes; `coregister` macht dieselbe selbst, wenn Regionen verlangt sind.</translation>
+      <source>Speckle is filtered, regions grow from homogeneous seeds, and those stay that are long or large and neither bright nor radar shadow. Long ones are thinned to their skeleton and broadened by a window; strong scatterers inside are masked. The mask is for the registration of this image.</source>
+      <translation>Der Speckle wird gefiltert, Regionen wachsen aus homogenen Keimen, und es bleiben die, die lang oder groß und weder hell noch Radarschatten sind. Lange werden zu ihrem Skelett verdünnt und um ein Fenster verbreitert; starke Streuer darin werden maskiert. Die Maske ist für die Registrierung dieses Bildes.</translation>
     </message>
     <message>
       <source>Standard deviation of the error, correlated over some 100 pixels, of the heights that the input was orthorectified with.</source>
@@ -1912,8 +1900,8 @@
       <translation>Die Fläche mit ihren Gipfeln, zum Ansehen.</translation>
     </message>
     <message>
-      <source>The thresholds are percentiles of the means over blocks of 4 × 4 pixels; whole blocks take part or do not. The mask is for the registration of this image; `coregister` makes the same one itself if asked for threshold.</source>
-      <translation>Die Schwellen sind Perzentile der Mittel über Blöcke von 4 × 4 Pixeln; ganze Blöcke nehmen teil oder nicht. Die Maske ist für die Registrierung dieses Bildes; `coregister` macht dieselbe selbst, wenn Schwellen verlangt sind.</translation>
+      <source>The thresholds are percentiles of the means over blocks of 4 × 4 pixels; whole blocks take part or do not. The mask is for the registration of this image.</source>
+      <translation>Die Schwellen sind Perzentile der Mittel über Blöcke von 4 × 4 Pixeln; ganze Blöcke nehmen teil oder nicht. Die Maske ist für die Registrierung dieses Bildes.</translation>
     </message>
     <message>
       <source>The transform, for the tool warp or a script.</source>
@@ -2100,10 +2088,6 @@
       <translation>Was von einer Maske nicht teilnimmt: Werte wie 3,8-10; scl, qa-pixel, fmask, hls-fmask oder udm2 für Wolken und ihre Schatten in den Masken dieser Missionen; inside für einen Vektorlayer dessen, was nicht teilnimmt. Ohne Angabe 0, und was außerhalb eines Layers liegt. Ohne Maske wird eine genommen, die unter den Namen der Mission neben dem Bild liegt; none nimmt keine. Bei zwei verschiedenen Masken zuerst die der Referenz, wie in '1; scl'.</translation>
     </message>
     <message>
-      <source>What takes part in scenes with high buildings, which layover displaces: threshold leaves out strong scatterers, regions all but homogeneous ground (roads, waters, squares); auto takes regions where a radar image beside a camera's shows a town.</source>
-      <translation>Was in Szenen mit hohen Gebäuden teilnimmt, die Layover verschiebt: Schwellen lassen starke Streuer weg, Regionen alles außer homogenem Boden (Straßen, Gewässer, Plätze); Automatisch nimmt Regionen, wo ein Radarbild neben einem Kamerabild eine Stadt zeigt.</translation>
-    </message>
-    <message>
       <source>What the heights of the terrain model count from: the ellipsoid, as RPCs do, or a geoid (SRTM: EGM96; Copernicus: EGM2008). Taking one for the other moves heights by up to 100 m.</source>
       <translation>Wovon die Höhen des Geländemodells zählen: vom Ellipsoid, wie bei RPCs, oder von einem Geoid (SRTM: EGM96; Copernicus: EGM2008). Eines für das andere zu nehmen verschiebt Höhen um bis zu 100 m.</translation>
     </message>
@@ -2168,8 +2152,8 @@
       <translation>Fenster</translation>
     </message>
     <message>
-      <source>Window by which skeletons of long regions, and lines of a vector layer, are broadened.</source>
-      <translation>Fenster, um das Skelette langer Regionen und Linien eines Vektorlayers verbreitert werden.</translation>
+      <source>Window by which skeletons of long regions are broadened.</source>
+      <translation>Fenster, um das Skelette langer Regionen verbreitert werden.</translation>
     </message>
     <message>
       <source>With a terrain model, what wrong heights displace the input by is taken out, too.</source>

@@ -10,7 +10,7 @@ from ...geometry.judging import TOLERANCE_PX
 from ...rasters.grid import FloatArray
 from ..evidence import LAYOVER
 from ..layover import count_on_line, scatter_along_line_px
-from .rule import GROUND, Rule
+from .rule import ON_GROUND, Rule
 
 
 class LayoverEvidence(Protocol):
@@ -73,7 +73,7 @@ LAYOVER_RULES: tuple[Rule, ...] = (
         "between two radar images, check points that disagree lie along one line, "
         f"{_LAYOVER_SHARE:.2f} times as many as agree",
         "suite sar_sar",
-        GROUND,
+        ON_GROUND,
         _layover_of_check_points,
     ),
     Rule(
@@ -82,7 +82,7 @@ LAYOVER_RULES: tuple[Rule, ...] = (
         "between two radar images, points of the fit scatter so far along one line that heights "
         "displace the model by more than the largest error",
         "[Mauchly1940]; suite sar_sar",
-        GROUND,
+        ON_GROUND,
         _layover_of_fit_points,
     ),
 )

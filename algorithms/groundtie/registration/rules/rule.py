@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 WIDER = "check the band and the overlap; give a larger search radius, or allow rotation"
-GROUND = "give a mask of the ground, such as roads and waters"
+ON_GROUND = "give a mask of the ground, such as roads and waters"
 WITHOUT = "give images, or masks, without what is drawn over the ground"
 
 

@@ -110,11 +110,10 @@ MaskOut = Annotated[
     RasterOut(label="Mask", help="GeoTIFF that is 1 where pixels take part and 0 elsewhere."),
 ]
 HighPercent = Annotated[
-    float | None,
+    float,
     Number(
         label="Brightest part masked",
-        help="Share that takes no part: strong scatterers as walls and corners; by default "
-        "20 % of the radar image with threshold, 10 % of what regions leave. Means over "
+        help="Share that takes no part: strong scatterers as walls and corners. Means over "
         "4 × 4 pixels are compared.",
         unit="%",
         minimum=0,
@@ -138,8 +137,7 @@ MaskWidth = Annotated[
     float,
     Distance(
         label="Width of lines",
-        help="Window by which skeletons of long regions, and lines of a vector layer, are "
-        "broadened.",
+        help="Window by which skeletons of long regions are broadened.",
         minimum=0.1,
         maximum=500,
         advanced=True,

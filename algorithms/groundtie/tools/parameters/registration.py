@@ -19,7 +19,6 @@ from ...kinds import (
     Text,
     VectorOut,
 )
-from ...masks.choice import MASKS
 from ...registration.registered_output import OUTPUT_GRIDS
 from .general import MASK_HELP, report_page
 
@@ -130,17 +129,6 @@ InputDem = Annotated[
         label="Terrain model of the input",
         help="The heights that the input was orthorectified with; by default, one height "
         "everywhere. Goes with a terrain model.",
-        advanced=True,
-    ),
-]
-Mask = Annotated[
-    str,
-    Choice(
-        label="Mask of the radar image",
-        help="What takes part in scenes with high buildings, which layover displaces: threshold "
-        "leaves out strong scatterers, regions all but homogeneous ground (roads, waters, "
-        "squares); auto takes regions where a radar image beside a camera's shows a town.",
-        choices=MASKS,
         advanced=True,
     ),
 ]

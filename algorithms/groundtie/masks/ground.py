@@ -1,4 +1,4 @@
-"""Ground of a dense town: what lies apart from layover and radar shadow, and where no roof lies.
+"""Ground of a town: what lies apart from layover and radar shadow, and where no roof lies.
 
 Along the radar's range direction an elevated object shows its bright layover first and its shadow
 last. So a roof has layover before it and shadow behind it; ground between buildings has the shadow
@@ -8,13 +8,18 @@ where ground ends better than its brightness or texture.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..progress import SILENT, Progress
 from ..rasters.patch import Patch
-from ..rasters.reading import FloatImage, Mask
-from .cast_shadow import shadow_azimuth_deg
+from ..rasters.reading import FloatImage, Mask, Window
+from .reduced import ReducedScene
+from .scene import Scene, Selection
+from .shadow_direction import shadow_azimuth_deg
 
 # Dark lies behind bright at all distances up to a building's layover and shadow together; nothing
 # farther matters. This and what follows was set on simulated cities (suites ground and towns).
@@ -28,6 +33,37 @@ _DARK_PERCENT, _BRIGHT_PERCENT = 25.0, 20.0
 
 # Ground lies so far from both, and by so many pixels.
 _GROUND_M, _GROUND_PX = 7.0, 3.0
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The ground of a town: a mask of the blocks of its radar image, shape (h, w)."""
+
+    image: ReducedScene
+    part: Mask
+
+    def select(self, window: Window) -> Selection:
+        """Return which pixels of a window are ground."""
+        return self.image.select(self.part, window)
+
+
+def find_ground(scene: Scene, progress: Progress = SILENT) -> Ground:
+    """Find the ground of a town in its radar image.
+
+    Parameters
+    ----------
+    scene
+        Grey values are amplitudes.
+    progress
+        Receives every step.
+
+    Raises
+    ------
+    RasterContentError
+        No pixel of the scene is valid.
+    """
+    image = ReducedScene.of(scene, progress)
+    return Ground(image, open_ground(image.level_db, image.patch.valid, image.pixel_m))
 
 
 def open_ground(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:

@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from raster_files import utm_grid, write_raster
 
-from groundtie.masks.range_order import distance_back_px, open_ground
-from groundtie.rasters.reading import Mask
+from groundtie.masks.ground import distance_back_px, find_ground, open_ground
+from groundtie.masks.scene import Scene
+from groundtie.rasters.reading import Mask, open_raster
 
 GROUND_DB, ROOF_DB, LAYOVER_DB, SHADOW_DB = 50.0, 50.0, 60.0, 35.0
 
@@ -88,3 +92,25 @@ def test_distances_on_a_slanting_line_are_those_on_the_ground() -> None:
     aside = east * np.cos(np.deg2rad(60)) - north * np.sin(np.deg2rad(60))
     # Both ends of a line are rounded to pixels.
     assert np.abs(aside).max() <= 1 and len(rows) == 80
+
+
+def test_bright_ground_between_shadow_and_layover_takes_part(
+    tmp_path: Path,
+) -> None:
+    # The radar looks to the right: rows of buildings, of which it shows layover, then shadow.
+    level_db = np.full((480, 480), 50.0)
+    for col in range(0, 480, 60):
+        level_db[:, col : col + 13] = 60
+        level_db[:, col + 13 : col + 28] = 35
+    level_db[::60] = 50
+    level_db[185:295, 240:255], level_db[185:295, 285:300] = 35, 60
+    level_db[185:295, 255:285] = 54.5
+    speckle = np.random.default_rng(1).gamma(4, 1 / 4, level_db.shape)
+    amplitude = np.sqrt(10 ** (level_db / 10) * speckle).astype(np.float32)
+    scene = Scene.of(
+        open_raster(write_raster(tmp_path / "a.tif", amplitude, utm_grid(480, 480, 1.0)))
+    )
+    square, street = np.s_[190:290, 264:276], np.s_[70:170, 43:48]
+    found = find_ground(scene).select(scene.whole).part
+    assert found[square].mean() > 0.9 and found[street].mean() > 0.9
+    assert found[level_db == 35].mean() < 0.01 and found[level_db == 60].mean() < 0.05

@@ -1,9 +1,7 @@
-"""The direction in which cast shadows fall, and the ground that is out of them.
+"""The direction in which shadows fall: cast shadows in a camera's image, radar shadow in a radar's.
 
-A camera shows ground beside tall objects dark, radar does not. Cast shadows make grey values of
-one kind of ground differ, always on the same side of the object, and so bias every match of the
-ground to one side. The direction is inferred from the image itself: dark pixels lie beside bright
-ones more often on the one side than on the other.
+It is inferred from the image itself: dark pixels lie beside bright ones more often on the one side
+than on the other.
 """
 
 from __future__ import annotations
@@ -11,19 +9,15 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
-from ..rasters.reading import FloatImage, Mask
+from ..rasters.reading import FloatImage
 
 # Dark and bright are the outer parts of the histogram.
 _OUTER_PERCENT = 15.0
 
 # Distances of dark pixels from bright ones, in pixels.
 _NEAR_PX, _FAR_PX = 2, 14
-
-# Longest cast shadow.
-SHADOW_M = 12.0
 
 
 def shadow_azimuth_deg(
@@ -64,26 +58,3 @@ def products_at_shifts(image: FloatImage, other: FloatImage, reach_px: int) -> F
     sums = scipy.fft.irfft2(np.conj(here) * there, size, workers=2)
     shifts = np.arange(-reach_px, reach_px + 1)
     return np.asarray(sums[np.ix_(shifts, shifts)])
-
-
-def out_of_shadow(ground: Mask, azimuth_deg: float, pixel_m: float) -> Mask:
-    """Return the ground that no cast shadow of an elevated object beside it can reach.
-
-    Parameters
-    ----------
-    ground
-        Pixels of the ground, shape (h, w); all others may be elevated.
-    azimuth_deg
-        Direction in which shadows fall, clockwise from the top of the image.
-    pixel_m
-        Size of a pixel.
-    """
-    reach = max(round(SHADOW_M / pixel_m), 1)
-    along = np.deg2rad(azimuth_deg)
-    steps = np.arange(1, reach + 1)
-    # From a place back to objects whose shadow may reach it.
-    cols, rows = (np.rint(f * steps).astype(int) for f in (np.sin(along), -np.cos(along)))
-    window: NDArray[np.uint8] = np.zeros((2 * reach + 1,) * 2, np.uint8)
-    window[reach - rows, reach - cols] = 1
-    window[reach, reach] = 1
-    return np.asarray(cv2.erode(ground.astype(np.uint8), window) > 0)
