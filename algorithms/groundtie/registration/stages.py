@@ -75,7 +75,6 @@ class Stages:
     def of(cls, images: ImagePair, masked: Masked, spec: Specification) -> Stages:
         """Put the stages together; `images` have no masks."""
         held_out = HeldOut.of(images)
-
         settings = SimilaritySettings(spec.similarity)
         chips = ChipMatcher(masked.pair, settings, held_out)
         # Chips of which a mask leaves too little share a joint histogram.
