@@ -12,8 +12,8 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from groundtie.arrays import Raster
-from groundtie.masks.choice import share_of_strong_scatterers
 from groundtie.masks.scene import Scene
+from groundtie.masks.town import share_of_strong_scatterers
 from groundtie.rasters.reading import Window, open_raster
 from groundtie.simulation.sar import SarOptions, render_sar
 from groundtie.simulation.scene import SceneOptions, generate_scene

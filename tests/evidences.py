@@ -12,7 +12,7 @@ from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.model_choice import block_folds
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
-from groundtie.masks.choice import MaskUsed
+from groundtie.masks.used import MaskUsed
 from groundtie.matching.bands import BandSurvey
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.registration.evidence import RegistrationEvidence

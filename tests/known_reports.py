@@ -17,7 +17,7 @@ from raster_files import utm_grid, wave_image, write_raster
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
-from groundtie.masks.choice import NONE, MaskUsed
+from groundtie.masks.used import NONE, MaskUsed
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.rasters.pair import Image, ImagePair, make_pair

@@ -13,7 +13,7 @@ from contexts import context
 from facts_of_pairs import FIELDS, TOWN, opened, speckled
 
 from groundtie.context import Context
-from groundtie.masks.choice import INPUT, LAYER, REFERENCE
+from groundtie.masks.used import INPUT, LAYER, REFERENCE
 from groundtie.rasters.pair import ImagePair
 from groundtie.registration.masks import (
     Masked,

@@ -43,7 +43,7 @@ from groundtie.errors import (
     TooFewPointsError,
 )
 from groundtie.geometry.estimation import Estimate
-from groundtie.masks.choice import GROUND, SURFACE, MaskUsed
+from groundtie.masks.used import GROUND, SURFACE, MaskUsed
 from groundtie.matching.rest import Rest
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages

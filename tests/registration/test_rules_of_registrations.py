@@ -27,7 +27,7 @@ from evidences import (
 )
 from scipy.stats import binom
 
-from groundtie.masks.choice import GROUND, LAYER, SURFACE, MaskUsed
+from groundtie.masks.used import GROUND, LAYER, SURFACE, MaskUsed
 from groundtie.matching.rest import Rest
 from groundtie.registration.evidence import Exchanged, RegistrationEvidence
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit

@@ -12,7 +12,7 @@ import pytest
 from evidences import facts, scene
 from facts_of_pairs import FIELDS, TOWN, grey_values, opened, speckled
 
-from groundtie.masks.choice import INPUT, REFERENCE
+from groundtie.masks.used import INPUT, REFERENCE
 from groundtie.matching.locked import Sensors
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster

@@ -16,8 +16,8 @@ from contexts import context
 from groundtie.context import Context
 from groundtie.errors import NoOverlapError, ParameterError
 from groundtie.geometry.views import View
-from groundtie.masks.choice import REFERENCE, SURFACE
 from groundtie.masks.scene import Scene
+from groundtie.masks.used import REFERENCE, SURFACE
 from groundtie.rasters.grid import compose
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster

@@ -23,7 +23,7 @@ from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.models import PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
-from groundtie.masks.choice import MaskUsed
+from groundtie.masks.used import MaskUsed
 from groundtie.registration.evidence import (
     AGREEMENT,
     ERROR,

@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import ParameterError
 from ..geometry.views import View, parse_view, split_views
 from ..kinds import AUTO
-from ..masks.choice import NONE
+from ..masks.used import NONE
 from ..rasters.rendered import LIGHTS, RADAR, SUN, Light
 from .registered_output import grid_of_output, model_for_grid
 from .specification import BOTH, Specification, StatedSurface

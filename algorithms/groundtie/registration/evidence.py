@@ -23,7 +23,7 @@ from ..geometry.estimation import Estimate, jackknife_spread
 from ..geometry.judging import CE90_FACTOR, LARGEST_LOG10_CHANCE, SMALLEST_INLIER_SHARE
 from ..geometry.misses import Misses
 from ..geometry.tie_points import TiePoints
-from ..masks.choice import GROUND, NONE, MaskUsed
+from ..masks.used import GROUND, NONE, MaskUsed
 from ..matching.bands import BandSurvey
 from ..matching.rest import Rest
 from ..matching.survey import SURVEY_RADIUS_PX, Survey

@@ -21,7 +21,7 @@ from ..errors import (
     TooFewPointsError,
 )
 from ..geometry.models import Model
-from ..masks.choice import INPUT
+from ..masks.used import INPUT
 from ..rasters.grid import FloatArray
 from ..rasters.pair import Image, ImagePair
 from ..rasters.reading import RasterSource

@@ -10,9 +10,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 from ..context import Context
-from ..masks.choice import GROUND, NONE, MaskUsed
 from ..masks.ground import find_ground
 from ..masks.surface_model import SurfaceGround
+from ..masks.used import GROUND, NONE, MaskUsed
 from ..rasters.pair import ImagePair
 from .scene import SceneInfo
 from .user_masks import with_mask

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..context import Context
 from ..geometry.terrain import Terrain
-from ..masks.choice import MaskUsed
+from ..masks.used import MaskUsed
 from ..rasters.pair import Image, ImagePair, coarser_m, make_pair
 from ..rasters.reading import open_raster
 from ..rasters.rendered import rendered

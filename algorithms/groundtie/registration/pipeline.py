@@ -12,7 +12,7 @@ import numpy as np
 
 from ..context import Context
 from ..errors import NoOverlapError, NothingFoundError, TooFewPointsError
-from ..masks.choice import NONE, MaskUsed
+from ..masks.used import NONE, MaskUsed
 from ..rasters.reading import bounded_cache
 from .evidence import Exchanged, RegistrationEvidence, SearchEvidence
 from .masks import Masked, of_ground, with_ground_mask

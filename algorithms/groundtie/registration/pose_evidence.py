@@ -15,7 +15,7 @@ from ..geometry.estimation import jackknife_spread
 from ..geometry.judging import SMALLEST_INLIER_SHARE, SMALLEST_SHARE_UNROTATED
 from ..geometry.limits import SearchLimits
 from ..geometry.misses import Misses
-from ..masks.choice import NONE, MaskUsed
+from ..masks.used import NONE, MaskUsed
 from ..matching.bands import BandSurvey
 from ..matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey
 from ..matching.rest import Rest

@@ -18,7 +18,7 @@ from ..errors import NotRegisteredError
 from ..geometry.estimation import Estimate
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
-from ..masks.choice import MaskUsed
+from ..masks.used import MaskUsed
 from ..matching.check import Check
 from ..matching.survey import Survey
 from ..raster_names import file_name

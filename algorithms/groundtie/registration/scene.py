@@ -7,15 +7,10 @@ from functools import cached_property
 from typing import Any
 
 from ..kinds import AUTO
-from ..masks.choice import (
-    INPUT,
-    REFERENCE,
-    is_town,
-    may_be_town,
-    share_of_strong_scatterers,
-)
 from ..masks.radar import LEAST_VARIATION2, LEAST_VARIATION2_RATIO, variation2_of
 from ..masks.scene import Scene
+from ..masks.town import is_town, may_be_town, share_of_strong_scatterers
+from ..masks.used import INPUT, REFERENCE
 from ..matching.locked import Sensors
 from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch

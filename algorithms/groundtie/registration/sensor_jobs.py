@@ -11,7 +11,7 @@ from typing import Any
 from ..context import Context, threads
 from ..declaration import file_lines
 from ..errors import ParameterError
-from ..masks.choice import MaskUsed
+from ..masks.used import MaskUsed
 from ..progress import Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster

@@ -9,7 +9,7 @@ from typing import Any
 from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..geometry.views import RADAR, View
 from ..kinds import AUTO
-from ..masks.choice import INPUT, REFERENCE
+from ..masks.used import INPUT, REFERENCE
 from ..matching.alignment import CANDIDATES
 from ..rasters.rendered import Light
 

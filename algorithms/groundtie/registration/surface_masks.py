@@ -14,11 +14,11 @@ import numpy as np
 
 from ..context import Context
 from ..geometry.views import View
-from ..masks.choice import REFERENCE, SURFACE, MaskUsed
 from ..masks.object_heights import RasterModel, SurfaceModel, read_footprints
 from ..masks.scene import Scene
 from ..masks.shadow_direction import products_at_shifts
 from ..masks.surface_model import SurfaceGround, write_image
+from ..masks.used import REFERENCE, SURFACE, MaskUsed
 from ..rasters.atomic import scratch_folder
 from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch, middle_window

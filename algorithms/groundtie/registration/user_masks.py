@@ -16,10 +16,10 @@ from ..errors import ParameterError
 from ..features.classified import ClassifiedScene
 from ..features.classifier import read_classifier
 from ..masks.beside import mask_beside
-from ..masks.choice import INPUT, LAYER, NONE, REFERENCE, MaskUsed
 from ..masks.layer import read_layer
 from ..masks.regions import WIDTH_M
 from ..masks.scene import Scene, Select, write_mask
+from ..masks.used import INPUT, LAYER, NONE, REFERENCE, MaskUsed
 from ..masks.values import INSIDE, RasterMask, mask_values
 from ..progress import Progress
 from ..raster_names import file_name, raster_name

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..assessment.comparison import Comparison
-from ..masks.choice import MaskUsed
+from ..masks.used import MaskUsed
 from ..registration.refinement import Refinement
 from ..sensor.height_check import HeightCheck
 from . import figures

@@ -10,7 +10,7 @@ from ..assessment.comparison import Comparison, without_masks
 from ..assessment.point_errors import PointErrors
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
-from ..masks.choice import MaskUsed
+from ..masks.used import MaskUsed
 from ..matching.survey import Survey
 from ..rasters.pair import ImagePair
 from ..registration.verdict import Verdict

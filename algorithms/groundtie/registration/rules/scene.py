@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...masks.choice import GROUND, LAYER, SURFACE
+from ...masks.used import GROUND, LAYER, SURFACE
 from ..evidence import SCENE, RegistrationEvidence
 from ..surface_masks import CLEAR_CORRELATION, RENDERED_CORRELATION
 from .rule import ON_GROUND, Rule

@@ -1,26 +1,13 @@
-"""The kinds of masks, and which scenes need one."""
+"""Which mask a registration used."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
-from ..rasters.patch import is_logarithmic
-from . import threshold
-from .scene import Scene
-
 # Kinds of masks: none, the ground of a town that its radar image shows, what a vector layer covers,
 # and the ground that both images show by a surface model.
 NONE, GROUND, LAYER, SURFACE = "none", "ground", "layer", "surface"
-
-# Block means above this many times their median are strong scatterers. Scenes with at least that
-# share of them are towns (simulated dense cities have 12–27 %, real towns up to 10 %), or may be:
-# simulated suburbs have 8.3 % and more, fields up to 3.5 % (20 seeds each of the suite simulated),
-# the least of the cities 9.5 % where a speckle filter has dimmed what is small and bright.
-_STRONG = 4.0
-_TOWN, _PERHAPS_TOWN = 0.11, 0.08
 
 # Where less than this share takes part, chips have too few pixels for a joint histogram of their
 # own. Of simulated cities up to 42 % is ground, in pixels of 2 m and 3 m: each chip by itself was
@@ -73,26 +60,3 @@ class MaskUsed:
         if self.image is None:
             return f"mask: {self.kind}, {self.reason}"
         return f"mask: {self.kind}, {self.share:.0%} of the {self.image} take part; {self.reason}"
-
-
-def is_town(strong_share: float) -> bool:
-    """Whether a radar image with this share of strong scatterers shows a town."""
-    return strong_share >= _TOWN
-
-
-def may_be_town(strong_share: float) -> bool:
-    """Whether a radar image with this share, filtered or not, may show a town."""
-    return strong_share >= _PERHAPS_TOWN
-
-
-def share_of_strong_scatterers(scene: Scene) -> float:
-    """Return the share of an image, 0 to 1, that is brighter than usual by 6 dB or more.
-
-    Grey values are amplitudes; means over 4 × 4 pixels are compared with their median. Decibels
-    are none: such an image has no share.
-    """
-    amplitude = scene.sample(threshold.BLOCK_PX)
-    if amplitude.size == 0 or is_logarithmic(amplitude):
-        return 0.0
-    power = amplitude**2
-    return float(np.mean(power > _STRONG * np.median(power)))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from raster_files import utm_grid, write_raster
 
-from groundtie.masks.choice import MaskUsed, is_town, may_be_town, share_of_strong_scatterers
 from groundtie.masks.scene import Scene
+from groundtie.masks.town import is_town, may_be_town, share_of_strong_scatterers
 from groundtie.rasters.kernels import interpolate
 from groundtie.rasters.reading import open_raster
 
@@ -62,9 +62,3 @@ def test_towns_are_where_strong_scatterers_stand(
     strong_share: float, expected: tuple[bool, bool]
 ) -> None:
     assert (is_town(strong_share), may_be_town(strong_share)) == expected
-
-
-def test_it_fits_in_a_line() -> None:
-    used = MaskUsed("layer", "reference", 0.8, "what roads.gpkg covers")
-    assert used.line() == "mask: layer, 80% of the reference take part; what roads.gpkg covers"
-    assert MaskUsed("none", None, 1.0, "as asked for").line() == "mask: none, as asked for"
