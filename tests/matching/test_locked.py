@@ -155,15 +155,15 @@ def test_a_transform_to_whole_pixels_is_evidence_itself(
 @pytest.mark.parametrize(
     ("sensors", "place", "off_m", "is_exact"),
     [
-        (Sensors.RADARS, 9, 1.2, True),
-        (Sensors.RADARS, 9, 1.3, False),
-        (Sensors.RADARS, 1, 1.2, False),
+        (Sensors.RADARS, 9, 4.0, True),
+        (Sensors.RADARS, 1, 0.0, False),
+        (Sensors.DIFFERENT, 9, 0.3, True),
         (Sensors.DIFFERENT, 9, 1.2, False),
         (Sensors.CAMERAS, 9, 1.2, False),
     ],
 )
 @pytest.mark.slow
-def test_radar_images_are_on_whole_pixels_to_an_eighth_unless_they_vary_as_one_ground(
+def test_radar_images_are_as_if_on_whole_pixels_unless_they_vary_as_one_ground(
     tmp_path: Path, context: Context, sensors: Sensors, place: int, off_m: float, is_exact: bool
 ) -> None:
     """Pixels of 10 m. Radar images of one ground vary alike where speckle has averaged out."""

@@ -34,10 +34,7 @@ from .matcher import FloatArray, Places
 # A transform that moves all of the overlap by whole pixels, but for this, may be content's.
 _LARGEST_BEND_PX = 1.5
 
-# Copies of pixels are found within this of whole pixels, a quarter of what others lie within; so is
-# what is drawn over two radars' images, whose speckle moves it, over different ground by 0.04 to
-# 0.11. Of 57 radar pairs on one grid it refuses no further one (`--only attacks --classes "aligned
-# ground" --seeds 9700-9729 --sample 150`).
+# Copies of pixels are found within this of whole pixels, a quarter of what others lie within.
 _WHOLE_PX = 0.125
 
 # What is drawn lies on whole pixels all over; different sensors' views, by chance or on one grid,
@@ -80,6 +77,8 @@ class LockedContent:
         What the images may be.
     is_exact
         Whether the transform moves the array by whole pixels all over, and does nothing else.
+        Speckle moves what is drawn over two radars' images off whole pixels; but radar images of
+        one ground vary alike where it has averaged out: those that do not count as exact.
     """
 
     pair: ImagePair
@@ -164,8 +163,7 @@ def find_locked_content(
     sensors
         What the images may be.
     exact_px
-        Within this of whole pixels, what was found lies on them as exactly as it is known; between
-        two radars' images that do not vary as one ground does, within `_WHOLE_PX` at least.
+        Within this of whole pixels, what was found lies on them as exactly as it is known.
     context
         Threads.
 
@@ -193,9 +191,9 @@ def find_locked_content(
 
     sameness = sameness_of(list(context.map(look, list(places.centres))))
     is_whole = bool(np.abs(np.median(moved, axis=0) - offset).max() <= _WHOLE_PX)
-    if sensors is Sensors.RADARS and not sameness.varies_as_ground:
-        exact_px = max(exact_px, _WHOLE_PX)
     is_exact = bool(np.abs(moved - offset).max() <= exact_px)
+    if sensors is Sensors.RADARS:
+        is_exact = not sameness.varies_as_ground
     return LockedContent(pair, found, sameness, is_whole, sensors, is_exact)
 
 
