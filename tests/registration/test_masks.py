@@ -45,7 +45,7 @@ def test_whoever_names_the_radar_image_is_believed(
         used = masked(pair, stack, context, declared=REFERENCE).used
         assert (used.kind, used.image) == ("ground", REFERENCE)
         used = masked(pair, stack, context, declared=INPUT).used
-        assert used.kind == "none" and "too few buildings" in used.reason
+        assert used.kind == "none" and "too few for a town" in used.reason
 
 
 def test_fields_need_no_ground(tmp_path: Path, stack: ExitStack, context: Context) -> None:

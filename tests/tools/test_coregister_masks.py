@@ -27,7 +27,7 @@ def test_fields_are_left_without_a_mask(
 ) -> None:
     pair = simulated("shift")
     mask = coregister(pair.reference, pair.input, tmp_path / "out.tif").mask
-    assert mask.kind == "none" and "too few buildings" in mask.reason
+    assert mask.kind == "none" and "too few for a town" in mask.reason
 
 
 @pytest.mark.slow

@@ -67,7 +67,7 @@ def with_ground_mask(
     if not scene.is_radar_and_camera:
         return Masked(pair, MaskUsed(NONE, None, 1.0, "there is no radar image beside a camera's"))
     if not scene.is_town:
-        reason = f"{_shown(scene)}: too few buildings to lead astray"
+        reason = f"{_shown(scene)}: too few for a town"
         return Masked(pair, MaskUsed(NONE, None, 1.0, reason))
     return of_ground(pair, scene, stack, context)
 
