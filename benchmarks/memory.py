@@ -80,6 +80,7 @@ def calls(pair: Pair, folder: Path) -> dict[str, list[str]]:
         "warp": [input, OUTPUT, "--transform", str(transform), *_THREADS],
         "filter-speckle": [reference, OUTPUT, *_THREADS],
         "mask-threshold": [reference, OUTPUT],
+        "mask-ground": [reference, OUTPUT],
         "mask-regions": [reference, OUTPUT],
     }
 

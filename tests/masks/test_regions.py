@@ -32,21 +32,21 @@ def ground(town: Town, tmp_path_factory: pytest.TempPathFactory) -> GroundRegion
 
 def test_ground_is_found_and_roofs_and_shadows_are_not(town: Town, ground: GroundRegions) -> None:
     for name in ("road", "river", "park"):
-        assert ground.regions[getattr(town, name)].mean() > 0.75, name
-    assert ground.regions[town.roofs].mean() < 0.03
-    assert ground.regions[town.shadow].mean() < 0.03
+        assert ground.regions.blocks[getattr(town, name)].mean() > 0.75, name
+    assert ground.regions.blocks[town.roofs].mean() < 0.03
+    assert ground.regions.blocks[town.shadow].mean() < 0.03
 
 
 @pytest.mark.parametrize("looks", [1.0, 8.0])
 def test_it_holds_for_other_speckle(town: Town, tmp_path: Path, looks: float) -> None:
     other = draw_town(looks=looks, seed=3)
     found = find_regions(scene_of(tmp_path / "a.tif", other.amplitude))
-    assert found.regions[other.ground].mean() > 0.7
-    assert found.regions[other.roofs | other.shadow].mean() < 0.05
+    assert found.regions.blocks[other.ground].mean() > 0.7
+    assert found.regions.blocks[other.roofs | other.shadow].mean() < 0.05
 
 
 def test_the_skeleton_runs_along_the_middle_of_the_road(town: Town, ground: GroundRegions) -> None:
-    inside = distance_transform_edt(town.road)[ground.skeleton & town.road]
+    inside = distance_transform_edt(town.road)[ground.skeleton.blocks & town.road]
     # The road is 12 px wide.
     assert np.median(inside) > 4
     along = np.hypot(400, 60) + np.hypot(150, 30) + np.hypot(250, 70)
@@ -59,11 +59,11 @@ def test_the_skeleton_is_broadened_by_the_window(town: Town, tmp_path: Path) -> 
     alone = distance_transform_edt(~(town.river | town.park)) > 40
     for width_m in (15.0, 19.0):
         found = find_regions(scene, width_m)
-        away = distance_transform_edt(~found.skeleton)
+        away = distance_transform_edt(~found.skeleton.blocks)
         # Half the window, and a border of 3 m.
-        assert found.part[away < width_m / 2 + 2].all()
+        assert found.part.blocks[away < width_m / 2 + 2].all()
         near_road = alone & (distance_transform_edt(~town.road) < 30)
-        assert away[found.part & near_road].max() < width_m / 2 + 3 + 1.5
+        assert away[found.part.blocks & near_road].max() < width_m / 2 + 3 + 1.5
 
 
 def test_the_brightest_inside_take_no_part(town: Town, tmp_path: Path) -> None:
@@ -71,17 +71,17 @@ def test_the_brightest_inside_take_no_part(town: Town, tmp_path: Path) -> None:
     shares = []
     for percent in (0.0, 10.0, 30.0):
         found = find_regions(scene, high_percent=percent)
-        shares.append(found.select(scene.whole).part.sum() / found.part.sum())
+        shares.append(found.select(scene.whole).part.sum() / found.part.blocks.sum())
     np.testing.assert_allclose(shares, [1.0, 0.9, 0.7], atol=0.02)
 
 
 def test_windows_are_cut_from_one_and_the_same_mask(ground: GroundRegions) -> None:
-    whole = ground.image.select(ground.part, ground.image.scene.whole).part
-    np.testing.assert_array_equal(whole, ground.part)
+    whole = ground.part.select(ground.part.scene.whole).part
+    np.testing.assert_array_equal(whole, ground.part.blocks)
     window = Window(35, 120, 90, 77)
-    part = ground.image.select(ground.part, window).part
+    part = ground.part.select(window).part
     np.testing.assert_array_equal(part, whole[120:197, 35:125])
-    beyond = ground.image.select(ground.part, Window(-20, 390, 50, 40)).part
+    beyond = ground.part.select(Window(-20, 390, 50, 40)).part
     assert not beyond[:, :20].any() and not beyond[10:].any()
 
 
@@ -90,8 +90,8 @@ def test_larger_scenes_are_looked_at_with_larger_pixels(
 ) -> None:
     monkeypatch.setattr(reduced, "_MOST_PIXELS", 100 * 100 * 4)
     found = find_regions(scene_of(tmp_path / "a.tif", town.amplitude))
-    assert found.image.factor == 2 and found.part.shape == (200, 200)
-    chosen = found.select(found.image.scene.whole)
+    assert found.part.factor == 2 and found.part.blocks.shape == (200, 200)
+    chosen = found.select(found.part.scene.whole)
     assert chosen.part.shape == (400, 400)
     assert chosen.part[town.river].mean() > 0.5
     assert chosen.part[town.roofs].mean() < 0.1
@@ -109,4 +109,4 @@ def test_what_holds_no_data_takes_no_part(town: Town, tmp_path: Path) -> None:
 def test_without_any_ground_nothing_takes_part(tmp_path: Path) -> None:
     noise = np.random.default_rng(0).lognormal(5, 1.5, (200, 200)).astype(np.float32)
     found = find_regions(scene_of(tmp_path / "a.tif", noise))
-    assert found.part.mean() < 0.02 and found.skeleton_m < 50
+    assert found.part.blocks.mean() < 0.02 and found.skeleton_m < 50

@@ -8,17 +8,15 @@ where ground ends better than its brightness or texture.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..progress import SILENT, Progress
 from ..rasters.patch import Patch
-from ..rasters.reading import FloatImage, Mask, Window
-from .reduced import ReducedScene
-from .scene import Scene, Selection
+from ..rasters.reading import FloatImage, Mask
+from .reduced import BlockMask, ReducedScene
+from .scene import Scene
 from .shadow_direction import shadow_azimuth_deg
 
 # Dark lies behind bright at all distances up to a building's layover and shadow together; nothing
@@ -35,19 +33,7 @@ _DARK_PERCENT, _BRIGHT_PERCENT = 25.0, 20.0
 _GROUND_M, _GROUND_PX = 7.0, 3.0
 
 
-@dataclass(frozen=True)
-class Ground:
-    """The ground of a town: a mask of the blocks of its radar image, shape (h, w)."""
-
-    image: ReducedScene
-    part: Mask
-
-    def select(self, window: Window) -> Selection:
-        """Return which pixels of a window are ground."""
-        return self.image.select(self.part, window)
-
-
-def find_ground(scene: Scene, progress: Progress = SILENT) -> Ground:
+def find_ground(scene: Scene, progress: Progress = SILENT) -> BlockMask:
     """Find the ground of a town in its radar image.
 
     Parameters
@@ -63,7 +49,8 @@ def find_ground(scene: Scene, progress: Progress = SILENT) -> Ground:
         No pixel of the scene is valid.
     """
     image = ReducedScene.of(scene, progress)
-    return Ground(image, open_ground(image.level_db, image.patch.valid, image.pixel_m))
+    level_db, _ = image.without_speckle()
+    return image.mask(open_ground(level_db, image.patch.valid, image.pixel_m))
 
 
 def open_ground(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:

@@ -1,9 +1,8 @@
-"""A whole radar image at once, reduced where it is large, and masks found in it."""
+"""A whole radar image at once, reduced where it is large, and masks that are found in it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +20,39 @@ _MOST_PIXELS = 24_000_000
 
 # Window of the speckle filter.
 _FILTER_PX = 7
+
+
+@dataclass(frozen=True)
+class BlockMask:
+    """Which blocks of a scene take part.
+
+    Parameters
+    ----------
+    scene
+        The image.
+    factor
+        Side of the blocks, in pixels of the scene.
+    blocks
+        Shape (h, w).
+    """
+
+    scene: Scene
+    factor: int
+    blocks: Mask
+
+    def cut(self, window: Window) -> Mask:
+        """Return which pixels of a window take part, valid ones and others; none beyond."""
+        rows = np.arange(window.row, window.row + window.height) // self.factor
+        cols = np.arange(window.col, window.col + window.width) // self.factor
+        height, width = self.blocks.shape
+        inside = (rows >= 0) & (rows < height), (cols >= 0) & (cols < width)
+        chosen = self.blocks[np.ix_(rows.clip(0, height - 1), cols.clip(0, width - 1))]
+        return np.asarray(chosen & inside[0][:, None] & inside[1])
+
+    def select(self, window: Window) -> Selection:
+        """Return which pixels of a window take part."""
+        valid = self.scene.read(window).valid
+        return Selection(self.cut(window) & valid, valid)
 
 
 @dataclass(frozen=True)
@@ -61,23 +93,17 @@ class ReducedScene:
         """Side of a block."""
         return self.scene.grid.pixel_size_m * self.factor
 
-    @cached_property
-    def looks(self) -> float:
-        """Equivalent number of looks of the means."""
-        return estimate_looks(power(self.patch), self.patch.valid)
+    def without_speckle(self) -> tuple[FloatImage, float]:
+        """Return the filtered power in decibels, shape (h, w), and the equivalent number of looks.
 
-    @cached_property
-    def level_db(self) -> FloatImage:
-        """Power without its speckle, in decibels, shape (h, w)."""
-        speckle_filter = SpeckleFilter("enhanced-frost", _FILTER_PX, self.looks)
-        filtered = speckle_filter(power(self.patch), self.patch.valid)
-        return np.asarray(10 * np.log10(np.maximum(filtered, np.float32(1e-6))), np.float32)
+        The looks are those of the means.
+        """
+        intensity, valid = power(self.patch), self.patch.valid
+        looks = estimate_looks(intensity, valid)
+        filtered = SpeckleFilter("enhanced-frost", _FILTER_PX, looks)(intensity, valid)
+        level_db = 10 * np.log10(np.maximum(filtered, np.float32(1e-6)))
+        return np.asarray(level_db, np.float32), looks
 
-    def select(self, mask: Mask, window: Window) -> Selection:
-        """Return the part of a mask of the blocks, shape (h, w), that lies in a window."""
-        valid = self.scene.read(window).valid
-        rows = np.arange(window.row, window.row + window.height) // self.factor
-        cols = np.arange(window.col, window.col + window.width) // self.factor
-        inside = (rows >= 0) & (rows < mask.shape[0]), (cols >= 0) & (cols < mask.shape[1])
-        chosen = mask[np.ix_(rows.clip(0, mask.shape[0] - 1), cols.clip(0, mask.shape[1] - 1))]
-        return Selection(chosen & inside[0][:, None] & inside[1] & valid, valid)
+    def mask(self, blocks: Mask) -> BlockMask:
+        """Return some of the blocks, shape (h, w), as a mask of the scene."""
+        return BlockMask(self.scene, self.factor, blocks)

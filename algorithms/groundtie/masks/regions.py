@@ -18,7 +18,7 @@ from ..rasters.reading import Mask, Window
 from ..speckle.statistics import LOOKS_WINDOW_PX, local_statistics
 from .growing import Region, Shape, grow_regions
 from .radar import power
-from .reduced import ReducedScene
+from .reduced import BlockMask, ReducedScene
 from .scene import Scene, Selection
 from .skeleton import pruned, skeleton
 from .threshold import BLOCK_PX, disc, grown
@@ -60,29 +60,26 @@ class GroundRegions:
 
     Parameters
     ----------
-    image
-        The image.
     regions, skeleton, part
         Homogeneous regions that were kept; the skeleton of the long ones; the mask: the broadened
-        skeleton and the large regions that are wider. Shape (h, w) of the image's blocks.
+        skeleton and the large regions that are wider.
     skeleton_m
         Length of the skeleton.
     high
         Grey value above which nothing takes part, of means over 4 × 4 pixels of the scene.
     """
 
-    image: ReducedScene
-    regions: Mask
-    skeleton: Mask
-    part: Mask
+    regions: BlockMask
+    skeleton: BlockMask
+    part: BlockMask
     skeleton_m: float
     high: float
 
     def select(self, window: Window) -> Selection:
         """Return which pixels of a window take part."""
-        chosen = self.image.select(self.part, window)
-        level = _smooth(self.image.scene.read(window))
-        return Selection(chosen.part & (level <= self.high), chosen.valid)
+        patch = self.part.scene.read(window)
+        chosen = self.part.cut(window) & (_smooth(patch) <= self.high)
+        return Selection(chosen & patch.valid, patch.valid)
 
 
 def find_regions(
@@ -117,7 +114,8 @@ def find_regions(
     part = _broadened(lines, wide, width_m, pixel_m) & image.patch.valid
     inside = _smooth(image.patch)[part]
     high = float(np.percentile(inside, 100 - high_percent)) if inside.size else np.inf
-    return GroundRegions(image, longs | wide, lines, part, _length_px(lines) * pixel_m, high)
+    regions, lined, kept = (image.mask(blocks) for blocks in (longs | wide, lines, part))
+    return GroundRegions(regions, lined, kept, _length_px(lines) * pixel_m, high)
 
 
 def _broadened(lines: Mask, wide: Mask, width_m: float, pixel_m: float) -> Mask:
@@ -128,13 +126,13 @@ def _broadened(lines: Mask, wide: Mask, width_m: float, pixel_m: float) -> Mask:
 
 def _kept_regions(image: ReducedScene, width_m: float, progress: Progress) -> tuple[Mask, Mask]:
     """Return long regions on the ground, and large and wide ones."""
-    valid, level, pixel_m = image.patch.valid, image.level_db, image.pixel_m
+    valid, pixel_m = image.patch.valid, image.pixel_m
+    level, looks = image.without_speckle()
     variation2 = local_statistics(power(image.patch), valid, LOOKS_WINDOW_PX).variation2
     brightest = np.percentile(level[valid], _BRIGHTEST_PERCENT)
     progress.update(0.5)
     smallest = max(int(_SMALLEST_M2 / pixel_m**2), 1)
-    most = _SEED_EXCESS / image.looks
-    found = grow_regions(level, variation2, valid, most, _TOLERANCE_DB, smallest)
+    found = grow_regions(level, variation2, valid, _SEED_EXCESS / looks, _TOLERANCE_DB, smallest)
     regions = [region for region in found if region.level_db <= brightest]
     shadow_db = _darkest_db(regions) + _SHADOW_DB
     longs, wide = np.zeros(level.shape, bool), np.zeros(level.shape, bool)

@@ -191,9 +191,10 @@ def find_locked_content(
 
     sameness = sameness_of(list(context.map(look, list(places.centres))))
     is_whole = bool(np.abs(np.median(moved, axis=0) - offset).max() <= _WHOLE_PX)
-    is_exact = bool(np.abs(moved - offset).max() <= exact_px)
     if sensors is Sensors.RADARS:
         is_exact = not sameness.varies_as_ground
+    else:
+        is_exact = bool(np.abs(moved - offset).max() <= exact_px)
     return LockedContent(pair, found, sameness, is_whole, sensors, is_exact)
 
 

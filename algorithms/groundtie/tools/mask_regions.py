@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -59,7 +58,7 @@ def mask_regions(
             share = write_mask(scene, outputs.stage(output), found.select, progress.part(0.7, 0.8))
             for path, part in ((regions, found.regions), (skeleton, found.skeleton)):
                 if path is not None:
-                    select = partial(found.image.select, part)
-                    write_mask(scene, outputs.stage(path), select, progress.part(0.8, 1.0))
+                    rest = progress.part(0.8, 1.0)
+                    write_mask(scene, outputs.stage(path), part.select, rest)
     words = f"{found.skeleton_m:.0f} m of skeleton"
     return WrittenMask(share, {"skeleton_m": found.skeleton_m}, words, files)
