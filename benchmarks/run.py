@@ -20,6 +20,7 @@ SUITES = (
     "simulated",
     "city",
     "towns",
+    "coarse_towns",
     "double_bounce",
     "layover",
     "radar_likeness",

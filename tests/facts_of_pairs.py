@@ -36,13 +36,17 @@ FIELDS, TOWN = grey_values(0.02, 0.01), grey_values(0.25, 0.01)
 
 @contextmanager
 def opened(
-    folder: Path, reference: np.ndarray, input: np.ndarray, filtered: tuple[str, ...] = ()
+    folder: Path,
+    reference: np.ndarray,
+    input: np.ndarray,
+    filtered: tuple[str, ...] = (),
+    pixel_m: float = 1.0,
 ) -> Iterator[ImagePair]:
     """Open two images of grey values as a pair; metadata may name a speckle filter."""
     with ExitStack() as stack:
         images = []
         for name, values in (("reference", reference), ("input", input)):
-            grid = utm_grid(*values.shape[::-1], 1.0)
+            grid = utm_grid(*values.shape[::-1], pixel_m)
             path = write_raster(folder / f"{name}.tif", values.astype(np.float32), grid)
             if name in filtered:
                 with rasterio.open(path, "r+") as dataset:

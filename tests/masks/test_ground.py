@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from raster_files import utm_grid, write_raster
 
-from groundtie.masks.ground import distance_back_px, find_ground, open_ground
+from groundtie.errors import RasterContentError
+from groundtie.masks.ground import distance_back_px, find_ground, open_ground, shows_ground
 from groundtie.masks.scene import Scene
 from groundtie.rasters.reading import Mask, open_raster
 
@@ -114,3 +115,24 @@ def test_bright_ground_between_shadow_and_layover_takes_part(
     found = find_ground(scene).select(scene.whole).part
     assert found[square].mean() > 0.9 and found[street].mean() > 0.9
     assert found[level_db == 35].mean() < 0.01 and found[level_db == 60].mean() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("size_px", "pixel_m", "expected"),
+    [
+        (400, 3.0, True),
+        (400, 3.5, False),
+        # 25 million pixels are reduced to a quarter, of twice the size.
+        (5000, 1.5, True),
+        (5000, 2.0, False),
+    ],
+)
+def test_large_pixels_do_not_resolve_ground(
+    tmp_path: Path, size_px: int, pixel_m: float, expected: bool
+) -> None:
+    like = open_raster(write_raster(tmp_path / "a.tif", np.ones((40, 40), np.float32)))
+    scene = Scene(utm_grid(size_px, size_px, pixel_m), Scene.of(like).read, like)
+    assert shows_ground(scene) == expected
+    if not expected:
+        with pytest.raises(RasterContentError, match="does not resolve the ground"):
+            find_ground(scene)

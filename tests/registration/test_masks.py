@@ -48,6 +48,24 @@ def test_whoever_names_the_radar_image_is_believed(
         assert used.kind == "none" and "too few for a town" in used.reason
 
 
+@pytest.mark.parametrize(
+    ("pixel_m", "kind", "elevated_px"), [(3.0, "ground", 0.5), (4.0, "none", 2.5)]
+)
+def test_a_town_in_large_pixels_takes_part_as_a_whole(
+    tmp_path: Path,
+    stack: ExitStack,
+    context: Context,
+    pixel_m: float,
+    kind: str,
+    elevated_px: float,
+) -> None:
+    """Elevated objects displace all of it by 10 m, what is taken for ground by half a pixel."""
+    with opened(tmp_path, speckled(0.25), FIELDS, pixel_m=pixel_m) as pair:
+        used = masked(pair, stack, context).used
+        assert used.kind == kind and "as in a town" in used.reason
+        assert used.elevated_px == pytest.approx(elevated_px)
+
+
 def test_fields_need_no_ground(tmp_path: Path, stack: ExitStack, context: Context) -> None:
     with opened(tmp_path, speckled(0.02), FIELDS) as pair:
         result = masked(pair, stack, context)

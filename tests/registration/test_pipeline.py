@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from contexts import context
-from facts_of_pairs import TOWN, opened, speckled
+from facts_of_pairs import TOWN, grey_values, opened, speckled
 from rpc_scenes import Scene, make_scene
 from speckled_pairs import write_speckled_pair
 from textured_pairs import (
@@ -170,6 +170,21 @@ def test_a_towns_ground_is_found_once_and_matched_by_one_joint_histogram(
         assert Counter(name for name, _ in found)["find_ground"] == 1
         stages = Stages.of(pair.images, masked, COREGISTER)
         assert isinstance(stages.matcher, PooledHistogramMatcher)
+
+
+def test_what_may_be_a_town_in_large_pixels_is_not_tried_by_its_ground(
+    tmp_path: Path, context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = grey_values(0.25, 0.01, seed=5)
+    for pixel_m, times in ((3.0, 1), (4.0, 0)):
+        with opened(tmp_path, speckled(0.08), other, pixel_m=pixel_m):
+            found = counting(monkeypatch)
+            images = tmp_path / "reference.tif", tmp_path / "input.tif"
+        with open_pair(*images, COREGISTER, context) as pair:
+            result = run(pair, COREGISTER, context)
+        assert not result.verdict.accepted and result.scene.may_be_town
+        assert Counter(name for name, _ in found)["find_ground"] == times
+        assert result.spec.tries == 1 + times
 
 
 def test_matchers_are_put_together_by_name(textured: TexturedPair, context: Context) -> None:

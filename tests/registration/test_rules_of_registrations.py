@@ -27,7 +27,7 @@ from evidences import (
 )
 from scipy.stats import binom
 
-from groundtie.masks.used import GROUND, LAYER, SURFACE, MaskUsed
+from groundtie.masks.used import GROUND, LAYER, NONE, SURFACE, MaskUsed
 from groundtie.matching.rest import Rest
 from groundtie.registration.evidence import Exchanged, RegistrationEvidence
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
@@ -43,6 +43,15 @@ def test_what_heights_may_displace_all_points_by_is_refused() -> None:
 
     assert refusing(along(2.0)) == []
     assert refusing(along(3.5)) == ["uncertain transform"]
+
+
+@pytest.mark.parametrize(("elevated_px", "expected"), [(2.0, []), (2.3, ["uncertain transform"])])
+def test_what_elevated_objects_displace_all_points_by_is_refused(
+    elevated_px: float, expected: list[str]
+) -> None:
+    """90 % of normal errors lie within 2.15 standard deviations; 3 px let 4.55 px pass."""
+    whole = MaskUsed(NONE, None, 1.0, "as in a town", elevated_px=elevated_px)
+    assert refusing(evidence(GOOD, mask=whole, max_error_px=3.0)) == expected
 
 
 @pytest.mark.parametrize("folds", [0, 1, 5])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,6 +56,11 @@ class BlockMask:
         return Selection(self.cut(window) & valid, valid)
 
 
+def reduction(scene: Scene) -> int:
+    """Return the side of the blocks, in pixels, that a scene is reduced by to fit into memory."""
+    return math.ceil(math.sqrt(scene.grid.width * scene.grid.height / _MOST_PIXELS))
+
+
 @dataclass(frozen=True)
 class ReducedScene:
     """A radar image as means over blocks of `factor` × `factor` pixels.
@@ -82,7 +88,7 @@ class ReducedScene:
         RasterContentError
             No pixel of the scene is valid.
         """
-        factor = int(np.ceil(np.sqrt(scene.grid.width * scene.grid.height / _MOST_PIXELS)))
+        factor = reduction(scene)
         patch = scene.reduced(factor, progress)
         if not patch.valid.any():
             raise RasterContentError(f"{scene.like.path} has no valid pixels to make a mask of")

@@ -33,6 +33,9 @@ class MaskUsed:
         Why, in a sentence.
     is_reliable
         Whether the image shows the elevated objects of the surface model, if that was used.
+    elevated_px
+        What elevated objects among what takes part displace all points alike by, as far as that is
+        known: the standard deviation along an axis, in matching pixels.
     """
 
     kind: str
@@ -40,6 +43,7 @@ class MaskUsed:
     share: float
     reason: str
     is_reliable: bool = True
+    elevated_px: float = 0.0
 
     @property
     def is_ground(self) -> bool:

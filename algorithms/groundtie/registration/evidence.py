@@ -23,7 +23,7 @@ from ..geometry.estimation import Estimate, jackknife_spread
 from ..geometry.judging import CE90_FACTOR, LARGEST_LOG10_CHANCE, SMALLEST_INLIER_SHARE
 from ..geometry.misses import Misses
 from ..geometry.tie_points import TiePoints
-from ..masks.used import GROUND, NONE, MaskUsed
+from ..masks.used import NONE, MaskUsed
 from ..matching.bands import BandSurvey
 from ..matching.rest import Rest
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
@@ -39,11 +39,6 @@ SURVEY, REFINEMENT, SERIES = "survey", "refinement", "series"
 
 # Scatter along a line is that of heights unless chance explains it with more than 5 %, as usual.
 _LOG10_FIVE_PERCENT = math.log10(0.05)
-
-# The ground of a town that is found in its radar image holds some of what is elevated: it
-# displaces all points alike, by so many matching pixels along an axis (standard deviation), of
-# whatever size they are. Measured by the suite calibration, classes city, seeds 400 to 439.
-TOWN_GROUND_PX = 0.5
 
 
 @dataclass(frozen=True)
@@ -298,8 +293,8 @@ class RegistrationEvidence:
 
     @property
     def common(self) -> Common:
-        """What displaces all points alike: heights, and what is no ground of a town's."""
-        return Common(self._heights_px, TOWN_GROUND_PX if self.mask.kind == GROUND else 0.0)
+        """What displaces all points alike: heights, and what of a town is no ground."""
+        return Common(self._heights_px, self.mask.elevated_px)
 
     @cached_property
     def _heights_px(self) -> FloatArray:

@@ -78,7 +78,7 @@ def register(
 
 def _may_be_matched_by_ground(masked: Masked, scene: SceneInfo, spec: Specification) -> bool:
     is_whole = masked.used.kind == NONE and not scene.has_user_mask and not spec.is_rendered
-    return is_whole and scene.is_radar_and_camera and scene.may_be_town
+    return is_whole and scene.is_radar_and_camera and scene.may_be_town and scene.shows_ground
 
 
 def _register_once(

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from ..kinds import AUTO
+from ..masks.ground import shows_ground
 from ..masks.radar import LEAST_VARIATION2, LEAST_VARIATION2_RATIO, variation2_of
 from ..masks.scene import Scene
 from ..masks.town import is_town, may_be_town, share_of_strong_scatterers
@@ -157,6 +158,11 @@ class SceneInfo:
     def is_town(self) -> bool:
         """Whether the radar image of a pair with a camera's shows a town."""
         return self.is_radar_and_camera and is_town(self.radar.strong_share)
+
+    @property
+    def shows_ground(self) -> bool:
+        """Whether the radar image resolves the ground between the buildings of a town."""
+        return shows_ground(self.radar.scene)
 
     @property
     def is_grey_and_oblique(self) -> bool:
