@@ -6,6 +6,7 @@ from scipy.ndimage import generic_filter
 
 from groundtie.speckle.statistics import (
     estimate_looks,
+    homogeneous_variation2,
     local_statistics,
     window_counts,
 )
@@ -49,6 +50,18 @@ def test_counts_of_a_full_image_are_those_of_any_other() -> None:
     expected = np.zeros(full.shape)
     expected[6:, 10:] = 1
     np.testing.assert_array_equal(difference, expected)
+
+
+@pytest.mark.parametrize("grey_value", [0.0, 17.0, 255.0])
+def test_a_frame_has_no_part_in_how_homogeneous_windows_vary(grey_value: float) -> None:
+    image = speckled(np.full((200, 200), 900.0), 4.0)
+    everywhere = np.ones(image.shape, bool)
+    alone = homogeneous_variation2(image[40:-40, 40:-40], everywhere[40:-40, 40:-40])
+    framed = np.full(image.shape, grey_value**2, np.float32)
+    framed[40:-40, 40:-40] = image[40:-40, 40:-40]
+    # Windows that hold its rim vary more: few of them.
+    assert homogeneous_variation2(framed, everywhere) == pytest.approx(alone, rel=0.05)
+    assert homogeneous_variation2(np.full_like(framed, 5.0), everywhere) == 0
 
 
 def test_values_of_16_bits_squared_keep_their_precision() -> None:

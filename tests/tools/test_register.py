@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import rasterio
-from raster_files import write_raster
+from raster_files import utm_grid, write_raster
 from rpc_models import camera_rpc, to_rasterio
-from textured_pairs import TexturedPair
+from textured_pairs import TexturedPair, texture
 
 import groundtie
-from groundtie.errors import ParameterError
+from groundtie.errors import NotRegisteredError, ParameterError
+from groundtie.registration import automatic
+from groundtie.registration.registration import Registration
 
 
 @pytest.mark.slow
@@ -46,3 +49,28 @@ def test_an_image_with_rpcs_has_none_to_write(
             **{name: tmp_path / f"other{suffix}"},
         )
     assert not (tmp_path / "out.tif").exists()
+
+
+def test_what_matches_at_two_places_is_not_tried_in_another_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same ground every 51 pixels: a search of rotations would find one of the places."""
+    tried: list[str] = []
+
+    def run(*arguments: Any) -> Registration:
+        found = automatic_run(*arguments)
+        tried.append(found.verdict.rule)
+        return found
+
+    automatic_run = automatic.run
+    monkeypatch.setattr(automatic, "run", run)
+    ground = np.tile(texture(51, 51), (9, 9))
+    paths = []
+    for name, first in (("reference.tif", 20), ("input.tif", 30)):
+        noise = np.random.default_rng(first).normal(size=(400, 400))
+        view = ground[first : first + 400, first : first + 400] + 0.2 * noise
+        image = np.clip(120 + 30 * view, 1, 255).astype(np.float32)
+        paths.append(write_raster(tmp_path / name, image, utm_grid(400, 400, 1.0)))
+    with pytest.raises(NotRegisteredError, match="two places match about as well"):
+        groundtie.register(*paths)
+    assert tried == ["second place"]

@@ -35,8 +35,9 @@ from .verdict import Verdict
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
 _DOUBTED_DEG, _DOUBTED_SCALE = 10.0, 1.1
 
-# Rules of the scene refuse what matches well, but not the ground: no other matcher may try again.
-_FINAL = {rule.name for rule in RULES if rule.stage in (SCENE, SURVEY)}
+# Rules of the scene refuse what matches well, but not the ground, or at two places: no other
+# matcher may try again.
+_FINAL = {rule.name for rule in RULES if rule.stage in (SCENE, SURVEY)} | {"second place"}
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from ..rasters.reading import FloatImage, Mask
 _NO_POWER = np.float32(1e-30)
 
 # Window in which looks are estimated, and the bins, in octaves of the squared coefficient of
-# variation; homogeneous areas share the fullest. No image has less than one look.
+# variation; homogeneous areas share the fullest. What varies less is drawn or a frame: it has no
+# sensor's noise. No image has less than one look.
 LOOKS_WINDOW_PX = 9
 _BIN_OCTAVES = 0.125
 _OCTAVES = (-14.0, 0.375)
@@ -129,7 +130,8 @@ def homogeneous_variation2(intensity: FloatImage, valid: Mask) -> float:
     """Return the squared coefficient of variation in the most homogeneous tenth of all windows.
 
     Speckle is in every window, while a camera's noise is far below its signal: of a radar and an
-    optical image, the radar's value is larger (measured: on all of 20 real pairs).
+    optical image, the radar's value is larger (measured: on all of 20 real pairs). Windows without
+    any noise, as of frames, are left out.
 
     Parameters
     ----------
@@ -141,9 +143,10 @@ def homogeneous_variation2(intensity: FloatImage, valid: Mask) -> float:
     Returns
     -------
     float
-        0 if no window is valid.
+        0 if no window is valid, or none has noise.
     """
     local = local_statistics(intensity, valid, _HOMOGENEOUS_WINDOW_PX)
     full = window_counts(valid, _HOMOGENEOUS_WINDOW_PX) == _HOMOGENEOUS_WINDOW_PX**2
-    variation2 = local.variation2[full & (local.mean > 0)]
+    has_noise = local.variation2 > 2 ** _OCTAVES[0]
+    variation2 = local.variation2[full & has_noise & (local.mean > 0)]
     return float(np.quantile(variation2, _HOMOGENEOUS_SHARE)) if variation2.size else 0.0
