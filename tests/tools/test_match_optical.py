@@ -23,6 +23,7 @@ from groundtie.errors import NotRegisteredError, ParameterError
 from groundtie.features.classifier_training import Training, train_classifier
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
+from groundtie.masks import ground
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.registration.rules import scene as scene_rules
 from groundtie.registration.scene import ImageFacts, SceneInfo
@@ -108,6 +109,8 @@ def test_a_radar_image_that_may_show_a_town_is_in_doubt(
     # Too few strong scatterers for a town, too many for one to be ruled out.
     monkeypatch.setattr(ImageFacts, "strong_share", 0.1)
     monkeypatch.setattr(scene_rules, "_CLEAR_SHARE", 1.1)
+    # Pixels of 10 m resolve streets.
+    monkeypatch.setattr(ground, "_COARSEST_M", 10.0)
     found = match_optical(files.reference, files.input, tmp_path / "out.tif")
     expected = ("ground", 2) if is_radar else ("none", 1)
     assert (found.mask.kind, found.spec.tries) == expected
