@@ -130,6 +130,7 @@ def facts(
     is_known_radar: bool = False,
     is_in_sensor_geometry: bool = False,
     has_colours: bool = False,
+    has_pixel_size: bool = True,
 ) -> ImageFacts:
     """Return facts about an image that need no image: by default a camera's, of fields."""
     found = ImageFacts(None, None)  # type: ignore[arg-type]
@@ -139,6 +140,7 @@ def facts(
         is_known_radar=is_known_radar,
         is_in_sensor_geometry=is_in_sensor_geometry,
         has_colours=has_colours,
+        has_pixel_size=has_pixel_size,
     )
     return found
 

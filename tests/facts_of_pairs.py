@@ -40,13 +40,16 @@ def opened(
     reference: np.ndarray,
     input: np.ndarray,
     filtered: tuple[str, ...] = (),
-    pixel_m: float = 1.0,
+    pixel_m: float | None = 1.0,
 ) -> Iterator[ImagePair]:
-    """Open two images of grey values as a pair; metadata may name a speckle filter."""
+    """Open two images of grey values as a pair; metadata may name a speckle filter.
+
+    Without a pixel size there is no georeferencing.
+    """
     with ExitStack() as stack:
         images = []
         for name, values in (("reference", reference), ("input", input)):
-            grid = utm_grid(*values.shape[::-1], pixel_m)
+            grid = None if pixel_m is None else utm_grid(*values.shape[::-1], pixel_m)
             path = write_raster(folder / f"{name}.tif", values.astype(np.float32), grid)
             if name in filtered:
                 with rasterio.open(path, "r+") as dataset:

@@ -293,7 +293,7 @@ def refine_click(
         here = grid.map_to_pixel(xy).ravel()
         # A lattice of the reference's pixels whose middle is the clicked place.
         corner = Affine.translation(*(here + 0.5 - side / 2))
-        around = Grid(compose(grid.transform, corner), grid.crs, side, side)
+        around = grid.on_same_map(compose(grid.transform, corner), side, side)
         middle = (side - 1) / 2
         windows = [
             Image(source, None).read_onto(around, to_px)

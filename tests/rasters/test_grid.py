@@ -75,6 +75,15 @@ def test_shifting_is_in_map_units() -> None:
     np.testing.assert_allclose(moved, [[3, -7]])
 
 
+def test_no_lattice_on_pixels_without_georeferencing_has_any() -> None:
+    own = Grid(PIXEL_COORDINATES, None, 40, 30)
+    for grid in (own.scaled(2.0), own.window(5, 6, 7, 8), own.shifted(3.0, 0.5)):
+        for further in (grid, grid.scaled(1.5), grid.window(1, 2, 3, 4), grid.shifted(-1, -1)):
+            assert not further.is_georeferenced and further.metres_per_pixel is None
+    local = Grid(Affine.scale(2.0, -2.0), None, 40, 30)
+    assert local.is_georeferenced and local.scaled(2.0).metres_per_pixel == pytest.approx(4.0)
+
+
 def test_containing() -> None:
     px = [[-0.5, -0.5], [3.5, 2.5], [-0.51, 0], [0, 2.51], [np.nan, 0], [np.inf, 0]]
     assert utm_grid(4, 3).contains(px).tolist() == [True, True, False, False, False, False]

@@ -15,8 +15,9 @@ from textured_pairs import listing
 from groundtie.context import Context
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.transform import Transform
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.registration.delivery import RegistrationFiles
-from groundtie.registration.displacement import displacement_field
+from groundtie.registration.displacement import displacement_field, write_displacement
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 
@@ -82,18 +83,22 @@ def test_a_curved_model_gets_smaller_pixels(evidence: RegistrationEvidence) -> N
     np.testing.assert_allclose(field[:2, 5, 3:5].T, expected, atol=0.05)
 
 
-def test_without_georeferencing_it_is_in_pixels(evidence: RegistrationEvidence) -> None:
-    lattice = replace(evidence.grid, transform=Affine.translation(-0.5, -0.5), crs=None)
+def test_without_georeferencing_it_is_in_pixels(
+    registration: Registration, evidence: RegistrationEvidence, tmp_path: Path
+) -> None:
+    own = Grid(PIXEL_COORDINATES, None, evidence.grid.width, evidence.grid.height)
     shift = PolynomialModel("translation", Frame(Affine.identity()), np.array([[3.0, -2.0]]))
-    moved = replace(
-        evidence,
-        grid=lattice,
-        estimate=replace(evidence.estimate, transform=Transform(shift, None, lattice)),
-    )
-    field, _ = displacement_field(moved)
-    known = np.isfinite(field[0])
-    np.testing.assert_allclose(field[0][known], -3.0)
-    np.testing.assert_allclose(field[1][known], 2.0)
+    estimate = replace(evidence.estimate, transform=Transform(shift, None, own))
+    like, path = registration.pair.reference.source, tmp_path / "d.tif"
+    # Larger pixels of the same lattice are moved by fewer of them.
+    for lattice, size in ((own, 1.0), (own.window(5, 4, 90, 80), 1.0), (own.scaled(2.0), 2.0)):
+        write_displacement(replace(evidence, grid=lattice, estimate=estimate), like, path)
+        with rasterio.open(path) as raster:
+            dx, dy, _ = raster.read()
+            assert raster.units == ("px",) * 3 and "down" in raster.descriptions[1]
+        known = np.isfinite(dx)
+        np.testing.assert_allclose(dx[known], -3.0 / size, rtol=1e-6)
+        np.testing.assert_allclose(dy[known], 2.0 / size, rtol=1e-6)
 
 
 def test_a_refused_registration_leaves_none(

@@ -49,17 +49,21 @@ def test_whoever_names_the_radar_image_is_believed(
 
 
 @pytest.mark.parametrize(
-    ("pixel_m", "kind", "elevated_px"), [(3.0, "ground", 0.5), (4.0, "none", 2.5)]
+    ("pixel_m", "kind", "elevated_px"),
+    [(3.0, "ground", 0.5), (4.0, "none", 2.5), (None, "none", 0.0)],
 )
 def test_a_town_in_large_pixels_takes_part_as_a_whole(
     tmp_path: Path,
     stack: ExitStack,
     context: Context,
-    pixel_m: float,
+    pixel_m: float | None,
     kind: str,
     elevated_px: float,
 ) -> None:
-    """Elevated objects displace all of it by 10 m, what is taken for ground by half a pixel."""
+    """Elevated objects displace all of it by 10 m, what is taken for ground by half a pixel.
+
+    In pixels of unknown size a rule refuses it.
+    """
     with opened(tmp_path, speckled(0.25), FIELDS, pixel_m=pixel_m) as pair:
         used = masked(pair, stack, context).used
         assert used.kind == kind and "as in a town" in used.reason

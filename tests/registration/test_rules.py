@@ -174,7 +174,7 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, mask=MaskUsed(SURFACE, "reference", 0.3, "shows nothing", False)),
         evidence(GOOD, mask=MaskUsed(SURFACE, "reference", 0.3, "fits")),
     ),
-    "despeckled town": (evidence(GOOD, scene=DESPECKLED), evidence(GOOD, scene=SPECKLED)),
+    "ground not found": (evidence(GOOD, scene=DESPECKLED), evidence(GOOD, scene=SPECKLED)),
     "town matched whole": (
         evidence(two_thirds(20), scene=PERHAPS),
         evidence(two_thirds(26), scene=PERHAPS),

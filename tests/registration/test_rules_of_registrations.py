@@ -236,11 +236,22 @@ def test_what_is_high_at_both_places_repeats() -> None:
 
 @pytest.mark.parametrize(
     ("kind", "expected"),
-    [(LAYER, []), (SURFACE, []), (GROUND, ["despeckled town"])],
+    [(LAYER, []), (SURFACE, []), (GROUND, ["ground not found"])],
 )
 def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list[str]) -> None:
     despeckled = scene(facts(is_known_radar=True, strong_share=0.25))
     assert refusing(evidence(GOOD, scene=despeckled, mask=masked(kind))) == expected
+
+
+@pytest.mark.parametrize(
+    ("variation2", "has_pixel_size", "expected"),
+    [(0.2, True, []), (0.2, False, ["ground not found"])],
+)
+def test_the_ground_of_a_town_is_not_found_in_pixels_of_unknown_size(
+    variation2: float, has_pixel_size: bool, expected: list[str]
+) -> None:
+    town = facts(variation2, strong_share=0.25, has_pixel_size=has_pixel_size)
+    assert refusing(evidence(GOOD, scene=scene(town))) == expected
 
 
 @pytest.mark.parametrize(("agreeing", "is_needed"), [(5, True), (6, False), (9, False)])

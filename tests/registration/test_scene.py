@@ -71,6 +71,19 @@ def test_the_ground_of_a_town_is_found_by_its_speckle(
         assert SceneInfo.of(pair, declared).is_despeckled_town == expected
 
 
+@pytest.mark.parametrize(
+    ("reference", "pixel_m", "expected"),
+    [(speckled(0.25), None, True), (speckled(0.25), 10.0, False), (speckled(0.02), None, False)],
+)
+def test_the_ground_of_a_town_is_found_by_its_pixel_size(
+    tmp_path: Path, reference: np.ndarray, pixel_m: float | None, expected: bool
+) -> None:
+    with opened(tmp_path, reference, FIELDS, pixel_m=pixel_m) as pair:
+        info = SceneInfo.of(pair)
+        assert info.is_town_of_unknown_size == expected
+        assert not replace(info, has_user_mask=True).is_town_of_unknown_size
+
+
 def test_a_users_mask_needs_no_speckle() -> None:
     town = facts(is_known_radar=True, strong_share=0.25)
     for has_mask in (False, True):

@@ -29,13 +29,18 @@ def test_the_ground_between_buildings_is_written(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("grey_value", "pixel_m", "reason"),
-    [(0, 1.0, "no valid pixels"), (9, 4.0, "pixels are larger than 3 m")],
+    [
+        (0, 1.0, "no valid pixels"),
+        (9, 4.0, "pixels are larger than 3 m"),
+        (9, None, "has no georeferencing"),
+    ],
 )
 def test_a_failure_leaves_nothing_behind(
-    tmp_path: Path, grey_value: int, pixel_m: float, reason: str
+    tmp_path: Path, grey_value: int, pixel_m: float | None, reason: str
 ) -> None:
     image = np.full((40, 40), grey_value, np.uint8)
-    path = write_raster(tmp_path / "in.tif", image, utm_grid(40, 40, pixel_m), nodata=0)
+    grid = None if pixel_m is None else utm_grid(40, 40, pixel_m)
+    path = write_raster(tmp_path / "in.tif", image, grid, nodata=0)
     with pytest.raises(RasterContentError, match=reason):
         mask_ground(path, tmp_path / "mask.tif")
     assert [found.name for found in tmp_path.iterdir()] == ["in.tif"]

@@ -40,8 +40,12 @@ _COARSEST_M = 3.0
 
 
 def shows_ground(scene: Scene) -> bool:
-    """Whether a radar image, reduced as `find_ground` does, resolves ground between buildings."""
-    return scene.grid.pixel_size_m * reduction(scene) <= _COARSEST_M
+    """Whether a radar image, reduced as `find_ground` does, resolves ground between buildings.
+
+    Without georeferencing nobody knows.
+    """
+    pixel_m = scene.grid.metres_per_pixel
+    return pixel_m is not None and pixel_m * reduction(scene) <= _COARSEST_M
 
 
 def find_ground(scene: Scene, progress: Progress = SILENT) -> BlockMask:
@@ -57,8 +61,13 @@ def find_ground(scene: Scene, progress: Progress = SILENT) -> BlockMask:
     Raises
     ------
     RasterContentError
-        No pixel of the scene is valid, or they are too large to resolve it.
+        No pixel of the scene is valid, or they are too large to resolve it, or of unknown size.
     """
+    if scene.grid.metres_per_pixel is None:
+        raise RasterContentError(
+            f"{scene.like.path} has no georeferencing, and without the size of its pixels the "
+            "ground between buildings is not found; give it a geotransform"
+        )
     if not shows_ground(scene):
         raise RasterContentError(
             f"{scene.like.path} does not resolve the ground between buildings: pixels are larger "

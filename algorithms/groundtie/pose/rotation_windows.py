@@ -13,7 +13,7 @@ from ..geometry.limits import SearchLimits
 from ..geometry.models import Frame, PolynomialModel
 from ..geometry.transform import Transform
 from ..matching.chips import MaskOf
-from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid, apply_affine, compose
+from ..rasters.grid import FloatArray, Grid, apply_affine, compose
 from ..rasters.pair import Image, require_georeferenced_alike
 from ..rasters.patch import Patch
 from .pose import Pose
@@ -170,7 +170,7 @@ def _metric_frame(grid: Grid) -> Affine:
     """Return the transform from metres right and down of a grid's centre to its map."""
     x, y = grid.pixel_to_map([grid.centre_px])[0]
     across, along = grid.metres_per_unit
-    down = 1 if grid.transform == PIXEL_COORDINATES else -1
+    down = -1 if grid.is_georeferenced else 1
     return Affine(1 / across, 0, x, 0, down / along, y)
 
 
@@ -185,7 +185,7 @@ def _grid(frame: Affine, like: Grid, centre: FloatArray, half: FloatArray, pixel
     width, height = np.maximum(np.ceil(2 * half / pixel - 1e-6), 1).astype(int)
     left, top = centre - np.array([width, height]) * pixel / 2
     corner = compose(frame, Affine.translation(left, top), Affine.scale(pixel))
-    return Grid(corner, like.crs, int(width), int(height))
+    return like.on_same_map(corner, int(width), int(height))
 
 
 def _apart(reference: Image, input: Image) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from typing import Any
 
@@ -57,12 +57,16 @@ class Grid:
         Coordinate reference system; None for local coordinates and pixel coordinates.
     width, height
         Size in pixels.
+    is_on_pixels
+        Whether the map is the pixels of a raster without georeferencing, of which this is another
+        lattice than its own.
     """
 
     transform: Affine
     crs: CRS | None
     width: int
     height: int
+    is_on_pixels: bool = field(default=False, compare=False, kw_only=True)
 
     @cached_property
     def centre_transform(self) -> Affine:
@@ -86,7 +90,8 @@ class Grid:
     @cached_property
     def is_georeferenced(self) -> bool:
         """Whether map positions are more than pixel coordinates."""
-        return self.crs is not None or self.transform != PIXEL_COORDINATES
+        is_on_pixels = self.is_on_pixels or self.transform == PIXEL_COORDINATES
+        return self.crs is not None or not is_on_pixels
 
     @cached_property
     def pixel_size(self) -> tuple[float, float]:
@@ -125,12 +130,8 @@ class Grid:
 
     def scaled(self, factor: float) -> Grid:
         """Return the grid of pixels `factor` times as large from the same corner, cut to fit."""
-        return Grid(
-            compose(self.transform, Affine.scale(factor)),
-            self.crs,
-            max(int(self.width / factor + 1e-6), 1),
-            max(int(self.height / factor + 1e-6), 1),
-        )
+        width, height = (max(int(side / factor + 1e-6), 1) for side in (self.width, self.height))
+        return self.on_same_map(compose(self.transform, Affine.scale(factor)), width, height)
 
     def window(self, col: int, row: int, width: int, height: int) -> Grid:
         """Return the part of this lattice that starts at a pixel; it may reach beyond the grid."""
@@ -139,11 +140,17 @@ class Grid:
             transform=compose(self.transform, Affine.translation(col, row)),
             width=width,
             height=height,
+            is_on_pixels=not self.is_georeferenced,
         )
 
     def shifted(self, dx: float, dy: float) -> Grid:
         """Return this grid moved by map units."""
-        return replace(self, transform=compose(Affine.translation(dx, dy), self.transform))
+        place = compose(Affine.translation(dx, dy), self.transform)
+        return replace(self, transform=place, is_on_pixels=not self.is_georeferenced)
+
+    def on_same_map(self, transform: Affine, width: int, height: int) -> Grid:
+        """Return another lattice on the map of this one."""
+        return Grid(transform, self.crs, width, height, is_on_pixels=not self.is_georeferenced)
 
     def outline(self, points_per_side: int = 21) -> FloatArray:
         """Return pixel positions along the outer border, shape (4 n, 2), in order."""

@@ -100,7 +100,7 @@ def _means(image: Image, level: Grid, to_px: PointFunction, context: Context) ->
     if (x, y) == (1, 1) or not is_shown or type(source.grid) is not Grid:
         return image
     larger = compose(source.grid.transform, Affine.scale(x, y))
-    grid = replace(source.grid, transform=larger, width=width, height=height)
+    grid = source.grid.on_same_map(larger, width, height)
     values, valid = np.empty((height, width), np.float32), np.empty((height, width), bool)
 
     def average(tile: Window) -> None:

@@ -91,7 +91,7 @@ def _overview(source: RasterSource, number: int) -> RasterSource | None:
         return None
     larger = Affine.scale(source.grid.width / width, source.grid.height / height)
     transform = compose(source.grid.transform, larger)
-    grid = replace(source.grid, transform=transform, width=width, height=height)
+    grid = source.grid.on_same_map(transform, width, height)
     return replace(source, grid=grid, _handles=handles, _overviews=None)
 
 

@@ -19,7 +19,7 @@ from ..errors import ParameterError
 from ..progress import SILENT, Progress
 from ..runs import RUN_TAG, run_tags
 from .atomic import scratch_file, scratch_folder, writing
-from .grid import Grid
+from .grid import PIXEL_COORDINATES, Grid
 from .hidden_files import final_name
 from .metadata import BandInfo, fits
 from .reading import RasterSource
@@ -154,7 +154,7 @@ def _profile(
         "endianness": "LITTLE",
         "sparse_ok": True,
     }
-    if grid.is_georeferenced:
+    if grid.transform != PIXEL_COORDINATES:
         profile["transform"] = grid.transform
     return profile
 

@@ -47,7 +47,7 @@ def displacement_field(evidence: RegistrationEvidence) -> tuple[FloatArray, Grid
     values = np.array(nodes.values[:, 1:-1, 1:-1])
     rows, cols = values.shape[1:]
     place = compose(matching.transform, Affine.scale(nodes.step))
-    grid = Grid(place, matching.crs, cols, rows)
+    grid = matching.on_same_map(place, cols, rows)
     px = mesh(np.arange(cols), np.arange(rows))
     xy = grid.pixel_to_map(px)
     if matching.is_georeferenced:

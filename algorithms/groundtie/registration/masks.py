@@ -75,6 +75,9 @@ def with_ground_mask(
     if not scene.is_town:
         reason = f"{_shown(scene)}: too few for a town"
         return Masked(pair, MaskUsed(NONE, None, 1.0, reason))
+    if scene.is_town_of_unknown_size:
+        reason = f"{_shown(scene)}, as in a town, in pixels of unknown size"
+        return Masked(pair, MaskUsed(NONE, None, 1.0, reason))
     if not scene.shows_ground:
         reason = f"{_shown(scene)}, as in a town, in pixels too large to resolve streets"
         elevated_px = _WHOLE_M / pair.grid.pixel_size_m

@@ -57,6 +57,11 @@ class ImageFacts:
         return isinstance(self.image.source.grid, SensorGrid)
 
     @cached_property
+    def has_pixel_size(self) -> bool:
+        """Whether it is known how large its pixels are on the ground."""
+        return self.scene.grid.metres_per_pixel is not None
+
+    @cached_property
     def has_colours(self) -> bool:
         """Whether its bands make classes of colour, by which a town's ground is matched."""
         return self.image.has_colours
@@ -163,6 +168,15 @@ class SceneInfo:
     def shows_ground(self) -> bool:
         """Whether the radar image resolves the ground between the buildings of a town."""
         return shows_ground(self.radar.scene)
+
+    @property
+    def is_town_of_unknown_size(self) -> bool:
+        """Whether the radar image shows a town, and nobody knows how large its pixels are.
+
+        In metres its ground is found, and is known what roofs displace. A mask of the user's needs
+        neither.
+        """
+        return self.is_town and not self.radar.has_pixel_size and not self.has_user_mask
 
     @property
     def is_grey_and_oblique(self) -> bool:

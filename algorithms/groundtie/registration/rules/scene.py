@@ -61,12 +61,15 @@ def _surface_elsewhere(evidence: RegistrationEvidence) -> str | None:
     )
 
 
-def _despeckled_town(evidence: RegistrationEvidence) -> str | None:
-    if evidence.scene is None or evidence.mask.kind in (LAYER, SURFACE):
+def _ground_not_found(evidence: RegistrationEvidence) -> str | None:
+    scene = evidence.scene
+    if scene is None or evidence.mask.kind in (LAYER, SURFACE):
         return None
-    if not evidence.scene.is_despeckled_town:
-        return None
-    return "the radar image of a town has no speckle, by which its ground is found"
+    if scene.is_despeckled_town:
+        return "the radar image of a town has no speckle, by which its ground is found"
+    if scene.is_town_of_unknown_size:
+        return "the reference of a town has no pixel size in metres, by which its ground is found"
+    return None
 
 
 def _town_matched_whole(evidence: RegistrationEvidence) -> str | None:
@@ -104,12 +107,13 @@ SCENE_RULES: tuple[Rule, ...] = (
         _surface_elsewhere,
     ),
     Rule(
-        "despeckled town",
+        "ground not found",
         SCENE,
-        "a radar image of a town has no speckle, by which its ground is found",
-        "suite city",
-        f"give the radar image unfiltered; {ON_GROUND}",
-        _despeckled_town,
+        "a radar image of a town has no speckle, or the reference no georeferencing, by which the "
+        "ground is found",
+        "suites city and coarse_towns",
+        f"give the radar image unfiltered, and the reference a geotransform; {ON_GROUND}",
+        _ground_not_found,
     ),
     Rule(
         "town matched whole",
