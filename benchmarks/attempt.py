@@ -67,6 +67,8 @@ class Outcome:
         Error that the tool itself claims.
     model, reason
         What the tool chose and said.
+    claimed_ce90_px
+        Radius that is to hold 90 % of the errors, where a suite asks for it.
     """
 
     name: str
@@ -80,6 +82,7 @@ class Outcome:
     claimed_rmse_px: float
     model: str
     reason: str
+    claimed_ce90_px: float = math.nan
 
     def record(self) -> dict[str, Any]:
         """Return the outcome as values that JSON can carry."""

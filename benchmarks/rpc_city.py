@@ -15,7 +15,7 @@ import groundtie
 from groundtie.sensor.rpc_files import read_rpc
 
 from .accuracy import CORRECT, CRASHED, INACCURATE, REFUSED, SILENTLY_WRONG, FloatArray
-from .attempt import Outcome, count, tried
+from .attempt import Outcome, accepted, count, tried
 from .rpc import crs_of, image_positions, misses, rms
 from .simulations import kept, simulator_version
 from .suites import Goal, Settings, SuiteResult, Table, by_group, run_cases
@@ -133,6 +133,7 @@ class CityCase:
             summary["verdict"]["check_rmse_px"],
             summary.get("bias", {}).get("model", "points"),
             summary["verdict"]["reason"],
+            summary["verdict"]["check_ce90_px"],
         )
 
 
@@ -232,8 +233,14 @@ def verdict_table(
             str(len(outcomes)),
             *(str(count(outcomes, verdict)) for verdict in verdicts),
             *error_cells(outcomes),
+            _below_ce90(accepted(outcomes)),
         ]
         for name, outcomes in groups.items()
     ]
-    head = ("", "cities", *verdicts, "median error (px)", "largest (px)")
+    head = ("", "cities", *verdicts, "median error (px)", "largest (px)", "RMSE below CE90")
     return Table(title, head, rows)
+
+
+def _below_ce90(outcomes: Sequence[Outcome]) -> str:
+    below = sum(outcome.error_px <= outcome.claimed_ce90_px for outcome in outcomes)
+    return f"{below} of {len(outcomes)}"

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from raster_files import UTM, utm_grid
 
+from groundtie.geometry.accuracy import NOTHING_COMMON, Common
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.model_choice import block_folds
@@ -173,10 +174,13 @@ def refinement(
     max_error_px: float = 3.0,
     kind: str = "auto",
     folding_px: float = 0.0,
+    common: Common = NOTHING_COMMON,
 ) -> RefinementEvidence:
     """Return the evidence of RPCs that are refined by ground control."""
     adjusted = adjust(fit, kind)
-    return RefinementEvidence.of(fit, adjusted, check, pixel_m, max_error_px, folding_px)
+    return RefinementEvidence.of(
+        fit, adjusted, check, pixel_m, max_error_px, folding_px, common=common
+    )
 
 
 # Check points that all agree.

@@ -113,7 +113,10 @@ def test_limits(error_px: float, verdict: str) -> None:
     assert rpc_city.judge(error_px) == verdict
 
 
-SUMMARY = {"verdict": {"check_rmse_px": 0.5, "reason": "they agree"}, "bias": {"model": "shift"}}
+SUMMARY = {
+    "verdict": {"check_rmse_px": 0.5, "check_ce90_px": 2.6, "reason": "they agree"},
+    "bias": {"model": "shift"},
+}
 
 
 def test_cases_call_the_tool_and_judge_what_it_writes(
@@ -131,6 +134,7 @@ def test_cases_call_the_tool_and_judge_what_it_writes(
     assert (found.verdict, found.model, found.reason) == (INACCURATE, "shift", "they agree")
     assert found.group == "refine_rpc, surface model, 64 px, 4 looks"
     assert found.error_px == pytest.approx(2.5, abs=1e-3)
+    assert found.claimed_ce90_px == 2.6
     assert calls[0]["surface_model"] == scene / "dsm.tif"
     assert CityCase(city, REFINED, scene.parent).run(1).verdict == INACCURATE
     assert "surface_model" not in calls[1]
@@ -180,11 +184,22 @@ def test_goals(
 def test_tables_count_by_size_and_looks(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     detailed, summed = suite(monkeypatch, tmp_path, REFINED).tables
     assert len(detailed.rows) == 4 * len(RUNS)
-    expected = ["refine_rpc, 700 px, 1 looks", "2", "1", "0", "1", "0", "0", "4.40", "8.30"]
+    expected = [
+        "refine_rpc, 700 px, 1 looks",
+        "2",
+        "1",
+        "0",
+        "1",
+        "0",
+        "0",
+        "4.40",
+        "8.30",
+        "0 of 2",
+    ]
     assert list(detailed.rows[0]) == expected
     assert [row[1] for row in summed.rows] == ["8"] * len(RUNS)
 
 
 def test_nothing_accepted() -> None:
     table = rpc_city.verdict_table({"a": [outcome(REFUSED)]})
-    assert table.rows == [["a", "1", "0", "0", "0", "1", "0", "–", "–"]]
+    assert table.rows == [["a", "1", "0", "0", "0", "1", "0", "–", "–", "0 of 0"]]

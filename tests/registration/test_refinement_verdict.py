@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from evidences import IMAGE_SIZE, control, refinement
 
+from groundtie.geometry.accuracy import Common
 from groundtie.registration.verdict import judge_refinement
 from groundtie.sensor.adjustment import Control
 
@@ -50,6 +51,17 @@ def test_refusals(fit: Control, check: Control | None, max_error_px: float, reas
     verdict = judge_refinement(refinement(fit, check, 1.0, max_error_px, "shift"))
     assert not verdict.accepted
     assert reason in verdict.reason
+
+
+@pytest.mark.parametrize(("sigma_px", "is_accepted"), [(2.0, True), (2.3, False)])
+def test_what_displaces_all_control_alike_is_part_of_the_error(
+    sigma_px: float, is_accepted: bool
+) -> None:
+    """90 % of normal errors lie within 2.15 standard deviations; 3 px let 4.55 px pass."""
+    found = refinement(control((20, -9)), common=Common(np.zeros(2), sigma_px))
+    verdict = judge_refinement(found)
+    assert verdict.accepted == is_accepted
+    assert verdict.check_ce90_px == pytest.approx(2.15 * sigma_px, rel=0.05)
 
 
 def test_a_model_that_points_do_not_hold_is_refused() -> None:

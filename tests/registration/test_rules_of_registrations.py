@@ -119,11 +119,11 @@ def test_ground_must_span_the_overlap() -> None:
     [
         (4, False, ["too little ground"]),
         (5, False, []),
+        (3, True, ["too little ground"]),
         (4, True, []),
-        (2, True, ["chance agreement"]),
     ],
 )
-def test_an_oblique_view_without_colours_needs_more_check_points_on_the_ground(
+def test_an_oblique_view_needs_more_check_points_on_the_ground(
     agreeing: int, has_colours: bool, expected: list[str]
 ) -> None:
     ground = MaskUsed(GROUND, "reference", 0.3, "as in a town")

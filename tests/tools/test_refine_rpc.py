@@ -15,6 +15,8 @@ from rpc_scenes import SIZE, Scene, ground_texture, make_scene
 import groundtie
 from benchmarks.rpc_city import true_error_px
 from groundtie.errors import GroundTieError, NotRegisteredError, OutputError, ParameterError
+from groundtie.geometry.accuracy import Common
+from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.sensor.bias import Bias, fold
 from groundtie.sensor.rpc import RPC
 from groundtie.sensor.rpc_files import read_rpc
@@ -87,6 +89,27 @@ def test_a_terrain_model_of_a_part_serves_for_matching_that_part(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("pixel_m", [1.0, 2.0])
+def test_what_displaces_the_match_displaces_the_rpcs(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pixel_m: float
+) -> None:
+    """3 m, in matching pixels; the image's pixels are 1 m."""
+    alike = Common(np.array([3.0 / pixel_m, 0.0]))
+    monkeypatch.setattr(RegistrationEvidence, "common", alike)
+    found = groundtie.refine_rpc(
+        scene.image,
+        tmp_path / "refined_RPC.TXT",
+        scene.reference,
+        dem=scene.dem,
+        dem_datum="ellipsoidal",
+        matching_pixel_size=pixel_m,
+    )
+    assert found.verdict.heights_px == pytest.approx(3.0, rel=0.1)
+    # Nine tenths of what is even up to 3 px, and what other points would have given.
+    assert 2.7 < found.verdict.check_ce90_px < 3.5
+
+
+@pytest.mark.slow
 def test_a_refused_matching_leaves_its_report(scene: Scene, tmp_path: Path) -> None:
     """The reference shows other ground."""
     with rasterio.open(scene.reference) as source:
@@ -111,7 +134,7 @@ def test_a_refused_matching_leaves_its_report(scene: Scene, tmp_path: Path) -> N
 @pytest.mark.slow
 def test_a_small_dense_town_is_right_by_colours_and_refused_without(tmp_path: Path) -> None:
     """All open ground takes part; by grey levels its few check points may agree on biased RPCs."""
-    groundtie.simulate_sensor(tmp_path, density="urban", shift=30.0, seed=6, size=600)
+    groundtie.simulate_sensor(tmp_path, density="urban", shift=30.0, seed=6, size=700)
 
     def refine(output: Path, **more: Any) -> None:
         groundtie.refine_rpc(

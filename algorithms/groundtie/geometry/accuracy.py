@@ -153,6 +153,9 @@ class Common:
     sigma_px: float = 0.0
 
 
+NOTHING_COMMON = Common()
+
+
 def predict_accuracy(
     fold_models: Sequence[PointFunction],
     places_px: FloatArray,

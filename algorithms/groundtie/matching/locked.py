@@ -19,8 +19,6 @@ from ..geometry.transform import Transform
 from ..rasters.grid import Grid, PointFunction, reproject
 from ..rasters.pair import ImagePair
 from ..similarity.in_common import (
-    DRAWN_SHARPNESS,
-    LEAST_SHARPNESS,
     LOOK_REACH_PX,
     Look,
     Sameness,
@@ -34,13 +32,10 @@ from .matcher import FloatArray, Places
 # A transform that moves all of the overlap by whole pixels, but for this, may be content's.
 _LARGEST_BEND_PX = 1.5
 
-# Copies of pixels are found within this of whole pixels, a quarter of what others lie within.
-_WHOLE_PX = 0.125
-
-# What is drawn lies on whole pixels all over; different sensors' views, by chance or on one grid,
-# no nearer than they can be matched. Measured (suite attacks): drawn up to 0.03; views that have no
-# more in common, from 0.05 on but for one, in whose rest the ground is found.
-EXACT_PX = 0.04
+# What is drawn into both arrays, and copies of pixels, are found within this of whole pixels: a
+# quarter of what others lie within. Of views of one ground on one grid few lie as near, and in the
+# rest of these the ground is found mostly (suite attacks).
+WHOLE_PX = 0.125
 
 _LATTICE = 9
 
@@ -107,10 +102,9 @@ class LockedContent:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it is sharper than ground in other colours, or sharp and on whole pixels."""
+        """Whether its edges are sharper than those of one ground, and it is no copy or view."""
         same = self.sameness
-        is_sharper = same.sharpness >= (LEAST_SHARPNESS if self.is_exact else DRAWN_SHARPNESS)
-        return is_sharper and not (self.is_explained or same.is_copy_in_other_colours)
+        return same.has_sharp_edges and not (self.is_explained or same.is_copy_in_other_colours)
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
@@ -190,7 +184,7 @@ def find_locked_content(
         return Look.of(*images.read(piece))
 
     sameness = sameness_of(list(context.map(look, list(places.centres))))
-    is_whole = bool(np.abs(np.median(moved, axis=0) - offset).max() <= _WHOLE_PX)
+    is_whole = bool(np.abs(np.median(moved, axis=0) - offset).max() <= WHOLE_PX)
     if sensors is Sensors.RADARS:
         is_exact = not sameness.varies_as_ground
     else:

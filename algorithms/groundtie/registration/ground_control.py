@@ -20,6 +20,7 @@ from ..errors import (
     NothingFoundError,
     TooFewPointsError,
 )
+from ..geometry.accuracy import NOTHING_COMMON, Common
 from ..geometry.models import Model
 from ..masks.used import INPUT
 from ..rasters.grid import FloatArray
@@ -55,10 +56,13 @@ class GroundControl:
         The judged registration on the map that it comes from.
     points
         The points, those of the fit first; None if there are none.
+    common
+        What displaces them all alike, in pixels of the image.
     """
 
     registration: Registration
     points: ControlPoints | None
+    common: Common = NOTHING_COMMON
 
     def accepted(self) -> ControlPoints:
         """Return the points.
@@ -152,7 +156,20 @@ def match_ground_control(
     heights = orientation.heights_at(points.reference_xy)
     points = points.reject(~np.isfinite(heights), "no height")
     heights = np.where(np.isfinite(heights), heights, 0.0)
-    return GroundControl(registration, ControlPoints(points, heights, orientation.crs))
+    control = ControlPoints(points, heights, orientation.crs)
+    return GroundControl(registration, control, _common_in_image(registration, by))
+
+
+def _common_in_image(registration: Registration, orientation: Orientation) -> Common:
+    """Return what displaces all points alike, as seen in the middle of the matched part."""
+    evidence = registration.evidence
+    if evidence is None:
+        return NOTHING_COMMON
+    grid = registration.pair.grid
+    middle = grid.pixel_to_map([grid.centre_px])
+    to_image = _matching_to_image(registration.pair, orientation, middle)[0]
+    scale = float(np.sqrt(abs(np.linalg.det(to_image))))
+    return Common(to_image @ evidence.common.heights_px, scale * evidence.common.sigma_px)
 
 
 def _shift_in_image(pair: ImagePair, orientation: Orientation, model: Model) -> FloatArray:

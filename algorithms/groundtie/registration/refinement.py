@@ -8,6 +8,7 @@ import numpy as np
 
 from ..assessment.point_errors import PointErrors
 from ..errors import NotRegisteredError, TooFewPointsError
+from ..geometry.accuracy import NOTHING_COMMON, Common
 from ..rasters.grid import PIXEL_COORDINATES, Grid
 from ..sensor.adjustment import Adjustment, Control, adjust
 from ..sensor.bias import SHIFT, fold
@@ -61,6 +62,7 @@ class Refinement:
         model: str,
         max_error_px: float,
         is_measured: bool = False,
+        common: Common = NOTHING_COMMON,
     ) -> Refinement:
         """Estimate the bias by the points of the fit that are used, and judge it.
 
@@ -76,6 +78,8 @@ class Refinement:
             Largest root mean square error at held-out points.
         is_measured
             Whether somebody measured the points, who were not matched.
+        common
+            What displaces all points alike, in pixels of the image, as far as it is known.
 
         Raises
         ------
@@ -98,7 +102,14 @@ class Refinement:
         pixel_m = sensor_grid(image.source, image.orientation).pixel_size_m
         fit = fold(image.rpc, adjustment.bias)
         evidence = RefinementEvidence.of(
-            control, adjustment, check, pixel_m, max_error_px, fit.largest_residual_px, needs_spread
+            control,
+            adjustment,
+            check,
+            pixel_m,
+            max_error_px,
+            fit.largest_residual_px,
+            needs_spread,
+            common,
         )
         kept = replace(points, points=table.reject(blunders, "blunder"))
         verdict = judge_refinement(evidence)

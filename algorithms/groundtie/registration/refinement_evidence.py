@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..assessment.statistics import Statistics
-from ..geometry.accuracy import Common, predict_accuracy
+from ..geometry.accuracy import NOTHING_COMMON, Common, predict_accuracy
 from ..geometry.judging import FEWEST_CHECK_POINTS, TOLERANCE_PX
 from ..geometry.misses import Misses
 from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid
@@ -89,6 +89,7 @@ class RefinementEvidence:
         max_error_px: float,
         folding_px: float = 0.0,
         needs_spread: bool = True,
+        common: Common = NOTHING_COMMON,
     ) -> RefinementEvidence:
         """Measure a bias that was estimated.
 
@@ -109,6 +110,8 @@ class RefinementEvidence:
             By how much RPCs with the bias folded in miss it.
         needs_spread
             Whether control at one place does not tell the bias elsewhere.
+        common
+            What displaces all points alike, in pixels of the image, as far as it is known.
         """
         if check is None or len(check) < FEWEST_CHECK_POINTS:
             name, points = LEFT_OUT, control
@@ -127,7 +130,7 @@ class RefinementEvidence:
             len(after),
             "the image",
             _spread_px(adjustment, nodes_px),
-            predict_accuracy(adjustment.fold_biases, nodes_px, misses.weighed, Common()),
+            predict_accuracy(adjustment.fold_biases, nodes_px, misses.weighed, common),
         )
         used_px = control.found_px[adjustment.used]
         return cls(

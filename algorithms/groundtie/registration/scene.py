@@ -179,11 +179,6 @@ class SceneInfo:
         return self.is_town and not self.radar.has_pixel_size and not self.has_user_mask
 
     @property
-    def is_grey_and_oblique(self) -> bool:
-        """Whether the input is located by a sensor model, and a camera's bands make no colours."""
-        return self.input.is_in_sensor_geometry and not self.other.has_colours
-
-    @property
     def may_be_town(self) -> bool:
         """Whether an image may be a radar's of a town.
 

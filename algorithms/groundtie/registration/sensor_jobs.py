@@ -11,6 +11,7 @@ from typing import Any
 from ..context import Context, threads
 from ..declaration import file_lines
 from ..errors import ParameterError
+from ..geometry.accuracy import NOTHING_COMMON
 from ..masks.used import MaskUsed
 from ..progress import Progress
 from ..rasters.atomic import Outputs
@@ -196,7 +197,12 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
             points = files.points_or_report(found)
         context.update(0.9, "estimating the bias")
         refinement = Refinement.of(
-            points, sensor, parameters["model"], parameters["max_error"], gcps is not None
+            points,
+            sensor,
+            parameters["model"],
+            parameters["max_error"],
+            is_measured=gcps is not None,
+            common=NOTHING_COMMON if found is None else found.common,
         )
         heights = refinement.heights(own_heights=gcps is not None and dem is not None)
         for warning in heights.warnings():

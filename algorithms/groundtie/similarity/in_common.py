@@ -36,9 +36,10 @@ LOOK_REACH_PX = int(np.abs(_OFFSETS).max())
 # What is drawn has its edges at one fraction of a pixel, in whatever colours: beyond chance, within
 # the first of the other's are so many times as many as from there to the second. Edges of one
 # ground are blurred by noise, light and physics. Suite sharpness: of different sensors and dates up
-# to 2.1, of different bands on one grid up to 2.45 (years apart) and 4.2 (one exposure).
+# to 2.1, of different bands on one grid up to 2.45 (years apart) and 4.2 (one exposure, so that the
+# second is the limit of one camera's views).
 _SHARP_PX, _BLURRED_PX = 0.25, 0.5
-LEAST_SHARPNESS, DRAWN_SHARPNESS = 2.5, 5.0
+LEAST_SHARPNESS, VIEW_SHARPNESS = 2.5, 5.0
 
 # More of the area than this varies alike where holes or waters of one shape are cut into noise, or
 # clouds of one deck lie over both. Different sensors' views of one ground: up to 17 %, measured on
@@ -125,7 +126,7 @@ class Sameness:
 
         Edges coincide no more sharply than those of its bands.
         """
-        return self.has_one_ground and self.sharpness < DRAWN_SHARPNESS
+        return self.has_one_ground and self.sharpness < VIEW_SHARPNESS
 
     @property
     def has_one_ground(self) -> bool:

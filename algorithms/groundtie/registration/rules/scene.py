@@ -17,8 +17,9 @@ _LEAST_GROUND_SHARE, _LARGEST_EXTRAPOLATED = 0.09, 0.5
 
 # An oblique view displaces fit and check points alike: by grey levels, where four sums of check
 # chips all agree, as in images of 700 px, the suite rpc_city has errors up to 6 px; with five and
-# more, below 1 px. By colours, three and more that chance does not explain: up to 2.1 px.
-_FEWEST_IN_SENSOR_GEOMETRY = 5
+# more, below 1 px. By colours, where three agree, up to 2.7 px there, and 3.8 px in smaller images
+# (suite attacks); where four do, up to 2.4 px.
+_FEWEST_GREY, _FEWEST_IN_COLOURS = 5, 4
 
 # From this share of agreeing check points on, more agree than roofs alone do. Measured where a
 # town was matched whole and a wrong registration accepted: 28 to 56 %; on other scenes with
@@ -32,13 +33,12 @@ def _little_ground(evidence: RegistrationEvidence) -> str | None:
         return None
     if mask.share < _LEAST_GROUND_SHARE:
         return f"only {mask.share:.0%} of the {mask.image} is ground that was found"
-    agreeing = evidence.held_out.agreeing
-    is_grey_and_oblique = evidence.scene is not None and evidence.scene.is_grey_and_oblique
-    if is_grey_and_oblique and agreeing < _FEWEST_IN_SENSOR_GEOMETRY:
-        return (
-            f"only {agreeing} check points on the ground agree, where the view is oblique and "
-            "without colours"
-        )
+    agreeing, scene = evidence.held_out.agreeing, evidence.scene
+    if scene is not None and scene.input.is_in_sensor_geometry:
+        has_colours = scene.other.has_colours
+        if agreeing < (_FEWEST_IN_COLOURS if has_colours else _FEWEST_GREY):
+            how = "oblique" if has_colours else "oblique and without colours"
+            return f"only {agreeing} check points on the ground agree, where the view is {how}"
     if evidence.extrapolated_share > _LARGEST_EXTRAPOLATED:
         share = f"{evidence.extrapolated_share:.0%}"
         return f"{share} of the overlap lies beyond the ground that was matched"
@@ -90,9 +90,9 @@ SCENE_RULES: tuple[Rule, ...] = (
         SCENE,
         "where the ground that was found in a radar image is matched alone: it covers less than "
         f"{_LEAST_GROUND_SHARE:.0%} of the image, points over less than "
-        f"{1 - _LARGEST_EXTRAPOLATED:.0%} of the overlap, or, in an image with RPCs and without "
-        f"colours, fewer than {_FEWEST_IN_SENSOR_GEOMETRY} check points that agree",
-        "suite rpc_city",
+        f"{1 - _LARGEST_EXTRAPOLATED:.0%} of the overlap, or, in an image with RPCs, fewer than "
+        f"{_FEWEST_IN_COLOURS} check points agree, {_FEWEST_GREY} without colours",
+        "suites rpc_city and attacks",
         ON_GROUND,
         _little_ground,
     ),
