@@ -20,7 +20,7 @@ import numpy as np
 from groundtie.context import threads
 from groundtie.geometry.models import shift_model
 from groundtie.geometry.transform import Transform
-from groundtie.matching.locked import WHOLE_PX, Sensors, find_locked_content
+from groundtie.matching.locked import EXACT_PX, Sensors, find_locked_content
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
@@ -119,7 +119,7 @@ def _sameness(
         pair = make_pair(Image(one, band), Image(other, other_band))
         nowhere = Transform(shift_model(0.0, 0.0), pair.grid.crs, other.grid)
         places = survey_places(pair.grid)
-        locked = find_locked_content(pair, nowhere, places, Sensors.CAMERAS, WHOLE_PX, context)
+        locked = find_locked_content(pair, nowhere, places, Sensors.CAMERAS, EXACT_PX, context)
     if locked is None:
         raise ValueError("the arrays do not lie on one another")
     return locked.sameness

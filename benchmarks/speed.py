@@ -16,6 +16,7 @@ from typing import Any
 import cv2
 import numpy as np
 import rasterio
+from affine import Affine
 from numpy.typing import NDArray
 
 from groundtie.context import threads
@@ -224,6 +225,8 @@ def time_radar(times: int) -> list[Record]:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "radar.tif"
             profile = {"driver": "GTiff", "dtype": "float32", "count": 1}
+            # The ground of a town is found by sizes in metres.
+            profile["transform"] = Affine.scale(1.0, -1.0)
             with rasterio.open(path, "w", width=RADAR_PX, height=RADAR_PX, **profile) as written:
                 written.write(np.sqrt(image), 1)
             with open_raster(path) as source:

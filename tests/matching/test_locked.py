@@ -14,7 +14,7 @@ from groundtie.context import Context
 from groundtie.geometry.models import Frame, Model, PolynomialModel
 from groundtie.geometry.transform import Transform
 from groundtie.matching.locked import (
-    WHOLE_PX,
+    EXACT_PX,
     LockedContent,
     Sensors,
     find_locked_content,
@@ -33,7 +33,7 @@ def looked_at(
     input: np.ndarray,
     context: Context,
     model: Model | None = None,
-    exact_px: float = WHOLE_PX,
+    exact_px: float = EXACT_PX,
     sensors: Sensors = Sensors.CAMERAS,
 ) -> LockedContent | None:
     """Look for content that two arrays of one grid have in common under a model."""
@@ -136,7 +136,7 @@ def test_views_without_anything_drawn_have_none(
 
 @pytest.mark.parametrize(
     ("off_m", "exact_px", "is_evident"),
-    [(1.2, WHOLE_PX, True), (1.4, WHOLE_PX, False), (1.9, 0.2, True), (2.1, 0.2, False)],
+    [(0.6, EXACT_PX, True), (0.7, EXACT_PX, False), (1.9, 0.2, True), (2.1, 0.2, False)],
 )
 @pytest.mark.slow
 def test_a_transform_to_whole_pixels_is_evidence_itself(
@@ -158,8 +158,8 @@ def test_a_transform_to_whole_pixels_is_evidence_itself(
         (Sensors.RADARS, 9, 4.0, True),
         (Sensors.RADARS, 1, 0.0, False),
         (Sensors.DIFFERENT, 9, 0.3, True),
-        (Sensors.DIFFERENT, 9, 1.4, False),
-        (Sensors.CAMERAS, 9, 1.4, False),
+        (Sensors.DIFFERENT, 9, 0.7, False),
+        (Sensors.CAMERAS, 9, 0.7, False),
     ],
 )
 @pytest.mark.slow
@@ -303,5 +303,5 @@ def test_arrays_that_are_resampled_have_none(
         transform = Transform(model, pair.grid.crs, other.grid)
         places = survey_places(pair.grid)
         assert (
-            find_locked_content(pair, transform, places, Sensors.CAMERAS, WHOLE_PX, context) is None
+            find_locked_content(pair, transform, places, Sensors.CAMERAS, EXACT_PX, context) is None
         )

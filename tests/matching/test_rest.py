@@ -10,7 +10,7 @@ from textured_pairs import shift_on_map, texture
 from groundtie.context import Context
 from groundtie.geometry.transform import Transform
 from groundtie.matching.chips import ChipMatcher
-from groundtie.matching.locked import WHOLE_PX, Sensors
+from groundtie.matching.locked import EXACT_PX, Sensors
 from groundtie.matching.parts import ELSEWHERE_PX
 from groundtie.matching.rest import Rest, survey_rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, survey_places
@@ -55,7 +55,7 @@ def rest_of(
         transform = Transform(found, pair.grid.crs, other.grid)
         matcher = ChipMatcher(pair, SimilaritySettings())
         places = survey_places(pair.grid)
-        return survey_rest(matcher, transform, places, ELSEWHERE_PX, sensors, WHOLE_PX, context)
+        return survey_rest(matcher, transform, places, ELSEWHERE_PX, sensors, EXACT_PX, context)
 
 
 @pytest.mark.parametrize("share", [0.35, 0.6])

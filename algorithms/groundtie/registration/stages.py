@@ -17,7 +17,7 @@ from ..matching.guided_fit import GuidedFit
 from ..matching.held_out import HeldOut
 from ..matching.keypoint_fit import KeypointFit
 from ..matching.keypoints import KeypointMatcher
-from ..matching.locked import WHOLE_PX
+from ..matching.locked import EXACT_PX
 from ..matching.parts import ELSEWHERE_PX
 from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
@@ -130,7 +130,7 @@ class Stages:
         places, sensors = survey_places(pair.grid), scene.sensors
         survey = survey_model(chips, transform.model, context.part(0.0, 0.5))
         part = context.part(0.5, 0.9)
-        rest = survey_rest(chips, transform, places, ELSEWHERE_PX, sensors, WHOLE_PX, part)
+        rest = survey_rest(chips, transform, places, ELSEWHERE_PX, sensors, EXACT_PX, part)
         last = context.part(0.9, 1.0)
         return survey, rest, survey_bands(chips, transform.model, places, ELSEWHERE_PX, last)
 
