@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio
+from affine import Affine
 from raster_files import utm_grid, waves, write_raster
 
 from groundtie.arrays import Raster
@@ -111,3 +112,17 @@ def test_progress_and_cancelling() -> None:
                 source.grid,
                 progress=Progress(is_cancelled=lambda: True),
             )
+
+
+def test_a_part_of_plain_pixels_keeps_its_place(tmp_path: Path) -> None:
+    """Pixels without georeferencing: another lattice on them needs a geotransform, its own none."""
+    path = write_raster(tmp_path / "in.tif", IMAGE.astype(np.uint8))
+    own = open_raster(path).grid
+    for target, expected in (
+        (own, None),
+        (own.window(30, 20, 20, 20), Affine.translation(29.5, 19.5)),
+    ):
+        array, file = both_ways(path, target)
+        with file:
+            assert array.transform == expected
+            assert file.transform == (expected or Affine.identity())

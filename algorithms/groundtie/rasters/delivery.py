@@ -207,8 +207,7 @@ def warp_to_array(
                 valid[rows, cols] = known
     if warp.leaves_gaps:
         values = np.ma.MaskedArray(values, np.broadcast_to(~valid, values.shape))
-    transform = target.transform if target.is_georeferenced else None
-    return Raster(values, transform, target.crs, warp.nodata)
+    return Raster(values, target.geotransform, target.crs, warp.nodata)
 
 
 def write_with_geotransform(

@@ -93,6 +93,11 @@ class Grid:
         is_on_pixels = self.is_on_pixels or self.transform == PIXEL_COORDINATES
         return self.crs is not None or not is_on_pixels
 
+    @property
+    def geotransform(self) -> Affine | None:
+        """What a raster on it states; None where its own pixels are the map."""
+        return None if self.transform == PIXEL_COORDINATES else self.transform
+
     @cached_property
     def pixel_size(self) -> tuple[float, float]:
         """Width and height of a pixel in map units."""

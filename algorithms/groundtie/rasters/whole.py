@@ -11,7 +11,7 @@ from rasterio.io import MemoryFile
 
 from ..runs import RUN_TAG, run_tags
 from .atomic import writing
-from .grid import PIXEL_COORDINATES, Grid
+from .grid import Grid
 
 
 def write_raster(
@@ -44,8 +44,8 @@ def write_raster(
         "predictor": 3 if image.dtype.kind == "f" else 2,
         "bigtiff": "if_safer",
     }
-    if grid.transform != PIXEL_COORDINATES:
-        profile["transform"] = grid.transform
+    if grid.geotransform is not None:
+        profile["transform"] = grid.geotransform
     # In memory: a full disk is no exception within GDAL (see `tiff`).
     with MemoryFile() as memory:
         with memory.open(**profile) as raster:

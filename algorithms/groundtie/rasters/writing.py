@@ -19,7 +19,7 @@ from ..errors import ParameterError
 from ..progress import SILENT, Progress
 from ..runs import RUN_TAG, run_tags
 from .atomic import scratch_file, scratch_folder, writing
-from .grid import PIXEL_COORDINATES, Grid
+from .grid import Grid
 from .hidden_files import final_name
 from .metadata import BandInfo, fits
 from .reading import RasterSource
@@ -154,8 +154,8 @@ def _profile(
         "endianness": "LITTLE",
         "sparse_ok": True,
     }
-    if grid.transform != PIXEL_COORDINATES:
-        profile["transform"] = grid.transform
+    if grid.geotransform is not None:
+        profile["transform"] = grid.geotransform
     return profile
 
 
