@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,7 @@ def opened(
     input: np.ndarray,
     filtered: tuple[str, ...] = (),
     pixel_m: float | None = 1.0,
+    has_crs: bool = True,
 ) -> Iterator[ImagePair]:
     """Open two images of grey values as a pair; metadata may name a speckle filter.
 
@@ -50,6 +52,8 @@ def opened(
         images = []
         for name, values in (("reference", reference), ("input", input)):
             grid = None if pixel_m is None else utm_grid(*values.shape[::-1], pixel_m)
+            if grid is not None and not has_crs:
+                grid = replace(grid, crs=None)
             path = write_raster(folder / f"{name}.tif", values.astype(np.float32), grid)
             if name in filtered:
                 with rasterio.open(path, "r+") as dataset:

@@ -69,7 +69,7 @@ class Pair:
     place
         What is shown.
     reference_transform, input_transform, reference_crs, input_crs
-        What the georeferencing claims.
+        What the georeferencing claims; without a CRS, map units may be anything.
     radius_px
         How far the tool is to search, where it can be asked to; None: as far as it does by itself.
     note
@@ -86,8 +86,8 @@ class Pair:
     place: str
     reference_transform: Affine = REFERENCE_TRANSFORM
     input_transform: Affine = REFERENCE_TRANSFORM
-    reference_crs: str = CRS
-    input_crs: str = CRS
+    reference_crs: str | None = CRS
+    input_crs: str | None = CRS
     radius_px: float | None = None
     note: str = ""
 
@@ -202,7 +202,8 @@ class Pair:
         if len(at) < _FEWEST_KNOWN:
             return np.inf, np.inf
         rows, columns = self.reference.shape[1:]
-        crs = rasterio.crs.CRS.from_user_input(self.reference_crs)
+        claimed = self.reference_crs
+        crs = None if claimed is None else rasterio.crs.CRS.from_user_input(claimed)
         grid = Grid(self.reference_transform, crs, columns, rows)
         off = np.hypot(*(transform(grid.pixel_to_map(shown)) - at).T)
         return float(np.percentile(off, ERROR_PERCENTILE)), float(np.sqrt(np.mean(off**2)))

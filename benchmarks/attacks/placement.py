@@ -95,6 +95,20 @@ def other_zone(pair: Pair, setting: Setting) -> Pair:
     return replace(pair, input_crs="EPSG:32634")
 
 
+def unknown_units(pair: Pair, setting: Setting) -> Pair:
+    """Neither image states a CRS, and units of both maps are 0.2 to 5 m."""
+    shift, scale = direction(setting.rng, 0.0, 12.0), float(5 ** setting.rng.uniform(-1, 1))
+    moved = pair.moved(shift, as_text(shift))
+    return replace(
+        moved,
+        reference_transform=compose(Affine.scale(scale), moved.reference_transform),
+        input_transform=compose(Affine.scale(scale), moved.input_transform),
+        reference_crs=None,
+        input_crs=None,
+        note=f"{moved.note}, {1 / scale:.2f} m a unit",
+    )
+
+
 def far_off(pair: Pair, setting: Setting) -> Pair:
     """The ground lies 30 to 60 px off, with a radius that is smaller."""
     shift = direction(setting.rng, 30.0, 60.0)
@@ -114,6 +128,7 @@ ATTACKS = [
     Attack(PLACEMENT, "wrong rotation claimed", "", claimed(wrong_rotation)),
     Attack(PLACEMENT, "wrong aspect claimed", "", claimed(wrong_aspect)),
     Attack(PLACEMENT, "other zone", "", other_zone),
+    Attack(PLACEMENT, "unknown units", "", unknown_units),
     Attack(PLACEMENT, "beyond the radius", "", far_off),
     Attack(PLACEMENT, "another place", "", other_place),
     Attack(CONTROLS, "rows run northwards", "", south_up),

@@ -42,6 +42,7 @@ from groundtie.registration import stages as stages_module
 from groundtie.registration.evidence import (
     AGREEMENT,
     ERROR,
+    IMAGES,
     REFINEMENT,
     SCENE,
     SEARCH,
@@ -233,7 +234,7 @@ def name_of(stage: str) -> str:
 
 @dataclass
 class HouseRules:
-    """Rules of all stages, each of which notes that it is asked, and the last of which refuses."""
+    """Rules of stages, each of which notes that it is asked, and the last of which refuses."""
 
     stages: tuple[str, ...]
     asked: list[str] = field(default_factory=list)
@@ -243,7 +244,7 @@ class HouseRules:
             Rule(
                 f"house rule at {stage}", stage, "all", "this test", "go", partial(self.ask, stage)
             )
-            for stage in self.stages
+            for stage in dict.fromkeys(self.stages)
         )
 
     def ask(self, stage: str, _: object) -> str | None:
@@ -257,7 +258,7 @@ def refused_by_house_rules(
     """Return the stages whose rules are asked until a call is refused by the last one's."""
     house = HouseRules(stages)
     monkeypatch.setattr(verdict, "RULES", house.rules())
-    if stages == (SEARCH,):
+    if stages[-1] == SEARCH:
         monkeypatch.setattr(stages_module, "find_coarse_model", nothing_found)
     with pytest.raises(NotRegisteredError, match="forbidden; go") as error:
         call()
@@ -266,12 +267,16 @@ def refused_by_house_rules(
     return house.asked
 
 
-SEARCHED, CHECKED = (SEARCH,), (AGREEMENT, ERROR, SCENE, SURVEY)
+INSPECTED, SEARCHED = (IMAGES,), (IMAGES, SEARCH)
+# The images are judged before anything is matched, and with what matched.
+CHECKED = (IMAGES, IMAGES, AGREEMENT, ERROR, SCENE, SURVEY)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("tool", [*PRESETS, "register"])
-@pytest.mark.parametrize("stages", [SEARCHED, CHECKED], ids=["search", "check"])
+@pytest.mark.parametrize(
+    "stages", [INSPECTED, SEARCHED, CHECKED], ids=["images", "search", "check"]
+)
 def test_every_tool_is_judged_by_the_rules_of_every_stage(
     textured: TexturedPair,
     radars: TexturedPair,
@@ -302,14 +307,17 @@ def sensor(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 @pytest.mark.parametrize(
     ("tool", "stages", "expected"),
     [
+        ("extract_gcps", INSPECTED, INSPECTED),
+        ("refine_rpc", INSPECTED, INSPECTED),
         ("extract_gcps", SEARCHED, SEARCHED),
         ("refine_rpc", SEARCHED, SEARCHED),
-        ("extract_gcps", CHECKED, CHECKED),
+        # The images are judged again where the coarse shift has put them.
+        ("extract_gcps", CHECKED, (IMAGES, *CHECKED)),
         # First of the ground control, then of what comes of it.
         (
             "refine_rpc",
-            (*CHECKED[:2], REFINEMENT),
-            (*CHECKED[:2], *CHECKED[:2], REFINEMENT),
+            (*CHECKED[:4], REFINEMENT),
+            (IMAGES, *CHECKED[:4], *CHECKED[2:4], REFINEMENT),
         ),
     ],
 )

@@ -50,6 +50,7 @@ from groundtie.registration import evidence as stages
 from groundtie.registration import rules
 from groundtie.registration.evidence import (
     Exchanged,
+    ImagesEvidence,
     RegistrationEvidence,
     SearchEvidence,
 )
@@ -62,6 +63,7 @@ from groundtie.registration.verdict import refusals
 
 RANK = (
     stages.TIE_POINTS,
+    stages.IMAGES,
     stages.SEARCH,
     stages.ASSESSMENT,
     stages.POSE,
@@ -132,6 +134,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         stored(ANYWHERE, RANDOM.uniform(0, 499, (50, 2)) - ANYWHERE),
         stored(ANYWHERE, 20 * RANDOM.normal(size=(50, 2))),
     ),
+    "ground not found": (
+        ImagesEvidence(DESPECKLED, MaskUsed(GROUND, "reference", 0.3, "as in a town")),
+        ImagesEvidence(SPECKLED, MaskUsed(GROUND, "reference", 0.3, "as in a town")),
+    ),
     "second place": (
         SearchEvidence(AmbiguousPlaceError("two places match about as well")),
         SearchEvidence(NothingFoundError("nothing in common was found")),
@@ -174,7 +180,6 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, mask=MaskUsed(SURFACE, "reference", 0.3, "shows nothing", False)),
         evidence(GOOD, mask=MaskUsed(SURFACE, "reference", 0.3, "fits")),
     ),
-    "ground not found": (evidence(GOOD, scene=DESPECKLED), evidence(GOOD, scene=SPECKLED)),
     "town matched whole": (
         evidence(two_thirds(20), scene=PERHAPS),
         evidence(two_thirds(26), scene=PERHAPS),
@@ -283,8 +288,10 @@ def test_a_rule_states_its_limit_its_source_and_what_to_try(rule: Rule) -> None:
 
 def test_only_rules_of_the_evidence_are_asked() -> None:
     """Rules of agreement and error judge refinements, too; those of scenes do not."""
+    assert ImagesEvidence.stages == (stages.IMAGES,)
     assert SearchEvidence.stages == (stages.SEARCH,)
     assert RegistrationEvidence.stages == (
+        stages.IMAGES,
         stages.AGREEMENT,
         stages.ERROR,
         stages.SCENE,

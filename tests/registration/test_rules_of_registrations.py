@@ -29,7 +29,7 @@ from scipy.stats import binom
 
 from groundtie.masks.used import GROUND, LAYER, NONE, SURFACE, MaskUsed
 from groundtie.matching.rest import Rest
-from groundtie.registration.evidence import Exchanged, RegistrationEvidence
+from groundtie.registration.evidence import Exchanged, ImagesEvidence, RegistrationEvidence
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
 from groundtie.registration.verdict import refusals
 
@@ -240,6 +240,7 @@ def test_what_is_high_at_both_places_repeats() -> None:
 )
 def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list[str]) -> None:
     despeckled = scene(facts(is_known_radar=True, strong_share=0.25))
+    assert refusing(ImagesEvidence(despeckled, masked(kind))) == expected
     assert refusing(evidence(GOOD, scene=despeckled, mask=masked(kind))) == expected
 
 
@@ -251,7 +252,7 @@ def test_the_ground_of_a_town_is_not_found_in_pixels_of_unknown_size(
     variation2: float, has_pixel_size: bool, expected: list[str]
 ) -> None:
     town = facts(variation2, strong_share=0.25, has_pixel_size=has_pixel_size)
-    assert refusing(evidence(GOOD, scene=scene(town))) == expected
+    assert refusing(ImagesEvidence(scene(town), masked(NONE))) == expected
 
 
 @pytest.mark.parametrize(("agreeing", "is_needed"), [(5, True), (6, False), (9, False)])

@@ -72,13 +72,18 @@ def test_the_ground_of_a_town_is_found_by_its_speckle(
 
 
 @pytest.mark.parametrize(
-    ("reference", "pixel_m", "expected"),
-    [(speckled(0.25), None, True), (speckled(0.25), 10.0, False), (speckled(0.02), None, False)],
+    ("reference", "pixel_m", "has_crs", "expected"),
+    [
+        (speckled(0.25), None, False, True),
+        (speckled(0.25), 1.0, False, True),
+        (speckled(0.25), 10.0, True, False),
+        (speckled(0.02), None, False, False),
+    ],
 )
 def test_the_ground_of_a_town_is_found_by_its_pixel_size(
-    tmp_path: Path, reference: np.ndarray, pixel_m: float | None, expected: bool
+    tmp_path: Path, reference: np.ndarray, pixel_m: float | None, has_crs: bool, expected: bool
 ) -> None:
-    with opened(tmp_path, reference, FIELDS, pixel_m=pixel_m) as pair:
+    with opened(tmp_path, reference, FIELDS, pixel_m=pixel_m, has_crs=has_crs) as pair:
         info = SceneInfo.of(pair)
         assert info.is_town_of_unknown_size == expected
         assert not replace(info, has_user_mask=True).is_town_of_unknown_size

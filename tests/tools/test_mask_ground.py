@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from raster_files import utm_grid, write_raster
 
 from groundtie import mask_ground
 from groundtie.errors import RasterContentError
+from groundtie.rasters.grid import Grid
 
 
 def test_the_ground_between_buildings_is_written(tmp_path: Path) -> None:
@@ -28,18 +30,18 @@ def test_the_ground_between_buildings_is_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("grey_value", "pixel_m", "reason"),
+    ("grey_value", "grid", "reason"),
     [
-        (0, 1.0, "no valid pixels"),
-        (9, 4.0, "pixels are larger than 3 m"),
-        (9, None, "has no georeferencing"),
+        (0, utm_grid(40, 40, 1.0), "no valid pixels"),
+        (9, utm_grid(40, 40, 4.0), "pixels are larger than 3 m"),
+        (9, replace(utm_grid(40, 40, 1.0), crs=None), "has no CRS"),
+        (9, None, "has no CRS"),
     ],
 )
 def test_a_failure_leaves_nothing_behind(
-    tmp_path: Path, grey_value: int, pixel_m: float | None, reason: str
+    tmp_path: Path, grey_value: int, grid: Grid | None, reason: str
 ) -> None:
     image = np.full((40, 40), grey_value, np.uint8)
-    grid = None if pixel_m is None else utm_grid(40, 40, pixel_m)
     path = write_raster(tmp_path / "in.tif", image, grid, nodata=0)
     with pytest.raises(RasterContentError, match=reason):
         mask_ground(path, tmp_path / "mask.tif")

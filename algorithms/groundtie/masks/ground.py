@@ -42,10 +42,10 @@ _COARSEST_M = 3.0
 def shows_ground(scene: Scene) -> bool:
     """Whether a radar image, reduced as `find_ground` does, resolves ground between buildings.
 
-    Without georeferencing nobody knows.
+    Without a CRS nobody knows.
     """
-    pixel_m = scene.grid.metres_per_pixel
-    return pixel_m is not None and pixel_m * reduction(scene) <= _COARSEST_M
+    grid = scene.grid
+    return grid.crs is not None and grid.pixel_size_m * reduction(scene) <= _COARSEST_M
 
 
 def find_ground(scene: Scene, progress: Progress = SILENT) -> BlockMask:
@@ -63,10 +63,10 @@ def find_ground(scene: Scene, progress: Progress = SILENT) -> BlockMask:
     RasterContentError
         No pixel of the scene is valid, or they are too large to resolve it, or of unknown size.
     """
-    if scene.grid.metres_per_pixel is None:
+    if scene.grid.crs is None:
         raise RasterContentError(
-            f"{scene.like.path} has no georeferencing, and without the size of its pixels the "
-            "ground between buildings is not found; give it a geotransform"
+            f"{scene.like.path} has no CRS, and without the size of its pixels in metres the "
+            "ground between buildings is not found; give it one"
         )
     if not shows_ground(scene):
         raise RasterContentError(

@@ -21,7 +21,7 @@ from ..rasters.reading import bounded_cache, open_raster
 from ..sensor.rpc_files import rpc_of
 from .asked import USUAL, asked_lights, asked_rendering, asked_surface_view, asked_terrain
 from .delivery import Call
-from .evidence import SCENE, SURVEY
+from .evidence import IMAGES, SCENE, SURVEY
 from .orthorectification import write_orthoimage
 from .pipeline import run
 from .registration import Registration
@@ -35,9 +35,9 @@ from .verdict import Verdict
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
 _DOUBTED_DEG, _DOUBTED_SCALE = 10.0, 1.1
 
-# Rules of the scene refuse what matches well, but not the ground, or at two places: no other
-# matcher may try again.
-_FINAL = {rule.name for rule in RULES if rule.stage in (SCENE, SURVEY)} | {"second place"}
+# Rules of the images and the scene refuse what matches well, but not the ground, or at two places:
+# no other matcher may try again.
+_FINAL = {r.name for r in RULES if r.stage in (IMAGES, SCENE, SURVEY)} | {"second place"}
 
 
 @dataclass(frozen=True)

@@ -33,12 +33,30 @@ from .scene import SceneInfo
 from .surface_masks import ModelFit
 
 # Stages of a registration, in the order in which their rules are asked.
-TIE_POINTS, SEARCH, ASSESSMENT, POSE = "tie points", "search", "assessment", "pose"
-AGREEMENT, ERROR, SCENE, LAYOVER = "agreement", "error", "scene", "layover"
-SURVEY, REFINEMENT, SERIES = "survey", "refinement", "series"
+TIE_POINTS, IMAGES, SEARCH, ASSESSMENT = "tie points", "images", "search", "assessment"
+POSE, AGREEMENT, ERROR, SCENE = "pose", "agreement", "error", "scene"
+LAYOVER, SURVEY, REFINEMENT, SERIES = "layover", "survey", "refinement", "series"
 
 # Scatter along a line is that of heights unless chance explains it with more than 5 %, as usual.
 _LOG10_FIVE_PERCENT = math.log10(0.05)
+
+
+@dataclass(frozen=True)
+class ImagesEvidence:
+    """What is known of a pair before anything is matched.
+
+    Parameters
+    ----------
+    scene
+        What the images are.
+    mask
+        What takes part.
+    """
+
+    scene: SceneInfo
+    mask: MaskUsed
+
+    stages: ClassVar = (IMAGES,)
 
 
 @dataclass(frozen=True)
@@ -230,7 +248,7 @@ class RegistrationEvidence:
     input_fit: ModelFit | None = None
     exchanged: Exchanged | None = None
 
-    stages: ClassVar = (AGREEMENT, ERROR, SCENE, LAYOVER, SURVEY)
+    stages: ClassVar = (IMAGES, AGREEMENT, ERROR, SCENE, LAYOVER, SURVEY)
 
     @cached_property
     def counted(self) -> TiePoints:

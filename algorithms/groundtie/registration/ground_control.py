@@ -30,7 +30,7 @@ from ..sensor.control_points import ControlPoints
 from ..sensor.orientation import Orientation, sensor_grid
 from .evidence import SearchEvidence
 from .opening import OpenPair, pair_images
-from .pipeline import mask_pair, register
+from .pipeline import begin, mask_pair, register
 from .registration import Registration
 from .scene import SceneInfo
 from .sensor_input import OrientedImage
@@ -127,12 +127,14 @@ def match_ground_control(
     pair = opened(by, spec)
     scene = SceneInfo.of(pair.pair, spec.radar)
     masked = mask_pair(pair, spec, scene, context.part(0.0, 0.1))
+    begun = begin(pair, masked, scene, spec)
+    if begun.verdict.rule:
+        return GroundControl(begun, None)
     context.update(0.1, "searching for the coarse shift")
     try:
         coarse = Stages.of(pair.images, masked, spec).coarse(context.part(0.1, 0.4))
     except (NothingFoundError, TooFewPointsError) as error:
-        verdict = judge_search(SearchEvidence(error))
-        refused = Registration(masked.pair, spec, scene, masked.used, verdict, started=started)
+        refused = replace(begun, verdict=judge_search(SearchEvidence(error)))
         return GroundControl(refused, None)
     shift_px = _shift_in_image(pair.pair, by, coarse)
     if np.hypot(*shift_px) > _COARSE_PX:

@@ -14,7 +14,7 @@ from ..context import Context
 from ..errors import NoOverlapError, NothingFoundError, TooFewPointsError
 from ..masks.used import NONE, MaskUsed
 from ..rasters.reading import bounded_cache
-from .evidence import Exchanged, RegistrationEvidence, SearchEvidence
+from .evidence import Exchanged, ImagesEvidence, RegistrationEvidence, SearchEvidence
 from .masks import Masked, of_ground, with_ground_mask
 from .opening import OpenPair
 from .registration import Registration
@@ -22,7 +22,7 @@ from .scene import SceneInfo
 from .specification import Specification
 from .stages import Stages
 from .surface_masks import with_surface_mask
-from .verdict import judge, judge_search
+from .verdict import NOT_JUDGED, judge, judge_search, refuse_images
 
 
 def run(
@@ -60,6 +60,12 @@ def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: 
     return with_ground_mask(opened.pair, scene, opened.stack, context)
 
 
+def begin(opened: OpenPair, masked: Masked, scene: SceneInfo, spec: Specification) -> Registration:
+    """Return a registration of which only the images are judged: refused by them, or by no rule."""
+    verdict = refuse_images(ImagesEvidence(scene, masked.used)) or NOT_JUDGED
+    return Registration(masked.pair, spec, scene, masked.used, verdict, started=opened.started)
+
+
 def register(
     opened: OpenPair, masked: Masked, scene: SceneInfo, spec: Specification, context: Context
 ) -> Registration:
@@ -84,8 +90,10 @@ def _may_be_matched_by_ground(masked: Masked, scene: SceneInfo, spec: Specificat
 def _register_once(
     opened: OpenPair, masked: Masked, scene: SceneInfo, spec: Specification, context: Context
 ) -> Registration:
+    result = begin(opened, masked, scene, spec)
+    if result.verdict.rule:
+        return result
     stages = Stages.of(opened.images, masked, spec)
-    result = Registration(masked.pair, spec, scene, masked.used, started=opened.started)
     try:
         estimate, check = stages.checked(context.part(0.0, 0.9))
         surveys = stages.survey(estimate, scene, context.part(0.9, 1.0))

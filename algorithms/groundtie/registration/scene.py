@@ -58,8 +58,11 @@ class ImageFacts:
 
     @cached_property
     def has_pixel_size(self) -> bool:
-        """Whether it is known how large its pixels are on the ground."""
-        return self.scene.grid.metres_per_pixel is not None
+        """Whether it is known how large its pixels are on the ground.
+
+        Without a CRS, units of the map are metres by convention only.
+        """
+        return self.scene.grid.crs is not None
 
     @cached_property
     def has_colours(self) -> bool:

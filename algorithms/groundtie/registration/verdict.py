@@ -8,7 +8,13 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
 from ..geometry.accuracy import UNKNOWN_ELLIPSE, Ellipse
-from .evidence import AGREEMENT, EvidenceOfPoints, RegistrationEvidence, SearchEvidence
+from .evidence import (
+    AGREEMENT,
+    EvidenceOfPoints,
+    ImagesEvidence,
+    RegistrationEvidence,
+    SearchEvidence,
+)
 from .refinement_evidence import RefinementEvidence
 from .rules import RULES, Rule
 
@@ -138,6 +144,12 @@ def decide(evidence: Evidence, confirmed: str) -> Verdict:
         return Verdict(True, confirmed)
     rule, reason = refusal
     return Verdict(False, reason, rule=rule.name, advice=rule.advice)
+
+
+def refuse_images(evidence: ImagesEvidence) -> Verdict | None:
+    """Return the refusal of a pair before anything is matched; None: it may be matched."""
+    verdict = decide(evidence, "")
+    return None if verdict.accepted else verdict
 
 
 def judge_search(evidence: SearchEvidence) -> Verdict:

@@ -14,6 +14,7 @@ from __future__ import annotations
 from .agreement import AGREEMENT_RULES
 from .assessment import ASSESSMENT_RULES
 from .error import ERROR_RULES
+from .images import IMAGES_RULES
 from .layover import LAYOVER_RULES
 from .pose import POSE_RULES
 from .refinement import REFINEMENT_RULES
@@ -28,6 +29,7 @@ __all__ = ["RULES", "Rule"]
 
 RULES: tuple[Rule, ...] = (
     *TIE_POINT_RULES,
+    *IMAGES_RULES,
     *SEARCH_RULES,
     *ASSESSMENT_RULES,
     *POSE_RULES,

@@ -1,10 +1,10 @@
-"""Rules on what the images are: towns and their ground."""
+"""Rules on what matched, where the images show a town: its ground, or roofs."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...masks.used import GROUND, LAYER, SURFACE
+from ...masks.used import GROUND, SURFACE
 from ..evidence import SCENE, RegistrationEvidence
 from ..surface_masks import CLEAR_CORRELATION, RENDERED_CORRELATION
 from .rule import ON_GROUND, Rule
@@ -61,17 +61,6 @@ def _surface_elsewhere(evidence: RegistrationEvidence) -> str | None:
     )
 
 
-def _ground_not_found(evidence: RegistrationEvidence) -> str | None:
-    scene = evidence.scene
-    if scene is None or evidence.mask.kind in (LAYER, SURFACE):
-        return None
-    if scene.is_despeckled_town:
-        return "the radar image of a town has no speckle, by which its ground is found"
-    if scene.is_town_of_unknown_size:
-        return "the reference of a town has no pixel size in metres, by which its ground is found"
-    return None
-
-
 def _town_matched_whole(evidence: RegistrationEvidence) -> str | None:
     points = evidence.held_out
     if evidence.scene is None or evidence.mask.is_ground or not evidence.scene.may_be_town:
@@ -105,15 +94,6 @@ SCENE_RULES: tuple[Rule, ...] = (
         "suite towns",
         "give the surface model of this place and the right views, or leave it out",
         _surface_elsewhere,
-    ),
-    Rule(
-        "ground not found",
-        SCENE,
-        "a radar image of a town has no speckle, or the reference no georeferencing, by which the "
-        "ground is found",
-        "suites city and coarse_towns",
-        f"give the radar image unfiltered, and the reference a geotransform; {ON_GROUND}",
-        _ground_not_found,
     ),
     Rule(
         "town matched whole",

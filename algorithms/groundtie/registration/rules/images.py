@@ -1,0 +1,31 @@
+"""Rules on what the images are: asked before anything is matched, and of what matched."""
+
+from __future__ import annotations
+
+from ...masks.used import LAYER, SURFACE
+from ..evidence import IMAGES, ImagesEvidence, RegistrationEvidence
+from .rule import ON_GROUND, Rule
+
+
+def _ground_not_found(evidence: ImagesEvidence | RegistrationEvidence) -> str | None:
+    scene = evidence.scene
+    if scene is None or evidence.mask.kind in (LAYER, SURFACE):
+        return None
+    if scene.is_despeckled_town:
+        return "the radar image of a town has no speckle, by which its ground is found"
+    if scene.is_town_of_unknown_size:
+        return "the reference of a town has no CRS, and its ground is found by distances in metres"
+    return None
+
+
+IMAGES_RULES: tuple[Rule, ...] = (
+    Rule(
+        "ground not found",
+        IMAGES,
+        "a radar image of a town has no speckle, or the reference no CRS, by which the ground is "
+        "found",
+        "suites city and coarse_towns",
+        f"give the radar image unfiltered, and the reference a CRS; {ON_GROUND}",
+        _ground_not_found,
+    ),
+)
