@@ -49,7 +49,7 @@ def test_what_is_not_here_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert missing(needed_by_all()) == ["opencv-python-headless"]
 
 
-def test_linear_algebra_works_in_the_calling_thread_unless_stated(
+def test_libraries_work_in_the_calling_thread_unless_stated(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)

@@ -92,6 +92,15 @@ PACKAGES = (
 )
 
 
+# How many threads libraries of linear algebra start, and OpenCV.
+_THREADS_OF = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "OPENCV_FOR_THREADS_NUM",
+)
+
+
 def missing(packages: Iterable[Package]) -> list[str]:
     """Return the names of those of some packages that are not here."""
     return [package.name for package in packages if not package.found()]
@@ -109,11 +118,11 @@ def needed_for(tool: str, paths: Iterable[PurePath]) -> list[Package]:
 
 
 def use_one_thread() -> None:
-    """Let linear algebra work in the calling thread, unless the environment states how many.
+    """Let libraries work in the calling thread, unless the environment states how many.
 
-    For processes that do this package's work alone, before they import numpy, which reads this
-    once. Their own threads are the parallel part: those of OpenBLAS would wait for work in a
-    busy loop.
+    For processes that do this package's work alone, before they import numpy and OpenCV, which
+    read this once. Their own threads are the parallel part: those of libraries would wait for work
+    in a busy loop. (Builds of OpenCV that share their threads, as Debian's, do not heed it.)
     """
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    for name in _THREADS_OF:
         os.environ.setdefault(name, "1")

@@ -59,7 +59,8 @@ class Colours:
             Which pixels count, shape (h, w).
         """
         every = max(int(np.count_nonzero(valid)) // _MOST_PIXELS, 1)
-        values = bands[:, valid][:, ::every]
+        # Not by the mask, which would copy all pixels first.
+        values = bands.reshape(len(bands), -1)[:, np.flatnonzero(valid)[::every]]
         darkest = max(_DARKEST * float(np.percentile(values, 99)), 1e-9)
         hues = _hues(values, darkest)
         component = np.linalg.eigh(np.cov(hues))[1][:, -1].astype(np.float32)
