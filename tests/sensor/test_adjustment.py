@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -82,6 +84,25 @@ def test_estimates_scatter_as_their_covariance_says() -> None:
     scatter = np.std([b.coefficients for b in drawn], axis=0)
     told = np.sqrt(np.diag(drawn[0].covariance)).reshape(-1, 2)
     assert np.all((scatter / told > 0.6) & (scatter / told < 1.5))
+
+
+@pytest.mark.parametrize("times", [0.05, 1.0, 5.0])
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_model_does_not_depend_on_the_unit_of_covariances(kind: str, times: float) -> None:
+    """Covariances may state too much or too little: left-out points show what is true."""
+    points = control(kind)
+    stated = replace(points, covariance_px2=times**2 * points.covariance_px2)
+    assert adjust(stated).bias.kind == kind
+
+
+@pytest.mark.parametrize("times", [1.0, 20.0])
+def test_noise_is_no_drift(times: float) -> None:
+    found = []
+    for seed in range(40):
+        points = control("shift", seed=seed)
+        stated = replace(points, covariance_px2=times**2 * points.covariance_px2)
+        found.append(adjust(stated).bias.kind)
+    assert found.count("shift") >= 36
 
 
 @pytest.mark.parametrize("kind", KINDS[1:])

@@ -6,7 +6,7 @@ and what a more flexible model gains is measured against its scatter between blo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 import numpy as np
@@ -23,6 +23,7 @@ T = TypeVar("T")
 # is better than none. Measured with `make bench`.
 STANDARD_ERRORS = {
     "translation": 0.0,
+    "shift_drift": 1.0,
     "similarity": 1.0,
     "affine": 1.0,
     "terrain": 1.0,
@@ -45,8 +46,7 @@ def choose_simplest(
     fit: Callable[[str], tuple[T, FloatArray]],
     px: FloatArray,
     baseline: FloatArray | None = None,
-    asked: Mapping[str, float] = STANDARD_ERRORS,
-    is_held: Callable[[T, T], bool] = lambda tried, chosen: True,
+    is_held: Callable[[T], bool] = lambda tried: True,
 ) -> tuple[T, list[T]]:
     """Fit models from simple to flexible and choose the simplest that the points justify.
 
@@ -62,8 +62,6 @@ def choose_simplest(
         Where the points lie, shape (n, 2).
     baseline
         Scores without any model, shape (n,), which the first one must exceed; None: it need not.
-    asked
-        By how many standard errors a kind must exceed what was chosen before; by default 0.
     is_held
         Whether points hold a model that would replace a simpler one, beside its gain.
 
@@ -88,8 +86,8 @@ def choose_simplest(
             continue
         fitted.append(tried)
         if scores is not None:
-            gains = standard_errors(left_out - scores, px) > asked.get(kind, 0.0)
-            if not gains or (chosen is not None and not is_held(tried, chosen)):
+            gains = standard_errors(left_out - scores, px) > STANDARD_ERRORS.get(kind, 0.0)
+            if not gains or (chosen is not None and not is_held(tried)):
                 continue
         chosen, scores = tried, left_out
     if chosen is None:

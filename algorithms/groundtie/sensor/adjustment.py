@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
-from ..geometry.estimation import jackknife_sigma, jackknife_spread
+from ..geometry.estimation import jackknife_spread
 from ..geometry.model_choice import (
     CONTROL_PER_PARAMETER,
     choose_simplest,
@@ -36,10 +36,6 @@ LEAST_REACH_PX = 50
 
 # A model is carried by points that leave it uncertain by less, over the image, in pixels.
 _LARGEST_SIGMA_PX = 1.0
-
-# A more flexible model must make left-out points more probable, and one of its further
-# coefficients must be larger than so many standard deviations.
-_SIGMAS = 3.5
 
 
 @dataclass(frozen=True)
@@ -133,10 +129,10 @@ def adjust(control: Control, kind: str = AUTO) -> Adjustment:
         tried = _adjust(control, each)
         return tried, _log_likelihoods(tried)
 
-    def is_held(tried: Adjustment, chosen: Adjustment) -> bool:
-        return _is_carried(tried, control) and _is_significant(tried, chosen)
+    def is_held(tried: Adjustment) -> bool:
+        return _is_carried(tried, control)
 
-    chosen, fitted = choose_simplest(KINDS, fit, control.expected_px, asked={}, is_held=is_held)
+    chosen, fitted = choose_simplest(KINDS, fit, control.expected_px, is_held=is_held)
     errors = {kind: rmse for each in fitted for kind, rmse in each.left_out_rmse_px.items()}
     return replace(chosen, left_out_rmse_px=errors)
 
@@ -148,17 +144,6 @@ def _is_carried(tried: Adjustment, control: Control) -> bool:
         max(tried.bias.sigma_px(corners).max(), np.median(tried.spread_px(corners)))
         < _LARGEST_SIGMA_PX * np.sqrt(2)
     )
-
-
-def _is_significant(tried: Adjustment, chosen: Adjustment) -> bool:
-    """Return whether a term that a model has and a simpler one has not is no noise."""
-    coefficients = tried.bias.coefficients
-    by_points = np.sqrt(np.diag(tried.bias.covariance))
-    folds = [bias.coefficients.reshape(-1, 1) for bias in tried.fold_biases]
-    by_blocks = jackknife_sigma(folds, coefficients.size)  # neighbours err together
-    sigma = np.maximum(by_points, by_blocks).reshape(-1, 2)
-    more = slice(len(chosen.bias.coefficients), None)
-    return bool((np.abs(coefficients[more]) > _SIGMAS * sigma[more]).any())
 
 
 def _log_likelihoods(adjustment: Adjustment) -> FloatArray:
