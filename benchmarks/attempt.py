@@ -68,7 +68,7 @@ class Outcome:
     model, reason
         What the tool chose and said.
     claimed_ce90_px
-        Radius that is to hold 90 % of the errors, where a suite asks for it.
+        Radius that the tool states to hold 90 % of the errors.
     """
 
     name: str
@@ -184,6 +184,7 @@ def attempt(
         result.verdict.check_rmse_px,
         result.transform.model.kind,
         result.verdict.reason,
+        result.verdict.check_ce90_px,
     )
 
 
