@@ -109,6 +109,7 @@ def test_a_model_that_lies_off_is_moved_to_where_the_reference_shows_it(
     off = with_surface_mask(pair, stated(city, model), stack, context)
     assert (right.used.kind, right.used.image) == (SURFACE, REFERENCE)
     assert right.used.is_ground and right.used.is_reliable and right.used.leaves_little
+    assert right.used.elevated_px == pytest.approx(0.25)
     assert off.used.share == pytest.approx(right.used.share, abs=1e-3)
     assert "moved by -7 and +4 px" in off.used.reason
     parts = [
