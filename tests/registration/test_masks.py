@@ -50,7 +50,7 @@ def test_whoever_names_the_radar_image_is_believed(
 
 @pytest.mark.parametrize(
     ("pixel_m", "kind", "elevated_px"),
-    [(3.0, "ground", 0.5), (4.0, "none", 2.5), (None, "none", 0.0)],
+    [(3.0, "ground", 0.65), (4.0, "none", 2.5), (None, "none", 0.0)],
 )
 def test_a_town_in_large_pixels_takes_part_as_a_whole(
     tmp_path: Path,
@@ -60,7 +60,7 @@ def test_a_town_in_large_pixels_takes_part_as_a_whole(
     kind: str,
     elevated_px: float,
 ) -> None:
-    """Elevated objects displace all of it by 10 m, what is taken for ground by half a pixel.
+    """Elevated objects displace all of it by 10 m, what is taken for ground by less than a pixel.
 
     In pixels of unknown size a rule refuses it.
     """
