@@ -31,7 +31,7 @@ _STYLES = {
 
 
 def calibration(_: Scenes) -> Figure:
-    """Said probabilities against observed shares, by class."""
+    """Stated probabilities against observed shares, by class."""
     classes = observed(RUNS)
     figure, (axes,) = canvas(5.6, 4.6, 1)
     axes.axis("on")
@@ -48,7 +48,7 @@ def calibration(_: Scenes) -> Figure:
     axes.plot(
         _SAID, every.mean(axis=0), "-", color="black", lw=1.5, label=f"all simulated ({len(every)})"
     )
-    axes.set(xlim=(0.4, 1), ylim=(0, 1.02), xlabel="said probability", ylabel="share of places")
+    axes.set(xlim=(0.4, 1), ylim=(0, 1.02), xlabel="stated probability", ylabel="share of places")
     axes.set_xticks(_SAID)
     axes.legend(fontsize=8, loc="lower right", frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
