@@ -40,21 +40,14 @@ class Estimate:
 def jackknife_spread(fold_models: Sequence[PointFunction], at_px: FloatArray) -> FloatArray:
     """Return the standard deviation of predictions, shape (n,), at positions, shape (n, 2).
 
-    Infinite for fewer than two models, each of which was fitted without one block of neighbouring
-    points: so it grows where the points do not hold the model (see `jackknife_sigma`).
+    Both axes together. Infinite for fewer than two models, each of which was fitted without one
+    block of neighbouring points: so it grows where the points do not hold the model. Source:
+    [Efron1993], chapter 11.
     """
-    return jackknife_sigma([model(at_px) for model in fold_models], len(at_px))
-
-
-def jackknife_sigma(estimates: Sequence[FloatArray], size: int) -> FloatArray:
-    """Return the standard deviation, shape (size,), of estimates without one block each, (size, k).
-
-    All of their k axes together; infinite for fewer than two. Source: [Efron1993], chapter 11.
-    """
-    count = len(estimates)
-    if count < 2:
-        return np.full(size, np.inf)
-    return np.asarray(np.sqrt((jackknife_deviations(estimates) ** 2).sum(axis=(0, 2))))
+    if len(fold_models) < 2:
+        return np.full(len(at_px), np.inf)
+    deviations = jackknife_deviations([model(at_px) for model in fold_models])
+    return np.asarray(np.sqrt((deviations**2).sum(axis=(0, 2))))
 
 
 def jackknife_deviations(estimates: Sequence[FloatArray]) -> FloatArray:

@@ -129,10 +129,9 @@ def adjust(control: Control, kind: str = AUTO) -> Adjustment:
         tried = _adjust(control, each)
         return tried, _log_likelihoods(tried)
 
-    def is_held(tried: Adjustment) -> bool:
-        return _is_carried(tried, control)
-
-    chosen, fitted = choose_simplest(KINDS, fit, control.expected_px, is_held=is_held)
+    chosen, fitted = choose_simplest(
+        KINDS, fit, control.expected_px, is_held=lambda tried: _is_carried(tried, control)
+    )
     errors = {kind: rmse for each in fitted for kind, rmse in each.left_out_rmse_px.items()}
     return replace(chosen, left_out_rmse_px=errors)
 
