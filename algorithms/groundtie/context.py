@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+from .memo import Memo
 from .progress import SILENT, Progress
 
 T = TypeVar("T")
@@ -29,16 +30,24 @@ class Context:
         Of random samples: the same seed gives the same result.
     workers
         Number of threads of steps that keep threads of their own, as warping does.
+    memo
+        Keeps what is made of the reference, where further images are registered to it; None: none
+        are.
     """
 
     executor: Executor
     progress: Progress = SILENT
     seed: int = 0
     workers: int = 1
+    memo: Memo | None = None
 
     def part(self, start: float, end: float) -> Context:
         """Return the context of a part of this work, from `start` to `end` (0 to 1)."""
         return replace(self, progress=self.progress.part(start, end))
+
+    def once(self) -> Context:
+        """Return this context for a step whose reference is shown in no other registration."""
+        return replace(self, memo=None)
 
     def quiet(self) -> Context:
         """Return this context without progress, for a step that is too short to report."""

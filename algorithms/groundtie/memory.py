@@ -26,6 +26,9 @@ _CACHE_SHARE = 0.2
 # For the dates of a series, which are matched again and again.
 _DATES_SHARE = 0.4
 
+# For what chips of its reference are described by, which is the same for every date.
+_DESCRIBED_SHARE = 0.15
+
 # What glibc's `mallopt` calls its options, and what they are set to. Threads share two heaps: there
 # are eight for each processor else, of which each keeps what its threads have given back, 110 MB
 # in the registration of 10 000² pixels by two threads, and no time is saved by it. Arrays come from
@@ -63,6 +66,11 @@ def cache_bytes() -> int:
 def dates_bytes() -> int:
     """Return how much the dates of a series may take."""
     return round(_DATES_SHARE * budget_bytes())
+
+
+def described_bytes() -> int:
+    """Return how much the descriptions of its reference's chips may take."""
+    return round(_DESCRIBED_SHARE * budget_bytes())
 
 
 def require_bytes(needed: float, what: str) -> None:

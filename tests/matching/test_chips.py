@@ -12,9 +12,13 @@ from groundtie.errors import CancelledError
 from groundtie.geometry.models import Model
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.matcher import ChipSurfaces, Places
+from groundtie.memo import Memo
 from groundtie.progress import Progress
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import ImagePair
+from groundtie.rasters.patch import Patch
+from groundtie.similarity import description
+from groundtie.similarity.orientation import orientation_fields
 from groundtie.similarity.surface import SimilaritySettings
 
 CHIP, RADIUS = 40, 10
@@ -53,6 +57,26 @@ def test_surfaces_of_both_ways_peak_at_the_shift(
     for surfaces in (found.forward, found.backward, found.combined):
         assert surfaces.shape == (3, 2 * RADIUS + 1, 2 * RADIUS + 1)
         assert np.abs(peaks(surfaces) - SHIFT_PX).max() <= 1
+
+
+def test_what_the_reference_shows_is_described_once_for_several_inputs(
+    pair: ImagePair, context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    described = []
+
+    def fields(window: Patch) -> np.ndarray:
+        described.append(len(window.values))
+        return orientation_fields(window)
+
+    monkeypatch.setattr(description, "orientation_fields", fields)
+    alone, other = (matched(matcher(pair), context, model=shift_on_map(m, 0.0)) for m in (0, 10))
+    assert sum(described) == 2 * 2 * len(CENTRES)
+    with_memo = replace(context, memo=Memo(10**8))
+    for model, expected in ((0, alone), (10, other)):
+        found = matched(matcher(pair), with_memo, model=shift_on_map(model, 0.0))
+        np.testing.assert_array_equal(found.forward, expected.forward)
+        np.testing.assert_array_equal(found.backward, expected.backward)
+    assert sum(described) == (4 + 3) * len(CENTRES)
 
 
 def test_one_way_is_the_same_as_the_first_of_both(pair: ImagePair, context: Context) -> None:

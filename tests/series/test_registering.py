@@ -49,6 +49,7 @@ def matching(monkeypatch: pytest.MonkeyPatch, one_thread: Context) -> Make:
         boxes: dict[int, tuple[int, ...]] | None = None,
         known: dict[str, PairResult] | None = None,
         off_px: dict[tuple[int, int], float] | None = None,
+        far: tuple[tuple[int, int], ...] = (),
     ) -> Matching:
         dates: list[Any] = [FakeDate(str(k)) for k in range(count)]
 
@@ -57,12 +58,12 @@ def matching(monkeypatch: pytest.MonkeyPatch, one_thread: Context) -> Make:
             ends = int(first.name), int(second.name)
             accepted = not set(bad) & set(ends) and not {ends, ends[::-1]} & set(unlike)
             key = pair_key(first, second, task.settings, FRAME)
-            names, surveyed = (first.name, second.name), task.settings.surveys
-            if not accepted:
-                return PairResult(*names, key, False, "a rule", "no", is_surveyed=surveyed)
+            names, placed = (first.name, second.name), task.settings.is_placed
+            if not accepted or (placed and ends in far):
+                return PairResult(*names, key, False, "a rule", "no", is_placed=placed)
             moved = ((off_px or {}).get(ends, 0.0), *ZERO[1:])
             return PairResult(
-                *names, key, True, "", "yes", 0.3, moved, COVARIANCE, is_surveyed=surveyed
+                *names, key, True, "", "yes", 0.3, moved, COVARIANCE, is_placed=placed
             )
 
         monkeypatch.setattr(registering, "register_pair", register)
@@ -83,11 +84,13 @@ def test_every_date_with_the_hub_and_in_a_loop(matching: Make) -> None:
     assert found.done == 8
 
 
-def test_only_links_that_close_loops_of_accepted_ones_go_without_a_survey(matching: Make) -> None:
+def test_only_links_that_close_loops_of_accepted_ones_are_matched_where_the_hub_has_them(
+    matching: Make,
+) -> None:
     found = matching(6, unlike=((0, 3),))
     found.from_hub(0)
     # 3, which 0 refused, is placed by its neighbours; the others are placed by 0.
-    assert {ends for ends, one in found.results.items() if not one.is_surveyed} == {(1, 2), (4, 5)}
+    assert {ends for ends, one in found.results.items() if one.is_placed} == {(1, 2), (4, 5)}
     assert {(2, 3), (3, 4)} <= found.results.keys()
 
 
@@ -102,17 +105,26 @@ def test_a_loop_that_does_not_close_gets_further_links(
     further = set(found.results) - set(sound.results)
     # With every date that one of the loop was not yet linked with, but no more than are near.
     assert further and all({1, 2} & set(ends) for ends in further)
-    assert all(found.results[ends].is_surveyed == (0 in ends) for ends in further)
+    assert all(found.results[ends].is_placed != (0 in ends) for ends in further)
 
 
-def test_a_link_without_a_survey_places_no_date_later(matching: Make) -> None:
+def test_what_is_refused_where_the_hub_has_it_is_searched_for(matching: Make) -> None:
+    found = matching(5, far=((1, 2),))
+    found.from_hub(0)
+    assert {ends for ends, one in found.results.items() if one.is_placed} == {(3, 4)}
+    assert found.results[1, 2].accepted
+    # Six pairs, one of them twice.
+    assert (len(found.results), found.done) == (6, 7)
+
+
+def test_a_link_that_was_placed_places_no_date_later(matching: Make) -> None:
     first = matching(3)
     first.from_hub(0)
-    assert not first.results[1, 2].is_surveyed
+    assert first.results[1, 2].is_placed
     known = {one.key: one for one in first.results.values()}
     again = matching(3, unlike=((0, 2),), known={first.results[1, 2].key: first.results[1, 2]})
     again.from_hub(0)
-    assert again.results[1, 2].is_surveyed and (2, 1) not in again.results
+    assert not again.results[1, 2].is_placed and (2, 1) not in again.results
     # As another's loop it is still good for nothing to be done again.
     unchanged = matching(3, known=known)
     unchanged.from_hub(0)

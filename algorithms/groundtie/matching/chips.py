@@ -157,10 +157,9 @@ class ChipMatcher:
         def surfaces(reference: Patch, input: Patch) -> Surfaces:
             if self.left_of is not None:
                 input = self.left_of(reference, input)
-            of_reference, of_input = (
-                describe(windows, places.chip_px**2, self.settings)
-                for windows in (reference, input)
-            )
+            pixels = places.chip_px**2
+            of_reference = describe(reference, pixels, self.settings, context.memo)
+            of_input = describe(input, pixels, self.settings)
             made = [way(of_reference, of_input, radius_px, self.settings) for way in ways]
             return np.stack(made, axis=1)
 

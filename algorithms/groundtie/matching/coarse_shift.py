@@ -147,7 +147,7 @@ def _places(
     # What a mask leaves of the input is all that can lie under the reference.
     valid = 1.0 if pair.input.mask is None else input.valid_share
     surface = similarity_surface(
-        describe(reference, level.width * level.height, settings),
+        describe(reference, level.width * level.height, settings, context.memo),
         describe(input, level.width * level.height, settings),
         radius_px,
         settings,

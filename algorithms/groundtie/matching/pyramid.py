@@ -17,6 +17,7 @@ from .coarse_shift import Candidate, coarse_candidates, level_factor
 from .level_fit import CoarseModel, fit_level, fit_level_pooled
 from .matcher import MaskOf
 from .pooled import PooledHistogramMatcher
+from .surface_fit import FIT_RADIUS_PX
 
 # A candidate that random matches would hardly ever support (log10) needs no rival.
 _CERTAIN = -6.0
@@ -31,12 +32,14 @@ _SAME_PLACE_PX = 5.0
 # succeed where large chips failed, and the verdict checks what comes of them.
 _HOPELESS = 0.0
 
-# How far chips are searched around a candidate, in pixels of the level; around a finer level's
-# model, as far as a level's model may be wrong, and the distortion that it does not model.
+# How far chips are searched around a candidate, in pixels of the level.
 _RADIUS_PX = 12
+
+# As far as a level's model may be wrong, in its own pixels, and the distortion that it does not
+# model, in those of the level that is searched.
 _LEVEL_ERROR_PX, _DISTORTION_PX = 2.0, 4
 
-# Each level is finer than the one before by this at most; the last is the matching grid itself.
+# Each level is finer than the one before by this at most.
 _STEP = 4.0
 
 # Masked chips have too little evidence to look so far: levels are this much finer.
@@ -102,11 +105,10 @@ def _descend(
         raise NothingFoundError("nothing in common was found")
     best = min(tried, key=_alarms)
     _require_no_rival(best, tried, level)
-    while factor > 1:
+    while not _reaches_tie_points(factor):
         finer_factor = max(factor / _STEP, 1.0)
         finer_level = grid if finer_factor == 1 else grid.scaled(finer_factor)
-        radius = int(np.ceil(_LEVEL_ERROR_PX * factor / finer_factor)) + _DISTORTION_PX
-        finer = fit_level(matcher, finer_level, best.model, radius, quiet)
+        finer = fit_level(matcher, finer_level, best.model, _reach_px(factor / finer_factor), quiet)
         if finer.log10_false_alarms < 0:
             best = finer
         factor = finer_factor
@@ -123,12 +125,21 @@ def _descend_pooled(
     if others and others[0].height > _RIVAL_HEIGHT * best.height:
         raise AmbiguousPlaceError("two places match about as well")
     model = best.model
-    while factor > _POOLED_STEP:
+    while not _reaches_tie_points(factor):
         factor = factor / _POOLED_STEP
-        radius = int(np.ceil(_LEVEL_ERROR_PX * _POOLED_STEP)) + _DISTORTION_PX
         level = matcher.pair.grid.scaled(factor)
-        model = fit_level_pooled(matcher, level, model, radius, context.quiet())
+        model = fit_level_pooled(matcher, level, model, _reach_px(_POOLED_STEP), context.quiet())
     return model
+
+
+def _reach_px(factor: float) -> int:
+    """Return how far to search around a model of a level so many times coarser, in pixels."""
+    return int(np.ceil(_LEVEL_ERROR_PX * factor)) + _DISTORTION_PX
+
+
+def _reaches_tie_points(factor: float) -> bool:
+    """Whether tie points are searched as far as the model of a level may be wrong."""
+    return _reach_px(factor) <= FIT_RADIUS_PX
 
 
 def _alarms(model: CoarseModel) -> float:

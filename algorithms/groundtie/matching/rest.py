@@ -77,12 +77,13 @@ def survey_rest(
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())
-    survey = survey_model(fused, transform.model, context, locked, places, elsewhere_px)
+    once = context.once()
+    survey = survey_model(fused, transform.model, once, locked, places, elsewhere_px)
     chips, is_sharp = len(places.centres), locked.sameness.has_sharp_edges
     rest = Rest(survey, locked.is_explained, None, chips, locked.is_drawn, is_sharp)
     if not (locked.is_explained and locked.is_whole):
         return rest
     # A copy may be blended into other ground, of which the same windows are no part.
     left = replace(fused, left_of=unexplained)
-    beyond = survey_model(left, locked.model, context, None, places, elsewhere_px)
+    beyond = survey_model(left, locked.model, once, None, places, elsewhere_px)
     return replace(rest, beyond=beyond)

@@ -119,8 +119,9 @@ class Specification:
     surface_view
         The reference is a surface model: it is rendered as a radar image from this view, with
         layover, radar shadow and double bounce. None: it is none.
-    surveys
-        Whether chips all over the pair are matched, too, which rules ask for.
+    is_placed
+        Whether other registrations, which all rules accepted, place both images where they are: tie
+        points are searched from there, and no survey is asked for.
     """
 
     matcher: str = CHIPS
@@ -141,7 +142,7 @@ class Specification:
     input_dem: Any = None
     light: Light | None = None
     surface_view: View | None = None
-    surveys: bool = True
+    is_placed: bool = False
 
     @property
     def is_rendered(self) -> bool:

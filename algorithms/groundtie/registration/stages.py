@@ -8,7 +8,7 @@ from typing import Protocol
 from ..context import Context
 from ..features.presets import optical_keypoints, sar_keypoints
 from ..geometry.estimation import Estimate
-from ..geometry.models import TERRAIN, Model
+from ..geometry.models import TERRAIN, Model, shift_model
 from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
 from ..matching.bands import BandSurvey, survey_bands
 from ..matching.check import CHECK_RADIUS_PX, Check, check_model
@@ -107,7 +107,9 @@ class Stages:
         return estimate, self.check(estimate, context.part(0.9, 1.0))
 
     def coarse(self, context: Context) -> Model:
-        """Return the coarse model."""
+        """Return the coarse model; that of images which are placed is none at all."""
+        if self.spec.is_placed:
+            return shift_model(0.0, 0.0)
         limits = self.masked.pair.limits
         return find_coarse_model(self.matcher, self.held_out, limits, context)
 
@@ -123,7 +125,7 @@ class Stages:
         the same in both arrays (None: there is none), and what bands show each where they do not
         coincide.
         """
-        if not self.spec.surveys:
+        if self.spec.is_placed:
             return None, None, ()
         pair, transform = self.masked.pair, estimate.transform
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))

@@ -44,7 +44,7 @@ class Settings:
     ----------
     model
         "auto", "translation", "similarity" or "affine".
-    max_error_px, search_radius_m, matching_pixel_size_m, surveys
+    max_error_px, search_radius_m, matching_pixel_size_m, is_placed
         See `Specification`.
     """
 
@@ -52,11 +52,11 @@ class Settings:
     max_error_px: float
     search_radius_m: float | None
     matching_pixel_size_m: float | None
-    surveys: bool = True
+    is_placed: bool = False
 
     def of_loops(self) -> Settings:
         """Return how a pair is registered that places no date, but closes a loop."""
-        return replace(self, surveys=False)
+        return replace(self, is_placed=True)
 
     def specification(self, first: Date, second: Date) -> Specification:
         """Return how a pair is registered: the preset of what the two images are."""
@@ -72,7 +72,7 @@ class Settings:
             max_error_px=self.max_error_px,
             search_radius_m=self.search_radius_m,
             matching_pixel_size_m=self.matching_pixel_size_m,
-            surveys=self.surveys,
+            is_placed=self.is_placed,
         )
 
 
@@ -95,8 +95,8 @@ class PairResult:
         See `network.Link`; None if it was refused.
     seconds
         How long it took.
-    is_surveyed
-        Whether the rules on the survey were asked, too.
+    is_placed
+        Whether the hub had placed both dates (see `Specification`).
     """
 
     first: str
@@ -109,7 +109,7 @@ class PairResult:
     displacement: tuple[float, ...] | None = None
     covariance: tuple[tuple[float, ...], ...] | None = None
     seconds: float = 0.0
-    is_surveyed: bool = True
+    is_placed: bool = False
 
     def link(self, first: int, second: int) -> Link:
         """Return an accepted registration as a link of two dates by their numbers."""
@@ -207,7 +207,7 @@ def register_pair(task: PairTask, context: Context) -> PairResult:
         False,
         "",
         "",
-        is_surveyed=settings.surveys,
+        is_placed=settings.is_placed,
     )
     spec = settings.specification(first, second)
     grids = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import permutations
 
 import numpy as np
@@ -12,6 +12,8 @@ import numpy as np
 from ..context import Context
 from ..errors import WorkerLostError
 from ..executors import POLL_SECONDS, result_of
+from ..memo import Memo
+from ..memory import described_bytes
 from .closure import triplet_closures
 from .dates import Date, Footprints
 from .frame import PARAMETERS, FloatArray, SeriesFrame
@@ -68,6 +70,7 @@ class Matching:
     executor: Executor | None = None
     keep: Callable[[PairResult], None] = _forget
     results: dict[tuple[int, int], PairResult] = field(default_factory=dict)
+    described: Memo | None = None
     done: int = 0
     reused: int = 0
 
@@ -89,6 +92,7 @@ class Matching:
 
     def from_hub(self, hub: int) -> None:
         """Register all dates to one, reach the others by their neighbours, and close loops."""
+        self.described = Memo(described_bytes())
         others = [date for date in range(len(self.dates)) if date != hub]
         self._attempt_all([(hub, date) for date in others], hub)
         self._reach(others, hub)
@@ -176,11 +180,12 @@ class Matching:
 
         What becomes of one does not depend on the others: they may run at once.
         """
-        asked = {
-            frozenset(ends): ends
-            for ends in pairs
-            if self.footprints.share(*ends) >= _LEAST_SHARE and not self._is_done(ends, hub)
-        }
+        worth = [ends for ends in pairs if self.footprints.share(*ends) >= _LEAST_SHARE]
+        # What is refused where the hub has it is searched for.
+        while asked := {frozenset(ends): ends for ends in worth if not self._is_done(ends, hub)}:
+            self._register(tuple(asked.values()), hub)
+
+    def _register(self, pairs: Sequence[tuple[int, int]], hub: int) -> None:
         placed = self.placed(hub)
         tasks = {
             (first, second): PairTask(
@@ -190,12 +195,13 @@ class Matching:
                 self._settings((first, second), hub),
                 self.frame,
             )
-            for first, second in asked.values()
+            for first, second in pairs
         }
         if self.executor is None:
             for ends, task in tasks.items():
                 part = self._next_part(f"registering {task.second.name} to {task.first.name}")
-                self._add(ends, register_pair(task, part))
+                memo = self.described if ends[0] == hub else None
+                self._add(ends, register_pair(task, replace(part, memo=memo)))
             return
         futures = {ends: self.executor.submit(task.elsewhere()) for ends, task in tasks.items()}
         try:
@@ -218,18 +224,15 @@ class Matching:
         Where the hub accepted both dates by all rules, the pair places neither of them: it closes
         the loop, which is what it is checked by.
         """
+        found = self._known(*ends)
+        is_refused = found is not None and not found.accepted
         links = [self._known(hub, date) for date in ends]
-        if all(one is not None and one.accepted and one.is_surveyed for one in links):
-            return self.settings.of_loops()
-        return self.settings
+        are_placed = all(one is not None and one.accepted and not one.is_placed for one in links)
+        return self.settings.of_loops() if are_placed and not is_refused else self.settings
 
     def _is_done(self, ends: tuple[int, int], hub: int) -> bool:
         found = self._known(*ends)
-        if found is None:
-            return False
-        # Who was refused without a survey is refused with one, too.
-        is_enough = found.is_surveyed or not found.accepted
-        return is_enough or not self._settings(ends, hub).surveys
+        return found is not None and (not found.is_placed or self._settings(ends, hub).is_placed)
 
     def _next_part(self, message: str) -> Context:
         expected = max(2 * len(self.dates) - 2, self.done + 1)

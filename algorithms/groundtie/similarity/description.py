@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch
 from .binning import to_bins
 from .joint_histogram import reach
-from .orientation import edge_strength, orientation_fields
+from .orientation import SCALES_PX, edge_strength, orientation_fields
 
 # Pixels that windows have beyond the chip on each side: what the widest gradient filter and the
 # widest histogram kernel reach.
 BORDER_PX = 8
 
 _MARGIN_PX = reach()
+
+# What all of a description takes: grey values and their validity, complex fields, strength and its
+# validity, bins.
+BYTES_A_PIXEL = 5 + 8 * len(SCALES_PX) + 5 + 1
 
 
 @dataclass(frozen=True)

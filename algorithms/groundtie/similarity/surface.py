@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
+from ..memo import Memo
 from ..rasters.patch import Patch
 from .correlation import MINIMUM_OVERLAP, overlap_share
-from .description import Description
+from .description import BYTES_A_PIXEL, Description
 from .measures import MEASURES
 from .order_statistics import upper_median
 from .stacks import each, flat
@@ -76,7 +77,9 @@ def detrend(surface: Surface, width_px: float = TREND_PX) -> Surface:
     return normalise(surface - trend)
 
 
-def describe(window: Patch, chip_pixels: int, settings: SimilaritySettings) -> Description:
+def describe(
+    window: Patch, chip_pixels: int, settings: SimilaritySettings, memo: Memo | None = None
+) -> Description:
     """Return what similarity is measured on.
 
     Parameters
@@ -87,8 +90,15 @@ def describe(window: Patch, chip_pixels: int, settings: SimilaritySettings) -> D
         Number of pixels of the template that will be matched.
     settings
         How similarity is measured.
+    memo
+        Keeps descriptions; None: it is not asked for again.
     """
-    return Description.of(window, settings.bins_for(chip_pixels))
+    bins = settings.bins_for(chip_pixels)
+    if memo is None:
+        return Description.of(window, bins)
+    made = window.values, window.valid, np.array([bins])
+    size_bytes = BYTES_A_PIXEL * window.values.size
+    return memo.recall(lambda: Description.of(window, bins), size_bytes, *made)
 
 
 def similarity_surface(
