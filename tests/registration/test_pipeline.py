@@ -102,6 +102,21 @@ def test_where_nothing_is_found_the_registration_has_a_verdict_alone(
     assert found.transform is None and found.tie_points is None
 
 
+@pytest.mark.parametrize(("shift_m", "is_near"), [((-53.0, 44.0), True), ((-203.0, 157.0), False)])
+def test_images_that_are_placed_are_matched_from_there_alone(
+    tmp_path: Path, context: Context, shift_m: tuple[float, float], is_near: bool
+) -> None:
+    files = write_textured_pair(tmp_path, (260, 240), shift_on_map(*shift_m))
+    spec = replace(COREGISTER, model="translation", search_radius_m=300.0)
+    for is_placed, is_found in ((False, True), (True, is_near)):
+        asked = replace(spec, is_placed=is_placed)
+        with open_pair(files.reference, files.input, asked, context) as pair:
+            found = run(pair, asked, context)
+        assert found.verdict.accepted == is_found
+        assert not is_found or error_px(found.accepted(), files) < 0.3
+        assert (found.survey is None) == is_placed
+
+
 @pytest.fixture(scope="module")
 def town(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """Return a radar's and a camera's image of a dense town."""
