@@ -1,4 +1,4 @@
-"""How sharply edges coincide: of ground at its place, and of what is drawn over other ground.
+"""How sharply edges and steps coincide: of ground at its place, and of what is drawn over other.
 
 Ground at its place is that of all scenes of the red team, and different bands of the shared series,
 of one date and of neighbouring ones: what cameras show of one ground in other colours.
@@ -25,16 +25,18 @@ from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.similarity.in_common import LEAST_SHARPNESS, VIEW_SHARPNESS, Sameness
+from groundtie.similarity.seams import DRAWN_WIDTH
 
 from .attacks.cases import AttackCase, all_scenes, cases
 from .attacks.catalogue import LOCKED
 from .attacks.examples import is_example
 from .attacks.pairs import Pair
 from .attacks.suite import sample
+from .attempt import for_json
 from .suites import Goal, Settings, SuiteResult, Table, run_cases
 
 _QUICK, _SAMPLE = 4, 60
-BANDS_OF_ONE = "bands of one exposure"
+BANDS_OF_ONE, BANDS_APART = "bands of one exposure", "bands, years apart"
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Measured:
 
     def record(self) -> dict[str, Any]:
         """Return what was measured as values that JSON can carry."""
-        return asdict(self)
+        return {**asdict(self), "sameness": for_json(asdict(self.sameness))}
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ class Bands:
 
     def run(self, workers: int | None) -> Measured:
         """Measure."""
-        group = BANDS_OF_ONE if self.reference == self.input else "bands, years apart"
+        group = BANDS_OF_ONE if self.reference == self.input else BANDS_APART
         name = f"{self.reference.stem} {self.band}, {self.input.stem} {self.other_band}"
         with tempfile.TemporaryDirectory() as folder:
             # A raster is not compared with itself.
@@ -173,6 +175,8 @@ def run(settings: Settings) -> SuiteResult:
     most, most_of_one = (
         max((one.sameness.sharpness for one in some), default=0.0) for some in (apart, ground)
     )
+    others = [one for one in apart if one.group != BANDS_APART]
+    least = min((one.sameness.step_width for one in others), default=np.inf)
     return SuiteResult(
         "How sharply edges coincide",
         (
@@ -188,10 +192,31 @@ def run(settings: Settings) -> SuiteResult:
                 f"at most {most_of_one:.2f}",
                 most_of_one < VIEW_SHARPNESS,
             ),
+            Goal(
+                "Steps between columns or rows, of different sensors' ground at its place",
+                f"wider than {DRAWN_WIDTH:g}",
+                f"at least {least:.2f}",
+                least > DRAWN_WIDTH,
+            ),
         ),
-        (_table("Ground at its place", ground), _table("Drawn over other ground", found)),
+        (
+            _table("Ground at its place", ground),
+            _table("Drawn over other ground", found),
+            _steps_table("Steps between columns or rows, ground at its place", ground),
+            _steps_table("Steps between columns or rows, drawn over other ground", found),
+        ),
         [one.record() for one in every],
     )
+
+
+def _steps_table(title: str, some: list[Measured]) -> Table:
+    rows = []
+    for group in sorted({one.group for one in some}):
+        own = [one.sameness for one in some if one.group == group]
+        widths = [one.step_width for one in own]
+        numbers = f"{min(widths):.2f}", f"{np.median(widths):.2f}"
+        rows.append([group, str(len(own)), *numbers, str(sum(one.has_seams for one in own))])
+    return Table(title, ("", "pairs", "least width", "median", "at the limit or below"), rows)
 
 
 def _table(title: str, some: list[Measured]) -> Table:

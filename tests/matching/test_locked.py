@@ -117,6 +117,27 @@ def test_lines_are_masked_in_any_colour_over_any_ground(
 
 
 @pytest.mark.slow
+def test_tiles_of_a_mosaic_are_found_in_speckle_and_their_seams_masked(
+    tmp_path: Path, context: Context
+) -> None:
+    """Where speckle hides how sharp their edges are."""
+    tile = np.searchsorted((45, 130, 240), np.arange(SIDE), side="right") % 2
+    gains = np.where(tile, 0.6, 1.2) * np.where(tile, 0.6, 1.2)[:, None]
+    reference, input = (
+        gains
+        * (10 + sensed(seed, 0.0, place))
+        * np.random.default_rng(seed).gamma(3.0, 1 / 3, (SIDE, SIDE))
+        for seed, place in ((1, 1), (2, 9))
+    )
+    locked = looked_at(tmp_path, reference, input, context, sensors=Sensors.DIFFERENT)
+    assert locked is not None and locked.is_evident
+    assert not locked.sameness.has_sharp_edges and locked.sameness.has_seams
+    mask = masked(tmp_path, locked)
+    # Columns are counted from 20 on.
+    assert mask[:, 104:116].mean() > 0.9 and mask[124:136].mean() > 0.9
+
+
+@pytest.mark.slow
 def test_edges_of_what_is_drawn_are_masked(tmp_path: Path, context: Context) -> None:
     """Beside a line, windows vary alike no more where the ground varies as much as the line."""
     reference, input = (drawn_into(3 * sensed(n, place=place)) for n, place in ((1, 1), (2, 9)))

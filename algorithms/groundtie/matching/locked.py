@@ -18,6 +18,7 @@ from ..geometry.models import Model, shift_model
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid, PointFunction, reproject
 from ..rasters.pair import ImagePair
+from ..similarity.description import BORDER_PX
 from ..similarity.in_common import (
     LOOK_REACH_PX,
     Look,
@@ -26,6 +27,7 @@ from ..similarity.in_common import (
     sameness_of,
 )
 from ..similarity.sameness import REACH_PX, WINDOW_PX, Windows, covered
+from ..similarity.seams import seams
 from .chip_windows import Resampled
 from .matcher import FloatArray, Places
 
@@ -42,8 +44,9 @@ EXACT_PX = 0.0625
 
 _LATTICE = 9
 
-# Around an edge, chips see it this far off.
+# Around an edge, chips see it this far off; around a seam, which is long, as far as filters reach.
 _EDGE_SURROUNDINGS_PX = 9
+_SEAM_SURROUNDINGS_PX = 2 * BORDER_PX + 1
 
 
 class Sensors(Enum):
@@ -125,6 +128,8 @@ class LockedContent:
             same = covered(same, WINDOW_PX)
             if self.sameness.has_sharp_edges or self.is_exact:
                 same |= covered(drawn_edges(*patches), _EDGE_SURROUNDINGS_PX)
+            if self.sameness.has_seams:
+                same |= covered(seams(*patches), _SEAM_SURROUNDINGS_PX)
         return same[reach:-reach, reach:-reach]
 
     @property

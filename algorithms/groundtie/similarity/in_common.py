@@ -22,6 +22,7 @@ from .sameness import (
     reduced,
     without,
 )
+from .seams import DRAWN_WIDTH, step_products, step_width
 
 # None, and offsets (x, y) at which edges coincide by chance: so many, on a spiral.
 _CHANCE_OFFSETS = 8
@@ -81,6 +82,8 @@ class Sameness:
     related
         Share of the area where one is half a linear function of the other, in the images or in
         reduced ones, whichever is smaller.
+    step_width
+        See `seams.step_width`.
     """
 
     sharpness: float
@@ -89,16 +92,22 @@ class Sameness:
     ground: float
     windows: float
     related: float = 0.0
+    step_width: float = np.inf
 
     @property
     def is_evident(self) -> bool:
         """Whether more is the same than two views show of one ground."""
-        return self.has_sharp_edges or self.area >= _LEAST_AREA
+        return self.has_sharp_edges or self.area >= _LEAST_AREA or self.has_seams
 
     @property
     def has_sharp_edges(self) -> bool:
         """Whether edges coincide more sharply than those of one ground."""
         return self.sharpness >= LEAST_SHARPNESS
+
+    @property
+    def has_seams(self) -> bool:
+        """Whether steps between columns or rows coincide more sharply than those of ground."""
+        return self.step_width <= DRAWN_WIDTH
 
     @property
     def is_finer_than_ground(self) -> bool:
@@ -153,10 +162,13 @@ class Look:
     windows
         How many pixels are the same, related, and valid (see `Windows`): of the images, of reduced
         ones, and of these without what is the same in the images, shape (3, 3).
+    steps
+        See `step_products`.
     """
 
     edges: NDArray[np.int_]
     windows: NDArray[np.int_]
+    steps: NDArray[np.float64]
 
     @classmethod
     def of(cls, reference: Patch, input: Patch) -> Look:
@@ -164,7 +176,7 @@ class Look:
         left = without(reference, whole.same), without(input, whole.same)
         smaller, rest = _reduced(reference, input), _reduced(*left)
         counts = np.array([windows.counts for windows in (whole, smaller, rest)])
-        return cls(_count_edges(reference, input), counts)
+        return cls(_count_edges(reference, input), counts, step_products(reference, input))
 
 
 def sameness_of(looks: Sequence[Look]) -> Sameness:
@@ -181,6 +193,7 @@ def sameness_of(looks: Sequence[Look]) -> Sameness:
         ground=float(left[0] / max(left[2], _LEAST_LEFT * every)),
         windows=every / WINDOW_PX**2,
         related=min(related, float(smaller[1] / every)),
+        step_width=step_width(np.sum([one.steps for one in looks], axis=0)) if looks else np.inf,
     )
 
 
