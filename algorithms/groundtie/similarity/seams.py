@@ -9,6 +9,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
@@ -41,9 +42,9 @@ def step_products(reference: Patch, input: Patch) -> NDArray[np.float64]:
     sums = []
     for one, other in zip(_both_ways(reference), _both_ways(input), strict=True):
         inner = one[:, _LAGS:-_LAGS]
-        ends = other.shape[1] - 2 * _LAGS
-        sums.append([(inner * other[:, k : k + ends]).sum() for k in range(2 * _LAGS + 1)])
-    return np.array(sums, np.float64)
+        moved = sliding_window_view(other, inner.shape[1], axis=1)
+        sums.append(np.einsum("bn,bkn->k", inner, moved, dtype=np.float64))
+    return np.array(sums)
 
 
 def step_width(products: NDArray[np.floating]) -> float:
