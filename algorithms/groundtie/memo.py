@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 T = TypeVar("T")
 
-_DIGEST_BYTES = 16
-
 
 class Memo:
     """Keeps results by the content of the arrays that they are made of.
@@ -43,7 +41,7 @@ class Memo:
         arrays
             What it is made of: of always the same types.
         """
-        key = blake2b(digest_size=_DIGEST_BYTES)
+        key = blake2b()
         for array in arrays:
             key.update(repr(array.shape).encode())
             key.update(np.ascontiguousarray(array).data)

@@ -77,6 +77,7 @@ def survey_rest(
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())
+    # Another input leaves something else of the reference.
     once = context.once()
     survey = survey_model(fused, transform.model, once, locked, places, elsewhere_px)
     chips, is_sharp = len(places.centres), locked.sameness.has_sharp_edges
@@ -85,5 +86,5 @@ def survey_rest(
         return rest
     # A copy may be blended into other ground, of which the same windows are no part.
     left = replace(fused, left_of=unexplained)
-    beyond = survey_model(left, locked.model, once, None, places, elsewhere_px)
+    beyond = survey_model(left, locked.model, context, None, places, elsewhere_px)
     return replace(rest, beyond=beyond)

@@ -59,6 +59,10 @@ class Matching:
         Runs pairs, each as a task of files, instead of these threads; None: they do.
     keep
         Receives each registration as soon as it is done.
+    results, done, reused
+        The registrations by the numbers of their dates; how many were done, and not done again.
+    described
+        What chips of the hub are described by, which all of its registrations ask for.
     """
 
     dates: Sequence[Date]
@@ -186,6 +190,7 @@ class Matching:
             self._register(tuple(asked.values()), hub)
 
     def _register(self, pairs: Sequence[tuple[int, int]], hub: int) -> None:
+        """Register pairs, here or by the executor."""
         placed = self.placed(hub)
         tasks = {
             (first, second): PairTask(

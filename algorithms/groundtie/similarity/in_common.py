@@ -22,7 +22,7 @@ from .sameness import (
     reduced,
     without,
 )
-from .seams import DRAWN_WIDTH, step_products, step_width
+from .seams import DRAWN_WIDTH, STANDARD_ERRORS, step_products, step_width
 
 # None, and offsets (x, y) at which edges coincide by chance: so many, on a spiral.
 _CHANCE_OFFSETS = 8
@@ -55,9 +55,6 @@ _LEAST_AREA = 0.2
 _REDUCTION = 4
 _GROUND_SHARE = 0.23
 _LEAST_LEFT = 0.1
-
-# Shares differ, but by chance with 5 %, if they are so many standard errors apart.
-_STANDARD_ERRORS = 1.645
 
 # Nothing is left to be judged of copies: this share is the same, in the images and reduced ones.
 _COPY_SHARE = 0.75
@@ -116,7 +113,7 @@ class Sameness:
         Ground is no less alike there, where noise has averaged out; noise that both have is.
         """
         error = np.sqrt(self.area * (1 - self.area) / max(self.windows, 1.0))
-        return bool(self.reduced_area < self.area - _STANDARD_ERRORS * error)
+        return bool(self.reduced_area < self.area - STANDARD_ERRORS * error)
 
     @property
     def is_copy_in_other_colours(self) -> bool:
@@ -203,7 +200,7 @@ def _sharpness(counts: FloatArray) -> float:
     sharp, blurred = counts[0] - chance
     # Of counts, which vary as much as they are many.
     error = np.sqrt(counts[0, 1] + chance[1] / _CHANCE_OFFSETS + 1)
-    return float(sharp / (max(blurred, 0.0) + _STANDARD_ERRORS * error))
+    return float(sharp / (max(blurred, 0.0) + STANDARD_ERRORS * error))
 
 
 def _count_edges(reference: Patch, input: Patch) -> NDArray[np.int_]:

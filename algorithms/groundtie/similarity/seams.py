@@ -17,8 +17,9 @@ from ..rasters.reading import FloatImage, Mask
 from .order_statistics import median
 from .orientation import compress
 
-# Steps are means along about so many pixels, of which this share must be known, in robust standard
-# deviations; no more of them count, so that no single one decides.
+# Steps are means along about so many pixels, as high as the windows that are looked at, of which
+# this share must be known, in robust standard deviations; no more of them count, so that no single
+# one decides.
 _ALONG_PX, _LEAST_KNOWN, _MOST_DEVIATIONS = 96, 1 / 3, 8.0
 
 # How many columns further on one array's steps are compared with the other's. What is this far off
@@ -26,8 +27,8 @@ _ALONG_PX, _LEAST_KNOWN, _MOST_DEVIATIONS = 96, 1 / 3, 8.0
 _LAGS, _NEAR = 16, 3
 _LAG = np.arange(-_LAGS, _LAGS + 1)
 
-# A sum is no larger, but by chance with 5 %, than so many standard deviations more.
-_STANDARD_ERRORS = 1.645
+# What is so many standard deviations more is exceeded by chance with 5 %.
+STANDARD_ERRORS = 1.645
 
 # Steps of what is drawn are no wider. Suite sharpness: of different sensors' ground at its place
 # from 0.51 on; of seams, stripes and lines of maps from 0.04 on, mostly below this.
@@ -62,7 +63,7 @@ def step_width(products: NDArray[np.floating]) -> float:
     aligned = np.sum([np.roll(of, -lag) for of, lag in zip(products, best, strict=True)], axis=0)
     far = aligned[np.abs(_LAG) > _NEAR]
     here, *beside = (float(aligned[_LAGS + k] - far.mean()) for k in (0, -1, 1))
-    return (max(*beside, 0.0) + _STANDARD_ERRORS * float(far.std())) / here if here > 0 else np.inf
+    return (max(*beside, 0.0) + STANDARD_ERRORS * float(far.std())) / here if here > 0 else np.inf
 
 
 def seams(reference: Patch, input: Patch) -> Mask:
