@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, rayleigh
 from series_dates import FRAME, link, shifted, star_and_chain
 
 from groundtie.series.network import SCATTER_RANGE_PX, adjust
@@ -105,6 +105,16 @@ def test_shifts_alone_have_two_degrees_of_freedom() -> None:
     ]
     found = adjust(FRAME, links, 15, 0, is_free=False)
     assert found.scatter_px == pytest.approx(scatter, rel=0.45)
+
+
+def test_dates_are_imprecise_if_two_of_them_may_be_further_apart_than_the_goal() -> None:
+    """More than 0.3 px by 1 in 1000, of Rayleigh's distribution: each axis has both variances."""
+    true, limit = np.zeros((2, 6)), 0.3 / rayleigh.isf(1e-3) / np.sqrt(2)
+    # Of an axis, over the frame: a shift, and two terms that grow over ±1.
+    variance = limit**2 / (1 + 1 / 3 + 1 / 3) - LEAST**2
+    for factor, expected in ((0.95, False), (1.05, True)):
+        found = adjust(FRAME, [link(0, 1, true, factor * variance**0.5)], 2, 0, is_free=False)
+        assert list(found.imprecise) == [False, expected]
 
 
 def test_without_a_reference_the_mean_is_zero() -> None:

@@ -21,7 +21,8 @@ from groundtie.series.registering import Matching
 
 SETTINGS = Settings("auto", 3.0, None, None)
 ZERO = (0.0,) * 6
-COVARIANCE = tuple(tuple(0.01 * (i == j) for j in range(6)) for i in range(6))
+PRECISE = tuple(tuple(1e-4 * (i == j) for j in range(6)) for i in range(6))
+IMPRECISE = tuple(tuple(0.1 * (i == j) for j in range(6)) for i in range(6))
 WHOLE = (0, 0, 10, 10)
 
 
@@ -50,6 +51,7 @@ def matching(monkeypatch: pytest.MonkeyPatch, one_thread: Context) -> Make:
         known: dict[str, PairResult] | None = None,
         off_px: dict[tuple[int, int], float] | None = None,
         far: tuple[tuple[int, int], ...] = (),
+        imprecise: tuple[tuple[int, int], ...] = (),
     ) -> Matching:
         dates: list[Any] = [FakeDate(str(k)) for k in range(count)]
 
@@ -62,8 +64,9 @@ def matching(monkeypatch: pytest.MonkeyPatch, one_thread: Context) -> Make:
             if not accepted or (placed and ends in far):
                 return PairResult(*names, key, False, "a rule", "no", is_placed=placed)
             moved = ((off_px or {}).get(ends, 0.0), *ZERO[1:])
+            covariance = IMPRECISE if ends in imprecise else PRECISE
             return PairResult(
-                *names, key, True, "", "yes", 0.3, moved, COVARIANCE, is_placed=placed
+                *names, key, True, "", "yes", 0.3, moved, covariance, is_placed=placed
             )
 
         monkeypatch.setattr(registering, "register_pair", register)
@@ -106,6 +109,16 @@ def test_a_loop_that_does_not_close_gets_further_links(
     # With every date that one of the loop was not yet linked with, but no more than are near.
     assert further and all({1, 2} & set(ends) for ends in further)
     assert all(found.results[ends].is_placed != (0 in ends) for ends in further)
+
+
+def test_a_date_whose_links_are_imprecise_gets_further_ones(matching: Make) -> None:
+    sound = matching(8)
+    sound.from_hub(0)
+    found = matching(8, imprecise=((0, 3), (3, 4)))
+    found.from_hub(0)
+    further = set(found.results) - set(sound.results)
+    # Of the three next in time, it was linked with 4 already.
+    assert further == {(2, 3), (1, 3)}
 
 
 def test_what_is_refused_where_the_hub_has_it_is_searched_for(matching: Make) -> None:

@@ -18,12 +18,15 @@ from scipy.special import chdtri  # scipy.stats takes 0.4 s to import
 
 from ..geometry.judging import LOG10_SIGNIFICANCE
 from ..rasters.reading import Mask
-from .frame import PARAMETERS, SHIFT_PX, FloatArray, SeriesFrame
+from .frame import PARAMETERS, SHIFT_PX, FloatArray, SeriesFrame, sigma_px
+
+# How far dates may be from each other.
+_GOAL_PX = 0.3
 
 # What links scatter by beside their own covariance, per parameter, in pixels: seasons, shadows and
 # tides displace all points alike. It is found from the misclosures, between what the best links
-# leave (suite series) and the goal for dates that are good; a network that needs more is wrong.
-SCATTER_RANGE_PX = (0.03, 0.3)
+# leave (suite series) and the goal; a network that needs more is wrong.
+SCATTER_RANGE_PX = (0.03, _GOAL_PX)
 
 # A link that the others control by less than this is not tested.
 _LEAST_REDUNDANCY = 0.01
@@ -98,6 +101,16 @@ class Adjustment:
     def reached(self) -> Mask:
         """Which dates the network reaches, shape (n,)."""
         return np.asarray(np.isfinite(self.displacements).all(axis=1))
+
+    @property
+    def imprecise(self) -> Mask:
+        """Which dates may differ from others of the kind by more than the goal, shape (n,).
+
+        By chance once in a thousand times: the variance of their difference, of each axis, is that
+        of one date, of both axes.
+        """
+        sigmas = np.array([sigma_px(covariance) for covariance in self.covariances])
+        return np.asarray(sigmas * np.sqrt(chdtri(2, 10**LOG10_SIGNIFICANCE)) > _GOAL_PX)
 
 
 def adjust(

@@ -281,11 +281,15 @@ class Matching:
         return pairs
 
     def _further(self, dates: Sequence[int], hub: int) -> list[tuple[int, int]]:
-        """Return further pairs of dates whose links contradict others: they show which is wrong."""
+        """Return further pairs of dates that are not well known.
+
+        Their links contradict others, so that further ones show which is wrong, or are imprecise.
+        """
         links = self.links
         found = adjust(self.frame, links, len(self.dates), hub, is_free=False)
         closures = triplet_closures(self.frame, links, found.scatter_px)
-        doubtful = {date for one in closures if not one.is_closed for date in one.dates}
+        doubtful = set(np.flatnonzero(found.imprecise).tolist())
+        doubtful |= {date for one in closures if not one.is_closed for date in one.dates}
         for link, is_kept in zip(links, found.kept, strict=True):
             doubtful |= set() if is_kept else {link.first, link.second}
         return [
