@@ -17,11 +17,13 @@ import numpy as np
 
 from groundtie.errors import GroundTieError
 from groundtie.matching.parts import LEAST_EXCESS
+from groundtie.matching.survey import Survey
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
     BEYOND_DEVIATIONS,
     DRAWN_REST_HEIGHT,
+    LEAST_EXCESS_OF_COPIES,
     RIVAL_HEIGHT,
     WEAK_COPY_HEIGHT,
     WEAK_HEIGHT,
@@ -55,14 +57,23 @@ class Statistic:
     is_refused_above: bool = True
 
 
-def _excess(is_weak: bool) -> Callable[[RegistrationEvidence], float]:
-    def value(evidence: RegistrationEvidence) -> float:
-        survey = evidence.survey
-        if survey is None or survey.is_weakly_confirmed != is_weak or survey.highest_part is None:
-            return math.nan
-        return survey.highest_part.excess / survey.least_excess
+def _excess(survey: Survey | None) -> float:
+    part = None if survey is None else survey.highest_part
+    return math.nan if part is None else part.excess
 
-    return value
+
+def _excess_of_all(evidence: RegistrationEvidence) -> float:
+    return _excess(evidence.survey)
+
+
+def _excess_of_rest(evidence: RegistrationEvidence) -> float:
+    rest = evidence.rest
+    return math.nan if rest is None or rest.is_explained else _excess(rest.survey)
+
+
+def _excess_of_copies(evidence: RegistrationEvidence) -> float:
+    rest = evidence.rest
+    return _excess(rest.survey) if rest is not None and rest.is_explained else math.nan
 
 
 def _of_survey(name: str) -> Callable[[RegistrationEvidence], float]:
@@ -108,10 +119,11 @@ def _elsewhere(evidence: RegistrationEvidence) -> float:
 
 
 STATISTICS = (
-    Statistic("part elsewhere: excess over its limit", 1.0, _excess(False)),
-    Statistic("part elsewhere: excess over its limit where few confirm", 1.0, _excess(True)),
+    Statistic("part elsewhere: excess", LEAST_EXCESS, _excess_of_all),
     Statistic("second place: share of the height", RIVAL_HEIGHT, _rival),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),
+    Statistic("pixel-locked content: excess", LEAST_EXCESS, _excess_of_rest),
+    Statistic("pixel-locked content: excess, copies", LEAST_EXCESS_OF_COPIES, _excess_of_copies),
     Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),
     Statistic("pixel-locked content: height, drawn", DRAWN_REST_HEIGHT, _drawn_height, False),
     Statistic("pixel-locked content: height of copies", WEAK_COPY_HEIGHT, _copy_height, False),

@@ -1,20 +1,12 @@
-"""Parts are found by what rectangles of chips show together, not by single peaks."""
+"""Parts are found by what chips show together, not by single peaks."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from raster_files import utm_grid
 
-from groundtie.matching.parts import (
-    LEAST_EXCESS,
-    excess_if_weak,
-    find_parts,
-    highest_part,
-)
-from groundtie.matching.survey import Survey
+from groundtie.matching.parts import LEAST_EXCESS, find_parts, highest_part
 
 RADIUS = 24
 COLS, ROWS = 7, 6
@@ -34,13 +26,18 @@ def raised(surfaces: np.ndarray, chips: np.ndarray, shift: tuple[int, int], by: 
     surfaces[np.flatnonzero(chips), RADIUS + shift[1], RADIUS + shift[0]] += by
 
 
+def highest_of_noise() -> float:
+    """Return how high noise is within 2 px on average: the highest of 13."""
+    return float(np.random.default_rng(1).normal(size=(10_000, 13)).max(axis=1).mean())
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_noise_has_no_part(seed: int) -> None:
     assert find_parts(GRID, CENTRES, noise(seed)) == []
 
 
 @pytest.mark.parametrize(
-    ("lower", "left", "where"), [(3, 7, "lower"), (0, 3, "left"), (3, 3, "lower left")]
+    ("lower", "left", "where"), [(3, 7, "lower"), (0, 3, "left"), (2, 4, "lower left")]
 )
 def test_a_part_is_found_though_no_chip_of_it_stands_out(lower: int, left: int, where: str) -> None:
     """Each chip is raised by less than noise is high somewhere; together they are evident."""
@@ -53,10 +50,12 @@ def test_a_part_is_found_though_no_chip_of_it_stands_out(lower: int, left: int, 
     assert part.shift_px == (9.0, -6.0)
     assert part.distance_px == pytest.approx(np.hypot(9, 6))
     assert part.where == where
-    wrong = set(part.members) ^ set(np.flatnonzero(inside).tolist())
-    assert len(wrong) <= 0.15 * inside.sum() + 1
-    # The sum of n surfaces, over the square root of n, is as high as one by the square root of n.
-    assert part.height == pytest.approx(by * np.sqrt(inside.sum()), abs=2.5)
+    members = set(np.flatnonzero(inside).tolist())
+    assert len(set(part.members) - members) <= 1
+    # One chip in six has noise where the model has it that leaves it less than half the mean.
+    assert len(members - set(part.members)) <= inside.sum() / 3
+    # The sum of n chips, over the square root of n, is as high as one by the square root of n.
+    assert part.excess == pytest.approx((by - highest_of_noise()) * np.sqrt(inside.sum()), rel=0.3)
 
 
 def test_two_parts_share_no_chip() -> None:
@@ -100,23 +99,28 @@ def test_chips_may_be_missing() -> None:
     assert find_parts(GRID, CENTRES[:0], surfaces[:0]) == []
 
 
-def test_less_speaks_for_a_part_where_less_speaks_for_the_model() -> None:
+def test_chips_of_a_part_need_not_be_neighbours() -> None:
+    """Tiles of another date lie anywhere: every fifth chip."""
     surfaces = noise()
-    raised(surfaces, np.isin(np.arange(len(CENTRES)), [0, 1, 2, 7, 8, 9]), (9, -6), 4.1)
-    part = highest_part(GRID, CENTRES, surfaces, np.arange(len(CENTRES)))
+    tiles = np.arange(len(CENTRES)) % 5 == 0
+    raised(surfaces, tiles, (9, -6), 6.0)
+    (part,) = find_parts(GRID, CENTRES, surfaces)
+    assert part.shift_px == (9.0, -6.0)
+    assert set(np.flatnonzero(tiles)) <= set(part.members)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_other_set_of_chips_is_higher(seed: int) -> None:
+    """Of all 219 sets of three chips or more of eight, by trying each."""
+    chips = np.arange(8)
+    surfaces = np.minimum(2 * noise(seed)[:8], 7.0)
+    part = highest_part(GRID, CENTRES[:8], surfaces, chips)
+    off = np.hypot(*np.meshgrid(*2 * [np.arange(-RADIUS, RADIUS + 1)]))
+    elsewhere = (off > 4) & (off <= 20)
+    higher = surfaces[:, elsewhere] - surfaces[:, off <= 2].max(axis=1)[:, None]
+    sets = [np.flatnonzero(bits >> chips & 1) for bits in range(256)]
+    highest = max(
+        float(higher[of].sum(axis=0).max() / np.sqrt(len(of))) for of in sets if len(of) >= 3
+    )
     assert part is not None
-    weak = excess_if_weak(len(CENTRES), False)
-    assert weak <= part.excess < LEAST_EXCESS
-    shifts = np.zeros((len(CENTRES), 2))
-    confirmed = Survey(GRID, CENTRES, shifts, surfaces, excess_if_weak=weak)
-    assert confirmed.parts == []
-    shifts[: len(CENTRES) // 2 + 1] = 5.0
-    assert [one.members for one in replace(confirmed, shifts_px=shifts).parts] == [part.members]
-
-
-def test_what_a_weakly_confirmed_part_needs_grows_with_the_chips() -> None:
-    """As the sum of chips that are all one standard deviation higher, over that of noise."""
-    assert excess_if_weak(49, is_masked=False) == excess_if_weak(9, is_masked=True) == 7.0
-    assert excess_if_weak(36, is_masked=False) == 6.0
-    assert excess_if_weak(9, is_masked=False) == 5.0
-    assert excess_if_weak(100, is_masked=False) == 7.0
+    assert part.excess == pytest.approx(highest)

@@ -140,11 +140,14 @@ def test_little_ground_may_be_weakly_similar(kind: str) -> None:
     assert refusing(evidence(GOOD, survey=weak)) == ["second place nearby", "weak similarity"]
 
 
-def test_a_part_of_which_half_confirms_is_layover_not_a_part() -> None:
+def test_parts_are_chips_that_do_not_confirm_wherever_they_lie() -> None:
+    """Every other one of twelve in a row."""
     found = survey(49, part=12)
     surfaces = found.surfaces.copy()
     surfaces[:12:2] = survey(49).surfaces[:12:2]
-    assert refusing(evidence(GOOD, survey=replace(found, surfaces=surfaces))) == []
+    survey_of_tiles = replace(found, surfaces=surfaces)
+    assert refusing(evidence(GOOD, survey=survey_of_tiles)) == ["part elsewhere"]
+    assert survey_of_tiles.parts[0].members == tuple(range(1, 12, 2))
 
 
 def test_without_locked_content_another_place_must_not_match_better() -> None:
@@ -157,6 +160,13 @@ def test_without_locked_content_another_place_must_not_match_better() -> None:
 def test_what_is_drawn_leaves_pieces_that_match(height: float, is_refused: bool) -> None:
     rest = Rest(survey(height=height), is_drawn=True)
     found = evidence(GOOD, survey=survey(), rest=rest)
+    assert refusing(found) == ["pixel-locked content"] * is_refused
+
+
+@pytest.mark.parametrize(("chips", "is_refused"), [(200, True), (190, False)])
+def test_a_quarter_of_the_chips_must_be_left_to_confirm(chips: int, is_refused: bool) -> None:
+    """Few are high by chance; 49 are left."""
+    found = evidence(GOOD, survey=survey(), rest=Rest(survey(49), chips=chips))
     assert refusing(found) == ["pixel-locked content"] * is_refused
 
 

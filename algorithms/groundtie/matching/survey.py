@@ -22,7 +22,6 @@ from .parts import (
     LEAST_EXCESS,
     SAME_PX,
     Part,
-    excess_if_weak,
     find_parts,
     highest_part,
     limited,
@@ -53,8 +52,6 @@ class Survey:
         shape (n, 2 r + 1, 2 r + 1).
     elsewhere_px
         Places farther than this from where the model has all chips are second places.
-    excess_if_weak
-        The excess from which on a part lies elsewhere, if few chips match where the model has them.
     """
 
     grid: Grid
@@ -62,7 +59,6 @@ class Survey:
     shifts_px: FloatArray
     surfaces: Surfaces
     elsewhere_px: float = ELSEWHERE_PX
-    excess_if_weak: float = LEAST_EXCESS
 
     @cached_property
     def mean(self) -> Surface:
@@ -78,11 +74,6 @@ class Survey:
     def confirming(self) -> int:
         """How many chips match where the model has them."""
         return int(self.is_confirming_chip.sum())
-
-    @property
-    def is_weakly_confirmed(self) -> bool:
-        """Whether fewer than two of three chips match where the model has them."""
-        return 3 * self.confirming < 2 * len(self.centres)
 
     @property
     def comparable(self) -> int:
@@ -118,13 +109,8 @@ class Survey:
 
     @cached_property
     def parts(self) -> Sequence[Part]:
-        """Neighbouring chips that together match elsewhere, the most evident first."""
-        return find_parts(self.grid, self.centres, self.surfaces, self.least_excess)
-
-    @property
-    def least_excess(self) -> float:
-        """The excess from which on a part lies elsewhere."""
-        return self.excess_if_weak if self.is_weakly_confirmed else LEAST_EXCESS
+        """Chips that together match elsewhere, the most evident first."""
+        return find_parts(self.grid, self.centres, self.surfaces)
 
     @property
     def excess(self) -> float:
@@ -182,8 +168,7 @@ def survey_model(
     kept, surfaces = seen.match_forward(model, places, SURVEY_RADIUS_PX, context)
     surfaces = _of_overlaps(surfaces)
     shifts = np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
-    weak = excess_if_weak(len(places.centres), without is not None)
-    return Survey(places.grid, kept, shifts, surfaces, elsewhere_px, weak)
+    return Survey(places.grid, kept, shifts, surfaces, elsewhere_px)
 
 
 def _of_overlaps(surfaces: Surfaces) -> Surfaces:

@@ -26,8 +26,7 @@ def summary(survey: Survey) -> list[dict[str, Any]]:
             "shift_px": part.shift_px,
             "chips": part.chips,
             "confirming": confirming(survey, part),
-            "height": part.height,
-            "model_height": part.model_height,
+            "excess": part.excess,
         }
         for part in survey.parts
     ]
@@ -80,11 +79,11 @@ def confirming(survey: Survey, part: Part) -> int:
 
 
 def _in_words(part: Part, survey: Survey) -> str:
-    """Return a part as "upper left: 9 neighbouring chips lie 10.3 px off (10.0 m east, …)"."""
+    """Return a part as "upper left: 9 chips lie 10.3 px off (10.0 m east, …)"."""
     origin, end = survey.grid.pixel_to_map(np.array([(0.0, 0.0), part.shift_px]))
     direction = move_in_words(end - origin, survey.grid)
     return (
-        f"{part.where}: {part.chips} neighbouring chips lie {part.distance_px:.1f} px off"
+        f"{part.where}: {part.chips} chips lie {part.distance_px:.1f} px off"
         f"{f' ({direction})' if direction else ''}; {confirming(survey, part)} of them "
         "match where the transform has them"
     )

@@ -24,15 +24,16 @@ WEAK_REST_HEIGHT = 2.5
 
 # Of what is drawn over the images, soft rims and pieces in faint colours remain, too. Measured by
 # the suites margins and attacks: over ground that lies elsewhere, up to 2.2 in 55 pairs and 5.2 in
-# another; one ground in other colours leaves 10 to 23.
+# another, and up to 7.7 of clouds in other colours; one ground in other colours leaves 10 to 23.
 DRAWN_REST_HEIGHT = 8.0
 
-# Copies and one camera's views leave little. Where a quarter of the chips have anything left, it
-# must be so high: right transforms from 1.66 on; beneath clouds and snow up to 1.5, but for one at
-# 1.8. Plain copies leave something of an eighth of the chips at most, clouds of 0.3 and more. Where
-# edges are sharp and half of the chips are left, it must be as high as of other content: right ones
-# from 2.53 on, clouds, snow and a reference that was blended in up to 2.2 (suites margins
-# and attacks).
+# Of all this, a quarter of the chips must be left: of right transforms nine of ten are, of noise
+# that two radar images share 2 of 49. Copies and one camera's views leave little; where as many
+# have anything left, it must be so high: right transforms from 1.66 on; beneath clouds and snow up
+# to 1.5, but for one at 1.8. Plain copies leave something of an eighth of the chips at most, clouds
+# of 0.3 and more. Where edges are sharp and half of the chips are left, it must be as high as of
+# other content: right ones from 2.53 on, clouds, snow and a reference that was blended in up to 2.2
+# (suites margins and attacks).
 WEAK_COPY_HEIGHT = 1.6
 _LEAST_CHIPS, _MANY_CHIPS = 0.25, 0.5
 
@@ -40,6 +41,11 @@ _LEAST_CHIPS, _MANY_CHIPS = 0.25, 0.5
 # standard deviations of its surfaces, if it is weak at the transform: right ones up to 4.3; ground
 # that shows through copies, clouds and labels from 6.1 on (suites margins and attacks).
 BEYOND_DEVIATIONS = 5.0
+
+# What is left of one camera's views are tall buildings, whose layover differs alike: their parts
+# must be so much higher elsewhere. Right ones up to 10.3, wrong ones from 10.5 on (suites real and
+# attacks).
+LEAST_EXCESS_OF_COPIES = 10.4
 
 
 def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
@@ -72,13 +78,17 @@ def _weak(evidence: RegistrationEvidence) -> str | None:
     )
 
 
+def _has_few_chips(rest: Rest) -> bool:
+    return rest.survey.comparable < _LEAST_CHIPS * rest.chips
+
+
 def _has_many_chips(left: Survey, rest: Rest) -> bool:
     return left.comparable >= _MANY_CHIPS * rest.chips
 
 
 def least_height_of_copies(rest: Rest) -> float:
     """Return how high what a mask leaves of copies must be; -∞ where it is too little."""
-    if rest.survey.comparable < _LEAST_CHIPS * rest.chips:
+    if _has_few_chips(rest):
         return -math.inf
     is_sharp = rest.has_sharp_edges and _has_many_chips(rest.survey, rest)
     return WEAK_REST_HEIGHT if is_sharp else WEAK_COPY_HEIGHT
@@ -96,6 +106,11 @@ def deviations_elsewhere(rest: Rest) -> float:
     return left.rival_deviations if is_elsewhere else 0.0
 
 
+def _has_part(rest: Rest) -> bool:
+    least = LEAST_EXCESS_OF_COPIES if rest.is_explained else LEAST_EXCESS
+    return any(part.excess >= least for part in rest.survey.parts)
+
+
 def _locked(evidence: RegistrationEvidence) -> str | None:
     """Ask of the rest what is asked of all; of copies and one camera's views little is left."""
     rest = evidence.rest
@@ -107,8 +122,8 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
         is_unconfirmed = is_nothing or deviations_elsewhere(rest) >= BEYOND_DEVIATIONS
     else:
         least = DRAWN_REST_HEIGHT if rest.is_drawn else WEAK_REST_HEIGHT
-        is_unconfirmed = survey.height < least or _has_rival(survey)
-    if not (survey.parts or is_unconfirmed):
+        is_unconfirmed = _has_few_chips(rest) or survey.height < least or _has_rival(survey)
+    if not (_has_part(rest) or is_unconfirmed):
         return None
     return (
         "without what both images show at the same columns and rows, only "
@@ -127,11 +142,9 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "part elsewhere",
         SURVEY,
-        "neighbouring chips together match elsewhere "
-        f"{LEAST_EXCESS:g} standard deviations of noise better than where the transform has them, "
-        "or, if fewer than two of three chips match there, by the square root of their number, "
-        "5 to 7",
-        "[Kulldorff1997]; suites margins and attacks",
+        f"three chips or more together match at one place elsewhere {LEAST_EXCESS:g} standard "
+        "deviations of noise better than where the transform has each",
+        "[Neill2012]; suites margins and attacks",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,
     ),
@@ -157,12 +170,14 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "pixel-locked content",
         SURVEY,
         "both images have the same content at the same columns and rows, such as labels or clouds, "
-        "and without it a part lies elsewhere, a second place matches about as well, or the mean "
-        f"similarity is below {WEAK_REST_HEIGHT:g} standard deviations, or {DRAWN_REST_HEIGHT:g} "
-        "of what is sharper than ground in other colours; of a copy, or one camera's views, below "
-        f"{WEAK_COPY_HEIGHT:g} if a quarter of the chips have anything left, below "
-        f"{WEAK_REST_HEIGHT:g} with sharp edges if half have, or what the reference does not "
-        f"explain of it matches elsewhere, and stands out there by {BEYOND_DEVIATIONS:g}",
+        "and without it less than a quarter of the chips is left, a part lies elsewhere, a second "
+        f"place matches about as well, or the mean similarity is below {WEAK_REST_HEIGHT:g} "
+        f"standard deviations, or {DRAWN_REST_HEIGHT:g} of what is sharper than ground, or lies on "
+        "whole pixels, in other colours; of a copy, or one camera's views, below "
+        f"{WEAK_COPY_HEIGHT:g} if a quarter is left, below {WEAK_REST_HEIGHT:g} with sharp edges "
+        f"if half is, or a part is {LEAST_EXCESS_OF_COPIES:g} higher elsewhere, or what the "
+        "reference does not explain of it matches elsewhere, and stands out there by "
+        f"{BEYOND_DEVIATIONS:g}",
         "suites margins and attacks",
         WITHOUT,
         _locked,
@@ -172,7 +187,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         SURVEY,
         "bands of an image do not coincide, and in one alone chips all over together match "
         f"elsewhere {LEAST_EXCESS:g} standard deviations of noise better",
-        "[Kulldorff1997]; suite margins",
+        "suite margins",
         "give the band that shows the ground, alone in a file",
         _other_ground_in_a_band,
     ),
