@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..context import Context
 from ..geometry.models import Model
 from ..rasters.grid import Grid
+from ..similarity.order_statistics import robust_deviation
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
 from .belief_propagation import Surfaces
@@ -99,8 +100,8 @@ class Survey:
         most of it is 0.
         """
         far = self.mean[self._distance_px > self.elsewhere_px]
-        spread = 1.4826 * float(np.median(np.abs(far - np.median(far))))
-        return self.rival_height / max(spread, max(len(self.surfaces), 1) ** -0.5)
+        least = max(len(self.surfaces), 1) ** -0.5
+        return self.rival_height / max(robust_deviation(far), least)
 
     @property
     def _distance_px(self) -> FloatArray:
@@ -180,7 +181,7 @@ def _of_overlaps(surfaces: Surfaces) -> Surfaces:
     for surface in made:
         known = surface[surface != 0]
         if known.size:
-            surface /= max(1.4826 * float(np.median(np.abs(known - np.median(known)))), 1.0)
+            surface /= max(robust_deviation(known), 1.0)
     return made
 
 

@@ -19,6 +19,7 @@ from ..geometry.limits import SearchLimits
 from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..similarity.correlation import MINIMUM_OVERLAP
+from ..similarity.order_statistics import robust_deviation
 from ..similarity.surface import Surface
 from .pose import Pose, PoseFound
 from .rotation_fields import Template
@@ -245,8 +246,8 @@ class _Search:
 
 
 def _spread(surface: Surface) -> float:
-    """Return the robust standard deviation of a surface."""
-    return max(1.4826 * float(np.median(np.abs(surface - np.median(surface)))), 1e-9)
+    """Return the robust standard deviation of a surface, above zero."""
+    return max(robust_deviation(surface), 1e-9)
 
 
 def _best_first(found: Iterable[PoseFound]) -> list[PoseFound]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask
-from .order_statistics import median
+from .order_statistics import DEVIATION_PER_MAD, median
 from .orientation import compress
 
 # Steps are means along about so many pixels, as high as the windows that are looked at, of which
@@ -100,7 +100,7 @@ def _steps(values: FloatImage, valid: Mask) -> FloatImage:
         deviation = np.sqrt(np.maximum(variance, np.finfo(np.float32).eps) / count)
         steps = np.where(count >= _LEAST_KNOWN * len(known), mean / deviation, 0)
         # Ground varies along rows alike, so that its steps are many deviations high.
-        spread = max(1.4826 * float(median(np.abs(steps))), 1.0)
+        spread = max(DEVIATION_PER_MAD * float(median(np.abs(steps))), 1.0)
         found.append(np.clip(steps / spread, -_MOST_DEVIATIONS, _MOST_DEVIATIONS))
     return np.array(found, np.float32)
 

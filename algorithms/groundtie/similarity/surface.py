@@ -18,7 +18,7 @@ from ..rasters.patch import Patch
 from .correlation import MINIMUM_OVERLAP, overlap_share
 from .description import BYTES_A_PIXEL, Description
 from .measures import MEASURES
-from .order_statistics import upper_median
+from .order_statistics import DEVIATION_PER_MAD, upper_median
 from .stacks import each, flat
 
 Surface = NDArray[np.float32]
@@ -67,7 +67,7 @@ class SimilaritySettings:
 def normalise(surface: Surface) -> Surface:
     """Return surfaces, (…, ny, nx), in robust standard deviations from their medians (by MAD)."""
     centred = surface - upper_median(flat(surface))[..., None, None]
-    spread = np.float32(1.4826) * upper_median(flat(np.abs(centred)))[..., None, None]
+    spread = np.float32(DEVIATION_PER_MAD) * upper_median(flat(np.abs(centred)))[..., None, None]
     return (centred / np.where(spread > _FLAT, spread, np.inf)).astype(np.float32)
 
 

@@ -14,6 +14,7 @@ from ..errors import ParameterError
 from ..geometry.limits import SearchLimits
 from ..pose.pose import Pose, PoseFound
 from ..rasters.patch import Patch
+from ..similarity.order_statistics import robust_deviation
 from ..similarity.surface import SimilaritySettings
 from .objective import BinnedPair, bin_pair
 
@@ -250,5 +251,4 @@ def _background(values: Sequence[float]) -> tuple[float, float]:
     """Return median and robust standard deviation."""
     if not values:
         return 0.0, 0.0
-    level = float(np.median(values))
-    return level, 1.4826 * float(np.median(np.abs(np.subtract(values, level))))
+    return float(np.median(values)), robust_deviation(np.asarray(values))
