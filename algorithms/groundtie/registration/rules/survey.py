@@ -52,7 +52,7 @@ def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
     if evidence.survey is None or not evidence.survey.parts:
         return None
     part = evidence.survey.parts[0]
-    return f"{part.chips} chips in the {part.where} match {part.distance_px:.1f} px off"
+    return f"{part.chips} chips around the {part.where} match {part.distance_px:.1f} px off"
 
 
 def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
