@@ -237,26 +237,15 @@ def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
 
 
 @pytest.mark.parametrize(
-    ("sharpness", "is_exact", "related", "is_drawn"),
-    [
-        (2.4, False, 0.0, False),
-        (2.6, False, 0.0, True),
-        (2.4, True, 0.0, True),
-        (2.6, True, 0.8, False),
-    ],
+    ("sharpness", "related", "is_drawn"), [(2.4, 0.0, False), (2.6, 0.0, True), (2.6, 0.8, False)]
 )
-def test_sharp_or_exact_edges_are_drawn_but_those_of_copies_in_other_colours(
-    tmp_path: Path,
-    context: Context,
-    sharpness: float,
-    is_exact: bool,
-    related: float,
-    is_drawn: bool,
+def test_sharp_edges_are_drawn_but_those_of_copies_in_other_colours(
+    tmp_path: Path, context: Context, sharpness: float, related: float, is_drawn: bool
 ) -> None:
     locked = looked_at(tmp_path, sensed(1), sensed(2, place=9), context)
     assert locked is not None
     sameness = replace(locked.sameness, sharpness=sharpness, related=related, ground=0.0)
-    assert replace(locked, sameness=sameness, is_exact=is_exact).is_drawn == is_drawn
+    assert replace(locked, sameness=sameness).is_drawn == is_drawn
 
 
 def test_a_copy_is_explained_of_one_kind_of_sensor(tmp_path: Path, context: Context) -> None:

@@ -108,13 +108,9 @@ class LockedContent:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether its edges are sharp, or lie so exactly, and it is no copy or view."""
-        is_explained = self.is_explained or self.sameness.is_copy_in_other_colours
-        return self._has_exact_edges and not is_explained
-
-    @property
-    def _has_exact_edges(self) -> bool:
-        return self.sameness.has_sharp_edges or self.is_exact
+        """Whether its edges are sharper than those of one ground, and it is no copy or view."""
+        same = self.sameness
+        return same.has_sharp_edges and not (self.is_explained or same.is_copy_in_other_colours)
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
@@ -130,7 +126,7 @@ class LockedContent:
         same = Windows.of(*patches).same
         if not self.is_explained:
             same = covered(same, WINDOW_PX)
-            if self._has_exact_edges:
+            if self.sameness.has_sharp_edges or self.is_exact:
                 same |= covered(drawn_edges(*patches), _EDGE_SURROUNDINGS_PX)
             if self.sameness.has_seams:
                 same |= covered(seams(*patches), _SEAM_SURROUNDINGS_PX)
