@@ -43,7 +43,7 @@ def test_a_part_is_found_though_no_chip_of_it_stands_out(lower: int, left: int, 
     """Each chip is raised by less than noise is high somewhere; together they are evident."""
     surfaces = noise()
     inside = (CENTRES[:, 1] // 50 >= lower) & (CENTRES[:, 0] // 50 < left)
-    by = 4.0
+    by = 4.3
     assert by < surfaces.max()
     raised(surfaces, inside, (9, -6), by)
     (part,) = find_parts(GRID, CENTRES, surfaces)

@@ -28,10 +28,11 @@ _FEWEST_CHIPS = 3
 _MOST_OF_ONE = 7.0
 
 # How much higher the chips of a part are elsewhere than where the model has them: the sum over the
-# square root of their number, in standard deviations of noise. Two of three reach 14 / √3 = 8.08,
-# however high they are. Suite margins (--seeds 2 --sample 120): of 85 right transforms 6 are
-# higher, five of which other rules refuse, too; of 40 wrong ones 13.
-LEAST_EXCESS = 8.1
+# square root of their number, in standard deviations of noise. Two of three reach 14 / √3 = 8.1,
+# however high they are, and 9.0 with a third that is 1.6 higher by chance, as some of 81 are. Suite
+# margins (--seeds 2 --sample 120): of 85 right transforms six are higher, five of which other rules
+# refuse, too; of 40 wrong ones 12.
+LEAST_EXCESS = 9.0
 
 _ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
 
