@@ -44,9 +44,9 @@ _LEAST_CHIPS, _MANY_CHIPS = 0.25, 0.5
 BEYOND_DEVIATIONS = 5.0
 
 # What is left of one camera's views are tall buildings, whose layover differs alike: their parts
-# must be so much higher elsewhere. Right ones up to 10.5, wrong ones 10.5 and from 11.6 on (suites
-# real and attacks).
-LEAST_EXCESS_OF_COPIES = 11.0
+# must be so much higher elsewhere. Right ones up to 11.96, wrong ones from 12.5 on (suites margins
+# and attacks).
+LEAST_EXCESS_OF_COPIES = 12.0
 
 
 def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
