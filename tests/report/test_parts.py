@@ -30,7 +30,7 @@ def test_numbers_of_a_part() -> None:
     assert part["shift_px"] == (9.0, -5.0)
     assert part["distance_px"] == pytest.approx(np.hypot(9, 5))
     assert (part["chips"], part["confirming"]) == (14, 0)
-    assert part["excess"] == pytest.approx(7 * np.sqrt(14))
+    assert part["excess"] == pytest.approx(7 * np.sqrt(13))
 
 
 def test_chips_that_fell_anywhere_are_no_part() -> None:

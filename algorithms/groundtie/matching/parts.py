@@ -27,12 +27,11 @@ ELSEWHERE_PX, _FARTHEST_PX = 2 * SAME_PX, 20.0
 _FEWEST_CHIPS = 3
 _MOST_OF_ONE = 7.0
 
-# How much higher the chips of a part are elsewhere than where the model has them: the sum over the
-# square root of their number, in standard deviations of noise. Two of three reach 14 / √3 = 8.1,
-# however high they are, and 9.0 with a third that is 1.6 higher by chance, as some of 81 are. Suite
-# margins (--seeds 2 --sample 120): of 85 right transforms six are higher, five of which other rules
-# refuse, too; of 40 wrong ones 12.
-LEAST_EXCESS = 9.0
+# The highest chip of a part names the place where it lies, and the others confirm it. How much
+# higher they are there than where the model has them is their sum over the square root of their
+# number, in standard deviations of noise. It must be more than one chip may count for: two copies
+# of one chip and a third by chance, 1.6 high as some of 81 are, leave 8.6 / √2 = 6.1.
+LEAST_EXCESS = _MOST_OF_ONE
 
 _ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
 
@@ -115,11 +114,11 @@ def highest_part(
     is_far = (distance > ELSEWHERE_PX) & (distance <= _FARTHEST_PX)
     shown = limited(surfaces[which]).astype(float).reshape(len(which), -1)
     higher = shown[:, is_far] - shown[:, distance <= SAME_PX].max(axis=1, keepdims=True)
-    sums = np.sort(higher, axis=0)[::-1].cumsum(axis=0)
-    excess = sums / np.sqrt(np.arange(1, len(which) + 1))[:, None]
-    excess[: _FEWEST_CHIPS - 1] = -np.inf
+    confirming = np.sort(higher, axis=0)[-2::-1].cumsum(axis=0)
+    excess = confirming / np.sqrt(np.arange(1, len(which)))[:, None]
+    excess[: _FEWEST_CHIPS - 2] = -np.inf
     last, place = np.unravel_index(excess.argmax(), excess.shape)
-    members = which[np.argsort(-higher[:, place])[: last + 1]]
+    members = which[np.argsort(-higher[:, place])[: last + 2]]
     x, y = shifts[is_far][place]
     return Part(
         _where(grid, centres[members].mean(axis=0)),
