@@ -22,14 +22,11 @@ from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
     BEYOND_DEVIATIONS,
-    DRAWN_REST_HEIGHT,
-    LEAST_EXCESS_OF_COPIES,
     RIVAL_HEIGHT,
-    WEAK_COPY_HEIGHT,
     WEAK_HEIGHT,
     WEAK_REST_HEIGHT,
     deviations_elsewhere,
-    least_height_of_copies,
+    has_few_chips,
 )
 from groundtie.registration.specification import COREGISTER
 from groundtie.registration.verdict import refusals
@@ -71,11 +68,6 @@ def _excess_of_rest(evidence: RegistrationEvidence) -> float:
     return math.nan if rest is None or rest.is_explained else _excess(rest.survey)
 
 
-def _excess_of_copies(evidence: RegistrationEvidence) -> float:
-    rest = evidence.rest
-    return _excess(rest.survey) if rest is not None and rest.is_explained else math.nan
-
-
 def _of_survey(name: str) -> Callable[[RegistrationEvidence], float]:
     def value(evidence: RegistrationEvidence) -> float:
         return math.nan if evidence.survey is None else float(getattr(evidence.survey, name))
@@ -90,21 +82,10 @@ def _rival(evidence: RegistrationEvidence) -> float:
 
 def _rest_height(evidence: RegistrationEvidence) -> float:
     rest = evidence.rest
-    if rest is None or rest.is_explained or rest.is_drawn:
+    left = None if rest is None else rest.survey
+    if rest is None or left is None or (rest.is_explained and has_few_chips(left, rest)):
         return math.nan
-    return rest.survey.height
-
-
-def _drawn_height(evidence: RegistrationEvidence) -> float:
-    rest = evidence.rest
-    return rest.survey.height if rest is not None and rest.is_drawn else math.nan
-
-
-def _copy_height(evidence: RegistrationEvidence) -> float:
-    rest = evidence.rest
-    if rest is None or not rest.is_explained or least_height_of_copies(rest) < 0:
-        return math.nan
-    return rest.survey.height
+    return left.height
 
 
 def _in_bands(evidence: RegistrationEvidence) -> float:
@@ -123,10 +104,7 @@ STATISTICS = (
     Statistic("second place: share of the height", RIVAL_HEIGHT, _rival),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),
     Statistic("pixel-locked content: excess", LEAST_EXCESS, _excess_of_rest),
-    Statistic("pixel-locked content: excess, copies", LEAST_EXCESS_OF_COPIES, _excess_of_copies),
     Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),
-    Statistic("pixel-locked content: height, drawn", DRAWN_REST_HEIGHT, _drawn_height, False),
-    Statistic("pixel-locked content: height of copies", WEAK_COPY_HEIGHT, _copy_height, False),
     Statistic("pixel-locked content: copies", BEYOND_DEVIATIONS, _elsewhere),
     Statistic("band elsewhere: excess", LEAST_EXCESS, _in_bands),
 )

@@ -91,3 +91,22 @@ def test_what_a_radar_and_a_camera_show_alike_is_no_view_of_one_sensor(
     views = noisy(place(), 1), noisy(place(), 2)
     rest = rest_of(tmp_path, *views, context, sensors=Sensors.DIFFERENT)
     assert rest is not None and not rest.is_explained and rest.beyond is None
+    assert rest.survey is not None
+
+
+def test_of_a_view_whose_edges_are_no_sharper_than_ground_nothing_more_is_asked(
+    tmp_path: Path, context: Context
+) -> None:
+    """Half a pixel apart, edges do not coincide sharply."""
+    other = (place() + place((1, 0))) / 2
+    rest = rest_of(tmp_path, noisy(place(), 1), noisy(other, 2), context)
+    assert rest is not None and rest.is_explained and rest.survey is None
+
+
+def test_what_is_drawn_is_not_looked_behind(tmp_path: Path, context: Context) -> None:
+    """The same lines over two places."""
+    images = [noisy(place(), 1), noisy(place()[::-1], 2)]
+    for values in images:
+        values[20::55] = values[:, 30::70] = 5.0
+    rest = rest_of(tmp_path, *images, context)
+    assert rest is not None and rest.is_drawn and rest.survey is None

@@ -21,7 +21,8 @@ class Rest:
     Parameters
     ----------
     survey
-        What they show.
+        What they show; None: it is not asked, as of content that is drawn, or of copies and views
+        whose edges do not coincide sharply.
     is_explained
         Whether such content needs no confirmation (see `LockedContent`).
     beyond
@@ -31,16 +32,13 @@ class Rest:
         How many chips there are; of some too little may be left.
     is_drawn
         Whether such content is drawn over the images (see `LockedContent`).
-    has_sharp_edges
-        Whether edges coincide more sharply than those of one ground.
     """
 
-    survey: Survey
+    survey: Survey | None = None
     is_explained: bool = False
     beyond: Survey | None = None
     chips: int = 0
     is_drawn: bool = False
-    has_sharp_edges: bool = False
 
 
 def survey_rest(
@@ -75,16 +73,19 @@ def survey_rest(
     locked = find_locked_content(pair, transform, asked, sensors, exact_px, context.quiet())
     if locked is None or not locked.is_evident:
         return None
+    rest = Rest(None, locked.is_explained, None, len(places.centres), locked.is_drawn)
+    if locked.is_drawn:
+        return rest
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())
-    # Another input leaves something else of the reference.
-    once = context.once()
-    survey = survey_model(fused, transform.model, once, locked, places, elsewhere_px)
-    chips, is_sharp = len(places.centres), locked.sameness.has_sharp_edges
-    rest = Rest(survey, locked.is_explained, None, chips, locked.is_drawn, is_sharp)
-    if not (locked.is_explained and locked.is_whole):
-        return rest
-    # A copy may be blended into other ground, of which the same windows are no part.
-    left = replace(fused, left_of=unexplained)
-    beyond = survey_model(left, locked.model, context, None, places, elsewhere_px)
-    return replace(rest, beyond=beyond)
+    if not locked.is_explained or locked.sameness.has_sharp_edges:
+        # Another input leaves something else of the reference.
+        once = context.once()
+        left = survey_model(fused, transform.model, once, locked, places, elsewhere_px)
+        rest = replace(rest, survey=left)
+    if locked.is_explained and locked.is_whole:
+        # A copy may be blended into other ground, of which the same windows are no part.
+        other = replace(fused, left_of=unexplained)
+        left = survey_model(other, locked.model, context, None, places, elsewhere_px)
+        rest = replace(rest, beyond=left)
+    return rest
