@@ -73,19 +73,17 @@ def survey_rest(
     locked = find_locked_content(pair, transform, asked, sensors, exact_px, context.quiet())
     if locked is None or not locked.is_evident:
         return None
-    rest = Rest(None, locked.is_explained, None, len(places.centres), locked.is_drawn)
     if locked.is_drawn:
-        return rest
+        return Rest(is_drawn=True)
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())
+    left = beyond = None
     if not locked.is_explained or locked.sameness.has_sharp_edges:
         # Another input leaves something else of the reference.
         once = context.once()
         left = survey_model(fused, transform.model, once, locked, places, elsewhere_px)
-        rest = replace(rest, survey=left)
     if locked.is_explained and locked.is_whole:
         # A copy may be blended into other ground, of which the same windows are no part.
         other = replace(fused, left_of=unexplained)
-        left = survey_model(other, locked.model, context, None, places, elsewhere_px)
-        rest = replace(rest, beyond=left)
-    return rest
+        beyond = survey_model(other, locked.model, context, None, places, elsewhere_px)
+    return Rest(left, locked.is_explained, beyond, len(places.centres))

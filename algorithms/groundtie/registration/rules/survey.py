@@ -93,7 +93,7 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
     if rest is None:
         return None
     if rest.is_drawn:
-        return "both images show the same edges at the same columns and rows, too sharp for ground"
+        return "both images show the same edges at the same columns and rows, sharper than ground's"
     if deviations_elsewhere(rest) >= BEYOND_DEVIATIONS:
         return "what the reference does not explain of the input matches elsewhere"
     left = rest.survey
