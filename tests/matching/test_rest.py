@@ -94,6 +94,17 @@ def test_what_a_radar_and_a_camera_show_alike_is_no_view_of_one_sensor(
     assert rest.survey is not None
 
 
+def test_beneath_one_deck_of_clouds_the_ground_is_asked(tmp_path: Path, context: Context) -> None:
+    """Most of both images is the same, with sharp rims, over two places."""
+    clouds = texture(SIDE, SIDE, 30) > -1.2
+    images = [
+        np.where(clouds, 4 + 0.5 * place(), ground)
+        for ground in (noisy(place(), 1), noisy(place()[::-1], 2))
+    ]
+    rest = rest_of(tmp_path, *images, context)
+    assert rest is not None and rest.is_explained and rest.survey is not None
+
+
 def test_of_a_view_whose_edges_are_no_sharper_than_ground_nothing_more_is_asked(
     tmp_path: Path, context: Context
 ) -> None:

@@ -21,8 +21,8 @@ class Rest:
     Parameters
     ----------
     survey
-        What they show; None: it is not asked, as of content that is drawn, or of copies and views
-        whose edges do not coincide sharply.
+        What they show; None: it is not asked, as of content that is drawn, and of views that are
+        the same nearly everywhere, or whose edges do not coincide sharply.
     is_explained
         Whether such content needs no confirmation (see `LockedContent`).
     beyond
@@ -78,7 +78,8 @@ def survey_rest(
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())
     left = beyond = None
-    if not locked.is_explained or locked.sameness.has_sharp_edges:
+    same = locked.sameness
+    if not locked.is_explained or (same.has_sharp_edges and not same.is_same_view):
         # Another input leaves something else of the reference.
         once = context.once()
         left = survey_model(fused, transform.model, once, locked, places, elsewhere_px)

@@ -127,6 +127,11 @@ class Sameness:
         return share >= _COPY_SHARE and not self.is_finer_than_ground
 
     @property
+    def is_same_view(self) -> bool:
+        """Whether nearly everything is the same, and edges no sharper than in a camera's views."""
+        return self.is_copy and self.sharpness < VIEW_SHARPNESS
+
+    @property
     def is_view(self) -> bool:
         """Whether both may be one camera's views of one ground.
 
