@@ -155,6 +155,11 @@ def test_without_locked_content_the_place_must_match() -> None:
     assert refusing(found) == ["pixel-locked content"]
 
 
+def test_without_locked_content_another_place_must_not_match_better() -> None:
+    found = evidence(GOOD, survey=survey(), rest=Rest(survey(20, height=4.0, rival=5.0)))
+    assert refusing(found) == ["pixel-locked content"]
+
+
 def test_of_what_is_drawn_nothing_that_is_left_is_evidence() -> None:
     """Soft rims of it match, too."""
     found = evidence(GOOD, survey=survey(), rest=Rest(survey(height=20.0), is_drawn=True))

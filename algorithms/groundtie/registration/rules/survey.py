@@ -84,7 +84,7 @@ def _confirms(left: Survey, rest: Rest) -> bool:
     is_high = left.height >= WEAK_REST_HEIGHT
     if rest.is_explained:
         return is_high or has_few_chips(left, rest)
-    return is_high and not (has_few_chips(left, rest) or left.parts)
+    return is_high and not (has_few_chips(left, rest) or _has_rival(left) or left.parts)
 
 
 def _locked(evidence: RegistrationEvidence) -> str | None:
@@ -145,10 +145,10 @@ SURVEY_RULES: tuple[Rule, ...] = (
         SURVEY,
         "both images have the same content at the same columns and rows, such as labels or clouds, "
         "with edges sharper than those of ground; or without it less than a quarter of the chips "
-        "is left, a part lies elsewhere, or the mean similarity is below "
-        f"{WEAK_REST_HEIGHT:g} standard deviations; of a copy, or one camera's views, below that "
-        "with sharp edges if a quarter is left, or what the reference does not explain of it "
-        f"matches elsewhere, and stands out there by {BEYOND_DEVIATIONS:g}",
+        "is left, a part lies elsewhere, a second place matches about as well, or the mean "
+        f"similarity is below {WEAK_REST_HEIGHT:g} standard deviations; of a copy, or one camera's "
+        "views, below that with sharp edges if a quarter is left, or what the reference does not "
+        f"explain of it matches elsewhere, and stands out there by {BEYOND_DEVIATIONS:g}",
         "suites margins and attacks",
         WITHOUT,
         _locked,
