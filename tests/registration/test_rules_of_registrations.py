@@ -161,8 +161,8 @@ def test_without_locked_content_another_place_must_not_match_better() -> None:
 
 
 def test_of_what_is_drawn_nothing_that_is_left_is_evidence() -> None:
-    """Soft rims of it match, too."""
-    found = evidence(GOOD, survey=survey(), rest=Rest(survey(height=20.0), is_drawn=True))
+    """Soft rims of it match, too: no survey of them is made, however high the whole one is."""
+    found = evidence(GOOD, survey=survey(height=20.0), rest=Rest())
     assert refusing(found) == ["pixel-locked content"]
 
 

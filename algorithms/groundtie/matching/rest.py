@@ -30,15 +30,17 @@ class Rest:
         the transform moves the array by whole pixels; None elsewhere.
     chips
         How many chips there are; of some too little may be left.
-    is_drawn
-        Whether such content is drawn over the images (see `LockedContent`).
     """
 
     survey: Survey | None = None
     is_explained: bool = False
     beyond: Survey | None = None
     chips: int = 0
-    is_drawn: bool = False
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether such content is drawn over the images: unexplained, and nothing is asked."""
+        return self.survey is None and not self.is_explained
 
 
 def survey_rest(
@@ -74,7 +76,7 @@ def survey_rest(
     if locked is None or not locked.is_evident:
         return None
     if locked.is_drawn:
-        return Rest(is_drawn=True)
+        return Rest()
     # What a mask leaves is little: one measure alone would miss most of it.
     fused = replace(matcher, settings=SimilaritySettings())
     left = beyond = None

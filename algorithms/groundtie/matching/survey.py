@@ -115,7 +115,7 @@ class Survey:
 
     @property
     def excess(self) -> float:
-        """How much higher all chips together are elsewhere, as `Part.excess`."""
+        """How much higher all chips together are elsewhere: as `Part.excess`, but of all."""
         alike = replace(self, surfaces=limited(self.surfaces))
         return float(np.sqrt(len(self.surfaces)) * (alike.rival_height - alike.height))
 

@@ -21,10 +21,9 @@ WEAK_HEIGHT = 2.0
 WEAK_REST_HEIGHT = 2.5
 
 # Of all this, a quarter of the chips must be left: of right transforms nine of ten are, of noise
-# that two radar images share 2 of 49. Copies and one camera's views leave as little: where their
-# edges are sharp, as those of clouds and snow of one shape are, and a quarter is left, it must be
-# as high as of other content. Plain copies leave something of an eighth of the chips at most,
-# clouds of 0.3 and more (suites margins and attacks).
+# that two radar images share 2 of 49. Copies and one camera's views may leave less, plain copies at
+# most an eighth of the chips. Where a quarter is left, and edges are sharp, as those of clouds and
+# snow of one shape are, it must be as high as of other content (suites margins and attacks).
 _LEAST_CHIPS = 0.25
 
 # What the reference does not explain of a copy may not stand out elsewhere by so many robust
@@ -88,7 +87,7 @@ def _confirms(left: Survey, rest: Rest) -> bool:
 
 
 def _locked(evidence: RegistrationEvidence) -> str | None:
-    """Ask what is left of what is asked of all; of copies and one camera's views it is little."""
+    """Ask of what is left what is asked of all; of copies and one camera's views it is little."""
     rest = evidence.rest
     if rest is None:
         return None
