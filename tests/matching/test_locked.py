@@ -201,7 +201,7 @@ def test_ground_varies_alike_or_follows_in_other_colours(
     ground: float, related: float, is_ground: bool
 ) -> None:
     """As of a negative, of which nothing varies alike."""
-    assert Sameness(1.0, 0.1, 0.2, ground, 300.0, related).varies_as_ground == is_ground
+    assert Sameness(1.0, 0.1, 0.2, 0.3, ground, related).varies_as_ground == is_ground
 
 
 @pytest.mark.slow
@@ -218,7 +218,8 @@ def test_what_varies_alike_in_two_radar_images_is_no_ground(
     """Each view of a radar has speckle of its own."""
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
     assert locked is not None
-    views = replace(locked.sameness, sharpness=1.5, area=0.4, reduced_area=0.7, ground=0.4)
+    areas = {"area": 0.4, "reduced_area": 0.7, "coarse_area": 0.8}
+    views = replace(locked.sameness, sharpness=1.5, ground=0.4, **areas)
     for sensors in Sensors:
         found = replace(locked, sameness=views, sensors=sensors)
         assert found.is_explained == (sensors is Sensors.CAMERAS)
@@ -230,7 +231,8 @@ def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
     assert locked is not None
     # As of one exposure's bands.
-    views = replace(locked.sameness, sharpness=4.2, area=0.4, reduced_area=0.7, ground=0.4)
+    areas = {"area": 0.4, "reduced_area": 0.7, "coarse_area": 0.8}
+    views = replace(locked.sameness, sharpness=4.2, ground=0.4, **areas)
     assert views.is_view
     assert not replace(views, sharpness=VIEW_SHARPNESS).is_view
     copy = replace(views, area=0.8, reduced_area=0.8, sharpness=VIEW_SHARPNESS)

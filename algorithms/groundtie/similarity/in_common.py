@@ -15,7 +15,6 @@ from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask
 from .sameness import (
-    WINDOW_PX,
     Edges,
     Windows,
     edges_apart_px,
@@ -48,11 +47,12 @@ LEAST_SHARPNESS, VIEW_SHARPNESS = 2.5, 5.0
 _LEAST_AREA = 0.2
 
 # One sensor's views of one ground vary alike where nothing is drawn, too, on images that are so
-# much smaller. Measured as above: 25 % of what is left and more; of different ground 0 to 21 %, of
-# ground that was displaced up to 43 %, which is left to the rules on a second place. Less than a
-# tenth of the area shows nothing. As much may follow in other colours: 24 % of a noisy negative
-# (tests/test_steps.py), up to 1 % of what is drawn over two radars' images of different ground.
-_REDUCTION = 4
+# much smaller, and no less on images reduced once more. Measured as above: 25 % of what is left and
+# more; of different ground 0 to 21 %, of ground that was displaced up to 43 %, which is left to the
+# rules on a second place. Less than a tenth of the area shows nothing. As much may follow in other
+# colours: 24 % of a noisy negative (tests/test_steps.py), up to 1 % of what is drawn over two
+# radars' images of different ground.
+_REDUCTION, _FURTHER = 4, 2
 _GROUND_SHARE = 0.23
 _LEAST_LEFT = 0.1
 
@@ -70,12 +70,11 @@ class Sameness:
         How many times as many edges coincide there within a quarter of a pixel as between a
         quarter and a half, each beyond those at other offsets; at least, as far as the latter are
         known, but by chance with 5 %.
-    area, reduced_area
-        Share of the area that varies alike, in the images and in reduced ones.
+    area, reduced_area, coarse_area
+        Share of the area that varies alike, in the images, in reduced ones, and in those reduced
+        once more.
     ground
-        The latter, of what does not vary alike in the images.
-    windows
-        How many windows of the reduced images do not overlap.
+        That in reduced ones, of what does not vary alike in the images.
     related
         Share of the area where one is half a linear function of the other, in the images or in
         reduced ones, whichever is smaller.
@@ -86,8 +85,8 @@ class Sameness:
     sharpness: float
     area: float
     reduced_area: float
+    coarse_area: float
     ground: float
-    windows: float
     related: float = 0.0
     step_width: float = np.inf
 
@@ -108,12 +107,11 @@ class Sameness:
 
     @property
     def is_finer_than_ground(self) -> bool:
-        """Whether less is the same on reduced images, but by chance with 5 %.
+        """Whether less is the same in coarser pixels.
 
         Ground is no less alike there, where noise has averaged out; noise that both have is.
         """
-        error = np.sqrt(self.area * (1 - self.area) / max(self.windows, 1.0))
-        return bool(self.reduced_area < self.area - STANDARD_ERRORS * error)
+        return self.coarse_area < self.reduced_area
 
     @property
     def is_copy_in_other_colours(self) -> bool:
@@ -123,8 +121,7 @@ class Sameness:
     @property
     def is_copy(self) -> bool:
         """Whether one image is a copy of the other: nearly everything is the same."""
-        share = min(self.area, self.reduced_area)
-        return share >= _COPY_SHARE and not self.is_finer_than_ground
+        return min(self.area, self.reduced_area, self.coarse_area) >= _COPY_SHARE
 
     @property
     def is_same_view(self) -> bool:
@@ -150,7 +147,7 @@ class Sameness:
         return self.has_one_ground or self.related >= _GROUND_SHARE
 
 
-_NO_WINDOWS = np.zeros((3, 3), int)
+_NO_WINDOWS = np.zeros((4, 3), int)
 
 
 @dataclass(frozen=True)
@@ -163,7 +160,8 @@ class Look:
         How many coincide, at each of `_OFFSETS`, shape (k, 2).
     windows
         How many pixels are the same, related, and valid (see `Windows`): of the images, of reduced
-        ones, and of these without what is the same in the images, shape (3, 3).
+        ones, of those reduced once more, and of reduced ones without what is the same in the
+        images, shape (4, 3).
     steps
         See `step_products`.
     """
@@ -175,9 +173,10 @@ class Look:
     @classmethod
     def of(cls, reference: Patch, input: Patch) -> Look:
         whole = Windows.of(reference, input)
-        left = without(reference, whole.same), without(input, whole.same)
-        smaller, rest = _reduced(reference, input), _reduced(*left)
-        counts = np.array([windows.counts for windows in (whole, smaller, rest)])
+        smaller = _reduced(_REDUCTION, reference, input)
+        left = _reduced(_REDUCTION, without(reference, whole.same), without(input, whole.same))
+        pairs = smaller, _reduced(_FURTHER, *smaller), left
+        counts = np.array([whole.counts, *(Windows.of(*pair).counts for pair in pairs)])
         return cls(_count_edges(reference, input), counts, step_products(reference, input))
 
 
@@ -185,16 +184,18 @@ def sameness_of(looks: Sequence[Look]) -> Sameness:
     """Return how much arrays have the same in windows all over them."""
     counts = np.sum([one.edges for one in looks], axis=0)
     sharpness = _sharpness(counts) if looks else 0.0
-    whole, smaller, left = np.sum([one.windows for one in looks], axis=0) if looks else _NO_WINDOWS
-    every = max(float(smaller[2]), 1.0)
-    area, related = (float(count / max(whole[2], 1)) for count in whole[:2])
+    windows = np.sum([one.windows for one in looks], axis=0) if looks else _NO_WINDOWS
+    every = windows[:, 2]
+    area, reduced_area, coarse_area, _ = windows[:, 0] / np.maximum(every, 1)
+    # Of the images and of reduced ones.
+    related = (windows[:, 1] / np.maximum(every, 1))[:2].min()
     return Sameness(
         sharpness,
-        area,
-        reduced_area=float(smaller[0] / every),
-        ground=float(left[0] / max(left[2], _LEAST_LEFT * every)),
-        windows=every / WINDOW_PX**2,
-        related=min(related, float(smaller[1] / every)),
+        float(area),
+        float(reduced_area),
+        float(coarse_area),
+        ground=float(windows[3, 0] / max(every[3], _LEAST_LEFT * every[1], 1.0)),
+        related=float(related),
         step_width=step_width(np.sum([one.steps for one in looks], axis=0)) if looks else np.inf,
     )
 
@@ -225,5 +226,5 @@ def drawn_edges(reference: Patch, input: Patch) -> Mask:
     return drawn
 
 
-def _reduced(reference: Patch, input: Patch) -> Windows:
-    return Windows.of(reduced(reference, _REDUCTION), reduced(input, _REDUCTION))
+def _reduced(factor: int, *patches: Patch) -> list[Patch]:
+    return [reduced(patch, factor) for patch in patches]
