@@ -123,8 +123,11 @@ class LockedContent:
         size = piece.width + 2 * reach, piece.height + 2 * reach
         around = piece.window(-reach, -reach, *size)
         patches = Resampled(self.pair, _to_input(self.pair, self.offset_px)).read(around)
-        same = Windows.of(*patches).same
+        windows = Windows.of(*patches)
+        same = windows.same
         if not self.is_explained:
+            if self.is_exact:
+                same = same | windows.related
             same = covered(same, WINDOW_PX)
             if self.sameness.has_sharp_edges or self.is_exact:
                 same |= covered(drawn_edges(*patches), _EDGE_SURROUNDINGS_PX)
