@@ -8,6 +8,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from ..cases import SAR_OPTICAL
 from .catalogue import GROUND, Attack, Make, Setting, as_text, direction
@@ -148,12 +149,19 @@ def self_copy(pair: Pair, setting: Setting) -> Pair:
     return replace(moved, input=np.stack(bands))
 
 
-def half_transparent_copy(pair: Pair, setting: Setting) -> Pair:
+def half_transparent_copy(is_resampled: bool) -> Make:
     """The reference shines through the input, as in a blended export."""
-    shift = direction(setting.rng, 8.0, 25.0)
-    moved = pair.moved(shift, as_text(shift))
-    share, copy = setting.rng.uniform(0.3, 0.7), pair.reference.mean(axis=0)
-    return moved.changed(None, lambda image: to_bytes((1 - share) * image + share * copy))
+
+    def make(pair: Pair, setting: Setting) -> Pair:
+        rng = setting.rng
+        shift = direction(rng, 8.0, 25.0)
+        moved = pair.moved(shift, as_text(shift))
+        share, copy = rng.uniform(0.3, 0.7), pair.reference.mean(axis=0)
+        if is_resampled:
+            copy = ndimage.shift(copy, rng.uniform(-0.5, 0.5, 2), mode="mirror")
+        return moved.changed(None, lambda image: to_bytes((1 - share) * image + share * copy))
+
+    return make
 
 
 def alpha_band(pair: Pair, setting: Setting) -> Pair:
@@ -185,6 +193,7 @@ ATTACKS = [
     Attack(GROUND, "water moved", "", water_moved),
     Attack(GROUND, "moving clouds", "", moving_clouds, camera_only),
     Attack(GROUND, "reference in one band", "", self_copy),
-    Attack(GROUND, "reference shines through", "", half_transparent_copy),
+    Attack(GROUND, "reference shines through", "", half_transparent_copy(False)),
+    Attack(GROUND, "reference shines through", "resampled", half_transparent_copy(True)),
     Attack(GROUND, "band of opacity", "", alpha_band),
 ]

@@ -210,6 +210,7 @@ def test_a_quarter_of_the_chips_that_copies_leave_must_show_something(
     ("height", "rival", "noise", "is_refused"),
     [
         (1.7, 2.7, 0.1, True),
+        (2.6, 2.7, 0.1, True),
         (2.6, 2.0, 0.1, False),
         (1.7, 2.7, 6.0, False),
     ],
@@ -217,20 +218,13 @@ def test_a_quarter_of_the_chips_that_copies_leave_must_show_something(
 def test_what_is_not_explained_of_copies_must_not_lie_elsewhere(
     height: float, rival: float, noise: float, is_refused: bool
 ) -> None:
-    """A weak rest is no evidence, unless a second place stands out of its noise."""
+    """Little may be left that matches anything, unless a second place stands out of its noise."""
     left = survey(height=height, rival=rival)
     drawn = noise * np.random.default_rng(3).normal(size=left.surfaces.shape)
     is_flat = left.surfaces == 0
     left = replace(left, surfaces=np.where(is_flat, drawn, left.surfaces).astype(np.float32))
     found = evidence(GOOD, survey=survey(), rest=Rest(survey(height=6.0), True, left))
     assert refusing(found) == ["pixel-locked content"] * is_refused
-
-
-def test_what_is_high_at_both_places_repeats() -> None:
-    """What the reference does not explain of a copy of a scene that repeats is high at both."""
-    left = survey(height=2.6, rival=4.0)
-    found = evidence(GOOD, survey=survey(), rest=Rest(survey(height=6.0), True, left))
-    assert refusing(found) == []
 
 
 @pytest.mark.parametrize(

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
-from ..geometry.models import Model, shift_model
 from ..geometry.transform import Transform
-from ..rasters.grid import Grid, PointFunction, reproject
+from ..rasters.grid import Grid, PointFunction
 from ..rasters.pair import ImagePair
 from ..similarity.description import BORDER_PX
 from ..similarity.in_common import (
@@ -33,9 +32,6 @@ from .matcher import FloatArray, Places
 
 # A transform that moves all of the overlap by whole pixels, but for this, may be content's.
 _LARGEST_BEND_PX = 1.5
-
-# Copies of pixels are found within this of whole pixels, a quarter of what others lie within.
-_WHOLE_PX = 0.125
 
 # What is drawn lies on whole pixels all over; of other pairs, one in 64 lies as near by chance.
 # Measured (suite attacks): drawn mostly up to 0.05; of 127 right pairs on one grid none as near is
@@ -71,9 +67,6 @@ class LockedContent:
         Input (col, row) − reference (col, row).
     sameness
         How much they have the same.
-    is_whole
-        Whether the transform moves the array by whole pixels: what was resampled is no copy of
-        pixels.
     sensors
         What the images may be.
     is_exact
@@ -85,7 +78,6 @@ class LockedContent:
     pair: ImagePair
     offset_px: tuple[int, int]
     sameness: Sameness
-    is_whole: bool
     sensors: Sensors
     is_exact: bool
 
@@ -134,17 +126,6 @@ class LockedContent:
             if self.sameness.has_seams:
                 same |= covered(seams(*patches), _SEAM_SURROUNDINGS_PX)
         return same[reach:-reach, reach:-reach]
-
-    @property
-    def model(self) -> Model:
-        """The misregistration on the map that moves the input's array by the offset."""
-        pair = self.pair
-        middle = np.array([pair.grid.centre_px])
-        xy = pair.grid.pixel_to_map(middle)
-        own = pair.input.source.grid
-        at = own.pixel_to_map(pair.reference.source.grid.map_to_pixel(xy) + self.offset_px)
-        shift = (reproject(at, own.crs, pair.grid.crs) - xy)[0]
-        return shift_model(float(shift[0]), float(shift[1]))
 
 
 def find_locked_content(
@@ -195,12 +176,11 @@ def find_locked_content(
         return Look.of(*images.read(piece))
 
     sameness = sameness_of(list(context.map(look, list(places.centres))))
-    is_whole = bool(np.abs(np.median(moved, axis=0) - offset).max() <= _WHOLE_PX)
     if sensors is Sensors.RADARS:
         is_exact = not sameness.varies_as_ground
     else:
         is_exact = bool(np.abs(moved - offset).max() <= exact_px)
-    return LockedContent(pair, found, sameness, is_whole, sensors, is_exact)
+    return LockedContent(pair, found, sameness, sensors, is_exact)
 
 
 def _to_input(pair: ImagePair, offset_px: tuple[int, int]) -> PointFunction:

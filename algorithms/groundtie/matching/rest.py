@@ -26,8 +26,8 @@ class Rest:
     is_explained
         Whether such content needs no confirmation (see `LockedContent`).
     beyond
-        What they show beyond what the reference explains of the input, where it is explained and
-        the transform moves the array by whole pixels; None elsewhere.
+        What they show beyond what the reference explains of the input, where it is explained; None
+        elsewhere.
     chips
         How many chips there are; of some too little may be left.
     """
@@ -85,8 +85,8 @@ def survey_rest(
         # Another input leaves something else of the reference.
         once = context.once()
         left = survey_model(fused, transform.model, once, locked, places, elsewhere_px)
-    if locked.is_explained and locked.is_whole:
+    if locked.is_explained:
         # A copy may be blended into other ground, of which the same windows are no part.
         other = replace(fused, left_of=unexplained)
-        beyond = survey_model(other, locked.model, context, None, places, elsewhere_px)
+        beyond = survey_model(other, transform.model, context, None, places, elsewhere_px)
     return Rest(left, locked.is_explained, beyond, len(places.centres))

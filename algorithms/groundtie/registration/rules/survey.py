@@ -26,9 +26,9 @@ WEAK_REST_HEIGHT = 2.5
 # snow of one shape are, it must be as high as of other content (suites margins and attacks).
 _LEAST_CHIPS = 0.25
 
-# What the reference does not explain of a copy may not stand out elsewhere by so many robust
-# standard deviations of its surfaces, if it is weak at the transform: right ones up to 4.3; ground
-# that shows through copies, clouds and labels from 6.1 on (suites margins and attacks).
+# What the reference does not explain of a copy, or one camera's view, may not stand out elsewhere
+# by so many robust standard deviations of its surfaces, if that is a second place: right ones up to
+# 4.3; ground that shows through copies, clouds and labels from 6.1 on (suites margins and attacks).
 BEYOND_DEVIATIONS = 5.0
 
 
@@ -70,20 +70,20 @@ def has_few_chips(left: Survey, rest: Rest) -> bool:
 def deviations_elsewhere(rest: Rest) -> float:
     """Return how far what a copy's reference does not explain stands out elsewhere.
 
-    In robust standard deviations; 0 where it is strong, or highest, where the transform has it.
+    In robust standard deviations; 0 where it matches best where the transform has it.
     """
     left = rest.beyond
-    if left is None or has_few_chips(left, rest):
+    if left is None or has_few_chips(left, rest) or not _has_rival(left):
         return 0.0
-    is_elsewhere = left.height < WEAK_REST_HEIGHT and _has_rival(left)
-    return left.rival_deviations if is_elsewhere else 0.0
+    return left.rival_deviations
 
 
 def _confirms(left: Survey, rest: Rest) -> bool:
-    is_high = left.height >= WEAK_REST_HEIGHT
-    if rest.is_explained:
-        return is_high or has_few_chips(left, rest)
-    return is_high and not (has_few_chips(left, rest) or _has_rival(left) or left.parts)
+    if has_few_chips(left, rest):
+        return rest.is_explained
+    # Tall buildings of views are parts, as layover and relief displacement differ.
+    is_part_elsewhere = bool(left.parts) and not rest.is_explained
+    return left.height >= WEAK_REST_HEIGHT and not (_has_rival(left) or is_part_elsewhere)
 
 
 def _locked(evidence: RegistrationEvidence) -> str | None:
