@@ -173,6 +173,19 @@ def test_a_transform_to_whole_pixels_is_evidence_itself(
     assert (masked(tmp_path, locked).mean() > 0.1) == is_evident
 
 
+@pytest.mark.slow
+def test_clouds_in_other_colours_are_masked_where_the_transform_is_evidence(
+    tmp_path: Path, context: Context
+) -> None:
+    """Nothing of them is the same, and soft ones have few edges."""
+    clouds = 3 * texture(SIDE, SIDE, 30)
+    images = sensed(1) + clouds, sensed(2, place=9) - clouds
+    locked = looked_at(tmp_path, *images, context)
+    assert locked is not None and locked.is_exact and locked.sameness.area < 0.1
+    assert masked(tmp_path, locked).mean() > 0.8
+    assert masked(tmp_path, replace(locked, is_exact=False)).mean() < 0.2
+
+
 @pytest.mark.parametrize(
     ("sensors", "place", "off_m", "is_exact"),
     [
@@ -273,10 +286,14 @@ def test_a_copy_in_other_colours_is_not_drawn(tmp_path: Path, context: Context) 
     assert locked.is_drawn
 
 
+@pytest.mark.parametrize(("blur_px", "strength"), [(0.1, 2.0), (2.0, 1.0)])
 def test_one_pattern_of_noise_over_different_ground_is_found(
-    tmp_path: Path, context: Context
+    tmp_path: Path, context: Context, blur_px: float, strength: float
 ) -> None:
-    pattern = 2 * np.random.default_rng(5).normal(size=(SIDE, SIDE))
+    """It may be correlated, so that as much is the same in images reduced by 4."""
+    noise = np.random.default_rng(5).normal(size=(SIDE, SIDE))
+    pattern = cv2.GaussianBlur(noise, (0, 0), blur_px)
+    pattern *= strength / pattern.std()
     reference, input = sensed(1, 0.1) + pattern, sensed(2, 0.1, place=9) + pattern
     locked = looked_at(tmp_path, reference, input, context)
     assert locked is not None and locked.sameness.is_evident

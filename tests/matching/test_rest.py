@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from raster_files import utm_grid, write_raster
+from scipy import ndimage
 from textured_pairs import shift_on_map, texture
 
 from groundtie.context import Context
@@ -38,7 +39,7 @@ def rest_of(
     reference: np.ndarray,
     input: np.ndarray,
     context: Context,
-    offset: tuple[int, int] = (0, 0),
+    offset: tuple[float, float] = (0.0, 0.0),
     sensors: Sensors = Sensors.CAMERAS,
 ) -> Rest | None:
     """Return what two arrays leave whose rows and columns are an offset apart."""
@@ -59,14 +60,15 @@ def rest_of(
 
 
 @pytest.mark.parametrize("share", [0.35, 0.6])
-@pytest.mark.parametrize("offset", [(0, 0), (6, -4)])
+@pytest.mark.parametrize("offset", [(0, 0), (6, -4), (6.4, -3.7)])
 @pytest.mark.slow
 def test_ground_shows_that_a_copy_was_blended_into(
-    share: float, offset: tuple[int, int], tmp_path: Path, context: Context
+    share: float, offset: tuple[float, float], tmp_path: Path, context: Context
 ) -> None:
     reference = noisy(place(), 1)
-    copied = np.roll(reference, offset[::-1], (0, 1))
-    blended = share * copied + (1 - share) * noisy(place((11 + offset[0], -7 + offset[1])), 2)
+    copied = ndimage.shift(reference, offset[::-1], mode="mirror")
+    ground = place((11 + round(offset[0]), -7 + round(offset[1])))
+    blended = share * copied + (1 - share) * noisy(ground, 2)
     rest = rest_of(tmp_path, reference, blended, context, offset)
     assert rest is not None and rest.is_explained and rest.beyond is not None
     top = np.unravel_index(np.argmax(rest.beyond.mean), rest.beyond.mean.shape)
