@@ -26,8 +26,8 @@ class Rest:
     is_explained
         Whether such content needs no confirmation (see `LockedContent`).
     beyond
-        What they show beyond what the reference explains of the input, where it is explained; None
-        elsewhere.
+        What they show beyond what the reference explains of the input, where it is explained;
+        None elsewhere.
     chips
         How many chips there are; of some too little may be left.
     """

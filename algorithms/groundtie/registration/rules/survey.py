@@ -26,9 +26,9 @@ WEAK_REST_HEIGHT = 2.5
 # snow of one shape are, it must be as high as of other content (suites margins and attacks).
 _LEAST_CHIPS = 0.25
 
-# What the reference does not explain of a copy, or one camera's view, may not stand out elsewhere
-# by so many robust standard deviations of its surfaces, if that is a second place: right ones up to
-# 4.3; ground that shows through copies, clouds and labels from 6.1 on (suites margins and attacks).
+# What the reference does not explain of a copy or view may not stand out elsewhere by so many
+# robust standard deviations of its surfaces, if that is a second place: right ones up to 4.3;
+# ground that shows through copies from 6.1 on (suites margins and attacks).
 BEYOND_DEVIATIONS = 5.0
 
 
@@ -146,8 +146,9 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "with edges sharper than those of ground; or without it less than a quarter of the chips "
         "is left, a part lies elsewhere, a second place matches about as well, or the mean "
         f"similarity is below {WEAK_REST_HEIGHT:g} standard deviations; of a copy, or one camera's "
-        "views, below that with sharp edges if a quarter is left, or what the reference does not "
-        f"explain of it matches elsewhere, and stands out there by {BEYOND_DEVIATIONS:g}",
+        "views, with sharp edges, a quarter is left that is below that or matches a second place "
+        "about as well, or what the reference does not explain of it matches elsewhere, and stands "
+        f"out there by {BEYOND_DEVIATIONS:g}",
         "suites margins and attacks",
         WITHOUT,
         _locked,
