@@ -280,6 +280,8 @@ def test_a_copy_in_other_colours_is_not_drawn(tmp_path: Path, context: Context) 
     copy = looked_at(tmp_path, sensed(1, 0.1), -1.5 * sensed(2, 0.1), context)
     assert copy is not None and copy.sameness.sharpness > 5
     assert not copy.is_drawn
+    # All of it follows in other colours, and must not be hidden; edges are.
+    assert copy.is_exact and masked(tmp_path, copy).mean() < 0.95
     drawn = drawn_into(sensed(1)), -drawn_into(sensed(2, place=9))
     locked = looked_at(tmp_path, *drawn, context)
     assert locked is not None and locked.sameness.sharpness > 5

@@ -109,7 +109,8 @@ class LockedContent:
 
         What is drawn ends somewhere in the windows that vary alike: all of them is taken, unless
         the surroundings are one camera's views of the ground, and what is around edges if they
-        or the transform are evidence.
+        or the transform are evidence. If the transform is, what follows in other colours is, too,
+        unless nearly everything does.
         """
         reach = 2 * REACH_PX
         size = piece.width + 2 * reach, piece.height + 2 * reach
@@ -118,7 +119,7 @@ class LockedContent:
         windows = Windows.of(*patches)
         same = windows.same
         if not self.is_explained:
-            if self.is_exact:
+            if self.is_exact and not self.sameness.is_copy_in_other_colours:
                 same = same | windows.related
             same = covered(same, WINDOW_PX)
             if self.sameness.has_sharp_edges or self.is_exact:
