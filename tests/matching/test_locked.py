@@ -26,6 +26,9 @@ from groundtie.similarity.in_common import VIEW_SHARPNESS, Sameness
 
 SIDE = 320
 
+# Shares that are the same of one sensor's views, the more, the coarser the pixels.
+OF_ONE_GROUND = {"area": 0.4, "reduced_area": 0.7, "coarse_area": 0.8, "ground": 0.4}
+
 
 def looked_at(
     folder: Path,
@@ -231,8 +234,7 @@ def test_what_varies_alike_in_two_radar_images_is_no_ground(
     """Each view of a radar has speckle of its own."""
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
     assert locked is not None
-    areas = {"area": 0.4, "reduced_area": 0.7, "coarse_area": 0.8}
-    views = replace(locked.sameness, sharpness=1.5, ground=0.4, **areas)
+    views = replace(locked.sameness, sharpness=1.5, **OF_ONE_GROUND)
     for sensors in Sensors:
         found = replace(locked, sameness=views, sensors=sensors)
         assert found.is_explained == (sensors is Sensors.CAMERAS)
@@ -244,8 +246,7 @@ def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
     assert locked is not None
     # As of one exposure's bands.
-    areas = {"area": 0.4, "reduced_area": 0.7, "coarse_area": 0.8}
-    views = replace(locked.sameness, sharpness=4.2, ground=0.4, **areas)
+    views = replace(locked.sameness, sharpness=4.2, **OF_ONE_GROUND)
     assert views.is_view
     assert not replace(views, sharpness=VIEW_SHARPNESS).is_view
     copy = replace(views, area=0.8, reduced_area=0.8, sharpness=VIEW_SHARPNESS)

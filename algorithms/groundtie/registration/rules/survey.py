@@ -27,8 +27,9 @@ WEAK_REST_HEIGHT = 2.5
 _LEAST_CHIPS = 0.25
 
 # What the reference does not explain of a copy or view may not stand out elsewhere by so many
-# robust standard deviations of its surfaces, if that is a second place: right ones up to 4.3;
-# ground that shows through copies from 6.1 on (suites margins and attacks).
+# robust standard deviations of its surfaces, if that is a second place: right ones up to 4.3, but
+# where more is drawn at one place, or repeats (up to 14.3); ground that shows through copies,
+# clouds and labels from 6.1 on (suites margins and attacks).
 BEYOND_DEVIATIONS = 5.0
 
 
