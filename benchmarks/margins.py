@@ -83,7 +83,7 @@ def _rival(evidence: RegistrationEvidence) -> float:
 def _rest_height(evidence: RegistrationEvidence) -> float:
     rest = evidence.rest
     left = None if rest is None else rest.survey
-    if rest is None or left is None or (rest.is_explained and has_few_chips(left, rest)):
+    if rest is None or left is None or (rest.is_explained and has_few_chips(left, rest.chips)):
         return math.nan
     return left.height
 

@@ -29,6 +29,7 @@ from scipy.stats import binom
 
 from groundtie.masks.used import GROUND, LAYER, NONE, SURFACE, MaskUsed
 from groundtie.matching.rest import Rest
+from groundtie.matching.survey import Survey
 from groundtie.registration.evidence import Exchanged, ImagesEvidence, RegistrationEvidence
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
 from groundtie.registration.verdict import refusals
@@ -138,6 +139,22 @@ def test_little_ground_may_be_weakly_similar(kind: str) -> None:
     weak = survey(height=1.9, rival=1.8)
     assert refusing(evidence(GOOD, survey=weak, mask=masked(kind))) == []
     assert refusing(evidence(GOOD, survey=weak)) == ["second place nearby", "weak similarity"]
+
+
+@pytest.mark.parametrize("mask", [None, masked(GROUND)])
+def test_a_quarter_of_the_chips_must_overlap_where_the_transform_has_them(
+    mask: MaskUsed | None,
+) -> None:
+    used = {} if mask is None else {"mask": mask}
+
+    def of(overlapping: int) -> Survey:
+        found = survey(height=20.0)
+        surfaces = found.surfaces.copy()
+        surfaces[overlapping:] = 0
+        return replace(found, surfaces=surfaces)
+
+    assert refusing(evidence(GOOD, survey=of(12), **used)) == ["weak similarity"]
+    assert refusing(evidence(GOOD, survey=of(13), **used)) == []
 
 
 def test_parts_are_chips_that_do_not_confirm_wherever_they_lie() -> None:

@@ -167,22 +167,8 @@ def survey_model(
     least = None if without is None else LEAST_VALID_MASKED
     seen = replace(matcher, held_out=without, least_valid=least)
     kept, surfaces = seen.match_forward(model, places, SURVEY_RADIUS_PX, context)
-    surfaces = _of_overlaps(surfaces)
     shifts = np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
     return Survey(places.grid, kept, shifts, surfaces, elsewhere_px)
-
-
-def _of_overlaps(surfaces: Surfaces) -> Surfaces:
-    """Return surfaces in robust standard deviations of the shifts at which enough overlaps.
-
-    Others are 0: where they are many, all seem to vary little, and peaks to be hundreds high.
-    """
-    made = surfaces.copy()
-    for surface in made:
-        known = surface[surface != 0]
-        if known.size:
-            surface /= max(robust_deviation(known), 1.0)
-    return made
 
 
 def _along(size: int, chip_px: int) -> NDArray[np.int_]:

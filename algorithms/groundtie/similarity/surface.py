@@ -22,6 +22,7 @@ from .order_statistics import DEVIATION_PER_MAD, upper_median
 from .stacks import each, flat
 
 Surface = NDArray[np.float32]
+Known = NDArray[np.bool_]
 
 # The measures that are summed up under this name, and their weights, chosen on 14 real SAR pairs;
 # docs/measurements.md has the figures of these and of others.
@@ -64,17 +65,50 @@ class SimilaritySettings:
         return self.bins or int(np.clip(np.sqrt(pixels) / 7.5, 8, 32))
 
 
-def normalise(surface: Surface) -> Surface:
-    """Return surfaces, (…, ny, nx), in robust standard deviations from their medians (by MAD)."""
+def normalise(surface: Surface, known: Known | None = None) -> Surface:
+    """Return surfaces, (…, ny, nx), in robust standard deviations from their medians (by MAD).
+
+    Parameters
+    ----------
+    surface
+        The surfaces.
+    known
+        At which shifts they have a value, same shape; others get 0, the background's. None: at all.
+    """
+    if known is None or known.all():
+        return _normalised(surface)
+    return each(_normalised_where, surface, known)
+
+
+def detrend(surface: Surface, known: Known | None = None) -> Surface:
+    """Return surfaces, (…, ny, nx), without their slow trend, normalised; see `normalise`."""
+    if known is None or known.all():
+        return _normalised(surface - each(_smooth, surface))
+    return normalise(surface - each(_mean_of_known, surface, known), known)
+
+
+def _normalised(surface: Surface) -> Surface:
     centred = surface - upper_median(flat(surface))[..., None, None]
     spread = np.float32(DEVIATION_PER_MAD) * upper_median(flat(np.abs(centred)))[..., None, None]
     return (centred / np.where(spread > _FLAT, spread, np.inf)).astype(np.float32)
 
 
-def detrend(surface: Surface, width_px: float = TREND_PX) -> Surface:
-    """Return surfaces, (…, ny, nx), without their slow trend, normalised."""
-    trend = each(lambda one: cv2.GaussianBlur(one, (0, 0), width_px), surface)
-    return normalise(surface - trend)
+def _normalised_where(surface: Surface, known: Known) -> Surface:
+    found = np.zeros(surface.shape, np.float32)
+    if known.any():
+        found[known] = _normalised(surface[known][None])[0]
+    return found
+
+
+def _mean_of_known(surface: Surface, known: Known) -> Surface:
+    if known.all():
+        return _smooth(surface)
+    weight = known.astype(np.float32)
+    return np.asarray(_smooth(surface * weight) / np.maximum(_smooth(weight), np.float32(_FLAT)))
+
+
+def _smooth(surface: Surface) -> Surface:
+    return np.asarray(cv2.GaussianBlur(surface, (0, 0), TREND_PX), np.float32)
 
 
 def describe(
@@ -133,18 +167,18 @@ def similarity_surface(
     overlap get 0, the background's value.
     """
     shape = *template.patch.values.shape[:-2], 2 * radius + 1, 2 * radius + 1
-    total = np.zeros(shape, np.float32)
+    total, known = np.zeros(shape, np.float32), None
+    if not (template.patch.all_valid and search.patch.all_valid):
+        known = overlap_share(template.patch, search.patch) >= least_overlap
     for name in settings.measures:
         values = MEASURES[name](template, search, radius, context)
-        total += _standardised(values.reshape(-1, *shape)) * np.float32(_WEIGHTS.get(name, 1.0))
-    surface = normalise(total)
-    if template.patch.all_valid and search.patch.all_valid:
-        return surface
-    overlap = overlap_share(template.patch, search.patch)
-    return np.where(overlap >= least_overlap, surface, 0).astype(np.float32)
+        weight = np.float32(_WEIGHTS.get(name, 1.0))
+        total += _standardised(values.reshape(-1, *shape), known) * weight
+    return normalise(total, known)
 
 
-def _standardised(values: NDArray[np.floating]) -> Surface:
+def _standardised(values: NDArray[np.floating], known: Known | None) -> Surface:
     """Return the detrended sum of one or several surfaces of a measure, each normalised."""
-    parts = detrend(values)
-    return parts[0] if len(parts) == 1 else normalise(parts.sum(axis=0))
+    # Where a scale has no valid pixels to compare, it is 0.
+    parts = detrend(values, None if known is None else known & (values != 0))
+    return parts[0] if len(parts) == 1 else normalise(parts.sum(axis=0), known)
