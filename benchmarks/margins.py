@@ -21,10 +21,12 @@ from groundtie.matching.survey import Survey
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
-    BEYOND_DEVIATIONS,
+    PEAK_DEVIATIONS,
+    REST_PEAK_DEVIATIONS,
     RIVAL_HEIGHT,
     WEAK_HEIGHT,
     WEAK_REST_HEIGHT,
+    deviations_beyond,
     deviations_elsewhere,
     has_few_chips,
 )
@@ -80,6 +82,10 @@ def _rival(evidence: RegistrationEvidence) -> float:
     return math.nan if survey is None else survey.rival_height / max(survey.height, 0.1)
 
 
+def _peak(evidence: RegistrationEvidence) -> float:
+    return math.nan if evidence.survey is None else deviations_elsewhere(evidence.survey)
+
+
 def _rest_height(evidence: RegistrationEvidence) -> float:
     rest = evidence.rest
     left = None if rest is None else rest.survey
@@ -92,20 +98,27 @@ def _in_bands(evidence: RegistrationEvidence) -> float:
     return max((one.survey.excess for one in evidence.bands), default=math.nan)
 
 
-def _elsewhere(evidence: RegistrationEvidence) -> float:
+def _rest_peak(evidence: RegistrationEvidence) -> float:
     rest = evidence.rest
-    if rest is None or rest.beyond is None:
+    if rest is None or rest.survey is None or has_few_chips(rest.survey, rest.chips):
         return math.nan
-    return deviations_elsewhere(rest)
+    return deviations_elsewhere(rest.survey)
+
+
+def _peak_beyond(evidence: RegistrationEvidence) -> float:
+    rest = evidence.rest
+    return math.nan if rest is None or rest.beyond is None else deviations_beyond(rest)
 
 
 STATISTICS = (
     Statistic("part elsewhere: excess", LEAST_EXCESS, _excess_of_all),
     Statistic("second place: share of the height", RIVAL_HEIGHT, _rival),
+    Statistic("second place: peak", PEAK_DEVIATIONS, _peak),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),
     Statistic("pixel-locked content: excess", LEAST_EXCESS, _excess_of_rest),
     Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),
-    Statistic("pixel-locked content: copies", BEYOND_DEVIATIONS, _elsewhere),
+    Statistic("pixel-locked content: second peak", REST_PEAK_DEVIATIONS, _rest_peak),
+    Statistic("pixel-locked content: copies", REST_PEAK_DEVIATIONS, _peak_beyond),
     Statistic("band elsewhere: excess", LEAST_EXCESS, _in_bands),
 )
 

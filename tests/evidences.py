@@ -15,6 +15,7 @@ from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.masks.used import MaskUsed
 from groundtie.matching.bands import BandSurvey
+from groundtie.matching.parts import ELSEWHERE_PX
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
@@ -105,8 +106,17 @@ def evidence(
     )
 
 
-def survey(confirming: int = 49, part: int = 0, height: float = 8.0, rival: float = 2.0) -> Survey:
-    """Return a survey of 7 × 7 chips, of which some confirm and some rows' first ones lie off."""
+def survey(
+    confirming: int = 49,
+    part: int = 0,
+    height: float = 8.0,
+    rival: float = 2.0,
+    peak: float = 0.0,
+) -> Survey:
+    """Return a survey of 7 × 7 chips, of which some confirm and some rows' first ones lie off.
+
+    The others have a rival beside where they confirm, which is no peak, and a peak elsewhere.
+    """
     centres = np.stack(np.meshgrid(*[np.arange(7) * 70 + 40] * 2), -1).reshape(-1, 2)
     random = np.random.default_rng(7)
     shifts = random.uniform(5, 24, (49, 2)) * random.choice([-1, 1], (49, 2))
@@ -115,7 +125,10 @@ def survey(confirming: int = 49, part: int = 0, height: float = 8.0, rival: floa
     side = 2 * SURVEY_RADIUS_PX + 1
     surfaces = np.zeros((49, side, side), np.float32)
     surfaces[part:, SURVEY_RADIUS_PX, SURVEY_RADIUS_PX] = height
-    surfaces[part:, SURVEY_RADIUS_PX + 9, SURVEY_RADIUS_PX] = rival
+    beside = SURVEY_RADIUS_PX + int(ELSEWHERE_PX)
+    surfaces[part:, beside, SURVEY_RADIUS_PX] = rival + 0.1
+    surfaces[part:, beside + 1, SURVEY_RADIUS_PX] = rival
+    surfaces[part:, SURVEY_RADIUS_PX + 9, SURVEY_RADIUS_PX] = peak
     surfaces[:part, SURVEY_RADIUS_PX - 5, SURVEY_RADIUS_PX + 9] = height
     return Survey(GRID, centres, shifts, surfaces)
 

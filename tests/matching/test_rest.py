@@ -17,7 +17,7 @@ from groundtie.matching.rest import Rest, survey_rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.rules.survey import BEYOND_DEVIATIONS, deviations_elsewhere
+from groundtie.registration.rules.survey import REST_PEAK_DEVIATIONS, deviations_beyond
 from groundtie.similarity.surface import SimilaritySettings
 
 SIDE, MARGIN = 340, 30
@@ -73,7 +73,7 @@ def test_ground_shows_that_a_copy_was_blended_into(
     assert rest is not None and rest.is_explained and rest.beyond is not None
     top = np.unravel_index(np.argmax(rest.beyond.mean), rest.beyond.mean.shape)
     assert np.subtract(top, SURVEY_RADIUS_PX)[::-1] == pytest.approx((11, -7), abs=1)
-    assert deviations_elsewhere(rest) > BEYOND_DEVIATIONS
+    assert deviations_beyond(rest) > REST_PEAK_DEVIATIONS
 
 
 @pytest.mark.slow
@@ -84,7 +84,7 @@ def test_a_view_of_one_sensor_and_a_copy_show_nothing_elsewhere(
     for input in (noisy(place(), 2), 0.7 * reference):
         rest = rest_of(tmp_path, reference, input, context)
         assert rest is not None and rest.is_explained and rest.beyond is not None
-        assert deviations_elsewhere(rest) < BEYOND_DEVIATIONS
+        assert deviations_beyond(rest) < REST_PEAK_DEVIATIONS
 
 
 def test_what_a_radar_and_a_camera_show_alike_is_no_view_of_one_sensor(

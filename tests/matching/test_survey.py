@@ -17,6 +17,11 @@ from groundtie.matching.survey import (
 )
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
+from groundtie.registration.rules.survey import (
+    PEAK_DEVIATIONS,
+    REST_PEAK_DEVIATIONS,
+    deviations_elsewhere,
+)
 from groundtie.similarity.surface import SimilaritySettings
 
 SIDE = 340
@@ -127,6 +132,33 @@ def test_what_repeats_matches_elsewhere_about_as_well(tmp_path: Path, context: C
     rows = np.tile(tile, (SIDE // 14 + 1, SIDE // 14 + 1))[:SIDE, :SIDE]
     survey = surveyed(tmp_path, noisy(rows, 1, 0.1), noisy(rows, 2, 0.1), context)
     assert survey.rival_height > 0.9 * survey.height
+
+
+@pytest.mark.parametrize("by_px", [(9, -5), (0, 0)])
+def test_ground_beneath_what_is_drawn_is_a_second_peak(
+    by_px: tuple[int, int], tmp_path: Path, context: Context
+) -> None:
+    """What is drawn matches where the model has it, in strong contrast; the ground elsewhere."""
+    drawn = 1.2 * place(seed=5)
+    views = drawn + place(), drawn + place(by_px)
+    survey = surveyed(tmp_path, noisy(views[0], 1), noisy(views[1], 2), context)
+    assert survey.confirming > 0.9 * len(survey.centres)
+    assert survey.rival_height < 0.8 * survey.height
+    if by_px == (0, 0):
+        assert deviations_elsewhere(survey) < REST_PEAK_DEVIATIONS
+    else:
+        assert deviations_elsewhere(survey) > PEAK_DEVIATIONS
+
+
+def test_what_is_similar_because_it_lies_near_is_no_second_peak() -> None:
+    """A wide peak is high where a rival may lie, too: no higher than all around it, but once."""
+    span = np.arange(-SURVEY_RADIUS_PX, SURVEY_RADIUS_PX + 1)
+    distance = np.hypot(*np.meshgrid(span, span))
+    wide = np.repeat(10 * np.exp(-(distance[None] ** 2) / 200), 9, axis=0).astype(np.float32)
+    grid, centres = utm_grid(SIDE, SIDE), np.full((9, 2), 50)
+    survey = Survey(grid, centres, np.zeros((9, 2)), wide)
+    assert survey.rival_height > 0.8 * survey.height
+    assert survey.second_peak == 0
 
 
 def test_what_is_left_out_is_not_matched(tmp_path: Path, context: Context) -> None:

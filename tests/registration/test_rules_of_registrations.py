@@ -206,7 +206,8 @@ def test_few_chips_of_a_band_are_no_ground(chips: int, expected: list[str]) -> N
 
 def test_what_one_cameras_views_leave_may_lie_elsewhere_in_parts() -> None:
     """Tall buildings do, whose layover differs."""
-    left = survey(3, part=14, height=6.0)
+    left = survey(3, part=5, height=6.0)
+    assert left.parts
     assert refusing(evidence(GOOD, survey=survey(), rest=Rest(left, True, survey()))) == []
 
 
@@ -223,20 +224,38 @@ def test_a_quarter_of_the_chips_that_copies_leave_must_show_something(
     assert refusing(found) == ["pixel-locked content"] * is_refused
 
 
+# Of 49 chips' mean surfaces, standard deviations are a seventh.
+@pytest.mark.parametrize("masks", [{}, {"mask": masked(GROUND)}])
+@pytest.mark.parametrize(("peak", "is_refused"), [(13.9 / 7, False), (14.1 / 7, True)])
+def test_a_second_peak_is_other_ground_however_high_the_first_is(
+    peak: float, is_refused: bool, masks: dict[str, MaskUsed]
+) -> None:
+    found = evidence(GOOD, survey=survey(height=40.0, peak=peak), **masks)
+    assert refusing(found) == ["second place nearby"] * is_refused
+
+
+@pytest.mark.parametrize("is_explained", [False, True])
+@pytest.mark.parametrize(("peak", "is_refused"), [(5.9 / 7, False), (6.1 / 7, True)])
+def test_what_is_left_must_have_no_second_peak(
+    peak: float, is_refused: bool, is_explained: bool
+) -> None:
+    for rest in (
+        Rest(survey(peak=peak), is_explained),
+        Rest(None, True, survey(height=1.7, rival=0.0, peak=peak)),
+    ):
+        found = evidence(GOOD, survey=survey(), rest=rest)
+        assert refusing(found) == ["pixel-locked content"] * is_refused
+
+
 @pytest.mark.parametrize(
-    ("height", "rival", "noise", "is_refused"),
-    [
-        (1.7, 2.7, 0.1, True),
-        (2.6, 2.7, 0.1, True),
-        (2.6, 2.0, 0.1, False),
-        (1.7, 2.7, 6.0, False),
-    ],
+    ("peak", "noise", "is_refused"),
+    [(2.0, 0.1, True), (0.5, 0.1, False), (2.0, 6.0, False)],
 )
 def test_what_is_not_explained_of_copies_must_not_lie_elsewhere(
-    height: float, rival: float, noise: float, is_refused: bool
+    peak: float, noise: float, is_refused: bool
 ) -> None:
     """Little may be left that matches anything, unless a second place stands out of its noise."""
-    left = survey(height=height, rival=rival)
+    left = survey(height=2.0, rival=0.0, peak=peak)
     drawn = noise * np.random.default_rng(3).normal(size=left.surfaces.shape)
     is_flat = left.surfaces == 0
     left = replace(left, surfaces=np.where(is_flat, drawn, left.surfaces).astype(np.float32))

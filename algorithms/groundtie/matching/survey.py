@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,6 +35,9 @@ _CHIP_RANGE_PX, _ALONG, _MOST_ALONG = (40, 64), 7, 9
 
 # How far off a part may lie.
 SURVEY_RADIUS_PX = 24
+
+# A peak is higher than all around it that counts as the same place.
+_NEIGHBOURS = np.ones((2 * int(SAME_PX) + 1,) * 2, np.uint8)
 
 
 @dataclass(frozen=True)
@@ -93,15 +97,24 @@ class Survey:
         return float(self.mean[self._distance_px > self.elsewhere_px].max())
 
     @property
-    def rival_deviations(self) -> float:
-        """How high it is there, in robust standard deviations of what it is elsewhere.
+    def second_peak(self) -> float:
+        """The height of the highest peak elsewhere; 0: there is none.
 
-        These are no less than those of a mean of as many independent chips: where little overlaps,
-        most of it is 0.
+        Ground that lies elsewhere has one; what is similar because it lies near has none.
+        """
+        is_far = self._distance_px > self.elsewhere_px
+        is_peak = is_far & (self.mean == cv2.dilate(self.mean, _NEIGHBOURS))
+        return float(self.mean[is_peak].max(initial=0.0))
+
+    @property
+    def deviation_elsewhere(self) -> float:
+        """The robust standard deviation of the mean similarity elsewhere.
+
+        It is no less than that of a mean of as many independent chips: where little overlaps, most
+        of it is 0.
         """
         far = self.mean[self._distance_px > self.elsewhere_px]
-        least = max(len(self.surfaces), 1) ** -0.5
-        return self.rival_height / max(robust_deviation(far), least)
+        return max(robust_deviation(far), max(len(self.surfaces), 1) ** -0.5)
 
     @property
     def _distance_px(self) -> FloatArray:
