@@ -96,6 +96,7 @@ def _normalised(surface: Surface) -> Surface:
 def _normalised_where(surface: Surface, known: Known) -> Surface:
     found = np.zeros(surface.shape, np.float32)
     if known.any():
+        # As an image of one row.
         found[known] = _normalised(surface[known][None])[0]
     return found
 

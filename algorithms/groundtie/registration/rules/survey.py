@@ -33,8 +33,9 @@ _LEAST_CHIPS = 0.25
 # its own, however high what is drawn is. In robust standard deviations of what is elsewhere, ground
 # that repeats reaches 11.9, ground beneath what is drawn 15.2 and more, but one of 12.8. Of what is
 # left without pixel-locked content, and of what the reference does not explain of the input, right
-# transforms reach 5.0, but one of 8.6 beneath a watermark that is displaced; others from 6.5 on
-# (suites real and attacks: controls --seeds 33000-33039, --seeds 72000-72029, once_wrong.txt).
+# transforms reach 5.0, but where more is drawn at another place, or an orchard repeats (8.6 to
+# 14.3); others from 6.5 on (suites real and attacks: controls --seeds 33000-33039, --seeds
+# 72000-72029, once_wrong.txt).
 PEAK_DEVIATIONS, REST_PEAK_DEVIATIONS = 14.0, 6.0
 
 
@@ -160,7 +161,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "has them; or, without a mask of the ground, their mean similarity there is below "
         f"{WEAK_HEIGHT:g} robust standard deviations of one of them",
         "suites real and attacks",
-        "give images with less noise, or a larger pixel size for matching",
+        "give images with less noise, a mask that leaves more, or a larger pixel size for matching",
         _weak,
     ),
     Rule(
