@@ -70,20 +70,11 @@ def _excess_of_rest(evidence: RegistrationEvidence) -> float:
     return math.nan if rest is None or rest.is_explained else _excess(rest.survey)
 
 
-def _of_survey(name: str) -> Callable[[RegistrationEvidence], float]:
+def _of_survey(measure: Callable[[Survey], float]) -> Callable[[RegistrationEvidence], float]:
     def value(evidence: RegistrationEvidence) -> float:
-        return math.nan if evidence.survey is None else float(getattr(evidence.survey, name))
+        return math.nan if evidence.survey is None else measure(evidence.survey)
 
     return value
-
-
-def _rival(evidence: RegistrationEvidence) -> float:
-    survey = evidence.survey
-    return math.nan if survey is None else survey.rival_height / max(survey.height, 0.1)
-
-
-def _peak(evidence: RegistrationEvidence) -> float:
-    return math.nan if evidence.survey is None else deviations_elsewhere(evidence.survey)
 
 
 def _rest_height(evidence: RegistrationEvidence) -> float:
@@ -112,9 +103,13 @@ def _peak_beyond(evidence: RegistrationEvidence) -> float:
 
 STATISTICS = (
     Statistic("part elsewhere: excess", LEAST_EXCESS, _excess_of_all),
-    Statistic("second place: share of the height", RIVAL_HEIGHT, _rival),
-    Statistic("second place: peak", PEAK_DEVIATIONS, _peak),
-    Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey("height"), False),
+    Statistic(
+        "second place: share of the height",
+        RIVAL_HEIGHT,
+        _of_survey(lambda s: s.rival_height / max(s.height, 0.1)),
+    ),
+    Statistic("second place: peak", PEAK_DEVIATIONS, _of_survey(deviations_elsewhere)),
+    Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),
     Statistic("pixel-locked content: excess", LEAST_EXCESS, _excess_of_rest),
     Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),
     Statistic("pixel-locked content: second peak", REST_PEAK_DEVIATIONS, _rest_peak),

@@ -141,20 +141,18 @@ def test_little_ground_may_be_weakly_similar(kind: str) -> None:
     assert refusing(evidence(GOOD, survey=weak)) == ["second place nearby", "weak similarity"]
 
 
-@pytest.mark.parametrize("mask", [None, masked(GROUND)])
+@pytest.mark.parametrize("masks", [{}, {"mask": masked(GROUND)}])
 def test_a_quarter_of_the_chips_must_overlap_where_the_transform_has_them(
-    mask: MaskUsed | None,
+    masks: dict[str, MaskUsed],
 ) -> None:
-    used = {} if mask is None else {"mask": mask}
-
     def of(overlapping: int) -> Survey:
         found = survey(height=20.0)
         surfaces = found.surfaces.copy()
         surfaces[overlapping:] = 0
         return replace(found, surfaces=surfaces)
 
-    assert refusing(evidence(GOOD, survey=of(12), **used)) == ["weak similarity"]
-    assert refusing(evidence(GOOD, survey=of(13), **used)) == []
+    assert refusing(evidence(GOOD, survey=of(12), **masks)) == ["weak similarity"]
+    assert refusing(evidence(GOOD, survey=of(13), **masks)) == []
 
 
 def test_parts_are_chips_that_do_not_confirm_wherever_they_lie() -> None:
@@ -248,14 +246,22 @@ def test_what_is_left_must_have_no_second_peak(
 
 
 @pytest.mark.parametrize(
-    ("peak", "noise", "is_refused"),
-    [(2.0, 0.1, True), (0.5, 0.1, False), (2.0, 6.0, False)],
+    ("height", "rival", "peak", "noise", "is_refused"),
+    [
+        (1.7, 2.7, 0.0, 0.1, True),
+        (2.6, 2.7, 0.0, 0.1, True),
+        (2.6, 2.0, 0.0, 0.1, False),
+        (1.7, 2.7, 0.0, 6.0, False),
+        (2.0, 0.0, 2.0, 0.1, True),
+        (2.0, 0.0, 0.5, 0.1, False),
+        (2.0, 0.0, 2.0, 6.0, False),
+    ],
 )
 def test_what_is_not_explained_of_copies_must_not_lie_elsewhere(
-    peak: float, noise: float, is_refused: bool
+    height: float, rival: float, peak: float, noise: float, is_refused: bool
 ) -> None:
     """Little may be left that matches anything, unless a second place stands out of its noise."""
-    left = survey(height=2.0, rival=0.0, peak=peak)
+    left = survey(height=height, rival=rival, peak=peak)
     drawn = noise * np.random.default_rng(3).normal(size=left.surfaces.shape)
     is_flat = left.surfaces == 0
     left = replace(left, surfaces=np.where(is_flat, drawn, left.surfaces).astype(np.float32))

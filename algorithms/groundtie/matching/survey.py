@@ -94,7 +94,7 @@ class Survey:
     @property
     def rival_height(self) -> float:
         """How high it is where all of them are moved elsewhere, at the best such place."""
-        return float(self.mean[self._distance_px > self.elsewhere_px].max())
+        return float(self._mean_elsewhere.max())
 
     @property
     def second_peak(self) -> float:
@@ -102,8 +102,7 @@ class Survey:
 
         Ground that lies elsewhere has one; what is similar because it lies near has none.
         """
-        is_far = self._distance_px > self.elsewhere_px
-        is_peak = is_far & (self.mean == cv2.dilate(self.mean, _NEIGHBOURS))
+        is_peak = self._is_far & (self.mean == cv2.dilate(self.mean, _NEIGHBOURS))
         return float(self.mean[is_peak].max(initial=0.0))
 
     @property
@@ -113,8 +112,17 @@ class Survey:
         It is no less than that of a mean of as many independent chips: where little overlaps, most
         of it is 0.
         """
-        far = self.mean[self._distance_px > self.elsewhere_px]
-        return max(robust_deviation(far), max(len(self.surfaces), 1) ** -0.5)
+        of_noise = max(len(self.surfaces), 1) ** -0.5
+        return max(robust_deviation(self._mean_elsewhere), of_noise)
+
+    @property
+    def _mean_elsewhere(self) -> FloatArray:
+        return np.asarray(self.mean[self._is_far])
+
+    @property
+    def _is_far(self) -> NDArray[np.bool_]:
+        """At which shifts second places lie, shape (2 r + 1, 2 r + 1)."""
+        return np.asarray(self._distance_px > self.elsewhere_px)
 
     @property
     def _distance_px(self) -> FloatArray:

@@ -82,9 +82,8 @@ def normalise(surface: Surface, known: Known | None = None) -> Surface:
 
 def detrend(surface: Surface, known: Known | None = None) -> Surface:
     """Return surfaces, (…, ny, nx), without their slow trend, normalised; see `normalise`."""
-    if known is None or known.all():
-        return _normalised(surface - each(_smooth, surface))
-    return normalise(surface - each(_mean_of_known, surface, known), known)
+    trend = each(_smooth, surface) if known is None else each(_mean_of_known, surface, known)
+    return normalise(surface - trend, known)
 
 
 def _normalised(surface: Surface) -> Surface:
