@@ -123,14 +123,18 @@ class RealPairCase:
     case: RealCase
     number: int
 
+    @property
+    def group(self) -> str:
+        """Its class."""
+        return f"real {self.case.kind}"
+
     def run(self, workers: int | None) -> CalibrationRun:
         """Write the pair, register it and compare."""
         shift = draw_shift(self.case, LARGEST_SHIFT_PX, self.number)
         with tempfile.TemporaryDirectory() as folder:
             pair = write_case(self.case, shift, Path(folder))
             radius = search_radius_m(LARGEST_SHIFT_PX)
-            group = f"real {self.case.kind}"
-            return compare(self.case.name, group, "coregister", pair, radius, workers)
+            return compare(self.case.name, self.group, "coregister", pair, radius, workers)
 
 
 def compare(
@@ -205,7 +209,11 @@ def cases(settings: Settings) -> list[SimulatedCase | RealPairCase]:
             found += _simulated(seed, size, settings.cache)
     if not settings.quick:
         found += [RealPairCase(case, settings.first_seed) for case in read_cases(settings.data)]
-    return found
+    known = {case.group for case in found}
+    for name in settings.classes:
+        if name not in known:
+            raise ValueError(f"no class {name!r}; there are {'; '.join(sorted(known))}")
+    return [case for case in found if not settings.classes or case.group in settings.classes]
 
 
 def _simulated(seed: int, size: int, cache: Path) -> list[SimulatedCase]:

@@ -74,7 +74,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     attacks = parser.add_argument_group("attacks", "what the suite attacks runs")
     attacks.add_argument("--sample", type=int, help="so many cases, of every class about as many")
     attacks.add_argument(
-        "--classes", nargs="+", default=(), help="classes or groups of classes, by their names"
+        "--classes", nargs="+", default=(), help="classes by their names, of calibration, too"
     )
     attacks.add_argument(
         "--case", nargs="+", default=(), help="by the names that a table gives, or @FILE of them"

@@ -34,9 +34,11 @@ class Settings:
         Folder of simulated pairs, which take long to make.
     first_seed
         The first of the seeds.
-    sample, classes, named, save
-        Of attacks alone: how many cases, of all classes; which classes; which by their names; a
-        folder for the images.
+    classes
+        Of attacks, margins and calibration: which classes.
+    sample, named, save
+        Of attacks alone: how many cases, of all classes; which by their names; a folder for the
+        images.
     """
 
     quick: bool

@@ -38,7 +38,7 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
     def __init__(self, tool: Any) -> None:
         super().__init__()
         self._tool = tool
-        self._given: dict[str, Any] = {}
+        self._inputs: dict[str, Any] = {}
         self._alike: dict[str, Any] = {}
         self._about = ""
 
@@ -103,7 +103,9 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         scratch = QgsProcessingContext()  # so that a mere check has no layer loaded afterwards
         try:
             given = with_layers_as_files(self, self._tool, parameters, context)
-            self._check(Reader(self, given, context, scratch, QgsProcessingFeedback()))
+            inputs = Reader(self, given, context, QgsProcessingFeedback())
+            outputs = Reader(self, parameters, scratch, QgsProcessingFeedback())
+            self._check(self._read(inputs, written=False) | self._read(outputs, written=True))
         except errors.GroundTieError as error:
             return False, error.one_line()
         return True, ""
@@ -114,8 +116,10 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> bool:
+        # Layers live in this thread, and must not be touched in that of `processAlgorithm`.
         try:
-            self._given = with_layers_as_files(self, self._tool, parameters, context)
+            given = with_layers_as_files(self, self._tool, parameters, context)
+            self._inputs = self._read(Reader(self, given, context, feedback), written=False)
         except errors.GroundTieError as error:
             raise QgsProcessingException(error.one_line()) from error
         for parameter in self._tool.parameters:
@@ -134,7 +138,8 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
     ) -> dict[str, Any]:
         values: dict[str, Any] = {}
         try:
-            values |= self._check(Reader(self, self._given, context, context, feedback))
+            outputs = Reader(self, parameters, context, feedback)
+            values |= self._check(self._inputs | self._read(outputs, written=True))
             with rasterio_env():
                 result = self._tool.run(**values, progress=_progress(feedback))
         except Exception as error:
@@ -153,9 +158,16 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         self._finish_layers(values, context)
         return self._results(values, result.summary())
 
-    def _check(self, reader: Reader) -> dict[str, Any]:
-        read = {parameter.name: reader.read(parameter) for parameter in self._tool.parameters}
-        read |= {parameter.name: _setting(parameter) for parameter in self._tool.common}
+    def _read(self, reader: Reader, *, written: bool) -> dict[str, Any]:
+        """Return the values of what is written, or of all the other parameters."""
+        return {
+            parameter.name: reader.read(parameter)
+            for parameter in self._tool.parameters
+            if isinstance(parameter.kind, kinds.WrittenKind) is written
+        }
+
+    def _check(self, read: dict[str, Any]) -> dict[str, Any]:
+        read = read | {parameter.name: _setting(parameter) for parameter in self._tool.common}
         values = dict(self._tool.check(read, spell=lambda parameter: tr(parameter.kind.label)))
         paths = [value for value in values.values() if isinstance(value, Path)]
         if missing := missing_for(self._tool.name, paths):

@@ -28,9 +28,7 @@ class Reader:
     Parameters
     ----------
     algorithm, parameters, context
-        As Processing hands them over.
-    outputs
-        The context to make outputs in: where it is not the call's own, nothing is loaded.
+        As Processing hands them over; the context loads outputs that are layers.
     feedback
         Takes the messages of layers that must be written to a file first.
     """
@@ -40,13 +38,11 @@ class Reader:
         algorithm: QgsProcessingAlgorithm,
         parameters: dict[str, Any],
         context: QgsProcessingContext,
-        outputs: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> None:
         self._algorithm = algorithm
         self._parameters = parameters
         self._context = context
-        self._outputs = outputs
         self._feedback = feedback
 
     def read(self, parameter: Any) -> Any:
@@ -73,23 +69,22 @@ class Reader:
             return self._word(name)
         if isinstance(kind, kinds.Crs):
             return self._crs(name)
-        read, context = self._method(kind)
-        return read(self._parameters, name, context)
+        return self._method(kind)(self._parameters, name, self._context)
 
-    def _method(self, kind: Any) -> tuple[Any, QgsProcessingContext]:
-        """Return the algorithm's method that reads values of this kind, and its context."""
+    def _method(self, kind: Any) -> Any:
+        """Return the algorithm's method that reads values of this kind."""
         algorithm = self._algorithm
         if isinstance(kind, (kinds.RasterOut, kinds.VectorOut)):
-            return algorithm.parameterAsOutputLayer, self._outputs
+            return algorithm.parameterAsOutputLayer
         if isinstance(kind, kinds.FileOut):
-            return algorithm.parameterAsFileOutput, self._outputs
+            return algorithm.parameterAsFileOutput
         if isinstance(kind, kinds.Flag):
-            return algorithm.parameterAsBool, self._context
+            return algorithm.parameterAsBool
         if isinstance(kind, kinds.Band) or (isinstance(kind, kinds.Number) and kind.integer):
-            return algorithm.parameterAsInt, self._context
+            return algorithm.parameterAsInt
         if isinstance(kind, kinds.Number):
-            return algorithm.parameterAsDouble, self._context
-        return algorithm.parameterAsString, self._context
+            return algorithm.parameterAsDouble
+        return algorithm.parameterAsString
 
     def _word(self, name: str) -> str:
         given = self._algorithm.parameterAsString(self._parameters, name, self._context)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -147,3 +148,11 @@ def test_optical_pairs_lie_where_their_truth_has_them(pair: Pair) -> None:
         return float(abs(np.corrcoef(seen, found.ravel())[0, 1]))
 
     assert likeness(0.0) > max(likeness(-4.0), likeness(4.0)) + 0.02
+
+
+def test_classes_may_be_chosen(tmp_path: Path, real_data: Path) -> None:
+    names = ("rural, large", "real sar-sar")
+    settings = Settings(False, 5, 1, real_data, tmp_path, first_seed=200, classes=names)
+    assert {case.group for case in calibration.cases(settings)} == set(names)
+    with pytest.raises(ValueError, match="no class 'rurals'"):
+        calibration.cases(dataclasses.replace(settings, classes=("rurals",)))

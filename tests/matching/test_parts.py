@@ -100,26 +100,38 @@ def test_chips_may_be_missing() -> None:
     assert find_parts(GRID, CENTRES[:0], surfaces[:0]) == []
 
 
-def test_chips_of_a_part_need_not_be_neighbours() -> None:
-    """Tiles of another date lie anywhere: every fifth chip."""
+def test_tiles_are_parts_wherever_they_lie() -> None:
+    """Two tiles of another date, of 2 × 2 chips each."""
     surfaces = noise()
-    tiles = np.arange(len(CENTRES)) % 5 == 0
-    raised(surfaces, tiles, (9, -6), 6.0)
-    (part,) = find_parts(GRID, CENTRES, surfaces)
-    assert part.shift_px == (9.0, -6.0)
-    assert set(np.flatnonzero(tiles)) <= set(part.members)
+    col, row = (CENTRES // 50).T
+    first, second = (col < 2) & (row < 2), (col > 3) & (col < 6) & (row > 2) & (row < 5)
+    raised(surfaces, first | second, (9, -6), 8.0)
+    parts = find_parts(GRID, CENTRES, surfaces)
+    assert {part.shift_px for part in parts} == {(9.0, -6.0)}
+    found = [set(part.members) for part in parts]
+    for tile in (first, second):
+        assert any(set(np.flatnonzero(tile)) <= members for members in found)
+
+
+def test_scattered_chips_are_no_part() -> None:
+    """Canopies are displaced all over a scene, wherever a chip holds little else."""
+    surfaces = noise()
+    col, row = (CENTRES // 50).T
+    raised(surfaces, (col % 2 == 0) & (row % 2 == 0), (9, -6), 6.0)
+    assert find_parts(GRID, CENTRES, surfaces) == []
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_no_other_set_of_chips_is_higher(seed: int) -> None:
-    """Of all 219 sets of three chips or more of eight, by trying each."""
-    chips = np.arange(8)
-    surfaces = np.minimum(2 * noise(seed)[:8], 7.0)
-    part = highest_part(GRID, CENTRES[:8], surfaces, chips)
+def test_no_other_set_of_neighbours_is_higher(seed: int) -> None:
+    """Of all five sets of three chips or more of four, by trying each."""
+    chips = np.arange(4)
+    four = np.flatnonzero((CENTRES < 100).all(axis=1))
+    surfaces = np.minimum(2 * noise(seed)[four], 7.0)
+    part = highest_part(GRID, CENTRES[four], surfaces, chips)
     off = np.hypot(*np.meshgrid(*2 * [np.arange(-RADIUS, RADIUS + 1)]))
     elsewhere = (off > 4) & (off <= 20)
     higher = surfaces[:, elsewhere] - surfaces[:, off <= 2].max(axis=1)[:, None]
-    sets = [np.flatnonzero(bits >> chips & 1) for bits in range(256)]
+    sets = [np.flatnonzero(bits >> chips & 1) for bits in range(16)]
     highest = max(
         float((higher[of].sum(axis=0) - higher[of].max(axis=0)).max() / np.sqrt(len(of) - 1))
         for of in sets

@@ -204,17 +204,30 @@ class TestRun:
         assert Path(results["OUTPUT"]).suffix == ".tif"
         assert Path(results["OUTPUT"]).read_bytes() == b"done"
 
-    def test_it_runs_off_the_main_thread_as_in_the_desktop(
-        self, algorithm: Any, values: dict[str, Any]
+    def test_it_runs_off_the_main_thread_and_reads_its_layers_in_it(
+        self, algorithm: Any, values: dict[str, Any], monkeypatch: pytest.MonkeyPatch
     ) -> None:
+        """As in the desktop: layers may be touched only where they live."""
+        import groundtie_qgis.values as reading
         from qgis.core import (
             QgsApplication,
             QgsProcessingAlgRunnerTask,
             QgsProcessingContext,
             QgsProcessingFeedback,
         )
-        from qgis.PyQt.QtCore import QEventLoop
+        from qgis.PyQt.QtCore import QEventLoop, QThread
 
+        threads: dict[str, list[bool]] = {"layers": [], "run": []}
+
+        def noting(what: str, function: Any) -> Any:
+            def noted(*given: Any, **named: Any) -> Any:
+                threads[what].append(QThread.currentThread() == QgsApplication.instance().thread())
+                return function(*given, **named)
+
+            return noted
+
+        monkeypatch.setattr(reading, "_file_of", noting("layers", reading._file_of))
+        monkeypatch.setitem(algorithm._tool.__dict__, "run", noting("run", algorithm._tool.run))
         context, feedback, loop = QgsProcessingContext(), QgsProcessingFeedback(), QEventLoop()
         task = QgsProcessingAlgRunnerTask(algorithm, values, context, feedback)
         done: list[Any] = []
@@ -223,6 +236,8 @@ class TestRun:
         loop.exec_()
         assert done[0][0]
         assert done[0][1]["CHECK_RMSE_PX"] == 0.25
+        assert threads["layers"] and all(threads["layers"])
+        assert threads["run"] == [False]
 
 
 class TestFailure:

@@ -196,7 +196,7 @@ def read(algorithm: Any, tool: str, **values: Any) -> Any:
     ((name, _),) = values.items()
     parameter = library_module("tools").load_tool(tool).parameter(name.lower())
     context = QgsProcessingContext()
-    return Reader(algorithm, values, context, context, QgsProcessingFeedback()).read(parameter)
+    return Reader(algorithm, values, context, QgsProcessingFeedback()).read(parameter)
 
 
 def test_a_crs_without_a_code_keeps_its_text(provider: Any) -> None:

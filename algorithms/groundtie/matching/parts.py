@@ -7,10 +7,13 @@ is lower where the model has it, they do: a strip of another pass, tiles of anot
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from ..rasters.grid import Grid
 from .belief_propagation import Surfaces
@@ -94,10 +97,11 @@ def find_parts(grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces) -> lis
 def highest_part(
     grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces, which: NDArray[np.int_]
 ) -> Part | None:
-    """Return the chips that are highest at one place elsewhere against where the model has each.
+    """Return neighbours that are highest at one place elsewhere, against where the model has each.
 
-    Of all sets of so many chips, the highest is that of the highest ones: so no more sets need be
-    looked at than there are chips [Neill2012].
+    Of all sets of so many chips, the highest at a place is that of the highest ones: so no more
+    sets need be looked at than there are chips [Neill2012]. Of that set, each group of neighbours
+    may be a part.
 
     Parameters
     ----------
@@ -106,26 +110,66 @@ def highest_part(
     which
         Which of the chips, by number.
     """
-    if len(which) < _FEWEST_CHIPS:
-        return None
+    shifts, higher = _higher_elsewhere(surfaces[which])
+    sizes, excesses = _highest_sets(higher)
+    are_neighbours = _are_neighbours(centres[which])
+    best, most = None, -np.inf
+    for place in np.argsort(-excesses):
+        if excesses[place] <= most:
+            break  # no group is higher than the set that it is of
+        highest = np.argsort(-higher[:, place])[: sizes[place]]
+        for group in _connected(highest, are_neighbours):
+            excess = float(_excess(higher[group, place]))
+            if len(group) >= _FEWEST_CHIPS and excess > most:
+                members, most = np.sort(which[group]), excess
+                where = _where(grid, centres[members].mean(axis=0))
+                x, y = map(float, shifts[place])
+                best = Part(where, (x, y), excess, tuple(map(int, members)))
+    return best
+
+
+def _higher_elsewhere(surfaces: Surfaces) -> tuple[NDArray[np.int_], FloatArray]:
+    """Return places elsewhere, (x, y), shape (s, 2), and how much higher chips are, (n, s)."""
     radius = surfaces.shape[-1] // 2
     shifts = np.stack(np.meshgrid(*2 * [np.arange(-radius, radius + 1)]), axis=-1).reshape(-1, 2)
     distance = np.hypot(*shifts.T)
     is_far = (distance > ELSEWHERE_PX) & (distance <= _FARTHEST_PX)
-    shown = limited(surfaces[which]).astype(float).reshape(len(which), -1)
-    higher = shown[:, is_far] - shown[:, distance <= SAME_PX].max(axis=1, keepdims=True)
+    shown = limited(surfaces).astype(float).reshape(len(surfaces), len(shifts))
+    own = shown[:, distance <= SAME_PX].max(axis=1, keepdims=True)
+    return shifts[is_far], shown[:, is_far] - own
+
+
+def _highest_sets(higher: FloatArray) -> tuple[NDArray[np.int_], FloatArray]:
+    """Return for each place of how many chips, the highest ones, the excess is largest, and it."""
+    chips, places = higher.shape
+    if chips < _FEWEST_CHIPS:
+        return np.zeros(places, int), np.full(places, -np.inf)
     confirming = np.sort(higher, axis=0)[-2::-1].cumsum(axis=0)
-    excess = confirming / np.sqrt(np.arange(1, len(which)))[:, None]
-    excess[: _FEWEST_CHIPS - 2] = -np.inf
-    last, place = np.unravel_index(excess.argmax(), excess.shape)
-    members = which[np.argsort(-higher[:, place])[: last + 2]]
-    x, y = shifts[is_far][place]
-    return Part(
-        _where(grid, centres[members].mean(axis=0)),
-        (float(x), float(y)),
-        float(excess[last, place]),
-        tuple(int(chip) for chip in np.sort(members)),
+    excess = confirming / np.sqrt(np.arange(1, chips))[:, None]
+    excess = excess[_FEWEST_CHIPS - 2 :]
+    return excess.argmax(axis=0) + _FEWEST_CHIPS, excess.max(axis=0)
+
+
+def _excess(higher: FloatArray) -> np.floating[Any]:
+    """Return the excess of chips that are so much higher, shape (n,): see `LEAST_EXCESS`."""
+    return (higher.sum() - higher.max()) / np.sqrt(max(len(higher) - 1, 1))
+
+
+def _are_neighbours(centres: NDArray[np.int_]) -> NDArray[np.bool_]:
+    """Return which chips of a regular layout are next to each other, (n, n), diagonals included."""
+    cols, rows = (np.unique(along, return_inverse=True)[1].reshape(-1) for along in centres.T)
+    return np.asarray(
+        (abs(np.subtract.outer(cols, cols)) <= 1) & (abs(np.subtract.outer(rows, rows)) <= 1)
     )
+
+
+def _connected(
+    chips: NDArray[np.int_], are_neighbours: NDArray[np.bool_]
+) -> Iterator[NDArray[np.int_]]:
+    """Yield the groups of chips that neighbours connect."""
+    count, group = connected_components(are_neighbours[np.ix_(chips, chips)])
+    for number in range(count):
+        yield chips[group == number]
 
 
 def limited(surfaces: Surfaces) -> Surfaces:
