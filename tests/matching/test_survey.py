@@ -161,6 +161,19 @@ def test_what_is_similar_because_it_lies_near_is_no_second_peak() -> None:
     assert survey.second_peak == 0
 
 
+@pytest.mark.parametrize(("height", "counted"), [(5.0, 5.0), (7.0, 7.0), (35.0, 7.0)])
+def test_one_chip_counts_for_so_much_at_most_of_a_second_peak(
+    height: float, counted: float
+) -> None:
+    """A few canopies are higher than all of a scene whose ground lies elsewhere."""
+    surfaces = np.zeros((9, 2 * SURVEY_RADIUS_PX + 1, 2 * SURVEY_RADIUS_PX + 1), np.float32)
+    surfaces[:, SURVEY_RADIUS_PX, SURVEY_RADIUS_PX] = 50.0
+    surfaces[:2, SURVEY_RADIUS_PX - 6, SURVEY_RADIUS_PX + 8] = height
+    grid, centres = utm_grid(SIDE, SIDE), np.full((9, 2), 50)
+    survey = Survey(grid, centres, np.zeros((9, 2)), surfaces)
+    assert survey.second_peak == pytest.approx(2 * counted / 9)
+
+
 def test_what_is_left_out_is_not_matched(tmp_path: Path, context: Context) -> None:
     survey = surveyed(tmp_path, place(), place(), context, hidden=np.ones((1, 1)))
     assert len(survey.centres) == 0

@@ -193,7 +193,7 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, estimated(fit_with(displaced(100, -0.8, 0.8))), layover_factor=3.0),
     ),
     "part elsewhere": (
-        evidence(GOOD, survey=survey(37, part=12)),
+        evidence(GOOD, survey=survey(38, part=11)),
         evidence(GOOD, survey=survey(46, part=2)),
     ),
     "second place nearby": (

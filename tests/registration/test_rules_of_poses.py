@@ -60,7 +60,7 @@ def fallen_beyond(count: int) -> np.ndarray:
     [
         (7, survey(), None, []),
         (5, survey(), None, ["chance agreement", "small share of check points"]),
-        (7, survey(37, part=12), None, ["part elsewhere"]),
+        (7, survey(38, part=11), None, ["part elsewhere"]),
         (7, survey(height=4.0, rival=3.5), None, ["second place nearby"]),
         (7, survey(height=1.9, rival=0.5), None, ["weak similarity"]),
         (7, survey(), Rest(survey(height=2.4, rival=1.0)), ["pixel-locked content"]),

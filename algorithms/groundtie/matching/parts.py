@@ -28,13 +28,13 @@ ELSEWHERE_PX, _FARTHEST_PX = 2 * SAME_PX, 20.0
 
 # Fewer chips are no part, and none counts for more than this.
 _FEWEST_CHIPS = 3
-_MOST_OF_ONE = 7.0
+MOST_OF_ONE = 7.0
 
 # The highest chip of a part names the place where it lies, and the others confirm it. How much
 # higher they are there than where the model has them is their sum over the square root of their
 # number, in standard deviations of noise. It must be more than one chip may count for: two copies
 # of one chip and a third by chance, 1.6 high as some of 81 are, leave 8.6 / √2 = 6.1.
-LEAST_EXCESS = _MOST_OF_ONE
+LEAST_EXCESS = MOST_OF_ONE
 
 _ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
 
@@ -174,8 +174,8 @@ def _connected(
 
 def limited(surfaces: Surfaces) -> Surfaces:
     """Return surfaces, shape (n, h, w), of which none is higher than one chip counts."""
-    highest = np.maximum(surfaces.max(axis=(1, 2), keepdims=True, initial=0.0), _MOST_OF_ONE)
-    return np.asarray(surfaces * (_MOST_OF_ONE / highest))
+    highest = np.maximum(surfaces.max(axis=(1, 2), keepdims=True, initial=0.0), MOST_OF_ONE)
+    return np.asarray(surfaces * (MOST_OF_ONE / highest))
 
 
 def _where(grid: Grid, px: FloatArray) -> str:

@@ -22,6 +22,7 @@ from .matcher import FloatArray, MaskOf, Places
 from .parts import (
     ELSEWHERE_PX,
     LEAST_EXCESS,
+    MOST_OF_ONE,
     SAME_PX,
     Part,
     find_parts,
@@ -94,30 +95,37 @@ class Survey:
     @property
     def rival_height(self) -> float:
         """How high it is where all of them are moved elsewhere, at the best such place."""
-        return float(self._mean_elsewhere.max())
+        return float(self.mean[self._is_far].max())
 
     @property
     def second_peak(self) -> float:
-        """The height of the highest peak elsewhere; 0: there is none.
+        """How high many chips are at the highest peak elsewhere; 0: there is none.
 
         Ground that lies elsewhere has one; what is similar because it lies near has none.
         """
-        is_peak = self._is_far & (self.mean == cv2.dilate(self.mean, _NEIGHBOURS))
-        return float(self.mean[is_peak].max(initial=0.0))
+        is_peak = self._is_far.copy()
+        for mean in (self.mean, self._mean_of_many):
+            is_peak &= mean == cv2.dilate(mean, _NEIGHBOURS)
+        return float(self._mean_of_many[is_peak].max(initial=0.0))
 
     @property
     def deviation_elsewhere(self) -> float:
-        """The robust standard deviation of the mean similarity elsewhere.
+        """The robust standard deviation of the mean similarity of many chips elsewhere.
 
         It is no less than that of a mean of as many independent chips: where little overlaps, most
         of it is 0.
         """
         of_noise = max(len(self.surfaces), 1) ** -0.5
-        return max(robust_deviation(self._mean_elsewhere), of_noise)
+        return max(robust_deviation(self._mean_of_many[self._is_far]), of_noise)
 
-    @property
-    def _mean_elsewhere(self) -> FloatArray:
-        return np.asarray(self.mean[self._is_far])
+    @cached_property
+    def _mean_of_many(self) -> Surface:
+        """As `mean`, but of surfaces cut off where a chip would count for more than one may.
+
+        So a few canopies that are displaced are no peak of the whole.
+        """
+        total = np.minimum(self.surfaces, MOST_OF_ONE).sum(axis=0)
+        return np.asarray(total / max(len(self.surfaces), 1))
 
     @property
     def _is_far(self) -> NDArray[np.bool_]:
