@@ -2,14 +2,14 @@
 
 Single chips match badly, but their similarity surfaces add up: what several of them have in common
 stands out of noise by the square root of their number. Where that lies elsewhere, and each of them
-is lower where the model has it, they do: a strip of another pass, tiles of another date, layover.
+is lower where the model has it, they do: a strip of another pass, a tile of another date, layover.
+They are neighbours: canopies are displaced, too, all over a scene that is registered right.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,7 @@ _ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
 
 @dataclass(frozen=True)
 class Part:
-    """Chips that together match elsewhere than a model has them.
+    """Neighbouring chips that together match elsewhere than a model has them.
 
     Parameters
     ----------
@@ -112,14 +112,14 @@ def highest_part(
     """
     shifts, higher = _higher_elsewhere(surfaces[which])
     sizes, excesses = _highest_sets(higher)
-    are_neighbours = _are_neighbours(centres[which])
+    are_neighbours = _are_neighbours(centres)[np.ix_(which, which)]
     best, most = None, -np.inf
     for place in np.argsort(-excesses):
         if excesses[place] <= most:
             break  # no group is higher than the set that it is of
         highest = np.argsort(-higher[:, place])[: sizes[place]]
         for group in _connected(highest, are_neighbours):
-            excess = float(_excess(higher[group, place]))
+            excess = _excess(higher[group, place])
             if len(group) >= _FEWEST_CHIPS and excess > most:
                 members, most = np.sort(which[group]), excess
                 where = _where(grid, centres[members].mean(axis=0))
@@ -150,9 +150,9 @@ def _highest_sets(higher: FloatArray) -> tuple[NDArray[np.int_], FloatArray]:
     return excess.argmax(axis=0) + _FEWEST_CHIPS, excess.max(axis=0)
 
 
-def _excess(higher: FloatArray) -> np.floating[Any]:
+def _excess(higher: FloatArray) -> float:
     """Return the excess of chips that are so much higher, shape (n,): see `LEAST_EXCESS`."""
-    return (higher.sum() - higher.max()) / np.sqrt(max(len(higher) - 1, 1))
+    return float((higher.sum() - higher.max()) / np.sqrt(max(len(higher) - 1, 1)))
 
 
 def _are_neighbours(centres: NDArray[np.int_]) -> NDArray[np.bool_]:
