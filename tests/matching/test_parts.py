@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from raster_files import utm_grid
 
-from groundtie.matching.parts import LEAST_EXCESS, find_parts, highest_part
+from groundtie.matching.parts import LEAST_EXCESS, find_parts, parts_in_turn
 
 RADIUS = 24
 COLS, ROWS = 7, 6
@@ -86,9 +86,7 @@ def test_two_chips_are_no_part_however_high(chips: int, found: int) -> None:
 def test_one_chip_counts_for_so_much_at_most() -> None:
     surfaces = noise()
     raised(surfaces, np.arange(len(CENTRES)) == 10, (9, -6), 1000.0)
-    part = highest_part(GRID, CENTRES, surfaces, np.arange(len(CENTRES)))
-    assert part is not None
-    assert part.excess < LEAST_EXCESS
+    assert next(parts_in_turn(GRID, CENTRES, surfaces)).excess < LEAST_EXCESS
 
 
 def test_chips_may_be_missing() -> None:
@@ -121,21 +119,29 @@ def test_scattered_chips_are_no_part() -> None:
     assert find_parts(GRID, CENTRES, surfaces) == []
 
 
+@pytest.mark.parametrize(("right", "found"), [(18, 1), (22, 0)])
+def test_what_is_highest_farther_off_is_no_part(right: int, found: int) -> None:
+    """Canopies of 30 m are displaced so far; their peaks reach nearer."""
+    surfaces = noise()
+    at = np.arange(-RADIUS, RADIUS + 1)
+    peak = 9 * np.exp(-((at - right) ** 2 + at[:, None] ** 2) / 18)
+    surfaces[CENTRES[:, 0] < 150] += peak.astype(np.float32)
+    assert len(find_parts(GRID, CENTRES, surfaces)) == found
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_no_other_set_of_neighbours_is_higher(seed: int) -> None:
     """Of all five sets of three chips or more of four, by trying each."""
-    chips = np.arange(4)
     four = np.flatnonzero((CENTRES < 100).all(axis=1))
-    surfaces = np.minimum(2 * noise(seed)[four], 7.0)
-    part = highest_part(GRID, CENTRES[four], surfaces, chips)
     off = np.hypot(*np.meshgrid(*2 * [np.arange(-RADIUS, RADIUS + 1)]))
+    surfaces = np.where(off <= 20, np.minimum(2 * noise(seed)[four], 7.0), -9.0)
+    part = next(parts_in_turn(GRID, CENTRES[four], surfaces))
     elsewhere = (off > 4) & (off <= 20)
     higher = surfaces[:, elsewhere] - surfaces[:, off <= 2].max(axis=1)[:, None]
-    sets = [np.flatnonzero(bits >> chips & 1) for bits in range(16)]
+    sets = [np.flatnonzero(bits >> np.arange(4) & 1) for bits in range(16)]
     highest = max(
         float((higher[of].sum(axis=0) - higher[of].max(axis=0)).max() / np.sqrt(len(of) - 1))
         for of in sets
         if len(of) >= 3
     )
-    assert part is not None
     assert part.excess == pytest.approx(highest)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +23,10 @@ from .matcher import FloatArray
 # Chips agree with each other, or with the model, within this distance.
 SAME_PX = 2.0
 
-# Farther from where the model has them, they lie elsewhere; still farther they are no part, but as
-# canopies are displaced: of 30 m, in pixels of 1 m.
-ELSEWHERE_PX, _FARTHEST_PX = 2 * SAME_PX, 20.0
+# Farther from where the model has them, they lie elsewhere; what is highest still farther off is no
+# part, but as canopies are displaced: of 30 m, in pixels of 1 m. Such a place is one of whole
+# pixels, and off by one at most.
+ELSEWHERE_PX, _FARTHEST_PX = 2 * SAME_PX, 20.0 + 1.0
 
 # Fewer chips are no part, and none counts for more than this.
 _FEWEST_CHIPS = 3
@@ -72,7 +74,13 @@ class Part:
 
 
 def find_parts(grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces) -> list[Part]:
-    """Return evident parts, the most evident first; no chip is in two of them.
+    """Return evident parts, the most evident first: see `parts_in_turn`."""
+    parts = parts_in_turn(grid, centres, surfaces)
+    return list(takewhile(lambda part: part.excess >= LEAST_EXCESS, parts))
+
+
+def parts_in_turn(grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces) -> Iterator[Part]:
+    """Yield parts, the most evident first, evident or not; no chip is in two of them.
 
     Parameters
     ----------
@@ -84,17 +92,14 @@ def find_parts(grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces) -> lis
         Their similarity around where the model has them, in robust standard deviations, shape
         (n, 2 r + 1, 2 r + 1).
     """
-    found = []
     left = np.arange(len(centres))
-    while part := highest_part(grid, centres, surfaces, left):
-        if part.excess < LEAST_EXCESS:
-            break
-        found.append(part)
+    while part := _highest_part(grid, centres, surfaces, left):
+        if part.distance_px <= _FARTHEST_PX:
+            yield part
         left = np.setdiff1d(left, part.members)
-    return found
 
 
-def highest_part(
+def _highest_part(
     grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces, which: NDArray[np.int_]
 ) -> Part | None:
     """Return neighbours that are highest at one place elsewhere, against where the model has each.
@@ -102,13 +107,6 @@ def highest_part(
     Of all sets of so many chips, the highest at a place is that of the highest ones: so no more
     sets need be looked at than there are chips [Neill2012]. Of that set, each group of neighbours
     may be a part.
-
-    Parameters
-    ----------
-    grid, centres, surfaces
-        See `find_parts`.
-    which
-        Which of the chips, by number.
     """
     shifts, higher = _higher_elsewhere(surfaces[which])
     sizes, excesses = _highest_sets(higher)
@@ -133,7 +131,7 @@ def _higher_elsewhere(surfaces: Surfaces) -> tuple[NDArray[np.int_], FloatArray]
     radius = surfaces.shape[-1] // 2
     shifts = np.stack(np.meshgrid(*2 * [np.arange(-radius, radius + 1)]), axis=-1).reshape(-1, 2)
     distance = np.hypot(*shifts.T)
-    is_far = (distance > ELSEWHERE_PX) & (distance <= _FARTHEST_PX)
+    is_far = distance > ELSEWHERE_PX
     shown = limited(surfaces).astype(float).reshape(len(surfaces), len(shifts))
     own = shown[:, distance <= SAME_PX].max(axis=1, keepdims=True)
     return shifts[is_far], shown[:, is_far] - own

@@ -26,8 +26,8 @@ from .parts import (
     SAME_PX,
     Part,
     find_parts,
-    highest_part,
     limited,
+    parts_in_turn,
 )
 
 # Chips lie side by side: so many along the shorter side of the grid if their sides allow it, and no
@@ -156,8 +156,7 @@ class Survey:
     @property
     def highest_part(self) -> Part | None:
         """The most evident part, evident or not; None: there are too few chips."""
-        everyone = np.arange(len(self.centres))
-        return highest_part(self.grid, self.centres, self.surfaces, everyone)
+        return next(parts_in_turn(self.grid, self.centres, self.surfaces), None)
 
 
 def survey_places(grid: Grid) -> Places:
