@@ -24,9 +24,8 @@ from .matcher import FloatArray
 SAME_PX = 2.0
 
 # Farther from where the model has them, they lie elsewhere; what is highest still farther off is no
-# part, but as canopies are displaced: of 30 m, in pixels of 1 m. Such a place is one of whole
-# pixels, and off by one at most.
-ELSEWHERE_PX, _FARTHEST_PX = 2 * SAME_PX, 20.0 + 1.0
+# part, but as canopies are displaced: of 30 m, in pixels of 1 m.
+ELSEWHERE_PX, _FARTHEST_PX = 2 * SAME_PX, 20.0
 
 # Fewer chips are no part, and none counts for more than this.
 _FEWEST_CHIPS = 3
