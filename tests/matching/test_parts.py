@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from raster_files import utm_grid
 
-from groundtie.matching.parts import LEAST_EXCESS, find_parts, parts_in_turn
+from groundtie.matching.parts import LEAST_EXCESS, find_parts
 
 RADIUS = 24
 COLS, ROWS = 7, 6
@@ -33,7 +33,7 @@ def highest_of_noise() -> float:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_noise_has_no_part(seed: int) -> None:
-    assert find_parts(GRID, CENTRES, noise(seed)) == []
+    assert list(find_parts(GRID, CENTRES, noise(seed))) == []
 
 
 @pytest.mark.parametrize(
@@ -73,20 +73,20 @@ def test_what_the_model_has_is_no_part() -> None:
     surfaces = noise()
     raised(surfaces, CENTRES[:, 0] < 150, (9, -6), 5.0)
     raised(surfaces, CENTRES[:, 0] < 150, (0, 0), 5.0)
-    assert find_parts(GRID, CENTRES, surfaces) == []
+    assert list(find_parts(GRID, CENTRES, surfaces)) == []
 
 
 @pytest.mark.parametrize(("chips", "found"), [(2, 0), (3, 1)])
 def test_two_chips_are_no_part_however_high(chips: int, found: int) -> None:
     surfaces = np.zeros_like(noise())
     raised(surfaces, np.arange(len(CENTRES)) < chips, (9, -6), 100.0)
-    assert len(find_parts(GRID, CENTRES, surfaces)) == found
+    assert len(list(find_parts(GRID, CENTRES, surfaces))) == found
 
 
 def test_one_chip_counts_for_so_much_at_most() -> None:
     surfaces = noise()
     raised(surfaces, np.arange(len(CENTRES)) == 10, (9, -6), 1000.0)
-    assert next(parts_in_turn(GRID, CENTRES, surfaces)).excess < LEAST_EXCESS
+    assert next(find_parts(GRID, CENTRES, surfaces, -np.inf)).excess < LEAST_EXCESS
 
 
 def test_chips_may_be_missing() -> None:
@@ -95,7 +95,7 @@ def test_chips_may_be_missing() -> None:
     raised(surfaces, CENTRES[:, 0] < 150, (9, -6), 6.0)
     (part,) = find_parts(GRID, CENTRES[kept], surfaces[kept])
     assert (CENTRES[kept][list(part.members), 0] < 150).all()
-    assert find_parts(GRID, CENTRES[:0], surfaces[:0]) == []
+    assert list(find_parts(GRID, CENTRES[:0], surfaces[:0])) == []
 
 
 def test_tiles_are_parts_wherever_they_lie() -> None:
@@ -104,7 +104,7 @@ def test_tiles_are_parts_wherever_they_lie() -> None:
     col, row = (CENTRES // 50).T
     first, second = (col < 2) & (row < 2), (col > 3) & (col < 6) & (row > 2) & (row < 5)
     raised(surfaces, first | second, (9, -6), 8.0)
-    parts = find_parts(GRID, CENTRES, surfaces)
+    parts = list(find_parts(GRID, CENTRES, surfaces))
     assert {part.shift_px for part in parts} == {(9.0, -6.0)}
     found = [set(part.members) for part in parts]
     for tile in (first, second):
@@ -116,7 +116,7 @@ def test_scattered_chips_are_no_part() -> None:
     surfaces = noise()
     col, row = (CENTRES // 50).T
     raised(surfaces, (col % 2 == 0) & (row % 2 == 0), (9, -6), 6.0)
-    assert find_parts(GRID, CENTRES, surfaces) == []
+    assert list(find_parts(GRID, CENTRES, surfaces)) == []
 
 
 @pytest.mark.parametrize(("right", "found"), [(18, 1), (22, 0)])
@@ -126,7 +126,7 @@ def test_what_is_highest_farther_off_is_no_part(right: int, found: int) -> None:
     at = np.arange(-RADIUS, RADIUS + 1)
     peak = 9 * np.exp(-((at - right) ** 2 + at[:, None] ** 2) / 18)
     surfaces[CENTRES[:, 0] < 150] += peak.astype(np.float32)
-    assert len(find_parts(GRID, CENTRES, surfaces)) == found
+    assert len(list(find_parts(GRID, CENTRES, surfaces))) == found
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -135,7 +135,7 @@ def test_no_other_set_of_neighbours_is_higher(seed: int) -> None:
     four = np.flatnonzero((CENTRES < 100).all(axis=1))
     off = np.hypot(*np.meshgrid(*2 * [np.arange(-RADIUS, RADIUS + 1)]))
     surfaces = np.where(off <= 20, np.minimum(2 * noise(seed)[four], 7.0), -9.0)
-    part = next(parts_in_turn(GRID, CENTRES[four], surfaces))
+    part = next(find_parts(GRID, CENTRES[four], surfaces, -np.inf))
     elsewhere = (off > 4) & (off <= 20)
     higher = surfaces[:, elsewhere] - surfaces[:, off <= 2].max(axis=1)[:, None]
     sets = [np.flatnonzero(bits >> np.arange(4) & 1) for bits in range(16)]

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,14 +71,10 @@ class Part:
         return float(np.hypot(*self.shift_px))
 
 
-def find_parts(grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces) -> list[Part]:
-    """Return evident parts, the most evident first: see `parts_in_turn`."""
-    parts = parts_in_turn(grid, centres, surfaces)
-    return list(takewhile(lambda part: part.excess >= LEAST_EXCESS, parts))
-
-
-def parts_in_turn(grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces) -> Iterator[Part]:
-    """Yield parts, the most evident first, evident or not; no chip is in two of them.
+def find_parts(
+    grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces, least: float = LEAST_EXCESS
+) -> Iterator[Part]:
+    """Yield parts, the most evident first; no chip is in two of them.
 
     Parameters
     ----------
@@ -90,16 +85,22 @@ def parts_in_turn(grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces) -> 
     surfaces
         Their similarity around where the model has them, in robust standard deviations, shape
         (n, 2 r + 1, 2 r + 1).
+    least
+        The excess from which on they are parts.
     """
     left = np.arange(len(centres))
-    while part := _highest_part(grid, centres, surfaces, left):
+    while part := _highest_part(grid, centres, surfaces, left, least):
         if part.distance_px <= _FARTHEST_PX:
             yield part
         left = np.setdiff1d(left, part.members)
 
 
 def _highest_part(
-    grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces, which: NDArray[np.int_]
+    grid: Grid,
+    centres: NDArray[np.int_],
+    surfaces: Surfaces,
+    which: NDArray[np.int_],
+    least: float,
 ) -> Part | None:
     """Return neighbours that are highest at one place elsewhere, against where the model has each.
 
@@ -107,18 +108,20 @@ def _highest_part(
     sets need be looked at than there are chips [Neill2012]. Of that set, each group of neighbours
     may be a part.
     """
+    if len(which) < _FEWEST_CHIPS:
+        return None
     shifts, higher = _higher_elsewhere(surfaces[which])
     sizes, excesses = _highest_sets(higher)
     are_neighbours = _are_neighbours(centres)[np.ix_(which, which)]
-    best, most = None, -np.inf
+    best = None
     for place in np.argsort(-excesses):
-        if excesses[place] <= most:
+        if excesses[place] < least:
             break  # no group is higher than the set that it is of
         highest = np.argsort(-higher[:, place])[: sizes[place]]
         for group in _connected(highest, are_neighbours):
             excess = _excess(higher[group, place])
-            if len(group) >= _FEWEST_CHIPS and excess > most:
-                members, most = np.sort(which[group]), excess
+            if len(group) >= _FEWEST_CHIPS and excess >= least:
+                members, least = np.sort(which[group]), excess
                 where = _where(grid, centres[members].mean(axis=0))
                 x, y = map(float, shifts[place])
                 best = Part(where, (x, y), excess, tuple(map(int, members)))
@@ -138,11 +141,8 @@ def _higher_elsewhere(surfaces: Surfaces) -> tuple[NDArray[np.int_], FloatArray]
 
 def _highest_sets(higher: FloatArray) -> tuple[NDArray[np.int_], FloatArray]:
     """Return for each place of how many chips, the highest ones, the excess is largest, and it."""
-    chips, places = higher.shape
-    if chips < _FEWEST_CHIPS:
-        return np.zeros(places, int), np.full(places, -np.inf)
     confirming = np.sort(higher, axis=0)[-2::-1].cumsum(axis=0)
-    excess = confirming / np.sqrt(np.arange(1, chips))[:, None]
+    excess = confirming / np.sqrt(np.arange(1, len(higher)))[:, None]
     excess = excess[_FEWEST_CHIPS - 2 :]
     return excess.argmax(axis=0) + _FEWEST_CHIPS, excess.max(axis=0)
 

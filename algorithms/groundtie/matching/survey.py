@@ -27,7 +27,6 @@ from .parts import (
     Part,
     find_parts,
     limited,
-    parts_in_turn,
 )
 
 # Chips lie side by side: so many along the shorter side of the grid if their sides allow it, and no
@@ -140,7 +139,7 @@ class Survey:
     @cached_property
     def parts(self) -> Sequence[Part]:
         """Chips that together match elsewhere, the most evident first."""
-        return find_parts(self.grid, self.centres, self.surfaces)
+        return list(find_parts(self.grid, self.centres, self.surfaces))
 
     @property
     def excess(self) -> float:
@@ -156,7 +155,7 @@ class Survey:
     @property
     def highest_part(self) -> Part | None:
         """The most evident part, evident or not; None: there are too few chips."""
-        return next(parts_in_turn(self.grid, self.centres, self.surfaces), None)
+        return next(find_parts(self.grid, self.centres, self.surfaces, -np.inf), None)
 
 
 def survey_places(grid: Grid) -> Places:
