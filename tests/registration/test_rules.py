@@ -200,6 +200,11 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(rival=6.5)),
         evidence(GOOD, survey=survey(rival=6.3)),
     ),
+    # Of 49 chips a third are 16.3.
+    "few chips confirm": (
+        evidence(GOOD, survey=survey(16)),
+        evidence(GOOD, survey=survey(17)),
+    ),
     "weak similarity": (
         evidence(GOOD, survey=survey(height=1.9, rival=1.0)),
         evidence(GOOD, survey=survey(height=2.1, rival=1.0)),

@@ -76,6 +76,11 @@ class Survey:
         return np.asarray(np.hypot(*self.shifts_px.T) <= SAME_PX)
 
     @property
+    def is_evident_chip(self) -> NDArray[np.bool_]:
+        """Which chips have a peak somewhere as high as one chip may count for, shape (n,)."""
+        return np.asarray(self.surfaces.max(axis=(1, 2), initial=0.0) >= MOST_OF_ONE)
+
+    @property
     def confirming(self) -> int:
         """How many chips match where the model has them."""
         return int(self.is_confirming_chip.sum())
