@@ -21,6 +21,7 @@ from groundtie.matching.survey import Survey
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
+    LARGEST_SHARE,
     PEAK_DEVIATIONS,
     REST_PEAK_DEVIATIONS,
     RIVAL_HEIGHT,
@@ -28,6 +29,7 @@ from groundtie.registration.rules.survey import (
     WEAK_REST_HEIGHT,
     deviations_beyond,
     deviations_elsewhere,
+    evident_share,
     has_few_chips,
 )
 from groundtie.registration.specification import COREGISTER
@@ -109,6 +111,7 @@ STATISTICS = (
         _of_survey(lambda s: s.rival_height / max(s.height, 0.1)),
     ),
     Statistic("second place: peak", PEAK_DEVIATIONS, _of_survey(deviations_elsewhere)),
+    Statistic("few chips confirm: share", LARGEST_SHARE, _of_survey(evident_share), False),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),
     Statistic("pixel-locked content: excess", LEAST_EXCESS, _excess_of_rest),
     Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ...matching.parts import LEAST_EXCESS, MOST_OF_ONE, SAME_PX
 from ...matching.rest import Rest
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
@@ -44,7 +46,7 @@ PEAK_DEVIATIONS, REST_PEAK_DEVIATIONS = 12.0, 6.0
 # where two halves of an image lie apart and a rotation leads through both (suites real, simulated
 # --seeds 201-206, calibration --seeds 440-442 and, large rural scenes, 440-565; controls --seeds
 # 33000-33039; once_wrong.txt). A third of three is no evidence: *so-cloudy-sentinel*.
-_FEWEST_EVIDENT, _LARGEST_SHARE = 5, 1 / 3
+_FEWEST_EVIDENT, LARGEST_SHARE = 5, 1 / 3
 
 
 def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
@@ -78,15 +80,23 @@ def deviations_elsewhere(survey: Survey) -> float:
     return height / survey.deviation_elsewhere
 
 
+def evident_share(survey: Survey) -> float:
+    """Return which share of the evident peaks lies where the transform has the chips.
+
+    NaN: too few are evident.
+    """
+    confirming = survey.is_confirming_chip[survey.is_evident_chip]
+    return float(confirming.mean()) if len(confirming) >= _FEWEST_EVIDENT else math.nan
+
+
 def _few_confirm(evidence: RegistrationEvidence) -> str | None:
     survey = evidence.survey
-    if survey is None or evidence.mask.is_ground:
+    if survey is None or evidence.mask.is_ground or not evident_share(survey) <= LARGEST_SHARE:
         return None
-    evident = survey.is_evident_chip
-    chips, confirming = int(evident.sum()), int((evident & survey.is_confirming_chip).sum())
-    if chips < _FEWEST_EVIDENT or confirming > _LARGEST_SHARE * chips:
-        return None
-    return f"of {chips} chips with evident peaks only {confirming} have them where they should be"
+    return (
+        f"of {survey.is_evident_chip.sum()} chips with evident peaks only "
+        f"{evident_share(survey):.0%} have them where the transform has them"
+    )
 
 
 def _weak(evidence: RegistrationEvidence) -> str | None:
