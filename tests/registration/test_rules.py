@@ -200,10 +200,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(rival=6.5)),
         evidence(GOOD, survey=survey(rival=6.3)),
     ),
-    # Of 49 chips a third are 16.3.
+    # A fifth of 49 chips are 9.8.
     "few chips confirm": (
-        evidence(GOOD, survey=survey(16)),
-        evidence(GOOD, survey=survey(17)),
+        evidence(GOOD, survey=survey(9)),
+        evidence(GOOD, survey=survey(10)),
     ),
     "weak similarity": (
         evidence(GOOD, survey=survey(height=1.9, rival=1.0)),
