@@ -20,7 +20,7 @@ from .optical_pairs import OpticalPair
 from .real import LARGEST_SHIFT_PX
 from .sar_pairs import SarPair
 from .simulations import Simulation
-from .suites import Goal, Settings, SuiteResult, Table, by_group, run_cases
+from .suites import Goal, Settings, SuiteResult, Table, by_group, of_classes, run_cases
 
 ACCEPTED = "accepted"
 SAID = {"ce50_px": 0.5, "ce90_px": 0.9, "ce95_px": 0.95}
@@ -209,11 +209,7 @@ def cases(settings: Settings) -> list[SimulatedCase | RealPairCase]:
             found += _simulated(seed, size, settings.cache)
     if not settings.quick:
         found += [RealPairCase(case, settings.first_seed) for case in read_cases(settings.data)]
-    known = {case.group for case in found}
-    for name in settings.classes:
-        if name not in known:
-            raise ValueError(f"no class {name!r}; there are {'; '.join(sorted(known))}")
-    return [case for case in found if not settings.classes or case.group in settings.classes]
+    return of_classes(found, settings.classes, lambda case: {case.group})
 
 
 def _simulated(seed: int, size: int, cache: Path) -> list[SimulatedCase]:

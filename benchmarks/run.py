@@ -71,10 +71,10 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         default=1,
         help="processes for the accuracy suites, with one thread each; 1: all threads in one",
     )
-    attacks = parser.add_argument_group("attacks", "what the suite attacks runs")
+    attacks = parser.add_argument_group("attacks", "what it runs; classes: calibration, too")
     attacks.add_argument("--sample", type=int, help="so many cases, of every class about as many")
     attacks.add_argument(
-        "--classes", nargs="+", default=(), help="classes by their names, of calibration, too"
+        "--classes", nargs="+", default=(), help="classes or groups, by their names"
     )
     attacks.add_argument(
         "--case", nargs="+", default=(), help="by the names that a table gives, or @FILE of them"

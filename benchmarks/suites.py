@@ -108,6 +108,26 @@ def by_group(found: Iterable[G], names: Iterable[str] = ()) -> dict[str, list[G]
     return groups
 
 
+C = TypeVar("C")
+
+
+def of_classes(
+    cases: Sequence[C], classes: Sequence[str], names_of: Callable[[C], set[str]]
+) -> list[C]:
+    """Return the cases of some classes, by any of their names; of no class, all.
+
+    Raises
+    ------
+    ValueError
+        No case has one of these names.
+    """
+    known = {name for case in cases for name in names_of(case)}
+    for name in classes:
+        if name not in known:
+            raise ValueError(f"no class {name!r}; there are {'; '.join(sorted(known))}")
+    return [case for case in cases if not classes or names_of(case) & set(classes)]
+
+
 @dataclass(frozen=True)
 class Table:
     """A table of text."""

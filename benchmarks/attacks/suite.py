@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..accuracy import REFUSED, SILENTLY_WRONG, VERDICTS
-from ..suites import Goal, Settings, SuiteResult, Table, run_cases
+from ..suites import Goal, Settings, SuiteResult, Table, of_classes, run_cases
 from .cases import AttackCase, cases, named
 from .catalogue import CONTROLS
 from .sensors import SensorCase
@@ -61,17 +61,9 @@ def choose(settings: Settings) -> list[AnyCase]:
     number = min(settings.seeds, _SEEDS) if is_whole else settings.seeds
     seeds = range(settings.first_seed, settings.first_seed + number)
     every = cases(seeds, settings.data, settings.cache)
-    known = {name for case in every for name in (case.attack, case.group)}
-    for name in settings.classes:
-        if name not in known:
-            raise ValueError(f"no class {name!r}; there are {', '.join(sorted(known))}")
-    every = [case for case in every if not settings.classes or _is_of(case, settings.classes)]
+    every = of_classes(every, settings.classes, lambda case: {case.attack, case.group})
     wanted = _QUICK if settings.quick else settings.sample
     return every if wanted is None else sample(every, wanted)
-
-
-def _is_of(case: AnyCase, classes: Sequence[str]) -> bool:
-    return any(name in (case.attack, case.group) for name in classes)
 
 
 def sample(every: Sequence[AnyCase], number: int) -> list[AnyCase]:

@@ -107,10 +107,13 @@ class Survey:
 
         Ground that lies elsewhere has one; what is similar because it lies near has none.
         """
-        is_peak = self._is_far.copy()
-        for mean in (self.mean, self._mean_of_many):
-            is_peak &= mean == cv2.dilate(mean, _NEIGHBOURS)
-        return float(self._mean_of_many[is_peak].max(initial=0.0))
+        mean, of_many = self.mean, self._mean_of_many
+        # A peak of both: cut off, a wide one is a plateau, whose rim is as high as its middle; and
+        # what few chips are highest at may be the flank of the first place to many.
+        is_peak = (mean == cv2.dilate(mean, _NEIGHBOURS)) & (
+            of_many == cv2.dilate(of_many, _NEIGHBOURS)
+        )
+        return float(of_many[self._is_far & is_peak].max(initial=0.0))
 
     @property
     def deviation_elsewhere(self) -> float:

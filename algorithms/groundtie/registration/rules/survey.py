@@ -91,11 +91,14 @@ def evident_share(survey: Survey) -> float:
 
 def _few_confirm(evidence: RegistrationEvidence) -> str | None:
     survey = evidence.survey
-    if survey is None or evidence.mask.is_ground or not evident_share(survey) <= LARGEST_SHARE:
+    if survey is None or evidence.mask.is_ground:
+        return None
+    share = evident_share(survey)
+    if not share <= LARGEST_SHARE:
         return None
     return (
-        f"of {survey.is_evident_chip.sum()} chips with evident peaks only "
-        f"{evident_share(survey):.0%} have them where the transform has them"
+        f"of {survey.is_evident_chip.sum()} chips with evident peaks only {share:.0%} have them "
+        "where the transform has them"
     )
 
 
