@@ -23,9 +23,10 @@ from .matcher import FloatArray
 SAME_PX = 2.0
 
 # Farther from where the model has them, they lie elsewhere. What is highest still farther off may
-# be canopies of 30 m, in pixels of 1 m, and is a part only where it is an eighth of the chips:
-# of 607 right transforms canopies were as many in one (suites calibration --seeds 440-499 and, large
-# rural scenes, 440-565; simulated --seeds 201-206; real; controls); a fifth of an image has 7 of 49.
+# be canopies of 30 m, in pixels of 1 m, and is a part only where it is an eighth of the chips: of
+# 607 right transforms canopies were as many in one (suites calibration --seeds 440-499 and, large
+# rural scenes, 440-565; simulated --seeds 201-206; real; attacks: controls --seeds 33000-33039); a
+# fifth of an image holds 7 of 49.
 ELSEWHERE_PX, _CANOPIES_PX, _CANOPIES_SHARE = 2 * SAME_PX, 20.0, 1 / 8
 
 # Fewer chips are no part, and none counts for more than this.
