@@ -34,11 +34,11 @@ _LEAST_CHIPS = 0.25
 # Ground that lies elsewhere shows through clouds, labels, patterns of noise and copies as a peak of
 # its own, however high what is drawn is. In robust standard deviations of what is elsewhere, right
 # transforms reach 11.6, by canopies that are displaced, and one of twelve dense cities in pixels of
-# 2 m more; most of ground beneath what is drawn has 12.3 and more, some 10 to 12. Of what is left without pixel-locked content, and of what the
-# reference does not explain of the input, right transforms reach 4.4, but where more is drawn at
-# another place, or an orchard repeats (8.6 to 14.3); others from 6.5 on (suites real, calibration
-# of large rural scenes, seeds 440-565, and attacks: controls --seeds 33000-33039, --seeds
-# 72000-72029, once_wrong.txt).
+# 2 m more; most of ground beneath what is drawn has 12.3 and more, some 10 to 12. Of what is left
+# without pixel-locked content, and of what the reference does not explain of the input, right
+# transforms reach 4.4, but where more is drawn at another place, or an orchard repeats (8.6 to
+# 14.3); others from 6.5 on (suites real, calibration of large rural scenes, seeds 440-565, and
+# attacks: controls --seeds 33000-33039, --seeds 72000-72029, once_wrong.txt).
 PEAK_DEVIATIONS, REST_PEAK_DEVIATIONS = 12.0, 6.0
 
 # Evident peaks lie mostly where the transform has the chips, but for canopies' and walls': of right
