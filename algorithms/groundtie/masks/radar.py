@@ -10,7 +10,7 @@ from ..rasters.reading import FloatImage
 from ..speckle.statistics import homogeneous_variation2
 
 # Looked at in the middle of an image, at full resolution: averaging would take speckle away.
-_SAMPLE_PX = 1024
+SAMPLE_PX = 1024
 
 # Squared coefficient of variation of the power in the most homogeneous windows of radar images, and
 # how many times that of a camera's it is. Measured at pixels of few metres: 0.09 to 0.24, 12 to 300
@@ -23,7 +23,7 @@ def variation2_of(image: Image) -> float:
 
     Grey values are taken for amplitudes.
     """
-    middle = middle_window(image.source.grid, _SAMPLE_PX)
+    middle = middle_window(image.source.grid, SAMPLE_PX)
     patch = Patch(*image.source.read(middle, image.band))
     return homogeneous_variation2(power(patch), patch.valid)
 

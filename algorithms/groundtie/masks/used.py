@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-# Kinds of masks: none, the ground of a town that its radar image shows, what a vector layer covers,
-# and the ground that both images show by a surface model.
-NONE, GROUND, LAYER, SURFACE = "none", "ground", "layer", "surface"
+# Kinds of masks: none, the ground of a town that its radar image shows, what a radar image shows
+# without texture, what a vector layer covers, and the ground that both images show by a surface
+# model.
+NONE, GROUND, UNTEXTURED = "none", "ground", "untextured"
+LAYER, SURFACE = "layer", "surface"
 
 # Where less than this share takes part, chips have too few pixels for a joint histogram of their
 # own. Of simulated cities up to 42 % is ground, in pixels of 2 m and 3 m: each chip by itself was
@@ -24,7 +26,7 @@ class MaskUsed:
     Parameters
     ----------
     kind
-        `NONE`, `GROUND`, `LAYER` or `SURFACE`.
+        `NONE`, `GROUND`, `UNTEXTURED`, `LAYER` or `SURFACE`.
     image
         Which image was masked: "reference" or "input"; None without a mask.
     share

@@ -227,6 +227,9 @@ class RegistrationEvidence:
         The same without content that is the same in both arrays; None: there is none.
     bands
         What bands show each, of images whose bands do not coincide.
+    ground
+        What the ground between forests and settlements shows; None: the images are not two radars',
+        or a mask states what is ground.
     input_fit
         How well a surface model fits the registered input; None: nothing is expected of it.
     exchanged
@@ -245,6 +248,7 @@ class RegistrationEvidence:
     survey: Survey | None = None
     rest: Rest | None = None
     bands: tuple[BandSurvey, ...] = ()
+    ground: Survey | None = None
     input_fit: ModelFit | None = None
     exchanged: Exchanged | None = None
 

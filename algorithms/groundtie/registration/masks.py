@@ -1,4 +1,4 @@
-"""What takes part in a registration: the ground of a town, where a radar image shows one.
+"""What takes part in a registration: the ground of a town or of the country, by a radar image.
 
 Whatever a mask comes from, the user or the radar image, it becomes the same thing: a raster that
 masks one image of the pair (see `user_masks`).
@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 from ..context import Context
 from ..masks.ground import find_ground
 from ..masks.surface_model import SurfaceGround
-from ..masks.used import GROUND, NONE, MaskUsed
+from ..masks.used import GROUND, NONE, REFERENCE, UNTEXTURED, MaskUsed
+from ..matching.locked import Sensors
 from ..rasters.pair import ImagePair
 from .scene import SceneInfo
 from .user_masks import with_mask
@@ -94,6 +95,28 @@ def of_ground(pair: ImagePair, scene: SceneInfo, stack: ExitStack, context: Cont
     reason = f"{_shown(scene)}, as in a town"
     elevated_px = _OBLIQUE_PX if scene.input.is_in_sensor_geometry else _ON_GROUND_PX
     return Masked(masked, MaskUsed(GROUND, name, share, reason, elevated_px=elevated_px))
+
+
+def ground_instead(
+    pair: ImagePair, scene: SceneInfo, stack: ExitStack, context: Context
+) -> Masked | None:
+    """Return a pair of whose radar image the ground alone takes part, or may; None: none is known.
+
+    It is that of what may be a town, beside a camera's image, and what is neither forest nor
+    settlement, beside another radar's.
+    """
+    if scene.has_user_mask:
+        return None
+    if scene.sensors is Sensors.RADARS:
+        ground = scene.reference.untextured
+        masked, share = with_mask(
+            pair, REFERENCE, ground.scene, ground.select, stack, context.quiet()
+        )
+        reason = "forests and settlements are textured"
+        return Masked(masked, MaskUsed(UNTEXTURED, REFERENCE, share, reason))
+    if scene.is_radar_and_camera and scene.may_be_town and scene.shows_ground:
+        return of_ground(pair, scene, stack, context.quiet())
+    return None
 
 
 def _shown(scene: SceneInfo) -> str:

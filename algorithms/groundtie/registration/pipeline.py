@@ -15,12 +15,12 @@ from ..errors import NoOverlapError, NothingFoundError, TooFewPointsError
 from ..masks.used import NONE, MaskUsed
 from ..rasters.reading import bounded_cache
 from .evidence import Exchanged, ImagesEvidence, RegistrationEvidence, SearchEvidence
-from .masks import Masked, of_ground, with_ground_mask
+from .masks import Masked, ground_instead, with_ground_mask
 from .opening import OpenPair
 from .registration import Registration
 from .scene import SceneInfo
 from .specification import Specification
-from .stages import Stages
+from .stages import NOT_SURVEYED, Stages
 from .surface_masks import with_surface_mask
 from .verdict import NOT_JUDGED, judge, judge_search, refuse_images
 
@@ -71,20 +71,17 @@ def register(
 ) -> Registration:
     """Register a pair whose masks and facts are found; parameters as `run` and its stages.
 
-    What may be a town, and is refused as a whole, is tried again by its ground.
+    What is refused as a whole is tried again by the ground of a radar image.
     """
     found = _register_once(opened, masked, scene, spec, context)
-    if found.verdict.accepted or not _may_be_matched_by_ground(masked, scene, spec):
+    if found.verdict.accepted or masked.used.kind != NONE or spec.is_rendered:
         return found
-    ground = of_ground(opened.pair, scene, opened.stack, context.quiet())
+    ground = ground_instead(opened.pair, scene, opened.stack, context)
+    if ground is None:
+        return found
     spec = replace(spec, tries=spec.tries + 1)
     again = _register_once(opened, ground, scene, spec, context.quiet())
     return again if again.verdict.accepted else replace(found, spec=spec)
-
-
-def _may_be_matched_by_ground(masked: Masked, scene: SceneInfo, spec: Specification) -> bool:
-    is_whole = masked.used.kind == NONE and not scene.has_user_mask and not spec.is_rendered
-    return is_whole and scene.is_radar_and_camera and scene.may_be_town and scene.shows_ground
 
 
 def _register_once(
@@ -142,7 +139,7 @@ def _exchanged(
         estimate, check = stages.checked(context)
     except (NothingFoundError, TooFewPointsError, NoOverlapError):
         return Exchanged()
-    points = stages.evidence(estimate, check, (None, None, ()), scene).held_out
+    points = stages.evidence(estimate, check, NOT_SURVEYED, scene).held_out
     px, input = evidence.grid.lattice(), evidence.estimate.transform.input_grid
     there = input.pixel_to_map(evidence.estimate.transform(evidence.grid.pixel_to_map(px)))
     reference = estimate.transform.input_grid

@@ -10,6 +10,7 @@ from ..kinds import AUTO
 from ..masks.ground import shows_ground
 from ..masks.radar import LEAST_VARIATION2, LEAST_VARIATION2_RATIO, variation2_of
 from ..masks.scene import Scene
+from ..masks.texture import UntexturedGround
 from ..masks.town import is_town, may_be_town, share_of_strong_scatterers
 from ..masks.used import INPUT, REFERENCE
 from ..matching.locked import Sensors
@@ -50,6 +51,11 @@ class ImageFacts:
     def strong_share(self) -> float:
         """Share of strong scatterers, 0 to 1: brighter than usual by 6 dB or more."""
         return share_of_strong_scatterers(self.scene)
+
+    @cached_property
+    def untextured(self) -> UntexturedGround:
+        """What of it is neither forest nor settlement, if it is a radar image."""
+        return UntexturedGround.of(self.scene)
 
     @cached_property
     def is_in_sensor_geometry(self) -> bool:

@@ -9,6 +9,7 @@ from ..context import Context
 from ..features.presets import optical_keypoints, sar_keypoints
 from ..geometry.estimation import Estimate
 from ..geometry.models import TERRAIN, Model, shift_model
+from ..masks.used import NONE
 from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
 from ..matching.bands import BandSurvey, survey_bands
 from ..matching.check import CHECK_RADIUS_PX, Check, check_model
@@ -17,7 +18,7 @@ from ..matching.guided_fit import GuidedFit
 from ..matching.held_out import HeldOut
 from ..matching.keypoint_fit import KeypointFit
 from ..matching.keypoints import KeypointMatcher
-from ..matching.locked import EXACT_PX
+from ..matching.locked import EXACT_PX, Sensors
 from ..matching.parts import ELSEWHERE_PX
 from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
@@ -36,8 +37,10 @@ from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
 from .surface_masks import ModelFit, fit_of, fit_of_images
 
-# What chips all over show; without what the arrays share, if anything; and in bands alone.
-Surveys = tuple[Survey | None, Rest | None, tuple[BandSurvey, ...]]
+# What chips all over show; without what the arrays share, if anything; in bands alone; and of the
+# ground between forests and settlements, if both images are a radar's.
+Surveys = tuple[Survey | None, Rest | None, tuple[BandSurvey, ...], Survey | None]
+NOT_SURVEYED: Surveys = (None, None, (), None)
 
 
 class Fit(Protocol):
@@ -122,11 +125,12 @@ class Stages:
         """Match chips all over the pair, with what its masks leave, around what was estimated.
 
         Returns what they show (None: it is not asked for), what they show without content that is
-        the same in both arrays (None: there is none), and what bands show each where they do not
-        coincide.
+        the same in both arrays (None: there is none), what bands show each where they do not
+        coincide, and what the ground of two radar images shows (None: they are none, or a mask
+        states what is ground).
         """
         if self.spec.is_placed:
-            return None, None, ()
+            return NOT_SURVEYED
         pair, transform = self.masked.pair, estimate.transform
         chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
         places, sensors = survey_places(pair.grid), scene.sensors
@@ -134,7 +138,12 @@ class Stages:
         part = context.part(0.5, 0.9)
         rest = survey_rest(chips, transform, places, ELSEWHERE_PX, sensors, EXACT_PX, part)
         last = context.part(0.9, 1.0)
-        return survey, rest, survey_bands(chips, transform.model, places, ELSEWHERE_PX, last)
+        bands = survey_bands(chips, transform.model, places, ELSEWHERE_PX, last)
+        ground = None
+        if sensors is Sensors.RADARS and self.masked.used.kind == NONE:
+            hides = scene.reference.untextured.hides
+            ground = survey_model(chips, transform.model, context.quiet(), hides)
+        return survey, rest, bands, ground
 
     def evidence(
         self,
@@ -161,7 +170,7 @@ class Stages:
             scene,
             self.masked.used,
             *surveys,
-            self._input_fit(estimate),
+            input_fit=self._input_fit(estimate),
         )
 
     def _input_fit(self, estimate: Estimate) -> ModelFit | None:

@@ -8,7 +8,7 @@ from ...matching.parts import LEAST_EXCESS, MOST_OF_ONE, SAME_PX
 from ...matching.rest import Rest
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
 from ..evidence import SURVEY, RegistrationEvidence
-from .rule import WITHOUT, Rule
+from .rule import ON_GROUND, WITHOUT, Rule
 
 # Chips all over are similar to a second place from this share on, and weakly similar below so many
 # robust standard deviations. Measured on pairs that were registered right: up to 0.76, and from
@@ -165,6 +165,15 @@ def _other_ground_in_a_band(evidence: RegistrationEvidence) -> str | None:
     return None
 
 
+def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
+    ground = evidence.ground
+    if ground is None or not _has_rival(ground):
+        return None
+    if deviations_elsewhere(ground) < REST_PEAK_DEVIATIONS:
+        return None
+    return "what is neither forest nor settlement matches elsewhere"
+
+
 SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "part elsewhere",
@@ -229,5 +238,14 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suite margins",
         "give the band that shows the ground, alone in a file",
         _other_ground_in_a_band,
+    ),
+    Rule(
+        "ground elsewhere",
+        SURVEY,
+        "between two radar images, what is neither forest nor settlement matches elsewhere about "
+        f"as well, and {REST_PEAK_DEVIATIONS:g} robust standard deviations better than usual",
+        "suite calibration, SAR–SAR pairs",
+        ON_GROUND,
+        _ground_elsewhere,
     ),
 )
