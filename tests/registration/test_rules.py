@@ -218,6 +218,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(), bands=in_band(survey(height=1.0, rival=2.1))),
         evidence(GOOD, survey=survey(), bands=in_band(survey(height=1.0, rival=1.9))),
     ),
+    "ground elsewhere": (
+        evidence(GOOD, survey=survey(), ground=survey(height=2.0, rival=1.7)),
+        evidence(GOOD, survey=survey(), ground=survey(height=2.0, rival=1.5)),
+    ),
     "narrow control": (
         refinement(control((20, -9), corner=0.2), kind="shift"),
         refinement(control((20, -9), corner=0.4), kind="shift"),

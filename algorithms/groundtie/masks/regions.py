@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..progress import SILENT, Progress
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
-from ..speckle.statistics import LOOKS_WINDOW_PX, local_statistics
+from ..speckle.statistics import HOMOGENEOUS_EXCESS, LOOKS_WINDOW_PX, local_statistics
 from .growing import Region, Shape, grow_regions
 from .radar import power
 from .reduced import BlockMask, ReducedScene
@@ -28,9 +28,7 @@ from .threshold import BLOCK_PX, disc, grown
 WIDTH_M = 11.0
 HIGH_PERCENT = 10.0
 
-# Seeds vary little more than speckle alone, in the windows in which looks are estimated; a region
-# takes in pixels that differ from its seed by so much.
-_SEED_EXCESS = 1.3
+# A region takes in pixels that differ from its seed, which is homogeneous, by so much.
 _TOLERANCE_DB = 2.5
 
 # Regions: long ones from this length and elongation on, others from this area on.
@@ -132,7 +130,7 @@ def _kept_regions(image: ReducedScene, width_m: float, progress: Progress) -> tu
     brightest = np.percentile(level[valid], _BRIGHTEST_PERCENT)
     progress.update(0.5)
     smallest = max(int(_SMALLEST_M2 / pixel_m**2), 1)
-    found = grow_regions(level, variation2, valid, _SEED_EXCESS / looks, _TOLERANCE_DB, smallest)
+    found = grow_regions(level, variation2, valid, HOMOGENEOUS_EXCESS / looks, _TOLERANCE_DB, smallest)
     regions = [region for region in found if region.level_db <= brightest]
     shadow_db = _darkest_db(regions) + _SHADOW_DB
     longs, wide = np.zeros(level.shape, bool), np.zeros(level.shape, bool)

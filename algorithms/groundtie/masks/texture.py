@@ -15,16 +15,20 @@ import numpy as np
 from ..rasters.grid import Grid
 from ..rasters.patch import Patch, middle_window
 from ..rasters.reading import Mask, Window
-from ..speckle.statistics import LOOKS_WINDOW_PX, estimate_looks, local_statistics, window_counts
+from ..speckle.statistics import (
+    HOMOGENEOUS_EXCESS,
+    LOOKS_WINDOW_PX,
+    estimate_looks,
+    local_statistics,
+    window_counts,
+)
 from .radar import SAMPLE_PX, power
 from .scene import Scene, Selection
 
-# Windows are textured that vary so many times as much as speckle; areas are where three quarters of
-# the windows are. These are wider than three windows, as along a border of two regions one is.
-# Suite calibration, SAR–SAR, rural, seeds 440-471: in areas as wide as two, 23 of 32 pairs were
-# registered right, as borders took no part.
-_EXCESS = 1.5
-_AREA_PX, _SHARE = 31, 0.75
+# Areas with texture are where so many windows are not homogeneous. They are wider than three
+# windows: along a border of two regions one is. Suite calibration, SAR–SAR, rural, seeds 440-471:
+# in areas as wide as two, 23 of 32 pairs were registered right, as borders took no part.
+_AREA_PX, _SHARE = 31, 0.85
 
 # Layover and radar shadow of trees reach so far from where they stand.
 _REACH_M = 15.0
@@ -74,6 +78,6 @@ class UntexturedGround:
     def _areas(self, patch: Patch) -> Mask:
         """Return the middles of areas with texture."""
         variation2 = local_statistics(power(patch), patch.valid, LOOKS_WINDOW_PX).variation2
-        textured = (variation2 > _EXCESS / self.looks) & patch.valid
+        textured = (variation2 > HOMOGENEOUS_EXCESS / self.looks) & patch.valid
         known = window_counts(patch.valid, _AREA_PX)
         return (window_counts(textured, _AREA_PX) >= _SHARE * known) & (known > 0)

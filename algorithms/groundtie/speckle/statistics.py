@@ -20,6 +20,10 @@ _BIN_OCTAVES = 0.125
 _OCTAVES = (-14.0, 0.375)
 _PEAK = 0.2
 
+# The squared coefficient of variation is at most so many times that of speckle alone in such a
+# window of a homogeneous area.
+HOMOGENEOUS_EXCESS = 1.3
+
 # Window, and share of the most homogeneous windows, that separate speckled images from others.
 _HOMOGENEOUS_WINDOW_PX = 3
 _HOMOGENEOUS_SHARE = 0.1
