@@ -130,7 +130,8 @@ def _kept_regions(image: ReducedScene, width_m: float, progress: Progress) -> tu
     brightest = np.percentile(level[valid], _BRIGHTEST_PERCENT)
     progress.update(0.5)
     smallest = max(int(_SMALLEST_M2 / pixel_m**2), 1)
-    found = grow_regions(level, variation2, valid, HOMOGENEOUS_EXCESS / looks, _TOLERANCE_DB, smallest)
+    most = HOMOGENEOUS_EXCESS / looks
+    found = grow_regions(level, variation2, valid, most, _TOLERANCE_DB, smallest)
     regions = [region for region in found if region.level_db <= brightest]
     shadow_db = _darkest_db(regions) + _SHADOW_DB
     longs, wide = np.zeros(level.shape, bool), np.zeros(level.shape, bool)

@@ -66,9 +66,16 @@ class UntexturedGround:
         return Selection(far[inside] & valid, valid)
 
     def hides(self, piece: Grid) -> Mask:
-        """Return which pixels of a part of the scene's grid take no part, shape (h, w)."""
-        col, row = np.rint(self.scene.grid.map_to_pixel(piece.pixel_to_map([[0.0, 0.0]])))[0]
-        return ~self.select(Window(int(col), int(row), piece.width, piece.height)).part
+        """Return which pixels of a piece of the scene's grid take no part, shape (h, w).
+
+        A pixel of a reduced grid takes part where all do that it is the mean of.
+        """
+        factor = round(piece.pixel_size_m / self.scene.grid.pixel_size_m)
+        corner = self.scene.grid.map_to_pixel(piece.pixel_to_map([[-0.5, -0.5]])) + 0.5
+        col, row = np.rint(corner[0]).astype(int)
+        size = piece.width * factor, piece.height * factor
+        part = self.select(Window(int(col), int(row), *size)).part
+        return ~part.reshape(piece.height, factor, piece.width, factor).all(axis=(1, 3))
 
     @property
     def _beside_px(self) -> int:
@@ -80,4 +87,4 @@ class UntexturedGround:
         variation2 = local_statistics(power(patch), patch.valid, LOOKS_WINDOW_PX).variation2
         textured = (variation2 > HOMOGENEOUS_EXCESS / self.looks) & patch.valid
         known = window_counts(patch.valid, _AREA_PX)
-        return (window_counts(textured, _AREA_PX) >= _SHARE * known) & (known > 0)
+        return np.asarray((window_counts(textured, _AREA_PX) >= _SHARE * known) & (known > 0))

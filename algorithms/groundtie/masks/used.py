@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-# Kinds of masks: none, the ground of a town that its radar image shows, what a radar image shows
-# without texture, what a vector layer covers, and the ground that both images show by a surface
-# model.
-NONE, GROUND, UNTEXTURED = "none", "ground", "untextured"
+# Kinds of masks: none, the ground of a town that its radar image shows beside a camera's, the
+# ground between forests and settlements of two radar images, what a vector layer covers, and the
+# ground that both images show by a surface model.
+NONE, GROUND, OPEN = "none", "ground", "open ground"
 LAYER, SURFACE = "layer", "surface"
 
 # Where less than this share takes part, chips have too few pixels for a joint histogram of their
@@ -26,7 +26,7 @@ class MaskUsed:
     Parameters
     ----------
     kind
-        `NONE`, `GROUND`, `UNTEXTURED`, `LAYER` or `SURFACE`.
+        `NONE`, `GROUND`, `OPEN`, `LAYER` or `SURFACE`.
     image
         Which image was masked: "reference" or "input"; None without a mask.
     share

@@ -26,7 +26,7 @@ from .chips import ChipMatcher
 from .coarse_shift import level_factor
 from .frames import compose
 from .locked import Sensors
-from .matcher import FloatArray, Places
+from .matcher import FloatArray, MaskOf, Places
 from .rest import Rest, survey_rest
 from .survey import SURVEY_RADIUS_PX, Survey, survey_model
 
@@ -67,6 +67,8 @@ class PoseSurvey:
         none where too few chips are left.
     bands
         What bands show each, of images whose bands do not coincide.
+    ground
+        What the ground between forests and settlements shows; None: not two radar images.
     """
 
     px: NDArray[np.int_]
@@ -76,6 +78,7 @@ class PoseSurvey:
     transform: Transform
     fold_models: tuple[Model, ...] = ()
     bands: tuple[BandSurvey, ...] = ()
+    ground: Survey | None = None
 
     @property
     def agrees(self) -> NDArray[np.bool_]:
@@ -88,6 +91,7 @@ def survey_pose(
     transform: Transform,
     accuracy_share: float,
     sensors: Sensors,
+    hides: MaskOf | None,
     context: Context,
 ) -> PoseSurvey:
     """Match chips all over a pair around a pose.
@@ -102,6 +106,8 @@ def survey_pose(
         Its accuracy, as a share of the reference's longer side.
     sensors
         What the images may be.
+    hides
+        What masks all but the ground between forests and settlements; None: it is not known.
     context
         Threads and progress.
     """
@@ -121,7 +127,8 @@ def survey_pose(
     moved = Transform(model, transform.crs, transform.input_grid)
     rest = survey_rest(matcher, moved, places, elsewhere_px, sensors, _EXACT_PX, quiet)
     bands = survey_bands(matcher, model, places, elsewhere_px, quiet)
-    return PoseSurvey(kept, residuals, survey, rest, moved, fold_models, bands)
+    ground = hides and survey_model(matcher, model, quiet, hides, places, elsewhere_px)
+    return PoseSurvey(kept, residuals, survey, rest, moved, fold_models, bands, ground)
 
 
 def _covered(grid: Grid, transform: Transform) -> Grid:

@@ -156,6 +156,11 @@ class PoseSurveyEvidence:
         return self.found.bands
 
     @property
+    def ground(self) -> Survey | None:
+        """What the ground between forests and settlements shows, of two radar images."""
+        return self.found.ground
+
+    @property
     def check_residuals_px(self) -> FloatArray:
         """Where each chip matches, from where the others have it, shape (n, 2)."""
         return self.found.residuals_px

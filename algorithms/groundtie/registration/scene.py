@@ -14,6 +14,7 @@ from ..masks.texture import UntexturedGround
 from ..masks.town import is_town, may_be_town, share_of_strong_scatterers
 from ..masks.used import INPUT, REFERENCE
 from ..matching.locked import Sensors
+from ..matching.matcher import MaskOf
 from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch
 from ..rasters.radar_tags import is_known_radar
@@ -167,6 +168,11 @@ class SceneInfo:
         if self.declared != NEITHER and self.is_radar_and_camera:
             return Sensors.DIFFERENT
         return Sensors.CAMERAS
+
+    @property
+    def hides(self) -> MaskOf | None:
+        """What masks all but the open ground of the reference; None: not two radar images."""
+        return self.reference.untextured.hides if self.sensors is Sensors.RADARS else None
 
     @property
     def is_town(self) -> bool:

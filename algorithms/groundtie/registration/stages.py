@@ -18,7 +18,7 @@ from ..matching.guided_fit import GuidedFit
 from ..matching.held_out import HeldOut
 from ..matching.keypoint_fit import KeypointFit
 from ..matching.keypoints import KeypointMatcher
-from ..matching.locked import EXACT_PX, Sensors
+from ..matching.locked import EXACT_PX
 from ..matching.parts import ELSEWHERE_PX
 from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
@@ -139,10 +139,8 @@ class Stages:
         rest = survey_rest(chips, transform, places, ELSEWHERE_PX, sensors, EXACT_PX, part)
         last = context.part(0.9, 1.0)
         bands = survey_bands(chips, transform.model, places, ELSEWHERE_PX, last)
-        ground = None
-        if sensors is Sensors.RADARS and self.masked.used.kind == NONE:
-            hides = scene.reference.untextured.hides
-            ground = survey_model(chips, transform.model, context.quiet(), hides)
+        hides = scene.hides if self.masked.used.kind == NONE else None
+        ground = hides and survey_model(chips, transform.model, context.quiet(), hides)
         return survey, rest, bands, ground
 
     def evidence(
