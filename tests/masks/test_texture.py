@@ -50,7 +50,11 @@ def test_any_window_of_it_is_the_same(country: Country, tmp_path: Path) -> None:
     window = Window(70, 110, 90, 50)
     assert np.array_equal(ground.select(window).part, whole[window.slices_in(ground.scene.whole)])
     piece = ground.scene.grid.window(*window)
-    assert np.array_equal(~ground.hides(piece), ground.select(window).part)
+    assert np.array_equal(~ground.hides(piece), whole[window.slices_in(ground.scene.whole)])
+    # A reduced grid's pixel is the mean of nine, all of which must take part.
+    nine = whole.reshape(SIZE // 3, 3, SIZE // 3, 3).all(axis=(1, 3))
+    reduced = ground.scene.grid.scaled(3.0).window(20, 40, 30, 10)
+    assert np.array_equal(~ground.hides(reduced), nine[40:50, 20:50])
 
 
 def test_trees_reach_fewer_of_larger_pixels(country: Country, tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 import pytest
 from brightness_classifiers import bright_is_left_out
-from raster_files import write_raster
+from canopies import draw_country
+from raster_files import utm_grid, write_raster
 from speckled_pairs import write_speckled_pair
 from textured_pairs import TexturedPair, error_px, listing, pixels, shift_on_map
 
@@ -17,6 +18,7 @@ from groundtie import coregister, match_sar_sar
 from groundtie.errors import NotRegisteredError
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
+from groundtie.masks.used import OPEN
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.registration.rules import layover as layover_rules
 from groundtie.registration.rules import scene as scene_rules
@@ -105,6 +107,36 @@ def test_another_place_is_refused_and_leaves_its_report_only(tmp_path: Path) -> 
         )
     assert set(listing(tmp_path)) >= {"report.html", "report.json"}
     assert not (tmp_path / "o.tif").exists()
+
+
+def forest_files(folder: Path, forest_share: float, seed: int) -> tuple[Path, Path]:
+    """Write fields and a forest, seen twice: canopies 8 px elsewhere, both wrong by (5, -3) px."""
+    country, grid = draw_country(420, forest_share, seed), utm_grid(420, 420, 1.0)
+    return (
+        write_raster(folder / "a.tif", country.seen(0, 4.0, 1), grid),
+        write_raster(folder / "b.tif", country.seen(8, 4.0, 2), grid.window(5, -3, 420, 420)),
+    )
+
+
+@pytest.mark.slow
+def test_ground_between_forests_is_matched_where_the_whole_is_refused(tmp_path: Path) -> None:
+    found = match_sar_sar(*forest_files(tmp_path, 0.3, 1), tmp_path / "out.tif")
+    assert (found.mask.kind, found.mask.image, found.spec.tries) == (OPEN, "reference", 2)
+    grid = utm_grid(420, 420, 1.0)
+    px = grid.lattice()
+    error = found.transform(grid.pixel_to_map(px)) - (px - (5, -3))
+    assert np.hypot(*error.T).max() < 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
+def test_canopies_are_no_evidence_against_the_ground(tmp_path: Path, seed: int) -> None:
+    """Three quarters are forest, which agrees with itself."""
+    with pytest.raises(NotRegisteredError, match="what is neither forest nor settlement") as error:
+        match_sar_sar(*forest_files(tmp_path, 0.75, seed), tmp_path / "out.tif")
+    assert error.value.verdict is not None
+    assert error.value.verdict.rule == "ground elsewhere"
+    assert not (tmp_path / "out.tif").exists()
 
 
 @pytest.mark.slow

@@ -75,7 +75,7 @@ class UntexturedGround:
         col, row = np.rint(corner[0]).astype(int)
         size = piece.width * factor, piece.height * factor
         part = self.select(Window(int(col), int(row), *size)).part
-        return ~part.reshape(piece.height, factor, piece.width, factor).all(axis=(1, 3))
+        return np.asarray(~part.reshape(piece.height, factor, piece.width, factor).all(axis=(1, 3)))
 
     @property
     def _beside_px(self) -> int:

@@ -14,15 +14,29 @@ from ..context import Context
 from ..errors import NoOverlapError, NothingFoundError, TooFewPointsError
 from ..masks.used import NONE, MaskUsed
 from ..rasters.reading import bounded_cache
-from .evidence import Exchanged, ImagesEvidence, RegistrationEvidence, SearchEvidence
+from .evidence import (
+    IMAGES,
+    SURVEY,
+    Exchanged,
+    ImagesEvidence,
+    RegistrationEvidence,
+    SearchEvidence,
+)
 from .masks import Masked, ground_instead, with_ground_mask
 from .opening import OpenPair
 from .registration import Registration
+from .rules import RULES
 from .scene import SceneInfo
 from .specification import Specification
 from .stages import NOT_SURVEYED, Stages
 from .surface_masks import with_surface_mask
 from .verdict import NOT_JUDGED, judge, judge_search, refuse_images
+
+# Rules that refuse what elevated objects may cause, and a mask of the ground may mend. What images
+# are, and what repeats or is drawn over them, no mask mends: noise and copies of the reference
+# passed a second try that a rule of the survey had refused (once_wrong.txt of the suite attacks).
+_OF_HEIGHTS = {r.name for r in RULES if r.stage not in (IMAGES, SURVEY)} - {"second place"}
+_OF_HEIGHTS |= {"part elsewhere", "ground elsewhere"}
 
 
 def run(
@@ -71,10 +85,12 @@ def register(
 ) -> Registration:
     """Register a pair whose masks and facts are found; parameters as `run` and its stages.
 
-    What is refused as a whole is tried again by the ground of a radar image.
+    What is refused as a whole, as elevated objects may cause, is tried again by the ground of a
+    radar image.
     """
     found = _register_once(opened, masked, scene, spec, context)
-    if found.verdict.accepted or masked.used.kind != NONE or spec.is_rendered:
+    is_whole = masked.used.kind == NONE and not spec.is_rendered
+    if found.verdict.rule not in _OF_HEIGHTS or not is_whole:
         return found
     ground = ground_instead(opened.pair, scene, opened.stack, context)
     if ground is None:
