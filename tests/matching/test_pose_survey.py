@@ -10,6 +10,7 @@ from raster_files import write_raster
 from turned_pairs import turned_pair
 
 from groundtie.context import Context
+from groundtie.matching.locked import Sensors
 from groundtie.matching.pose_survey import PoseSurvey, survey_pose
 from groundtie.pose.pose import Pose
 from groundtie.pose.rotation_windows import read_windows
@@ -29,7 +30,7 @@ def surveyed(folder: Path, pose: Pose, context: Context, **more: int) -> PoseSur
             images.append(Image(stack.enter_context(open_raster(path))))
         windows = read_windows(*images, (0.8, 1.25))
         pair = make_pair(*images, None, windows.radius_m, 180.0, 1.25)
-        return survey_pose(pair, windows.transform(pose), 0.02, True, context)
+        return survey_pose(pair, windows.transform(pose), 0.02, Sensors.RADARS, None, context)
 
 
 # How accurate a pose is to be, and what it may be wrong by.

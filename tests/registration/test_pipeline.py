@@ -313,6 +313,28 @@ def test_every_tool_is_judged_by_the_rules_of_every_stage(
     assert not output.exists()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("rule", "tries"),
+    [
+        ("uncertain transform", 2),
+        ("ground elsewhere", 2),
+        ("part elsewhere", 1),
+        ("second place nearby", 1),
+        ("pixel-locked content", 1),
+    ],
+)
+def test_radar_images_are_tried_by_their_ground_after_what_heights_may_cause(
+    radars: TexturedPair, monkeypatch: pytest.MonkeyPatch, rule: str, tries: int
+) -> None:
+    house = HouseRules((AGREEMENT,))
+    asking = replace(house.rules()[0], name=rule)
+    monkeypatch.setattr(verdict, "RULES", (asking,))
+    with pytest.raises(NotRegisteredError, match="forbidden"):
+        groundtie.match_sar_sar(radars.reference, radars.input)
+    assert house.asked == [AGREEMENT] * tries
+
+
 @pytest.fixture(scope="module")
 def sensor(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return make_scene(tmp_path_factory.mktemp("sensor"), None)

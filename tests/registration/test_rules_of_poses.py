@@ -55,6 +55,12 @@ def fallen_beyond(count: int) -> np.ndarray:
     return errors[np.hypot(*errors.T) > POSE_TOLERANCE_PX][:count]
 
 
+@pytest.mark.parametrize(("rival", "expected"), [(1.7, ["ground elsewhere"]), (1.5, [])])
+def test_poses_of_canopies_are_refused(rival: float, expected: list[str]) -> None:
+    ground = survey(height=2.0, rival=rival)
+    assert refusing(posed(scatter(21, 0.5), ground=ground)) == expected
+
+
 @pytest.mark.parametrize(
     ("agreeing", "found", "rest", "expected"),
     [
