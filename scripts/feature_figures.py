@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
+from numpy.typing import NDArray
 
 import groundtie
+from groundtie.masks.scene import Scene
 from groundtie.masks.surface_model import Reason
+from groundtie.masks.texture import UntexturedGround
 from groundtie.rasters.patch import Patch
+from groundtie.rasters.reading import open_raster
 from groundtie.studies.sift_variants import sift_detector
 from scripts.drawing import BLUE, GREY, ORANGE, FloatArray, Scenes, canvas, read_band, stretched
 
@@ -49,12 +55,11 @@ def hog(scenes: Scenes) -> Figure:
 
 
 def masks(scenes: Scenes) -> Figure:
-    """A radar image of a city, and two masks of it."""
+    """A radar image of a city, two masks of it, and open ground of the country."""
     radar = scenes.large_city() / "reference.tif"
-    figure, axes = canvas(8, 2.85, 3)
+    figure, axes = canvas(8, 2.3, 4)
     window = np.s_[120:420:2, 200:500:2]
-    power = cv2.blur(read_band(radar) ** 2, (3, 3))
-    grey = stretched(np.log(power + 1.0))[window]
+    grey = _radar_grey(radar)[window]
     axes[0].imshow(grey, cmap="gray")
     axes[0].set_title("radar image", fontsize=9)
     for each, tool, name in (
@@ -63,12 +68,28 @@ def masks(scenes: Scenes) -> Figure:
     ):
         path = scenes.folder / f"{name}.tif"
         tool(radar, path)
-        taken = read_band(path)
-        colours = np.repeat(grey[:, :, None], 3, axis=2) * 0.75
-        colours[taken[window] == 0] = (0.84, 0.37, 0.0)
-        each.imshow(colours)
-        each.set_title(f"{name}: {np.mean(taken > 0):.0%} take part", fontsize=9)
+        taken = read_band(path) > 0
+        _draw_mask(each, grey, taken[window], f"{name}: {taken.mean():.0%}")
+    country = scenes.rural() / "reference.tif"
+    with open_raster(country) as source:
+        ground = UntexturedGround.of(Scene.of(source))
+        taken = ground.select(ground.scene.whole).part
+    third = np.s_[::3, ::3]
+    _draw_mask(
+        axes[3], _radar_grey(country)[third], taken[third], f"open ground: {taken.mean():.0%}"
+    )
     return figure
+
+
+def _radar_grey(path: Path) -> FloatArray:
+    return stretched(np.log(cv2.blur(read_band(path) ** 2, (3, 3)) + 1.0))
+
+
+def _draw_mask(axes: Axes, grey: FloatArray, taken: NDArray[np.bool_], title: str) -> None:
+    colours = np.repeat(grey[:, :, None], 3, axis=2) * 0.75
+    colours[~taken] = (0.84, 0.37, 0.0)
+    axes.imshow(colours)
+    axes.set_title(title, fontsize=9)
 
 
 def surface_model(scenes: Scenes) -> Figure:

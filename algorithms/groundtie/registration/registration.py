@@ -227,6 +227,8 @@ class Registration:
                 f"check points that agree: {v.check_points_agreeing} of {v.check_points}; by "
                 f"chance 1 in 10^{-v.log10_chance:.0f}",
             ]
+            if self.mask.image is not None:
+                lines.append(self.mask.line())
         return lines + file_lines(self.files)
 
     def close(self) -> None:
