@@ -12,9 +12,9 @@ from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
 
 import groundtie
+from groundtie.masks.open_ground import OpenGround
 from groundtie.masks.scene import Scene
 from groundtie.masks.surface_model import Reason
-from groundtie.masks.texture import UntexturedGround
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import open_raster
 from groundtie.studies.sift_variants import sift_detector
@@ -72,7 +72,7 @@ def masks(scenes: Scenes) -> Figure:
         _draw_mask(each, grey, taken[window], f"{name}: {taken.mean():.0%}")
     country = scenes.rural() / "reference.tif"
     with open_raster(country) as source:
-        ground = UntexturedGround.of(Scene.of(source))
+        ground = OpenGround.of(Scene.of(source))
         taken = ground.select(ground.scene.whole).part
     third = np.s_[::3, ::3]
     _draw_mask(

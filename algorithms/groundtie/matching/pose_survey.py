@@ -68,7 +68,7 @@ class PoseSurvey:
     bands
         What bands show each, of images whose bands do not coincide.
     ground
-        What the ground between forests and settlements shows; None: not two radar images.
+        What open ground shows; None: the images are not two radars'.
     """
 
     px: NDArray[np.int_]
@@ -91,7 +91,7 @@ def survey_pose(
     transform: Transform,
     accuracy_share: float,
     sensors: Sensors,
-    hides: MaskOf | None,
+    open_ground: MaskOf | None,
     context: Context,
 ) -> PoseSurvey:
     """Match chips all over a pair around a pose.
@@ -106,8 +106,8 @@ def survey_pose(
         Its accuracy, as a share of the reference's longer side.
     sensors
         What the images may be.
-    hides
-        What masks all but the ground between forests and settlements; None: it is not known.
+    open_ground
+        Returns which pixels are none, of two radar images; None: it is not known.
     context
         Threads and progress.
     """
@@ -127,7 +127,9 @@ def survey_pose(
     moved = Transform(model, transform.crs, transform.input_grid)
     rest = survey_rest(matcher, moved, places, elsewhere_px, sensors, _EXACT_PX, quiet)
     bands = survey_bands(matcher, model, places, elsewhere_px, quiet)
-    ground = hides and survey_model(matcher, model, quiet, hides, places, elsewhere_px)
+    ground = None
+    if open_ground is not None:
+        ground = survey_model(matcher, model, quiet, open_ground, places, elsewhere_px)
     return PoseSurvey(kept, residuals, survey, rest, moved, fold_models, bands, ground)
 
 

@@ -228,8 +228,7 @@ class RegistrationEvidence:
     bands
         What bands show each, of images whose bands do not coincide.
     ground
-        What the ground between forests and settlements shows; None: the images are not two radars',
-        or a mask states what is ground.
+        What open ground shows; None: the images are not two radars', or it alone takes part.
     input_fit
         How well a surface model fits the registered input; None: nothing is expected of it.
     exchanged

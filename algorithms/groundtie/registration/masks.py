@@ -96,8 +96,8 @@ def ground_instead(
 ) -> Masked | None:
     """Return a pair of which the ground takes part that a radar image shows; None: it shows none.
 
-    Of what may be a town, beside a camera's image; and of any two radar images, as far as one alone
-    shows what is ground.
+    Of what may be a town, beside a camera's image; and of any two radar images, as far as the
+    reference alone shows what is ground.
     """
     if scene.has_user_mask:
         return None
@@ -115,7 +115,7 @@ def _of_open_ground(
     if may_be_town(facts.strong_share) and shows_ground(facts.scene):
         masked = _of_town(pair, scene, REFERENCE, stack, context)
         return replace(masked, used=replace(masked.used, kind=OPEN))
-    select = facts.untextured.select
+    select = facts.open_ground.select
     image, share = with_mask(pair, REFERENCE, facts.scene, select, stack, context)
     reason = "what has texture over a wide area is forest or settlement"
     return Masked(image, MaskUsed(OPEN, REFERENCE, share, reason, elevated_px=_OPEN_PX))

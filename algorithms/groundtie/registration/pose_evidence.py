@@ -157,7 +157,7 @@ class PoseSurveyEvidence:
 
     @property
     def ground(self) -> Survey | None:
-        """What the ground between forests and settlements shows, of two radar images."""
+        """What open ground shows, of two radar images."""
         return self.found.ground
 
     @property

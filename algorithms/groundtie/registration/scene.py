@@ -8,13 +8,12 @@ from typing import Any
 
 from ..kinds import AUTO
 from ..masks.ground import shows_ground
+from ..masks.open_ground import OpenGround
 from ..masks.radar import LEAST_VARIATION2, LEAST_VARIATION2_RATIO, variation2_of
 from ..masks.scene import Scene
-from ..masks.texture import UntexturedGround
 from ..masks.town import is_town, may_be_town, share_of_strong_scatterers
 from ..masks.used import INPUT, REFERENCE
 from ..matching.locked import Sensors
-from ..matching.matcher import MaskOf
 from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch
 from ..rasters.radar_tags import is_known_radar
@@ -54,9 +53,9 @@ class ImageFacts:
         return share_of_strong_scatterers(self.scene)
 
     @cached_property
-    def untextured(self) -> UntexturedGround:
-        """What of it is neither forest nor settlement, if it is a radar image."""
-        return UntexturedGround.of(self.scene)
+    def open_ground(self) -> OpenGround:
+        """What of it is neither forest nor settlement, as far as a radar image shows it."""
+        return OpenGround.of(self.scene)
 
     @cached_property
     def is_in_sensor_geometry(self) -> bool:
@@ -170,9 +169,9 @@ class SceneInfo:
         return Sensors.CAMERAS
 
     @property
-    def hides(self) -> MaskOf | None:
-        """What masks all but the open ground of the reference; None: not two radar images."""
-        return self.reference.untextured.hides if self.sensors is Sensors.RADARS else None
+    def open_ground(self) -> OpenGround | None:
+        """The open ground of the reference; None: the images are not two radars'."""
+        return self.reference.open_ground if self.sensors is Sensors.RADARS else None
 
     @property
     def is_town(self) -> bool:

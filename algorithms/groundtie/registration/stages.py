@@ -37,8 +37,8 @@ from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
 from .surface_masks import ModelFit, fit_of, fit_of_images
 
-# What chips all over show; without what the arrays share, if anything; in bands alone; and of the
-# ground between forests and settlements, if both images are a radar's.
+# What chips all over show; without what the arrays share, if anything; in bands alone; and of open
+# ground, if both images are a radar's.
 Surveys = tuple[Survey | None, Rest | None, tuple[BandSurvey, ...], Survey | None]
 NOT_SURVEYED: Surveys = (None, None, (), None)
 
@@ -126,8 +126,8 @@ class Stages:
 
         Returns what they show (None: it is not asked for), what they show without content that is
         the same in both arrays (None: there is none), what bands show each where they do not
-        coincide, and what the ground of two radar images shows (None: they are none, or a mask
-        states what is ground).
+        coincide, and what open ground of two radar images shows (None: they are none, or it alone
+        takes part).
         """
         if self.spec.is_placed:
             return NOT_SURVEYED
@@ -139,8 +139,9 @@ class Stages:
         rest = survey_rest(chips, transform, places, ELSEWHERE_PX, sensors, EXACT_PX, part)
         last = context.part(0.9, 1.0)
         bands = survey_bands(chips, transform.model, places, ELSEWHERE_PX, last)
-        hides = scene.hides if self.masked.used.kind == NONE else None
-        ground = hides and survey_model(chips, transform.model, context.quiet(), hides)
+        ground, open_ground = None, scene.open_ground
+        if self.masked.used.kind == NONE and open_ground is not None:
+            ground = survey_model(chips, transform.model, context.quiet(), open_ground)
         return survey, rest, bands, ground
 
     def evidence(

@@ -1,4 +1,4 @@
-"""Ground between forests and settlements of a radar image: what has no texture over a wide area.
+"""Open ground of a radar image, between forests and settlements: areas without texture.
 
 In a homogeneous area speckle alone varies; canopies, roofs and their shadows vary more
 ([Lopes1990a]), and so do borders, as those of fields and roads. Borders are narrow, and stay.
@@ -35,8 +35,10 @@ _REACH_M = 15.0
 
 
 @dataclass(frozen=True)
-class UntexturedGround:
+class OpenGround:
     """What of a radar image lies apart from areas with texture.
+
+    Called with a piece of its grid, or of a reduced one, it returns what is none, as a `MaskOf`.
 
     Parameters
     ----------
@@ -50,7 +52,7 @@ class UntexturedGround:
     looks: float
 
     @classmethod
-    def of(cls, scene: Scene) -> UntexturedGround:
+    def of(cls, scene: Scene) -> OpenGround:
         """Return that of a scene whose looks are estimated in its middle."""
         patch = scene.read(middle_window(scene.grid, SAMPLE_PX))
         return cls(scene, estimate_looks(power(patch), patch.valid))
@@ -65,10 +67,10 @@ class UntexturedGround:
         valid = patch.valid[inside]
         return Selection(far[inside] & valid, valid)
 
-    def hides(self, piece: Grid) -> Mask:
-        """Return which pixels of a piece of the scene's grid take no part, shape (h, w).
+    def __call__(self, piece: Grid) -> Mask:
+        """Return which pixels of a piece of the scene's grid are no open ground, shape (h, w).
 
-        A pixel of a reduced grid takes part where all do that it is the mean of.
+        A pixel of a reduced grid is where all are that it is the mean of.
         """
         factor = round(piece.pixel_size_m / self.scene.grid.pixel_size_m)
         corner = self.scene.grid.map_to_pixel(piece.pixel_to_map([[-0.5, -0.5]])) + 0.5

@@ -10,16 +10,16 @@ from canopies import Country, draw_country
 from raster_files import utm_grid, write_raster
 from scipy.ndimage import distance_transform_edt
 
+from groundtie.masks.open_ground import OpenGround
 from groundtie.masks.scene import Scene
-from groundtie.masks.texture import UntexturedGround
 from groundtie.rasters.reading import Window, open_raster
 
 SIZE = 300
 
 
-def ground_of(path: Path, image: np.ndarray, pixel_m: float = 1.0) -> UntexturedGround:
+def ground_of(path: Path, image: np.ndarray, pixel_m: float = 1.0) -> OpenGround:
     write_raster(path, image, utm_grid(image.shape[1], image.shape[0], pixel_m), nodata=0)
-    return UntexturedGround.of(Scene.of(open_raster(path)))
+    return OpenGround.of(Scene.of(open_raster(path)))
 
 
 @pytest.fixture(scope="module")
@@ -50,11 +50,11 @@ def test_any_window_of_it_is_the_same(country: Country, tmp_path: Path) -> None:
     window = Window(70, 110, 90, 50)
     assert np.array_equal(ground.select(window).part, whole[window.slices_in(ground.scene.whole)])
     piece = ground.scene.grid.window(*window)
-    assert np.array_equal(~ground.hides(piece), whole[window.slices_in(ground.scene.whole)])
+    assert np.array_equal(~ground(piece), whole[window.slices_in(ground.scene.whole)])
     # A reduced grid's pixel is the mean of nine, all of which must take part.
     nine = whole.reshape(SIZE // 3, 3, SIZE // 3, 3).all(axis=(1, 3))
     reduced = ground.scene.grid.scaled(3.0).window(20, 40, 30, 10)
-    assert np.array_equal(~ground.hides(reduced), nine[40:50, 20:50])
+    assert np.array_equal(~ground(reduced), nine[40:50, 20:50])
 
 
 def test_trees_reach_fewer_of_larger_pixels(country: Country, tmp_path: Path) -> None:
