@@ -10,13 +10,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 from ..context import Context
-from ..masks.ground import find_ground, shows_ground
+from ..masks.ground import find_ground
 from ..masks.surface_model import SurfaceGround
-from ..masks.town import may_be_town
 from ..masks.used import GROUND, NONE, OPEN, REFERENCE, MaskUsed
-from ..matching.locked import Sensors
 from ..rasters.pair import ImagePair
-from .scene import ImageFacts, SceneInfo
+from .scene import SceneInfo
 from .user_masks import with_mask
 
 # Elevated objects of a town displace all points alike. Along an axis, as standard deviation: by so
@@ -79,16 +77,16 @@ def with_ground_mask(
     if not scene.is_radar_and_camera:
         return Masked(pair, MaskUsed(NONE, None, 1.0, "there is no radar image beside a camera's"))
     if not scene.is_town:
-        reason = f"{_shown(scene.radar)}: too few for a town"
+        reason = f"{_shown(scene)}: too few for a town"
         return Masked(pair, MaskUsed(NONE, None, 1.0, reason))
     if scene.is_town_of_unknown_size:
-        reason = f"{_shown(scene.radar)}, as in a town, in pixels of unknown size"
+        reason = f"{_shown(scene)}, as in a town, in pixels of unknown size"
         return Masked(pair, MaskUsed(NONE, None, 1.0, reason))
     if not scene.shows_ground:
-        reason = f"{_shown(scene.radar)}, as in a town, in pixels too large to resolve streets"
+        reason = f"{_shown(scene)}, as in a town, in pixels too large to resolve streets"
         elevated_px = _WHOLE_M / pair.grid.pixel_size_m
         return Masked(pair, MaskUsed(NONE, None, 1.0, reason, elevated_px=elevated_px))
-    return _of_town(pair, scene, scene.radar_name, stack, context)
+    return _of_town(pair, scene, stack, context)
 
 
 def ground_instead(
@@ -96,42 +94,31 @@ def ground_instead(
 ) -> Masked | None:
     """Return a pair of which the ground takes part that a radar image shows; None: it shows none.
 
-    Of what may be a town, beside a camera's image; and of any two radar images, as far as the
-    reference alone shows what is ground.
+    Of what may be a town, beside a camera's image; and of any two radar images, if most of the
+    reference is open ground: less must not outvote the rest.
     """
     if scene.has_user_mask:
         return None
-    if scene.sensors is Sensors.RADARS:
-        return _of_open_ground(pair, scene, stack, context)
+    if scene.open_ground is not None:
+        select = scene.open_ground.select
+        image, share = with_mask(pair, REFERENCE, scene.reference.scene, select, stack, context)
+        reason = "what has texture over a wide area is forest or settlement"
+        used = MaskUsed(OPEN, REFERENCE, share, reason, elevated_px=_OPEN_PX)
+        return None if used.leaves_little else Masked(image, used)
     if scene.is_radar_and_camera and scene.may_be_town and scene.shows_ground:
-        return _of_town(pair, scene, scene.radar_name, stack, context)
+        return _of_town(pair, scene, stack, context)
     return None
 
 
-def _of_open_ground(
-    pair: ImagePair, scene: SceneInfo, stack: ExitStack, context: Context
-) -> Masked:
-    facts = scene.reference
-    if may_be_town(facts.strong_share) and shows_ground(facts.scene):
-        masked = _of_town(pair, scene, REFERENCE, stack, context)
-        return replace(masked, used=replace(masked.used, kind=OPEN))
-    select = facts.open_ground.select
-    image, share = with_mask(pair, REFERENCE, facts.scene, select, stack, context)
-    reason = "what has texture over a wide area is forest or settlement"
-    return Masked(image, MaskUsed(OPEN, REFERENCE, share, reason, elevated_px=_OPEN_PX))
-
-
-def _of_town(
-    pair: ImagePair, scene: SceneInfo, name: str, stack: ExitStack, context: Context
-) -> Masked:
-    """Return a pair of which the ground between buildings takes part that one image shows."""
-    facts = scene.of_name(name)
-    ground = find_ground(facts.scene, context.progress)
-    masked, share = with_mask(pair, name, facts.scene, ground.select, stack, context)
-    reason = f"{_shown(facts)}, as in a town"
+def _of_town(pair: ImagePair, scene: SceneInfo, stack: ExitStack, context: Context) -> Masked:
+    """Return a pair of whose radar image the ground of a town alone takes part."""
+    radar, name = scene.radar.scene, scene.radar_name
+    ground = find_ground(radar, context.progress)
+    masked, share = with_mask(pair, name, radar, ground.select, stack, context)
+    reason = f"{_shown(scene)}, as in a town"
     elevated_px = _OBLIQUE_PX if scene.input.is_in_sensor_geometry else _ON_GROUND_PX
     return Masked(masked, MaskUsed(GROUND, name, share, reason, elevated_px=elevated_px))
 
 
-def _shown(radar: ImageFacts) -> str:
-    return f"strong scatterers on {radar.strong_share:.0%} of the image"
+def _shown(scene: SceneInfo) -> str:
+    return f"strong scatterers on {scene.radar.strong_share:.0%} of the image"
