@@ -37,7 +37,10 @@ if ! command -v apt-get >/dev/null || ! "${root[@]}" true 2>/dev/null; then
 fi
 
 echo "system_packages.sh: installing ${missing[*]}"
-apt_get=("${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -y)
+noninteractive=("${root[@]}" env DEBIAN_FRONTEND=noninteractive)
+apt_get=("${noninteractive[@]}" apt-get -q -y)
+# An installation that was interrupted is ended first: apt-get refuses to work before.
+"${noninteractive[@]}" dpkg --configure -a
 # A third-party source that does not answer must not stop Debian's own packages.
 "${apt_get[@]}" update || echo "system_packages.sh: apt-get update failed, trying to install" >&2
 "${apt_get[@]}" install --no-install-recommends "${missing[@]}"
