@@ -57,6 +57,7 @@ def machine(tmp_path: Path) -> Machine:
     debian = Machine(tmp_path)
     debian.add("id", "echo 0")
     debian.add("dpkg-query", "exit 1")
+    debian.add("dpkg", "")
     debian.add("apt-get", "")
     debian.add("true", "")
     return debian
@@ -74,6 +75,13 @@ def test_missing_packages_are_installed(machine: Machine) -> None:
     update, install = machine.calls("apt-get")
     assert update.endswith("update")
     assert install.endswith("install --no-install-recommends one two")
+
+
+def test_an_interrupted_installation_is_ended_first(machine: Machine) -> None:
+    machine.add("apt-get", f"grep -q 'dpkg --configure -a' {machine.log} || exit 100")
+    (machine.bin / "grep").symlink_to(shutil.which("grep") or "/usr/bin/grep")
+    done = machine.run("scripts/system_packages.sh", "one")
+    assert done.returncode == 0, done.stderr
 
 
 def test_installed_packages_are_left_alone(machine: Machine) -> None:
