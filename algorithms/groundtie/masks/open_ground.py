@@ -26,10 +26,11 @@ from .radar import SAMPLE_PX, power
 from .scene import Scene, Selection
 
 # Areas with texture are where so many windows are not homogeneous. They are wider than three
-# windows: along the border of two regions one is not, and on both sides of a road two.
+# windows: along the border of two regions one is not, along both sides of a road two, which is
+# 82 % of an area where two roads cross: 1 - (1 - 18 / 31)².
 _AREA_PX, _SHARE = 31, 0.85
 
-# Layover and radar shadow of trees reach so far from where they stand.
+# Radar shadow of trees of 20 m reaches so far at an incidence angle of 37°.
 _REACH_M = 15.0
 
 
