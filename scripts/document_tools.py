@@ -92,8 +92,9 @@ def with_tables(page: str, text: str, name: str, begin: str = BEGIN, end: str = 
 
 def rule_table(rules: Sequence[Rule]) -> str:
     """Return the table of rules, in the order in which they are asked."""
-    rows = [(rule.name, rule.stage, rule.refuses, rule.source, rule.advice) for rule in rules]
-    return _rows(("rule", "stage", "refuses", "source of the limit", "what to try"), rows)
+    rows = [(r.name, r.stage, r.refuses, r.source, r.advice, r.retry) for r in rules]
+    titles = ("rule", "stage", "refuses", "source of the limit", "what to try", "tried next")
+    return _rows(titles, rows)
 
 
 def tables(tool: Tool) -> str:

@@ -21,11 +21,10 @@ from ..rasters.reading import bounded_cache, open_raster
 from ..sensor.rpc_files import rpc_of
 from .asked import USUAL, asked_lights, asked_rendering, asked_surface_view, asked_terrain
 from .delivery import Call
-from .evidence import IMAGES, SCENE, SURVEY
 from .orthorectification import write_orthoimage
 from .pipeline import run
 from .registration import Registration
-from .rules import RULES
+from .rules.rule import ANOTHER_WAY
 from .scene import SceneInfo
 from .sensor_input import Ground, open_sensor_image
 from .sensor_jobs import RefinedRpc, refine
@@ -34,10 +33,6 @@ from .verdict import Verdict
 
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
 _DOUBTED_DEG, _DOUBTED_SCALE = 10.0, 1.1
-
-# Rules of the images and the scene refuse what matches well, but not the ground, or at two places:
-# no other matcher may try again.
-_FINAL = {r.name for r in RULES if r.stage in (IMAGES, SCENE, SURVEY)} | {"second place"}
 
 
 @dataclass(frozen=True)
@@ -165,7 +160,7 @@ def _first_accepted(
             found.append(run(call.with_limits(opened, spec, part), spec, part, scene))
             verdict, tries = found[-1].verdict, found[-1].spec.tries
             tried.append(_line(way.name, way.because, verdict))
-            is_final = verdict.accepted or verdict.rule in _FINAL
+            is_final = verdict.retry != ANOTHER_WAY
             if is_final:
                 break
         chosen = replace(

@@ -14,30 +14,16 @@ from ..context import Context
 from ..errors import NoOverlapError, NothingFoundError, TooFewPointsError
 from ..masks.used import NONE, MaskUsed
 from ..rasters.reading import bounded_cache
-from .evidence import (
-    IMAGES,
-    SURVEY,
-    Exchanged,
-    ImagesEvidence,
-    RegistrationEvidence,
-    SearchEvidence,
-)
+from .evidence import Exchanged, ImagesEvidence, RegistrationEvidence, SearchEvidence
 from .masks import Masked, ground_instead, with_ground_mask
 from .opening import OpenPair
 from .registration import Registration
-from .rules import RULES
+from .rules.rule import NOTHING
 from .scene import SceneInfo
 from .specification import Specification
 from .stages import NOT_SURVEYED, Stages
 from .surface_masks import with_surface_mask
 from .verdict import NOT_JUDGED, judge, judge_search, refuse_images
-
-# Rules that refuse what elevated objects may cause, and a mask of the ground may mend. What images
-# are, what repeats or is drawn over them, and parts that lie elsewhere, no mask mends, but may
-# hide: noise, copies of the reference and seams of mosaics passed a second try that a rule of the
-# survey had refused (once_wrong.txt of the suite attacks).
-_OF_HEIGHTS = {r.name for r in RULES if r.stage not in (IMAGES, SURVEY)} - {"second place"}
-_OF_HEIGHTS |= {"ground elsewhere"}
 
 
 def run(
@@ -91,7 +77,7 @@ def register(
     """
     found = _register_once(opened, masked, scene, spec, context)
     is_whole = masked.used.kind == NONE and not spec.is_rendered
-    if found.verdict.rule not in _OF_HEIGHTS or not is_whole:
+    if found.verdict.retry == NOTHING or not is_whole:
         return found
     ground = ground_instead(opened.pair, scene, opened.stack, context)
     if ground is None:

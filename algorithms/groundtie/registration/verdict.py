@@ -17,6 +17,7 @@ from .evidence import (
 )
 from .refinement_evidence import RefinementEvidence
 from .rules import RULES, Rule
+from .rules.rule import NOTHING
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,9 @@ class Verdict:
     rule
         Name of the rule that refused it; empty if it is accepted.
     advice
-        What can be tried next; empty if it is accepted.
+        What a user can try next; empty if it is accepted.
+    retry
+        What is tried next without being asked for, as of a `Rule`; nothing if it is accepted.
     ce50_px, ce95_px
         As `check_ce90_px`, with 50 and 95 %.
     ce90_range_px
@@ -73,6 +76,7 @@ class Verdict:
     extrapolated_share: float = math.nan
     rule: str = ""
     advice: str = ""
+    retry: str = NOTHING
     ce50_px: float = math.nan
     ce95_px: float = math.nan
     ce90_range_px: tuple[float, float] = (math.nan, math.nan)
@@ -109,7 +113,7 @@ class Verdict:
         values = asdict(self) | {"points": self.points, "chance": self.chance}
         values |= {"ce90_low_px": low, "ce90_high_px": high}
         values |= {f"ellipse_{name}": value for name, value in asdict(self.ellipse).items()}
-        del values["ce90_range_px"], values["ellipse"]
+        del values["ce90_range_px"], values["ellipse"], values["retry"]
         unknown = {k for k, v in values.items() if isinstance(v, float) and not math.isfinite(v)}
         return {k: None if k in unknown else v for k, v in values.items()}
 
@@ -143,7 +147,7 @@ def decide(evidence: Evidence, confirmed: str) -> Verdict:
     if refusal is None:
         return Verdict(True, confirmed)
     rule, reason = refusal
-    return Verdict(False, reason, rule=rule.name, advice=rule.advice)
+    return Verdict(False, reason, rule=rule.name, advice=rule.advice, retry=rule.retry)
 
 
 def refuse_images(evidence: ImagesEvidence) -> Verdict | None:

@@ -2,7 +2,8 @@
 
 A rule looks at evidence and returns why it refuses, in a sentence, or None. Its `stage` states
 which kind of evidence it reads (see `evidence`); `verdict.judge` asks all rules of the evidence's
-stages in their order, and the first one that refuses decides.
+stages in their order, and the first one that refuses decides. Its `retry` states what may be tried
+after that.
 
 Each stage has a module here, with its limits and their sources. To add a rule, write a function
 and put a `Rule` in the tuple of its module. docs/method-verdict.md is made from this list, and a

@@ -8,7 +8,7 @@ from ...matching.parts import LEAST_EXCESS, MOST_OF_ONE, SAME_PX
 from ...matching.rest import Rest
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
 from ..evidence import SURVEY, RegistrationEvidence
-from .rule import ON_GROUND, WITHOUT, Rule
+from .rule import GROUND_ALONE, NOTHING, ON_GROUND, WITHOUT, Rule
 
 # Chips all over are similar to a second place from this share on, and weakly similar below so many
 # robust standard deviations. Measured on pairs that were registered right: up to 0.76, and from
@@ -184,6 +184,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "[Neill2012]; suites margins and attacks",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,
+        NOTHING,
     ),
     Rule(
         "second place nearby",
@@ -195,6 +196,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suites real and attacks",
         "give a larger part of the scene, which shows more than what repeats or is drawn over it",
         _second_place_nearby,
+        NOTHING,
     ),
     Rule(
         "few chips confirm",
@@ -205,6 +207,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suites real, simulated, calibration and attacks",
         "register parts that lie apart one by one, without what is drawn over them",
         _few_confirm,
+        NOTHING,
     ),
     Rule(
         "weak similarity",
@@ -215,6 +218,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suites real and attacks",
         "give images with less noise, a mask that leaves more, or a larger pixel size for matching",
         _weak,
+        NOTHING,
     ),
     Rule(
         "pixel-locked content",
@@ -229,6 +233,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suites margins and attacks",
         WITHOUT,
         _locked,
+        NOTHING,
     ),
     Rule(
         "band elsewhere",
@@ -238,6 +243,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suite margins",
         "give the band that shows the ground, alone in a file",
         _other_ground_in_a_band,
+        NOTHING,
     ),
     Rule(
         "ground elsewhere",
@@ -247,5 +253,6 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suite calibration, SAR–SAR pairs",
         ON_GROUND,
         _ground_elsewhere,
+        GROUND_ALONE,
     ),
 )
