@@ -17,6 +17,7 @@ import numpy as np
 
 from groundtie.errors import GroundTieError
 from groundtie.matching.parts import LEAST_EXCESS
+from groundtie.matching.rest import Rest
 from groundtie.matching.survey import Survey
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
@@ -29,6 +30,7 @@ from groundtie.registration.rules.survey import (
     WEAK_REST_HEIGHT,
     deviations_beyond,
     deviations_elsewhere,
+    deviations_of_rest,
     evident_share,
     has_few_chips,
 )
@@ -64,23 +66,29 @@ def _excess(survey: Survey | None) -> float:
 
 
 def _excess_of_all(evidence: RegistrationEvidence) -> float:
-    return _excess(evidence.survey)
+    return _excess(evidence.surveys.whole)
+
+
+def _without_drawn(evidence: RegistrationEvidence) -> Rest | None:
+    """Return what is left without content that may be drawn; None: there is none."""
+    rest = evidence.surveys.rest
+    return None if rest is None or not rest.is_evident else rest
 
 
 def _excess_of_rest(evidence: RegistrationEvidence) -> float:
-    rest = evidence.rest
+    rest = _without_drawn(evidence)
     return math.nan if rest is None or rest.is_explained else _excess(rest.survey)
 
 
 def _of_survey(measure: Callable[[Survey], float]) -> Callable[[RegistrationEvidence], float]:
     def value(evidence: RegistrationEvidence) -> float:
-        return math.nan if evidence.survey is None else measure(evidence.survey)
+        return math.nan if evidence.surveys.whole is None else measure(evidence.surveys.whole)
 
     return value
 
 
 def _rest_height(evidence: RegistrationEvidence) -> float:
-    rest = evidence.rest
+    rest = _without_drawn(evidence)
     left = None if rest is None else rest.survey
     if rest is None or left is None or (rest.is_explained and has_few_chips(left, rest.chips)):
         return math.nan
@@ -88,18 +96,18 @@ def _rest_height(evidence: RegistrationEvidence) -> float:
 
 
 def _in_bands(evidence: RegistrationEvidence) -> float:
-    return max((one.survey.excess for one in evidence.bands), default=math.nan)
+    return max((one.survey.excess for one in evidence.surveys.bands), default=math.nan)
 
 
 def _rest_peak(evidence: RegistrationEvidence) -> float:
-    rest = evidence.rest
+    rest = _without_drawn(evidence)
     if rest is None or rest.survey is None or has_few_chips(rest.survey, rest.chips):
         return math.nan
     return deviations_elsewhere(rest.survey)
 
 
 def _peak_beyond(evidence: RegistrationEvidence) -> float:
-    rest = evidence.rest
+    rest = _without_drawn(evidence)
     return math.nan if rest is None or rest.beyond is None else deviations_beyond(rest)
 
 
@@ -117,6 +125,11 @@ STATISTICS = (
     Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),
     Statistic("pixel-locked content: second peak", REST_PEAK_DEVIATIONS, _rest_peak),
     Statistic("pixel-locked content: copies", REST_PEAK_DEVIATIONS, _peak_beyond),
+    Statistic(
+        "rest elsewhere: second peak",
+        REST_PEAK_DEVIATIONS,
+        lambda evidence: deviations_of_rest(evidence.surveys.rest),
+    ),
     Statistic("band elsewhere: excess", LEAST_EXCESS, _in_bands),
 )
 

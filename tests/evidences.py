@@ -16,7 +16,9 @@ from groundtie.geometry.transform import Transform
 from groundtie.masks.used import MaskUsed
 from groundtie.matching.bands import BandSurvey
 from groundtie.matching.parts import ELSEWHERE_PX
+from groundtie.matching.rest import Rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
+from groundtie.matching.surveys import Surveys
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.scene import ImageFacts, SceneInfo
@@ -97,12 +99,18 @@ def evidence(
     check_errors: np.ndarray,
     estimate: Estimate | None = None,
     max_error_px: float = 3.0,
+    *,
+    survey: Survey | None = None,
+    rest: Rest | None = None,
+    bands: tuple[BandSurvey, ...] = (),
+    ground: Survey | None = None,
     **more: Any,
 ) -> RegistrationEvidence:
     """Return the evidence of a registration whose check points have errors, shape (n, 2)."""
-    estimate = estimate or estimated(fit_points())
+    estimate, check = estimate or estimated(fit_points()), check_points(check_errors)
+    surveys = Surveys(survey, rest, bands, ground)
     return RegistrationEvidence(
-        estimate, check_points(check_errors), GRID, max_error_px, RADIUS, **more
+        estimate, check, GRID, max_error_px, RADIUS, surveys=surveys, **more
     )
 
 

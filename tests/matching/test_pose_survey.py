@@ -40,9 +40,10 @@ def test_chips_confirm_a_pose(pose: Pose, tmp_path: Path, context: Context) -> N
     found = surveyed(tmp_path, pose, context)
     assert len(found.agrees) >= 15
     assert found.agrees.mean() > 0.9
-    assert found.survey.confirming > 0.9 * len(found.agrees)
-    assert found.survey.parts == []
-    assert found.rest is None
+    survey = found.surveys.whole
+    assert survey is not None and survey.confirming > 0.9 * len(found.agrees)
+    assert survey.parts == []
+    assert found.surveys.rest is None
 
 
 @pytest.mark.slow

@@ -17,7 +17,11 @@ from groundtie.matching.rest import Rest, survey_rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.rules.survey import REST_PEAK_DEVIATIONS, deviations_beyond
+from groundtie.registration.rules.survey import (
+    REST_PEAK_DEVIATIONS,
+    deviations_beyond,
+    deviations_elsewhere,
+)
 from groundtie.similarity.surface import SimilaritySettings
 
 SIDE, MARGIN = 340, 30
@@ -30,8 +34,8 @@ def place(shift: tuple[int, int] = (0, 0)) -> np.ndarray:
     return canvas[top : top + SIDE, left : left + SIDE]
 
 
-def noisy(values: np.ndarray, seed: int) -> np.ndarray:
-    return values + 0.2 * np.random.default_rng(seed).normal(size=values.shape)
+def noisy(values: np.ndarray, seed: int, deviation: float = 0.2) -> np.ndarray:
+    return values + deviation * np.random.default_rng(seed).normal(size=values.shape)
 
 
 def rest_of(
@@ -123,3 +127,21 @@ def test_what_is_drawn_is_not_looked_behind(tmp_path: Path, context: Context) ->
         values[20::55] = values[:, 30::70] = 5.0
     rest = rest_of(tmp_path, *images, context)
     assert rest is not None and rest.is_drawn and rest.survey is None
+
+
+@pytest.mark.parametrize(("moved_rows", "is_elsewhere"), [(0, False), (SIDE // 3, True)])
+@pytest.mark.slow
+def test_what_two_views_have_not_in_common_shows_where_a_part_lies(
+    moved_rows: int, is_elsewhere: bool, tmp_path: Path, context: Context
+) -> None:
+    """What they have in common is too little to be drawn, and is taken out all the same."""
+    reference, offset = place(), (0.4, -0.3)
+    input = place()
+    input[:moved_rows] = place((11, -7))[:moved_rows]
+    input = ndimage.shift(input, offset[::-1], mode="mirror")
+    views = [noisy(view, seed, 1.0) for seed, view in enumerate((reference, input))]
+    rest = rest_of(tmp_path, *views, context, offset, sensors=Sensors.DIFFERENT)
+    assert rest is not None and not rest.is_evident and rest.survey is not None
+    assert (deviations_elsewhere(rest.survey) >= REST_PEAK_DEVIATIONS) == is_elsewhere
+    shifts = [part.shift_px for part in rest.survey.parts]
+    assert shifts == ([pytest.approx((11, -7), abs=0.5)] if is_elsewhere else [])

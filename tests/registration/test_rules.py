@@ -213,6 +213,18 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(), rest=Rest(survey(height=2.4, rival=1.0))),
         evidence(GOOD, survey=survey(), rest=Rest(survey(height=2.6, rival=1.0))),
     ),
+    "rest elsewhere": (
+        evidence(
+            GOOD,
+            survey=survey(),
+            rest=Rest(survey(part=5, rival=7.0), chips=49, is_evident=False),
+        ),
+        evidence(
+            GOOD,
+            survey=survey(),
+            rest=Rest(survey(part=5, rival=5.0), chips=49, is_evident=False),
+        ),
+    ),
     # Of 49 chips' mean surfaces, standard deviations are a seventh.
     "band elsewhere": (
         evidence(GOOD, survey=survey(), bands=in_band(survey(height=1.0, rival=2.1))),

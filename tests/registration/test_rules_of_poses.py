@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from evidences import (
+    GRID,
     displaced,
     estimated,
     fallen,
@@ -20,9 +21,11 @@ from evidences import (
     survey,
 )
 
+from groundtie.matching.bands import BandSurvey
 from groundtie.matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import Survey
+from groundtie.matching.surveys import Surveys
 from groundtie.registration.layover import CHIPS_MEAN_OVER_SCATTER
 from groundtie.registration.pose_evidence import PoseSurveyEvidence
 
@@ -35,16 +38,20 @@ def posed(
     *,
     layover_factor: float | None = None,
     is_shift: bool = False,
+    rest: Rest | None = None,
+    bands: tuple[BandSurvey, ...] = (),
+    ground: Survey | None = None,
     **more: Any,
 ) -> PoseSurveyEvidence:
     """Return the evidence of a pose that chips miss by residuals, shape (n, 2)."""
     fitted = estimated(fit_points())
     found = PoseSurvey(
+        GRID,
         CHIPS[: len(residuals)],
         residuals,
-        chips or survey(),
-        transform=fitted.transform,
-        **{"rest": None, "fold_models": fitted.fold_models, **more},
+        Surveys(chips or survey(), rest, bands, ground),
+        fitted.transform,
+        **{"fold_models": fitted.fold_models, **more},
     )
     return PoseSurveyEvidence(found, layover_factor, is_shift)
 

@@ -29,7 +29,7 @@ from scipy.stats import binom
 
 from groundtie.masks.used import GROUND, LAYER, NONE, SURFACE, MaskUsed
 from groundtie.matching.rest import Rest
-from groundtie.matching.survey import Survey
+from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.registration.evidence import Exchanged, ImagesEvidence, RegistrationEvidence
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
 from groundtie.registration.verdict import refusals
@@ -207,6 +207,20 @@ def test_what_one_cameras_views_leave_may_lie_elsewhere_in_parts() -> None:
     left = survey(3, part=5, height=6.0)
     assert left.parts
     assert refusing(evidence(GOOD, survey=survey(), rest=Rest(left, True, survey()))) == []
+
+
+@pytest.mark.parametrize(
+    ("height", "rival", "part", "is_refused"),
+    [(0.5, 1.0, 5, True), (1.1, 1.0, 5, True), (2.0, 1.0, 5, False), (0.5, 1.0, 0, False)],
+)
+def test_what_two_views_have_not_in_common_must_not_match_elsewhere(
+    height: float, rival: float, part: int, is_refused: bool
+) -> None:
+    """Walls are a second place, canopies are parts: what is drawn over ground leaves both."""
+    left = survey(part=part, height=height, rival=rival)
+    left.surfaces[:part, SURVEY_RADIUS_PX - 5, SURVEY_RADIUS_PX + 9] = 6.0
+    found = evidence(GOOD, survey=survey(), rest=Rest(left, chips=49, is_evident=False))
+    assert refusing(found) == ["rest elsewhere"] * is_refused
 
 
 @pytest.mark.parametrize(

@@ -20,15 +20,14 @@ from ..rasters.pair import ImagePair
 from ..similarity.peak import find_peak
 from ..similarity.surface import SimilaritySettings
 from .alignment import IDENTITY, Alignment, align
-from .bands import BandSurvey, survey_bands
 from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .coarse_shift import level_factor
 from .frames import compose
 from .locked import Sensors
 from .matcher import FloatArray, MaskOf, Places
-from .rest import Rest, survey_rest
-from .survey import SURVEY_RADIUS_PX, Survey, survey_model
+from .survey import SURVEY_RADIUS_PX
+from .surveys import Surveys, survey_all
 
 # Chips along the shorter side. Of the 29 shared rotated pairs, at their poses: four are too few to
 # show parts, six so small that radar hardly matches.
@@ -51,34 +50,28 @@ class PoseSurvey:
 
     Parameters
     ----------
+    grid
+        What the chips lie on.
     px
-        The chips' centres, in pixels of the survey's grid, shape (n, 2).
+        Their centres, in its pixels, shape (n, 2).
     residuals_px
         Where each chip matches, (x, y) from where a pose has it that was moved without the chip,
         shape (n, 2); infinite where too few chips are left.
-    survey
-        Where they match around the pose that was moved by all of them.
-    rest
-        The same without content that is the same in both arrays; None: there is none.
+    surveys
+        What they show of the pose that was moved by all of them.
     transform
         The pose that was moved by all of them.
     fold_models
         The pose moved without one block of chips after the other, between pixels of that grid;
         none where too few chips are left.
-    bands
-        What bands show each, of images whose bands do not coincide.
-    ground
-        What open ground shows; None: the images are not two radars'.
     """
 
+    grid: Grid
     px: NDArray[np.int_]
     residuals_px: FloatArray
-    survey: Survey
-    rest: Rest | None
+    surveys: Surveys
     transform: Transform
     fold_models: tuple[Model, ...] = ()
-    bands: tuple[BandSurvey, ...] = ()
-    ground: Survey | None = None
 
     @property
     def agrees(self) -> NDArray[np.bool_]:
@@ -123,14 +116,10 @@ def survey_pose(
         aligned = _moved(kept, surfaces)
         model, fold_models = compose(model, aligned.model, level), aligned.fold_models
     elsewhere_px = max(accuracy_share * max(level.width, level.height), POSE_TOLERANCE_PX)
-    survey = survey_model(matcher, model, quiet, None, places, elsewhere_px)
     moved = Transform(model, transform.crs, transform.input_grid)
-    rest = survey_rest(matcher, moved, places, elsewhere_px, sensors, _EXACT_PX, quiet)
-    bands = survey_bands(matcher, model, places, elsewhere_px, quiet)
-    ground = None
-    if open_ground is not None:
-        ground = survey_model(matcher, model, quiet, open_ground, places, elsewhere_px)
-    return PoseSurvey(kept, residuals, survey, rest, moved, fold_models, bands, ground)
+    accuracy_px = elsewhere_px, _EXACT_PX
+    surveys = survey_all(matcher, moved, places, accuracy_px, sensors, open_ground, quiet)
+    return PoseSurvey(level, kept, residuals, surveys, moved, fold_models)
 
 
 def _covered(grid: Grid, transform: Transform) -> Grid:

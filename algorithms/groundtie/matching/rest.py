@@ -30,12 +30,15 @@ class Rest:
         None elsewhere.
     chips
         How many chips there are; of some too little may be left.
+    is_evident
+        Whether there is more of such content than two views of one ground have in common.
     """
 
     survey: Survey | None = None
     is_explained: bool = False
     beyond: Survey | None = None
     chips: int = 0
+    is_evident: bool = True
 
     @property
     def is_drawn(self) -> bool:
@@ -52,7 +55,7 @@ def survey_rest(
     exact_px: float,
     context: Context,
 ) -> Rest | None:
-    """Return what chips show without content that is the same in both arrays; None: there is none.
+    """Return what chips show without content that is the same in both arrays.
 
     Parameters
     ----------
@@ -70,15 +73,22 @@ def survey_rest(
         See `find_locked_content`.
     context
         Threads and progress.
+
+    Returns
+    -------
+    None where the transform does more than move the array.
     """
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
     locked = find_locked_content(pair, transform, asked, sensors, exact_px, context.quiet())
-    if locked is None or not locked.is_evident:
+    if locked is None:
         return None
+    # What a mask leaves is little: one measure alone would miss most of it.
+    fused, chips = replace(matcher, settings=SimilaritySettings()), len(places.centres)
+    if not locked.is_evident:
+        survey = survey_model(fused, transform.model, context, locked, places, elsewhere_px)
+        return Rest(survey, chips=chips, is_evident=False)
     if locked.is_drawn:
         return Rest()
-    # What a mask leaves is little: one measure alone would miss most of it.
-    fused = replace(matcher, settings=SimilaritySettings())
     left = beyond = None
     same = locked.sameness
     if not locked.is_explained or (same.has_sharp_edges and not same.is_same_view):
@@ -89,4 +99,4 @@ def survey_rest(
         # A copy may be blended into other ground, of which the same windows are no part.
         other = replace(fused, left_of=unexplained)
         beyond = survey_model(other, transform.model, context, None, places, elsewhere_px)
-    return Rest(left, locked.is_explained, beyond, len(places.centres))
+    return Rest(left, locked.is_explained, beyond, chips)

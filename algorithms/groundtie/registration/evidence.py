@@ -24,9 +24,8 @@ from ..geometry.judging import CE90_FACTOR, LARGEST_LOG10_CHANCE, SMALLEST_INLIE
 from ..geometry.misses import Misses
 from ..geometry.tie_points import TiePoints
 from ..masks.used import NONE, MaskUsed
-from ..matching.bands import BandSurvey
-from ..matching.rest import Rest
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
+from ..matching.surveys import Surveys
 from ..rasters.grid import FloatArray, Grid
 from .layover import EVEN_MEAN_OVER_SCATTER, scatter_along_line
 from .scene import SceneInfo
@@ -221,14 +220,8 @@ class RegistrationEvidence:
         What the images are; None: unknown, as in tests of other rules.
     mask
         The mask that was used.
-    survey
-        Where chips all over the overlap match; None: not looked at, as in tests of other rules.
-    rest
-        The same without content that is the same in both arrays; None: there is none.
-    bands
-        What bands show each, of images whose bands do not coincide.
-    ground
-        What open ground shows; None: the images are not two radars', or it alone takes part.
+    surveys
+        What chips all over the overlap show.
     input_fit
         How well a surface model fits the registered input; None: nothing is expected of it.
     exchanged
@@ -244,10 +237,7 @@ class RegistrationEvidence:
     layover_factor: float | None = None
     scene: SceneInfo | None = None
     mask: MaskUsed = field(default_factory=lambda: MaskUsed(NONE, None, 1.0, ""))
-    survey: Survey | None = None
-    rest: Rest | None = None
-    bands: tuple[BandSurvey, ...] = ()
-    ground: Survey | None = None
+    surveys: Surveys = field(default_factory=Surveys)
     input_fit: ModelFit | None = None
     exchanged: Exchanged | None = None
 
@@ -319,9 +309,7 @@ class RegistrationEvidence:
 
     @cached_property
     def _heights_px(self) -> FloatArray:
-        if self.survey is None:
-            return np.zeros(2)
-        mean = mean_of_heights_px(self.survey, self.layover_factor, self.max_error_px)
+        mean = mean_of_heights_px(self.surveys.whole, self.layover_factor, self.max_error_px)
         return mean if self.mask.is_ground else 2 * mean
 
     @property
@@ -332,16 +320,16 @@ class RegistrationEvidence:
 
 
 def mean_of_heights_px(
-    survey: Survey, layover_factor: float | None, max_error_px: float
+    survey: Survey | None, layover_factor: float | None, max_error_px: float
 ) -> FloatArray:
     """Return what heights displace all matches by on average, as they scatter chips, shape (2,).
 
     So far they may displace all to either side where a mask left more ground than heights; twice
     as far where the ground may be the lowest of what matched.
     """
-    shifts = survey.shifts_px
-    if len(shifts) == 0:
+    if survey is None or len(survey.centres) == 0:
         return np.zeros(2)
+    shifts = survey.shifts_px
     misses = Misses(survey.centres.astype(float), shifts, SURVEY_RADIUS_PX, max_error_px)
     scatter = scatter_along_line(shifts, misses.mixture.probability, _LOG10_FIVE_PERCENT)
     return (layover_factor or EVEN_MEAN_OVER_SCATTER) * scatter

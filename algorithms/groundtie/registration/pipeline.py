@@ -13,6 +13,7 @@ import numpy as np
 from ..context import Context
 from ..errors import NoOverlapError, NothingFoundError, TooFewPointsError
 from ..masks.used import NONE, MaskUsed
+from ..matching.surveys import Surveys
 from ..rasters.reading import bounded_cache
 from .evidence import Exchanged, ImagesEvidence, RegistrationEvidence, SearchEvidence
 from .masks import Masked, ground_instead, with_ground_mask
@@ -21,7 +22,7 @@ from .registration import Registration
 from .rules.rule import NOTHING
 from .scene import SceneInfo
 from .specification import Specification
-from .stages import NOT_SURVEYED, Stages
+from .stages import Stages
 from .surface_masks import with_surface_mask
 from .verdict import NOT_JUDGED, judge, judge_search, refuse_images
 
@@ -110,7 +111,7 @@ def _register_once(
         verdict=verdict,
         estimate=estimate,
         check=check,
-        survey=surveys[0],
+        survey=surveys.whole,
         evidence=evidence,
     )
 
@@ -142,7 +143,7 @@ def _exchanged(
         estimate, check = stages.checked(context)
     except (NothingFoundError, TooFewPointsError, NoOverlapError):
         return Exchanged()
-    points = stages.evidence(estimate, check, NOT_SURVEYED, scene).held_out
+    points = stages.evidence(estimate, check, Surveys(), scene).held_out
     px, input = evidence.grid.lattice(), evidence.estimate.transform.input_grid
     there = input.pixel_to_map(evidence.estimate.transform(evidence.grid.pixel_to_map(px)))
     reference = estimate.transform.input_grid

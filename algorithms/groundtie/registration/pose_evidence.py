@@ -16,10 +16,9 @@ from ..geometry.judging import SMALLEST_INLIER_SHARE, SMALLEST_SHARE_UNROTATED
 from ..geometry.limits import SearchLimits
 from ..geometry.misses import Misses
 from ..masks.used import NONE, MaskUsed
-from ..matching.bands import BandSurvey
 from ..matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey
-from ..matching.rest import Rest
-from ..matching.survey import SURVEY_RADIUS_PX, Survey
+from ..matching.survey import SURVEY_RADIUS_PX
+from ..matching.surveys import Surveys
 from ..pose.pose import PoseFound
 from ..pose.rotation_windows import DEFAULT_RADIUS_SHARE
 from ..pose.search import find_poses, moved_px
@@ -141,24 +140,9 @@ class PoseSurveyEvidence:
     max_error_px: ClassVar = POSE_TOLERANCE_PX
 
     @property
-    def survey(self) -> Survey:
-        """Where the chips match around the pose."""
-        return self.found.survey
-
-    @property
-    def rest(self) -> Rest | None:
-        """The same without content that is the same in both arrays."""
-        return self.found.rest
-
-    @property
-    def bands(self) -> tuple[BandSurvey, ...]:
-        """What bands show each, of images whose bands do not coincide."""
-        return self.found.bands
-
-    @property
-    def ground(self) -> Survey | None:
-        """What open ground shows, of two radar images."""
-        return self.found.ground
+    def surveys(self) -> Surveys:
+        """What the chips show of the pose."""
+        return self.found.surveys
 
     @property
     def check_residuals_px(self) -> FloatArray:
@@ -174,8 +158,8 @@ class PoseSurveyEvidence:
     def held_out(self) -> HeldOut:
         """How each chip agrees with the pose as the others have it."""
         misses, total = self._misses, len(self.found.agrees)
-        fold_models, lattice = self.found.fold_models, self.survey.grid.lattice()
-        heights = mean_of_heights_px(self.survey, self.layover_factor, POSE_TOLERANCE_PX)
+        fold_models, lattice = self.found.fold_models, self.found.grid.lattice()
+        heights = mean_of_heights_px(self.surveys.whole, self.layover_factor, POSE_TOLERANCE_PX)
         return HeldOut.of(
             "chips all over",
             misses,
@@ -200,5 +184,5 @@ class PoseSurveyEvidence:
     @property
     def extrapolated_share(self) -> float:
         """Share of the overlap outside of the hull of the chips that agree."""
-        grid, agreeing = self.survey.grid, self.found.px[self.found.agrees]
+        grid, agreeing = self.found.grid, self.found.px[self.found.agrees]
         return 1 - hull_share(agreeing.astype(float), (grid.width, grid.height))

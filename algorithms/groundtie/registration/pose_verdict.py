@@ -27,7 +27,7 @@ def judge_pose_survey(evidence: PoseSurveyEvidence) -> Verdict:
         "chips all over confirm it, and no other pose matches nearly as well",
         0,
         0,
-        evidence.survey.grid.metres_per_pixel,
+        evidence.found.grid.metres_per_pixel,
     )
 
 

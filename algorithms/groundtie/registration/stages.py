@@ -11,7 +11,6 @@ from ..geometry.estimation import Estimate
 from ..geometry.models import TERRAIN, Model, shift_model
 from ..masks.used import NONE
 from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
-from ..matching.bands import BandSurvey, survey_bands
 from ..matching.check import CHECK_RADIUS_PX, Check, check_model
 from ..matching.chips import ChipMatcher
 from ..matching.guided_fit import GuidedFit
@@ -22,9 +21,9 @@ from ..matching.locked import EXACT_PX
 from ..matching.parts import ELSEWHERE_PX
 from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
-from ..matching.rest import Rest, survey_rest
 from ..matching.surface_fit import SurfaceFit
-from ..matching.survey import Survey, survey_model, survey_places
+from ..matching.survey import survey_places
+from ..matching.surveys import Surveys, survey_all
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch, middle_window
@@ -36,11 +35,6 @@ from .opening import open_terrain
 from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
 from .surface_masks import ModelFit, fit_of, fit_of_images
-
-# What chips all over show; without what the arrays share, if anything; in bands alone; and of open
-# ground, if both images are a radar's.
-Surveys = tuple[Survey | None, Rest | None, tuple[BandSurvey, ...], Survey | None]
-NOT_SURVEYED: Surveys = (None, None, (), None)
 
 
 class Fit(Protocol):
@@ -122,27 +116,19 @@ class Stages:
         return check_model(self.matcher, self.held_out.layout, model, context)
 
     def survey(self, estimate: Estimate, scene: SceneInfo, context: Context) -> Surveys:
-        """Match chips all over the pair, with what its masks leave, around what was estimated.
-
-        Returns what they show (None: it is not asked for), what they show without content that is
-        the same in both arrays (None: there is none), what bands show each where they do not
-        coincide, and what open ground of two radar images shows (None: they are none, or it alone
-        takes part).
-        """
+        """Match chips all over the pair, with what its masks leave, around what was estimated."""
         if self.spec.is_placed:
-            return NOT_SURVEYED
-        pair, transform = self.masked.pair, estimate.transform
-        chips = ChipMatcher(pair, SimilaritySettings(self.spec.similarity))
-        places, sensors = survey_places(pair.grid), scene.sensors
-        survey = survey_model(chips, transform.model, context.part(0.0, 0.5))
-        part = context.part(0.5, 0.9)
-        rest = survey_rest(chips, transform, places, ELSEWHERE_PX, sensors, EXACT_PX, part)
-        last = context.part(0.9, 1.0)
-        bands = survey_bands(chips, transform.model, places, ELSEWHERE_PX, last)
-        ground, open_ground = None, scene.open_ground
-        if self.masked.used.kind == NONE and open_ground is not None:
-            ground = survey_model(chips, transform.model, context.quiet(), open_ground)
-        return survey, rest, bands, ground
+            return Surveys()
+        chips = ChipMatcher(self.masked.pair, SimilaritySettings(self.spec.similarity))
+        return survey_all(
+            chips,
+            estimate.transform,
+            survey_places(chips.pair.grid),
+            (ELSEWHERE_PX, EXACT_PX),
+            scene.sensors,
+            scene.open_ground if self.masked.used.kind == NONE else None,
+            context,
+        )
 
     def evidence(
         self,
@@ -168,7 +154,7 @@ class Stages:
             factor if is_radar else None,
             scene,
             self.masked.used,
-            *surveys,
+            surveys,
             input_fit=self._input_fit(estimate),
         )
 

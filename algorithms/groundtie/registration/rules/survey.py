@@ -50,14 +50,15 @@ _FEWEST_EVIDENT, LARGEST_SHARE = 5, 0.2
 
 
 def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
-    if evidence.survey is None or not evidence.survey.parts:
+    survey = evidence.surveys.whole
+    if survey is None or not survey.parts:
         return None
-    part = evidence.survey.parts[0]
+    part = survey.parts[0]
     return f"{part.chips} chips around the {part.where} match {part.distance_px:.1f} px off"
 
 
 def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
-    survey = evidence.survey
+    survey = evidence.surveys.whole
     if survey is None:
         return None
     if deviations_elsewhere(survey) >= PEAK_DEVIATIONS:
@@ -90,7 +91,7 @@ def evident_share(survey: Survey) -> float:
 
 
 def _few_confirm(evidence: RegistrationEvidence) -> str | None:
-    survey = evidence.survey
+    survey = evidence.surveys.whole
     if survey is None or evidence.mask.is_ground:
         return None
     share = evident_share(survey)
@@ -103,7 +104,7 @@ def _few_confirm(evidence: RegistrationEvidence) -> str | None:
 
 
 def _weak(evidence: RegistrationEvidence) -> str | None:
-    survey = evidence.survey
+    survey = evidence.surveys.whole
     if survey is None:
         return None
     chips = len(survey.centres)
@@ -142,8 +143,8 @@ def _confirms(left: Survey, rest: Rest) -> bool:
 
 def _locked(evidence: RegistrationEvidence) -> str | None:
     """Ask of what is left what is asked of all; of copies and one camera's views it is little."""
-    rest = evidence.rest
-    if rest is None:
+    rest = evidence.surveys.rest
+    if rest is None or not rest.is_evident:
         return None
     if rest.is_drawn:
         return "both images show the same edges at the same columns and rows, sharper than ground's"
@@ -158,15 +159,32 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
     )
 
 
+def deviations_of_rest(rest: Rest | None) -> float:
+    """Return how far what is left of one ground stands out elsewhere, as a whole and in a part.
+
+    0: it does not. Of right transforms, walls and canopies are now and then the one or the other.
+    """
+    left = None if rest is None or rest.is_evident else rest.survey
+    if left is None or not (_has_rival(left) and left.parts):
+        return 0.0
+    return deviations_elsewhere(left)
+
+
+def _rest_elsewhere(evidence: RegistrationEvidence) -> str | None:
+    if deviations_of_rest(evidence.surveys.rest) < REST_PEAK_DEVIATIONS:
+        return None
+    return "without what both images have in common, chips all over match elsewhere"
+
+
 def _other_ground_in_a_band(evidence: RegistrationEvidence) -> str | None:
-    for one in evidence.bands:
+    for one in evidence.surveys.bands:
         if one.survey.is_elsewhere:
             return f"band {one.band} of the {one.image} alone matches elsewhere"
     return None
 
 
 def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
-    ground = evidence.ground
+    ground = evidence.surveys.ground
     if ground is None or not _has_rival(ground):
         return None
     if deviations_elsewhere(ground) < REST_PEAK_DEVIATIONS:
@@ -233,6 +251,17 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suites margins and attacks",
         WITHOUT,
         _locked,
+        NOTHING,
+    ),
+    Rule(
+        "rest elsewhere",
+        SURVEY,
+        "without what both images have in common at the same columns and rows, a second place "
+        f"matches about as well, and {REST_PEAK_DEVIATIONS:g} robust standard deviations better "
+        "than usual, and a part lies elsewhere",
+        "suites margins and attacks",
+        WITHOUT,
+        _rest_elsewhere,
         NOTHING,
     ),
     Rule(

@@ -1,0 +1,78 @@
+"""All that the rules ask of chips all over a pair: as it is, and without what may deceive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..context import Context
+from ..geometry.transform import Transform
+from .bands import BandSurvey, survey_bands
+from .chips import ChipMatcher
+from .locked import Sensors
+from .matcher import MaskOf, Places
+from .rest import Rest, survey_rest
+from .survey import Survey, survey_model
+
+
+@dataclass(frozen=True)
+class Surveys:
+    """What chips all over a pair show of a transform.
+
+    Parameters
+    ----------
+    whole
+        Of all that takes part; None: they were not asked, nor are the others then.
+    rest
+        Without content that is the same in both arrays; None: the transform does more than move
+        the array.
+    bands
+        Of bands each, of images whose bands do not coincide.
+    ground
+        Of open ground; None: the images are not two radars', or it alone takes part.
+    """
+
+    whole: Survey | None = None
+    rest: Rest | None = None
+    bands: tuple[BandSurvey, ...] = ()
+    ground: Survey | None = None
+
+
+def survey_all(
+    matcher: ChipMatcher,
+    transform: Transform,
+    places: Places,
+    accuracy_px: tuple[float, float],
+    sensors: Sensors,
+    open_ground: MaskOf | None,
+    context: Context,
+) -> Surveys:
+    """Match chips all over a pair around a transform, in each way that the rules ask for.
+
+    Parameters
+    ----------
+    matcher
+        What the chips are matched by.
+    transform
+        What was found.
+    places
+        The chips, on a regular layout.
+    accuracy_px
+        Farther than the first from where the transform has all chips lies a second place; within
+        the second of whole pixels, it moves the array by these.
+    sensors
+        What the images may be.
+    open_ground
+        Returns which pixels are none, of two radar images; None: it is not asked for.
+    context
+        Threads and progress.
+    """
+    model, (elsewhere_px, exact_px) = transform.model, accuracy_px
+    whole = survey_model(matcher, model, context.part(0.0, 0.4), None, places, elsewhere_px)
+    part = context.part(0.4, 0.8)
+    rest = survey_rest(matcher, transform, places, elsewhere_px, sensors, exact_px, part)
+    bands = survey_bands(matcher, model, places, elsewhere_px, context.part(0.8, 0.9))
+    ground = None
+    if open_ground is not None:
+        last = context.part(0.9, 1.0)
+        ground = survey_model(matcher, model, last, open_ground, places, elsewhere_px)
+    return Surveys(whole, rest, bands, ground)
