@@ -20,12 +20,19 @@ from groundtie.rasters.reading import open_raster
 TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
 
 
-def surveyed(folder: Path, pose: Pose, context: Context, **more: int) -> PoseSurvey:
-    """Survey a pair whose true pose is `TRUTH` around a pose."""
+def surveyed(
+    folder: Path, pose: Pose, context: Context, moved: tuple[int, int] = (0, 0), **more: int
+) -> PoseSurvey:
+    """Survey a pair whose true pose is `TRUTH` around a pose; the last rows of the input moved.
+
+    `moved` is how many rows, and by how many columns.
+    """
     with ExitStack() as stack:
         images, turned = [], turned_pair(TRUTH, (250, 250), (260, 260), **more)
         for name, window in zip("ri", turned, strict=True):
             values = np.clip(window.values, 1, 65_535).astype(np.uint16)
+            if name == "i":
+                values[-moved[0] :] = np.roll(values[-moved[0] :], moved[1], axis=1)
             path = write_raster(folder / f"{name}.tif", values)
             images.append(Image(stack.enter_context(open_raster(path))))
         windows = read_windows(*images, (0.8, 1.25))
@@ -42,7 +49,7 @@ def test_chips_confirm_a_pose(pose: Pose, tmp_path: Path, context: Context) -> N
     assert found.agrees.mean() > 0.9
     survey = found.surveys.whole
     assert survey is not None and survey.confirming > 0.9 * len(found.agrees)
-    assert survey.parts == []
+    assert found.surveys.parts == []
     assert found.surveys.rest is None
 
 
@@ -59,6 +66,15 @@ def test_chips_confirm_no_wrong_pose(
 ) -> None:
     found = surveyed(tmp_path, pose, context, **more)
     assert found.agrees.mean() < 0.25
+
+
+@pytest.mark.slow
+def test_a_strip_that_moved_is_found_by_smaller_chips(tmp_path: Path, context: Context) -> None:
+    """It is too narrow for three chips of those that confirm the pose."""
+    surveys = surveyed(tmp_path, TRUTH, context, moved=(50, 10)).surveys
+    assert surveys.whole is not None and surveys.whole.parts == []
+    (part,) = surveys.parts
+    assert part.distance_px == pytest.approx(10 / TRUTH.scale, abs=0.7)
 
 
 @pytest.mark.slow

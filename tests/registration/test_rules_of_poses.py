@@ -41,6 +41,7 @@ def posed(
     rest: Rest | None = None,
     bands: tuple[BandSurvey, ...] = (),
     ground: Survey | None = None,
+    fine: Survey | None = None,
     **more: Any,
 ) -> PoseSurveyEvidence:
     """Return the evidence of a pose that chips miss by residuals, shape (n, 2)."""
@@ -49,7 +50,7 @@ def posed(
         GRID,
         CHIPS[: len(residuals)],
         residuals,
-        Surveys(chips or survey(), rest, bands, ground),
+        Surveys(chips or survey(), rest, bands, ground, fine),
         fitted.transform,
         **{"fold_models": fitted.fold_models, **more},
     )
@@ -85,6 +86,11 @@ def test_rules_of_registrations_judge_poses(
     """Of 21 chips, about as many agree as at the worst real pose that is right."""
     residuals = np.concatenate([scatter(agreeing, 1.5), fallen_beyond(21 - agreeing)])
     assert refusing(posed(residuals, found, rest=rest)) == expected
+
+
+def test_smaller_chips_show_parts_too() -> None:
+    found = posed(scatter(21, 0.5), fine=survey(38, part=11))
+    assert refusing(found) == ["part elsewhere"]
 
 
 @pytest.mark.parametrize(("rival", "expected"), [(8.0, ["band elsewhere"]), (1.0, [])])

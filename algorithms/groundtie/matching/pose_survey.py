@@ -2,12 +2,12 @@
 
 A pose is a start, good to a hundredth or two of the image. So its chips are larger than those that
 survey a registration, a pose is first moved to where they agree, and each chip is compared with a
-pose that was moved without it.
+pose that was moved without it. Parts that lie elsewhere are looked for with smaller chips, too.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from .coarse_shift import level_factor
 from .frames import compose
 from .locked import Sensors
 from .matcher import FloatArray, MaskOf, Places
-from .survey import SURVEY_RADIUS_PX
+from .survey import SURVEY_RADIUS_PX, survey_model, survey_places
 from .surveys import Surveys, survey_all
 
 # Chips along the shorter side. Of the 29 shared rotated pairs, at their poses: four are too few to
@@ -119,6 +119,8 @@ def survey_pose(
     moved = Transform(model, transform.crs, transform.input_grid)
     accuracy_px = elsewhere_px, _EXACT_PX
     surveys = survey_all(matcher, moved, places, accuracy_px, sensors, open_ground, quiet)
+    fine = survey_model(matcher, model, quiet, None, survey_places(level), elsewhere_px)
+    surveys = replace(surveys, fine=fine)
     return PoseSurvey(level, kept, residuals, surveys, moved, fold_models)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..context import Context
@@ -10,6 +11,7 @@ from .bands import BandSurvey, survey_bands
 from .chips import ChipMatcher
 from .locked import Sensors
 from .matcher import MaskOf, Places
+from .parts import Part
 from .rest import Rest, survey_rest
 from .survey import Survey, survey_model
 
@@ -29,12 +31,21 @@ class Surveys:
         Of bands each, of images whose bands do not coincide.
     ground
         Of open ground; None: the images are not two radars', or it alone takes part.
+    fine
+        Of smaller chips, which show smaller parts; None: the others are as small.
     """
 
     whole: Survey | None = None
     rest: Rest | None = None
     bands: tuple[BandSurvey, ...] = ()
     ground: Survey | None = None
+    fine: Survey | None = None
+
+    @property
+    def parts(self) -> Sequence[Part]:
+        """Chips that together match elsewhere, the most evident first."""
+        found = [part for one in (self.whole, self.fine) if one is not None for part in one.parts]
+        return sorted(found, key=lambda part: part.excess, reverse=True)
 
 
 def survey_all(

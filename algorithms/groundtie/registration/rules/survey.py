@@ -50,10 +50,10 @@ _FEWEST_EVIDENT, LARGEST_SHARE = 5, 0.2
 
 
 def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
-    survey = evidence.surveys.whole
-    if survey is None or not survey.parts:
+    parts = evidence.surveys.parts
+    if not parts:
         return None
-    part = survey.parts[0]
+    part = parts[0]
     return f"{part.chips} chips around the {part.where} match {part.distance_px:.1f} px off"
 
 
