@@ -131,7 +131,7 @@ def test_what_is_drawn_is_not_looked_behind(tmp_path: Path, context: Context) ->
 
 @pytest.mark.parametrize(("moved_rows", "is_elsewhere"), [(0, False), (SIDE // 3, True)])
 @pytest.mark.slow
-def test_what_two_views_have_not_in_common_shows_where_a_part_lies(
+def test_what_two_radar_images_have_not_in_common_shows_where_a_part_lies(
     moved_rows: int, is_elsewhere: bool, tmp_path: Path, context: Context
 ) -> None:
     """What they have in common is too little to be drawn, and is taken out all the same."""
@@ -140,7 +140,7 @@ def test_what_two_views_have_not_in_common_shows_where_a_part_lies(
     input[:moved_rows] = place((11, -7))[:moved_rows]
     input = ndimage.shift(input, offset[::-1], mode="mirror")
     views = [noisy(view, seed, 1.0) for seed, view in enumerate((reference, input))]
-    rest = rest_of(tmp_path, *views, context, offset, sensors=Sensors.DIFFERENT)
+    rest = rest_of(tmp_path, *views, context, offset, sensors=Sensors.RADARS)
     assert rest is not None and not rest.is_evident and rest.survey is not None
     assert (deviations_elsewhere(rest.survey) >= REST_PEAK_DEVIATIONS) == is_elsewhere
     shifts = [part.shift_px for part in rest.survey.parts]

@@ -76,11 +76,12 @@ def survey_rest(
 
     Returns
     -------
-    None where the transform does more than move the array.
+    None where the transform does more than move the array, and where there is no more of such
+    content than two views of one ground have, unless both are a radar's: speckle blurs it.
     """
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
     locked = find_locked_content(pair, transform, asked, sensors, exact_px, context.quiet())
-    if locked is None:
+    if locked is None or not (locked.is_evident or sensors is Sensors.RADARS):
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
     fused, chips = replace(matcher, settings=SimilaritySettings()), len(places.centres)

@@ -25,8 +25,7 @@ class Surveys:
     whole
         Of all that takes part; None: they were not asked, nor are the others then.
     rest
-        Without content that is the same in both arrays; None: the transform does more than move
-        the array.
+        Without content that is the same in both arrays; None: there is none (see `survey_rest`).
     bands
         Of bands each, of images whose bands do not coincide.
     ground

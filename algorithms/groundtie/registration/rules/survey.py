@@ -160,7 +160,7 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
 
 
 def deviations_of_rest(rest: Rest | None) -> float:
-    """Return how far what is left of one ground stands out elsewhere, as a whole and in a part.
+    """Return how far what two radar images leave stands out elsewhere, as a whole and in a part.
 
     0: it does not. Of right transforms, walls and canopies are now and then the one or the other.
     """
@@ -256,9 +256,10 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "rest elsewhere",
         SURVEY,
-        "without what both images have in common at the same columns and rows, a second place "
-        f"matches about as well, and {REST_PEAK_DEVIATIONS:g} robust standard deviations better "
-        "than usual, and a part lies elsewhere",
+        "between two radar images, without what they have in common at the same columns and rows, "
+        "a second place matches about as well, and "
+        f"{REST_PEAK_DEVIATIONS:g} robust standard deviations better than usual, and a part lies "
+        "elsewhere",
         "suites margins and attacks",
         WITHOUT,
         _rest_elsewhere,
