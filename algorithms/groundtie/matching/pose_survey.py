@@ -119,8 +119,10 @@ def survey_pose(
     moved = Transform(model, transform.crs, transform.input_grid)
     accuracy_px = elsewhere_px, _EXACT_PX
     surveys = survey_all(matcher, moved, places, accuracy_px, sensors, open_ground, quiet)
-    fine = survey_model(matcher, model, quiet, None, survey_places(level), elsewhere_px)
-    surveys = replace(surveys, fine=fine)
+    smaller = survey_places(level)
+    if smaller.chip_px < places.chip_px:
+        fine = survey_model(matcher, model, quiet, None, smaller, elsewhere_px)
+        surveys = replace(surveys, fine=fine)
     return PoseSurvey(level, kept, residuals, surveys, moved, fold_models)
 
 
