@@ -9,14 +9,16 @@ from pathlib import Path
 
 import pytest
 from brightness_classifiers import bright_is_left_out
+from canopies import draw_country
 from contexts import context
 from facts_of_pairs import FIELDS, TOWN, opened, speckled
 
 from groundtie.context import Context
-from groundtie.masks.used import INPUT, LAYER, REFERENCE
+from groundtie.masks.used import INPUT, LAYER, OPEN, REFERENCE
 from groundtie.rasters.pair import ImagePair
 from groundtie.registration.masks import (
     Masked,
+    ground_instead,
     with_ground_mask,
 )
 from groundtie.registration.scene import SceneInfo
@@ -74,6 +76,21 @@ def test_fields_need_no_ground(tmp_path: Path, stack: ExitStack, context: Contex
     with opened(tmp_path, speckled(0.02), FIELDS) as pair:
         result = masked(pair, stack, context)
         assert (result.used.kind, result.pair) == ("none", pair)
+
+
+@pytest.mark.parametrize(
+    ("forest_share", "kind"),
+    [(0.0, None), (0.3, OPEN), (0.75, None)],
+    ids=["all is open", "forest", "mostly forest"],
+)
+def test_open_ground_is_matched_alone_where_it_is_most_and_not_all(
+    tmp_path: Path, stack: ExitStack, context: Context, forest_share: float, kind: str | None
+) -> None:
+    """Else it is the same registration once more, or outvoted."""
+    country = draw_country(420, forest_share, seed=1)
+    with opened(tmp_path, country.seen(0, 4.0, 1), country.seen(8, 4.0, 2)) as pair:
+        ground = ground_instead(pair, SceneInfo.of(pair), stack, context)
+        assert (None if ground is None else ground.used.kind) == kind
 
 
 def test_masks_of_the_reference_go_with_it(
