@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from raster_files import utm_grid, write_raster
 from scipy.ndimage import gaussian_filter
 from speckled_pairs import speckled
 
@@ -63,3 +65,15 @@ def draw_country(size: int, forest_share: float, seed: int = 0) -> Country:
     forest[:, : round(forest_share * size)] = True
     crowns_db = 4 + _CROWN_DB * crowns / crowns.std()
     return Country(level, crowns_db.astype(np.float32), forest)
+
+
+def forest_files(folder: Path, forest_share: float, seed: int) -> tuple[Path, Path]:
+    """Write fields and a forest, seen twice: canopies 8 px elsewhere.
+
+    The input's geotransform is wrong by (5, -3) px: pixels that belong together are the same.
+    """
+    country, grid = draw_country(420, forest_share, seed), utm_grid(420, 420, 1.0)
+    return (
+        write_raster(folder / "a.tif", country.seen(0, 4.0, 1), grid),
+        write_raster(folder / "b.tif", country.seen(8, 4.0, 2), grid.window(5, -3, 420, 420)),
+    )

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from canopies import forest_files
 from contexts import context
 from facts_of_pairs import TOWN, grey_values, opened, speckled
 from rpc_scenes import Scene, make_scene
@@ -340,12 +341,12 @@ def test_every_tool_is_judged_by_the_rules_of_every_stage(
     ],
 )
 def test_radar_images_are_tried_by_their_ground_after_what_heights_may_cause(
-    radars: TexturedPair, monkeypatch: pytest.MonkeyPatch, rule: str, tries: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rule: str, tries: int
 ) -> None:
     house = HouseRules((AGREEMENT,), next(r.retry for r in RULES if r.name == rule))
     monkeypatch.setattr(verdict, "RULES", house.rules())
     with pytest.raises(NotRegisteredError, match="forbidden"):
-        groundtie.match_sar_sar(radars.reference, radars.input)
+        groundtie.match_sar_sar(*forest_files(tmp_path, 0.3, seed=1))
     assert house.asked == [AGREEMENT] * tries
 
 

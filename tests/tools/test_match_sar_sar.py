@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from brightness_classifiers import bright_is_left_out
-from canopies import draw_country
+from canopies import forest_files
 from raster_files import utm_grid, write_raster
 from speckled_pairs import write_speckled_pair
 from textured_pairs import TexturedPair, error_px, listing, pixels, shift_on_map
@@ -107,18 +107,6 @@ def test_another_place_is_refused_and_leaves_its_report_only(tmp_path: Path) -> 
         )
     assert set(listing(tmp_path)) >= {"report.html", "report.json"}
     assert not (tmp_path / "o.tif").exists()
-
-
-def forest_files(folder: Path, forest_share: float, seed: int) -> tuple[Path, Path]:
-    """Write fields and a forest, seen twice: canopies 8 px elsewhere.
-
-    The input's geotransform is wrong by (5, -3) px: pixels that belong together are the same.
-    """
-    country, grid = draw_country(420, forest_share, seed), utm_grid(420, 420, 1.0)
-    return (
-        write_raster(folder / "a.tif", country.seen(0, 4.0, 1), grid),
-        write_raster(folder / "b.tif", country.seen(8, 4.0, 2), grid.window(5, -3, 420, 420)),
-    )
 
 
 @pytest.mark.slow
