@@ -79,6 +79,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     attacks.add_argument(
         "--case", nargs="+", default=(), help="by the names that a table gives, or @FILE of them"
     )
+    attacks.add_argument("--large", action="store_true", help="scenes of 450 to 1000 pixels")
     attacks.add_argument("--save", type=Path, help="folder for the images of what is run")
     parser.add_argument("--results", type=Path, default=HERE / "results", help="folder of results")
     return parser.parse_args(arguments)
@@ -147,6 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         tuple(options.classes),
         tuple(options.case),
         options.save,
+        options.large,
     )
     crashed = 0
     for name in options.only:

@@ -148,7 +148,7 @@ def run(settings: Settings) -> SuiteResult:
         *(
             Case(f"{name} {seed}", scene.kind, False, partial(scene.pair, seed, settings.cache))
             for name, scene in all_scenes(settings.data).items()
-            if not is_example(scene)
+            if not (is_example(scene) or scene.is_large)
             for seed in seeds
         ),
     ]

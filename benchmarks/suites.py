@@ -36,9 +36,9 @@ class Settings:
         The first of the seeds.
     classes
         Of attacks, margins and calibration: which classes.
-    sample, named, save
+    sample, named, save, large
         Of attacks alone: how many cases, of all classes; which by their names; a folder for the
-        images.
+        images; whether scenes are large.
     """
 
     quick: bool
@@ -51,6 +51,7 @@ class Settings:
     classes: tuple[str, ...] = ()
     named: tuple[str, ...] = ()
     save: Path | None = None
+    large: bool = False
 
     def seed_numbers(self, most: int | None = None) -> range:
         """Return the seeds, at most so many; quickly, it is one."""

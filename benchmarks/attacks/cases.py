@@ -88,8 +88,13 @@ class AttackCase:
         key = f"{self.attack}/{self.variant}/{self.scene}"
         rng = np.random.default_rng((zlib.crc32(key.encode()), self.seed))
         every = all_scenes(self.data)
-        pair = every[self.scene].pair(self.seed, self.cache)
-        others = [scene for name, scene in every.items() if not examples.is_example(scene)]
+        own = every[self.scene]
+        pair = own.pair(self.seed, self.cache)
+        others = [
+            scene
+            for scene in every.values()
+            if not examples.is_example(scene) and scene.is_large == own.is_large
+        ]
         setting = Setting(rng, others, self.seed, self.cache)
         attack = find(self.attack, self.variant)
         made = attack.make(pair, setting)
@@ -160,9 +165,14 @@ def named(name: str, data: Path, cache: Path) -> AttackCase | SensorCase:
     return AttackCase(attack, variant, scene, tool, int(seed), data, cache)
 
 
-def cases(seeds: Sequence[int], data: Path, cache: Path) -> list[AttackCase | SensorCase]:
-    """Return the cases: each seed draws scenes for each attack, which is tried on all tools."""
-    made: list[AttackCase | SensorCase] = list(sensor_cases(seeds, cache))
+def cases(
+    seeds: Sequence[int], data: Path, cache: Path, large: bool = False
+) -> list[AttackCase | SensorCase]:
+    """Return the cases: each seed draws scenes for each attack, which is tried on all tools.
+
+    Images with RPCs have one size: of large scenes there are none.
+    """
+    made: list[AttackCase | SensorCase] = [] if large else list(sensor_cases(seeds, cache))
     every = all_scenes(data)
     for seed in seeds:
         for number, attack in enumerate(ATTACKS):
@@ -175,7 +185,9 @@ def cases(seeds: Sequence[int], data: Path, cache: Path) -> list[AttackCase | Se
             fitting = [
                 scene
                 for scene in every.values()
-                if attack.fits(scene) and examples.is_example(scene) == attack.is_example
+                if attack.fits(scene)
+                and examples.is_example(scene) == attack.is_example
+                and scene.is_large == large
             ]
             draws = DRAWS.get(attack.group, 1) if fitting else 0
             names = dict.fromkeys(draw_scene(fitting, rng).name for _ in range(draws))

@@ -24,13 +24,14 @@ from ..simulations import kept, simulator_version
 from .pairs import Image, Pair, Source, pixels, render, to_bytes
 
 SAR_SAR = "sar-sar"
+LARGE = "-large"
 DENSITIES = ("rural", "suburban", "urban", "city")
 
-# Sides of the windows in pixels, and what is kept free around them for what lies elsewhere.
-_SIDES_PX = (300, 400)
-_SIMULATED_SIDES_PX = (320, 480)
+# Sides of the windows in pixels, of real pairs and simulated ones, and of large windows of them;
+# and what is kept free around them for what lies elsewhere.
+_SIDES_PX, _LARGE_SIDES_PX = (300, 400), (450, 900)
+_SIMULATED_SIDES_PX, _SIMULATED_LARGE_SIDES_PX = (320, 480), (700, 1000)
 _MARGIN_PX = 26
-_SIMULATED_PX = _SIMULATED_SIDES_PX[1] + 2 * _MARGIN_PX
 _LEAST_SIDE_PX = 200
 
 # Scenes that satellites of medium resolution have seen, and a pixel of theirs.
@@ -58,12 +59,22 @@ class Scene:
         As of a real case; simulated ones have an exact truth.
     case
         The real pair; None: simulated.
+    is_large
+        Whether its windows are large; the name of such a scene ends in `LARGE`.
     """
 
     name: str
     kind: str
     sigma_px: float = 0.0
     case: RealCase | None = None
+    is_large: bool = False
+
+    @property
+    def sides_px(self) -> tuple[int, int]:
+        """Least and largest side of a window."""
+        if self.case is not None:
+            return _LARGE_SIDES_PX if self.is_large else _SIDES_PX
+        return _SIMULATED_LARGE_SIDES_PX if self.is_large else _SIMULATED_SIDES_PX
 
     @property
     def place(self) -> str:
@@ -73,7 +84,11 @@ class Scene:
     @property
     def density(self) -> str:
         """How densely a simulated scene is built up; empty for real ones."""
-        return self.name.partition("-")[2].rstrip("23") if self.case is None else ""
+        return self._simulated_name.rstrip("23") if self.case is None else ""
+
+    @property
+    def _simulated_name(self) -> str:
+        return self.name.removesuffix(LARGE).partition("-")[2]
 
     def source(self, seed: int, cache: Path) -> Source:
         """Return the whole scene; simulated ones are made unless the folder `cache` has them."""
@@ -81,15 +96,16 @@ class Scene:
             return Source(
                 *_real(self.case.reference, self.case.input), self.case.reference_to_input
             )
-        further = int(self.name[-1]) if self.name[-1].isdigit() else 0
-        return _simulated(self.kind, self.density, seed + _FURTHER_SEEDS * further, cache)
+        last, size_px = self._simulated_name[-1], self.sides_px[1] + 2 * _MARGIN_PX
+        seed += _FURTHER_SEEDS * (int(last) if last.isdigit() else 0)
+        return _simulated(self.kind, self.density, size_px, seed, cache)
 
     def pair(self, seed: int, cache: Path) -> Pair:
         """Return a window, the same for the same seed, whose ground lies as the images claim."""
         source = self.source(seed, cache)
         rng = np.random.default_rng((zlib.crc32(self.name.encode()), seed))
         most = np.array(source.reference.shape[:0:-1]) - 2 * _MARGIN_PX
-        low, high = _SIDES_PX if self.case is not None else _SIMULATED_SIDES_PX
+        low, high = self.sides_px
         side = np.minimum(most, np.maximum(rng.integers(low, high + 1, 2), _LEAST_SIDE_PX))
         first = _corner(source, side, most, rng)
         window = slice(first[1], first[1] + side[1]), slice(first[0], first[0] + side[0])
@@ -127,7 +143,7 @@ def _corner(
 
 
 def scenes(data: Path) -> tuple[Scene, ...]:
-    """Return the scenes: of the folder of real pairs, and simulated."""
+    """Return the scenes: of the folder of real pairs, and simulated; large ones, too."""
     real = [
         Scene(case.name, case.kind, case.sigma_px, case)
         for case in read_cases(data)
@@ -137,7 +153,14 @@ def scenes(data: Path) -> tuple[Scene, ...]:
     names = (*DENSITIES, "city2", "city3", "urban2", "suburban2")
     simulated = [Scene(f"sim-{name}", SAR_OPTICAL) for name in names]
     radar = [Scene(f"simss-{density}", SAR_SAR) for density in DENSITIES[:3]]
-    return (*real, *simulated, *radar)
+    usual = (*real, *simulated, *radar)
+    large_px = _LARGE_SIDES_PX[0] + 2 * _MARGIN_PX
+    large = [
+        replace(scene, name=f"{scene.name}{LARGE}", is_large=True)
+        for scene in usual
+        if scene.case is None or min(image_size(scene.case.reference)) >= large_px
+    ]
+    return (*usual, *large)
 
 
 def elsewhere(
@@ -177,16 +200,16 @@ def to_grey(image: NDArray[Any]) -> Image:
 
 
 @lru_cache(maxsize=40)
-def _simulated(kind: str, density: str, seed: int, cache: Path) -> Source:
+def _simulated(kind: str, density: str, size_px: int, seed: int, cache: Path) -> Source:
     if kind == SAR_SAR:
         looks = 1 + seed % 4
-        made = SarPair(_SIMULATED_PX, density, seed, looks, bool(seed % 2)).pair(cache)
+        made = SarPair(size_px, density, seed, looks, bool(seed % 2)).pair(cache)
         found = made.reference.with_name("truth.json")
         reference, image = (to_grey(read_image(path)) for path in (made.reference, made.input))
         return Source(reference, image, on_pixels(groundtie.load_transform(found), made.reference))
     make = partial(
         groundtie.simulate,
-        size=_SIMULATED_PX,
+        size=size_px,
         density=density,
         seed=seed,
         shift=0.0,
@@ -194,7 +217,7 @@ def _simulated(kind: str, density: str, seed: int, cache: Path) -> Source:
         changed=10.0 * (seed % 2),
         warp=2.0,
     )
-    folder = kept(cache / f"attacked-{density}-{_SIMULATED_PX}-{seed}-{simulator_version()}", make)
+    folder = kept(cache / f"attacked-{density}-{size_px}-{seed}-{simulator_version()}", make)
     reference, image = (folder / files.NAMES[key] for key in ("reference", "input"))
     truth = groundtie.load_transform(folder / files.NAMES["truth"])
     return Source(

@@ -60,7 +60,7 @@ def choose(settings: Settings) -> list[AnyCase]:
     is_whole = not (settings.sample or settings.classes)
     number = min(settings.seeds, _SEEDS) if is_whole else settings.seeds
     seeds = range(settings.first_seed, settings.first_seed + number)
-    every = cases(seeds, settings.data, settings.cache)
+    every = cases(seeds, settings.data, settings.cache, settings.large)
     every = of_classes(every, settings.classes, lambda case: {case.attack, case.group})
     wanted = _QUICK if settings.quick else settings.sample
     return every if wanted is None else sample(every, wanted)

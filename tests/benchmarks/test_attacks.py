@@ -21,7 +21,7 @@ from benchmarks.attacks.catalogue import CONTROLS, EXAMPLES, LOCKED, Attack, Set
 from benchmarks.attacks.effects import OF_THE_ARRAY
 from benchmarks.attacks.overlays import OVERLAYS
 from benchmarks.attacks.pairs import Pair, Source
-from benchmarks.attacks.scenes import Scene
+from benchmarks.attacks.scenes import Scene, scenes
 from benchmarks.attacks.sensors import SensorCase
 from benchmarks.suites import Settings
 from groundtie.geometry.transform import Transform
@@ -225,6 +225,25 @@ def test_cases_are_the_same_every_time_and_others_by_another_seed() -> None:
         others += once.input.shape != other.input.shape or (once.input != other.input).any()
     # Where nothing is drawn, as in aligned controls, the same scene is the same.
     assert others >= 6
+
+
+def test_large_scenes_are_others_of_the_same_names(
+    data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    every = scenes(data)
+    monkeypatch.setattr(attack_cases, "all_scenes", lambda data: {s.name: s for s in every})
+    large = [scene for scene in every if scene.is_large]
+    usual = {scene.name: scene for scene in every if not scene.is_large}
+    for scene in large:
+        small = usual[scene.name.removesuffix("-large")]
+        assert (scene.kind, scene.density) == (small.kind, small.density)
+        assert scene.sides_px[0] > small.sides_px[1]
+    drawn = [
+        {case.scene for case in cases([1], data, data, large=is_large)}
+        for is_large in (False, True)
+    ]
+    names = {scene.name for scene in large}
+    assert not drawn[0] & names and drawn[1] <= names
 
 
 @pytest.mark.usefixtures("made_scenes")
