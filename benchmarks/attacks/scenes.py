@@ -166,8 +166,9 @@ def scenes(data: Path) -> tuple[Scene, ...]:
 def elsewhere(
     pair: Pair, others: Sequence[Scene], rng: np.random.Generator, seed: int, cache: Path
 ) -> Pair:
-    """Return a pair with an input of another place, of the same kind if there is one."""
-    choice = [one for one in others if one.kind == pair.kind and one.place not in pair.place]
+    """Return a pair with an input of another place, of a pair of the same kind if there is one."""
+    elsewhere = [one for one in others if one.place not in pair.place]
+    choice = [one for one in elsewhere if one.kind == pair.kind] or elsewhere
     for _ in range(20):
         scene = choice[int(rng.integers(len(choice)))]
         other = scene.source(seed, cache)
