@@ -59,15 +59,17 @@ class Scene:
         As of a real case; simulated ones have an exact truth.
     case
         The real pair; None: simulated.
-    is_large
-        Whether its windows are large; the name of such a scene ends in `LARGE`.
     """
 
     name: str
     kind: str
     sigma_px: float = 0.0
     case: RealCase | None = None
-    is_large: bool = False
+
+    @property
+    def is_large(self) -> bool:
+        """Whether its windows are large."""
+        return self.name.endswith(LARGE)
 
     @property
     def sides_px(self) -> tuple[int, int]:
@@ -96,9 +98,10 @@ class Scene:
             return Source(
                 *_real(self.case.reference, self.case.input), self.case.reference_to_input
             )
-        last, size_px = self._simulated_name[-1], self.sides_px[1] + 2 * _MARGIN_PX
-        seed += _FURTHER_SEEDS * (int(last) if last.isdigit() else 0)
-        return _simulated(self.kind, self.density, size_px, seed, cache)
+        last = self._simulated_name[-1]
+        further = int(last) if last.isdigit() else 0
+        size_px = self.sides_px[1] + 2 * _MARGIN_PX
+        return _simulated(self.kind, self.density, size_px, seed + _FURTHER_SEEDS * further, cache)
 
     def pair(self, seed: int, cache: Path) -> Pair:
         """Return a window, the same for the same seed, whose ground lies as the images claim."""
@@ -147,28 +150,31 @@ def scenes(data: Path) -> tuple[Scene, ...]:
     real = [
         Scene(case.name, case.kind, case.sigma_px, case)
         for case in read_cases(data)
-        if case.sigma_px <= _LARGEST_SIGMA_PX
-        and min(image_size(case.reference)) >= _LEAST_SIDE_PX + 2 * _MARGIN_PX
+        if case.sigma_px <= _LARGEST_SIGMA_PX and _has_room(case, _LEAST_SIDE_PX)
     ]
     names = (*DENSITIES, "city2", "city3", "urban2", "suburban2")
     simulated = [Scene(f"sim-{name}", SAR_OPTICAL) for name in names]
     radar = [Scene(f"simss-{density}", SAR_SAR) for density in DENSITIES[:3]]
     usual = (*real, *simulated, *radar)
-    large_px = _LARGE_SIDES_PX[0] + 2 * _MARGIN_PX
     large = [
-        replace(scene, name=f"{scene.name}{LARGE}", is_large=True)
+        replace(scene, name=f"{scene.name}{LARGE}")
         for scene in usual
-        if scene.case is None or min(image_size(scene.case.reference)) >= large_px
+        if scene.case is None or _has_room(scene.case, _LARGE_SIDES_PX[0])
     ]
     return (*usual, *large)
+
+
+def _has_room(case: RealCase, side_px: int) -> bool:
+    """Whether windows of a side can be cut from a real pair."""
+    return min(image_size(case.reference)) >= side_px + 2 * _MARGIN_PX
 
 
 def elsewhere(
     pair: Pair, others: Sequence[Scene], rng: np.random.Generator, seed: int, cache: Path
 ) -> Pair:
     """Return a pair with an input of another place, of a pair of the same kind if there is one."""
-    elsewhere = [one for one in others if one.place not in pair.place]
-    choice = [one for one in elsewhere if one.kind == pair.kind] or elsewhere
+    other_places = [one for one in others if one.place not in pair.place]
+    choice = [one for one in other_places if one.kind == pair.kind] or other_places
     for _ in range(20):
         scene = choice[int(rng.integers(len(choice)))]
         other = scene.source(seed, cache)

@@ -27,9 +27,10 @@ from .user_masks import with_mask
 _ON_GROUND_PX, _OBLIQUE_PX, _WHOLE_M = 0.65, 0.9, 10.0
 _OPEN_PX = 0.15
 
-# Above this share open ground is all there is: the same once more, accepted by its luck alone.
-# Right registrations by open ground had up to 90 % of the reference, one 12 px wrong, of a forest
-# that its mask missed, 99 % (suite attacks: simss-rural, --seeds 34000-34039).
+# Where open ground is more than this share of the reference, it is the same registration again,
+# and no other evidence than what was refused. Right ones by open ground had up to 90 %; one that
+# was 12 px wrong, of a forest that the mask missed, 99 % (suite attacks: overlay on aligned ground/
+# JPEG blocks/simss-rural/match_sar_sar/34004).
 _MOST_OPEN = 0.95
 
 
