@@ -79,9 +79,14 @@ def qgis_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 
     Processing.initialize()
     yield app
-    # a layer that outlives QGIS crashes it
+    from qgis.PyQt.QtCore import QCoreApplication, QEvent, QThreadPool
+
+    # a layer, a thread or a widget that outlives QGIS crashes it
     QgsProject.instance().clear()
     gc.collect()
+    QgsApplication.taskManager().cancelAll()
+    QThreadPool.globalInstance().waitForDone()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     Processing.deinitialize()
     QgsApplication.exitQgis()
 
@@ -168,6 +173,7 @@ def iface(provider: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     import qgis.utils
     from qgis.core import QgsProject
     from qgis.gui import QgsMapCanvas
+    from qgis.PyQt import sip
     from qgis.PyQt.QtWidgets import QMainWindow
 
     window, iface = QMainWindow(), MagicMock()
@@ -176,7 +182,9 @@ def iface(provider: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     iface.activeLayer.return_value = None
     monkeypatch.setattr(qgis.utils, "iface", iface)
     yield iface
+    iface.mapCanvas().setLayers([])
     QgsProject.instance().clear()
+    sip.delete(window)
 
 
 @pytest.fixture

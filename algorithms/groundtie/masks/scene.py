@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from ..rasters.averaging import area_average
 from ..rasters.grid import FloatArray, Grid, reproject
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask, RasterSource, Window
+from ..rasters.tiff_directories import BLOCK
 from ..rasters.tiling import require_workable, tile_count, tiles
 from ..rasters.warping import sample
 from ..rasters.writing import create_like, one_band
@@ -33,8 +34,8 @@ Select = Callable[[Window], Selection]
 # Pixels of the result that are averaged at a time.
 _STRIP_PIXELS = 1 << 18
 
-# Means that a histogram is made from, at most: larger scenes are sampled.
-_SAMPLE = 4_000_000
+# Means that a histogram is made from: of larger scenes some tiles are sampled.
+_TILE, _SAMPLE = BLOCK, 1_000_000
 
 
 @dataclass(frozen=True)
@@ -71,29 +72,33 @@ class Scene:
 
         Blocks at the right and lower border may be cut.
         """
-        strips = list(self.reduced_strips(factor, progress))
+        width, height = self.grid.width, self.grid.height
+        rows = max(_STRIP_PIXELS // width, 1) * factor
+        strips = []
+        for top in range(0, height, rows):
+            progress.update(top / height)
+            strip = self.read(Window(0, top, width, min(rows, height - top)))
+            strips.append(block_means(strip, factor))
         return Patch(
             np.concatenate([strip.values for strip in strips]),
             np.concatenate([strip.valid for strip in strips]),
         )
 
     def sample(self, factor: int, progress: Progress = SILENT) -> NDArray[np.float32]:
-        """Return the valid means over blocks, shape (n,), of large scenes some spread evenly."""
-        step = max(self.grid.width * self.grid.height // (factor**2 * _SAMPLE), 1)
-        parts, first = [], 0
-        for strip in self.reduced_strips(factor, progress):
-            found = strip.values[strip.valid]
-            parts.append(found[first::step])
-            first = (first - len(found)) % step
-        return np.concatenate(parts)
+        """Return the valid means over blocks, shape (n,), of large scenes those of some tiles.
 
-    def reduced_strips(self, factor: int, progress: Progress = SILENT) -> Iterator[Patch]:
-        """Yield what `reduced` returns, some rows at a time."""
-        width, height = self.grid.width, self.grid.height
-        rows = max(_STRIP_PIXELS // width, 1) * factor
-        for top in range(0, height, rows):
-            progress.update(top / height)
-            yield block_means(self.read(Window(0, top, width, min(rows, height - top))), factor)
+        These lie along diagonals, so that each row and column of tiles has as many.
+        """
+        step = max(self.grid.width * self.grid.height // (factor**2 * _SAMPLE), 1)
+        side = _TILE // factor * factor
+        all_tiles = tiles(self.grid, side)
+        some = [one for one in all_tiles if (one.row + one.col) // side % step == 0]
+        parts = []
+        for i, tile in enumerate(some):
+            means = block_means(self.read(tile), factor)
+            parts.append(means.values[means.valid])
+            progress.update((i + 1) / len(some))
+        return np.concatenate(parts)
 
 
 def block_means(patch: Patch, factor: int) -> Patch:
