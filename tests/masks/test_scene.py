@@ -25,15 +25,14 @@ def scene(tmp_path: Path) -> Scene:
 
 
 def test_all_means_of_a_small_scene_are_taken(scene: Scene) -> None:
-    assert scene.sample(FACTOR).tolist() == list(range(1, 900))
+    assert scene.sample(FACTOR, 1000).tolist() == list(range(1, 900))
 
 
 def test_of_a_large_scene_tiles_along_diagonals_are_taken(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(scene_module, "_SAMPLE", 200)
     monkeypatch.setattr(scene_module, "_TILE", 2 * FACTOR + 1)
-    taken = np.isin(np.arange(900), scene.sample(FACTOR)).reshape(30, 30)
+    taken = np.isin(np.arange(900), scene.sample(FACTOR, 200)).reshape(30, 30)
     tiles = taken.reshape(15, 2, 15, 2).mean(axis=(1, 3))
     tiles[0, 0] = 1  # of which a block is not valid
     rows, cols = np.indices(tiles.shape)

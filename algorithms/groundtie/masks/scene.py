@@ -34,8 +34,8 @@ Select = Callable[[Window], Selection]
 # Pixels of the result that are averaged at a time.
 _STRIP_PIXELS = 1 << 18
 
-# Means that a histogram is made from: of larger scenes some tiles are sampled.
-_TILE, _SAMPLE = BLOCK, 1_000_000
+# Side of the tiles of a sample, at most.
+_TILE = BLOCK
 
 
 @dataclass(frozen=True)
@@ -84,12 +84,13 @@ class Scene:
             np.concatenate([strip.valid for strip in strips]),
         )
 
-    def sample(self, factor: int, progress: Progress = SILENT) -> NDArray[np.float32]:
+    def sample(self, factor: int, most: int, progress: Progress = SILENT) -> NDArray[np.float32]:
         """Return the valid means over blocks, shape (n,), of large scenes those of some tiles.
 
-        These lie along diagonals, so that each row and column of tiles has as many.
+        So that there are about `most`. The tiles lie along diagonals: each row and column of tiles
+        has as many.
         """
-        step = max(self.grid.width * self.grid.height // (factor**2 * _SAMPLE), 1)
+        step = max(self.grid.width * self.grid.height // (factor**2 * most), 1)
         side = _TILE // factor * factor
         all_tiles = tiles(self.grid, side)
         some = [one for one in all_tiles if (one.row + one.col) // side % step == 0]

@@ -23,6 +23,10 @@ BLOCK_PX = 4
 # Masked by default: 20–30 % served best in [Suri2010].
 HIGH_PERCENT = 20.0
 
+# So many means give the percentiles: scenes of more than 8000 × 8000 px are sampled, as all means
+# would take memory that grows with the scene.
+_MEANS = 4_000_000
+
 
 @dataclass(frozen=True)
 class ThresholdMask:
@@ -52,7 +56,7 @@ class ThresholdMask:
         RasterContentError
             No pixel of the scene is valid.
         """
-        sample = scene.sample(BLOCK_PX, progress)
+        sample = scene.sample(BLOCK_PX, _MEANS, progress)
         if sample.size == 0:
             raise RasterContentError(f"{scene.like.path} has no valid pixels to make a mask of")
         low, high = np.percentile(sample, [low_percent, 100 - high_percent])

@@ -15,6 +15,9 @@ from .scene import Scene
 _STRONG = 4.0
 _TOWN, _PERHAPS_TOWN = 0.11, 0.08
 
+# So many means give a share: scenes of more than 4000 × 4000 px are sampled.
+_MEANS = 1_000_000
+
 
 def is_town(strong_share: float) -> bool:
     """Whether a radar image with this share of strong scatterers shows a town."""
@@ -32,7 +35,7 @@ def share_of_strong_scatterers(scene: Scene) -> float:
     Grey values are amplitudes; means over 4 × 4 pixels are compared with their median. Decibels
     are none: such an image has no share.
     """
-    amplitude = scene.sample(threshold.BLOCK_PX)
+    amplitude = scene.sample(threshold.BLOCK_PX, _MEANS)
     if amplitude.size == 0 or is_logarithmic(amplitude):
         return 0.0
     power = amplitude**2
