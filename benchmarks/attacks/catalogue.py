@@ -90,6 +90,17 @@ def direction(rng: np.random.Generator, low: float, high: float) -> np.ndarray:
     return length * np.array([np.cos(angle), np.sin(angle)])
 
 
+def resampled(make: Make) -> Make:
+    """Make the same, and put the input onto another grid, which its georeferencing states."""
+
+    def made(pair: Pair, setting: Setting) -> Pair:
+        other = make(pair, setting)
+        scale, corner = float(setting.rng.uniform(0.85, 1.2)), setting.rng.uniform(0, 1, 2)
+        return other.on_another_grid(scale, corner)
+
+    return made
+
+
 def as_text(shift_px: np.ndarray) -> str:
     """Return a shift for people."""
     return f"ground at ({shift_px[0]:+.1f}, {shift_px[1]:+.1f}) px"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..cases import SAR_OPTICAL
-from .catalogue import GROUND, Attack, Make, Setting, as_text, direction
+from .catalogue import GROUND, Attack, Make, Setting, as_text, direction, resampled
 from .effects import snow_cover
 from .overlays import Overlay, cloud_deck, smooth_noise
 from .pairs import Change, Image, Pair, to_bytes
@@ -193,6 +193,7 @@ ATTACKS = [
     Attack(GROUND, "water moved", "", water_moved),
     Attack(GROUND, "moving clouds", "", moving_clouds, camera_only),
     Attack(GROUND, "reference in one band", "", self_copy),
+    Attack(GROUND, "reference in one band", "resampled", resampled(self_copy)),
     Attack(GROUND, "reference shines through", "", half_transparent_copy(False)),
     Attack(GROUND, "reference shines through", "resampled", half_transparent_copy(True)),
     Attack(GROUND, "band of opacity", "", alpha_band),

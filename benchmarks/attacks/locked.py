@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from groundtie.rasters.grid import compose
 
 from . import cartography, effects
-from .catalogue import CONTROLS, LOCKED, Attack, Make, Setting, as_text, direction
+from .catalogue import CONTROLS, LOCKED, Attack, Make, Setting, as_text, direction, resampled
 from .overlays import OVERLAYS, Draw
 from .pairs import Change, Pair
 
@@ -88,6 +88,11 @@ def at_an_offset(draw: Draw) -> Make:
     return make
 
 
+def on_another_grid(draw: Draw) -> Make:
+    """What is locked lies at the same place of the map, in pixels of another size."""
+    return resampled(displaced(draw))
+
+
 def restyled(draw: Draw) -> Make:
     """What is locked has other colours in the input, and both were compressed."""
 
@@ -126,6 +131,7 @@ _WAYS = {
     "other place": other_place,
     "rightly placed": placed_right,
     "on the map": on_the_map,
+    "resampled": on_another_grid,
     "at an offset": at_an_offset,
     "restyled": restyled,
 }

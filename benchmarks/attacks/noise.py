@@ -7,7 +7,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from .catalogue import CITIES, CONTROLS, NOISE, Attack, Make, Setting, as_text, direction
+from .catalogue import CITIES, CONTROLS, NOISE, Attack, Make, Setting, as_text, direction, resampled
 from .effects import Effect, each_band, jpeg
 from .pairs import Change, Image, Pair, to_bytes
 from .scenes import Scene
@@ -134,4 +134,6 @@ ATTACKS = [
     *(Attack(CONTROLS, "ground elsewhere", f"{n}", plain, no_city) for n in range(4)),
     *(Attack(CONTROLS, "images exchanged", f"{n}", exchanged, no_city) for n in range(2)),
     *(Attack(CONTROLS, "aligned ground", f"{n}", untouched, no_city) for n in range(4)),
+    Attack(CONTROLS, "ground elsewhere", "resampled", resampled(plain), no_city),
+    Attack(CONTROLS, "aligned ground", "resampled", resampled(untouched), no_city),
 ]

@@ -13,7 +13,7 @@ from affine import Affine
 from numpy.typing import NDArray
 
 import groundtie
-from groundtie.rasters.grid import Grid
+from groundtie.rasters.grid import Grid, compose
 
 from ..accuracy import FloatArray, lattice
 from ..accuracy import Mapping as PixelMapping
@@ -149,6 +149,39 @@ class Pair:
     def both(self, change: Change, note: str = "") -> Pair:
         """Return the pair with the same change made to both images."""
         return self.changed(change, change, note)
+
+    def on_another_grid(self, scale: float, corner_px: FloatArray) -> Pair:
+        """Return the pair with its input resampled, so that pixels differ in size and place.
+
+        Parameters
+        ----------
+        scale
+            Pixels of the other grid per pixel of the input.
+        corner_px
+            Where the first of them lies, (col, row) of the input, shape (2,).
+        """
+        to_old = compose(Affine.translation(*corner_px), Affine.scale(1 / scale))
+        size = tuple(
+            int((side - corner) * scale) for side, corner in zip(self.size, corner_px, strict=True)
+        )
+        at = (pixels(size) / scale + corner_px).astype(np.float32)
+        cols, rows = at[..., 0], at[..., 1]
+        near = np.rint(at).astype(int)
+        near = np.minimum(near, np.array(self.size) - 1)
+        shown = self.shown[near[..., 1], near[..., 0]] + (at - near)
+        held = self.input.any(axis=0)[near[..., 1], near[..., 0]]
+        bands = [
+            cv2.remap(band, cols, rows, cv2.INTER_CUBIC, None, cv2.BORDER_REFLECT_101)
+            for band in self.input
+        ]
+        half = Affine.translation(0.5, 0.5), Affine.translation(-0.5, -0.5)
+        return replace(
+            self,
+            input=np.where(held, np.clip(np.stack(bands), 1, 255), NODATA).astype(np.uint8),
+            shown=shown,
+            input_transform=compose(self.input_transform, half[0], to_old, half[1]),
+            note=join(self.note, f"{scale:.2f} times as many pixels"),
+        )
 
     def within(self, radius_px: float) -> Pair:
         """Return the pair with a radius for the tool."""

@@ -1,8 +1,8 @@
 """Pixel-locked content: structure that is the same in both arrays, wherever the ground lies.
 
 Labels, frames, watermarks, clouds of one deck, tiles of one mosaic and the pattern of one sensor
-are drawn at a column and row, not at a place. Two images that share them match at that offset of
-columns and rows, whatever ground they show.
+are drawn at a column and row, or at a nominal place, which another grid has at other columns and
+rows. Two images that share them match there, whatever ground they show.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ..similarity.in_common import (
 from ..similarity.sameness import REACH_PX, WINDOW_PX, Windows, covered
 from ..similarity.seams import seams
 from .chip_windows import Resampled
-from .matcher import FloatArray, Places
+from .matcher import Places
 
 # A transform that moves all of the overlap by whole pixels, but for this, may be content's.
 _LARGEST_BEND_PX = 1.5
@@ -55,16 +55,17 @@ class Sensors(Enum):
 
 @dataclass(frozen=True)
 class LockedContent:
-    """Which pixels of the reference the input repeats at an offset of whole columns and rows.
+    """Which pixels of the reference the input repeats where both are drawn alike.
 
     Called with a part of the matching grid, it returns their surroundings, as `HeldOut` does.
 
     Parameters
     ----------
     pair
-        The images, with pixels of one size.
-    offset_px
-        Input (col, row) − reference (col, row).
+        The images.
+    to_input
+        Takes map positions to where the input has what is drawn there, in its pixels: a whole
+        number of columns and rows off, or at its nominal place.
     sameness
         How much they have the same.
     sensors
@@ -76,7 +77,7 @@ class LockedContent:
     """
 
     pair: ImagePair
-    offset_px: tuple[int, int]
+    to_input: PointFunction
     sameness: Sameness
     sensors: Sensors
     is_exact: bool
@@ -115,7 +116,7 @@ class LockedContent:
         reach = 2 * REACH_PX
         size = piece.width + 2 * reach, piece.height + 2 * reach
         around = piece.window(-reach, -reach, *size)
-        patches = Resampled(self.pair, _to_input(self.pair, self.offset_px)).read(around)
+        patches = Resampled(self.pair, self.to_input).read(around)
         windows = Windows.of(*patches)
         same = windows.same
         if not self.is_explained:
@@ -137,7 +138,7 @@ def find_locked_content(
     exact_px: float,
     context: Context,
 ) -> LockedContent | None:
-    """Return what the images repeat where a transform puts the input's array.
+    """Return what the images repeat where they are drawn alike, and a transform has them so.
 
     Parameters
     ----------
@@ -156,19 +157,14 @@ def find_locked_content(
 
     Returns
     -------
-    None where the transform does more than move the array, which nothing drawn into both does.
+    None where the transform does more, which nothing drawn into both does.
     """
-    moved = _moved_px(pair, transform)
-    if moved is None:
+    way = _nearest_way(pair, transform)
+    if way is None or way.bend_px > _LARGEST_BEND_PX:
         return None
-    offset = np.rint(np.median(moved, axis=0))
-    # Not a number, where the transform has none, is no small bend either.
-    if not np.abs(moved - offset).max() <= _LARGEST_BEND_PX:
-        return None
-    found = int(offset[0]), int(offset[1])
     # Chips may end a pixel beyond the grid.
     reach_px = LOOK_REACH_PX + 1
-    images = Resampled.of(pair, _to_input(pair, found), places.grid, reach_px, context)
+    images = Resampled.of(pair, way.to_input, places.grid, reach_px, context)
 
     def look(centre: NDArray[np.int_]) -> Look:
         side = places.chip_px + 2 * LOOK_REACH_PX
@@ -180,26 +176,53 @@ def find_locked_content(
     if sensors is Sensors.RADARS:
         is_exact = not sameness.varies_as_ground
     else:
-        is_exact = bool(np.abs(moved - offset).max() <= exact_px)
-    return LockedContent(pair, found, sameness, sensors, is_exact)
+        is_exact = way.bend_px <= exact_px
+    return LockedContent(pair, way.to_input, sameness, sensors, way.is_of_array and is_exact)
 
 
-def _to_input(pair: ImagePair, offset_px: tuple[int, int]) -> PointFunction:
-    """Return the function from map positions to the input's pixels at an offset in the array."""
-    to_reference = pair.reference.source.grid.map_to_pixel
-    return lambda xy: to_reference(xy) + offset_px
+@dataclass(frozen=True)
+class _Way:
+    """How what is drawn may lie alike in both images, and how far off a transform has it.
+
+    Parameters
+    ----------
+    to_input
+        See `LockedContent`.
+    is_of_array
+        Whether it lies a whole number of columns and rows off; else at its nominal place, where
+        the ground lies, too, if the georeferencing is right: so no transform is evidence.
+    bend_px
+        How far off the transform has it at most, in pixels of the matching grid.
+    """
+
+    to_input: PointFunction
+    is_of_array: bool
+    bend_px: float
 
 
-def _moved_px(pair: ImagePair, transform: Transform) -> FloatArray | None:
-    """Return by how many columns and rows a transform moves the input, on a lattice, (n, 2).
+def _nearest_way(pair: ImagePair, transform: Transform) -> _Way | None:
+    """Return the way that is nearest to a transform; None: nothing drawn is alike.
 
-    None where pixels differ in size.
+    An image in the geometry of its sensor has nothing that is drawn at a place.
     """
     grid, reference = pair.grid, pair.reference.source.grid
-    if not np.isclose(grid.pixel_size_m, reference.pixel_size_m, rtol=1e-6):
-        return None
     cols, rows = np.meshgrid(
         np.linspace(0, grid.width - 1, _LATTICE), np.linspace(0, grid.height - 1, _LATTICE)
     )
-    xy = grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
-    return np.asarray(transform(xy) - reference.map_to_pixel(xy))
+    px = np.column_stack([cols.ravel(), rows.ravel()])
+    xy = grid.pixel_to_map(px)
+    found = transform(xy)
+    input_px = np.hypot(*(found[-1] - found[0])) / np.hypot(*(px[-1] - px[0]))
+
+    def way(to_input: PointFunction, is_of_array: bool) -> _Way:
+        bend_px = float(np.abs(found - to_input(xy)).max() / input_px)
+        return _Way(to_input, is_of_array, bend_px)
+
+    ways = []
+    if np.isclose(grid.pixel_size_m, reference.pixel_size_m, rtol=1e-6):
+        offset = np.rint(np.median(found - reference.map_to_pixel(xy), axis=0))
+        ways.append(way(lambda xy: reference.map_to_pixel(xy) + offset, True))
+    if type(pair.input.source.grid) is Grid:
+        ways.append(way(pair.nominal_px, False))
+    known = [one for one in ways if np.isfinite(one.bend_px)]
+    return min(known, key=lambda one: one.bend_px, default=None)
