@@ -15,7 +15,8 @@ from .scene import Scene
 _STRONG = 4.0
 _TOWN, _PERHAPS_TOWN = 0.11, 0.08
 
-# So many means give a share: scenes of more than 4000 × 4000 px are sampled.
+# So many means give a share, if they were independent a tenth to 0.03 %: scenes of more than
+# 4000 × 4000 px are sampled.
 _MEANS = 1_000_000
 
 

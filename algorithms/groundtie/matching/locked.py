@@ -30,7 +30,8 @@ from ..similarity.seams import seams
 from .chip_windows import Resampled
 from .matcher import Places
 
-# A transform that moves all of the overlap by whole pixels, but for this, may be content's.
+# A transform that moves all of the overlap by whole pixels, or leaves it at its nominal place, but
+# for this, may be content's.
 _LARGEST_BEND_PX = 1.5
 
 # What is drawn lies on whole pixels all over; of other pairs, one in 64 lies as near by chance.
