@@ -93,6 +93,25 @@ def on_another_grid(draw: Draw) -> Make:
     return resampled(displaced(draw))
 
 
+def at_an_offset_on_another_grid(draw: Draw) -> Make:
+    """What is locked lies elsewhere on the map, too, in pixels of another size."""
+    return resampled(at_an_offset(draw))
+
+
+def of_wrong_scale(draw: Draw) -> Make:
+    """What is locked lies at the same pixels, whose size the input's georeferencing has wrong."""
+
+    def make(pair: Pair, setting: Setting) -> Pair:
+        made = displaced(draw)(pair, setting)
+        scale = float(setting.rng.choice([0.98, 1.02]))
+        middle = np.array(made.size) / 2
+        about = Affine.translation(*middle), Affine.scale(scale), Affine.translation(*-middle)
+        place = compose(made.input_transform, *about)
+        return replace(made, input_transform=place, note=f"{made.note}, {scale:g} of pixel size")
+
+    return make
+
+
 def restyled(draw: Draw) -> Make:
     """What is locked has other colours in the input, and both were compressed."""
 
@@ -107,6 +126,11 @@ def restyled(draw: Draw) -> Make:
         return made.changed(*(_compressed(int(rng.integers(30, 85))) for _ in range(2)))
 
     return make
+
+
+def restyled_on_another_grid(draw: Draw) -> Make:
+    """What is locked has other colours in the input, in pixels of another size."""
+    return resampled(restyled(draw))
 
 
 def _compressed(quality: int) -> Change:
@@ -132,12 +156,20 @@ _WAYS = {
     "rightly placed": placed_right,
     "on the map": on_the_map,
     "resampled": on_another_grid,
+    "other pixel size": of_wrong_scale,
     "at an offset": at_an_offset,
+    "at an offset, resampled": at_an_offset_on_another_grid,
     "restyled": restyled,
+    "restyled, resampled": restyled_on_another_grid,
 }
 
 # What cannot be done to a function of the whole array.
-_OVERLAYS_ONLY = ("at an offset", "restyled")
+_OVERLAYS_ONLY = (
+    "at an offset",
+    "at an offset, resampled",
+    "restyled",
+    "restyled, resampled",
+)
 
 # Where more is put in the list of overlays.
 _DRAWN_IN = (effects, cartography)

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import fields, replace
 from pathlib import Path
 
 import cv2
@@ -20,8 +22,8 @@ from groundtie.matching.locked import (
     find_locked_content,
 )
 from groundtie.matching.survey import survey_places
-from groundtie.rasters.grid import compose
-from groundtie.rasters.pair import Image, make_pair
+from groundtie.rasters.grid import Grid, compose
+from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.similarity.in_common import VIEW_SHARPNESS, Sameness
 
@@ -68,7 +70,7 @@ def sensed(seed: int, noise: float = 0.4, place: int = 1) -> np.ndarray:
     return ground + noise * np.random.default_rng(seed).normal(size=ground.shape)
 
 
-def lies_at(locked: LockedContent, offset: tuple[int, int]) -> bool:
+def lies_at(locked: LockedContent, offset: tuple[float, float]) -> bool:
     """Return whether what is drawn lies so many columns and rows off in the input."""
     reference = locked.pair.reference.source.grid
     place = [[10.0, 20.0]]
@@ -177,7 +179,8 @@ def test_a_transform_to_whole_pixels_is_evidence_itself(
     """Pixels of 10 m. Few of two sensors' views of one ground match so exactly; poses to 0.2."""
     images = sensed(1, 0.8), -sensed(2, 0.8, 9)
     locked = looked_at(tmp_path, *images, context, shift_on_map(70.0 + off_m, -30.0), exact_px)
-    assert locked is not None and lies_at(locked, (7, 3))
+    assert locked is not None
+    assert lies_at(locked, (7 if is_evident else 7 + off_m / 10, 3))
     assert not locked.sameness.is_evident
     assert locked.is_evident == is_evident
     # What is masked then is around edges, whatever they look like.
@@ -263,7 +266,7 @@ def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
 
 
 @pytest.mark.parametrize(
-    ("sharpness", "related", "is_drawn"), [(2.4, 0.0, False), (2.6, 0.0, True), (2.6, 0.8, False)]
+    ("sharpness", "related", "is_drawn"), [(2.9, 0.0, False), (3.1, 0.0, True), (3.1, 0.8, False)]
 )
 def test_sharp_edges_are_drawn_but_those_of_copies_in_other_colours(
     tmp_path: Path, context: Context, sharpness: float, related: float, is_drawn: bool
@@ -334,61 +337,98 @@ def test_the_same_holes_are_found_in_speckle(tmp_path: Path, context: Context) -
     assert not locked.is_explained
 
 
+@contextmanager
+def on_grids(
+    folder: Path, reference: np.ndarray, input: np.ndarray, place: Affine
+) -> Iterator[ImagePair]:
+    """Yield two arrays as a pair, the second with a geotransform of its own."""
+    grid = utm_grid(SIDE, SIDE)
+    own = grid.on_same_map(place, input.shape[1], input.shape[0])
+    paths = [
+        write_raster(folder / name, np.rint(2000 + 300 * values).astype(np.uint16), on)
+        for name, values, on in (("reference.tif", reference, grid), ("input.tif", input, own))
+    ]
+    with open_raster(paths[0]) as one, open_raster(paths[1]) as other:
+        yield make_pair(Image(one), Image(other), search_radius_m=500.0)
+
+
+def found_in(pair: ImagePair, model: Model, context: Context) -> LockedContent | None:
+    """Look for content that two cameras' images have in common under a model."""
+    transform = Transform(model, pair.grid.crs, pair.input.source.grid)
+    places = survey_places(pair.grid)
+    return find_locked_content(pair, transform, places, Sensors.CAMERAS, EXACT_PX, context)
+
+
 @pytest.mark.parametrize("side_m", [8.0, 10.0])
-@pytest.mark.parametrize("off_m", [0.0, 1.0])
+@pytest.mark.parametrize("offset", [(0, 0), (5, -3)])
 @pytest.mark.slow
 def test_lines_that_are_drawn_on_the_map_are_found_on_another_grid(
-    tmp_path: Path, context: Context, side_m: float, off_m: float
+    tmp_path: Path, context: Context, side_m: float, offset: tuple[int, int]
 ) -> None:
     """The other grid has pixels of 8 m, or of 10 m as the reference, and starts 4 m beside it.
 
-    That a transform is the nominal one is no evidence: the ground may lie there, too.
+    The lines may lie beside their place of the map. That a transform is the nominal one, or a
+    shift, is no evidence: the ground may lie there, too.
     """
     grid, factor = utm_grid(SIDE, SIDE), side_m / 10.0
-    reference, input = drawn_into(sensed(1)), drawn_into(sensed(2, place=9))
+    reference, input = drawn_into(sensed(1)), drawn_into(sensed(2, place=9), offset)
     side = round((SIDE - 1) / factor)
     there = ((np.arange(side) + 0.5) * factor + 0.4 - 0.5).astype(np.float32)
     seen = cv2.remap(input.astype(np.float32), *np.meshgrid(there, there), cv2.INTER_CUBIC)
     place = compose(grid.transform, Affine.translation(0.4, 0.4), Affine.scale(factor))
-    paths = [
-        write_raster(tmp_path / name, np.rint(2000 + 300 * values).astype(np.uint16), own)
-        for name, values, own in (
-            ("reference.tif", reference, grid),
-            ("input.tif", seen, grid.on_same_map(place, side, side)),
-        )
-    ]
-    with open_raster(paths[0]) as one, open_raster(paths[1]) as other:
-        pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
-        transform = Transform(shift_on_map(off_m, 0.0), pair.grid.crs, other.grid)
-        places = survey_places(pair.grid)
-        locked = find_locked_content(pair, transform, places, Sensors.CAMERAS, EXACT_PX, context)
+    model = shift_on_map(10.0 * offset[0], -10.0 * offset[1])
+    with on_grids(tmp_path, reference, seen, place) as pair:
+        locked = found_in(pair, model, context)
         assert locked is not None and locked.sameness.is_evident
         assert locked.sameness.has_sharp_edges and not locked.is_exact
-        xy = grid.pixel_to_map([[100.0, 50.0]])
-        np.testing.assert_allclose(locked.to_input(xy), other.grid.map_to_pixel(xy))
+
+
+@pytest.mark.slow
+def test_lines_at_the_same_columns_and_rows_are_found_whatever_pixels_are_nominal(
+    tmp_path: Path, context: Context
+) -> None:
+    """A transform that undoes another pixel size to a sixteenth of a pixel is evidence."""
+    grid, factor = utm_grid(SIDE, SIDE), 1.02
+    reference, input = drawn_into(sensed(1)), drawn_into(sensed(2, place=9))
+    place = compose(grid.transform, Affine.scale(factor))
+    # The reference's map to the input's, x and y from the common corner.
+    corner = np.array([grid.transform.c, grid.transform.f])
+    stretched = PolynomialModel(
+        "affine",
+        Frame(Affine.identity()),
+        np.array([(1 - factor) * corner, [factor - 1, 0.0], [0.0, factor - 1]]),
+    )
+    with on_grids(tmp_path, reference, input, place) as pair:
+        locked = found_in(pair, stretched, context)
+        assert locked is not None and locked.is_exact and locked.sameness.has_sharp_edges
+        assert lies_at(locked, (0, 0))
 
 
 @pytest.mark.parametrize("side_m", [10.0, 12.0])
-def test_arrays_that_are_resampled_have_none(
+def test_arrays_are_not_the_same_where_a_transform_has_them_elsewhere(
     tmp_path: Path, context: Context, side_m: float
 ) -> None:
-    paths = [
-        write_raster(tmp_path / name, (2000 + 300 * sensed(1)).astype(np.uint16), grid)
-        for name, grid in (
-            ("reference.tif", utm_grid(SIDE, SIDE)),
-            ("input.tif", utm_grid(SIDE, SIDE).scaled(side_m / 10.0)),
-        )
-    ]
-    with open_raster(paths[0]) as one, open_raster(paths[1]) as other:
-        pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
-        turned = PolynomialModel(
-            "affine",
-            Frame(Affine.identity()),
-            np.array([[50.0, -30.0], [1e-3, 2e-2], [-2e-2, 1e-3]]),
-        )
-        model = turned if side_m == 10.0 else shift_on_map(40.0, 0.0)
-        transform = Transform(model, pair.grid.crs, other.grid)
-        places = survey_places(pair.grid)
-        assert (
-            find_locked_content(pair, transform, places, Sensors.CAMERAS, EXACT_PX, context) is None
-        )
+    turned = PolynomialModel(
+        "affine",
+        Frame(Affine.identity()),
+        np.array([[50.0, -30.0], [1e-3, 2e-2], [-2e-2, 1e-3]]),
+    )
+    model = turned if side_m == 10.0 else shift_on_map(40.0, 0.0)
+    place = utm_grid(SIDE, SIDE).scaled(side_m / 10.0).transform
+    with on_grids(tmp_path, sensed(1), sensed(1), place) as pair:
+        locked = found_in(pair, model, context)
+        assert locked is not None and not locked.is_evident
+
+
+class OfASensor(Grid):
+    """The pixels of an image in the geometry of its sensor."""
+
+
+def test_nothing_is_drawn_on_the_map_of_an_image_of_a_sensor(
+    tmp_path: Path, context: Context
+) -> None:
+    with on_grids(tmp_path, sensed(1), sensed(1), utm_grid(SIDE, SIDE).transform) as pair:
+        source = pair.input.source
+        own = OfASensor(**{one.name: getattr(source.grid, one.name) for one in fields(Grid)})
+        image = replace(pair.input, source=replace(source, grid=own))
+        assert found_in(replace(pair, input=image), shift_on_map(3.0, 0.0), context) is None

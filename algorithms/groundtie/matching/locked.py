@@ -1,8 +1,8 @@
 """Pixel-locked content: structure that is the same in both arrays, wherever the ground lies.
 
 Labels, frames, watermarks, clouds of one deck, tiles of one mosaic and the pattern of one sensor
-are drawn at a column and row, or at a nominal place, which another grid has at other columns and
-rows. Two images that share them match there, whatever ground they show.
+are drawn at a column and row, or on the map, which another grid has at other columns and rows. Two
+images that share them match there, whatever ground they show.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from ..similarity.in_common import (
     sameness_of,
 )
 from ..similarity.sameness import REACH_PX, WINDOW_PX, Windows, covered
-from ..similarity.seams import seams
-from .chip_windows import Resampled
+from ..similarity.seams import seams, step_products
+from .chip_windows import ChipWindows, Resampled, singly
 from .matcher import Places
 
-# A transform that moves all of the overlap by whole pixels, or leaves it at its nominal place, but
-# for this, may be content's.
-_LARGEST_BEND_PX = 1.5
+# Steps between whole columns are compared unresampled, radar images as if on whole pixels, where a
+# transform is so near to those.
+_NEAR_PX = 1.5
 
 # What is drawn lies on whole pixels all over; of other pairs, one in 64 lies as near by chance.
 # Measured (suite attacks): drawn mostly up to 0.05; of 127 right pairs on one grid none as near is
@@ -65,14 +65,14 @@ class LockedContent:
     pair
         The images.
     to_input
-        Takes map positions to where the input has what is drawn there, in its pixels: a whole
-        number of columns and rows off, or at its nominal place.
+        Takes map positions to where the input has what is drawn there, in its pixels: where the
+        transform has them, or the whole number of columns and rows off that it moves the array by.
     sameness
         How much they have the same.
     sensors
         What the images may be.
     is_exact
-        Whether the transform moves the array by whole pixels all over, and does nothing else.
+        Whether the transform moves the array by whole pixels all over, whatever is nominal.
         Speckle moves what is drawn over two radars' images off whole pixels; but radar images of
         one ground vary alike where it has averaged out: those that do not count as exact.
     """
@@ -139,7 +139,7 @@ def find_locked_content(
     exact_px: float,
     context: Context,
 ) -> LockedContent | None:
-    """Return what the images repeat where they are drawn alike, and a transform has them so.
+    """Return what the images repeat where a transform has them.
 
     Parameters
     ----------
@@ -158,72 +158,46 @@ def find_locked_content(
 
     Returns
     -------
-    None where the transform does more, which nothing drawn into both does.
+    None of an image in the geometry of its sensor, which repeats nothing that is drawn on a map,
+    unless the transform moves the array.
     """
-    way = _nearest_way(pair, transform)
-    if way is None or way.bend_px > _LARGEST_BEND_PX:
-        return None
-    # Chips may end a pixel beyond the grid.
-    reach_px = LOOK_REACH_PX + 1
-    images = Resampled.of(pair, way.to_input, places.grid, reach_px, context)
-
-    def look(centre: NDArray[np.int_]) -> Look:
-        side = places.chip_px + 2 * LOOK_REACH_PX
-        corner = centre - side // 2
-        piece = places.grid.window(int(corner[0]), int(corner[1]), side, side)
-        return Look.of(*images.read(piece))
-
-    sameness = sameness_of(list(context.map(look, list(places.centres))))
-    if sensors is Sensors.RADARS:
-        is_exact = not sameness.varies_as_ground
-    else:
-        is_exact = way.bend_px <= exact_px
-    return LockedContent(pair, way.to_input, sameness, sensors, way.is_of_array and is_exact)
-
-
-@dataclass(frozen=True)
-class _Way:
-    """How what is drawn may lie alike in both images, and how far off a transform has it.
-
-    Parameters
-    ----------
-    to_input
-        See `LockedContent`.
-    is_of_array
-        Whether it lies a whole number of columns and rows off; else at its nominal place, where
-        the ground lies, too, if the georeferencing is right: so no transform is evidence.
-    bend_px
-        How far off the transform has it at most, in pixels of the matching grid.
-    """
-
+    whole, off_px = _by_whole_pixels(pair, transform)
     to_input: PointFunction
-    is_of_array: bool
-    bend_px: float
+    if off_px <= exact_px:
+        to_input = whole
+    elif type(pair.input.source.grid) is Grid:
+        to_input = transform
+    else:
+        return None
+
+    def windows(by: PointFunction) -> ChipWindows:
+        # Chips may end a pixel beyond the grid.
+        images = Resampled.of(pair, by, places.grid, LOOK_REACH_PX + 1, context)
+        return ChipWindows(images, places, LOOK_REACH_PX, None)
+
+    is_near, seen = off_px <= _NEAR_PX, windows(to_input)
+    unresampled = windows(whole) if is_near and to_input is not whole else seen
+    _, looks = seen.map(singly(Look.of), context)
+    _, steps = unresampled.map(singly(step_products), context)
+    sameness = sameness_of(looks, steps)
+    if sensors is Sensors.RADARS:
+        is_exact = is_near and not sameness.varies_as_ground
+    else:
+        is_exact = off_px <= exact_px
+    return LockedContent(pair, to_input, sameness, sensors, is_exact)
 
 
-def _nearest_way(pair: ImagePair, transform: Transform) -> _Way | None:
-    """Return the way that is nearest to a transform; None: nothing drawn is alike.
+def _by_whole_pixels(pair: ImagePair, transform: Transform) -> tuple[PointFunction, float]:
+    """Return the move by whole columns and rows nearest to a transform, and how far off it is.
 
-    An image in the geometry of its sensor has nothing that is drawn at a place.
+    The latter at most, in pixels.
     """
     grid, reference = pair.grid, pair.reference.source.grid
     cols, rows = np.meshgrid(
         np.linspace(0, grid.width - 1, _LATTICE), np.linspace(0, grid.height - 1, _LATTICE)
     )
-    px = np.column_stack([cols.ravel(), rows.ravel()])
-    xy = grid.pixel_to_map(px)
-    found = transform(xy)
-    input_px = np.hypot(*(found[-1] - found[0])) / np.hypot(*(px[-1] - px[0]))
-
-    def way(to_input: PointFunction, is_of_array: bool) -> _Way:
-        bend_px = float(np.abs(found - to_input(xy)).max() / input_px)
-        return _Way(to_input, is_of_array, bend_px)
-
-    ways = []
-    if np.isclose(grid.pixel_size_m, reference.pixel_size_m, rtol=1e-6):
-        offset = np.rint(np.median(found - reference.map_to_pixel(xy), axis=0))
-        ways.append(way(lambda xy: reference.map_to_pixel(xy) + offset, True))
-    if type(pair.input.source.grid) is Grid:
-        ways.append(way(pair.nominal_px, False))
-    known = [one for one in ways if np.isfinite(one.bend_px)]
-    return min(known, key=lambda one: one.bend_px, default=None)
+    xy = grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
+    found, there = transform(xy), reference.map_to_pixel(xy)
+    offset = np.rint(np.median(found - there, axis=0))
+    off_px = float(np.abs(found - there - offset).max())
+    return lambda xy: reference.map_to_pixel(xy) + offset, off_px

@@ -76,8 +76,8 @@ def survey_rest(
 
     Returns
     -------
-    None where the transform does more than move the array, and where there is no more of such
-    content than two views of one ground have, unless both are a radar's: speckle blurs it.
+    None where there is no more of such content than two views of one ground have, unless both are
+    a radar's: speckle blurs it; and where none is looked for.
     """
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
     locked = find_locked_content(pair, transform, asked, sensors, exact_px, context.quiet())

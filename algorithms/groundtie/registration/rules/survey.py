@@ -147,14 +147,14 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
     if rest is None or not rest.is_evident:
         return None
     if rest.is_drawn:
-        return "both images show the same edges at the same columns and rows, sharper than ground's"
+        return "both images show the same edges, sharper than ground's, pixel by pixel"
     if deviations_beyond(rest) >= REST_PEAK_DEVIATIONS:
         return "what the reference does not explain of the input matches elsewhere"
     left = rest.survey
     if left is None or _confirms(left, rest):
         return None
     return (
-        "without what both images show at the same columns and rows, only "
+        "without what both images have the same, pixel by pixel, only "
         f"{left.confirming} of {len(left.centres)} chips match where the transform has them"
     )
 
@@ -241,7 +241,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "pixel-locked content",
         SURVEY,
-        "both images have the same content at the same columns and rows, such as labels or clouds, "
+        "both images have the same content, pixel by pixel, such as labels or clouds, "
         "with edges sharper than those of ground; or without it less than a quarter of the chips "
         "is left, a part lies elsewhere, a second place matches about as well or is a peak of "
         f"{REST_PEAK_DEVIATIONS:g} robust standard deviations, or their mean similarity is below "
@@ -256,7 +256,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "rest elsewhere",
         SURVEY,
-        "between two radar images, without what they have in common at the same columns and rows, "
+        "between two radar images, without what they have in common, pixel by pixel, "
         "a second place matches about as well, and "
         f"{REST_PEAK_DEVIATIONS:g} robust standard deviations better than usual, and a part lies "
         "elsewhere",
