@@ -415,7 +415,7 @@ def beside_another_place(share: float, folder: Path) -> tuple[TexturedPair, Path
     """Return a pair of which a share of squares of 64 px shows another place, and all of that."""
     pair, other = (
         write_textured_pair(made_folder(folder / name), (450, 450), shift_on_map(73.0, -42.0), **of)
-        for name, of in (("same", {}), ("other", {"input_seed": 5}))
+        for name, of in (("same", {"noise": 0.5}), ("other", {"input_seed": 5}))
     )
     squares = np.random.default_rng(3).uniform(size=(8, 8)) < share
     is_other = np.kron(squares, np.ones((64, 64), bool))[:450, :450]

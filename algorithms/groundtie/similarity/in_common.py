@@ -100,8 +100,12 @@ class Sameness:
 
     @property
     def has_sharp_edges(self) -> bool:
-        """Whether edges coincide more sharply than those of one ground."""
-        return self.sharpness >= LEAST_SHARPNESS
+        """Whether edges coincide more sharply than those of one ground.
+
+        Where as much as of one ground follows in other colours: than those of one exposure's bands.
+        """
+        is_related = self.related >= _GROUND_SHARE
+        return self.sharpness >= (VIEW_SHARPNESS if is_related else LEAST_SHARPNESS)
 
     @property
     def has_seams(self) -> bool:
