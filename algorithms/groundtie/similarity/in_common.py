@@ -102,10 +102,10 @@ class Sameness:
     def has_sharp_edges(self) -> bool:
         """Whether edges coincide more sharply than those of one ground.
 
-        Where as much as of one ground follows in other colours: than those of one exposure's bands.
+        Where nearly everything follows in other colours: than those of one exposure's bands.
         """
-        is_related = self.related >= _GROUND_SHARE
-        return self.sharpness >= (VIEW_SHARPNESS if is_related else LEAST_SHARPNESS)
+        is_copy = self.is_copy_in_other_colours
+        return self.sharpness >= (VIEW_SHARPNESS if is_copy else LEAST_SHARPNESS)
 
     @property
     def has_seams(self) -> bool:
