@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import cv2
@@ -88,16 +89,6 @@ def at_an_offset(draw: Draw) -> Make:
     return make
 
 
-def on_another_grid(draw: Draw) -> Make:
-    """What is locked lies at the same place of the map, in pixels of another size."""
-    return resampled(displaced(draw))
-
-
-def at_an_offset_on_another_grid(draw: Draw) -> Make:
-    """What is locked lies elsewhere on the map, too, in pixels of another size."""
-    return resampled(at_an_offset(draw))
-
-
 def of_wrong_scale(draw: Draw) -> Make:
     """What is locked lies at the same pixels, whose size the input's georeferencing has wrong."""
 
@@ -128,17 +119,17 @@ def restyled(draw: Draw) -> Make:
     return make
 
 
-def restyled_on_another_grid(draw: Draw) -> Make:
-    """What is locked has other colours in the input, in pixels of another size."""
-    return resampled(restyled(draw))
-
-
 def _compressed(quality: int) -> Change:
     def compress(band: NDArray[np.uint8]) -> NDArray[np.uint8]:
         _, code = cv2.imencode(".jpg", band, [cv2.IMWRITE_JPEG_QUALITY, quality])
         return np.asarray(cv2.imdecode(code, cv2.IMREAD_GRAYSCALE))
 
     return effects.each_band(compress).change()
+
+
+def on_another_grid(way: Callable[[Draw], Make]) -> Callable[[Draw], Make]:
+    """The same, in pixels of another size."""
+    return lambda draw: resampled(way(draw))
 
 
 def aligned(draw: Draw) -> Make:
@@ -155,12 +146,12 @@ _WAYS = {
     "other place": other_place,
     "rightly placed": placed_right,
     "on the map": on_the_map,
-    "resampled": on_another_grid,
+    "resampled": on_another_grid(displaced),
     "other pixel size": of_wrong_scale,
     "at an offset": at_an_offset,
-    "at an offset, resampled": at_an_offset_on_another_grid,
+    "at an offset, resampled": on_another_grid(at_an_offset),
     "restyled": restyled,
-    "restyled, resampled": restyled_on_another_grid,
+    "restyled, resampled": on_another_grid(restyled),
 }
 
 # What cannot be done to a function of the whole array.
