@@ -24,7 +24,7 @@ from groundtie.matching.locked import EXACT_PX, Sensors, find_locked_content
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.similarity.in_common import LEAST_SHARPNESS, VIEW_SHARPNESS, Sameness
+from groundtie.similarity.in_common import LEAST_SHARPNESS, MOST_BESIDE, VIEW_SHARPNESS, Sameness
 from groundtie.similarity.seams import DRAWN_WIDTH
 
 from .attacks.cases import AttackCase, all_scenes, cases
@@ -175,6 +175,7 @@ def run(settings: Settings) -> SuiteResult:
     most, most_of_one = (
         max((one.sameness.sharpness for one in some), default=0.0) for some in (apart, ground)
     )
+    most_beside = max((one.sameness.beside for one in every if not one.is_drawn), default=0.0)
     others = [one for one in apart if one.group != BANDS_APART]
     least = min((one.sameness.step_width for one in others), default=np.inf)
     return SuiteResult(
@@ -191,6 +192,12 @@ def run(settings: Settings) -> SuiteResult:
                 f"below {VIEW_SHARPNESS:g}",
                 f"at most {most_of_one:.2f}",
                 most_of_one < VIEW_SHARPNESS,
+            ),
+            Goal(
+                "Edges beside one another for each on one another, of all ground at its place",
+                f"at most {MOST_BESIDE:g}",
+                f"at most {most_beside:.2f}",
+                most_beside <= MOST_BESIDE,
             ),
             Goal(
                 "Steps between columns or rows, of different sensors' ground at its place",
@@ -226,7 +233,11 @@ def _table(title: str, some: list[Measured]) -> Table:
         above = sum(value >= LEAST_SHARPNESS for value in values)
         evident = sum(one.sameness.is_evident for one in some if one.group == group)
         low, middle, high = np.percentile(values, [0, 50, 100])
-        numbers = f"{low:.2f}", f"{middle:.2f}", f"{high:.2f}", str(above), str(evident)
-        rows.append([group, str(len(values)), *numbers])
-    columns = ("", "pairs", "least", "median", "most", "at the limit or above", "evident in all")
+        beside = [one.sameness.beside for one in some if one.group == group]
+        numbers = f"{low:.2f}", f"{middle:.2f}", f"{high:.2f}", str(above), f"{max(beside):.2f}"
+        rows.append([group, str(len(values)), *numbers, str(evident)])
+    columns = (
+        *("", "pairs", "least", "median", "most", "at the limit or above"),
+        *("most beside", "evident in all"),
+    )
     return Table(title, columns, rows)

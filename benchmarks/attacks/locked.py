@@ -20,12 +20,20 @@ from .pairs import Change, Pair
 _NEAREST_PX, _FARTHEST_PX = 8.0, 25.0
 
 
+def _moved(pair: Pair, setting: Setting) -> Pair:
+    shift = direction(setting.rng, _NEAREST_PX, _FARTHEST_PX)
+    return pair.moved(shift, as_text(shift))
+
+
+def _of_another_place(pair: Pair, setting: Setting) -> Pair:
+    return setting.elsewhere(pair)
+
+
 def displaced(draw: Draw) -> Make:
     """The ground lies elsewhere in the input, what is locked does not."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
-        shift = direction(setting.rng, _NEAREST_PX, _FARTHEST_PX)
-        moved = pair.moved(shift, as_text(shift))
+        moved = _moved(pair, setting)
         return moved.both(draw(moved.reference.shape[1:], setting.rng).change())
 
     return make
@@ -35,7 +43,7 @@ def other_place(draw: Draw) -> Make:
     """The input shows another place."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
-        other = setting.elsewhere(pair)
+        other = _of_another_place(pair, setting)
         return other.both(draw(other.reference.shape[1:], setting.rng).change())
 
     return make
@@ -107,9 +115,7 @@ def restyled(draw: Draw) -> Make:
     """What is locked has other colours in the input, and both were compressed."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
-        rng = setting.rng
-        shift = direction(rng, _NEAREST_PX, _FARTHEST_PX)
-        moved = pair.moved(shift, as_text(shift))
+        rng, moved = setting.rng, _moved(pair, setting)
         drawn = draw(moved.reference.shape[1:], rng)
         other = replace(drawn, values=np.clip(rng.choice([0, 255]) - drawn.values, 0, 255))
         other = replace(other, alpha=drawn.alpha * rng.uniform(0.6, 1.0))
@@ -125,6 +131,20 @@ def _compressed(quality: int) -> Change:
         return np.asarray(cv2.imdecode(code, cv2.IMREAD_GRAYSCALE))
 
     return effects.each_band(compress).change()
+
+
+def wider(ground: Callable[[Pair, Setting], Pair]) -> Callable[[Draw], Make]:
+    """Lines, letters and clouds are a pixel or two wider in the input, whose ground is no match."""
+
+    def way(draw: Draw) -> Make:
+        def make(pair: Pair, setting: Setting) -> Pair:
+            rng, other = setting.rng, ground(pair, setting)
+            drawn, px = draw(other.reference.shape[1:], rng), int(rng.integers(1, 3))
+            return other.changed(drawn.change(), drawn.wider(px).change(), f"{px} px wider")
+
+        return make
+
+    return way
 
 
 def on_another_grid(way: Callable[[Draw], Make]) -> Callable[[Draw], Make]:
@@ -152,6 +172,9 @@ _WAYS = {
     "at an offset, resampled": on_another_grid(at_an_offset),
     "restyled": restyled,
     "restyled, resampled": on_another_grid(restyled),
+    "wider": wider(_moved),
+    "wider, other place": wider(_of_another_place),
+    "wider, resampled": on_another_grid(wider(_moved)),
 }
 
 # What cannot be done to a function of the whole array.
@@ -160,6 +183,9 @@ _OVERLAYS_ONLY = (
     "at an offset, resampled",
     "restyled",
     "restyled, resampled",
+    "wider",
+    "wider, other place",
+    "wider, resampled",
 )
 
 # Where more is put in the list of overlays.

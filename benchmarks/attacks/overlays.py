@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -48,6 +48,12 @@ class Overlay:
             return to_bytes(image * gain * (1 - alpha) + values * alpha + offset)
 
         return changed
+
+    def wider(self, px: int) -> Overlay:
+        """Return it with all that covers the image so many pixels wider on every side."""
+        side = np.ones((2 * px + 1,) * 2, np.uint8)
+        values, alpha = (cv2.dilate(layer, side) for layer in (self.values, self.alpha))
+        return replace(self, values=values, alpha=alpha)
 
 
 def _moved(

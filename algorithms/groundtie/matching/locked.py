@@ -102,9 +102,13 @@ class LockedContent:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether its edges are sharper than those of one ground, and it is no copy or view."""
+        """Whether its edges are not those of one ground.
+
+        They lie beside one another; or they are sharper, of what is no copy or view.
+        """
         same = self.sameness
-        return same.has_sharp_edges and not (self.is_explained or same.is_copy_in_other_colours)
+        is_image = self.is_explained or same.is_copy_in_other_colours
+        return same.has_edges_beside or (same.has_sharp_edges and not is_image)
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask
 from .sameness import (
@@ -38,9 +37,14 @@ LOOK_REACH_PX = int(np.abs(_OFFSETS).max())
 # ground are blurred by noise, light and physics. Suite sharpness: of different sensors and dates up
 # to 2.1, of different bands on one grid up to 2.45 (years apart) and 4.2 (one exposure, so that the
 # second is the limit of one camera's views). Where right transforms have it (suite attacks,
-# controls): up to 2.8.
-_SHARP_PX, _BLURRED_PX = 0.25, 0.5
-LEAST_SHARPNESS, VIEW_SHARPNESS = 3.0, 5.0
+# controls): up to 2.8; where ground is displaced beneath snow of one shape, from 2.93 on.
+_NEAR_PX = _SHARP_PX, _BLURRED_PX, _BESIDE_PX = 0.25, 0.5, 1.0
+LEAST_SHARPNESS, VIEW_SHARPNESS = 2.9, 5.0
+
+# Edges of one ground coincide most often where they lie on one another. Those of one thing that is
+# drawn twice, in other widths or as thinner cloud, lie beside one another. Where right transforms
+# have it (suites real and attacks, controls): up to 0.8.
+MOST_BESIDE = 1.0
 
 # More of the area than this varies alike where holes or waters of one shape are cut into noise, or
 # clouds of one deck lie over both. Different sensors' views of one ground, and those of day and
@@ -83,6 +87,9 @@ class Sameness:
         reduced ones, whichever is smaller.
     step_width
         See `seams.step_width`.
+    beside
+        How many times as many edges lie between a half and a whole pixel beside one another as
+        within a half; beyond chance, and at least, as above.
     """
 
     sharpness: float
@@ -92,11 +99,13 @@ class Sameness:
     ground: float
     related: float = 0.0
     step_width: float = np.inf
+    beside: float = 0.0
 
     @property
     def is_evident(self) -> bool:
         """Whether more is the same than two views show of one ground."""
-        return self.has_sharp_edges or self.area >= _LEAST_AREA or self.has_seams
+        has_edges = self.has_sharp_edges or self.has_edges_beside
+        return has_edges or self.area >= _LEAST_AREA or self.has_seams
 
     @property
     def has_sharp_edges(self) -> bool:
@@ -106,6 +115,11 @@ class Sameness:
         """
         is_copy = self.is_copy_in_other_colours
         return self.sharpness >= (VIEW_SHARPNESS if is_copy else LEAST_SHARPNESS)
+
+    @property
+    def has_edges_beside(self) -> bool:
+        """Whether edges lie beside one another rather than on one another, as of no ground."""
+        return self.beside > MOST_BESIDE
 
     @property
     def has_seams(self) -> bool:
@@ -154,7 +168,7 @@ class Sameness:
         return self.has_one_ground or self.related >= _GROUND_SHARE
 
 
-_NO_WINDOWS = np.zeros((4, 3), int)
+_NO_WINDOWS, _NO_EDGES = np.zeros((4, 3), int), np.zeros((len(_OFFSETS), 3), int)
 
 
 @dataclass(frozen=True)
@@ -164,7 +178,7 @@ class Look:
     Parameters
     ----------
     edges
-        How many coincide, at each of `_OFFSETS`, shape (k, 2).
+        How many lie within each of `_NEAR_PX` of one another, at each of `_OFFSETS`, shape (k, 3).
     windows
         How many pixels are the same, related, and valid (see `Windows`): of the images, of reduced
         ones, of those reduced once more, and of reduced ones without what is the same in the
@@ -195,39 +209,42 @@ def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> 
     steps
         Their `step_products`, of the input where it is not resampled if it can be.
     """
-    counts = np.sum([one.edges for one in looks], axis=0)
-    sharpness = _sharpness(counts) if looks else 0.0
+    within = np.sum([one.edges for one in looks], axis=0) if looks else _NO_EDGES
+    sharp, blurred, beside = np.diff(within, axis=1, prepend=0).T
     windows = np.sum([one.windows for one in looks], axis=0) if looks else _NO_WINDOWS
     every = windows[:, 2]
     area, reduced_area, coarse_area, _ = windows[:, 0] / np.maximum(every, 1)
     # Of the images and of reduced ones.
     related = (windows[:, 1] / np.maximum(every, 1))[:2].min()
     return Sameness(
-        sharpness,
+        _times_as_many(sharp, blurred),
         float(area),
         float(reduced_area),
         float(coarse_area),
         ground=float(windows[3, 0] / max(every[3], _LEAST_LEFT * every[1], 1.0)),
         related=float(related),
         step_width=step_width(np.sum(steps, axis=0)) if steps else np.inf,
+        beside=_times_as_many(beside, within[:, 1]),
     )
 
 
-def _sharpness(counts: FloatArray) -> float:
-    """Return `Sameness.sharpness` of counts of edges, (sharp, less so) at each of `_OFFSETS`."""
-    chance = counts[1:].mean(axis=0)
-    sharp, blurred = counts[0] - chance
+def _times_as_many(some: NDArray[np.int_], others: NDArray[np.int_]) -> float:
+    """Return how many times as many of some edges coincide as of others, at least.
+
+    Each beyond chance, by counts at each of `_OFFSETS`, shape (k,).
+    """
+    chance = others[1:].mean()
     # Of counts, which vary as much as they are many.
-    error = np.sqrt(counts[0, 1] + chance[1] / _CHANCE_OFFSETS + 1)
-    return float(sharp / (max(blurred, 0.0) + STANDARD_ERRORS * error))
+    error = np.sqrt(others[0] + chance / _CHANCE_OFFSETS + 1)
+    most = max(others[0] - chance, 0.0) + STANDARD_ERRORS * error
+    return float((some[0] - some[1:].mean()) / most)
 
 
 def _count_edges(reference: Patch, input: Patch) -> NDArray[np.int_]:
-    """Return how many strong edges coincide sharply, and less so, at each of `_OFFSETS`, (k, 2)."""
+    """Return `Look.edges` of two patches: how many strong edges lie how near to one another."""
     one, other = (Edges.of(patch).strongest for patch in (reference, input))
     apart = edges_apart_px(one.inner(LOOK_REACH_PX), other, _OFFSETS)
-    sharp = (apart < _SHARP_PX).sum(axis=1)
-    return np.column_stack([sharp, (apart < _BLURRED_PX).sum(axis=1) - sharp])
+    return np.column_stack([(apart < px).sum(axis=1) for px in _NEAR_PX])
 
 
 def drawn_edges(reference: Patch, input: Patch) -> Mask:

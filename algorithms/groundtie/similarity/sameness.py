@@ -12,9 +12,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
+from ..rasters.patch import reduced as means
 from ..rasters.reading import FloatImage, Mask
-from .order_statistics import median
+from .order_statistics import quantiles
 
 # Where one thing is drawn into both, their difference varies less than this share of what both
 # vary, in windows of this side; independent content would have it vary as much as both.
@@ -23,9 +25,9 @@ WINDOW_PX = 9
 REACH_PX = WINDOW_PX // 2
 
 # Edges are maxima of the gradient along itself, after a Gaussian of this scale, against gradients
-# around, above so many per cent of them: strong ones, and weak ones. Nodata is kept so far away.
+# around, above such a share of them: weak ones, and strong ones. Nodata is kept so far away.
 _EDGE_SCALE_PX, _AROUND_PX = 0.8, 31
-_STRONG_EDGE_PERCENT, _WEAK_EDGE_PERCENT = 85.0, 60.0
+_WEAK_AND_STRONG = np.array([0.6, 0.85])
 _EDGE_RIM_PX = 9
 
 # Edges are parallel within 20°, and side by side within this.
@@ -61,7 +63,7 @@ class Windows:
     def of(cls, one: Patch, other: Patch) -> Windows:
         """Return the windows of two patches."""
         valid = one.valid & other.valid
-        share = np.maximum(_mean(valid.astype(np.float32)), np.finfo(np.float32).eps)
+        share = np.maximum(_mean(valid.astype(np.float64)), np.finfo(np.float32).eps)
         images = one.values, other.values, one.values - other.values
         return cls(valid, *(_variance(image, valid, share) for image in images))
 
@@ -115,7 +117,7 @@ class Edges:
         smooth = cv2.GaussianBlur(values, (0, 0), _EDGE_SCALE_PX)
         tiny = np.finfo(np.float32).tiny
         along = [cv2.Sobel(smooth, cv2.CV_32F, *order) for order in ((1, 0), (0, 1))]
-        length = np.asarray(np.hypot(*along), np.float32)
+        length = cv2.magnitude(*along)
         x, y = (np.asarray(one / np.maximum(length, tiny), np.float32) for one in along)
         height = length / np.maximum(cv2.blur(length, (_AROUND_PX, _AROUND_PX)), tiny)
         rows, cols = np.indices(height.shape, np.float32)
@@ -124,8 +126,7 @@ class Edges:
         )
         valid = cv2.erode(patch.valid.astype(np.uint8), np.ones((_EDGE_RIM_PX,) * 2, np.uint8)) > 0
         found = valid & (height > after) & (height >= before)
-        levels = (_WEAK_EDGE_PERCENT, _STRONG_EDGE_PERCENT)
-        weak, strong = np.percentile(height[valid], levels) if valid.any() else (0.0, 0.0)
+        weak, strong = quantiles(height[valid], _WEAK_AND_STRONG) if valid.any() else (0.0, 0.0)
         found &= height > weak
         bend = np.where(found, 2 * height - before - after, 1)
         offset = np.where(found, (after - before) / (2 * bend), 0)
@@ -196,29 +197,22 @@ def without(patch: Patch, hidden: Mask) -> Patch:
 
 def reduced(patch: Patch, factor: int) -> Patch:
     """Return the means of squares of valid pixels; what remains at the right and below is cut."""
-    height, width = (size // factor for size in patch.values.shape)
-
-    def mean(of: FloatImage) -> FloatImage:
-        cut = of[: height * factor, : width * factor]
-        return cut.reshape(height, factor, width, factor).mean((1, 3), dtype=np.float32)
-
-    share = mean(patch.valid.astype(np.float32))
-    sums = mean(np.where(patch.valid, patch.values, 0).astype(np.float32))
-    means = np.asarray(sums / np.maximum(share, np.finfo(np.float32).eps), np.float32)
-    return Patch(means, share >= _LEAST_VALID)
+    share = means(patch.valid.astype(np.float32), factor)
+    sums = means(np.where(patch.valid, patch.values, 0).astype(np.float32), factor)
+    values = np.asarray(sums / np.maximum(share, np.finfo(np.float32).eps), np.float32)
+    return Patch(values, share >= _LEAST_VALID)
 
 
-def _variance(values: FloatImage, valid: Mask, share: FloatImage) -> FloatImage:
+def _variance(values: FloatImage, valid: Mask, share: FloatArray) -> FloatImage:
     """Return the variance of valid values in windows around pixels, shape (h, w).
 
     `share` is that of the windows' pixels that are valid.
     """
-    # About a middle: of squares of large values, small differences would lose digits.
-    middle = median(values[valid]) if valid.any() else 0.0
-    known = np.where(valid, values - middle, 0).astype(np.float32)
+    # Of squares of large values, small differences would lose their digits in single precision.
+    known = np.where(valid, values, 0).astype(np.float64)
     return np.asarray(_mean(known**2) / share - (_mean(known) / share) ** 2, np.float32)
 
 
-def _mean(of: FloatImage) -> FloatImage:
+def _mean(of: FloatArray) -> FloatArray:
     """Return the mean in windows around pixels, shape (h, w)."""
-    return np.asarray(cv2.blur(of, (WINDOW_PX, WINDOW_PX)), np.float32)
+    return np.asarray(cv2.blur(of, (WINDOW_PX, WINDOW_PX)))

@@ -147,7 +147,7 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
     if rest is None or not rest.is_evident:
         return None
     if rest.is_drawn:
-        return "both images show the same edges, sharper than ground's, pixel by pixel"
+        return "both images show the same drawn edges, sharper than ground's or beside one another"
     if deviations_beyond(rest) >= REST_PEAK_DEVIATIONS:
         return "what the reference does not explain of the input matches elsewhere"
     left = rest.survey
@@ -242,12 +242,12 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "pixel-locked content",
         SURVEY,
         "both images have the same content, pixel by pixel, such as labels or clouds, "
-        "with edges sharper than those of ground; or without it less than a quarter of the chips "
-        "is left, a part lies elsewhere, a second place matches about as well or is a peak of "
-        f"{REST_PEAK_DEVIATIONS:g} robust standard deviations, or their mean similarity is below "
-        f"{WEAK_REST_HEIGHT:g}; of a copy, or one camera's views, with sharp edges, a quarter is "
-        "left that is below that or has such a peak, or what the reference does not explain of it "
-        "has one",
+        "with edges sharper than those of ground, or beside one another; or without it less than a "
+        "quarter of the chips is left, a part lies elsewhere, a second place matches about as well "
+        f"or is a peak of {REST_PEAK_DEVIATIONS:g} robust standard deviations, or their mean "
+        f"similarity is below {WEAK_REST_HEIGHT:g}; of a copy, or one camera's views, with sharp "
+        "edges, a quarter is left that is below that or has such a peak, or what the reference "
+        "does not explain of it has one",
         "suites margins and attacks",
         WITHOUT,
         _locked,
