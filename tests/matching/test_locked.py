@@ -92,10 +92,13 @@ def test_lines_that_are_drawn_over_different_ground_are_found(
     assert locked.sameness.has_sharp_edges
 
 
+@pytest.mark.parametrize("width", [6, 8])
 @pytest.mark.slow
-def test_lines_that_are_drawn_in_other_widths_are_found(tmp_path: Path, context: Context) -> None:
-    """Their edges lie a pixel beside one another, as those of no ground do."""
-    reference, input = drawn_into(sensed(1)), drawn_into(sensed(2, place=9), width=6)
+def test_lines_that_are_drawn_in_other_widths_are_found(
+    tmp_path: Path, context: Context, width: int
+) -> None:
+    """Their edges lie a pixel, or two, beside one another, as those of no ground do."""
+    reference, input = drawn_into(sensed(1)), drawn_into(sensed(2, place=9), width=width)
     locked = looked_at(tmp_path, reference, input, context)
     assert locked is not None and locked.sameness.is_evident
     assert locked.sameness.has_edges_beside and not locked.sameness.has_sharp_edges

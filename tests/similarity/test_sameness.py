@@ -38,7 +38,7 @@ def test_edges_are_found_to_a_fraction_of_a_pixel(along: float, contrast: float)
     np.testing.assert_allclose(off[near], 0, atol=0.08)
 
 
-@pytest.mark.parametrize("shift", [0.0, 0.2, 0.4])
+@pytest.mark.parametrize("shift", [0.0, 0.2, 0.4, 1.0, 1.7])
 def test_parallel_edges_are_as_far_apart_as_they_are(shift: float) -> None:
     rows, cols = np.indices((80, 80))
 

@@ -38,13 +38,16 @@ LOOK_REACH_PX = int(np.abs(_OFFSETS).max())
 # to 2.1, of different bands on one grid up to 2.45 (years apart) and 4.2 (one exposure, so that the
 # second is the limit of one camera's views). Where right transforms have it (suite attacks,
 # controls): up to 2.8; where ground is displaced beneath snow of one shape, from 2.93 on.
-_NEAR_PX = _SHARP_PX, _BLURRED_PX, _BESIDE_PX = 0.25, 0.5, 1.0
+_SHARP_PX, _BLURRED_PX = 0.25, 0.5
 LEAST_SHARPNESS, VIEW_SHARPNESS = 2.9, 5.0
 
-# Edges of one ground coincide most often where they lie on one another. Those of one thing that is
-# drawn twice, in other widths or as thinner cloud, lie beside one another. Where right transforms
-# have it (suites real and attacks, controls): up to 0.8.
+# Edges of one ground coincide most often where they lie on one another, within half a pixel. Those
+# of one thing that is drawn twice, in other widths or as thinner cloud, lie half a pixel more or
+# some apart. Where right transforms have it (suites real and attacks, controls): up to 0.8.
+_BESIDE_PX = 1.0, 1.5, 2.0
 MOST_BESIDE = 1.0
+
+_NEAR_PX = _SHARP_PX, _BLURRED_PX, *_BESIDE_PX
 
 # More of the area than this varies alike where holes or waters of one shape are cut into noise, or
 # clouds of one deck lie over both. Different sensors' views of one ground, and those of day and
@@ -88,8 +91,8 @@ class Sameness:
     step_width
         See `seams.step_width`.
     beside
-        How many times as many edges lie between a half and a whole pixel beside one another as
-        within a half; beyond chance, and at least, as above.
+        How many times as many edges lie a half to 1, 1 to 1.5, or 1.5 to 2 pixels beside one
+        another, whichever are most, as within a half; beyond chance, and at least, as above.
     """
 
     sharpness: float
@@ -168,7 +171,7 @@ class Sameness:
         return self.has_one_ground or self.related >= _GROUND_SHARE
 
 
-_NO_WINDOWS, _NO_EDGES = np.zeros((4, 3), int), np.zeros((len(_OFFSETS), 3), int)
+_NO_WINDOWS, _NO_EDGES = np.zeros((4, 3), int), np.zeros((len(_OFFSETS), len(_NEAR_PX)), int)
 
 
 @dataclass(frozen=True)
@@ -178,7 +181,7 @@ class Look:
     Parameters
     ----------
     edges
-        How many lie within each of `_NEAR_PX` of one another, at each of `_OFFSETS`, shape (k, 3).
+        How many lie within each of `_NEAR_PX` of one another, at each of `_OFFSETS`, shape (k, 5).
     windows
         How many pixels are the same, related, and valid (see `Windows`): of the images, of reduced
         ones, of those reduced once more, and of reduced ones without what is the same in the
@@ -210,7 +213,7 @@ def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> 
         Their `step_products`, of the input where it is not resampled if it can be.
     """
     within = np.sum([one.edges for one in looks], axis=0) if looks else _NO_EDGES
-    sharp, blurred, beside = np.diff(within, axis=1, prepend=0).T
+    sharp, blurred, *beside = np.diff(within, axis=1, prepend=0).T
     windows = np.sum([one.windows for one in looks], axis=0) if looks else _NO_WINDOWS
     every = windows[:, 2]
     area, reduced_area, coarse_area, _ = windows[:, 0] / np.maximum(every, 1)
@@ -224,7 +227,7 @@ def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> 
         ground=float(windows[3, 0] / max(every[3], _LEAST_LEFT * every[1], 1.0)),
         related=float(related),
         step_width=step_width(np.sum(steps, axis=0)) if steps else np.inf,
-        beside=_times_as_many(beside, within[:, 1]),
+        beside=max(_times_as_many(some, within[:, 1]) for some in beside),
     )
 
 

@@ -35,7 +35,9 @@ _PARALLEL_COSINE = float(np.cos(np.deg2rad(20)))
 _ALONG_PX = 0.5
 
 # Where the nearest edge may be, and no shift, (x, y).
-_NEIGHBOURS = np.array([(x, y) for y in (-1, 0, 1) for x in (-1, 0, 1)])
+_FARTHEST_PX = 2
+_EITHER_WAY = range(-_FARTHEST_PX, _FARTHEST_PX + 1)
+_NEIGHBOURS = np.array([(x, y) for y in _EITHER_WAY for x in _EITHER_WAY])
 _NONE = np.zeros((1, 2), int)
 
 # Means of a reduced image need this share of their pixels.
@@ -160,13 +162,13 @@ def edges_apart_px(one: Edges, other: Edges, shifts: NDArray[np.int_] = _NONE) -
     Returns
     -------
     Shape (k, n), in the order of `np.nonzero(one.found)`, in pixels across the edges; infinite
-    where there is none within a pixel or so.
+    where there is none within two pixels or so.
     """
-    reach = int(np.abs(shifts).max()) + 1
+    reach = int(np.abs(shifts).max()) + _FARTHEST_PX
     width = one.found.shape[1] + 2 * reach
     is_found = np.pad(other.found, reach).ravel()
     rows, cols = np.nonzero(one.found)
-    # Of all shifts, neighbours and edges, (k, 9, n), those where the other has an edge: few.
+    # Of all shifts, neighbours and edges, (k, 25, n), those where the other has an edge: few.
     step = (shifts[:, None] + _NEIGHBOURS) @ np.array([1, width])
     at = step[..., None] + ((rows + reach) * width + cols + reach)
     which, beside, edge = np.nonzero(is_found[at])
