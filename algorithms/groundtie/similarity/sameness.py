@@ -171,8 +171,9 @@ def edges_apart_px(one: Edges, other: Edges, shifts: NDArray[np.int_] = _NONE) -
     # Of all shifts, neighbours and edges, (k, 25, n), those where the other has an edge: few.
     step = (shifts[:, None] + _NEIGHBOURS) @ np.array([1, width])
     at = step[..., None] + ((rows + reach) * width + cols + reach)
-    which, beside, edge = np.nonzero(is_found[at])
-    near = tuple(np.array(divmod(at[which, beside, edge], width)) - reach)
+    hits = np.flatnonzero(is_found.take(at))
+    which, beside, edge = np.unravel_index(hits, at.shape)
+    near = tuple(np.array(divmod(at.take(hits), width)) - reach)
     mine, (step_x, step_y) = (rows[edge], cols[edge]), _NEIGHBOURS[beside].T
     x, y, offset = one.x[mine], one.y[mine], one.offset[mine]
     other_x, other_y, other_offset = other.x[near], other.y[near], other.offset[near]
