@@ -58,7 +58,8 @@ def looked_at(
 def drawn_into(values: np.ndarray, offset: tuple[int, int] = (0, 0), width: int = 4) -> np.ndarray:
     """Return an array with lines drawn at columns and rows, moved by an offset."""
     made = values.copy()
-    first, end = 2 - width // 2, 2 + width // 2
+    first = 2 - width // 2
+    end = first + width
     for at in (40, 110, 190, 260):
         made[at + offset[1] + first : at + offset[1] + end] = 8.0
         made[:, at + offset[0] + first : at + offset[0] + end] = 8.0
@@ -92,13 +93,16 @@ def test_lines_that_are_drawn_over_different_ground_are_found(
     assert locked.sameness.has_sharp_edges
 
 
-@pytest.mark.parametrize("width", [6, 8])
+@pytest.mark.parametrize("widths", [(4, 6), (4, 8), (1, 3)])
 @pytest.mark.slow
 def test_lines_that_are_drawn_in_other_widths_are_found(
-    tmp_path: Path, context: Context, width: int
+    tmp_path: Path, context: Context, widths: tuple[int, int]
 ) -> None:
-    """Their edges lie a pixel, or two, beside one another, as those of no ground do."""
-    reference, input = drawn_into(sensed(1)), drawn_into(sensed(2, place=9), width=width)
+    """Their edges lie a pixel, or two, beside one another; of the thinnest a fraction of one."""
+    reference, input = (
+        drawn_into(sensed(seed, place=place), width=width)
+        for seed, place, width in zip((1, 2), (1, 9), widths, strict=True)
+    )
     locked = looked_at(tmp_path, reference, input, context)
     assert locked is not None and locked.sameness.is_evident
     assert locked.sameness.has_edges_beside and not locked.sameness.has_sharp_edges

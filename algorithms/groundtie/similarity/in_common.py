@@ -41,9 +41,10 @@ LOOK_REACH_PX = int(np.abs(_OFFSETS).max())
 _SHARP_PX, _BLURRED_PX = 0.25, 0.5
 LEAST_SHARPNESS, VIEW_SHARPNESS = 2.9, 5.0
 
-# Edges of one ground coincide most often where they lie on one another, within half a pixel. Those
-# of one thing that is drawn twice, in other widths or as thinner cloud, lie half a pixel more or
-# some apart. Where right transforms have it (suites real and attacks, controls): up to 0.8.
+# Edges of one ground coincide most often where they lie on one another. Those of one thing that is
+# drawn twice, in other widths or as thinner cloud, lie beside one another: as many as on one
+# another, or more, in steps as wide. Where right transforms have it (suites real and attacks,
+# controls): up to 0.8.
 _BESIDE_PX = 1.0, 1.5, 2.0
 MOST_BESIDE = 1.0
 
@@ -92,7 +93,8 @@ class Sameness:
         See `seams.step_width`.
     beside
         How many times as many edges lie a half to 1, 1 to 1.5, or 1.5 to 2 pixels beside one
-        another, whichever are most, as within a half; beyond chance, and at least, as above.
+        another as within a half, or a quarter to a half as within a quarter, whichever is most;
+        beyond chance, and at least, as above.
     """
 
     sharpness: float
@@ -227,7 +229,10 @@ def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> 
         ground=float(windows[3, 0] / max(every[3], _LEAST_LEFT * every[1], 1.0)),
         related=float(related),
         step_width=step_width(np.sum(steps, axis=0)) if steps else np.inf,
-        beside=max(_times_as_many(some, within[:, 1]) for some in beside),
+        beside=max(
+            _times_as_many(blurred, sharp),
+            *(_times_as_many(some, within[:, 1]) for some in beside),
+        ),
     )
 
 
