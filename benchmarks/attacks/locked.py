@@ -25,10 +25,6 @@ def _moved(pair: Pair, setting: Setting) -> Pair:
     return pair.moved(shift, as_text(shift))
 
 
-def _of_another_place(pair: Pair, setting: Setting) -> Pair:
-    return setting.elsewhere(pair)
-
-
 def displaced(draw: Draw) -> Make:
     """The ground lies elsewhere in the input, what is locked does not."""
 
@@ -43,7 +39,7 @@ def other_place(draw: Draw) -> Make:
     """The input shows another place."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
-        other = _of_another_place(pair, setting)
+        other = setting.elsewhere(pair)
         return other.both(draw(other.reference.shape[1:], setting.rng).change())
 
     return make
@@ -173,7 +169,7 @@ _WAYS = {
     "restyled": restyled,
     "restyled, resampled": on_another_grid(restyled),
     "wider": wider(_moved),
-    "wider, other place": wider(_of_another_place),
+    "wider, other place": wider(lambda pair, setting: setting.elsewhere(pair)),
     "wider, resampled": on_another_grid(wider(_moved)),
 }
 
