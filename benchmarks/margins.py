@@ -27,7 +27,6 @@ from groundtie.registration.rules.survey import (
     REST_PEAK_DEVIATIONS,
     RIVAL_HEIGHT,
     WEAK_HEIGHT,
-    WEAK_REST_HEIGHT,
     deviations_beyond,
     deviations_elsewhere,
     deviations_of_rest,
@@ -122,7 +121,7 @@ STATISTICS = (
     Statistic("few chips confirm: share", LARGEST_SHARE, _of_survey(evident_share), False),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),
     Statistic("pixel-locked content: excess", LEAST_EXCESS, _excess_of_rest),
-    Statistic("pixel-locked content: height", WEAK_REST_HEIGHT, _rest_height, False),
+    Statistic("pixel-locked content: height", WEAK_HEIGHT, _rest_height, False),
     Statistic("pixel-locked content: second peak", REST_PEAK_DEVIATIONS, _rest_peak),
     Statistic("pixel-locked content: copies", REST_PEAK_DEVIATIONS, _peak_beyond),
     Statistic(

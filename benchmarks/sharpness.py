@@ -1,7 +1,8 @@
 """How sharply edges and steps coincide: of ground at its place, and of what is drawn over other.
 
-Ground at its place is that of all scenes of the red team, and different bands of the shared series,
-of one date and of neighbouring ones: what cameras show of one ground in other colours.
+Ground at its place is that of all scenes of the red team, different bands of the shared series, of
+one date and of neighbouring ones: what cameras show of one ground in other colours; and dates of
+simulated series.
 """
 
 from __future__ import annotations
@@ -11,32 +12,39 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from groundtie.context import threads
-from groundtie.geometry.models import shift_model
 from groundtie.geometry.transform import Transform
 from groundtie.matching.locked import EXACT_PX, Sensors, find_locked_content
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
+from groundtie.series.frame import PARAMETERS, SeriesFrame
 from groundtie.similarity.in_common import LEAST_SHARPNESS, MOST_BESIDE, VIEW_SHARPNESS, Sameness
 from groundtie.similarity.seams import DRAWN_WIDTH
 
+from .accuracy import FloatArray
 from .attacks.cases import AttackCase, all_scenes, cases
 from .attacks.catalogue import LOCKED
 from .attacks.examples import is_example
 from .attacks.pairs import Pair
 from .attacks.suite import sample
 from .attempt import for_json
+from .series_scenes import simulate_series
 from .suites import Goal, Settings, SuiteResult, Table, run_cases
 
 _QUICK, _SAMPLE = 4, 60
 BANDS_OF_ONE, BANDS_APART = "bands of one exposure", "bands, years apart"
+
+# Series of other seeds than the suite series has, and dates of each.
+_SERIES_SEEDS, _DATES = range(4, 9), 5
+
+_NOWHERE = np.zeros(PARAMETERS)
 
 
 @dataclass(frozen=True)
@@ -106,12 +114,32 @@ class Bands:
             return Measured(name, group, False, _sameness(*images, workers, *bands))
 
 
+@dataclass(frozen=True)
+class Dates:
+    """A date of a simulated series, and its first one."""
+
+    seed: int
+    date: int
+    cache: Path
+
+    def run(self, workers: int | None) -> Measured:
+        """Simulate the series and measure."""
+        with tempfile.TemporaryDirectory() as folder:
+            series = simulate_series(Path(folder), self.cache, self.seed, _DATES, ())
+            images = series.files[0], series.files[self.date]
+            displacement = series.displacement_px[self.date]
+            sameness = _sameness(*images, workers, displacement=displacement)
+        name = f"series {self.seed}, date {self.date}"
+        return Measured(name, "dates of one camera", False, sameness)
+
+
 def _sameness(
     reference: Path,
     input: Path,
     workers: int | None,
     band: int | None = None,
     other_band: int | None = None,
+    displacement: FloatArray = _NOWHERE,
 ) -> Sameness:
     with (
         open_raster(reference) as one,
@@ -119,9 +147,10 @@ def _sameness(
         threads(workers) as context,
     ):
         pair = make_pair(Image(one, band), Image(other, other_band))
-        nowhere = Transform(shift_model(0.0, 0.0), pair.grid.crs, other.grid)
+        model = SeriesFrame.around(pair.grid, [pair.grid]).model(displacement)
+        truth = Transform(model, pair.grid.crs, other.grid)
         places = survey_places(pair.grid)
-        locked = find_locked_content(pair, nowhere, places, Sensors.CAMERAS, EXACT_PX, context)
+        locked = find_locked_content(pair, truth, places, Sensors.CAMERAS, EXACT_PX, context)
     if locked is None:
         raise ValueError("the arrays do not lie on one another")
     return locked.sameness
@@ -143,8 +172,9 @@ def run(settings: Settings) -> SuiteResult:
     """Measure all ground at its place, and `--sample` drawn pairs."""
     seeds = range(settings.first_seed, settings.first_seed + settings.seeds)
     bands = bands_of_series(settings.data)
-    scenes: list[Case | Bands] = [
-        *(bands[:1] if settings.quick else bands),
+    dates = [Dates(*at, settings.cache) for at in product(_SERIES_SEEDS, range(1, _DATES))]
+    scenes: list[Case | Bands | Dates] = [
+        *(bands[:1] if settings.quick else [*bands, *dates]),
         *(
             Case(f"{name} {seed}", scene.kind, False, partial(scene.pair, seed, settings.cache))
             for name, scene in all_scenes(settings.data).items()
@@ -168,9 +198,8 @@ def run(settings: Settings) -> SuiteResult:
     )
     every += run_cases(attacked, settings.jobs)
     found = [one for one in every if one.is_drawn]
-    ground = [
-        one for one in every if not (one.is_drawn or one.sameness.is_copy or one.sameness.is_view)
-    ]
+    ground = [one for one in every if not (one.is_drawn or _is_explained(one))]
+    views = [one for one in every if not one.is_drawn and _is_explained(one)]
     apart = [one for one in ground if one.group != BANDS_OF_ONE]
     most, most_of_one = (
         max((one.sameness.sharpness for one in some), default=0.0) for some in (apart, ground)
@@ -208,12 +237,28 @@ def run(settings: Settings) -> SuiteResult:
         ),
         (
             _table("Ground at its place", ground),
+            _views_table("Copies and one camera's views at their place", views),
             _table("Drawn over other ground", found),
             _steps_table("Steps between columns or rows, ground at its place", ground),
             _steps_table("Steps between columns or rows, drawn over other ground", found),
         ),
         [one.record() for one in every],
     )
+
+
+def _is_explained(one: Measured) -> bool:
+    return one.sameness.is_copy or one.sameness.is_view
+
+
+def _views_table(title: str, some: list[Measured]) -> Table:
+    rows = []
+    for group in sorted({one.group for one in some}):
+        own = [one.sameness for one in some if one.group == group]
+        coarse = [one.coarse_area / one.reduced_area for one in own]
+        numbers = max(one.sharpness for one in own), min(one.ground for one in own), min(coarse)
+        rows.append([group, str(len(own)), *(f"{number:.2f}" for number in numbers)])
+    columns = "", "pairs", "sharpest edges", "least ground", "least in coarser pixels"
+    return Table(title, columns, rows)
 
 
 def _steps_table(title: str, some: list[Measured]) -> Table:

@@ -269,6 +269,19 @@ def test_one_sensors_views_of_one_ground_are_explained(tmp_path: Path, context: 
     assert locked.is_explained
 
 
+@pytest.mark.parametrize(("coarse", "is_view"), [(0.66, True), (0.6, False)])
+def test_views_are_a_little_less_alike_in_coarser_pixels(
+    tmp_path: Path, context: Context, coarse: float, is_view: bool
+) -> None:
+    """Light and seasons differ over wide areas; two radar images have neither."""
+    locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
+    assert locked is not None
+    sameness = replace(locked.sameness, sharpness=1.5, related=0.0, **OF_ONE_GROUND)
+    sameness = replace(sameness, coarse_area=coarse)
+    assert replace(locked, sameness=sameness).is_explained == is_view
+    assert sameness.is_finer_than_ground and not sameness.varies_as_ground
+
+
 def test_what_varies_alike_in_two_radar_images_is_no_ground(
     tmp_path: Path, context: Context
 ) -> None:

@@ -210,8 +210,8 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(height=2.1, rival=1.0)),
     ),
     "pixel-locked content": (
-        evidence(GOOD, survey=survey(), rest=Rest(survey(height=2.4, rival=1.0))),
-        evidence(GOOD, survey=survey(), rest=Rest(survey(height=2.6, rival=1.0))),
+        evidence(GOOD, survey=survey(), rest=Rest(survey(height=1.9, rival=1.0))),
+        evidence(GOOD, survey=survey(), rest=Rest(survey(height=2.1, rival=1.0))),
     ),
     "rest elsewhere": (
         evidence(

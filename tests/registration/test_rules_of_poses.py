@@ -77,7 +77,7 @@ def test_poses_of_canopies_are_refused(rival: float, expected: list[str]) -> Non
         (7, survey(38, part=11), None, ["part elsewhere"]),
         (7, survey(height=4.0, rival=3.5), None, ["second place nearby"]),
         (7, survey(height=1.9, rival=0.5), None, ["weak similarity"]),
-        (7, survey(), Rest(survey(height=2.4, rival=1.0)), ["pixel-locked content"]),
+        (7, survey(), Rest(survey(height=1.9, rival=1.0)), ["pixel-locked content"]),
     ],
 )
 def test_rules_of_registrations_judge_poses(

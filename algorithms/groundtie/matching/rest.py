@@ -92,7 +92,8 @@ def survey_rest(
         return Rest()
     left = beyond = None
     same = locked.sameness
-    if not locked.is_explained or (same.has_sharp_edges and not same.is_same_view):
+    is_doubtful = same.has_sharp_edges or same.is_finer_than_ground
+    if not locked.is_explained or (is_doubtful and not same.is_same_view):
         # Another input leaves something else of the reference.
         once = context.once()
         left = survey_model(fused, transform.model, once, locked, places, elsewhere_px)

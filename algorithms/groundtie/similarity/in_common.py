@@ -63,8 +63,12 @@ _LEAST_AREA = 0.3
 # radars' images of different ground. The further step is an octave: by it, 1.04 times as much and
 # more varies alike in right radar pairs, less in noise that is smooth along some pixels (suite
 # attacks).
+# Light and seasons differ over wide areas: two dates of one camera are alike in coarse pixels by
+# 0.945 times as much as in finer ones, or more (suite series, simulated dates of seeds 1 to 7);
+# patterns of noise that are smooth along up to 2 pixels by 0.78 times as much, or less
+# (tests/matching/test_locked.py).
 _REDUCTION, _FURTHER = 4, 2
-_GROUND_SHARE = 0.23
+_GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
 _LEAST_LEFT = 0.1
 
 # Nothing is left to be judged of copies: this share is the same, in the images and reduced ones.
@@ -158,19 +162,25 @@ class Sameness:
     def is_view(self) -> bool:
         """Whether both may be one camera's views of one ground.
 
-        Edges coincide no more sharply than those of its bands.
+        Edges coincide no more sharply than those of its bands, and little less is alike in coarser
+        pixels, by light and season.
         """
-        return self.has_one_ground and self.sharpness < VIEW_SHARPNESS
+        is_ground = self.coarse_area >= _LEAST_COARSE_SHARE * self.reduced_area
+        return self._has_ground and is_ground and self.sharpness < VIEW_SHARPNESS
 
     @property
     def has_one_ground(self) -> bool:
         """Whether what is not the same varies alike, too, as one sensor's views of one ground."""
-        return self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
+        return self._has_ground and not self.is_finer_than_ground
 
     @property
     def varies_as_ground(self) -> bool:
         """Whether as much as of one ground varies alike, or follows in other colours."""
         return self.has_one_ground or self.related >= _GROUND_SHARE
+
+    @property
+    def _has_ground(self) -> bool:
+        return self.ground >= _GROUND_SHARE
 
 
 _NO_WINDOWS, _NO_EDGES = np.zeros((4, 3), int), np.zeros((len(_OFFSETS), len(_NEAR_PX)), int)

@@ -17,11 +17,6 @@ from .rule import GROUND_ALONE, NOTHING, ON_GROUND, WITHOUT, Rule
 RIVAL_HEIGHT = 0.8
 WEAK_HEIGHT = 2.0
 
-# The same of what is left without what the columns and rows share, whose rims remain. Measured by
-# the suite margins (--seeds 2 --sample 120): from 4.4 on, on shared pairs; of 5 wrong transforms
-# up to 1.8.
-WEAK_REST_HEIGHT = 2.5
-
 # A quarter of the chips must have enough valid pixels in both images. All have where no mask is
 # used; on the ground of cities that were registered right 22 of 57 and more have, on snow of one
 # shape that was taken for the ground of a city 4 of 37. Without pixel-locked content, of right
@@ -138,7 +133,7 @@ def _confirms(left: Survey, rest: Rest) -> bool:
     # Tall buildings of views are parts, as layover and relief displacement differ.
     is_part_elsewhere = bool(left.parts) and not rest.is_explained
     is_elsewhere = _has_rival(left) or deviations_elsewhere(left) >= REST_PEAK_DEVIATIONS
-    return left.height >= WEAK_REST_HEIGHT and not (is_elsewhere or is_part_elsewhere)
+    return left.height >= WEAK_HEIGHT and not (is_elsewhere or is_part_elsewhere)
 
 
 def _locked(evidence: RegistrationEvidence) -> str | None:
@@ -245,7 +240,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "with edges sharper than those of ground, or beside one another; or without it less than a "
         "quarter of the chips is left, a part lies elsewhere, a second place matches about as well "
         f"or is a peak of {REST_PEAK_DEVIATIONS:g} robust standard deviations, or their mean "
-        f"similarity is below {WEAK_REST_HEIGHT:g}; of a copy, or one camera's views, with sharp "
+        f"similarity is below {WEAK_HEIGHT:g}; of a copy, or one camera's views, with sharp "
         "edges, a quarter is left that is below that or has such a peak, or what the reference "
         "does not explain of it has one",
         "suites margins and attacks",
