@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
-from itertools import pairwise, product
+from itertools import combinations, pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,7 @@ from .suites import Goal, Settings, SuiteResult, Table, run_cases
 
 _QUICK, _SAMPLE = 4, 60
 BANDS_OF_ONE, BANDS_APART = "bands of one exposure", "bands, years apart"
+SIMULATED_DATES, DATES = "simulated dates of one camera", "dates of one camera, years apart"
 
 # Series of other seeds than the suite series has, and dates of each.
 _SERIES_SEEDS, _DATES = range(4, 9), 5
@@ -106,6 +107,8 @@ class Bands:
     def run(self, workers: int | None) -> Measured:
         """Measure."""
         group = BANDS_OF_ONE if self.reference == self.input else BANDS_APART
+        if self.band == self.other_band:
+            group = DATES
         name = f"{self.reference.stem} {self.band}, {self.input.stem} {self.other_band}"
         with tempfile.TemporaryDirectory() as folder:
             # A raster is not compared with itself.
@@ -130,7 +133,7 @@ class Dates:
             displacement = series.displacement_px[self.date]
             sameness = _sameness(*images, workers, displacement=displacement)
         name = f"series {self.seed}, date {self.date}"
-        return Measured(name, "dates of one camera", False, sameness)
+        return Measured(name, SIMULATED_DATES, False, sameness)
 
 
 def _sameness(
@@ -157,7 +160,7 @@ def _sameness(
 
 
 def bands_of_series(folder: Path) -> list[Bands]:
-    """Return bands of one exposure, and of neighbouring dates that lie on one grid."""
+    """Return bands of one exposure, and of dates that lie on one grid."""
     found = []
     for dates in ("fields", "river"):
         files = sorted((folder / "series" / dates).glob("*.tif"))
@@ -165,6 +168,8 @@ def bands_of_series(folder: Path) -> list[Bands]:
         if dates == "river":
             neighbours = list(pairwise(files))
             found += [Bands(one, other, band, 4) for one, other in neighbours for band in (1, 3)]
+            every = combinations(files, 2)
+            found += [Bands(one, other, band, band) for one, other in every for band in (1, 4)]
     return found
 
 
@@ -199,13 +204,15 @@ def run(settings: Settings) -> SuiteResult:
     every += run_cases(attacked, settings.jobs)
     found = [one for one in every if one.is_drawn]
     ground = [one for one in every if not (one.is_drawn or _is_explained(one))]
-    views = [one for one in every if not one.is_drawn and _is_explained(one)]
+    views = [
+        one for one in every if not one.is_drawn and (one.group == DATES or _is_explained(one))
+    ]
     apart = [one for one in ground if one.group != BANDS_OF_ONE]
     most, most_of_one = (
         max((one.sameness.sharpness for one in some), default=0.0) for some in (apart, ground)
     )
     most_beside = max((one.sameness.beside for one in every if not one.is_drawn), default=0.0)
-    others = [one for one in apart if one.group != BANDS_APART]
+    others = [one for one in apart if one.group not in (BANDS_APART, DATES)]
     least = min((one.sameness.step_width for one in others), default=np.inf)
     return SuiteResult(
         "How sharply edges coincide",
@@ -237,7 +244,7 @@ def run(settings: Settings) -> SuiteResult:
         ),
         (
             _table("Ground at its place", ground),
-            _views_table("Copies and one camera's views at their place", views),
+            _views_table("Copies, one camera's views and its dates at their place", views),
             _table("Drawn over other ground", found),
             _steps_table("Steps between columns or rows, ground at its place", ground),
             _steps_table("Steps between columns or rows, drawn over other ground", found),
@@ -255,9 +262,10 @@ def _views_table(title: str, some: list[Measured]) -> Table:
     for group in sorted({one.group for one in some}):
         own = [one.sameness for one in some if one.group == group]
         coarse = [one.coarse_area / one.reduced_area for one in own]
-        numbers = max(one.sharpness for one in own), min(one.ground for one in own), min(coarse)
-        rows.append([group, str(len(own)), *(f"{number:.2f}" for number in numbers)])
-    columns = "", "pairs", "sharpest edges", "least ground", "least in coarser pixels"
+        sharpness = [one.sharpness for one in own]
+        least = min(sharpness), max(sharpness), min(one.ground for one in own), min(coarse)
+        rows.append([group, str(len(own)), *(f"{number:.2f}" for number in least)])
+    columns = "", "pairs", "least sharp", "sharpest", "least ground", "least in coarser pixels"
     return Table(title, columns, rows)
 
 

@@ -446,3 +446,20 @@ def test_real_images_of_two_places_are_refused(real_data: Path, tmp_path: Path) 
     with pytest.raises(NotRegisteredError):
         coregister(reference, input, tmp_path / "out.tif", workers=2)
     assert listing(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("dates", "band"), [(("1985", "2015"), 1), (("1995", "2020"), 4), (("2015", "2020"), 1)]
+)
+@pytest.mark.slow
+def test_dates_of_one_camera_on_one_grid_are_registered(
+    real_data: Path, dates: tuple[str, str], band: int
+) -> None:
+    """They lie on whole pixels as exactly as a drawing does; years have changed most windows."""
+    reference, input = (real_data / f"series/river/{date}.tif" for date in dates)
+    found = coregister(reference, input, reference_band=band, input_band=band)
+    assert found.verdict.accepted and found.transform is not None
+    grid = found.transform.input_grid
+    assert grid is not None
+    px = np.array([[50.0, 50.0], [400.0, 300.0]])
+    np.testing.assert_allclose(found.transform(grid.pixel_to_map(px)), px, atol=1.0)

@@ -187,7 +187,7 @@ def find_locked_content(
     if sensors is Sensors.RADARS:
         is_exact = is_near and not sameness.varies_as_ground
     else:
-        is_exact = off_px <= exact_px
+        is_exact = off_px <= exact_px and not (sensors is Sensors.CAMERAS and sameness.has_dates)
     return LockedContent(pair, to_input, sameness, sensors, is_exact)
 
 
