@@ -29,12 +29,15 @@ def test_bands_are_measured_where_they_lie_on_one_another(exposure: Path) -> Non
     assert found.record()["name"] == "date 1, date 2"
 
 
-def test_every_date_is_measured_and_neighbours_on_one_grid(tmp_path: Path) -> None:
+def test_every_date_is_measured_and_others_on_one_grid(tmp_path: Path) -> None:
     for name in ("fields/1.tif", "fields/2.tif", "river/1.tif", "river/2.tif", "river/3.tif"):
         path = tmp_path / "series" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
     found = bands_of_series(tmp_path)
-    apart = [(one.reference.stem, one.input.stem) for one in found if one.reference != one.input]
-    assert len(found) == 2 * 5 + 2 * 2
-    assert sorted(set(apart)) == [("1", "2"), ("2", "3")]
+    apart = [one for one in found if one.reference != one.input]
+    alike = [one for one in apart if one.band == one.other_band]
+    others = [one for one in apart if one not in alike]
+    assert len(found) == 2 * 5 + 2 * 2 + 2 * 3
+    assert {(one.reference.stem, one.input.stem) for one in others} == {("1", "2"), ("2", "3")}
+    assert len({(one.reference, one.input) for one in alike}) == 3
