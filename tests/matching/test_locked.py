@@ -283,7 +283,7 @@ def test_views_are_a_little_less_alike_in_coarser_pixels(
 
 
 @pytest.mark.parametrize(
-    ("sharpness", "ground", "coarse", "has_dates"),
+    ("sharpness", "ground", "coarse", "is_of_dates"),
     [
         (2.0, 0.12, 0.3, True),
         (1.0, 0.12, 0.3, False),
@@ -292,10 +292,10 @@ def test_views_are_a_little_less_alike_in_coarser_pixels(
     ],
 )
 def test_dates_of_one_camera_on_one_grid_vary_alike_and_have_sharp_edges(
-    sharpness: float, ground: float, coarse: float, has_dates: bool
+    sharpness: float, ground: float, coarse: float, is_of_dates: bool
 ) -> None:
     """As where years have changed most of the ground (Landsat), and no heat map."""
-    assert Sameness(sharpness, 0.1, 0.2, coarse, ground).has_dates == has_dates
+    assert Sameness(sharpness, 0.1, 0.2, coarse, ground).varies_as_dates == is_of_dates
 
 
 def test_what_varies_alike_in_two_radar_images_is_no_ground(
@@ -359,7 +359,7 @@ def test_a_copy_in_other_colours_is_not_drawn(tmp_path: Path, context: Context) 
     assert locked.is_drawn
 
 
-@pytest.mark.parametrize(("blur_px", "strength"), [(0.1, 2.0), (2.0, 1.0)])
+@pytest.mark.parametrize(("blur_px", "strength"), [(0.1, 2.0), (2.0, 1.0), (2.0, 2.0)])
 def test_one_pattern_of_noise_over_different_ground_is_found(
     tmp_path: Path, context: Context, blur_px: float, strength: float
 ) -> None:

@@ -63,18 +63,18 @@ _LEAST_AREA = 0.3
 # radars' images of different ground. The further step is an octave: by it, 1.04 times as much and
 # more varies alike in right radar pairs, less in noise that is smooth along some pixels (suite
 # attacks).
+#
 # Light and seasons differ over wide areas: two dates of one camera are alike in coarse pixels by
-# 0.945 times as much as in finer ones, or more (suite series, simulated dates of seeds 1 to 7);
-# patterns of noise that are smooth along up to 2 pixels by 0.78 times as much, or less
-# (tests/matching/test_locked.py).
+# 0.96 times as much as in finer ones, or more (suite sharpness); patterns of noise that are smooth
+# along up to 2 pixels by 0.78 times as much, or less (tests/matching/test_locked.py).
 _REDUCTION, _FURTHER = 4, 2
 _GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
+_LEAST_LEFT = 0.1
 
 # Of one camera's dates on one grid, years apart, at least so much varies alike, and edges coincide
-# so sharply (suite sharpness: 12 %, 1.84); where drawn content alone is exact, and is evident by
-# nothing else, up to 6 %, and of a heat map 17 % with 1.03 (suite attacks).
+# so sharply (suite sharpness: from 12 % and 1.84 on). Of what is drawn on whole pixels and shows by
+# nothing else, up to 6 %, and of a heat map 17 % with 1.03 (suite attacks, once_wrong.txt).
 _DATES_SHARE, _DATES_SHARPNESS = 0.1, 1.5
-_LEAST_LEFT = 0.1
 
 # Nothing is left to be judged of copies: this share is the same, in the images and reduced ones.
 _COPY_SHARE = 0.75
@@ -179,7 +179,7 @@ class Sameness:
         return self._has_ground and not self.is_finer_than_ground
 
     @property
-    def has_dates(self) -> bool:
+    def varies_as_dates(self) -> bool:
         """Whether both may be one camera's dates, of which little varies alike, but as ground."""
         is_alike = self.ground >= _DATES_SHARE and self.sharpness >= _DATES_SHARPNESS
         return is_alike and not self.is_finer_than_ground
