@@ -80,7 +80,7 @@ def simulate_series(
     files = []
     for date in range(count):
         seen = _seen(other if date in elsewhere else ground, moved[date], size)
-        image = _aged(seen, rng)
+        image = aged(seen, rng)
         if date in cloudy:
             image = clouds_over(image, _CLOUD_SHARE, seed + date).over(image)
         values = np.clip(image * 200 + 20, 1, 255).astype(np.uint8)
@@ -106,6 +106,14 @@ def write_moved(source: Path, target: Path, shift_px: tuple[float, float]) -> Pa
     return target
 
 
+def aged(image: FloatArray, rng: np.random.Generator) -> np.ndarray:
+    """Return an image, 0 to 1, of another season: patches of other brightness, gain, noise."""
+    patches = np.round(fractal(image.shape, 3.0, rng))
+    gain, gamma = rng.uniform(0.7, 1.0), rng.uniform(0.8, 1.25)
+    seasonal = gain * np.clip(image, 0, 1) ** gamma + _SEASON * 0.5 * patches
+    return np.asarray(seasonal + rng.normal(0, _NOISE, image.shape), np.float32)
+
+
 def _ground(cache: Path, seed: int, size: int) -> FloatArray:
     """Return a simulated optical scene, 0 to 1, larger than the dates."""
     pair = Simulation(size + 2 * _MARGIN_PX, "suburban", seed).pair(cache)
@@ -125,11 +133,3 @@ def _seen(ground: FloatArray, displacement: FloatArray, size: int) -> FloatArray
     matrix = np.eye(2) + linear / half
     place = (nominal - centre - shift) @ np.linalg.inv(matrix) + centre + _MARGIN_PX
     return np.asarray(map_coordinates(ground, [place[..., 1], place[..., 0]], order=3))
-
-
-def _aged(image: FloatArray, rng: np.random.Generator) -> np.ndarray:
-    """Return an image of another season: patches brighter or darker, another gain, noise."""
-    patches = np.round(fractal(image.shape, 3.0, rng))
-    gain, gamma = rng.uniform(0.7, 1.0), rng.uniform(0.8, 1.25)
-    seasonal = gain * np.clip(image, 0, 1) ** gamma + _SEASON * 0.5 * patches
-    return np.asarray(seasonal + rng.normal(0, _NOISE, image.shape), np.float32)

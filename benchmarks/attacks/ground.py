@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..cases import SAR_OPTICAL
-from .catalogue import GROUND, Attack, Make, Setting, as_text, direction, resampled
+from ..series_scenes import aged
+from .catalogue import CONTROLS, GROUND, Attack, Make, Setting, as_text, direction, resampled
 from .effects import snow_cover
 from .overlays import Overlay, cloud_deck, smooth_noise
-from .pairs import Change, Image, Pair, to_bytes
+from .pairs import Change, Image, Pair, Source, to_bytes
 from .scenes import SAR_SAR, Scene
 
 Shape = tuple[int, int]
@@ -139,6 +140,18 @@ def water_moved(pair: Pair, setting: Setting) -> Pair:
     return moved.changed(drawn.change(), drawn.change(right, down), note)
 
 
+def two_dates(pair: Pair, setting: Setting) -> Pair:
+    """Both images are one camera's, of the reference's ground, on two dates; it lies off."""
+    rng, grey = setting.rng, pair.reference.mean(axis=0, keepdims=True).astype(np.uint8)
+    seen = replace(pair, reference=grey, source=Source(grey, grey, np.copy), corner=(0, 0))
+    shift = direction(rng, 0.0, 12.0)
+
+    def on_a_date(image: Image) -> Image:
+        return to_bytes(20 + 200 * aged(image[0] / 255.0, rng))[None]
+
+    return seen.moved(shift, as_text(shift)).changed(on_a_date, on_a_date)
+
+
 def self_copy(pair: Pair, setting: Setting) -> Pair:
     """One band of the input is the reference itself; the others show ground that lies off."""
     rng = setting.rng
@@ -197,4 +210,6 @@ ATTACKS = [
     Attack(GROUND, "reference shines through", "", half_transparent_copy(False)),
     Attack(GROUND, "reference shines through", "resampled", half_transparent_copy(True)),
     Attack(GROUND, "band of opacity", "", alpha_band),
+    Attack(CONTROLS, "two dates of one camera", "", two_dates, camera_only),
+    Attack(CONTROLS, "two dates of one camera", "resampled", resampled(two_dates), camera_only),
 ]
