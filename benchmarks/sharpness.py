@@ -257,10 +257,14 @@ def _is_explained(one: Measured) -> bool:
     return one.sameness.is_copy or one.sameness.is_view
 
 
+def _by_group(some: list[Measured]) -> list[tuple[str, list[Sameness]]]:
+    groups = sorted({one.group for one in some})
+    return [(group, [one.sameness for one in some if one.group == group]) for group in groups]
+
+
 def _views_table(title: str, some: list[Measured]) -> Table:
     rows = []
-    for group in sorted({one.group for one in some}):
-        own = [one.sameness for one in some if one.group == group]
+    for group, own in _by_group(some):
         coarse = [one.coarse_area / one.reduced_area for one in own]
         sharpness = [one.sharpness for one in own]
         least = min(sharpness), max(sharpness), min(one.ground for one in own), min(coarse)
@@ -271,8 +275,7 @@ def _views_table(title: str, some: list[Measured]) -> Table:
 
 def _steps_table(title: str, some: list[Measured]) -> Table:
     rows = []
-    for group in sorted({one.group for one in some}):
-        own = [one.sameness for one in some if one.group == group]
+    for group, own in _by_group(some):
         widths = [one.step_width for one in own]
         numbers = f"{min(widths):.2f}", f"{np.median(widths):.2f}"
         rows.append([group, str(len(own)), *numbers, str(sum(one.has_seams for one in own))])
@@ -281,12 +284,12 @@ def _steps_table(title: str, some: list[Measured]) -> Table:
 
 def _table(title: str, some: list[Measured]) -> Table:
     rows = []
-    for group in sorted({one.group for one in some}):
-        values = [one.sameness.sharpness for one in some if one.group == group]
+    for group, own in _by_group(some):
+        values = [one.sharpness for one in own]
         above = sum(value >= LEAST_SHARPNESS for value in values)
-        evident = sum(one.sameness.is_evident for one in some if one.group == group)
+        evident = sum(one.is_evident for one in own)
         low, middle, high = np.percentile(values, [0, 50, 100])
-        beside = [one.sameness.beside for one in some if one.group == group]
+        beside = [one.beside for one in own]
         numbers = f"{low:.2f}", f"{middle:.2f}", f"{high:.2f}", str(above), f"{max(beside):.2f}"
         rows.append([group, str(len(values)), *numbers, str(evident)])
     columns = (
