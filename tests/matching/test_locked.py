@@ -282,22 +282,6 @@ def test_views_are_a_little_less_alike_in_coarser_pixels(
     assert sameness.is_finer_than_ground and not sameness.varies_as_ground
 
 
-@pytest.mark.parametrize(
-    ("sharpness", "ground", "coarse", "is_of_dates"),
-    [
-        (2.0, 0.12, 0.3, True),
-        (1.0, 0.12, 0.3, False),
-        (2.0, 0.06, 0.3, False),
-        (2.0, 0.12, 0.1, False),
-    ],
-)
-def test_dates_of_one_camera_on_one_grid_vary_alike_and_have_sharp_edges(
-    sharpness: float, ground: float, coarse: float, is_of_dates: bool
-) -> None:
-    """As where years have changed most of the ground (Landsat), and no heat map."""
-    assert Sameness(sharpness, 0.1, 0.2, coarse, ground).varies_as_dates == is_of_dates
-
-
 def test_what_varies_alike_in_two_radar_images_is_no_ground(
     tmp_path: Path, context: Context
 ) -> None:

@@ -448,14 +448,12 @@ def test_real_images_of_two_places_are_refused(real_data: Path, tmp_path: Path) 
     assert listing(tmp_path) == before
 
 
-@pytest.mark.parametrize(
-    ("dates", "band"), [(("1985", "2015"), 1), (("1995", "2020"), 4), (("2015", "2020"), 1)]
-)
+@pytest.mark.parametrize(("dates", "band"), [(("1985", "1990"), 4), (("2015", "2020"), 1)])
 @pytest.mark.slow
 def test_dates_of_one_camera_on_one_grid_are_registered(
     real_data: Path, dates: tuple[str, str], band: int
 ) -> None:
-    """They lie on whole pixels as exactly as a drawing does; years have changed most windows."""
+    """Most products lie on one grid, on whole pixels as what is drawn does."""
     reference, input = (real_data / f"series/river/{date}.tif" for date in dates)
     found = coregister(reference, input, reference_band=band, input_band=band)
     assert found.verdict.accepted and found.transform is not None

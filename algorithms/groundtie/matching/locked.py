@@ -74,8 +74,7 @@ class LockedContent:
     is_exact
         Whether the transform moves the array by whole pixels all over, whatever is nominal.
         Speckle moves what is drawn over two radars' images off whole pixels; but radar images of
-        one ground vary alike where it has averaged out: those that do not count as exact. One
-        camera's dates may lie on one grid: they do not.
+        one ground vary alike where it has averaged out: those that do not count as exact.
     """
 
     pair: ImagePair
@@ -188,8 +187,7 @@ def find_locked_content(
     if sensors is Sensors.RADARS:
         is_exact = is_near and not sameness.varies_as_ground
     else:
-        are_dates = sensors is Sensors.CAMERAS and sameness.varies_as_dates
-        is_exact = off_px <= exact_px and not are_dates
+        is_exact = off_px <= exact_px
     return LockedContent(pair, to_input, sameness, sensors, is_exact)
 
 

@@ -22,7 +22,8 @@ class Rest:
     ----------
     survey
         What they show; None: it is not asked, as of content that is drawn, and of views that are
-        the same nearly everywhere, or whose edges do not coincide sharply.
+        the same nearly everywhere, or whose edges do not coincide sharply, and which are no less
+        alike in coarser pixels.
     is_explained
         Whether such content needs no confirmation (see `LockedContent`).
     beyond

@@ -71,11 +71,6 @@ _REDUCTION, _FURTHER = 4, 2
 _GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
 _LEAST_LEFT = 0.1
 
-# Of one camera's dates on one grid, years apart, at least so much varies alike, and edges coincide
-# so sharply (suite sharpness: from 12 % and 1.84 on). Of what is drawn on whole pixels and shows by
-# nothing else, up to 6 %, and of a heat map 17 % with 1.03 (suite attacks, once_wrong.txt).
-_DATES_SHARE, _DATES_SHARPNESS = 0.1, 1.5
-
 # Nothing is left to be judged of copies: this share is the same, in the images and reduced ones.
 _COPY_SHARE = 0.75
 
@@ -177,12 +172,6 @@ class Sameness:
     def has_one_ground(self) -> bool:
         """Whether what is not the same varies alike, too, as one sensor's views of one ground."""
         return self._has_ground and not self.is_finer_than_ground
-
-    @property
-    def varies_as_dates(self) -> bool:
-        """Whether both may be one camera's dates, of which little varies alike, but as ground."""
-        is_alike = self.ground >= _DATES_SHARE and self.sharpness >= _DATES_SHARPNESS
-        return is_alike and not self.is_finer_than_ground
 
     @property
     def varies_as_ground(self) -> bool:

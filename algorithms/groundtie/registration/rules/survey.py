@@ -241,8 +241,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "quarter of the chips is left, a part lies elsewhere, a second place matches about as well "
         f"or is a peak of {REST_PEAK_DEVIATIONS:g} robust standard deviations, or their mean "
         f"similarity is below {WEAK_HEIGHT:g}; of a copy, or one camera's views, with sharp "
-        "edges, a quarter is left that is below that or has such a peak, or what the reference "
-        "does not explain of it has one",
+        "edges, or less alike in coarser pixels, a quarter is left that is below that or has such "
+        "a peak, or what the reference does not explain of it has one",
         "suites margins and attacks",
         WITHOUT,
         _locked,
