@@ -71,6 +71,13 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         default=1,
         help="processes for the accuracy suites, with one thread each; 1: all threads in one",
     )
+    parser.add_argument(
+        "--without",
+        nargs="+",
+        default=(),
+        metavar="RULE",
+        help="judge without these rules: what becomes wrong, or right, hinges on them",
+    )
     attacks = parser.add_argument_group("attacks", "what it runs; classes: calibration, too")
     attacks.add_argument("--sample", type=int, help="so many cases, of every class about as many")
     attacks.add_argument(
@@ -116,6 +123,7 @@ def about(options: argparse.Namespace) -> dict[str, Any]:
         "date": datetime.date.today().isoformat(),
         "commit": commit.stdout.strip() or "unknown",
         "quick": "yes: not all cases" if options.quick else "no",
+        "without": ", ".join(options.without) or "no rule",
         "jobs": options.jobs,
         "processors": os.cpu_count(),
         **{name: importlib.import_module(name).__version__ for name in ("numpy", "scipy", "cv2")},
@@ -131,11 +139,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run suites, print and write their results; return 1 if the tool crashed, else 0."""
     options = parse(arguments)
     # Not before: help is for those, too, who have not installed anything yet.
+    from benchmarks.ablation import leave_out
     from benchmarks.accuracy import CRASHED
     from benchmarks.cases import data_folder
     from benchmarks.suites import Settings
     from benchmarks.tables import suite_markdown, write_result
 
+    leave_out(options.without)
     first_seed, seeds = options.seeds
     settings = Settings(
         options.quick,

@@ -11,6 +11,7 @@ from typing import Any, Protocol, TypeVar
 
 import cv2
 
+from .ablation import leave_out, left_out
 from .accuracy import SILENTLY_WRONG
 from .attempt import Outcome, count
 
@@ -166,7 +167,7 @@ def run_cases(
         return [o for o in outcomes if o is not None]
     # Not forked: OpenCV's and GDAL's threads do not survive a fork.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, context, _one_thread_each) as pool:
+    with ProcessPoolExecutor(jobs, context, _begin, (left_out(),)) as pool:
         futures = {pool.submit(case.run, 1): index for index, case in enumerate(cases)}
         try:
             for future in as_completed(futures):
@@ -176,5 +177,6 @@ def run_cases(
     return [o for o in outcomes if o is not None]
 
 
-def _one_thread_each() -> None:
+def _begin(without: Sequence[str]) -> None:
     cv2.setNumThreads(1)
+    leave_out(without)

@@ -1,0 +1,28 @@
+"""Registrations judged without some of the rules: whether anything hinges on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from groundtie.registration import verdict
+from groundtie.registration.rules import RULES
+
+
+def leave_out(names: Sequence[str]) -> None:
+    """Judge without the rules of these names, in this process.
+
+    Raises
+    ------
+    ValueError
+        There is no rule of one of these names.
+    """
+    known = {rule.name for rule in RULES}
+    for name in names:
+        if name not in known:
+            raise ValueError(f"no rule {name!r}; there are {'; '.join(sorted(known))}")
+    verdict.RULES = tuple(rule for rule in RULES if rule.name not in names)
+
+
+def left_out() -> tuple[str, ...]:
+    """Return the names of rules that are left out in this process."""
+    return tuple(rule.name for rule in RULES if rule not in verdict.RULES)
