@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,6 @@ from groundtie.matching.survey import Survey
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
-    LARGEST_SHARE,
     PEAK_DEVIATIONS,
     REST_PEAK_DEVIATIONS,
     RIVAL_HEIGHT,
@@ -30,20 +29,22 @@ from groundtie.registration.rules.survey import (
     deviations_beyond,
     deviations_elsewhere,
     deviations_of_rest,
-    evident_share,
     has_few_chips,
 )
-from groundtie.registration.specification import COREGISTER
+from groundtie.registration.specification import COREGISTER, OPTICAL, SAR_SAR
 from groundtie.registration.verdict import refusals
 
 from .accuracy import SILENTLY_WRONG_PX
-from .attacks.cases import AttackCase, cases
-from .attacks.suite import sample
+from .attacks.cases import AttackCase, cases, named
+from .attacks.suite import AnyCase, sample
 from .attempt import for_json, on_pixels
 from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
 from .pipeline_runs import found_by
 from .real import LARGEST_SHIFT_PX
-from .suites import Settings, SuiteResult, Table, run_cases
+from .suites import Settings, SuiteResult, Table, of_classes, run_cases
+
+# By tool.
+_SPECIFICATIONS = {"coregister": COREGISTER, "match_sar_sar": SAR_SAR, "match_optical": OPTICAL}
 
 _QUICK, _SAMPLE = 10, 200
 _PERCENT = (0, 5, 50, 95, 100)
@@ -59,24 +60,15 @@ class Statistic:
     is_refused_above: bool = True
 
 
-def _excess(survey: Survey | None) -> float:
-    part = None if survey is None else survey.highest_part
+def _excess(survey: Survey) -> float:
+    part = survey.highest_part
     return math.nan if part is None else part.excess
-
-
-def _excess_of_all(evidence: RegistrationEvidence) -> float:
-    return _excess(evidence.surveys.whole)
 
 
 def _without_drawn(evidence: RegistrationEvidence) -> Rest | None:
     """Return what is left without content that may be drawn; None: there is none."""
     rest = evidence.surveys.rest
     return None if rest is None or not rest.is_evident else rest
-
-
-def _excess_of_rest(evidence: RegistrationEvidence) -> float:
-    rest = _without_drawn(evidence)
-    return math.nan if rest is None or rest.is_explained else _excess(rest.survey)
 
 
 def _of_survey(measure: Callable[[Survey], float]) -> Callable[[RegistrationEvidence], float]:
@@ -94,42 +86,27 @@ def _rest_height(evidence: RegistrationEvidence) -> float:
     return left.height
 
 
-def _in_bands(evidence: RegistrationEvidence) -> float:
-    return max((one.survey.excess for one in evidence.surveys.bands), default=math.nan)
-
-
-def _rest_peak(evidence: RegistrationEvidence) -> float:
-    rest = _without_drawn(evidence)
-    if rest is None or rest.survey is None or has_few_chips(rest.survey, rest.chips):
-        return math.nan
-    return deviations_elsewhere(rest.survey)
-
-
 def _peak_beyond(evidence: RegistrationEvidence) -> float:
     rest = _without_drawn(evidence)
     return math.nan if rest is None or rest.beyond is None else deviations_beyond(rest)
 
 
 STATISTICS = (
-    Statistic("part elsewhere: excess", LEAST_EXCESS, _excess_of_all),
+    Statistic("part elsewhere: excess", LEAST_EXCESS, _of_survey(_excess)),
     Statistic(
         "second place: share of the height",
         RIVAL_HEIGHT,
         _of_survey(lambda s: s.rival_height / max(s.height, 0.1)),
     ),
     Statistic("second place: peak", PEAK_DEVIATIONS, _of_survey(deviations_elsewhere)),
-    Statistic("few chips confirm: share", LARGEST_SHARE, _of_survey(evident_share), False),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),
-    Statistic("pixel-locked content: excess", LEAST_EXCESS, _excess_of_rest),
     Statistic("pixel-locked content: height", WEAK_HEIGHT, _rest_height, False),
-    Statistic("pixel-locked content: second peak", REST_PEAK_DEVIATIONS, _rest_peak),
     Statistic("pixel-locked content: copies", REST_PEAK_DEVIATIONS, _peak_beyond),
     Statistic(
         "rest elsewhere: second peak",
         REST_PEAK_DEVIATIONS,
         lambda evidence: deviations_of_rest(evidence.surveys.rest),
     ),
-    Statistic("band elsewhere: excess", LEAST_EXCESS, _in_bands),
 )
 
 
@@ -185,7 +162,8 @@ class AttackedPair:
         """Register the pair and measure."""
         pair = self.case.make()
         try:
-            found = found_by(COREGISTER, *pair.rasters(), **pair.arguments(), workers=workers)
+            spec = _SPECIFICATIONS[self.case.tool]
+            found = found_by(spec, *pair.rasters(), **pair.arguments(), workers=workers)
         except GroundTieError as error:
             return Margins(self.case.name, math.inf, False, (str(error),), _NOTHING)
         error_px = math.inf if found.transform is None else pair.errors_px(found.transform)[0]
@@ -226,18 +204,10 @@ def _measured(name: str, found: Registration, error_px: float, sigma_px: float) 
 
 
 def run(settings: Settings) -> SuiteResult:
-    """Run the suite: `--sample` attacks of `--classes`, and the real pairs."""
-    seeds = range(settings.first_seed, settings.first_seed + settings.seeds)
-    attacks = [
-        case
-        for case in cases(seeds, settings.data, settings.cache)
-        if isinstance(case, AttackCase)
-        and case.tool == "coregister"
-        and (not settings.classes or {case.attack, case.group} & set(settings.classes))
-    ]
-    wanted = _QUICK if settings.quick else settings.sample or _SAMPLE
-    chosen = [AttackedPair(case) for case in sample(attacks, wanted)]
-    real = [] if settings.quick else [RealPair(case) for case in read_cases(settings.data)]
+    """Run the suite: `--sample` attacks of `--classes`, or those of a `--case`; and real pairs."""
+    chosen = [AttackedPair(case) for case in _attacks(settings)]
+    is_all = not (settings.quick or settings.named)
+    real = [RealPair(case) for case in read_cases(settings.data)] if is_all else []
     found: list[Margins] = list(run_cases([*real, *chosen], settings.jobs))
     return SuiteResult(
         "Margins: what right and wrong transforms leave to the limits of rules",
@@ -252,6 +222,19 @@ def run(settings: Settings) -> SuiteResult:
             "refuse what is wrong. Alone: no other rule refuses the same transform.",
         ),
     )
+
+
+def _attacks(settings: Settings) -> list[AttackCase]:
+    """Return the attacks that settings ask for, on the tools that have a specification."""
+    if settings.named:
+        return _specified(named(name, settings.data, settings.cache) for name in settings.named)
+    every = _specified(cases(settings.seed_numbers(), settings.data, settings.cache))
+    every = of_classes(every, settings.classes, lambda case: {case.attack, case.group})
+    return sample(every, _QUICK if settings.quick else settings.sample or _SAMPLE)
+
+
+def _specified(every: Iterable[AnyCase]) -> list[AttackCase]:
+    return [case for case in every if isinstance(case, AttackCase) and case.tool in _SPECIFICATIONS]
 
 
 def _table(number: int, statistic: Statistic, found: Sequence[Margins]) -> Table:

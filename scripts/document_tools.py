@@ -92,7 +92,10 @@ def with_tables(page: str, text: str, name: str, begin: str = BEGIN, end: str = 
 
 def rule_table(rules: Sequence[Rule]) -> str:
     """Return the table of rules, in the order in which they are asked."""
-    rows = [(r.name, r.stage, r.refuses, r.source, r.advice, r.retry) for r in rules]
+    rows = [
+        (r.name, r.stage, r.refuses, r.source, r.advice, "nothing" if r.is_final else "another way")
+        for r in rules
+    ]
     titles = ("rule", "stage", "refuses", "source of the limit", "what to try", "tried next")
     return _rows(titles, rows)
 

@@ -14,7 +14,6 @@ from groundtie.geometry.model_choice import block_folds
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.masks.used import MaskUsed
-from groundtie.matching.bands import BandSurvey
 from groundtie.matching.parts import ELSEWHERE_PX
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
@@ -102,13 +101,12 @@ def evidence(
     *,
     survey: Survey | None = None,
     rest: Rest | None = None,
-    bands: tuple[BandSurvey, ...] = (),
     ground: Survey | None = None,
     **more: Any,
 ) -> RegistrationEvidence:
     """Return the evidence of a registration whose check points have errors, shape (n, 2)."""
     estimate, check = estimate or estimated(fit_points()), check_points(check_errors)
-    surveys = Surveys(survey, rest, bands, ground)
+    surveys = Surveys(survey, rest, ground)
     return RegistrationEvidence(
         estimate, check, GRID, max_error_px, RADIUS, surveys=surveys, **more
     )
@@ -139,11 +137,6 @@ def survey(
     surfaces[part:, SURVEY_RADIUS_PX + 9, SURVEY_RADIUS_PX] = peak
     surfaces[:part, SURVEY_RADIUS_PX - 5, SURVEY_RADIUS_PX + 9] = height
     return Survey(GRID, centres, shifts, surfaces)
-
-
-def in_band(found: Survey) -> tuple[BandSurvey, ...]:
-    """Return what the input's second band shows alone."""
-    return (BandSurvey("input", 2, found),)
 
 
 def facts(

@@ -16,14 +16,11 @@ from evidences import (
     PERHAPS,
     TOWN,
     control,
-    displaced,
     estimated,
     evidence,
     facts,
     fallen,
     fit_points,
-    fit_with,
-    in_band,
     points,
     refinement,
     refusing,
@@ -70,7 +67,6 @@ RANK = (
     stages.AGREEMENT,
     stages.ERROR,
     stages.SCENE,
-    stages.LAYOVER,
     stages.SURVEY,
     stages.REFINEMENT,
     stages.SERIES,
@@ -184,14 +180,6 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(two_thirds(20), scene=PERHAPS),
         evidence(two_thirds(26), scene=PERHAPS),
     ),
-    "layover of check points": (
-        evidence(np.concatenate([scatter(24, 0.3), displaced(20, 4, 10)]), layover_factor=3.0),
-        evidence(np.concatenate([scatter(24, 0.3), displaced(10, 4, 10)]), layover_factor=3.0),
-    ),
-    "layover of fit points": (
-        evidence(GOOD, estimated(fit_with(displaced(100, -2.5, 2.5))), layover_factor=3.0),
-        evidence(GOOD, estimated(fit_with(displaced(100, -0.8, 0.8))), layover_factor=3.0),
-    ),
     "part elsewhere": (
         evidence(GOOD, survey=survey(38, part=11)),
         evidence(GOOD, survey=survey(46, part=2)),
@@ -199,11 +187,6 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "second place nearby": (
         evidence(GOOD, survey=survey(rival=6.5)),
         evidence(GOOD, survey=survey(rival=6.3)),
-    ),
-    # A fifth of 49 chips are 9.8.
-    "few chips confirm": (
-        evidence(GOOD, survey=survey(9)),
-        evidence(GOOD, survey=survey(10)),
     ),
     "weak similarity": (
         evidence(GOOD, survey=survey(height=1.9, rival=1.0)),
@@ -224,11 +207,6 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
             survey=survey(),
             rest=Rest(survey(part=5, rival=5.0), chips=49, is_evident=False),
         ),
-    ),
-    # Of 49 chips' mean surfaces, standard deviations are a seventh.
-    "band elsewhere": (
-        evidence(GOOD, survey=survey(), bands=in_band(survey(height=1.0, rival=2.1))),
-        evidence(GOOD, survey=survey(), bands=in_band(survey(height=1.0, rival=1.9))),
     ),
     "ground elsewhere": (
         evidence(GOOD, survey=survey(), ground=survey(height=2.0, rival=1.7)),
@@ -316,7 +294,6 @@ def test_only_rules_of_the_evidence_are_asked() -> None:
         stages.AGREEMENT,
         stages.ERROR,
         stages.SCENE,
-        stages.LAYOVER,
         stages.SURVEY,
     )
     assert RefinementEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.REFINEMENT)
@@ -324,7 +301,6 @@ def test_only_rules_of_the_evidence_are_asked() -> None:
     assert PoseSurveyEvidence.stages == (
         stages.AGREEMENT,
         stages.ERROR,
-        stages.LAYOVER,
         stages.SURVEY,
     )
 

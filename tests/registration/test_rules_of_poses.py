@@ -15,18 +15,15 @@ from evidences import (
     estimated,
     fallen,
     fit_points,
-    in_band,
     refusing,
     scatter,
     survey,
 )
 
-from groundtie.matching.bands import BandSurvey
 from groundtie.matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import Survey
 from groundtie.matching.surveys import Surveys
-from groundtie.registration.layover import CHIPS_MEAN_OVER_SCATTER
 from groundtie.registration.pose_evidence import PoseSurveyEvidence
 
 CHIPS = np.stack(np.meshgrid(*[np.arange(5) * 100 + 50] * 2), -1).reshape(-1, 2)
@@ -39,7 +36,6 @@ def posed(
     layover_factor: float | None = None,
     is_shift: bool = False,
     rest: Rest | None = None,
-    bands: tuple[BandSurvey, ...] = (),
     ground: Survey | None = None,
     fine: Survey | None = None,
     **more: Any,
@@ -50,7 +46,7 @@ def posed(
         GRID,
         CHIPS[: len(residuals)],
         residuals,
-        Surveys(chips or survey(), rest, bands, ground, fine),
+        Surveys(chips or survey(), rest, ground, fine),
         fitted.transform,
         **{"fold_models": fitted.fold_models, **more},
     )
@@ -91,32 +87,6 @@ def test_rules_of_registrations_judge_poses(
 def test_smaller_chips_show_parts_too() -> None:
     found = posed(scatter(21, 0.5), fine=survey(38, part=11))
     assert refusing(found) == ["part elsewhere"]
-
-
-@pytest.mark.parametrize(("rival", "expected"), [(8.0, ["band elsewhere"]), (1.0, [])])
-def test_a_band_of_other_ground_refuses_a_pose(rival: float, expected: list[str]) -> None:
-    alone = in_band(survey(height=2.0, rival=rival))
-    assert refusing(posed(scatter(21, 0.5), bands=alone)) == expected
-
-
-@pytest.mark.parametrize(
-    ("residuals", "factor", "expected"),
-    [
-        (scatter(25, 0.5), CHIPS_MEAN_OVER_SCATTER, []),
-        (
-            np.concatenate([scatter(13, 0.5), displaced(12, 6, 12)]),
-            CHIPS_MEAN_OVER_SCATTER,
-            ["layover of check points"],
-        ),
-        (displaced(25, -2, 2), CHIPS_MEAN_OVER_SCATTER, ["layover of fit points"]),
-        (displaced(25, -2, 2), None, []),
-    ],
-)
-def test_poses_of_elevated_objects_are_refused(
-    residuals: np.ndarray, factor: float | None, expected: list[str]
-) -> None:
-    """Between two radar images, canopies and roofs lie along a line beside the ground."""
-    assert refusing(posed(residuals, layover_factor=factor)) == expected
 
 
 @pytest.mark.parametrize(

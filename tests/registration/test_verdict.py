@@ -184,7 +184,7 @@ def test_summaries_are_json_whatever_happened() -> None:
         assert summary["points"] == verdict.points
         more = {"points", "chance", "ce90_low_px", "ce90_high_px"}
         more |= {"ellipse_major_px", "ellipse_minor_px", "ellipse_angle_deg"}
-        assert set(summary) == set(vars(verdict)) - {"ce90_range_px", "ellipse", "retry"} | more
+        assert set(summary) == set(vars(verdict)) - {"ce90_range_px", "ellipse", "is_final"} | more
     assert LOST.summary()["check_rmse_px"] is None
     assert NOT_JUDGED.summary()["check_rmse_px"] is None
 

@@ -133,7 +133,7 @@ def _higher_elsewhere(surfaces: Surfaces) -> tuple[NDArray[np.int_], FloatArray]
     shifts = np.stack(np.meshgrid(*2 * [np.arange(-radius, radius + 1)]), axis=-1).reshape(-1, 2)
     distance = np.hypot(*shifts.T)
     is_far = distance > ELSEWHERE_PX
-    shown = limited(surfaces).astype(float).reshape(len(surfaces), len(shifts))
+    shown = _limited(surfaces).astype(float).reshape(len(surfaces), len(shifts))
     own = shown[:, distance <= SAME_PX].max(axis=1, keepdims=True)
     return shifts[is_far], shown[:, is_far] - own
 
@@ -168,7 +168,7 @@ def _connected(
         yield chips[group == number]
 
 
-def limited(surfaces: Surfaces) -> Surfaces:
+def _limited(surfaces: Surfaces) -> Surfaces:
     """Return surfaces, shape (n, h, w), of which none is higher than one chip counts."""
     highest = np.maximum(surfaces.max(axis=(1, 2), keepdims=True, initial=0.0), MOST_OF_ONE)
     return np.asarray(surfaces * (MOST_OF_ONE / highest))

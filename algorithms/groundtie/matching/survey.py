@@ -21,12 +21,10 @@ from .chips import LEAST_VALID_MASKED, ChipMatcher
 from .matcher import FloatArray, MaskOf, Places
 from .parts import (
     ELSEWHERE_PX,
-    LEAST_EXCESS,
     MOST_OF_ONE,
     SAME_PX,
     Part,
     find_parts,
-    limited,
 )
 
 # Chips lie side by side: so many along the shorter side of the grid if their sides allow it, and no
@@ -74,11 +72,6 @@ class Survey:
     def is_confirming_chip(self) -> NDArray[np.bool_]:
         """Which chips match where the model has them, shape (n,)."""
         return np.asarray(np.hypot(*self.shifts_px.T) <= SAME_PX)
-
-    @property
-    def is_evident_chip(self) -> NDArray[np.bool_]:
-        """Which chips have a peak somewhere as high as one chip may count for, shape (n,)."""
-        return np.asarray(self.surfaces.max(axis=(1, 2), initial=0.0) >= MOST_OF_ONE)
 
     @property
     def confirming(self) -> int:
@@ -148,17 +141,6 @@ class Survey:
     def parts(self) -> Sequence[Part]:
         """Chips that together match elsewhere, the most evident first."""
         return list(find_parts(self.grid, self.centres, self.surfaces))
-
-    @property
-    def excess(self) -> float:
-        """How much higher all chips together are elsewhere: as `Part.excess`, but of all."""
-        alike = replace(self, surfaces=limited(self.surfaces))
-        return float(np.sqrt(len(self.surfaces)) * (alike.rival_height - alike.height))
-
-    @property
-    def is_elsewhere(self) -> bool:
-        """Whether all chips together evidently match elsewhere."""
-        return self.excess >= LEAST_EXCESS
 
     @property
     def highest_part(self) -> Part | None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from ..context import Context
 from ..geometry.transform import Transform
-from .bands import BandSurvey, survey_bands
 from .chips import ChipMatcher
 from .locked import Sensors
 from .matcher import MaskOf, Places
@@ -26,8 +25,6 @@ class Surveys:
         Of all that takes part; None: they were not asked, nor are the others then.
     rest
         Without content that is the same in both arrays; None: there is none (see `survey_rest`).
-    bands
-        Of bands each, of images whose bands do not coincide.
     ground
         Of open ground; None: the images are not two radars', or it alone takes part.
     fine
@@ -36,7 +33,6 @@ class Surveys:
 
     whole: Survey | None = None
     rest: Rest | None = None
-    bands: tuple[BandSurvey, ...] = ()
     ground: Survey | None = None
     fine: Survey | None = None
 
@@ -78,11 +74,10 @@ def survey_all(
     """
     model, (elsewhere_px, exact_px) = transform.model, accuracy_px
     whole = survey_model(matcher, model, context.part(0.0, 0.4), None, places, elsewhere_px)
-    part = context.part(0.4, 0.8)
+    part = context.part(0.4, 0.9)
     rest = survey_rest(matcher, transform, places, elsewhere_px, sensors, exact_px, part)
-    bands = survey_bands(matcher, model, places, elsewhere_px, context.part(0.8, 0.9))
     ground = None
     if open_ground is not None:
         last = context.part(0.9, 1.0)
         ground = survey_model(matcher, model, last, open_ground, places, elsewhere_px)
-    return Surveys(whole, rest, bands, ground)
+    return Surveys(whole, rest, ground)

@@ -24,7 +24,6 @@ from .delivery import Call
 from .orthorectification import write_orthoimage
 from .pipeline import run
 from .registration import Registration
-from .rules.rule import ANOTHER_WAY
 from .scene import SceneInfo
 from .sensor_input import Ground, open_sensor_image
 from .sensor_jobs import RefinedRpc, refine
@@ -160,12 +159,10 @@ def _first_accepted(
             found.append(run(call.with_limits(opened, spec, part), spec, part, scene))
             verdict, tries = found[-1].verdict, found[-1].spec.tries
             tried.append(_line(way.name, way.because, verdict))
-            is_final = verdict.retry != ANOTHER_WAY
-            if is_final:
+            if verdict.is_final:
                 break
-        chosen = replace(
-            found[-1 if is_final else 0], tried=tuple(tried), parameters=call.parameters or {}
-        )
+        chosen = found[-1] if found[-1].verdict.is_final else found[0]
+        chosen = replace(chosen, tried=tuple(tried), parameters=call.parameters or {})
         return chosen, stack.pop_all()
 
 

@@ -24,20 +24,16 @@ from ..geometry.judging import CE90_FACTOR, LARGEST_LOG10_CHANCE, SMALLEST_INLIE
 from ..geometry.misses import Misses
 from ..geometry.tie_points import TiePoints
 from ..masks.used import NONE, MaskUsed
-from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..matching.surveys import Surveys
 from ..rasters.grid import FloatArray, Grid
-from .layover import EVEN_MEAN_OVER_SCATTER, scatter_along_line
+from .layover import mean_of_heights_px
 from .scene import SceneInfo
 from .surface_masks import ModelFit
 
 # Stages of a registration, in the order in which their rules are asked.
 TIE_POINTS, IMAGES, SEARCH, ASSESSMENT = "tie points", "images", "search", "assessment"
 POSE, AGREEMENT, ERROR, SCENE = "pose", "agreement", "error", "scene"
-LAYOVER, SURVEY, REFINEMENT, SERIES = "layover", "survey", "refinement", "series"
-
-# Scatter along a line is that of heights unless chance explains it with more than 5 %, as usual.
-_LOG10_FIVE_PERCENT = math.log10(0.05)
+SURVEY, REFINEMENT, SERIES = "survey", "refinement", "series"
 
 
 @dataclass(frozen=True)
@@ -241,7 +237,7 @@ class RegistrationEvidence:
     input_fit: ModelFit | None = None
     exchanged: Exchanged | None = None
 
-    stages: ClassVar = (IMAGES, AGREEMENT, ERROR, SCENE, LAYOVER, SURVEY)
+    stages: ClassVar = (IMAGES, AGREEMENT, ERROR, SCENE, SURVEY)
 
     @cached_property
     def counted(self) -> TiePoints:
@@ -252,16 +248,6 @@ class RegistrationEvidence:
     def residuals_px(self) -> FloatArray:
         """Their residuals, in matching pixels, shape (n, 2)."""
         return self.counted.residual_on(self.grid, self.estimate.transform)
-
-    @property
-    def check_residuals_px(self) -> FloatArray:
-        """Residuals of all check points, in matching pixels, shape (n, 2)."""
-        return self.check.residual_on(self.grid, self.estimate.transform)
-
-    @property
-    def fit_residuals_px(self) -> FloatArray:
-        """Residuals of the points of the fit, in matching pixels, shape (n, 2)."""
-        return self._fitted.residual_on(self.grid, self.estimate.transform)
 
     @property
     def _fitted(self) -> TiePoints:
@@ -317,22 +303,6 @@ class RegistrationEvidence:
         """Share of the overlap outside of the hull of the points that were used."""
         size = self.grid.width, self.grid.height
         return 1 - hull_share(self.grid.map_to_pixel(self._fitted.reference_xy), size)
-
-
-def mean_of_heights_px(
-    survey: Survey | None, layover_factor: float | None, max_error_px: float
-) -> FloatArray:
-    """Return what heights displace all matches by on average, as they scatter chips, shape (2,).
-
-    So far they may displace all to either side where a mask left more ground than heights; twice
-    as far where the ground may be the lowest of what matched.
-    """
-    if survey is None or len(survey.centres) == 0:
-        return np.zeros(2)
-    shifts = survey.shifts_px
-    misses = Misses(survey.centres.astype(float), shifts, SURVEY_RADIUS_PX, max_error_px)
-    scatter = scatter_along_line(shifts, misses.mixture.probability, _LOG10_FIVE_PERCENT)
-    return (layover_factor or EVEN_MEAN_OVER_SCATTER) * scatter
 
 
 def hull_share(px: FloatArray, size: tuple[int, int]) -> float:

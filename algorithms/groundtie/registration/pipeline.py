@@ -19,7 +19,6 @@ from .evidence import Exchanged, ImagesEvidence, RegistrationEvidence, SearchEvi
 from .masks import Masked, ground_instead, with_ground_mask
 from .opening import OpenPair
 from .registration import Registration
-from .rules.rule import NOTHING
 from .scene import SceneInfo
 from .specification import Specification
 from .stages import Stages
@@ -78,7 +77,7 @@ def register(
     """
     found = _register_once(opened, masked, scene, spec, context)
     is_whole = masked.used.kind == NONE and not spec.is_rendered
-    if found.verdict.retry == NOTHING or not is_whole:
+    if found.verdict.is_final or not is_whole:
         return found
     ground = ground_instead(opened.pair, scene, opened.stack, context)
     if ground is None:

@@ -22,18 +22,16 @@ from ..matching.surveys import Surveys
 from ..pose.pose import PoseFound
 from ..pose.rotation_windows import DEFAULT_RADIUS_SHARE
 from ..pose.search import find_poses, moved_px
-from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from .evidence import (
     AGREEMENT,
     ERROR,
-    LAYOVER,
     POSE,
     SURVEY,
     HeldOut,
     hull_share,
-    mean_of_heights_px,
 )
+from .layover import mean_of_heights_px
 
 
 @dataclass(frozen=True)
@@ -134,25 +132,14 @@ class PoseSurveyEvidence:
     layover_factor: float | None = None
     is_shift: bool = False
 
-    stages: ClassVar = (AGREEMENT, ERROR, LAYOVER, SURVEY)
+    stages: ClassVar = (AGREEMENT, ERROR, SURVEY)
     mask: ClassVar = MaskUsed(NONE, None, 1.0, "a pose is searched for without a mask")
-    radius_px: ClassVar = SURVEY_RADIUS_PX
     max_error_px: ClassVar = POSE_TOLERANCE_PX
 
     @property
     def surveys(self) -> Surveys:
         """What the chips show of the pose."""
         return self.found.surveys
-
-    @property
-    def check_residuals_px(self) -> FloatArray:
-        """Where each chip matches, from where the others have it, shape (n, 2)."""
-        return self.found.residuals_px
-
-    @property
-    def fit_residuals_px(self) -> FloatArray:
-        """The same of chips that agree, shape (n, 2)."""
-        return self.found.residuals_px[self.found.agrees]
 
     @cached_property
     def held_out(self) -> HeldOut:

@@ -17,7 +17,6 @@ from .evidence import (
 )
 from .refinement_evidence import RefinementEvidence
 from .rules import RULES, Rule
-from .rules.rule import NOTHING
 
 
 @dataclass(frozen=True)
@@ -49,8 +48,8 @@ class Verdict:
         Name of the rule that refused it; empty if it is accepted.
     advice
         What a user can try next; empty if it is accepted.
-    retry
-        What is tried next without being asked for, as of a `Rule`; nothing if it is accepted.
+    is_final
+        Whether nothing else is tried after it: what is accepted, or refused by such a `Rule`.
     ce50_px, ce95_px
         As `check_ce90_px`, with 50 and 95 %.
     ce90_range_px
@@ -76,7 +75,7 @@ class Verdict:
     extrapolated_share: float = math.nan
     rule: str = ""
     advice: str = ""
-    retry: str = NOTHING
+    is_final: bool = True
     ce50_px: float = math.nan
     ce95_px: float = math.nan
     ce90_range_px: tuple[float, float] = (math.nan, math.nan)
@@ -113,7 +112,7 @@ class Verdict:
         values = asdict(self) | {"points": self.points, "chance": self.chance}
         values |= {"ce90_low_px": low, "ce90_high_px": high}
         values |= {f"ellipse_{name}": value for name, value in asdict(self.ellipse).items()}
-        del values["ce90_range_px"], values["ellipse"], values["retry"]
+        del values["ce90_range_px"], values["ellipse"], values["is_final"]
         unknown = {k for k, v in values.items() if isinstance(v, float) and not math.isfinite(v)}
         return {k: None if k in unknown else v for k, v in values.items()}
 
@@ -147,7 +146,7 @@ def decide(evidence: Evidence, confirmed: str) -> Verdict:
     if refusal is None:
         return Verdict(True, confirmed)
     rule, reason = refusal
-    return Verdict(False, reason, rule=rule.name, advice=rule.advice, retry=rule.retry)
+    return Verdict(False, reason, rule=rule.name, advice=rule.advice, is_final=rule.is_final)
 
 
 def refuse_images(evidence: ImagesEvidence) -> Verdict | None:

@@ -2,8 +2,8 @@
 
 A rule looks at evidence and returns why it refuses, in a sentence, or None. Its `stage` states
 which kind of evidence it reads (see `evidence`); `verdict.judge` asks all rules of the evidence's
-stages in their order, and the first one that refuses decides. Its `retry` states what may be tried
-after that.
+stages in their order, and the first one that refuses decides. What may be tried
+after that, `is_final` states.
 
 Each stage has a module here, with its limits and their sources. To add a rule, write a function
 and put a `Rule` in the tuple of its module. docs/method-verdict.md is made from this list, and a
@@ -16,7 +16,6 @@ from .agreement import AGREEMENT_RULES
 from .assessment import ASSESSMENT_RULES
 from .error import ERROR_RULES
 from .images import IMAGES_RULES
-from .layover import LAYOVER_RULES
 from .pose import POSE_RULES
 from .refinement import REFINEMENT_RULES
 from .rule import Rule
@@ -37,7 +36,6 @@ RULES: tuple[Rule, ...] = (
     *AGREEMENT_RULES,
     *ERROR_RULES,
     *SCENE_RULES,
-    *LAYOVER_RULES,
     *SURVEY_RULES,
     *REFINEMENT_RULES,
     *SERIES_RULES,

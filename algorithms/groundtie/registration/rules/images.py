@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...masks.used import LAYER, SURFACE
 from ..evidence import IMAGES, ImagesEvidence, RegistrationEvidence
-from .rule import NOTHING, ON_GROUND, Rule
+from .rule import ON_GROUND, Rule
 
 
 def _ground_not_found(evidence: ImagesEvidence | RegistrationEvidence) -> str | None:
@@ -27,6 +27,6 @@ IMAGES_RULES: tuple[Rule, ...] = (
         "suites city and coarse_towns",
         f"give the radar image unfiltered, and the reference a CRS; {ON_GROUND}",
         _ground_not_found,
-        NOTHING,
+        is_final=True,
     ),
 )

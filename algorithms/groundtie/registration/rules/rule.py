@@ -10,12 +10,6 @@ WIDER = "check the band and the overlap; give a larger search radius, or allow r
 ON_GROUND = "give a mask of the ground, such as roads and waters"
 WITHOUT = "give images, or masks, without what is drawn over the ground"
 
-# What may be tried after a refusal. What images are, what repeats or is drawn over them, and parts
-# that lie elsewhere, no other mask or matcher mends, but may hide: noise, copies of the reference
-# and seams of mosaics passed tries that followed such refusals (once_wrong.txt of the suite
-# attacks).
-ANOTHER_WAY, GROUND_ALONE, NOTHING = "another way", "the ground alone", "nothing"
-
 
 @dataclass(frozen=True)
 class Rule:
@@ -35,9 +29,11 @@ class Rule:
         What a user can do that is safe.
     reason
         Returns why it refuses, in a sentence; None: it does not.
-    retry
-        What may be tried after it: `ANOTHER_WAY`, which may be the ground alone, too,
-        `GROUND_ALONE` or `NOTHING`.
+    is_final
+        Whether nothing else is tried after it. What images are, what repeats or is drawn over them,
+        and parts that lie elsewhere, no other mask or matcher mends, but may hide: noise, copies of
+        the reference and seams of mosaics passed tries that followed such refusals (once_wrong.txt
+        of the suite attacks).
     """
 
     name: str
@@ -46,4 +42,4 @@ class Rule:
     source: str
     advice: str
     reason: Callable[[Any], str | None]
-    retry: str = ANOTHER_WAY
+    is_final: bool = False

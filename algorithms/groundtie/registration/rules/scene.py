@@ -7,7 +7,7 @@ import numpy as np
 from ...masks.used import GROUND, SURFACE
 from ..evidence import SCENE, RegistrationEvidence
 from ..surface_masks import CLEAR_CORRELATION, RENDERED_CORRELATION
-from .rule import GROUND_ALONE, ON_GROUND, Rule
+from .rule import ON_GROUND, Rule
 
 # Less ground than this, or points over less of the overlap, does not hold a model. Measured on the
 # seeds 1 to 12 of the suite rpc_city: accepted and more than 3 px wrong at 7 % of ground, and with
@@ -84,7 +84,7 @@ SCENE_RULES: tuple[Rule, ...] = (
         "suites rpc_city and attacks",
         ON_GROUND,
         _little_ground,
-        GROUND_ALONE,
+        is_final=True,
     ),
     Rule(
         "surface model elsewhere",
@@ -95,7 +95,7 @@ SCENE_RULES: tuple[Rule, ...] = (
         "suite towns",
         "give the surface model of this place and the right views, or leave it out",
         _surface_elsewhere,
-        GROUND_ALONE,
+        is_final=True,
     ),
     Rule(
         "town matched whole",
@@ -105,6 +105,5 @@ SCENE_RULES: tuple[Rule, ...] = (
         "suite city",
         f"if it is a town, give the radar image unfiltered; {ON_GROUND}",
         _town_matched_whole,
-        GROUND_ALONE,
     ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...errors import AmbiguousPlaceError, NothingFoundError, TooFewPointsError
 from ..evidence import SEARCH, SearchEvidence
-from .rule import NOTHING, WIDER, Rule
+from .rule import WIDER, Rule
 
 
 def _ambiguous(evidence: SearchEvidence) -> str | None:
@@ -35,7 +35,7 @@ SEARCH_RULES: tuple[Rule, ...] = (
         "give a larger part of the scene, or a matching pixel size that shows more than what "
         "repeats",
         _ambiguous,
-        NOTHING,
+        is_final=True,
     ),
     Rule(
         "nothing in common",

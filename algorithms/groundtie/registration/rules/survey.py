@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
-from ...matching.parts import LEAST_EXCESS, MOST_OF_ONE, SAME_PX
+from ...matching.parts import LEAST_EXCESS
 from ...matching.rest import Rest
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
 from ..evidence import SURVEY, RegistrationEvidence
-from .rule import GROUND_ALONE, NOTHING, ON_GROUND, WITHOUT, Rule
+from .rule import ON_GROUND, WITHOUT, Rule
 
 # Chips all over are similar to a second place from this share on, and weakly similar below so many
 # robust standard deviations. Measured on pairs that were registered right: up to 0.76, and from
@@ -35,13 +33,6 @@ _LEAST_CHIPS = 0.25
 # 14.3); others from 6.5 on (suites real, calibration of large rural scenes, seeds 440-565, and
 # attacks: controls --seeds 33000-33039, --seeds 72000-72029, once_wrong.txt).
 PEAK_DEVIATIONS, REST_PEAK_DEVIATIONS = 12.0, 6.0
-
-# Evident peaks lie mostly where the transform has the chips, but for canopies' and walls': of right
-# transforms without a mask of the ground at least 0.27 do, of others some from 0.14 on down, as
-# where two halves of an image lie apart and a rotation leads through both (suites real, simulated
-# --seeds 201-206, calibration --seeds 440-499 and, large rural scenes, 440-565; controls --seeds
-# 33000-33039; once_wrong.txt). A third of three is no evidence: *so-cloudy-sentinel*.
-_FEWEST_EVIDENT, LARGEST_SHARE = 5, 0.2
 
 
 def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
@@ -76,28 +67,6 @@ def deviations_elsewhere(survey: Survey) -> float:
     return height / survey.deviation_elsewhere
 
 
-def evident_share(survey: Survey) -> float:
-    """Return which share of the evident peaks lies where the transform has the chips.
-
-    NaN: too few are evident.
-    """
-    confirming = survey.is_confirming_chip[survey.is_evident_chip]
-    return float(confirming.mean()) if len(confirming) >= _FEWEST_EVIDENT else math.nan
-
-
-def _few_confirm(evidence: RegistrationEvidence) -> str | None:
-    survey = evidence.surveys.whole
-    if survey is None or evidence.mask.is_ground:
-        return None
-    share = evident_share(survey)
-    if not share <= LARGEST_SHARE:
-        return None
-    return (
-        f"of {survey.is_evident_chip.sum()} chips with evident peaks only {share:.0%} have them "
-        "where the transform has them"
-    )
-
-
 def _weak(evidence: RegistrationEvidence) -> str | None:
     survey = evidence.surveys.whole
     if survey is None:
@@ -130,10 +99,7 @@ def deviations_beyond(rest: Rest) -> float:
 def _confirms(left: Survey, rest: Rest) -> bool:
     if has_few_chips(left, rest.chips):
         return rest.is_explained
-    # Tall buildings of views are parts, as layover and relief displacement differ.
-    is_part_elsewhere = bool(left.parts) and not rest.is_explained
-    is_elsewhere = _has_rival(left) or deviations_elsewhere(left) >= REST_PEAK_DEVIATIONS
-    return left.height >= WEAK_HEIGHT and not (is_elsewhere or is_part_elsewhere)
+    return left.height >= WEAK_HEIGHT and not _has_rival(left)
 
 
 def _locked(evidence: RegistrationEvidence) -> str | None:
@@ -171,13 +137,6 @@ def _rest_elsewhere(evidence: RegistrationEvidence) -> str | None:
     return "without what both images have in common, chips all over match elsewhere"
 
 
-def _other_ground_in_a_band(evidence: RegistrationEvidence) -> str | None:
-    for one in evidence.surveys.bands:
-        if one.survey.is_elsewhere:
-            return f"band {one.band} of the {one.image} alone matches elsewhere"
-    return None
-
-
 def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
     ground = evidence.surveys.ground
     if ground is None or not _has_rival(ground):
@@ -197,7 +156,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "[Neill2012]; suites margins and attacks",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,
-        NOTHING,
+        is_final=True,
     ),
     Rule(
         "second place nearby",
@@ -209,18 +168,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suites real and attacks",
         "give a larger part of the scene, which shows more than what repeats or is drawn over it",
         _second_place_nearby,
-        NOTHING,
-    ),
-    Rule(
-        "few chips confirm",
-        SURVEY,
-        f"without a mask of the ground, of {_FEWEST_EVIDENT} chips or more with peaks of "
-        f"{MOST_OF_ONE:g} robust standard deviations no more than a fifth have them within "
-        f"{SAME_PX:g} px of where the transform has them",
-        "suites real, simulated, calibration and attacks",
-        "register parts that lie apart one by one, without what is drawn over them",
-        _few_confirm,
-        NOTHING,
+        is_final=True,
     ),
     Rule(
         "weak similarity",
@@ -231,22 +179,22 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suites real and attacks",
         "give images with less noise, a mask that leaves more, or a larger pixel size for matching",
         _weak,
-        NOTHING,
+        is_final=True,
     ),
     Rule(
         "pixel-locked content",
         SURVEY,
         "both images have the same content, pixel by pixel, such as labels or clouds, "
         "with edges sharper than those of ground, or beside one another; or without it less than a "
-        "quarter of the chips is left, a part lies elsewhere, a second place matches about as well "
-        f"or is a peak of {REST_PEAK_DEVIATIONS:g} robust standard deviations, or their mean "
+        "quarter of the chips is left, a second place matches about as well, or their mean "
         f"similarity is below {WEAK_HEIGHT:g}; of a copy, or one camera's views, with sharp "
         "edges, or less alike in coarser pixels, a quarter is left that is below that or has such "
-        "a peak, or what the reference does not explain of it has one",
+        "a place, or what the reference does not explain of it has one, or a second peak of "
+        f"{REST_PEAK_DEVIATIONS:g} robust standard deviations",
         "suites margins and attacks",
         WITHOUT,
         _locked,
-        NOTHING,
+        is_final=True,
     ),
     Rule(
         "rest elsewhere",
@@ -258,17 +206,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suites margins and attacks",
         WITHOUT,
         _rest_elsewhere,
-        NOTHING,
-    ),
-    Rule(
-        "band elsewhere",
-        SURVEY,
-        "bands of an image do not coincide, and in one alone chips all over together match "
-        f"elsewhere {LEAST_EXCESS:g} standard deviations of noise better",
-        "suite margins",
-        "give the band that shows the ground, alone in a file",
-        _other_ground_in_a_band,
-        NOTHING,
+        is_final=True,
     ),
     Rule(
         "ground elsewhere",
@@ -278,6 +216,5 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suite calibration, SAR–SAR pairs",
         ON_GROUND,
         _ground_elsewhere,
-        GROUND_ALONE,
     ),
 )
