@@ -330,7 +330,7 @@ def test_every_tool_is_judged_by_the_rules_of_every_stage(
     [
         ("uncertain transform", 2),
         ("ground elsewhere", 2),
-        ("too little ground", 1),
+        ("few points on the ground", 1),
         ("part elsewhere", 1),
         ("second place nearby", 1),
         ("pixel-locked content", 1),

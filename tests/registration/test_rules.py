@@ -74,6 +74,8 @@ RANK = (
 
 # Dense towns: of a radar with speckle, and of one whose speckle a filter took.
 SPECKLED = scene(facts(variation2=0.2, **TOWN))
+ON_GROUND = MaskUsed(GROUND, "reference", 0.3, "as in a town")
+OBLIQUE = scene(facts(variation2=0.2, **TOWN), facts(is_in_sensor_geometry=True))
 DESPECKLED = scene(facts(is_known_radar=True, **TOWN))
 
 
@@ -168,9 +170,9 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(scatter(72, 0.9), max_error_px=1.5),
     ),
     "uncertain transform": (evidence(GOOD, loose(2.0)), evidence(GOOD, loose(1.0))),
-    "too little ground": (
-        evidence(GOOD, mask=MaskUsed(GROUND, "reference", 0.08, "as in a town")),
-        evidence(GOOD, mask=MaskUsed(GROUND, "reference", 0.12, "as in a town")),
+    "few points on the ground": (
+        evidence(scatter(4, 0.3), mask=ON_GROUND, scene=OBLIQUE),
+        evidence(scatter(5, 0.3), mask=ON_GROUND, scene=OBLIQUE),
     ),
     "surface model elsewhere": (
         evidence(GOOD, mask=MaskUsed(SURFACE, "reference", 0.3, "shows nothing", False)),

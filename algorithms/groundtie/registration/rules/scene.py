@@ -9,12 +9,6 @@ from ..evidence import SCENE, RegistrationEvidence
 from ..surface_masks import CLEAR_CORRELATION, RENDERED_CORRELATION
 from .rule import ON_GROUND, Rule
 
-# Less ground than this, or points over less of the overlap, does not hold a model. Measured on the
-# seeds 1 to 12 of the suite rpc_city: accepted and more than 3 px wrong at 7 % of ground, and with
-# 61 % extrapolated; right from 12 %, and up to 35 %. So 10 %, less the darkest tenth, which took
-# part then.
-_LEAST_GROUND_SHARE, _LARGEST_EXTRAPOLATED = 0.09, 0.5
-
 # An oblique view displaces fit and check points alike: by grey levels, where four sums of check
 # chips all agree, as in images of 700 px, the suite rpc_city has errors up to 6 px; with five and
 # more, below 1 px. By colours, where three agree, up to 2.7 px there, and 3.8 px in smaller images
@@ -27,22 +21,15 @@ _FEWEST_GREY, _FEWEST_IN_COLOURS = 5, 4
 _CLEAR_SHARE = 2 / 3
 
 
-def _little_ground(evidence: RegistrationEvidence) -> str | None:
-    mask = evidence.mask
-    if mask.kind != GROUND:
+def _few_on_ground(evidence: RegistrationEvidence) -> str | None:
+    scene = evidence.scene
+    if scene is None or evidence.mask.kind != GROUND or not scene.input.is_in_sensor_geometry:
         return None
-    if mask.share < _LEAST_GROUND_SHARE:
-        return f"only {mask.share:.0%} of the {mask.image} is ground that was found"
-    agreeing, scene = evidence.held_out.agreeing, evidence.scene
-    if scene is not None and scene.input.is_in_sensor_geometry:
-        has_colours = scene.other.has_colours
-        if agreeing < (_FEWEST_IN_COLOURS if has_colours else _FEWEST_GREY):
-            how = "oblique" if has_colours else "oblique and without colours"
-            return f"only {agreeing} check points on the ground agree, where the view is {how}"
-    if evidence.extrapolated_share > _LARGEST_EXTRAPOLATED:
-        share = f"{evidence.extrapolated_share:.0%}"
-        return f"{share} of the overlap lies beyond the ground that was matched"
-    return None
+    agreeing, has_colours = evidence.held_out.agreeing, scene.other.has_colours
+    if agreeing >= (_FEWEST_IN_COLOURS if has_colours else _FEWEST_GREY):
+        return None
+    how = "oblique" if has_colours else "oblique and without colours"
+    return f"only {agreeing} check points on the ground agree, where the view is {how}"
 
 
 def _surface_elsewhere(evidence: RegistrationEvidence) -> str | None:
@@ -75,15 +62,13 @@ def _town_matched_whole(evidence: RegistrationEvidence) -> str | None:
 
 SCENE_RULES: tuple[Rule, ...] = (
     Rule(
-        "too little ground",
+        "few points on the ground",
         SCENE,
-        "where the ground that was found in a radar image is matched alone: it covers less than "
-        f"{_LEAST_GROUND_SHARE:.0%} of the image, points over less than "
-        f"{1 - _LARGEST_EXTRAPOLATED:.0%} of the overlap, or, in an image with RPCs, fewer than "
-        f"{_FEWEST_IN_COLOURS} check points agree, {_FEWEST_GREY} without colours",
+        "where the ground that was found in a radar image is matched alone in an image with RPCs: "
+        f"fewer than {_FEWEST_IN_COLOURS} check points agree, {_FEWEST_GREY} without colours",
         "suites rpc_city and attacks",
         ON_GROUND,
-        _little_ground,
+        _few_on_ground,
         is_final=True,
     ),
     Rule(
