@@ -86,6 +86,13 @@ def _rest_height(evidence: RegistrationEvidence) -> float:
     return left.height
 
 
+def _rest_peak(evidence: RegistrationEvidence) -> float:
+    rest = _without_drawn(evidence)
+    if rest is None or rest.survey is None or has_few_chips(rest.survey, rest.chips):
+        return math.nan
+    return deviations_elsewhere(rest.survey)
+
+
 def _peak_beyond(evidence: RegistrationEvidence) -> float:
     rest = _without_drawn(evidence)
     return math.nan if rest is None or rest.beyond is None else deviations_beyond(rest)
@@ -101,6 +108,7 @@ STATISTICS = (
     Statistic("second place: peak", PEAK_DEVIATIONS, _of_survey(deviations_elsewhere)),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),
     Statistic("pixel-locked content: height", WEAK_HEIGHT, _rest_height, False),
+    Statistic("pixel-locked content: second peak", REST_PEAK_DEVIATIONS, _rest_peak),
     Statistic("pixel-locked content: copies", REST_PEAK_DEVIATIONS, _peak_beyond),
     Statistic(
         "rest elsewhere: second peak",

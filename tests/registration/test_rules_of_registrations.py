@@ -216,14 +216,17 @@ def test_a_second_peak_is_other_ground_however_high_the_first_is(
     assert refusing(found) == ["second place nearby"] * is_refused
 
 
+@pytest.mark.parametrize("is_explained", [False, True])
 @pytest.mark.parametrize(("peak", "is_refused"), [(5.9 / 7, False), (6.1 / 7, True)])
-def test_what_is_not_explained_of_copies_must_have_no_second_peak(
-    peak: float, is_refused: bool
+def test_what_is_left_must_have_no_second_peak(
+    peak: float, is_refused: bool, is_explained: bool
 ) -> None:
-    rest = Rest(None, True, survey(height=1.7, rival=0.0, peak=peak))
-    assert refusing(evidence(GOOD, survey=survey(), rest=rest)) == (
-        ["pixel-locked content"] * is_refused
-    )
+    for rest in (
+        Rest(survey(peak=peak), is_explained),
+        Rest(None, True, survey(height=1.7, rival=0.0, peak=peak)),
+    ):
+        found = evidence(GOOD, survey=survey(), rest=rest)
+        assert refusing(found) == ["pixel-locked content"] * is_refused
 
 
 @pytest.mark.parametrize(

@@ -99,7 +99,8 @@ def deviations_beyond(rest: Rest) -> float:
 def _confirms(left: Survey, rest: Rest) -> bool:
     if has_few_chips(left, rest.chips):
         return rest.is_explained
-    return left.height >= WEAK_HEIGHT and not _has_rival(left)
+    is_elsewhere = _has_rival(left) or deviations_elsewhere(left) >= REST_PEAK_DEVIATIONS
+    return left.height >= WEAK_HEIGHT and not is_elsewhere
 
 
 def _locked(evidence: RegistrationEvidence) -> str | None:
@@ -186,11 +187,11 @@ SURVEY_RULES: tuple[Rule, ...] = (
         SURVEY,
         "both images have the same content, pixel by pixel, such as labels or clouds, "
         "with edges sharper than those of ground, or beside one another; or without it less than a "
-        "quarter of the chips is left, a second place matches about as well, or their mean "
-        f"similarity is below {WEAK_HEIGHT:g}; of a copy, or one camera's views, with sharp "
-        "edges, or less alike in coarser pixels, a quarter is left that is below that or has such "
-        "a place, or what the reference does not explain of it has one, or a second peak of "
-        f"{REST_PEAK_DEVIATIONS:g} robust standard deviations",
+        "quarter of the chips is left, a second place matches about as well or is a peak of "
+        f"{REST_PEAK_DEVIATIONS:g} robust standard deviations, or their mean similarity is below "
+        f"{WEAK_HEIGHT:g}; of a copy, or one camera's views, with sharp edges, or less alike in "
+        "coarser pixels, a quarter is left that is below that or has such a place, or what the "
+        "reference does not explain of it has one",
         "suites margins and attacks",
         WITHOUT,
         _locked,
