@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask
 from .sameness import (
+    FARTHEST_PX,
     Edges,
     Windows,
     edges_apart_px,
@@ -45,7 +46,7 @@ LEAST_SHARPNESS, VIEW_SHARPNESS = 2.9, 5.0
 # drawn twice, in other widths or as thinner cloud, lie beside one another: as many as on one
 # another, or more, in steps as wide. Where right transforms have it (suites real and attacks,
 # controls): up to 0.8.
-_BESIDE_PX = 1.0, 1.5, 2.0
+_BESIDE_PX = 1.0, 1.5, float(FARTHEST_PX)
 MOST_BESIDE = 1.0
 
 _NEAR_PX = _SHARP_PX, _BLURRED_PX, *_BESIDE_PX

@@ -35,8 +35,8 @@ _PARALLEL_COSINE = float(np.cos(np.deg2rad(20)))
 _ALONG_PX = 0.5
 
 # Where the nearest edge may be, and no shift, (x, y).
-_FARTHEST_PX = 2
-_EITHER_WAY = range(-_FARTHEST_PX, _FARTHEST_PX + 1)
+FARTHEST_PX = 2
+_EITHER_WAY = range(-FARTHEST_PX, FARTHEST_PX + 1)
 _NEIGHBOURS = np.array([(x, y) for y in _EITHER_WAY for x in _EITHER_WAY])
 _NONE = np.zeros((1, 2), int)
 
@@ -164,7 +164,7 @@ def edges_apart_px(one: Edges, other: Edges, shifts: NDArray[np.int_] = _NONE) -
     Shape (k, n), in the order of `np.nonzero(one.found)`, in pixels across the edges; infinite
     where there is none within two pixels or so.
     """
-    reach = int(np.abs(shifts).max()) + _FARTHEST_PX
+    reach = int(np.abs(shifts).max()) + FARTHEST_PX
     width = one.found.shape[1] + 2 * reach
     is_found = np.pad(other.found, reach).ravel()
     rows, cols = np.nonzero(one.found)
