@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,13 +35,13 @@ from groundtie.registration.specification import COREGISTER, OPTICAL, SAR_SAR
 from groundtie.registration.verdict import refusals
 
 from .accuracy import SILENTLY_WRONG_PX
-from .attacks.cases import AttackCase, cases, named
-from .attacks.suite import AnyCase, sample
+from .attacks.cases import AttackCase
+from .attacks.suite import choose
 from .attempt import for_json, on_pixels
 from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
 from .pipeline_runs import found_by
 from .real import LARGEST_SHIFT_PX
-from .suites import Settings, SuiteResult, Table, of_classes, run_cases
+from .suites import Settings, SuiteResult, Table, run_cases
 
 # By tool.
 _SPECIFICATIONS = {"coregister": COREGISTER, "match_sar_sar": SAR_SAR, "match_optical": OPTICAL}
@@ -213,7 +213,9 @@ def _measured(name: str, found: Registration, error_px: float, sigma_px: float) 
 
 def run(settings: Settings) -> SuiteResult:
     """Run the suite: `--sample` attacks of `--classes`, or those of a `--case`; and real pairs."""
-    chosen = [AttackedPair(case) for case in _attacks(settings)]
+    wanted = _QUICK if settings.quick else settings.sample or _SAMPLE
+    attacks = choose(replace(settings, quick=False, sample=wanted), _SPECIFICATIONS)
+    chosen = [AttackedPair(case) for case in attacks]
     is_all = not (settings.quick or settings.named)
     real = [RealPair(case) for case in read_cases(settings.data)] if is_all else []
     found: list[Margins] = list(run_cases([*real, *chosen], settings.jobs))
@@ -230,19 +232,6 @@ def run(settings: Settings) -> SuiteResult:
             "refuse what is wrong. Alone: no other rule refuses the same transform.",
         ),
     )
-
-
-def _attacks(settings: Settings) -> list[AttackCase]:
-    """Return the attacks that settings ask for, on the tools that have a specification."""
-    if settings.named:
-        return _specified(named(name, settings.data, settings.cache) for name in settings.named)
-    every = _specified(cases(settings.seed_numbers(), settings.data, settings.cache))
-    every = of_classes(every, settings.classes, lambda case: {case.attack, case.group})
-    return sample(every, _QUICK if settings.quick else settings.sample or _SAMPLE)
-
-
-def _specified(every: Iterable[AnyCase]) -> list[AttackCase]:
-    return [case for case in every if isinstance(case, AttackCase) and case.tool in _SPECIFICATIONS]
 
 
 def _table(number: int, statistic: Statistic, found: Sequence[Margins]) -> Table:

@@ -56,12 +56,6 @@ def fit_points(within: tuple[float, float] = (1.0, 1.0), sigma: float = 0.3) -> 
     return points(px, sigma * rng.normal(size=px.shape), check=False)
 
 
-def fit_with(errors: np.ndarray) -> TiePoints:
-    """Return points of a fit whose matches have errors."""
-    px = np.random.default_rng(6).uniform([20, 20], [579, 479], (len(errors), 2))
-    return points(px, errors, check=False)
-
-
 def estimated(fit: TiePoints, kind: str = "affine") -> Estimate:
     """Fit a model to points as the search does: on the map, and in pixels without each block."""
     px, nominal_px = GRID.map_to_pixel(fit.reference_xy), fit.input_px

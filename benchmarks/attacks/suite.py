@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
@@ -53,17 +53,22 @@ def run(settings: Settings) -> SuiteResult:
     )
 
 
-def choose(settings: Settings) -> list[AnyCase]:
-    """Return the cases that settings ask for."""
+def choose(settings: Settings, tools: Collection[str] | None = None) -> list[AnyCase]:
+    """Return the cases that settings ask for, on some tools; None: on all."""
+
+    def is_asked(case: AnyCase) -> bool:
+        return tools is None or case.tool in tools
+
     if settings.named:
-        return [named(name, settings.data, settings.cache) for name in settings.named]
+        every = (named(name, settings.data, settings.cache) for name in settings.named)
+        return list(filter(is_asked, every))
     is_whole = not (settings.sample or settings.classes)
     number = min(settings.seeds, _SEEDS) if is_whole else settings.seeds
     seeds = range(settings.first_seed, settings.first_seed + number)
-    every = cases(seeds, settings.data, settings.cache, settings.large)
-    every = of_classes(every, settings.classes, lambda case: {case.attack, case.group})
+    asked = filter(is_asked, cases(seeds, settings.data, settings.cache, settings.large))
+    some = of_classes(list(asked), settings.classes, lambda case: {case.attack, case.group})
     wanted = _QUICK if settings.quick else settings.sample
-    return every if wanted is None else sample(every, wanted)
+    return some if wanted is None else sample(some, wanted)
 
 
 def sample(every: Sequence[AnyCase], number: int) -> list[AnyCase]:

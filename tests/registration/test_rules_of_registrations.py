@@ -179,6 +179,13 @@ def test_a_quarter_of_the_chips_must_be_left_to_confirm(chips: int, is_refused: 
     assert refusing(found) == ["pixel-locked content"] * is_refused
 
 
+def test_what_one_cameras_views_leave_may_lie_elsewhere_in_parts() -> None:
+    """Tall buildings do, whose layover differs."""
+    left = survey(3, part=5, height=6.0)
+    assert left.parts
+    assert refusing(evidence(GOOD, survey=survey(), rest=Rest(left, True, survey()))) == []
+
+
 @pytest.mark.parametrize(
     ("height", "rival", "part", "is_refused"),
     [(0.5, 1.0, 5, True), (1.1, 1.0, 5, True), (2.0, 1.0, 5, False), (0.5, 1.0, 0, False)],

@@ -228,6 +228,8 @@ def test_a_model_through_many_heights_is_refused(
 ) -> None:
     """Check points agree with it as well as with the ground, which it is 3 px off."""
     pair = on_many_heights(files, tmp_path, side_px, seed=1)
-    with pytest.raises(NotRegisteredError):
+    with pytest.raises(NotRegisteredError) as refused:
         tool(pair.reference, pair.input, tmp_path / "out.tif")
+    assert refused.value.verdict is not None
+    assert refused.value.verdict.rule == "uncertain transform"
     assert not (tmp_path / "out.tif").exists()

@@ -26,8 +26,8 @@ SMALLEST_SHARE_UNROTATED = 0.55
 # moved and by repetition (suite attacks).
 LARGEST_LOG10_CHANCE = -4.0
 
-# What chance explains with less than this (log10) is evidence against a registration.
-LOG10_SIGNIFICANCE = -3.0
+# What chance explains with less than this is evidence against a registration.
+SIGNIFICANCE = 1e-3
 
 # Largest root mean square error that is allowed where nobody asks for another.
 USUAL_MAX_ERROR_PX = 3.0

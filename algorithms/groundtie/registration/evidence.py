@@ -249,10 +249,6 @@ class RegistrationEvidence:
         """Their residuals, in matching pixels, shape (n, 2)."""
         return self.counted.residual_on(self.grid, self.estimate.transform)
 
-    @property
-    def _fitted(self) -> TiePoints:
-        return self.estimate.points.take(self.estimate.points.used)
-
     @cached_property
     def held_out(self) -> HeldOut:
         """How the check points agree; those without a peak count as disagreeing."""
@@ -301,8 +297,8 @@ class RegistrationEvidence:
     @property
     def extrapolated_share(self) -> float:
         """Share of the overlap outside of the hull of the points that were used."""
-        size = self.grid.width, self.grid.height
-        return 1 - hull_share(self.grid.map_to_pixel(self._fitted.reference_xy), size)
+        fitted, size = self.estimate.points, (self.grid.width, self.grid.height)
+        return 1 - hull_share(self.grid.map_to_pixel(fitted.reference_xy[fitted.used]), size)
 
 
 def hull_share(px: FloatArray, size: tuple[int, int]) -> float:

@@ -22,7 +22,7 @@ KEYPOINTS_MEAN_OVER_SCATTER = 3.0
 CHIPS_MEAN_OVER_SCATTER = 6.0
 
 # The same of heights that spread evenly from the ground up: mean over standard deviation.
-EVEN_MEAN_OVER_SCATTER = math.sqrt(3)
+_EVEN_MEAN_OVER_SCATTER = math.sqrt(3)
 
 # Scatter along a line is that of heights unless chance explains it with more than 5 %, as usual.
 _SIGNIFICANCE = 0.05
@@ -41,7 +41,7 @@ def mean_of_heights_px(
     shifts = survey.shifts_px
     misses = Misses(survey.centres.astype(float), shifts, SURVEY_RADIUS_PX, max_error_px)
     scatter = scatter_along_line(shifts, misses.mixture.probability)
-    return (layover_factor or EVEN_MEAN_OVER_SCATTER) * scatter
+    return (layover_factor or _EVEN_MEAN_OVER_SCATTER) * scatter
 
 
 def scatter_along_line(residuals_px: FloatArray, weights: FloatArray) -> FloatArray:

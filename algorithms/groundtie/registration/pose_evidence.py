@@ -134,7 +134,6 @@ class PoseSurveyEvidence:
 
     stages: ClassVar = (AGREEMENT, ERROR, SURVEY)
     mask: ClassVar = MaskUsed(NONE, None, 1.0, "a pose is searched for without a mask")
-    max_error_px: ClassVar = POSE_TOLERANCE_PX
 
     @property
     def surveys(self) -> Surveys:

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 from scipy.special import chdtri  # scipy.stats takes 0.4 s to import
 
-from ..geometry.judging import LOG10_SIGNIFICANCE
+from ..geometry.judging import SIGNIFICANCE
 from ..rasters.reading import Mask
 from .frame import PARAMETERS, SHIFT_PX, FloatArray, SeriesFrame, sigma_px
 
@@ -68,7 +68,7 @@ def degrees_of_freedom(links: Sequence[Link]) -> int:
 
 def largest_statistic(links: Sequence[Link]) -> float:
     """Return the squared normalised length that links exceed by chance once in a thousand times."""
-    return float(chdtri(degrees_of_freedom(links), 10**LOG10_SIGNIFICANCE))
+    return float(chdtri(degrees_of_freedom(links), SIGNIFICANCE))
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Adjustment:
         of one date, of both axes.
         """
         sigmas = np.array([sigma_px(covariance) for covariance in self.covariances])
-        return np.asarray(sigmas * np.sqrt(chdtri(2, 10**LOG10_SIGNIFICANCE)) > _GOAL_PX)
+        return np.asarray(sigmas * np.sqrt(chdtri(2, SIGNIFICANCE)) > _GOAL_PX)
 
 
 def adjust(
