@@ -13,7 +13,7 @@ from rasterio.crs import CRS
 from rpc_scenes import SIZE, make_scene
 
 from groundtie.errors import NothingFoundError, TooFewPointsError
-from groundtie.geometry.models import KINDS, PolynomialModel
+from groundtie.geometry.models import KINDS, shift_model
 from groundtie.geometry.tie_point_files import EDITED
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
@@ -182,7 +182,7 @@ def test_a_click_is_refined_by_similarity(tmp_path: Path, off: tuple[float, floa
     write_pair(tmp_path, 0)
     with rasterio.open(tmp_path / "input.tif") as source:
         grid = Grid(source.transform, source.crs, source.width, source.height)
-    nominal = Transform(PolynomialModel.identity(), CRS_33, grid)
+    nominal = Transform(shift_model(0.0, 0.0), CRS_33, grid)
     xy = np.array(ORIGIN) + [180.25, -200.5]
     truth = true_input_px(xy[None])[0]
     names = tmp_path / "reference.tif", tmp_path / "input.tif"
@@ -195,7 +195,7 @@ def test_clicks_at_different_places_are_not_refined(tmp_path: Path) -> None:
     write_pair(tmp_path, 0)
     with rasterio.open(tmp_path / "input.tif") as source:
         grid = Grid(source.transform, source.crs, source.width, source.height)
-    nominal = Transform(PolynomialModel.identity(), CRS_33, grid)
+    nominal = Transform(shift_model(0.0, 0.0), CRS_33, grid)
     names = tmp_path / "reference.tif", tmp_path / "input.tif"
     lost = 0
     for shift in (60.0, 90.0, 120.0):

@@ -20,7 +20,7 @@ from .arrays import Raster
 from .context import Context, threads
 from .errors import ParameterError, TooFewPointsError
 from .geometry.estimation import Estimate, fit_without_blocks
-from .geometry.models import DEGREE, KINDS, Model, PolynomialModel
+from .geometry.models import DEGREE, KINDS, Model, shift_model
 from .geometry.robust import find_consensus, fit_robustly
 from .geometry.tie_points import TiePoints
 from .geometry.transform import Transform
@@ -119,7 +119,7 @@ def match_chips(
     context
         Threads and progress; None: a thread for each processor.
     """
-    model = PolynomialModel.identity() if model is None else model
+    model = shift_model(0.0, 0.0) if model is None else model
     with _stages(reference, input, spec, context) as (stages, _, running):
         places = stages.matcher.fit_places(stages.held_out.layout)
         surfaces = stages.matcher.match(model, places, radius_px, running)

@@ -111,13 +111,13 @@ def test_a_pair_is_located_where_its_transform_puts_it(
     cases: dict[str, RealCase], tmp_path: Path
 ) -> None:
     """The true transform of a pair that is written with a wrong shift is that of its case."""
-    from groundtie.geometry.models import PolynomialModel
+    from groundtie.geometry.models import shift_model
     from groundtie.geometry.transform import Transform
     from groundtie.rasters.reading import open_raster
 
     prepared = PairRegistration("coregister", cases["hills"]).prepare(tmp_path)
     with open_raster(tmp_path / "input.tif") as source:
-        nominal = Transform(PolynomialModel.identity(), source.grid.crs, source.grid)
+        nominal = Transform(shift_model(0.0, 0.0), source.grid.crs, source.grid)
     (tmp_path / "transform.json").write_text(json.dumps(nominal.to_json()))
     found = prepared.positions()
     px = lattice(image_size(cases["hills"].reference))

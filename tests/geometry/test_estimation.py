@@ -8,13 +8,13 @@ from groundtie.errors import TooFewPointsError
 from groundtie.geometry.estimation import fit_thin_plate, jackknife_spread
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.model_choice import block_folds
-from groundtie.geometry.models import Frame, Model, PolynomialModel
+from groundtie.geometry.models import Frame, Model, PolynomialModel, shift_model
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 
 GRID = utm_grid(800, 600)
 NOMINAL = Transform.nominal(UTM, GRID)
-IDENTITY = PolynomialModel.identity()
+IDENTITY = shift_model(0.0, 0.0)
 
 
 def lattice(columns: int = 13, rows: int = 11) -> np.ndarray:

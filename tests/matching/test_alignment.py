@@ -9,7 +9,7 @@ from scipy.optimize import check_grad
 
 from groundtie.arrays import Raster
 from groundtie.geometry.fitting import fit_model
-from groundtie.geometry.models import DEGREE, TERRAIN, Frame, Model, PolynomialModel
+from groundtie.geometry.models import DEGREE, TERRAIN, Frame, Model, shift_model
 from groundtie.geometry.terrain import Terrain
 from groundtie.geometry.terrain_model import TerrainModel
 from groundtie.matching.alignment import (
@@ -79,7 +79,7 @@ def surfaces_at(shifts: np.ndarray, seed: int, wrong: float = 0.4) -> np.ndarray
 
 
 def identity() -> Model:
-    return PolynomialModel.identity()
+    return shift_model(0.0, 0.0)
 
 
 def error_px(model: Model, kind: str) -> float:

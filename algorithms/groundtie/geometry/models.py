@@ -177,11 +177,6 @@ class PolynomialModel(Model):
 
     coefficients: FloatArray
 
-    @classmethod
-    def identity(cls) -> PolynomialModel:
-        """Return the translation by nothing."""
-        return cls("translation", Frame(Affine.identity()), np.zeros((1, 2)))
-
     def displacement(self, uv: FloatArray) -> FloatArray:
         """Return the displacement, in the frame, of positions in the frame, both (n, 2)."""
         return monomials(uv, DEGREE[self.kind]) @ self.coefficients
@@ -220,5 +215,5 @@ def thin_plate_kernel(uv: FloatArray, knots: FloatArray) -> FloatArray:
 
 
 def shift_model(dx: float, dy: float) -> Model:
-    """Return a translation in map units as a model."""
+    """Return a translation in map units, by nothing the identity, as a model."""
     return PolynomialModel("translation", Frame(Affine.identity()), np.array([[dx, dy]]))

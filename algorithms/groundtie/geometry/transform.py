@@ -22,7 +22,7 @@ from ..rasters.grid import (
     reproject,
 )
 from ..strict_json import read_json
-from .models import DEGREE, TERRAIN, Frame, Model, PolynomialModel, ThinPlateSpline
+from .models import DEGREE, TERRAIN, Frame, Model, PolynomialModel, ThinPlateSpline, shift_model
 from .terrain_model import TerrainModel
 
 FORMAT = "groundtie-transform/1"
@@ -55,7 +55,7 @@ class Transform:
     @classmethod
     def nominal(cls, crs: CRS | None, input_grid: Grid) -> Transform:
         """Return the transform that takes the input's georeferencing as it is."""
-        return cls(PolynomialModel.identity(), crs, input_grid)
+        return cls(shift_model(0.0, 0.0), crs, input_grid)
 
     def __call__(self, xy: ArrayLike) -> FloatArray:
         """Return the input pixels (col, row), centres at integers, of map positions (..., 2)."""
