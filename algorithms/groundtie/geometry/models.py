@@ -67,10 +67,6 @@ class Frame:
         scale = float(np.max(high - low) / 2) or 1.0
         return cls(compose(Affine.translation(*((low + high) / 2)), Affine.scale(scale)))
 
-    def seen_from(self, affine: Affine) -> Frame:
-        """Return this frame when what was the map is a lattice that `affine` takes to the map."""
-        return Frame(compose(affine, self.to_map))
-
     def enter(self, xy: ArrayLike) -> FloatArray:
         """Return map positions in this frame."""
         return apply_affine(~self.to_map, xy)
@@ -146,7 +142,7 @@ class Model(ABC):
 
         `affine` takes the lattice to the map.
         """
-        return replace(self, frame=self.frame.seen_from(affine))
+        return replace(self, frame=Frame(compose(affine, self.frame.to_map)))
 
     def _newton_step(self, uv: FloatArray, target: FloatArray) -> FloatArray:
         step = 1e-4

@@ -92,8 +92,7 @@ class TerrainModel(Model):
 
     def on_map(self, affine: Affine) -> TerrainModel:
         """Return this model of lattice positions as one of map positions."""
-        terrain = self.terrain.seen_from(~affine)
-        return replace(self, frame=self.frame.seen_from(affine), terrain=terrain)
+        return replace(super().on_map(affine), terrain=self.terrain.seen_from(~affine))
 
     def to_json(self) -> dict[str, Any]:
         """Return the model as values that JSON can carry."""
