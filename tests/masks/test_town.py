@@ -7,7 +7,7 @@ import pytest
 from raster_files import utm_grid, write_raster
 
 from groundtie.masks.scene import Scene
-from groundtie.masks.town import is_town, may_be_town, share_of_strong_scatterers
+from groundtie.masks.town import PERHAPS_TOWN_SHARE, share_of_strong_scatterers
 from groundtie.rasters.kernels import interpolate
 from groundtie.rasters.reading import open_raster
 
@@ -51,14 +51,4 @@ def test_fields_are_no_town(tmp_path: Path) -> None:
     fields = np.kron(random.uniform(200, 500, (20, 20)), np.ones((20, 20)))
     fields *= np.sqrt(random.gamma(1, 1, fields.shape))
     scene = scene_of(tmp_path / "a.tif", fields.astype(np.float32))
-    assert not is_town(share_of_strong_scatterers(scene))
-
-
-@pytest.mark.parametrize(
-    ("strong_share", "expected"),
-    [(0.079, (False, False)), (0.081, (False, True)), (0.111, (True, True))],
-)
-def test_towns_are_where_strong_scatterers_stand(
-    strong_share: float, expected: tuple[bool, bool]
-) -> None:
-    assert (is_town(strong_share), may_be_town(strong_share)) == expected
+    assert share_of_strong_scatterers(scene) < PERHAPS_TOWN_SHARE

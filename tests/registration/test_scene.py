@@ -89,6 +89,17 @@ def test_the_ground_of_a_town_is_found_by_its_pixel_size(
         assert not replace(info, has_user_mask=True).is_town_of_unknown_size
 
 
+@pytest.mark.parametrize(
+    ("strong_share", "expected"),
+    [(0.079, (False, False)), (0.081, (False, True)), (0.111, (True, True))],
+)
+def test_towns_are_where_strong_scatterers_stand(
+    strong_share: float, expected: tuple[bool, bool]
+) -> None:
+    info = SceneInfo(facts(is_known_radar=True, strong_share=strong_share), facts())
+    assert (info.is_town, info.may_be_town) == expected
+
+
 def test_a_users_mask_needs_no_speckle() -> None:
     town = facts(is_known_radar=True, strong_share=0.25)
     for has_mask in (False, True):

@@ -13,21 +13,11 @@ from .scene import Scene
 # simulated suburbs have 8.3 % and more, fields up to 3.5 % (20 seeds each of the suite simulated),
 # the least of the cities 9.5 % where a speckle filter has dimmed what is small and bright.
 _STRONG = 4.0
-_TOWN, _PERHAPS_TOWN = 0.11, 0.08
+TOWN_SHARE, PERHAPS_TOWN_SHARE = 0.11, 0.08
 
 # So many means give a share, if they were independent a tenth to 0.03 %: scenes of more than
 # 4000 × 4000 px are sampled.
 _MEANS = 1_000_000
-
-
-def is_town(strong_share: float) -> bool:
-    """Whether a radar image with this share of strong scatterers shows a town."""
-    return strong_share >= _TOWN
-
-
-def may_be_town(strong_share: float) -> bool:
-    """Whether a radar image with this share, filtered or not, may show a town."""
-    return strong_share >= _PERHAPS_TOWN
 
 
 def share_of_strong_scatterers(scene: Scene) -> float:

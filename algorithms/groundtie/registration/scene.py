@@ -11,7 +11,7 @@ from ..masks.ground import shows_ground
 from ..masks.open_ground import OpenGround
 from ..masks.radar import LEAST_VARIATION2, LEAST_VARIATION2_RATIO, variation2_of
 from ..masks.scene import Scene
-from ..masks.town import is_town, may_be_town, share_of_strong_scatterers
+from ..masks.town import PERHAPS_TOWN_SHARE, TOWN_SHARE, share_of_strong_scatterers
 from ..masks.used import INPUT, REFERENCE
 from ..matching.locked import Sensors
 from ..rasters.pair import Image, ImagePair
@@ -176,7 +176,7 @@ class SceneInfo:
     @property
     def is_town(self) -> bool:
         """Whether the radar image of a pair with a camera's shows a town."""
-        return self.is_radar_and_camera and is_town(self.radar.strong_share)
+        return self.is_radar_and_camera and self.radar.strong_share >= TOWN_SHARE
 
     @property
     def shows_ground(self) -> bool:
@@ -202,9 +202,9 @@ class SceneInfo:
         if self.are_both_radar:
             return False
         if self.is_radar_and_camera:
-            return may_be_town(self.radar.strong_share)
+            return self.radar.strong_share >= PERHAPS_TOWN_SHARE
         suspects = () if self.declared == NEITHER else (self.reference, self.input)
-        return any(may_be_town(one.strong_share) for one in suspects)
+        return any(one.strong_share >= PERHAPS_TOWN_SHARE for one in suspects)
 
     @property
     def is_despeckled_town(self) -> bool:
