@@ -82,7 +82,7 @@ class Image:
     def shown_on(self, grid: Grid, to_px: PointFunction) -> Mask:
         """Return what the mask, which there must be, lets take part; parameters as `read_onto`."""
         assert self.mask is not None
-        own, to_mask = self.source.grid, _nominal_pixels(self.source.grid, self.mask.grid)
+        own, to_mask = self.source.grid, nominal_pixels(self.source.grid, self.mask.grid)
         shown, known = sample(
             self.mask, grid, lambda xy: to_mask(own.pixel_to_map(to_px(xy))), "nearest", 1
         )
@@ -163,7 +163,7 @@ class ImagePair:
 
     def nominal_px(self, xy: FloatArray) -> FloatArray:
         """Return the input pixels at reference map positions of its nominal place, shape (n, 2)."""
-        return _nominal_pixels(self.grid, self.input.source.grid)(xy)
+        return nominal_pixels(self.grid, self.input.source.grid)(xy)
 
 
 def make_pair(
@@ -207,7 +207,7 @@ def make_pair(
     grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
     radius = default_radius_m(grid) if search_radius_m is None else search_radius_m
     limits = SearchLimits(radius, rotation_deg, (1 / scale, scale))
-    outline = _nominal_pixels(inp.grid, ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
+    outline = nominal_pixels(inp.grid, ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
     nominal = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
     if not limits.is_shift and not ref.grid.is_georeferenced:
         outline = outline + np.subtract(ref.grid.centre_px, inp.grid.centre_px)
@@ -277,7 +277,7 @@ def coarser_m(reference: Grid, input: Grid) -> float:
     return max(reference.pixel_size_m, input.pixel_size_m if input.is_georeferenced else 0.0)
 
 
-def _nominal_pixels(source: Grid, target: Grid) -> PointFunction:
+def nominal_pixels(source: Grid, target: Grid) -> PointFunction:
     """Return the function from map positions of `source` to pixels of `target`."""
     return lambda xy: target.map_to_pixel(reproject(xy, source.crs, target.crs))
 
