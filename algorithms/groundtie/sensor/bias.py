@@ -95,7 +95,7 @@ def fold(rpc: RPC, bias: Bias) -> RPCFit:
     over the image and the RPCs' range of heights.
     """
     if bias.kind == SHIFT:
-        return RPCFit(rpc.shifted(bias.coefficients[0]), 0.0, 0.0)
+        return RPCFit(rpc.shifted(bias.coefficients[0]), 0.0)
     heights_m = np.linspace(*rpc.height_range_m, _HEIGHTS)
     lon_lat, height = ground_lattice(rpc, bias.size, heights_m)
     seen = np.isfinite(lon_lat).all(axis=1)

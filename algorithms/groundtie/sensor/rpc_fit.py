@@ -26,11 +26,10 @@ _FITS = 4
 
 @dataclass(frozen=True)
 class RPCFit:
-    """Fitted RPCs, and how far they miss: the largest and the RMS residual, in pixels."""
+    """Fitted RPCs, and how far they miss at most: the largest residual, in pixels."""
 
     rpc: RPC
     largest_residual_px: float
-    rmse_px: float
 
 
 def fit_rpc(lon_lat: ArrayLike, height_m: ArrayLike, px: ArrayLike, **stated: Any) -> RPCFit:
@@ -78,7 +77,7 @@ def fit_rpc(lon_lat: ArrayLike, height_m: ArrayLike, px: ArrayLike, **stated: An
         **stated,
     )
     miss = np.hypot(*(rpc.project(ground[:, :2], ground[:, 2]) - px).T)
-    return RPCFit(rpc, float(miss.max()), float(np.sqrt(np.mean(miss**2))))
+    return RPCFit(rpc, float(miss.max()))
 
 
 def _frame(values: FloatArray) -> tuple[FloatArray, FloatArray]:
