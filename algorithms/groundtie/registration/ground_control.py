@@ -138,7 +138,7 @@ def match_ground_control(
         return GroundControl(refused, None)
     shift_px = _shift_in_image(pair.pair, by, coarse)
     if np.hypot(*shift_px) > _COARSE_PX:
-        by = by.with_rpc(by.rpc.shifted(shift_px))
+        by = replace(by, rpc=by.rpc.shifted(shift_px))
         spec = replace(spec, search_radius_m=_LEFT_PX * pair.pair.grid.pixel_size_m)
         pair = opened(by, spec)
         if masked.used.image == INPUT:

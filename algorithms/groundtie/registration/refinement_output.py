@@ -94,7 +94,7 @@ class RefinementFiles:
                 fit = refinement.accepted()
                 _write_rpcs(image, fit, outputs.stage(self.output), progress)
                 if self.residuals is not None:
-                    by_refined = image.orientation.with_rpc(fit.rpc)
+                    by_refined = replace(image.orientation, rpc=fit.rpc)
                     staged = outputs.stage(self.residuals)
                     refinement.points.write(staged, by_refined, image.source.grid)
             # Last: who finds it finds all that it is about.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from affine import Affine
@@ -120,10 +120,6 @@ class Orientation:
         """Return where lines of sight have a height, and how far the ground lies above them."""
         lon_lat = self.rpc.localise(px, height)
         return lon_lat, self.heights.at(lon_lat) - height
-
-    def with_rpc(self, rpc: RPC) -> Orientation:
-        """Return the orientation by other RPCs of the same image."""
-        return replace(self, rpc=rpc)
 
 
 @dataclass(frozen=True)
