@@ -167,8 +167,9 @@ def _adjust(control: Control, kind: str) -> Adjustment:
             f"at least {needed}"
         )
     kept = control.take(used)
+    bias = _fit(kept, kind, sigma)
+    left_out = control.residuals_px(bias)
     biases = []
-    left_out = control.residuals_px(_fit(kept, kind, sigma))
     inside = np.flatnonzero(used)
     for block in left_out_blocks(kept.expected_px):
         if (~block).sum() < TERMS[kind]:
@@ -176,7 +177,7 @@ def _adjust(control: Control, kind: str) -> Adjustment:
         biases.append(_fit(kept.take(~block), kind, sigma))
         left_out[inside[block]] = kept.take(block).residuals_px(biases[-1])
     rmse = float(np.sqrt(np.mean((left_out[used] ** 2).sum(axis=1))))
-    return Adjustment(_fit(kept, kind, sigma), used, sigma, tuple(biases), left_out, {kind: rmse})
+    return Adjustment(bias, used, sigma, tuple(biases), left_out, {kind: rmse})
 
 
 def _without_improbable(control: Control, kind: str) -> tuple[NDArray[np.bool_], float]:
