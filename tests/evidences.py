@@ -10,7 +10,7 @@ from raster_files import UTM, utm_grid
 from groundtie.geometry.accuracy import NOTHING_COMMON, Common
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.fitting import fit_model
-from groundtie.geometry.model_choice import block_folds
+from groundtie.geometry.model_choice import left_out_blocks
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.masks.used import MaskUsed
@@ -60,8 +60,7 @@ def estimated(fit: TiePoints, kind: str = "affine") -> Estimate:
     """Fit a model to points as the search does: on the map, and in pixels without each block."""
     px, nominal_px = GRID.map_to_pixel(fit.reference_xy), fit.input_px
     on_map = fit_model(kind, fit.reference_xy, GRID.pixel_to_map(nominal_px))
-    folds = block_folds(px)
-    left_out = [fit_model(kind, px[folds != f], nominal_px[folds != f]) for f in np.unique(folds)]
+    left_out = [fit_model(kind, px[~out], nominal_px[~out]) for out in left_out_blocks(px)]
     return Estimate(Transform(on_map, UTM, GRID), fit, tuple(left_out))
 
 

@@ -7,7 +7,7 @@ from raster_files import UTM, utm_grid
 from groundtie.errors import TooFewPointsError
 from groundtie.geometry.estimation import fit_thin_plate, jackknife_spread
 from groundtie.geometry.fitting import fit_model
-from groundtie.geometry.model_choice import block_folds
+from groundtie.geometry.model_choice import left_out_blocks
 from groundtie.geometry.models import Frame, Model, PolynomialModel, shift_model
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
@@ -44,13 +44,13 @@ def tie_points(px: np.ndarray, nominal_px: np.ndarray, variance: float = 0.05) -
 def test_the_spread_is_how_much_estimates_vary(kind: str) -> None:
     """The jackknife's mean over many drawn data sets is the scatter of their predictions."""
     px, rng, sigma = lattice(), np.random.default_rng(0), 0.5
-    folds = block_folds(px)
+    blocks = left_out_blocks(px)
     at = lattice(5, 4)
     told, predictions = [], []
     for _ in range(60):
         claimed = px + sigma * rng.normal(size=px.shape)
         predictions.append(fit_model(kind, px, claimed)(at))
-        left_out = [fit_model(kind, px[folds != f], claimed[folds != f]) for f in range(5)]
+        left_out = [fit_model(kind, px[~out], claimed[~out]) for out in blocks]
         told.append(jackknife_spread(left_out, at) ** 2)
     actual = np.var(predictions, axis=0).sum(axis=1)
     assert np.sqrt(np.mean(told)) == pytest.approx(np.sqrt(actual.mean()), rel=0.25)
@@ -69,8 +69,8 @@ def test_the_spread_grows_away_from_the_points() -> None:
     px = lattice() * 0.2
     rng = np.random.default_rng(1)
     claimed = px + 0.3 * rng.normal(size=px.shape)
-    folds = block_folds(px)
-    models = [fit_model("affine", px[folds != f], claimed[folds != f]) for f in range(5)]
+    blocks = left_out_blocks(px)
+    models = [fit_model("affine", px[~out], claimed[~out]) for out in blocks]
     near, far = jackknife_spread(models, np.array([[80.0, 60.0], [780.0, 580.0]]))
     assert far > 5 * near
 

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from groundtie.errors import TooFewPointsError
 from groundtie.geometry.model_choice import (
     STANDARD_ERRORS,
-    block_folds,
     choose_simplest,
     left_out_blocks,
     left_out_scores,
@@ -90,21 +89,18 @@ def test_standard_errors_are_those_of_the_sums_of_blocks() -> None:
 @settings(max_examples=60)
 @given(
     px=st.lists(st.tuples(st.floats(0, 1e4), st.floats(0, 1e4)), min_size=1, max_size=40),
-    shift=st.floats(-1e3, 1e3),
 )
-def test_folds_are_numbered_and_move_with_the_points(
-    px: list[tuple[float, float]], shift: float
-) -> None:
-    folds = block_folds(np.array(px))
-    assert folds.shape == (len(px),)
-    assert ((folds >= 0) & (folds < 5)).all()
+def test_each_point_is_left_out_by_one_of_five_folds(px: list[tuple[float, float]]) -> None:
+    blocks = left_out_blocks(np.array(px))
+    assert (np.sum(blocks, axis=0) == np.ones(len(px))).all()
     same = np.unique(np.array(px), axis=0)
-    assert len(np.unique(folds)) <= len(same)
+    assert len(blocks) <= min(len(same), 5)
 
 
 def test_neighbours_share_a_fold_and_each_line_holds_all() -> None:
     cols, rows = np.meshgrid(np.arange(50.0), np.arange(50.0))
-    folds = block_folds(np.column_stack([cols.ravel(), rows.ravel()])).reshape(50, 50)
+    left_out = left_out_blocks(np.column_stack([cols.ravel(), rows.ravel()]))
+    folds = np.argmax(left_out, axis=0).reshape(50, 50)
     blocks = folds.reshape(5, 10, 5, 10).transpose(0, 2, 1, 3).reshape(25, 100)
     # The last row and column of the extent belong to the last blocks: all blocks but those are
     # of 10 points a side, give or take one.
@@ -116,5 +112,5 @@ def test_neighbours_share_a_fold_and_each_line_holds_all() -> None:
 
 
 def test_points_on_one_spot_or_line_have_folds() -> None:
-    assert block_folds(np.ones((4, 2))).tolist() == [0, 0, 0, 0]
-    assert len(np.unique(block_folds(np.column_stack([np.arange(20.0), np.ones(20)])))) == 5
+    assert len(left_out_blocks(np.ones((4, 2)))) == 1
+    assert len(left_out_blocks(np.column_stack([np.arange(20.0), np.ones(20)]))) == 5

@@ -116,18 +116,13 @@ def left_out_scores(
 
 
 def left_out_blocks(px: FloatArray) -> list[Mask]:
-    """Return which points each fold leaves out, shape (n,) each; all are left out once."""
-    folds = block_folds(px)
-    return [folds == fold for fold in np.unique(folds)]
+    """Return which points each fold leaves out, shape (n,) each; all are left out once.
 
-
-def block_folds(px: FloatArray) -> NDArray[np.int_]:
-    """Return fold numbers, shape (n,), such that neighbours share one, for cross-validation.
-
-    Each row and each column of blocks holds every fold once.
+    Neighbours share a fold; each row and each column of blocks holds every fold once.
     """
     block = _blocks_of(px)
-    return np.asarray((block[:, 0] + 2 * block[:, 1]) % _FOLDS)
+    folds = (block[:, 0] + 2 * block[:, 1]) % _FOLDS
+    return [folds == fold for fold in np.unique(folds)]
 
 
 def standard_errors(rise: FloatArray, px: FloatArray) -> float:
