@@ -12,13 +12,15 @@ from scipy.stats import binom
 from groundtie.geometry.accuracy import (
     UNKNOWN,
     Accuracy,
-    CheckResiduals,
     Common,
     predict_accuracy,
+    shared_by_neighbours,
     standard_deviation_px,
 )
 from groundtie.geometry.estimation import fit_without_blocks
 from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.misses import Misses
+from groundtie.geometry.robust import Mixture
 
 SIZE_PX = 500
 RUNS = 80
@@ -34,6 +36,16 @@ def lattice(count: int, margin: float) -> np.ndarray:
 PLACES, FIT, CHECK = lattice(9, 0), lattice(8, 25), lattice(4, 80)
 
 
+def missed(
+    px: np.ndarray, residuals_px: np.ndarray, probability: np.ndarray | None = None
+) -> Misses:
+    """Return by how much points are missed that are inliers with a probability, or for sure."""
+    found = Misses(px, residuals_px, radius_px=10, max_error_px=3.0)
+    known = np.ones(len(px)) if probability is None else probability
+    vars(found).update(mixture=Mixture(known, 1.0))
+    return found
+
+
 def run(
     seed: int, kind: str, sigma: float, check_sigma: float, bias: np.ndarray = NO_BIAS
 ) -> tuple[Accuracy, float]:
@@ -43,7 +55,7 @@ def run(
     model = fit_model(kind, FIT, nominal)
     folds = fit_without_blocks(kind, FIT, nominal, np.ones(len(FIT)))
     matched = CHECK + check_sigma * random.standard_normal(CHECK.shape)
-    check = CheckResiduals(CHECK, matched - model(CHECK), np.ones(len(CHECK)))
+    check = missed(CHECK, matched - model(CHECK))
     place = random.uniform(0, SIZE_PX, (1, 2))
     found = predict_accuracy(folds, PLACES, check, NOTHING)
     return found, float(np.hypot(*(model(place) - place)[0]))
@@ -70,7 +82,7 @@ def test_an_error_that_no_block_shows_is_seen_by_check_points() -> None:
 
 def test_heights_may_displace_all_points_evenly_up_to_the_largest() -> None:
     folds = [partial(np.add, (0.01 * k, 0.0)) for k in range(5)]
-    check = CheckResiduals(CHECK, np.zeros_like(CHECK), np.ones(len(CHECK)))
+    check = missed(CHECK, np.zeros_like(CHECK))
     accuracy = predict_accuracy(folds, PLACES, check, Common(4.0 * np.array([0.6, 0.8])))
     assert accuracy.ce50_px == pytest.approx(2.0, rel=0.05)
     assert accuracy.ce90_px == pytest.approx(3.6, rel=0.05)
@@ -78,7 +90,7 @@ def test_heights_may_displace_all_points_evenly_up_to_the_largest() -> None:
 
 def test_what_displaces_all_points_in_any_direction_is_normal() -> None:
     folds = [partial(np.add, (0.001 * k, 0.0)) for k in range(5)]
-    check = CheckResiduals(CHECK, np.zeros_like(CHECK), np.ones(len(CHECK)))
+    check = missed(CHECK, np.zeros_like(CHECK))
     common = Common(sigma_px=0.5)
     accuracy = predict_accuracy(folds, PLACES, check, common)
     # Circles of two normal variates: sqrt(-2 ln(1 - p)) standard deviations.
@@ -96,7 +108,7 @@ def test_the_ellipse_is_longest_along_what_heights_displace(angle_deg: float) ->
     angle = math.radians(angle_deg)
     along = np.array([math.sin(angle), -math.cos(angle)])
     folds = [partial(np.add, (0.01 * k, 0.01 * k**2)) for k in range(5)]
-    check = CheckResiduals(CHECK, np.zeros_like(CHECK), np.ones(len(CHECK)))
+    check = missed(CHECK, np.zeros_like(CHECK))
     accuracy = predict_accuracy(folds, PLACES, check, Common(4.0 * along))
     # An even distribution to ±4 px has a standard deviation of 4 / √3; 90 % of two normal
     # variates lie within 2.146 of theirs.
@@ -126,24 +138,21 @@ def test_the_interval_holds_the_true_radius_as_often_as_it_says() -> None:
 
 def test_matching_errors_of_neighbours_are_not_shared() -> None:
     random = np.random.default_rng(5)
-    own = [
-        CheckResiduals(CHECK, random.standard_normal(CHECK.shape), np.ones(len(CHECK)))
-        for _ in range(200)
-    ]
-    assert np.mean([check.shared_variance_px2 for check in own]) < 0.1
-    common = CheckResiduals(CHECK, np.full(CHECK.shape, 0.7), np.ones(len(CHECK)))
-    assert common.shared_variance_px2 == pytest.approx(0.49)
+    own = [missed(CHECK, random.standard_normal(CHECK.shape)) for _ in range(200)]
+    assert np.mean([shared_by_neighbours(check)[0] for check in own]) < 0.1
+    common = missed(CHECK, np.full(CHECK.shape, 0.7))
+    assert shared_by_neighbours(common)[0] == pytest.approx(0.49)
 
 
 def test_outliers_count_by_their_probability() -> None:
     residuals, weights = np.zeros_like(CHECK), np.ones(len(CHECK))
     residuals[3], weights[3] = 12.0, 0.0
-    assert CheckResiduals(CHECK, residuals, weights).shared_variance_px2 == 0.0
+    assert shared_by_neighbours(missed(CHECK, residuals, weights))[0] == 0.0
 
 
 def test_one_block_or_no_check_point_predicts_nothing() -> None:
-    check = CheckResiduals(CHECK, np.zeros_like(CHECK), np.ones(len(CHECK)))
-    none = CheckResiduals(CHECK[:0], CHECK[:0], np.ones(0))
+    check = missed(CHECK, np.zeros_like(CHECK))
+    none = missed(CHECK[:0], CHECK[:0])
     alike = partial(np.add, 0.0)
     assert predict_accuracy([alike], PLACES, check, NOTHING) is UNKNOWN
     assert predict_accuracy([alike] * 5, PLACES, none, NOTHING) is UNKNOWN
@@ -157,7 +166,7 @@ def test_fewer_check_points_leave_a_wider_interval() -> None:
         px = lattice(side, 80)
         # The same error to the left and to the right in turns: nothing is shared.
         own = np.where((np.arange(len(px)) + np.arange(len(px)) // side) % 2, 0.5, -0.5)
-        check = CheckResiduals(px, np.column_stack([own, 0 * own]), np.ones(len(px)))
+        check = missed(px, np.column_stack([own, 0 * own]))
         low, high = predict_accuracy(folds, PLACES, check, NOTHING).ce90_range_px
         return high / low
 
@@ -173,7 +182,7 @@ def test_the_standard_deviation_is_that_of_errors(kind: str) -> None:
         model = fit_model(kind, FIT, nominal)
         folds = fit_without_blocks(kind, FIT, nominal, np.ones(len(FIT)))
         matched = CHECK + random.standard_normal(CHECK.shape)
-        check = CheckResiduals(CHECK, matched - model(CHECK), np.ones(len(CHECK)))
+        check = missed(CHECK, matched - model(CHECK))
         place = random.uniform(0, SIZE_PX, (1, 2))
         sigma = standard_deviation_px(folds, place, check, NOTHING)
         squared.append(((model(place) - place)[0] / sigma) ** 2)
@@ -183,7 +192,7 @@ def test_the_standard_deviation_is_that_of_errors(kind: str) -> None:
 
 def test_heights_add_the_variance_of_an_even_distribution() -> None:
     still = [lambda px: px] * 4
-    check = CheckResiduals(CHECK, np.zeros(CHECK.shape), np.ones(len(CHECK)))
+    check = missed(CHECK, np.zeros(CHECK.shape))
     found = standard_deviation_px(still, PLACES, check, Common(np.array([3.0, 3.0])))
     np.testing.assert_allclose(found, math.sqrt(3.0))
     assert np.isinf(standard_deviation_px(still[:1], PLACES, check, NOTHING)).all()

@@ -11,14 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from scipy.special import gammaincinv
 
 from ..rasters.grid import FloatArray, PointFunction
+from ..rasters.reading import Mask
 from .estimation import jackknife_deviations
 from .judging import CE90_FACTOR
+from .misses import Misses
 
 # Points at a side or a corner of each other are neighbours: √2 spacings are the farthest.
 NEIGHBOUR_SPACINGS = 1.5
@@ -92,52 +93,6 @@ UNKNOWN = Accuracy(math.nan, math.nan, math.nan, (math.nan, math.nan))
 
 
 @dataclass(frozen=True)
-class CheckResiduals:
-    """Residuals of points that took no part in the fit.
-
-    Parameters
-    ----------
-    px
-        Where the points lie, shape (n, 2).
-    residuals_px
-        By how much the transform misses them, shape (n, 2).
-    weights
-        Their probabilities to be inliers, shape (n,).
-    """
-
-    px: FloatArray
-    residuals_px: FloatArray
-    weights: FloatArray
-
-    @property
-    def variance_px2(self) -> float:
-        """Variance along an axis of a residual."""
-        squared = (self.residuals_px**2).sum(axis=1) / 2
-        return float((self.weights * squared).sum() / max(self.weights.sum(), _LEAST_WEIGHT))
-
-    @cached_property
-    def neighbours(self) -> FloatArray:
-        """The product of weights of points that are neighbours, 0 of others, shape (n, n)."""
-        if len(self.px) < 2:
-            return np.zeros((len(self.px),) * 2)
-        apart = np.hypot(*(self.px[:, None] - self.px).transpose(2, 0, 1))
-        np.fill_diagonal(apart, np.inf)
-        reach = NEIGHBOUR_SPACINGS * np.median(apart.min(axis=1))
-        return np.asarray(np.outer(self.weights, self.weights) * (apart <= reach))
-
-    @property
-    def shared_variance_px2(self) -> float:
-        """Variance along an axis of what neighbours have in common; 0 without neighbours.
-
-        The matching errors of two points are independent, so that the mean product of their
-        residuals is the variance of what they share: the error of the transform.
-        """
-        products = self.residuals_px @ self.residuals_px.T / 2
-        weights = self.neighbours
-        return max(float((weights * products).sum() / max(weights.sum(), _LEAST_WEIGHT)), 0.0)
-
-
-@dataclass(frozen=True)
 class Common:
     """What displaces all points alike, so that no check point shows it.
 
@@ -159,7 +114,7 @@ NOTHING_COMMON = Common()
 def predict_accuracy(
     fold_models: Sequence[PointFunction],
     places_px: FloatArray,
-    check: CheckResiduals,
+    check: Misses,
     common: Common,
 ) -> Accuracy:
     """Predict the error of a transform at a random one of some places.
@@ -186,7 +141,8 @@ def predict_accuracy(
         return UNKNOWN
 
     blocks = _block_variance_px2(fold_models, check)
-    factor, deviations = _factor(blocks, check), _deviations(fold_models, places_px)
+    shared, noise = shared_by_neighbours(check)
+    factor, deviations = _factor(blocks, shared), _deviations(fold_models, places_px)
     random = np.random.default_rng(0)
     parts = random.standard_normal((_DRAWS, count)) * factor
     moved = np.einsum("dk,kmx->dmx", parts, deviations)
@@ -200,7 +156,7 @@ def predict_accuracy(
         return [float(r) for r in np.quantile(np.hypot(error[..., 0], error[..., 1]), shares)]
 
     ce50, ce90, ce95 = radii(1 / np.sqrt(known), (0.5, 0.9, 0.95))
-    freedom = _degrees_of_freedom(blocks, count, check)
+    freedom = _degrees_of_freedom(blocks, count, shared, noise)
     low, high = (
         radii(math.sqrt(freedom / (2 * float(gammaincinv(freedom / 2, share)))), (0.9,))[0]
         for share in ((1 + _CONFIDENCE) / 2, (1 - _CONFIDENCE) / 2)
@@ -222,7 +178,7 @@ def predict_accuracy(
 def standard_deviation_px(
     fold_models: Sequence[PointFunction],
     places_px: FloatArray,
-    check: CheckResiduals,
+    check: Misses,
     common: Common,
 ) -> FloatArray:
     """Return the standard deviation along an axis of a transform's error at places, shape (m,).
@@ -232,7 +188,7 @@ def standard_deviation_px(
     """
     if len(fold_models) < 2 or len(check.px) == 0:
         return np.full(len(places_px), np.inf)
-    factor = _factor(_block_variance_px2(fold_models, check), check)
+    factor = _factor(_block_variance_px2(fold_models, check), shared_by_neighbours(check)[0])
     variance = (_deviations(fold_models, places_px) ** 2).sum(axis=0).mean(axis=-1) * factor**2
     # Heights: of an even distribution between both limits.
     alike = float((common.heights_px**2).mean()) / 3 + common.sigma_px**2
@@ -243,30 +199,56 @@ def _deviations(fold_models: Sequence[PointFunction], px: FloatArray) -> FloatAr
     return jackknife_deviations([model(px) for model in fold_models])
 
 
-def _block_variance_px2(fold_models: Sequence[PointFunction], check: CheckResiduals) -> float:
+def _block_variance_px2(fold_models: Sequence[PointFunction], check: Misses) -> float:
     """Return the mean variance along an axis that blocks of points leave at the check points."""
     return float((_deviations(fold_models, check.px) ** 2).sum(axis=0).mean())
 
 
-def _factor(blocks_px2: float, check: CheckResiduals) -> float:
+def shared_by_neighbours(check: Misses) -> tuple[float, float]:
+    """Return the variance along an axis of what neighbours have in common, and that of its noise.
+
+    The first is 0 without neighbours. The matching errors of two points are independent, so that
+    the mean product of their residuals is the variance of what they share: the error of the
+    transform. Points count by their probabilities to be inliers.
+    """
+    weights, residuals = check.mixture.probability, check.residuals_px
+    pairs = np.outer(weights, weights) * _are_neighbours(check.px)
+    count = max(float(pairs.sum()), _LEAST_WEIGHT)
+    products = residuals @ residuals.T / 2
+    shared = max(float((pairs * products).sum()) / count, 0.0)
+    squared = (residuals**2).sum(axis=1) / 2
+    variance = float((weights * squared).sum()) / max(float(weights.sum()), _LEAST_WEIGHT)
+    return shared, variance**2 / count
+
+
+def _are_neighbours(px: FloatArray) -> Mask:
+    """Return which points, (n, 2), are neighbours, shape (n, n)."""
+    if len(px) < 2:
+        return np.zeros((len(px),) * 2, bool)
+    apart = np.hypot(*(px[:, None] - px).transpose(2, 0, 1))
+    np.fill_diagonal(apart, np.inf)
+    return np.asarray(apart <= NEIGHBOUR_SPACINGS * np.median(apart.min(axis=1)))
+
+
+def _factor(blocks_px2: float, shared_px2: float) -> float:
     """Return by how much deviations are larger than those of blocks show: see `predict_accuracy`.
 
     Their variance is the mean of what blocks show and of what check points share.
     """
     if blocks_px2 <= 0:
         return 1.0
-    return math.sqrt((blocks_px2 + check.shared_variance_px2) / (2 * blocks_px2))
+    return math.sqrt((blocks_px2 + shared_px2) / (2 * blocks_px2))
 
 
-def _degrees_of_freedom(blocks_px2: float, count: int, check: CheckResiduals) -> float:
+def _degrees_of_freedom(
+    blocks_px2: float, count: int, shared_px2: float, noise_px4: float
+) -> float:
     """Return those of the mean of the two variances, by their own variances ([Satterthwaite1946]).
 
     What all check points share was drawn once, along two axes, and is found among the noise of the
     products of neighbours. No fewer than Student's distribution has, as noise is no variance.
     """
-    shared, pairs = check.shared_variance_px2, float(check.neighbours.sum()) / 2
-    by_blocks = blocks_px2**2 / (count - 1)
-    by_check = shared**2 + check.variance_px2**2 / max(2 * pairs, _LEAST_WEIGHT)
-    total = by_blocks + by_check
-    found = 2 * (blocks_px2 + shared) ** 2 / total if total > 0 else 0.0
+    by_check = shared_px2**2 + noise_px4
+    total = blocks_px2**2 / (count - 1) + by_check
+    found = 2 * (blocks_px2 + shared_px2) ** 2 / total if total > 0 else 0.0
     return max(found, count - 1.0)

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from ..rasters.grid import FloatArray
-from .accuracy import CheckResiduals
 from .chance import agreement_probability, log10_chance
 from .judging import TOLERANCE_PX, sigma_range_px
 from .robust import Mixture, fit_mixture
@@ -59,8 +58,3 @@ class Misses:
         """Return log10 of the probability that as many of so many random matches would agree."""
         probability = agreement_probability(self.tolerance_px, self.radius_px)
         return log10_chance(self.agreeing, total, probability)
-
-    @property
-    def weighed(self) -> CheckResiduals:
-        """The residuals with their probabilities to be inliers."""
-        return CheckResiduals(self.px, self.residuals_px, self.mixture.probability)

@@ -260,7 +260,7 @@ class RegistrationEvidence:
             len(self.check),
             "the overlap",
             jackknife_spread(fold_models, lattice),
-            predict_accuracy(fold_models, lattice, misses.weighed, self.common),
+            predict_accuracy(fold_models, lattice, misses, self.common),
             self.tries,
         )
 
@@ -275,9 +275,7 @@ class RegistrationEvidence:
 
     def standard_deviation_px(self, px: FloatArray) -> FloatArray:
         """Return that of the transform's error along an axis, shape (n,), at pixels (n, 2)."""
-        return standard_deviation_px(
-            self.estimate.fold_models, px, self._misses.weighed, self.common
-        )
+        return standard_deviation_px(self.estimate.fold_models, px, self._misses, self.common)
 
     @cached_property
     def _misses(self) -> Misses:

@@ -152,7 +152,7 @@ class PoseSurveyEvidence:
             total,
             "the overlap",
             jackknife_spread(fold_models, lattice),
-            predict_accuracy(fold_models, lattice, misses.weighed, Common(2 * heights)),
+            predict_accuracy(fold_models, lattice, misses, Common(2 * heights)),
             least_share=SMALLEST_SHARE_UNROTATED if self.is_shift else SMALLEST_INLIER_SHARE,
         )
 

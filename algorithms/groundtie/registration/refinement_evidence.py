@@ -130,7 +130,7 @@ class RefinementEvidence:
             len(after),
             "the image",
             _spread_px(adjustment, nodes_px),
-            predict_accuracy(adjustment.fold_biases, nodes_px, misses.weighed, common),
+            predict_accuracy(adjustment.fold_biases, nodes_px, misses, common),
         )
         used_px = control.found_px[adjustment.used]
         return cls(
