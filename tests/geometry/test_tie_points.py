@@ -42,10 +42,6 @@ def test_rejecting_keeps_the_first_reason() -> None:
     assert points.used.tolist() == [False, False, True, False, True]
 
 
-def test_roles() -> None:
-    assert some_points(3).role.tolist() == ["check", "fit", "check"]
-
-
 def test_taking_and_joining_rows() -> None:
     points = some_points()
     joined = TiePoints.concatenate([points.take(points.is_check), points.take(~points.is_check)])

@@ -50,7 +50,7 @@ def tie_point_columns(points: TiePoints, transform: Transform) -> dict[str, NDAr
             sigma,
         ]
     )
-    texts = (points.role, points.state)
+    texts = (np.where(points.is_check, "check", "fit"), points.state)
     return dict(zip((*NUMBERS, *TEXTS), (*numbers.T, *texts), strict=True))
 
 

@@ -70,11 +70,6 @@ class TiePoints:
         """Which points, held out of every fit, are measured, shape (n,)."""
         return self.used & self.is_check
 
-    @property
-    def role(self) -> NDArray[np.str_]:
-        """The points' role, "fit" or "check", shape (n,)."""
-        return np.where(self.is_check, "check", "fit")
-
     def residual_px(self, transform: Transform) -> FloatArray:
         """Return `input_px` minus where `transform` puts the points, in input pixels, (n, 2)."""
         return np.asarray(self.input_px - transform(self.reference_xy))
