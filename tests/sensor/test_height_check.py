@@ -28,10 +28,12 @@ def narrow() -> RPC:
 
 
 def check(folder: Path, rpc: RPC, offset_m: float) -> HeightCheck:
+    px = np.random.default_rng(0).uniform(0, 1, (20, 2)) * SIZE
+    control = Control(px, px, np.tile(0.01 * np.eye(2), (20, 1, 1)), SIZE)
     image = write_positions(folder / "image.tif", rpc)
     dem = write_dem(folder / "dem.tif", offset_m=offset_m)
     with open_raster(image, allow_sensor_geometry=True) as source, open_raster(dem) as terrain:
-        return check_heights(orient(source, rpc, UTM, terrain), SIZE)
+        return check_heights(orient(source, rpc, UTM, terrain), control, adjust(control))
 
 
 @pytest.mark.slow
@@ -67,7 +69,7 @@ def told_by_residuals(tmp_path: Path, noise_px: float) -> tuple[float, float]:
     found = rpc.project(ground, 340.0) + random.normal(0, noise_px, px.shape) + [5.0, -3.0]
     control = Control(px, found, np.tile(np.eye(2) * noise_px**2, (200, 1, 1)), SIZE)
     adjustment = replace(adjust(control, "shift"), sigma_px=0.0, used=np.ones(200, bool))
-    result = check_heights(orientation, SIZE, control, adjustment)
+    result = check_heights(orientation, control, adjustment)
     assert result.offset_m is not None
     assert result.offset_sigma_m is not None
     return result.offset_m, result.offset_sigma_m
@@ -92,7 +94,7 @@ def test_an_affine_bias_is_no_height_error(tmp_path: Path) -> None:
     found = px + [5.0, -3.0] + (px - np.array(SIZE) / 2) @ [[1e-3, 0], [-5e-4, 1e-3]]
     found += random.normal(0, 0.1, px.shape)
     control = Control(px, found, np.tile(np.eye(2) * 0.1**2, (200, 1, 1)), SIZE)
-    result = check_heights(orientation, SIZE, control, adjust(control, "shift"))
+    result = check_heights(orientation, control, adjust(control, "shift"))
     assert result.warnings() == []
 
 

@@ -156,9 +156,7 @@ class Refinement:
         With `own_heights` the points have heights of their own, which are compared.
         """
         above = self._median_above() if own_heights else None
-        return check_heights(
-            self.image.orientation, self.image.size, self.control, self.adjustment, above
-        )
+        return check_heights(self.image.orientation, self.control, self.adjustment, above)
 
     def _median_above(self) -> float | None:
         """Return how far points that have heights of their own lie above the ground."""

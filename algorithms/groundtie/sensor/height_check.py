@@ -107,9 +107,8 @@ class HeightCheck:
 
 def check_heights(
     orientation: Orientation,
-    size: tuple[int, int],
-    control: Control | None = None,
-    adjustment: Adjustment | None = None,
+    control: Control,
+    adjustment: Adjustment,
     control_offset_m: float | None = None,
 ) -> HeightCheck:
     """Check the heights of an orientation.
@@ -118,21 +117,17 @@ def check_heights(
     ----------
     orientation
         How the image sees the ground.
-    size
-        Width and height of the image.
     control, adjustment
         Control points of the image and what was fitted to them.
     control_offset_m
         See `HeightCheck`.
     """
     rpc = orientation.rpc
-    seen = seen_at(rpc, size, orientation.heights.typical_m, 33)
+    seen = seen_at(rpc, control.size, orientation.heights.typical_m, 33)
     heights = orientation.heights.at(seen)
     heights = heights[np.isfinite(heights)]
     low, high = (float(np.quantile(heights, tail)) for tail in (_TAIL, 1 - _TAIL))
-    offset = sigma = None
-    if control is not None and adjustment is not None:
-        offset, sigma = _offset(orientation, control, adjustment)
+    offset, sigma = _offset(orientation, control, adjustment)
     constant = isinstance(orientation.heights, ConstantHeight)
     return HeightCheck(
         (low, high),
