@@ -42,6 +42,9 @@ RADIUS_PX = 40
 GROUND = {"ground, grey levels": False, "ground, colours": True}
 _GROUND_RADIUS_PX, _GROUND_CHIP_PX = 10, 80
 
+# How directions of shadows are inferred: outer percentages of the histogram, farthest pixels.
+_SHADOWS = 15.0, 14
+
 # Where the search of the ground starts, right and down of the truth, and how often it is repeated,
 # as its joint histogram gets the better the nearer it is.
 _START_PX, _ROUNDS = (2.0, 2.0), 3
@@ -134,7 +137,7 @@ def of_ground(seed: int, pair: Pair) -> tuple[list[Drawn], Directions]:
         )
         scene = Scene.of(images.reference.source)
         camera = Scene.of(images.input.source)
-        azimuths = [shadow_azimuth_deg(one.read(one.whole)) for one in (scene, camera)]
+        azimuths = [shadow_azimuth_deg(one.read(one.whole), *_SHADOWS) for one in (scene, camera)]
         masked = masked_by(images, scene, find_ground(scene).select, stack)
         for name, is_coloured in GROUND.items():
             matcher = PooledHistogramMatcher.of(masked, _GROUND_CHIP_PX, nothing_hidden)

@@ -13,16 +13,11 @@ import scipy.fft
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage
 
-# Dark and bright are the outer parts of the histogram.
-_OUTER_PERCENT = 15.0
-
-# Distances of dark pixels from bright ones, in pixels.
-_NEAR_PX, _FAR_PX = 2, 14
+# Least distance of dark pixels from bright ones, in pixels.
+_NEAR_PX = 2
 
 
-def shadow_azimuth_deg(
-    patch: Patch, outer_percent: float = _OUTER_PERCENT, far_px: int = _FAR_PX
-) -> float:
+def shadow_azimuth_deg(patch: Patch, outer_percent: float, far_px: int) -> float:
     """Return the direction in which shadows fall, clockwise from the top of the image.
 
     Parameters
@@ -31,7 +26,7 @@ def shadow_azimuth_deg(
         An image with tall objects: a camera's, or a radar's without speckle, whose shadows fall
         away from the sensor.
     outer_percent
-        So many of the pixels are dark, and so many bright.
+        So many of the pixels, the outer parts of the histogram, are dark, and so many bright.
     far_px
         Largest distance of dark pixels from bright ones.
     """
