@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from affine import Affine
@@ -103,17 +103,14 @@ class Model(ABC):
     kind: str
     frame: Frame
 
-    # Arrays that make the model.
-    _NUMBERS: ClassVar[tuple[str, ...]] = ("coefficients",)
-
     @abstractmethod
     def displacement(self, uv: FloatArray) -> FloatArray:
         """Return the displacement, in the frame, of positions in the frame, both (n, 2)."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the model as values that JSON can carry."""
-        numbers = {name: getattr(self, name).tolist() for name in self._NUMBERS}
-        return {"kind": self.kind, "frame": list(self.frame.to_map)[:6], **numbers}
+        arrays = {k: v.tolist() for k, v in vars(self).items() if isinstance(v, np.ndarray)}
+        return {"kind": self.kind, "frame": list(self.frame.to_map)[:6], **arrays}
 
     def __call__(self, xy: ArrayLike) -> FloatArray:
         """Return the nominal positions, shape (n, 2), of reference map positions `xy`."""
@@ -195,8 +192,6 @@ class ThinPlateSpline(Model):
     knots: FloatArray
     weights: FloatArray
     affine: FloatArray
-
-    _NUMBERS = ("knots", "weights", "affine")
 
     def displacement(self, uv: FloatArray) -> FloatArray:
         """Return the displacement, in the frame, of positions in the frame, both (n, 2)."""
