@@ -103,8 +103,8 @@ def open_ground(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:
     found = np.zeros(level.shape, np.float32)
     with np.errstate(divide="ignore"):  # layover and shadow themselves lie 0 from themselves
         for times, px in (
-            (2, _nearest_px(bright)),
-            (2, _nearest_px(dark)),
+            (2, nearest_px(bright)),
+            (2, nearest_px(dark)),
             (1, distance_back_px(bright, azimuth_deg)),
             (1, distance_back_px(dark, azimuth_deg + 180)),
         ):
@@ -113,7 +113,8 @@ def open_ground(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:
     return np.asarray((found >= np.log(least_px)) & valid)
 
 
-def _nearest_px(mask: Mask) -> FloatImage:
+def nearest_px(mask: Mask) -> FloatImage:
+    """Return how far each pixel lies from the nearest of a mask, shape (h, w)."""
     return np.asarray(cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5))
 
 

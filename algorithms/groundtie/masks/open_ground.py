@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from ..rasters.grid import Grid
@@ -22,6 +21,7 @@ from ..speckle.statistics import (
     local_statistics,
     window_counts,
 )
+from .ground import nearest_px
 from .radar import SAMPLE_PX, power
 from .scene import Scene, Selection
 
@@ -62,8 +62,7 @@ class OpenGround:
         around = window.widened(LOOKS_WINDOW_PX // 2 + _AREA_PX // 2 + self._beside_px)
         patch = self.scene.read(around)
         inside = window.slices_in(around)
-        others = (~self._areas(patch)).astype(np.uint8)
-        far = cv2.distanceTransform(others, cv2.DIST_L2, 5) > self._beside_px
+        far = nearest_px(self._areas(patch)) > self._beside_px
         valid = patch.valid[inside]
         return Selection(far[inside] & valid, valid)
 
