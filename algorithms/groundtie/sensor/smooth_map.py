@@ -47,16 +47,13 @@ class SmoothMap:
         moved = np.empty((len(xy), 2))
 
         def work(part: slice, terms: FloatArray) -> None:
-            unit = self._unit(xy[part])
+            unit = (2 * (xy[part] - self.low) / (self.high - self.low) - 1).T
             fill_terms(unit, terms, _PRODUCTS)
             moved[part] = (self.coefficients @ terms).T
             moved[part][(np.abs(unit) > 1 + 1e-9).any(axis=0)] = np.nan
 
         in_blocks(work, len(xy), terms=_TERMS)
         return moved
-
-    def _unit(self, xy: FloatArray) -> FloatArray:
-        return np.asarray((2 * (xy - self.low) / (self.high - self.low) - 1).T)
 
 
 def smooth_map(
