@@ -45,22 +45,18 @@ class MaskValues:
         return np.asarray(found)
 
 
-def _bits(*numbers: int) -> int:
-    return sum(1 << number for number in numbers)
-
-
 # No data, defects, clouds and their shadows; water and snow take part.
 SCHEMES: Mapping[str, MaskValues] = MappingProxyType(
     {
         # Sentinel-2's scene classification: no data, saturated, shadow, clouds [MainKnorn2017].
         "scl": MaskValues(((0, 1), (3, 3), (8, 10))),
         # Landsat Collection 2: fill, dilated cloud, cirrus, cloud, shadow [USGS2022].
-        "qa-pixel": MaskValues(bits=_bits(0, 1, 2, 3, 4)),
+        "qa-pixel": MaskValues(bits=0b11111),
         # Fmask: shadow, cloud, no observation [Zhu2012].
         "fmask": MaskValues(((2, 2), (4, 4), (255, 255))),
         # Harmonized Landsat Sentinel-2: cirrus, cloud, beside them, shadow [Claverie2018]; fill is
         # all bits.
-        "hls-fmask": MaskValues(bits=_bits(0, 1, 2, 3)),
+        "hls-fmask": MaskValues(bits=0b1111),
         # Planet's usable data mask: its first band is 0 where the ground is hidden [Planet2022].
         "udm2": MaskValues(((0, 0),)),
     }
