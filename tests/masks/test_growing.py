@@ -78,6 +78,3 @@ class TestShape:
         across = (rows - 100) * np.cos(0.6) - (cols - 100) * np.sin(0.6)
         shape = Shape.of((np.abs(along) < 60) & (np.abs(across) < 10))
         np.testing.assert_allclose([shape.length, shape.width], [120, 20], rtol=0.02)
-
-    def test_nothing_has_no_area(self) -> None:
-        assert Shape.of(np.zeros((4, 4), bool)).area == 0

@@ -100,11 +100,9 @@ class Shape:
 
     @classmethod
     def of(cls, region: Mask) -> Shape:
-        """Return the shape of the pixels of a mask, shape (h, w)."""
+        """Return the shape of the pixels, one at least, of a mask, shape (h, w)."""
         m = cv2.moments(region.astype(np.uint8), binaryImage=True)
         area = m["m00"]
-        if area == 0:
-            return cls(0.0, 0.0, 0.0)
         # A pixel is a square: it has moments of its own.
         xx, yy, xy = m["mu20"] / area + 1 / 12, m["mu02"] / area + 1 / 12, m["mu11"] / area
         middle, half = (xx + yy) / 2, float(np.hypot((xx - yy) / 2, xy))
