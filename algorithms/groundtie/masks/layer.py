@@ -106,9 +106,8 @@ def read_layer(path: str | os.PathLike[str], scene: Scene, width_m: float) -> La
     """
     layer = read_vector_layer(path).on_map(scene.grid.crs)
     every = [feature["geometry"] for feature in layer.features]
-    found = [geometry for geometry in every if geometry["type"] in AREAS + _LINES]
     areas, lines = (
-        tuple(geometry for geometry in found if geometry["type"] in kinds)
+        tuple(geometry for geometry in every if geometry["type"] in kinds)
         for kinds in (AREAS, _LINES)
     )
     if not areas and not lines:
