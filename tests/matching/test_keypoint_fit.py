@@ -15,7 +15,6 @@ from groundtie.errors import TooFewPointsError
 from groundtie.features import tiles
 from groundtie.features.descriptors import SiftDescriptor
 from groundtie.features.detectors import SiftOctDetector
-from groundtie.features.keypoints import Keypoints
 from groundtie.features.matching import GATE_PX
 from groundtie.features.tiles import Describing, Detecting
 from groundtie.geometry.estimation import Estimate
@@ -24,7 +23,7 @@ from groundtie.matching import keypoints
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.held_out import HeldOut
 from groundtie.matching.keypoint_fit import KeypointFit
-from groundtie.matching.keypoints import KeypointMatcher, KeypointMatches, correspondences
+from groundtie.matching.keypoints import KeypointMatcher
 from groundtie.matching.matcher import Correspondences
 from groundtie.matching.surface_fit import SurfaceFit
 from groundtie.rasters.grid import Grid
@@ -146,12 +145,7 @@ class Astray:
         partner[:, 0] += self.most_px * px[:, 0] / grid.width
         # Nearly all agree on a wrong place; so few others are no rival.
         partner[np.arange(len(px)) % 20 > 0, 1] += self.wrong_px
-        both = [
-            Keypoints(at, *(np.ones(len(px)) for _ in range(3)), np.zeros(len(px), int))
-            for at in (px, partner)
-        ]
-        found = KeypointMatches(*both, np.full(len(px), 0.5), (len(px), len(px)))
-        return correspondences(found, radius_px)
+        return Correspondences(px, partner, np.full(len(px), 2.0), float(np.pi * radius_px**2))
 
 
 @pytest.mark.slow
@@ -182,16 +176,14 @@ def test_the_coarse_model_is_taken_where_keypoints_agree_on_a_wrong_one(
 @pytest.mark.slow
 def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.MonkeyPatch) -> None:
     with files.opened() as pair, threads(2) as context:
-        whole = KeypointMatcher(pair, *KEYPOINTS).keypoints(COARSE, GATE_PX, context)
+        whole = KeypointMatcher(pair, *KEYPOINTS).match(COARSE, None, GATE_PX, context)
         monkeypatch.setattr(tiles, "_TILE_PX", 128)
-        parts = KeypointMatcher(pair, *KEYPOINTS).keypoints(COARSE, GATE_PX, context)
+        parts = KeypointMatcher(pair, *KEYPOINTS).match(COARSE, None, GATE_PX, context)
 
-    def places(matches: keypoints.KeypointMatches) -> set[tuple[float, ...]]:
-        both = np.hstack([matches.reference.position_px, matches.input.position_px])
-        return {tuple(row) for row in np.rint(both)}
+    def places(matches: Correspondences) -> set[tuple[float, ...]]:
+        return {tuple(row) for row in np.rint(np.hstack([matches.px, matches.partner_px]))}
 
     # Each tile stretches its own grey values.
-    assert abs(parts.found[0] - whole.found[0]) < 0.15 * whole.found[0]
     shared = places(whole) & places(parts)
     assert len(shared) > 0.6 * len(places(whole))
 
@@ -209,15 +201,17 @@ def test_a_tile_sees_all_that_its_keypoints_see_but_not_far_beyond_the_grid() ->
 
 
 def test_only_keypoints_on_the_ground_are_matched(files: TexturedPair, tmp_path: Path) -> None:
-    shown = np.zeros((SIZE[1], SIZE[0]), np.uint8)
-    shown[:, 100:] = 1
-    mask = write_raster(tmp_path / "ground.tif", shown, files.grid)
+    ground_px = np.zeros((SIZE[1], SIZE[0]), np.uint8)
+    ground_px[:, 100:] = 1
+    mask = write_raster(tmp_path / "ground.tif", ground_px, files.grid)
     with files.opened() as pair, open_raster(mask) as ground, threads(2) as context:
         masked = replace(pair, reference=Image(pair.reference.source, None, ground))
-        found = KeypointMatcher(pair, *KEYPOINTS, shown=masked).keypoints(COARSE, GATE_PX, context)
-        everywhere = KeypointMatcher(pair, *KEYPOINTS).keypoints(COARSE, GATE_PX, context)
-    assert 50 < len(found.reference) < len(everywhere.reference)
-    assert found.reference.position_px[:, 0].min() > 99
+        found, everywhere = (
+            KeypointMatcher(pair, *KEYPOINTS, shown=shown).match(COARSE, None, GATE_PX, context)
+            for shown in (masked, None)
+        )
+    assert 50 < len(found.px) < len(everywhere.px)
+    assert found.px[:, 0].min() > 99
 
 
 def test_a_coarse_model_that_is_off_by_more_than_the_gate_finds_nothing_right(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..rasters.grid import FloatArray
 
@@ -50,10 +50,6 @@ class Keypoints:
     def take(self, which: Any) -> Keypoints:
         """Return the rows that the index or mask `which` selects."""
         return Keypoints(**{name: getattr(self, name)[which] for name in _FIELDS})
-
-    def moved(self, by_px: ArrayLike) -> Keypoints:
-        """Return the keypoints with positions (col, row) moved by `by_px`."""
-        return replace(self, position_px=self.position_px + np.asarray(by_px, float))
 
     def with_orientation(self, orientation_rad: FloatArray) -> Keypoints:
         """Return the keypoints with other orientations, shape (n,)."""

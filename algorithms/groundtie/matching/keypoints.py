@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..context import Context
 from ..features.detectors import seen_whole
@@ -14,14 +13,11 @@ from ..features.keypoints import Keypoints
 from ..features.matching import match_near
 from ..features.tiles import MARGIN_PX, Describing, Detecting, inside, tiles
 from ..geometry.models import Model
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
 from .matcher import Correspondences, MaskOf, Places
-
-FloatArray = NDArray[np.float64]
-
 
 # A keypoint lies in a part of an image if all within so many of its scales belongs to it.
 _INSIDE_SCALES = 1.5
@@ -29,39 +25,8 @@ _INSIDE_SCALES = 1.5
 # More keypoints than this in a tile make matching longer, not better.
 _MOST_PER_TILE = 6000
 
-
 # A partner without a rival in its gate is as much nearer than the next as this, at most.
 _LARGEST_SCORE = 10.0
-
-
-@dataclass(frozen=True)
-class KeypointMatches:
-    """Pairs of keypoints on the matching grid, the input's resampled by a coarse model.
-
-    Parameters
-    ----------
-    reference, input
-        The keypoints, row by row partners.
-    ratio
-        Distance of the descriptors over that to the next best partner, shape (n,).
-    found
-        How many keypoints each image has.
-    """
-
-    reference: Keypoints
-    input: Keypoints
-    ratio: FloatArray
-    found: tuple[int, int]
-
-    @classmethod
-    def concatenate(cls, parts: list[KeypointMatches]) -> KeypointMatches:
-        """Return the matches of all tiles."""
-        return cls(
-            Keypoints.concatenate([part.reference for part in parts]),
-            Keypoints.concatenate([part.input for part in parts]),
-            np.concatenate([part.ratio for part in parts]),
-            (sum(part.found[0] for part in parts), sum(part.found[1] for part in parts)),
-        )
 
 
 @dataclass(frozen=True)
@@ -104,17 +69,18 @@ class KeypointMatcher:
         context
             Threads and progress.
         """
-        return correspondences(self.keypoints(model, radius_px, context), radius_px)
-
-    def keypoints(self, model: Model, radius_px: int, context: Context) -> KeypointMatches:
-        """Return the matched keypoints themselves; parameters as `match`."""
         match_tile = partial(self._match_tile, coarse=model, gate=radius_px)
         parts = context.map(match_tile, list(tiles(self.pair.grid)))
-        return KeypointMatches.concatenate(list(parts))
+        px, partner_px, ratio = map(np.concatenate, zip(*parts, strict=True))
+        # The better, the farther the next one in the gate is.
+        score = 1 / np.maximum(ratio, 1 / _LARGEST_SCORE)
+        return Correspondences(px, partner_px, score, float(np.pi * radius_px**2))
 
-    def _match_tile(self, tile: Window, coarse: Model, gate: int) -> KeypointMatches:
+    def _match_tile(
+        self, tile: Window, coarse: Model, gate: int
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the positions, (n, 2), of partners in both images, and their ratios, (n,)."""
         area = seen_around(tile, self.pair.grid, gate)
-        corner = area.col, area.row
         piece = self.pair.grid.window(*area)
         masked = None if self.held_out is None else self.held_out(piece)
         reference = self.pair.reference_patch(piece, masked)
@@ -144,11 +110,11 @@ class KeypointMatcher:
             partners.position_px,
             gate,
         )
-        return KeypointMatches(
-            points.take(matches.first).moved(corner),
-            partners.take(matches.second).moved(corner),
+        corner = np.array([area.col, area.row], float)
+        return (
+            points.position_px[matches.first] + corner,
+            partners.position_px[matches.second] + corner,
             matches.ratio,
-            (len(own), int(inside(others.position_px, core).sum())),
         )
 
     def _features(self, patch: Patch, window: Window, part: Mask | None) -> Keypoints:
@@ -170,18 +136,3 @@ def seen_around(tile: Window, grid: Grid, gate: int) -> Window:
     """
     whole = Window(0, 0, grid.width, grid.height)
     return tile.widened(gate + MARGIN_PX).common(whole.widened(gate))
-
-
-def correspondences(matches: KeypointMatches, radius_px: int) -> Correspondences:
-    """Return matched keypoints as correspondences, with a score by how much the next one is worse.
-
-    Parameters
-    ----------
-    matches
-        The keypoints.
-    radius_px
-        How far a partner was looked for.
-    """
-    score = 1 / np.maximum(matches.ratio, 1 / _LARGEST_SCORE)
-    area = float(np.pi * radius_px**2)
-    return Correspondences(matches.reference.position_px, matches.input.position_px, score, area)
