@@ -21,7 +21,11 @@ from groundtie.geometry.limits import SearchLimits
 from groundtie.pose.pose import Pose
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.binning import MASKED, to_bins
-from groundtie.similarity.joint_histogram import count_joint_histograms, reach
+from groundtie.similarity.joint_histogram import (
+    count_joint_histograms,
+    gpve_histograms,
+    reach,
+)
 from groundtie.similarity.measures import normalized_mutual_information
 from groundtie.similarity.surface import SimilaritySettings, detrend
 from groundtie.studies.climbing import ClimbingSearch
@@ -124,15 +128,15 @@ def nmi_surfaces(
 
     `search` is larger than `template` by the radius and the widest kernel's reach on each side.
     """
-    margin = max(reach(order) for order in ORDERS)
-    radius = (search.shape[0] - template.shape[0]) // 2 - margin
-    volume = count_joint_histograms(template, search, (bins, bins), radius)
-    inner = slice(margin, -margin)
+    counts = count_joint_histograms(template, search, (bins, bins))
     surfaces = []
     for order in orders:
-        counts = volume.counts[inner, inner] if order == NEAREST else volume.histograms(order)
+        further = max(reach(other) for other in ORDERS) - reach(order)
+        inner = slice(further, -further or None)
+        near = counts[inner, inner]
+        histograms = near if order == NEAREST else gpve_histograms(near, order)
         # Row by row: the logarithms of all histograms at once would need much memory.
-        rows = [normalized_mutual_information(row) for row in counts]
+        rows = [normalized_mutual_information(row) for row in histograms]
         surfaces.append(np.stack(rows).astype(np.float32))
     return surfaces
 
@@ -384,7 +388,7 @@ def exhaustive_peak(template: Patch, input: Patch) -> Peak:
     """Return the shift of the highest NMI at aligned grids."""
     bins = CLIMBED.bins_for(template.values.size)
     own, other = (to_bins(patch.values, patch.valid, bins) for patch in (template, input))
-    counts = count_joint_histograms(own, other, (bins, bins), RADIUS_PX).counts
+    counts = count_joint_histograms(own, other, (bins, bins))
     return peak_of(np.stack([normalized_mutual_information(row) for row in counts]))
 
 
@@ -431,14 +435,14 @@ def time_counting(size: int) -> dict[str, Any]:
         for side in (size, size + span - 1)
     )
     started = time.perf_counter()
-    volume = count_joint_histograms(template, search, (WINDOW_BINS,) * 2, WINDOW_RADIUS_PX)
+    counts = count_joint_histograms(template, search, (WINDOW_BINS,) * 2)
     chosen = time.perf_counter()
     ranges = [0, WINDOW_BINS] * 2
     same = True
     for row, col in np.ndindex(span, span):
         window = search[row : row + size, col : col + size]
         counted = cv2.calcHist([template, window], [0, 1], None, [WINDOW_BINS] * 2, ranges)
-        same &= bool(np.array_equal(counted, volume.counts[row, col]))
+        same &= bool(np.array_equal(counted, counts[row, col]))
     direct = time.perf_counter()
     return {
         "what": "counting",

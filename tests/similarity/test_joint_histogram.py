@@ -6,19 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from scipy.interpolate import BSpline
 
 from groundtie.context import threads
 from groundtie.similarity import joint_histogram
 from groundtie.similarity.binning import MASKED
-from groundtie.similarity.joint_histogram import (
-    ORDERS,
-    JointHistogramVolume,
-    count_joint_histograms,
-    kernel,
-    support,
-)
+from groundtie.similarity.joint_histogram import count_joint_histograms, gpve_histograms, reach
 
+ORDERS = (2, 3, 4, 5, 6, 7)
 RADIUS, MARGIN = 3, 4
 BINS = (5, 6)
 
@@ -65,23 +59,14 @@ def gpve(
 
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("masked", [False, True])
-def test_sub_pixel_histograms_are_those_of_the_definition(order: int, masked: bool) -> None:
+def test_histograms_are_those_of_the_definition(order: int, masked: bool) -> None:
     template, search = windows(masked)
-    volume = count_joint_histograms(template, search, BINS, RADIUS)
-    for shift in ((0.3, -0.2), (-2.5, 1.75), (2.99, 0.0)):
-        expected = gpve(template, search, shift, order)
-        np.testing.assert_allclose(volume.at(shift, order), expected, atol=1e-6)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_surfaces_hold_the_histograms_of_whole_shifts(order: int) -> None:
-    template, search = windows(masked=True)
-    volume = count_joint_histograms(template, search, BINS, RADIUS)
-    histograms = volume.histograms(order)
-    assert histograms.shape == (2 * RADIUS + 1, 2 * RADIUS + 1, *BINS)
+    histograms = gpve_histograms(count_joint_histograms(template, search, BINS), order)
+    radius = RADIUS + MARGIN - reach(order)
+    assert histograms.shape == (2 * radius + 1, 2 * radius + 1, *BINS)
     for dy, dx in ((0, 0), (-3, 2), (3, 3)):
         expected = gpve(template, search, (dy, dx), order)
-        np.testing.assert_allclose(histograms[dy + RADIUS, dx + RADIUS], expected, atol=1e-4)
+        np.testing.assert_allclose(histograms[dy + radius, dx + radius], expected, atol=1e-4)
 
 
 def with_numpy(template: np.ndarray, search: np.ndarray, bins: tuple[int, int]) -> np.ndarray:
@@ -104,9 +89,8 @@ def test_counts_are_those_of_numpy(bins: tuple[int, int], masked: bool) -> None:
     expected = with_numpy(template, search, bins)
     with threads(2) as context:
         for where in (None, context):
-            volume = count_joint_histograms(template, search, bins, RADIUS, where)
-            np.testing.assert_array_equal(volume.counts, expected)
-    assert volume.margin == MARGIN
+            counts = count_joint_histograms(template, search, bins, where)
+            np.testing.assert_array_equal(counts, expected)
 
 
 @pytest.mark.parametrize("shape", [(20, 31), (3, 4), (11, 9)])
@@ -122,8 +106,8 @@ def test_counts_where_a_search_window_reaches_beyond_its_image(
     search = np.full_like(whole, MASKED)
     search[filled] = whole[filled]
     monkeypatch.setattr(joint_histogram, "_SPECTRAL_COST", 0.0)
-    volume = count_joint_histograms(template, search, bins, RADIUS)
-    np.testing.assert_array_equal(volume.counts, with_numpy(template, search, bins))
+    counts = count_joint_histograms(template, search, bins)
+    np.testing.assert_array_equal(counts, with_numpy(template, search, bins))
 
 
 @pytest.mark.parametrize("masked", [False, True])
@@ -137,8 +121,8 @@ def test_all_ways_to_count_agree(
     expected = with_numpy(template, search, bins)
     for cost in (0.0, 1e9):
         monkeypatch.setattr(joint_histogram, "_SPECTRAL_COST", cost)
-        volume = count_joint_histograms(template, search, bins, RADIUS)
-        np.testing.assert_array_equal(volume.counts, expected)
+        counts = count_joint_histograms(template, search, bins)
+        np.testing.assert_array_equal(counts, expected)
 
 
 @pytest.mark.parametrize("cost", [0.0, 1e9])
@@ -147,55 +131,26 @@ def test_stacks_are_counted_window_by_window(monkeypatch: pytest.MonkeyPatch, co
     bins = (4, 3)
     pairs = [windows(masked, (12, 20), bins) for masked in (False, True)]
     templates, searches = (np.stack(of) for of in zip(*pairs, strict=True))
-    volume = count_joint_histograms(templates, searches, bins, RADIUS)
-    for of_one, pair in zip(volume.counts, pairs, strict=True):
+    counts = count_joint_histograms(templates, searches, bins)
+    for of_one, pair in zip(counts, pairs, strict=True):
         np.testing.assert_array_equal(of_one, with_numpy(*pair, bins))
-    alone = [count_joint_histograms(*pair, bins, RADIUS) for pair in pairs]
-    np.testing.assert_array_equal(volume.histograms(), [one.histograms() for one in alone])
-    shift = (1.3, -0.6)
-    np.testing.assert_allclose(volume.at(shift, 4), [one.at(shift, 4) for one in alone])
+    alone = [gpve_histograms(count_joint_histograms(*pair, bins)) for pair in pairs]
+    np.testing.assert_array_equal(gpve_histograms(counts), alone)
 
 
 def test_every_pixel_is_counted_once() -> None:
     template, search = windows(masked=False)
-    histograms = count_joint_histograms(template, search, BINS, RADIUS).histograms(4)
+    histograms = gpve_histograms(count_joint_histograms(template, search, BINS), 4)
     np.testing.assert_allclose(histograms.sum(axis=(-2, -1)), template.size, rtol=1e-6)
     own = np.bincount(template.ravel(), minlength=BINS[0])
-    np.testing.assert_allclose(histograms.sum(axis=-1), np.broadcast_to(own, (7, 7, 5)), rtol=1e-5)
+    found = histograms.sum(axis=-1)
+    np.testing.assert_allclose(found, np.broadcast_to(own, found.shape), rtol=1e-5)
 
 
 @pytest.mark.parametrize("order", [4, 7])
 def test_rotated_images_have_the_histogram_of_the_opposite_shift(order: int) -> None:
     template, search = windows(masked=False)
-    volume = count_joint_histograms(template, search, BINS, RADIUS)
-    rotated = count_joint_histograms(template[::-1, ::-1], search[::-1, ::-1], BINS, RADIUS)
-    np.testing.assert_allclose(
-        volume.at((1.3, -0.6), order), rotated.at((-1.3, 0.6), order), atol=1e-9
-    )
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_kernels(order: int) -> None:
-    reach = support(order)
-    for offset in (-0.5, -0.2, 0.0, 0.35, 0.5):
-        weights = kernel(order, offset)
-        assert weights.shape == (2 * reach + 1,)
-        assert weights.sum() == pytest.approx(1)
-        assert weights.min() >= 0
-        expected = spline(order, np.arange(-reach, reach + 1) - offset)
-        np.testing.assert_allclose(weights, expected, atol=1e-12)
-        # From order 2 on, the mean of the weights' places is the offset itself.
-        assert weights @ np.arange(-reach, reach + 1) == pytest.approx(offset, abs=1e-12)
-    whole = BSpline.basis_element(np.arange(order + 1) - order / 2)(0.0)
-    assert kernel(order, 0.0)[reach] == pytest.approx(float(whole))
-
-
-def test_a_volume_without_margin_refuses_wide_kernels() -> None:
-    template, search = windows(masked=False)
-    counts = count_joint_histograms(template, search, BINS, RADIUS).counts
-    tight = JointHistogramVolume(counts, RADIUS + MARGIN)
-    assert tight.margin == 0
-    with pytest.raises(ValueError, match="margin of 0"):
-        tight.histograms(4)
-    with pytest.raises(ValueError, match="margin of 0"):
-        tight.at((0.0, 0.0), 2)
+    counts = count_joint_histograms(template, search, BINS)
+    rotated = count_joint_histograms(template[::-1, ::-1], search[::-1, ::-1], BINS)
+    opposite = gpve_histograms(rotated, order)[::-1, ::-1]
+    np.testing.assert_allclose(gpve_histograms(counts, order), opposite, atol=1e-4)

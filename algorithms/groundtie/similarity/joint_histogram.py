@@ -1,4 +1,4 @@
-"""The joint-histogram volume: joint histograms of a template and a search window at all shifts.
+"""Joint histograms of a template and a search window at all shifts.
 
 The joint histogram of generalised partial volume estimation (GPVE; [Chen2003], [Suri2010]
 eq 3.34) at any continuous shift is a B-spline combination of the nearest-neighbour histograms at
@@ -6,8 +6,8 @@ integer shifts, as long as every shift sees the same template pixels:
 
     h(i + u, j + v) = Σ_p Σ_q β(p - u) β(q - v) h_NN(i + p, j + q)
 
-So pixels are counted once, at integer shifts; every order, sub-pixel shift and derivative follows
-from the volume without touching a pixel again.
+So pixels are counted once, at integer shifts; every order follows from the counts without
+touching a pixel again.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from .correlation import from_spectrum, spans, spectrum, tight_shape
 from .stacks import each
 
 FloatArray = NDArray[np.float32]
-ORDERS = (2, 3, 4, 5, 6, 7)
 
 # The cubic B-spline is the first without interpolation artefacts.
 ORDER = 4
@@ -41,79 +40,35 @@ _PIXEL_COST, _CALL_COST, _SPECTRAL_COST = 0.8e-9, 3.5e-6, 0.15e-9
 _LARGEST_ROUNDING = 0.5 / 4
 
 
-def support(order: int) -> int:
-    """Return how far beyond a shift the kernel of this order reaches, in whole pixels."""
-    return (order + 1) // 2
-
-
 def reach(order: int = ORDER) -> int:
     """Return how far the kernel of this order reaches at integer shifts, in whole pixels."""
     return (order - 1) // 2
 
 
-def kernel(order: int, offset: float) -> NDArray[np.float64]:
-    """Return B-spline weights β(p - offset) at p = -support … support; they sum to 1.
-
-    `offset` is within ±0.5. Order n is degree n - 1: 2 is linear (PVI), 4 is cubic.
-    """
-    far = support(order)
-    start = offset - order / 2
-    first = math.floor(start)
-    weights = np.zeros(2 * far + 1)
-    weights[far + first + 1 :][:order] = bspline_weights(order, start - first)
-    return weights
-
-
-@dataclass(frozen=True)
-class JointHistogramVolume:
-    """Nearest-neighbour joint histograms at integer shifts.
+def gpve_histograms(counts: FloatArray, order: int = ORDER) -> FloatArray:
+    """Return the GPVE histograms at all integer shifts around which the kernel's reach was counted.
 
     Parameters
     ----------
     counts
-        Histograms, shape (…, 2 R + 1, 2 R + 1, template bins, search bins), for shifts -R … R of
-        rows and columns.
-    radius
-        Largest shift for which surfaces are wanted; R - radius shifts remain for the kernel.
+        See `count_joint_histograms`.
+    order
+        Order of the B-spline, its degree + 1, 2 (partial volume interpolation) to 7.
+
+    Returns
+    -------
+    Shape (…, ny - 2 reach, nx - 2 reach, template bins, search bins), float32.
     """
-
-    counts: FloatArray
-    radius: int
-
-    @property
-    def margin(self) -> int:
-        """How many further shifts there are on each side for the kernel."""
-        return (self.counts.shape[-3] - 1) // 2 - self.radius
-
-    def histograms(self, order: int = ORDER) -> FloatArray:
-        """Return the GPVE histograms at the integer shifts -radius … radius, float32."""
-        near, far = reach(order), support(order)
-        self._require(near)
-        weights = kernel(order, 0.0).astype(np.float32)[far - near : far + near + 1]
-        first, span = self.margin - near, 2 * self.radius + 1
-        inner = slice(first, first + span + 2 * near)
-        counts = np.moveaxis(self.counts[..., inner, inner, :, :], (-2, -1), (-4, -3))
-        made = np.empty((*counts.shape[:-2], span, span), np.float32)
-        # Bin by bin, so that what is worked stays in the processor's cache.
-        for own in range(counts.shape[-4]):
-            rows = _convolve(counts[..., own, :, :, :], weights, span, -2)
-            made[..., own, :, :, :] = _convolve(rows, weights, span, -1)
-        return np.moveaxis(made, (-4, -3), (-2, -1))
-
-    def at(self, shift: tuple[float, float], order: int) -> NDArray[np.float64]:
-        """Return the GPVE histogram at one shift (rows, columns), shape (…, bins, bins)."""
-        far = support(order)
-        self._require(far)
-        centre = self.counts.shape[-3] // 2
-        whole = [round(s) for s in shift]
-        weights = [kernel(order, s - w) for s, w in zip(shift, whole, strict=True)]
-        rows, cols = (slice(centre + w - far, centre + w + far + 1) for w in whole)
-        near = self.counts[..., rows, cols, :, :].astype(np.float64)
-        return np.einsum("p,q,...pqab->...ab", *weights, near)
-
-    def _require(self, needed: int) -> None:
-        if needed > self.margin:
-            raise ValueError(f"the volume's margin of {self.margin} is below the kernel's {needed}")
+    far = reach(order)
+    weights = bspline_weights(order, order % 2 / 2)[: 2 * far + 1].astype(np.float32)
+    planes = np.moveaxis(counts, (-2, -1), (-4, -3))
+    span_y, span_x = (n - 2 * far for n in planes.shape[-2:])
+    made = np.empty((*planes.shape[:-2], span_y, span_x), np.float32)
+    # Bin by bin, so that what is worked stays in the processor's cache.
+    for own in range(planes.shape[-4]):
+        rows = _convolve(planes[..., own, :, :, :], weights, span_y, -2)
+        made[..., own, :, :, :] = _convolve(rows, weights, span_x, -1)
+    return np.moveaxis(made, (-4, -3), (-2, -1))
 
 
 def _convolve(planes: FloatArray, weights: FloatArray, span: int, axis: int) -> FloatArray:
@@ -128,9 +83,8 @@ def count_joint_histograms(
     template: NDArray[np.uint8],
     search: NDArray[np.uint8],
     bins: tuple[int, int],
-    radius: int,
     context: Context | None = None,
-) -> JointHistogramVolume:
+) -> FloatArray:
     """Count the joint histograms of a template at all integer shifts in its search window.
 
     Parameters
@@ -138,14 +92,15 @@ def count_joint_histograms(
     template
         Binned template, shape (…, h, w), with `binning.MASKED` where a pixel does not count.
     search
-        Binned search window, shape (…, h + 2 R, w + 2 R), R ≥ `radius`; shift (0, 0) is its
-        centre.
+        Binned search window, shape (…, h + ny - 1, w + nx - 1).
     bins
         Number of bins of template and search window.
-    radius
-        Largest shift for which surfaces are wanted.
     context
         Threads to count in; by default the calling one alone.
+
+    Returns
+    -------
+    Nearest-neighbour histograms, shape (…, ny, nx, template bins, search bins), float32.
     """
     # Masked pixels go to one extra bin that is dropped; OpenCV's own mask is much slower.
     template = np.minimum(template, bins[0]).astype(np.uint8)
@@ -153,10 +108,8 @@ def count_joint_histograms(
     (own_rows, own_cols), (rows, cols) = template.shape[-2:], search.shape[-2:]
     if _spectral_cost(rows * cols, bins) < _direct_cost(own_rows * own_cols, rows - own_rows + 1):
         workers = 1 if context is None else context.workers
-        counts = _count_spectrally(template, search, bins, workers)
-    else:
-        counts = _count_directly(template, search, bins, context)
-    return JointHistogramVolume(counts, radius)
+        return _count_spectrally(template, search, bins, workers)
+    return _count_directly(template, search, bins, context)
 
 
 def _direct_cost(pixels: int, span: int) -> float:

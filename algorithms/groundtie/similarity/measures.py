@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..context import Context
 from .correlation import correlate_fields, correlate_grey
 from .description import Description
-from .joint_histogram import count_joint_histograms
+from .joint_histogram import count_joint_histograms, gpve_histograms
 
 FloatArray = NDArray[np.floating]
 Histograms: TypeAlias = Any  # an array, or a sparse matrix of scipy
@@ -58,9 +58,9 @@ def of_histograms(function: HistogramMeasure) -> Measure:
     def values(
         template: Description, search: Description, radius: int, context: Context | None
     ) -> FloatArray:
-        counts = (template.bin_count, search.bin_count)
-        volume = count_joint_histograms(template.bins, search.bins_around, counts, radius, context)
-        return function(volume.histograms()).astype(np.float32)
+        bins = (template.bin_count, search.bin_count)
+        counts = count_joint_histograms(template.bins, search.bins_around, bins, context)
+        return function(gpve_histograms(counts)).astype(np.float32)
 
     return values
 

@@ -213,9 +213,7 @@ def information_surface(
 def _most_informative_shift(template: Patch, search: Patch) -> tuple[int, int]:
     """Return the shift (rows, columns), from 0, of the highest mutual information of histograms."""
     first, second = (to_bins(p.values, p.valid, _ROUGH_BINS) for p in (template, search))
-    radius = (search.values.shape[0] - template.values.shape[0]) // 2
-    counts = count_joint_histograms(first, second, (_ROUGH_BINS,) * 2, radius).counts
-    information = mutual_information(counts)
+    information = mutual_information(count_joint_histograms(first, second, (_ROUGH_BINS,) * 2))
     dy, dx = np.unravel_index(information.argmax(), information.shape)
     return int(dy), int(dx)
 

@@ -26,7 +26,12 @@ from ..rasters.grid import FloatArray
 from ..rasters.kernels import bspline_weights
 from ..rasters.patch import Patch
 from ..similarity.binning import MASKED, bin_edges
-from ..similarity.joint_histogram import ORDER, count_joint_histograms, reach
+from ..similarity.joint_histogram import (
+    ORDER,
+    count_joint_histograms,
+    gpve_histograms,
+    reach,
+)
 from ..similarity.measures import HistogramMeasure
 
 Bins = NDArray[np.uint8] | NDArray[np.uint16]
@@ -187,8 +192,8 @@ def measure_surface(
     volume_bytes = 4 * (span + 2 * margin) ** 2 * counts[0] * counts[1]
     if max(counts) <= MASKED and volume_bytes <= _MOST_VOLUME_BYTES:
         first, second = (np.minimum(bins, MASKED).astype(np.uint8) for bins in (template, search))
-        volume = count_joint_histograms(first, second, counts, span // 2, context)
-        rows = context.map(measure, list(volume.histograms(order)))
+        counted = count_joint_histograms(first, second, counts, context)
+        rows = context.map(measure, list(gpve_histograms(counted, order)))
     else:
         rows = context.map(one_by_one, range(span))
     return np.array(list(rows), np.float32)
