@@ -29,9 +29,9 @@ Histograms: TypeAlias = Any  # an array, or a sparse matrix of scipy
 HistogramMeasure = Callable[[Histograms], FloatArray]
 
 # Takes templates (…, h, w), one or a stack; search windows with the same centres that are larger
-# by a radius on each side; the radius; and a context to work in. Returns values over shifts, shape
+# by a radius on each side; and a context to work in. Returns values over shifts, shape
 # (…, 2 radius + 1, 2 radius + 1), or several such surfaces that count the same, shape (n, …).
-Measure = Callable[[Description, Description, int, Context | None], FloatArray]
+Measure = Callable[[Description, Description, Context | None], FloatArray]
 
 MEASURES: dict[str, Measure] = {}
 
@@ -55,9 +55,7 @@ def measure(name: str) -> Callable[[Measure], Measure]:
 def of_histograms(function: HistogramMeasure) -> Measure:
     """Return the measure of windows that a measure on joint histograms makes."""
 
-    def values(
-        template: Description, search: Description, radius: int, context: Context | None
-    ) -> FloatArray:
+    def values(template: Description, search: Description, context: Context | None) -> FloatArray:
         bins = (template.bin_count, search.bin_count)
         counts = count_joint_histograms(template.bins, search.bins_around, bins, context)
         return function(gpve_histograms(counts)).astype(np.float32)
@@ -77,7 +75,7 @@ nmi = measure("nmi")(of_histograms(normalized_mutual_information))
 
 @measure("orientation")
 def orientation(
-    template: Description, search: Description, radius: int, context: Context | None = None
+    template: Description, search: Description, context: Context | None = None
 ) -> FloatArray:
     """Return the correlation of the orientation of edges, a surface for each scale."""
     valid = template.patch.valid, search.patch.valid
@@ -86,16 +84,14 @@ def orientation(
 
 @measure("edge-strength")
 def strength(
-    template: Description, search: Description, radius: int, context: Context | None = None
+    template: Description, search: Description, context: Context | None = None
 ) -> FloatArray:
     """Return the correlation of the strength of edges."""
     return correlate_grey(template.strength, search.strength)
 
 
 @measure("ncc")
-def ncc(
-    template: Description, search: Description, radius: int, context: Context | None = None
-) -> FloatArray:
+def ncc(template: Description, search: Description, context: Context | None = None) -> FloatArray:
     """Return the correlation of grey values."""
     return correlate_grey(template.patch, search.patch)
 

@@ -171,7 +171,7 @@ def similarity_surface(
     if not (template.patch.all_valid and search.patch.all_valid):
         known = overlap_share(template.patch, search.patch) >= least_overlap
     for name in settings.measures:
-        values = MEASURES[name](template, search, radius, context)
+        values = MEASURES[name](template, search, context)
         weight = np.float32(_WEIGHTS.get(name, 1.0))
         total += _standardised(values.reshape(-1, *shape), known) * weight
     return normalise(total, known)

@@ -200,7 +200,7 @@ class SurfaceSettings:
         deviations = similarity_surface(template, search, radius, settings, context)
         if self.similarity not in MEASURES:  # a sum of several has no values of its own
             return deviations, deviations
-        values = MEASURES[self.similarity](template, search, radius, context)
+        values = MEASURES[self.similarity](template, search, context)
         return values.reshape(-1, *deviations.shape).mean(axis=0), deviations
 
     def _of_histograms(
