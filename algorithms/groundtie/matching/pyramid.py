@@ -17,7 +17,7 @@ from .coarse_shift import Candidate, coarse_candidates, level_factor
 from .level_fit import CoarseModel, fit_level, fit_level_pooled
 from .matcher import MaskOf
 from .pooled import PooledHistogramMatcher
-from .surface_fit import FIT_RADIUS_PX
+from .surface_fit import FIT_RADIUS_PX, SurfaceMatcher
 
 # A candidate that random matches would hardly ever support (log10) needs no rival.
 _CERTAIN = -6.0
@@ -47,7 +47,7 @@ _POOLED_STEP = 2.0
 
 
 def find_coarse_model(
-    matcher: ChipMatcher | PooledHistogramMatcher,
+    matcher: SurfaceMatcher,
     held_out: MaskOf,
     limits: SearchLimits,
     context: Context,

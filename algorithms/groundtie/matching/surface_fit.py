@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
@@ -17,14 +18,16 @@ from ..geometry.terrain_model import TerrainModel
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..kinds import AUTO
-from ..rasters.grid import Grid, PointFunction
+from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..similarity.peak import Peak, find_peak, find_peak_near
 from .alignment import CANDIDATES, Alignment, Prior, align, choose_alignment
 from .belief_propagation import Surfaces
+from .chips import ChipMatcher
 from .frames import on_grid, on_map
 from .layout import ChipLayout
-from .matcher import ChipSurfaces, FloatArray, Places
+from .matcher import ChipSurfaces, FloatArray
+from .pooled import PooledHistogramMatcher
 
 # A tie point of the fit is the peak within this distance from the aligned model.
 _NEAR_PX = 3
@@ -35,32 +38,8 @@ FIT_RADIUS_PX = 8
 # Largest distance between a match and its match back for points of the fit.
 FORWARD_BACKWARD_PX = 2.0
 
-
-class SurfaceMatcher(Protocol):
-    """A matcher (see `matcher`) of chips with surfaces; its parts that a fit depends on."""
-
-    @property
-    def pair(self) -> ImagePair: ...
-
-    def match(
-        self, model: Model, places: Places, radius_px: int, context: Context
-    ) -> ChipSurfaces: ...
-
-    def fit_places(self, layout: ChipLayout) -> Places: ...
-
-    def first_model(
-        self, surfaces: ChipSurfaces, layout: ChipLayout, kind: str, seed: int
-    ) -> PointFunction: ...
-
-    def kind_of(self, kind: str) -> str: ...
-
-    def is_settled(self, expected_px: FloatArray) -> bool: ...
-
-    def for_points(self, surfaces: ChipSurfaces) -> ChipSurfaces: ...
-
-    def for_check(self, surfaces: ChipSurfaces, layout: ChipLayout) -> ChipSurfaces: ...
-
-    def seeing_all(self) -> SurfaceMatcher: ...
+# The matchers of chips with surfaces.
+SurfaceMatcher: TypeAlias = ChipMatcher | PooledHistogramMatcher
 
 
 @dataclass(frozen=True)
@@ -196,12 +175,12 @@ def check_points(pair: ImagePair, surfaces: ChipSurfaces, model: Model) -> TiePo
     return _tie_points(pair, surfaces, model, peaks, is_check=True)
 
 
-class _Peaks(Protocol):
-    def __call__(self, of: Surfaces) -> list[Peak]: ...
-
-
 def _tie_points(
-    pair: ImagePair, surfaces: ChipSurfaces, model: Model, peaks: _Peaks, is_check: bool
+    pair: ImagePair,
+    surfaces: ChipSurfaces,
+    model: Model,
+    peaks: Callable[[Surfaces], list[Peak]],
+    is_check: bool,
 ) -> TiePoints:
     def shifts(of: list[Peak]) -> FloatArray:
         return np.array([peak.shift_px for peak in of]).reshape(-1, 2)

@@ -21,7 +21,7 @@ from ..matching.locked import EXACT_PX
 from ..matching.parts import ELSEWHERE_PX
 from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
-from ..matching.surface_fit import SurfaceFit
+from ..matching.surface_fit import SurfaceFit, SurfaceMatcher
 from ..matching.survey import survey_places
 from ..matching.surveys import Surveys, survey_all
 from ..rasters.grid import Grid
@@ -65,7 +65,7 @@ class Stages:
     masked: Masked
     spec: Specification
     held_out: HeldOut
-    matcher: ChipMatcher | PooledHistogramMatcher
+    matcher: SurfaceMatcher
     fit: Fit
 
     @classmethod
@@ -177,7 +177,7 @@ class Stages:
 def _fit(
     images: ImagePair,
     pair: ImagePair,
-    matcher: ChipMatcher | PooledHistogramMatcher,
+    matcher: SurfaceMatcher,
     held_out: HeldOut,
     spec: Specification,
 ) -> Fit:
