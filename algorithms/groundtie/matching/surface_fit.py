@@ -36,7 +36,7 @@ _NEAR_PX = 3
 FIT_RADIUS_PX = 8
 
 # Largest distance between a match and its match back for points of the fit.
-FORWARD_BACKWARD_PX = 2.0
+_FORWARD_BACKWARD_PX = 2.0
 
 # The matchers of chips with surfaces.
 SurfaceMatcher: TypeAlias = ChipMatcher | PooledHistogramMatcher
@@ -54,8 +54,6 @@ class SurfaceFit:
         Where chips lie in the matching grid.
     candidates
         What "auto" chooses from, from simple to flexible.
-    forward_backward_px
-        Largest distance between a match and its match back.
     terrain
         Heights on the map, for the model that needs them, which is then a candidate.
     """
@@ -63,7 +61,6 @@ class SurfaceFit:
     matcher: SurfaceMatcher
     layout: ChipLayout
     candidates: tuple[str, ...] = CANDIDATES
-    forward_backward_px: float = FORWARD_BACKWARD_PX
     terrain: Terrain | None = None
 
     def estimate(self, coarse: Model, kind: str, context: Context) -> Estimate:
@@ -94,7 +91,7 @@ class SurfaceFit:
                 kind = TERRAIN
             surfaces, aligned, expected = self._align(coarse, kind, context)
         surfaces = self.matcher.for_points(surfaces)
-        points = fit_points(pair, surfaces, coarse, expected, self.forward_backward_px)
+        points = fit_points(pair, surfaces, coarse, expected)
         model, fold_models = aligned.model, aligned.fold_models
         nominal = Transform.nominal(pair.grid.crs, pair.input.source.grid)
         if kind == "tps":
@@ -149,11 +146,7 @@ def _prior_of(model: Model, grid: Grid) -> Prior:
 
 
 def fit_points(
-    pair: ImagePair,
-    surfaces: ChipSurfaces,
-    model: Model,
-    expected_px: FloatArray,
-    forward_backward_px: float,
+    pair: ImagePair, surfaces: ChipSurfaces, model: Model, expected_px: FloatArray
 ) -> TiePoints:
     """Return the surfaces' peaks near expected shifts, shape (n, 2), as points of a fit."""
 
@@ -162,8 +155,8 @@ def fit_points(
         return [find_peak_near(surface, shift, _NEAR_PX) for surface, shift in pairs]
 
     points = _tie_points(pair, surfaces, model, peaks, is_check=False)
-    limit = f"forward–backward error above {forward_backward_px:g} px"
-    return points.reject(points.forward_backward_error_px > forward_backward_px, limit)
+    limit = f"forward–backward error above {_FORWARD_BACKWARD_PX:g} px"
+    return points.reject(points.forward_backward_error_px > _FORWARD_BACKWARD_PX, limit)
 
 
 def check_points(pair: ImagePair, surfaces: ChipSurfaces, model: Model) -> TiePoints:
