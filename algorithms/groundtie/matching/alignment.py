@@ -58,13 +58,10 @@ class Alignment:
         of the same grid.
     fold_models
         The same fitted without one block of chips after the other, to infer how the model varies.
-    left_out_score
-        Mean similarity at chips that were left out of the fit, for the models compared.
     """
 
     model: Model
     fold_models: tuple[Model, ...]
-    left_out_score: dict[str, float]
 
 
 # The four weights of a cubic B-spline, and their derivatives, are polynomials of the way between
@@ -188,9 +185,7 @@ def choose_alignment(
             raise TooFewPointsError(f"{len(px)} chips are too few for the {kind} model")
         return _align(kind, fields, start, terrain)
 
-    chosen, fitted = choose_simplest(candidates, fit, fields[-1].px)
-    scores = {kind: mean for each in fitted for kind, mean in each.left_out_score.items()}
-    return replace(chosen, left_out_score=scores)
+    return choose_simplest(candidates, fit, fields[-1].px)[0]
 
 
 def _align(
@@ -215,8 +210,7 @@ def _align(
         return part.scores(model(part.px))[0]
 
     scores = left_out_scores(sharp.px, models, score)
-    mean = float(scores.sum()) / len(scores)
-    return Alignment(family.model(parameters), models, {kind: mean}), scores
+    return Alignment(family.model(parameters), models), scores
 
 
 def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Prior) -> list[_Field]:
