@@ -23,7 +23,6 @@ from groundtie.matching.alignment import (
     Prior,
     _fields,
     align,
-    choose_alignment,
 )
 from groundtie.matching.families import Family
 from groundtie.rasters.grid import Grid, apply_affine
@@ -100,7 +99,7 @@ PRIORS = [Affine.identity(), Affine(1.003, 0.002, 1.0, -0.001, 0.998, -0.5)]
 def test_the_model_behind_the_surfaces_is_found(kind: str, prior: Affine) -> None:
     px = centres()
     found = align(
-        kind, px, surfaces_of(kind, px, prior, seed=0), Prior.of_affine(prior), identity()
+        [kind], px, surfaces_of(kind, px, prior, seed=0), Prior.of_affine(prior), identity()
     )
     assert found.model.kind == kind
     assert error_px(found.model, kind) < 0.1
@@ -129,8 +128,12 @@ def fitted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 @pytest.mark.parametrize("seed", range(2))
 def test_the_simplest_model_that_fits_is_chosen(kind: str, seed: int, fitted: list[str]) -> None:
     px = centres()
-    chosen = choose_alignment(
-        px, surfaces_of(kind, px, PRIORS[1], seed), Prior.of_affine(PRIORS[1]), identity()
+    chosen = align(
+        CANDIDATES,
+        px,
+        surfaces_of(kind, px, PRIORS[1], seed),
+        Prior.of_affine(PRIORS[1]),
+        identity(),
     )
     assert chosen.model.kind == kind
     assert error_px(chosen.model, kind) < 0.1
@@ -140,7 +143,7 @@ def test_the_simplest_model_that_fits_is_chosen(kind: str, seed: int, fitted: li
 def test_nothing_is_chosen_but_candidates(fitted: list[str]) -> None:
     px, prior = centres(), PRIORS[0]
     bent = surfaces_of("polynomial2", px, prior, 0)
-    chosen = choose_alignment(px, bent, Prior.of_affine(prior), identity(), LINEAR_CANDIDATES)
+    chosen = align(LINEAR_CANDIDATES, px, bent, Prior.of_affine(prior), identity())
     assert fitted == ["translation", "similarity", "affine"]
     assert chosen.model.kind in fitted
 
@@ -160,14 +163,14 @@ def test_few_chips_take_no_model_of_many_parameters(fitted: list[str]) -> None:
     px = centres()[::25]
     assert len(px) == 8
     prior = Affine.identity()
-    choose_alignment(px, surfaces_of("translation", px, prior, 0, 0), IDENTITY, identity())
+    align(CANDIDATES, px, surfaces_of("translation", px, prior, 0, 0), IDENTITY, identity())
     assert fitted == ["translation", "similarity"]
 
 
 def test_surfaces_without_peaks_leave_a_finite_model() -> None:
     px = centres()
     flat = np.zeros((len(px), SPAN, SPAN), np.float32)
-    found = choose_alignment(px, flat, IDENTITY, identity())
+    found = align(CANDIDATES, px, flat, IDENTITY, identity())
     assert found.model.kind == "translation"
     np.testing.assert_allclose(found.model(px), px, atol=1e-9)
 
@@ -257,9 +260,7 @@ class TestHeights:
         terrain = self.terrain(seed)
         truth = self.truth(terrain)
         px, surfaces = self.chips(truth, seed)
-        chosen = choose_alignment(
-            px, surfaces, IDENTITY, identity(), TERRAIN_CANDIDATES, terrain
-        ).model
+        chosen = align(TERRAIN_CANDIDATES, px, surfaces, IDENTITY, identity(), terrain).model
         assert isinstance(chosen, TerrainModel)
         at = np.random.default_rng(1).uniform(40, 450, (200, 2))
         assert np.hypot(*(truth(at) - truth.affine(at)).T).max() > 2
@@ -275,8 +276,8 @@ class TestHeights:
     ) -> None:
         px = centres()
         surfaces = surfaces_of(kind, px, Affine.identity(), seed)
-        chosen = choose_alignment(
-            px, surfaces, IDENTITY, identity(), TERRAIN_CANDIDATES, self.terrain(seed + 7)
+        chosen = align(
+            TERRAIN_CANDIDATES, px, surfaces, IDENTITY, identity(), self.terrain(seed + 7)
         )
         assert TERRAIN in fitted
         assert chosen.model.kind == kind
@@ -287,12 +288,6 @@ class TestHeights:
         low, high = self.GRID.pixel_to_map([[0, 499], [599, 0]])
         terrain = Terrain.open(flat, None, self.GRID.crs, (*low, *high))
         px, surfaces = self.chips(identity(), 0)
-        choose_alignment(
-            px,
-            surfaces,
-            IDENTITY,
-            identity(),
-            TERRAIN_CANDIDATES,
-            terrain.seen_from(self.GRID.centre_transform),
-        )
+        seen = terrain.seen_from(self.GRID.centre_transform)
+        align(TERRAIN_CANDIDATES, px, surfaces, IDENTITY, identity(), seen)
         assert fitted and TERRAIN not in fitted

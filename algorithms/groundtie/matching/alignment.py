@@ -41,7 +41,7 @@ _STEPS = 60
 # Where a chip is shown depends on the heights there: they are asked for again so often.
 _HEIGHT_PASSES = 3
 
-# From simple to flexible, those that "auto" chooses from; see `choose_alignment`.
+# From simple to flexible, those that "auto" chooses from; see `align`.
 CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3")
 LINEAR_CANDIDATES = CANDIDATES[:3]
 TERRAIN_CANDIDATES = (*LINEAR_CANDIDATES, TERRAIN, *CANDIDATES[3:])
@@ -137,19 +137,22 @@ IDENTITY = Prior.of_affine(Affine.identity())
 
 
 def align(
-    kind: str,
+    kinds: Sequence[str],
     px: NDArray[np.int_],
     surfaces: Surfaces,
     prior: Prior,
     start: PointFunction,
     terrain: Terrain | None = None,
 ) -> Alignment:
-    """Fit a model to surfaces.
+    """Fit the simplest model that the surfaces justify (see `choose_simplest`).
+
+    Its score is the similarity at chips that were left out of its fit.
 
     Parameters
     ----------
-    kind
-        One of `models.DEGREE`, or `models.TERRAIN`.
+    kinds
+        Of `models.DEGREE`, or `models.TERRAIN`, from simple to flexible: one, or what is chosen
+        from.
     px
         The chips' centres in the matching grid, shape (n, 2).
     surfaces
@@ -162,30 +165,14 @@ def align(
     terrain
         Heights at the grid's pixels, for the model that needs them.
     """
-    return _align(kind, _fields(px, surfaces, prior), start, terrain)[0]
-
-
-def choose_alignment(
-    px: NDArray[np.int_],
-    surfaces: Surfaces,
-    prior: Prior,
-    start: PointFunction,
-    candidates: Sequence[str] = CANDIDATES,
-    terrain: Terrain | None = None,
-) -> Alignment:
-    """Fit the simplest model that the surfaces justify (see `choose_simplest`).
-
-    Its score is the similarity at chips that were left out of its fit. Parameters as `align`, and
-    the candidates, from simple to flexible.
-    """
     fields = _fields(px, surfaces, prior)
 
     def fit(kind: str) -> tuple[Alignment, FloatArray]:
-        if kind != candidates[0] and len(px) < CHIPS_PER_PARAMETER * PARAMETERS[kind]:
+        if kind != kinds[0] and len(px) < CHIPS_PER_PARAMETER * PARAMETERS[kind]:
             raise TooFewPointsError(f"{len(px)} chips are too few for the {kind} model")
         return _align(kind, fields, start, terrain)
 
-    return choose_simplest(candidates, fit, fields[-1].px)[0]
+    return choose_simplest(kinds, fit, fields[-1].px)[0]
 
 
 def _align(

@@ -106,7 +106,7 @@ def fit_level_pooled(
     if len(found.centres) < PARAMETERS["affine"]:
         raise TooFewPointsError(f"only {len(found.centres)} chips show any ground")
     shift = found.common_shift_px
-    aligned = align("affine", found.centres, found.weighted, IDENTITY, lambda px: px + shift)
+    aligned = align(["affine"], found.centres, found.weighted, IDENTITY, lambda px: px + shift)
     return compose(model, aligned.model, level)
 
 

@@ -156,7 +156,7 @@ def _moved(px: NDArray[np.int_], surfaces: Surfaces) -> Alignment:
     """Return the similarity transform of a grid's pixels on which chips' surfaces agree."""
     # Every chip counts the same; none is as low as 1, but for those that show nothing.
     equal = surfaces / np.maximum(surfaces.max(axis=(1, 2), keepdims=True), 1)
-    return align("similarity", px, equal, IDENTITY, np.copy)
+    return align(["similarity"], px, equal, IDENTITY, np.copy)
 
 
 def _cross_fitted_px(px: NDArray[np.int_], surfaces: Surfaces, pitch_px: int) -> FloatArray:

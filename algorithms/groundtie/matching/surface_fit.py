@@ -21,7 +21,7 @@ from ..kinds import AUTO
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
 from ..similarity.peak import Peak, find_peak, find_peak_near
-from .alignment import CANDIDATES, Alignment, Prior, align, choose_alignment
+from .alignment import CANDIDATES, Alignment, Prior, align
 from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .frames import on_grid, on_map
@@ -126,10 +126,8 @@ class SurfaceFit:
             return prior.to_nominal(residual(px))
 
         kind = matcher.kind_of(kind)
-        if kind in (AUTO, "tps"):
-            aligned = choose_alignment(centres, weighted, prior, start, self.candidates, terrain)
-        else:
-            aligned = align(kind, centres, weighted, prior, start, terrain)
+        kinds = self.candidates if kind in (AUTO, "tps") else (kind,)
+        aligned = align(kinds, centres, weighted, prior, start, terrain)
         moved = aligned.model(px) - prior.to_nominal(px)
         return surfaces, aligned, moved @ np.linalg.inv(prior.linear).T
 
