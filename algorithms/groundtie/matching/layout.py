@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoOverlapError
+from ..rasters.grid import mesh
 from ..rasters.pair import ImagePair
 
 # Share of a cell's side that is held out. Check chips stand alone, so they get the larger part;
@@ -125,19 +126,15 @@ class ChipLayout:
         cols, rows = self.columns.lattice(self.parts), self.rows.lattice(self.parts)
         on_line_col = np.arange(len(cols)) % self.parts == 0
         on_line_row = np.arange(len(rows)) % self.parts == 0
-        grid_cols, grid_rows = np.meshgrid(cols, rows)
         on_line = on_line_row[:, None] | on_line_col[None, :]
-        on_lines = np.column_stack([grid_cols[on_line], grid_rows[on_line]])
-        return _middle_pixels(on_lines, self.chip_px)
+        return _middle_pixels(mesh(cols, rows)[on_line.ravel()], self.chip_px)
 
     @cached_property
     def check_centres(self) -> NDArray[np.int_]:
         """Centres (col, row) of the check chips, shape (n, 2)."""
-        cols, rows = np.meshgrid(
-            *(axis.check_centres(self.check_chip_px) for axis in (self.columns, self.rows))
-        )
-        centres = np.column_stack([cols.ravel(), rows.ravel()])
-        return _middle_pixels(centres, self.check_chip_px)
+        chip = self.check_chip_px
+        sides = (axis.check_centres(chip) for axis in (self.columns, self.rows))
+        return _middle_pixels(mesh(*sides), chip)
 
     def neighbourhoods(self, centres_px: NDArray[np.int_]) -> NDArray[np.int_]:
         """Return which of the squares of 2 × 2 cells positions (col, row), (n, 2), lie in."""

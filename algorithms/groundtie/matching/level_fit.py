@@ -67,7 +67,9 @@ def fit_level(
         Threads and progress.
     """
     chip = int(np.clip(min(level.width, level.height) / 5, *_CHIP_RANGE_PX))
-    places = Places(level, _regular_centres(level, chip), chip)
+    places = Places.spread(
+        level, chip, lambda side: np.clip((side - chip) / (chip / 2) + 1, 2, _CHIPS_PER_SIDE)
+    )
     centres, surfaces = matcher.match_forward(model, places, radius_px, context)
     if len(centres) < 4:
         return CoarseModel(model, np.inf)
@@ -108,15 +110,6 @@ def fit_level_pooled(
     shift = found.common_shift_px
     aligned = align(["affine"], found.centres, found.weighted, IDENTITY, lambda px: px + shift)
     return compose(model, aligned.model, level)
-
-
-def _regular_centres(level: Grid, chip: int) -> NDArray[np.int_]:
-    sides = []
-    for size in (level.width, level.height):
-        count = int(np.clip((size - chip) / (chip / 2) + 1, 2, _CHIPS_PER_SIDE))
-        sides.append(np.linspace(chip / 2, size - chip / 2, count))
-    cols, rows = np.meshgrid(*sides)
-    return np.round(np.column_stack([cols.ravel(), rows.ravel()])).astype(int)
 
 
 def _peaks(surfaces: NDArray[np.float32]) -> FloatArray:

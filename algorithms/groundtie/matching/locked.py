@@ -39,8 +39,6 @@ _NEAR_PX = 1.5
 # refused, but some beyond 0.09, and one of the suite series at 0.08.
 EXACT_PX = 0.0625
 
-_LATTICE = 9
-
 # Around an edge, chips see it this far off; around a seam, which is long, as far as filters reach.
 _EDGE_SURROUNDINGS_PX = 9
 _SEAM_SURROUNDINGS_PX = 2 * BORDER_PX + 1
@@ -197,10 +195,7 @@ def _by_whole_pixels(pair: ImagePair, transform: Transform) -> tuple[PointFuncti
     The latter at most, in pixels.
     """
     grid, reference = pair.grid, pair.reference.source.grid
-    cols, rows = np.meshgrid(
-        np.linspace(0, grid.width - 1, _LATTICE), np.linspace(0, grid.height - 1, _LATTICE)
-    )
-    xy = grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
+    xy = grid.pixel_to_map(grid.lattice())
     found, there = transform(xy), reference.map_to_pixel(xy)
     offset = np.rint(np.median(found - there, axis=0))
     off_px = float(np.abs(found - there - offset).max())

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..geometry.models import Model
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, mesh
 from ..similarity.peak import find_peak
 from ..similarity.surface import normalise
 from .belief_propagation import Surfaces
@@ -48,12 +48,23 @@ class Places:
     @classmethod
     def tiles(cls, grid: Grid, chip_px: int) -> Places:
         """Return chips that cover a grid side by side."""
-        sides = [
+        sides = (
             np.arange(length // chip_px) * chip_px + chip_px // 2
             for length in (grid.width, grid.height)
-        ]
-        cols, rows = np.meshgrid(*sides)
-        return cls(grid, np.column_stack([cols.ravel(), rows.ravel()]), chip_px)
+        )
+        return cls(grid, mesh(*sides).astype(int), chip_px)
+
+    @classmethod
+    def spread(cls, grid: Grid, chip_px: int, count: Callable[[int], float]) -> Places:
+        """Return chips from border to border, as many along a side as `count` has for its length.
+
+        They are equally far apart along each axis, to a pixel.
+        """
+        sides = (
+            np.linspace(chip_px / 2, length - chip_px / 2, int(count(length)))
+            for length in (grid.width, grid.height)
+        )
+        return cls(grid, np.rint(mesh(*sides)).astype(int), chip_px)
 
 
 @dataclass(frozen=True)

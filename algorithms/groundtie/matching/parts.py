@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, mesh
 from .belief_propagation import Surfaces
 from .matcher import FloatArray
 
@@ -127,10 +127,10 @@ def _highest_group(
     return best
 
 
-def _higher_elsewhere(surfaces: Surfaces) -> tuple[NDArray[np.int_], FloatArray]:
+def _higher_elsewhere(surfaces: Surfaces) -> tuple[FloatArray, FloatArray]:
     """Return places elsewhere, (x, y), shape (s, 2), and how much higher chips are, (n, s)."""
     radius = surfaces.shape[-1] // 2
-    shifts = np.stack(np.meshgrid(*2 * [np.arange(-radius, radius + 1)]), axis=-1).reshape(-1, 2)
+    shifts = mesh(*2 * [np.arange(-radius, radius + 1)])
     distance = np.hypot(*shifts.T)
     is_far = distance > ELSEWHERE_PX
     shown = _limited(surfaces).astype(float).reshape(len(surfaces), len(shifts))

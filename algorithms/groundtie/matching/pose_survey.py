@@ -144,12 +144,7 @@ def _places(grid: Grid) -> Places:
     factor = level_factor(grid)
     level = grid if factor == 1 else grid.scaled(factor)
     chip = max(min(level.width, level.height) // _ALONG, 1)
-    sides = [
-        np.rint(np.linspace(chip / 2, side - chip / 2, side // chip)).astype(int)
-        for side in (level.width, level.height)
-    ]
-    cols, rows = np.meshgrid(*sides)
-    return Places(level, np.column_stack([cols.ravel(), rows.ravel()]), chip)
+    return Places.spread(level, chip, lambda side: side // chip)
 
 
 def _moved(px: NDArray[np.int_], surfaces: Surfaces) -> Alignment:

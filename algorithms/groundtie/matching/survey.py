@@ -151,8 +151,7 @@ class Survey:
 def survey_places(grid: Grid) -> Places:
     """Return chips all over a grid, side by side, or farther apart where it is large."""
     chip = int(np.clip(min(grid.width, grid.height) / _ALONG, *_CHIP_RANGE_PX))
-    cols, rows = np.meshgrid(*(_along(size, chip) for size in (grid.width, grid.height)))
-    return Places(grid, np.column_stack([cols.ravel(), rows.ravel()]), chip)
+    return Places.spread(grid, chip, lambda side: np.clip(side // chip, 1, _MOST_ALONG))
 
 
 def survey_model(
@@ -186,9 +185,3 @@ def survey_model(
     kept, surfaces = seen.match_forward(model, places, SURVEY_RADIUS_PX, context)
     shifts = np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
     return Survey(places.grid, kept, shifts, surfaces, elsewhere_px)
-
-
-def _along(size: int, chip_px: int) -> NDArray[np.int_]:
-    """Return the centres of chips along a side of a grid."""
-    count = int(np.clip(size // chip_px, 1, _MOST_ALONG))
-    return np.rint(np.linspace(chip_px / 2, size - chip_px / 2, count)).astype(int)
