@@ -24,12 +24,10 @@ from ..geometry.model_choice import (
 )
 from ..geometry.models import PARAMETERS, TERRAIN, Model
 from ..geometry.terrain import Terrain
-from ..rasters.grid import PointFunction, apply_affine
+from ..rasters.grid import FloatArray, PointFunction, apply_affine
 from ..rasters.kernels import bspline_weights
 from .belief_propagation import Surfaces
 from .families import Family, coefficients_of
-
-FloatArray = NDArray[np.float64]
 
 # Surfaces are blurred by these, one after the other, so that the fit is caught from afar.
 _BLURS_PX = (1.5, 0.0)

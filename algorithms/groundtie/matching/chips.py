@@ -13,7 +13,7 @@ from ..context import Context
 from ..geometry.accuracy import NEIGHBOUR_SPACINGS
 from ..geometry.models import DEGREE, Model
 from ..geometry.robust import find_consensus
-from ..rasters.grid import PointFunction
+from ..rasters.grid import FloatArray, PointFunction
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.description import BORDER_PX, Description
@@ -28,7 +28,7 @@ from ..similarity.surface import (
 from .belief_propagation import Surfaces, propagate
 from .chip_windows import ChipWindows, Resampled, of_kept
 from .layout import ChipLayout
-from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
+from .matcher import ChipSurfaces, MaskOf, Places
 
 _log = logging.getLogger(__name__)
 

@@ -12,9 +12,7 @@ from ..errors import TooFewPointsError
 from ..geometry.models import DEGREE, TERRAIN, Frame, Model, PolynomialModel, monomials
 from ..geometry.terrain import Terrain
 from ..geometry.terrain_model import TerrainModel
-from ..rasters.grid import PointFunction
-
-FloatArray = NDArray[np.float64]
+from ..rasters.grid import FloatArray, PointFunction
 
 
 @dataclass(frozen=True)

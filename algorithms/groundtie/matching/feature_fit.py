@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 
 from ..errors import NothingFoundError, TooFewPointsError
 from ..geometry.chance import log10_false_alarms
@@ -21,9 +20,7 @@ from ..geometry.model_choice import (
 from ..geometry.models import PARAMETERS, Model
 from ..geometry.robust import Mixture, distances, find_consensus, fit_robustly
 from ..kinds import AUTO
-from ..rasters.grid import apply_affine
-
-FloatArray = NDArray[np.float64]
+from ..rasters.grid import FloatArray, apply_affine
 
 # What "auto" chooses from. What bends between radar images of other incidence angles are mostly
 # forests and cities, by their relief displacement, and not the ground.

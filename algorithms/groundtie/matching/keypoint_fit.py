@@ -22,15 +22,13 @@ from ..geometry.robust import fit_mixture
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..kinds import AUTO
-from ..rasters.grid import Grid, apply_affine
+from ..rasters.grid import FloatArray, Grid, apply_affine
 from .chips import ChipMatcher
 from .feature_fit import Fit, fit_matches, require_no_rival
 from .frames import on_grid, on_map
 from .keypoints import KeypointMatcher
 from .matcher import Correspondences, Places
 from .surface_fit import SurfaceFit
-
-FloatArray = NDArray[np.float64]
 
 # Chips around matches: how large, and how far they are moved: by so many standard deviations of the
 # first model's predictions, within these limits.

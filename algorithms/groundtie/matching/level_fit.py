@@ -12,7 +12,7 @@ from ..errors import TooFewPointsError
 from ..geometry.chance import agreement_probability, log10_false_alarms
 from ..geometry.models import PARAMETERS, Model
 from ..geometry.robust import distances, find_consensus
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from ..similarity.peak import find_peak
 from .alignment import IDENTITY, align
 from .belief_propagation import propagate
@@ -20,8 +20,6 @@ from .chips import ChipMatcher
 from .frames import compose
 from .matcher import Places
 from .pooled import PooledHistogramMatcher
-
-FloatArray = NDArray[np.float64]
 
 # Chips and agreement at every level of the pyramid, in pixels of the level.
 _TOLERANCE_PX = 2.0

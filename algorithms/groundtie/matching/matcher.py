@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..geometry.models import Model
-from ..rasters.grid import Grid, mesh
+from ..rasters.grid import FloatArray, Grid, mesh
 from ..similarity.peak import find_peak
 from ..similarity.surface import normalise
 from .belief_propagation import Surfaces
 
-FloatArray = NDArray[np.float64]
 MaskOf = Callable[[Grid], NDArray[np.bool_]]
 
 

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from ..rasters.grid import Grid, mesh
+from ..rasters.grid import FloatArray, Grid, mesh
 from .belief_propagation import Surfaces
-from .matcher import FloatArray
 
 # Chips agree with each other, or with the model, within this distance.
 SAME_PX = 2.0

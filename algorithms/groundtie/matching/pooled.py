@@ -16,7 +16,7 @@ from ..errors import TooFewPointsError
 from ..geometry.models import Model
 from ..kinds import AUTO
 from ..rasters.colours import Colours
-from ..rasters.grid import PointFunction
+from ..rasters.grid import FloatArray, PointFunction
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch, middle_window
 from ..rasters.reading import FloatImage
@@ -25,7 +25,7 @@ from ..similarity.surface import SimilaritySettings, Surface, normalise
 from .belief_propagation import Surfaces
 from .chip_windows import ChipWindows, Resampled, of_kept, singly
 from .layout import ChipLayout
-from .matcher import ChipSurfaces, FloatArray, MaskOf, Places
+from .matcher import ChipSurfaces, MaskOf, Places
 
 # Chips with less ground than this are left out; fewer pixels in all make no joint histogram, and
 # more are not needed for one.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..context import Context
 from ..geometry.models import Model
 from ..geometry.transform import Transform
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import ImagePair
 from ..similarity.peak import find_peak
 from ..similarity.surface import SimilaritySettings
@@ -25,7 +25,7 @@ from .chips import ChipMatcher
 from .coarse_shift import level_factor
 from .frames import compose
 from .locked import Sensors
-from .matcher import FloatArray, MaskOf, Places
+from .matcher import MaskOf, Places
 from .survey import SURVEY_RADIUS_PX, survey_model, survey_places
 from .surveys import Surveys, survey_all
 

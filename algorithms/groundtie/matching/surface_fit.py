@@ -18,7 +18,7 @@ from ..geometry.terrain_model import TerrainModel
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..kinds import AUTO
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import ImagePair
 from ..similarity.peak import Peak, find_peak, find_peak_near
 from .alignment import CANDIDATES, Alignment, Prior, align
@@ -26,7 +26,7 @@ from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .frames import on_grid, on_map
 from .layout import ChipLayout
-from .matcher import ChipSurfaces, FloatArray
+from .matcher import ChipSurfaces
 from .pooled import PooledHistogramMatcher
 
 # A tie point of the fit is the peak within this distance from the aligned model.

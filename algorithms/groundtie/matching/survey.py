@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..geometry.models import Model
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from ..similarity.order_statistics import robust_deviation
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
 from .belief_propagation import Surfaces
 from .chips import LEAST_VALID_MASKED, ChipMatcher
-from .matcher import FloatArray, MaskOf, Places
+from .matcher import MaskOf, Places
 from .parts import (
     ELSEWHERE_PX,
     MOST_OF_ONE,

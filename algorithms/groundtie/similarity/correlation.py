@@ -12,9 +12,8 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from ..rasters.patch import Patch
+from ..rasters.reading import FloatImage
 from .stacks import each
-
-FloatImage = NDArray[np.float32]
 
 _ZERO = cv2.BORDER_CONSTANT
 
