@@ -79,20 +79,6 @@ def test_the_same_share_of_every_cell_is_held_out_and_chips_of_the_fit_reach_all
     assert corners.max(axis=0).tolist() == list(inner)
 
 
-@settings(max_examples=40)
-@given(
-    size=SIZES,
-    px=st.lists(st.tuples(st.floats(-20, 920), st.floats(-20, 920)), min_size=1, max_size=20),
-)
-def test_positions_and_masks_agree_on_what_is_held_out(
-    source: RasterSource, size: tuple[int, int], px: list[tuple[float, float]]
-) -> None:
-    layout = laid_out(source, size)
-    positions = np.array(px)
-    mask = layout.held_out_mask(positions[:, 0], positions[:, 1])
-    np.testing.assert_array_equal(mask.diagonal(), layout.held_out(positions))
-
-
 def test_the_middle_of_each_cell_is_held_out() -> None:
     """A side of 110 px with chips of 10 and 2 cells: lines at 4.5, 54.5 and 104.5."""
     axis = Axis(size=110, chip=10, cells=2)

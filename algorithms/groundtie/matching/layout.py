@@ -144,10 +144,6 @@ class ChipLayout:
         )
         return np.asarray(row * self.columns.cells + col)
 
-    def held_out(self, positions_px: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which positions (col, row), shape (n, 2), are held out of the fit."""
-        return self.columns.held_out(positions_px[:, 0]) & self.rows.held_out(positions_px[:, 1])
-
     def held_out_mask(
         self, cols: NDArray[np.float64], rows: NDArray[np.float64], reach_px: float = 0.0
     ) -> NDArray[np.bool_]:
