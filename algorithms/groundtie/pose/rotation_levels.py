@@ -105,7 +105,7 @@ class Level:
             across, down, height = _between(surface, row, col)
             shift = linear @ [col - radius + across, row - radius + down] + pose.shift_px
             moved = replace(pose, shift_px=(float(shift[0]), float(shift[1])))
-            found.append(PoseFound(moved, height, 1))
+            found.append(PoseFound(moved, height))
         return found
 
 
@@ -124,17 +124,15 @@ class Climber:
 
     def climb(self, start: PoseFound) -> PoseFound:
         """Return the best of a candidate and its neighbours, tried on this level."""
-        tried = self.around(start.pose)
-        return replace(max(tried.values(), key=HEIGHT), evaluations=len(tried))
+        return max(self.around(start.pose).values(), key=HEIGHT)
 
     def climb_finely(self, start: PoseFound) -> PoseFound:
         """Return the best pose near a candidate of this level, between the steps."""
-        best, count, climber = start, 0, self
+        best, climber = start, self
         for _ in range(_HALVINGS):
             climber = replace(climber, rotation=climber.rotation / 2, scale=climber.scale / 2)
             for _ in range(_CLIMBS):
                 tried = climber.around(best.pose)
-                count += len(tried)
                 centre, best = tried[0, 0], max(tried.values(), key=HEIGHT)
                 if best is centre:
                     break
@@ -145,7 +143,7 @@ class Climber:
             for i, j in ((1, 0), (0, 1))
         )
         between = climber.level.best(climber.template, climber.step(best.pose, rotation, scale))
-        return replace(max(best, between, key=HEIGHT), evaluations=count + 1)
+        return max(best, between, key=HEIGHT)
 
     def around(self, pose: Pose) -> dict[tuple[int, int], PoseFound]:
         """Return the matches at a pose and its neighbours within the limits, by steps."""

@@ -152,9 +152,7 @@ class _Search:
         return float(np.degrees(angle)), _SCALE_STEP * angle / float(np.log(2))
 
     def run(self) -> list[PoseFound]:
-        scanned = self.scan()
-        found: Sequence[PoseFound] = scanned.found
-        count = scanned.heights.size
+        found: Sequence[PoseFound] = self.scan().found
         (rotation, scale), pixel_px = self.steps, self.coarse_px
         for kept in _KEPT:
             if not found:
@@ -163,17 +161,13 @@ class _Search:
             rotation, scale = rotation / 2, scale / 2
             level = self.level(pixel_px, [candidate.pose.scale for candidate in found[:kept]])
             climber = Climber(level, rotation, scale, self.limits)
-            climbed = list(self.context.map(climber.climb, found[:kept]))
-            count += sum(candidate.evaluations for candidate in climbed)
-            found = self.distinct(climbed)
+            found = self.distinct(self.context.map(climber.climb, found[:kept]))
             if pixel_px == self.fine_px:
                 break
         best = climber.climb_finely(found[0])
-        count += best.evaluations
         chance = _spread(level.surface(Template(level.reference, _BACKGROUND_PX), best.pose))
         return [
-            PoseFound(candidate.pose, candidate.height / chance, count)
-            for candidate in (best, *found[1:])
+            PoseFound(candidate.pose, candidate.height / chance) for candidate in (best, *found[1:])
         ]
 
     def scan(self) -> Scan:
