@@ -21,6 +21,7 @@ from ..geometry.models import PARAMETERS, Model
 from ..geometry.robust import Mixture, distances, find_consensus, fit_robustly
 from ..kinds import AUTO
 from ..rasters.grid import FloatArray, apply_affine
+from .matcher import Correspondences
 
 # What "auto" chooses from. What bends between radar images of other incidence angles are mostly
 # forests and cities, by their relief displacement, and not the ground.
@@ -59,27 +60,17 @@ class Fit:
     mixture: Mixture
 
 
-def fit_matches(
-    kind: str,
-    px: FloatArray,
-    partner_px: FloatArray,
-    prior: Affine,
-    window_area: float,
-    seed: int,
-) -> Fit:
+def fit_matches(kind: str, matches: Correspondences, prior: Affine, seed: int) -> Fit:
     """Fit a model to matches of which most may be outliers.
 
     Parameters
     ----------
     kind
         One of `models.KINDS`, or "auto" for the simplest polynomial that the matches justify.
-    px, partner_px
-        Positions that belong together, in matching pixels, those of the input as it was resampled
-        for matching, shape (n, 2).
+    matches
+        The matches, in matching pixels.
     prior
-        What it was resampled by: from such positions to nominal ones.
-    window_area
-        Area over which outliers fall, px².
+        What the input was resampled by for matching: from such positions to nominal ones.
     seed
         Of random samples.
 
@@ -88,14 +79,15 @@ def fit_matches(
     TooFewPointsError
         Too few matches agree.
     """
+    px, window_area = matches.px, matches.window_area_px2
     if len(px) <= PARAMETERS["affine"] // 2:
         raise TooFewPointsError(f"only {len(px)} features were matched")
     # Where most are outliers, samples of two matches are without one far more often than those of
     # three; the prior has taken out what a similarity lacks.
     first_kind = kind if kind in ("translation", "rigid") else "similarity"
-    residual = find_consensus(px, partner_px, _CONSENSUS_PX, first_kind, seed)
+    residual = find_consensus(px, matches.partner_px, _CONSENSUS_PX, first_kind, seed)
     start = fit_model("affine", px, apply_affine(prior, residual(px)))
-    nominal_px = apply_affine(prior, partner_px)
+    nominal_px = apply_affine(prior, matches.partner_px)
     if kind == AUTO:
         kind = _choose(px, nominal_px, start, window_area)
     model, mixture = _fit(kind, px, nominal_px, start, window_area)
@@ -106,9 +98,7 @@ def fit_matches(
     return Fit(model, fit_without_blocks(kind, px, nominal_px, weights), mixture)
 
 
-def require_no_rival(
-    px: FloatArray, partner_px: FloatArray, prior: Affine, model: Model, window_area: float
-) -> None:
+def require_no_rival(matches: Correspondences, prior: Affine, model: Model) -> None:
     """Refuse a model if many of its outliers agree on a shift from it.
 
     Forests and cities lie on other transforms than the ground between radar images of different
@@ -116,7 +106,7 @@ def require_no_rival(
 
     Parameters
     ----------
-    px, partner_px, prior, window_area
+    matches, prior
         See `fit_matches`.
     model
         What was fitted to them.
@@ -126,12 +116,12 @@ def require_no_rival(
     NothingFoundError
         There is such a shift.
     """
-    residual = apply_affine(prior, partner_px) - model(px)
+    residual = apply_affine(prior, matches.partner_px) - model(matches.px)
     length = np.hypot(*residual.T)
     far = length > _FAR_PX + _CONSENSUS_PX
     if far.sum() < _FEWEST_RIVALS:
         return
-    at, residual = px[far], residual[far]
+    at, residual = matches.px[far], residual[far]
     rival = find_consensus(at, at + residual, _CONSENSUS_PX, "translation")
     shift = rival([[0.0, 0.0]])[0]
 
@@ -142,7 +132,7 @@ def require_no_rival(
     # Along roads and between crowns matches slip to both sides alike; elevated objects are
     # displaced to one.
     displaced = others - agreeing(-shift)
-    probability = np.pi * _CONSENSUS_PX**2 / window_area
+    probability = np.pi * _CONSENSUS_PX**2 / matches.window_area_px2
     alarms = log10_false_alarms(others, len(at), probability, 1)
     if alarms < _RIVAL_ALARMS and displaced >= _RIVAL_SHARE * (length <= _FAR_PX).sum():
         apart = float(np.hypot(*shift))

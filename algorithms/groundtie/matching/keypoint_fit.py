@@ -121,13 +121,7 @@ class KeypointFit:
         everywhere = self.matcher.match(coarse, None, GATE_PX, context)
         found = everywhere.take(best_of_cells(everywhere.px, everywhere.score, _CELL_PX, _PER_CELL))
         fit = self._fit(kind, found, coarse, context.seed)
-        require_no_rival(
-            found.px,
-            found.partner_px,
-            on_grid(coarse, self._grid),
-            fit.model,
-            found.window_area_px2,
-        )
+        require_no_rival(found, on_grid(coarse, self._grid), fit.model)
         return found, fit
 
     def _refined(
@@ -170,14 +164,8 @@ class KeypointFit:
         return found, coarse, fit
 
     def _fit(self, kind: str, matches: Correspondences, coarse: Model, seed: int) -> Fit:
-        return fit_matches(
-            AUTO if kind == "tps" else kind,
-            matches.px,
-            matches.partner_px,
-            on_grid(coarse, self._grid),
-            matches.window_area_px2,
-            seed,
-        )
+        first_kind = AUTO if kind == "tps" else kind
+        return fit_matches(first_kind, matches, on_grid(coarse, self._grid), seed)
 
     def _estimate(self, kind: str, matches: Correspondences, coarse: Model, fit: Fit) -> Estimate:
         pair, grid = self.matcher.pair, self._grid
