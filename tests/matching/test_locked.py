@@ -248,7 +248,7 @@ def test_radar_images_are_as_if_on_whole_pixels_unless_they_vary_as_one_ground(
     images, model = (sensed(1, 0.8), sensed(2, 0.8, place)), shift_on_map(off_m, 0.0)
     locked = looked_at(tmp_path, *images, context, model, sensors=sensors)
     assert locked is not None and locked.is_exact == is_exact
-    assert locked.sameness.has_one_ground == (place == 1)
+    assert locked.sameness.varies_as_ground == (place == 1)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ from groundtie.similarity.sameness import (
     Windows,
     edges_apart_px,
     reduced,
-    without,
 )
 
 
@@ -145,9 +144,3 @@ def test_reduced_pixels_are_means_of_valid_ones() -> None:
     np.testing.assert_allclose(smaller.values[1, 1], values[4:8, 4:8].mean())
     assert smaller.valid.all()
     assert not reduced(patch(values, np.s_[:4, :4]), 4).valid[0, 0]
-
-
-def test_pixels_can_be_hidden() -> None:
-    hidden = np.zeros((8, 10), bool)
-    hidden[2, 3] = True
-    assert not without(patch(np.zeros((8, 10))), hidden).valid[2, 3]

@@ -6,7 +6,7 @@ What is counted in a window is in `sameness`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,6 @@ from .sameness import (
     Windows,
     edges_apart_px,
     reduced,
-    without,
 )
 from .seams import DRAWN_WIDTH, STANDARD_ERRORS, step_width
 
@@ -167,21 +166,16 @@ class Sameness:
         pixels, by light and season.
         """
         is_ground = self.coarse_area >= _LEAST_COARSE_SHARE * self.reduced_area
-        return self._has_ground and is_ground and self.sharpness < VIEW_SHARPNESS
-
-    @property
-    def has_one_ground(self) -> bool:
-        """Whether what is not the same varies alike, too, as one sensor's views of one ground."""
-        return self._has_ground and not self.is_finer_than_ground
+        return self.ground >= _GROUND_SHARE and is_ground and self.sharpness < VIEW_SHARPNESS
 
     @property
     def varies_as_ground(self) -> bool:
-        """Whether as much as of one ground varies alike, or follows in other colours."""
-        return self.has_one_ground or self.related >= _GROUND_SHARE
+        """Whether as much as of one ground varies alike, or follows in other colours.
 
-    @property
-    def _has_ground(self) -> bool:
-        return self.ground >= _GROUND_SHARE
+        What is not the same varies alike, too, as one sensor's views of one ground.
+        """
+        has_one_ground = self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
+        return has_one_ground or self.related >= _GROUND_SHARE
 
 
 _NO_WINDOWS, _NO_EDGES = np.zeros((4, 3), int), np.zeros((len(_OFFSETS), len(_NEAR_PX)), int)
@@ -208,9 +202,12 @@ class Look:
     def of(cls, reference: Patch, input: Patch) -> Look:
         """Return what two patches show."""
         whole = Windows.of(reference, input)
-        smaller = _reduced(_REDUCTION, reference, input)
-        left = _reduced(_REDUCTION, without(reference, whole.same), without(input, whole.same))
-        pairs = smaller, _reduced(_FURTHER, *smaller), left
+        both = reference, input
+        without_same = [replace(patch, valid=patch.valid & ~whole.same) for patch in both]
+        smaller, left = (
+            [reduced(patch, _REDUCTION) for patch in pair] for pair in (both, without_same)
+        )
+        pairs = smaller, [reduced(patch, _FURTHER) for patch in smaller], left
         counts = np.array([whole.counts, *(Windows.of(*pair).counts for pair in pairs)])
         return cls(_count_edges(reference, input), counts)
 
@@ -273,7 +270,3 @@ def drawn_edges(reference: Patch, input: Patch) -> Mask:
     for edges, others in ((one, other.strongest), (one.strongest, other)):
         drawn[edges.found] |= edges_apart_px(edges, others)[0] <= _BLURRED_PX
     return drawn
-
-
-def _reduced(factor: int, *patches: Patch) -> list[Patch]:
-    return [reduced(patch, factor) for patch in patches]

@@ -193,11 +193,6 @@ def covered(middles: Mask, side_px: int) -> Mask:
     return np.asarray(cv2.dilate(middles.astype(np.uint8), window) > 0)
 
 
-def without(patch: Patch, hidden: Mask) -> Patch:
-    """Return a patch of which some pixels are invalid besides."""
-    return replace(patch, valid=patch.valid & ~hidden)
-
-
 def reduced(patch: Patch, factor: int) -> Patch:
     """Return the means of squares of valid pixels; what remains at the right and below is cut."""
     share = means(patch.valid.astype(np.float32), factor)
