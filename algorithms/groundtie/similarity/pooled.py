@@ -54,11 +54,7 @@ class PooledHistogram:
 
     @classmethod
     def of(
-        cls,
-        template: FloatArray,
-        search: FloatArray,
-        bins: int = BINS,
-        search_edges: FloatArray | None = None,
+        cls, template: FloatArray, search: FloatArray, search_edges: FloatArray | None = None
     ) -> PooledHistogram:
         """Return the pointwise mutual information by a sample of pairs.
 
@@ -66,14 +62,13 @@ class PooledHistogram:
         ----------
         template, search
             Grey values of corresponding pixels, the template's `smooth`, shape (n,).
-        bins
-            Number of grey levels, equally frequent each.
         search_edges
-            Inner edges between levels of the second image; None: as many as of the first.
+            Inner edges between levels of the second image; None: as of the first, `BINS` equally
+            frequent ones.
         """
 
         def equal(values: FloatArray) -> FloatArray:
-            return bin_edges(values, np.ones(values.shape, bool), bins, "equal-frequency")
+            return bin_edges(values, np.ones(values.shape, bool), BINS, "equal-frequency")
 
         edges = equal(template), equal(search) if search_edges is None else search_edges
         own, other = (
