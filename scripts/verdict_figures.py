@@ -16,7 +16,8 @@ from groundtie.context import threads
 from groundtie.geometry.chance import agreement_probability, log10_chance
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.matching.chips import ChipMatcher
-from groundtie.matching.survey import Survey, survey_model
+from groundtie.matching.parts import ELSEWHERE_PX
+from groundtie.matching.survey import Survey, survey_model, survey_places
 from groundtie.rasters.pair import Image as PairImage
 from groundtie.rasters.pair import make_pair
 from groundtie.rasters.patch import Patch
@@ -183,4 +184,5 @@ def _surveyed(reference: FloatArray, input: FloatArray) -> Survey:
     with open_raster(rasters[0]) as one, open_raster(rasters[1]) as other, threads() as context:
         matcher = ChipMatcher(make_pair(PairImage(one), PairImage(other)), SimilaritySettings())
         none = PolynomialModel("translation", Frame(Affine.identity()), np.zeros((1, 2)))
-        return survey_model(matcher, none, context)
+        places = survey_places(matcher.pair.grid)
+        return survey_model(matcher, none, places, ELSEWHERE_PX, context)

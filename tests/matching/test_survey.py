@@ -9,6 +9,7 @@ from textured_pairs import shift_on_map, texture
 
 from groundtie.context import Context
 from groundtie.matching.chips import ChipMatcher
+from groundtie.matching.parts import ELSEWHERE_PX
 from groundtie.matching.survey import (
     SURVEY_RADIUS_PX,
     Survey,
@@ -48,7 +49,9 @@ def surveyed(
             None if hidden is None else lambda piece: np.ones((piece.height, piece.width), bool)
         )
         model = shift_on_map(0.0, 0.0)
-        return survey_model(matcher, model, context, without)
+        return survey_model(
+            matcher, model, survey_places(pair.grid), ELSEWHERE_PX, context, without
+        )
 
 
 def place(shift: tuple[int, int] = (0, 0), seed: int = 0) -> np.ndarray:

@@ -121,7 +121,7 @@ def survey_pose(
     surveys = survey_all(matcher, moved, places, accuracy_px, sensors, open_ground, quiet)
     smaller = survey_places(level)
     if smaller.chip_px < places.chip_px:
-        fine = survey_model(matcher, model, quiet, None, smaller, elsewhere_px)
+        fine = survey_model(matcher, model, smaller, elsewhere_px, quiet)
         surveys = replace(surveys, fine=fine)
     return PoseSurvey(level, kept, residuals, surveys, moved, fold_models)
 

@@ -87,7 +87,7 @@ def survey_rest(
     # What a mask leaves is little: one measure alone would miss most of it.
     fused, chips = replace(matcher, settings=SimilaritySettings()), len(places.centres)
     if not locked.is_evident:
-        survey = survey_model(fused, transform.model, context, locked, places, elsewhere_px)
+        survey = survey_model(fused, transform.model, places, elsewhere_px, context, locked)
         return Rest(survey, chips=chips, is_evident=False)
     if locked.is_drawn:
         return Rest()
@@ -97,9 +97,9 @@ def survey_rest(
     if not locked.is_explained or (is_doubtful and not same.is_same_view):
         # Another input leaves something else of the reference.
         once = context.once()
-        left = survey_model(fused, transform.model, once, locked, places, elsewhere_px)
+        left = survey_model(fused, transform.model, places, elsewhere_px, once, locked)
     if locked.is_explained:
         # A copy may be blended into other ground, of which the same windows are no part.
         other = replace(fused, left_of=unexplained)
-        beyond = survey_model(other, transform.model, context, None, places, elsewhere_px)
+        beyond = survey_model(other, transform.model, places, elsewhere_px, context)
     return Rest(left, locked.is_explained, beyond, chips)

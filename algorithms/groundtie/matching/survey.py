@@ -157,10 +157,10 @@ def survey_places(grid: Grid) -> Places:
 def survey_model(
     matcher: ChipMatcher,
     model: Model,
+    places: Places,
+    elsewhere_px: float,
     context: Context,
     without: MaskOf | None = None,
-    places: Places | None = None,
-    elsewhere_px: float = ELSEWHERE_PX,
 ) -> Survey:
     """Match chips all over a pair around what a model on the map predicts.
 
@@ -170,16 +170,15 @@ def survey_model(
         What the chips are matched by.
     model
         The model.
+    places
+        The chips, on a regular layout.
+    elsewhere_px
+        See `Survey`.
     context
         Threads and progress.
     without
         Returns for a piece of the grid which pixels of the reference are left out; None: none.
-    places
-        The chips, on a regular layout; None: side by side on the matching grid.
-    elsewhere_px
-        See `Survey`.
     """
-    places = places or survey_places(matcher.pair.grid)
     least = None if without is None else LEAST_VALID_MASKED
     seen = replace(matcher, held_out=without, least_valid=least)
     kept, surfaces = seen.match_forward(model, places, SURVEY_RADIUS_PX, context)

@@ -73,11 +73,11 @@ def survey_all(
         Threads and progress.
     """
     model, (elsewhere_px, exact_px) = transform.model, accuracy_px
-    whole = survey_model(matcher, model, context.part(0.0, 0.4), None, places, elsewhere_px)
+    whole = survey_model(matcher, model, places, elsewhere_px, context.part(0.0, 0.4))
     part = context.part(0.4, 0.9)
     rest = survey_rest(matcher, transform, places, elsewhere_px, sensors, exact_px, part)
     ground = None
     if open_ground is not None:
         last = context.part(0.9, 1.0)
-        ground = survey_model(matcher, model, last, open_ground, places, elsewhere_px)
+        ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground)
     return Surveys(whole, rest, ground)
