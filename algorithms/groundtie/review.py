@@ -60,20 +60,14 @@ class ModelFit:
         What was fitted.
     residuals_px
         Residuals of all points, shape (n,), in input pixels.
-    rmse_px
-        Root mean square residual of the points of the fit: no measure of accuracy.
     left_out_px
         Root mean square error of points at models that have not seen their block; None: too few.
-    check_px
-        Root mean square error of the check points; None: there are none.
     """
 
     kind: str
     transform: Transform
     residuals_px: FloatArray
-    rmse_px: float
     left_out_px: float | None
-    check_px: float | None
 
 
 @dataclass(frozen=True)
@@ -167,16 +161,8 @@ class Review:
             They are fewer than the model needs.
         """
         evidence = TiePointEvidence.of(self.points, kind, self.input_grid)
-        residuals = evidence.residuals_px(evidence.transform)
-        check = self.points.check
-        return ModelFit(
-            kind,
-            evidence.transform,
-            residuals,
-            _root_mean_square(residuals[evidence.taken]),
-            self._left_out_px(kind),
-            _root_mean_square(residuals[check]) if check.any() else None,
-        )
+        residuals_px = evidence.residuals_px(evidence.transform)
+        return ModelFit(kind, evidence.transform, residuals_px, self._left_out_px(kind))
 
     def objection(self, kind: str) -> str:
         """Return why `warp` refuses a model of these points; empty if it does not.
@@ -223,11 +209,7 @@ class Review:
             seen = TiePointEvidence(self.points.take(taken[~block]), kind, self.input_grid)
             left = self.points.take(taken[block])
             errors[block] = np.hypot(*left.residual_px(seen.transform).T)
-        return _root_mean_square(errors) if np.isfinite(errors).all() else None
-
-
-def _root_mean_square(residuals: FloatArray) -> float:
-    return float(np.sqrt(np.mean(residuals**2)))
+        return float(np.sqrt(np.mean(errors**2))) if np.isfinite(errors).all() else None
 
 
 def without_points(reference: Any, input: Any) -> Review:

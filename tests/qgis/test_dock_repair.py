@@ -54,7 +54,7 @@ def test_repair_moves_switches_and_writes(desktop: Desktop, dock: Any, tmp_path:
     assert table.point_at(0) == index
     assert table.setData(table.index(0, 0), Qt.CheckState.Unchecked, Qt.ItemDataRole.CheckStateRole)
     assert not repair.review.points.used[index]
-    assert repair.fits["affine"].rmse_px < after.rmse_px
+    assert repair.fits["affine"].left_out_px < after.left_out_px
 
     repair.model.setCurrentIndex(repair.model.findData("translation"))
     repair.write.click()
