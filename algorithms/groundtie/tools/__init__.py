@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import importlib
 import importlib.util
-import inspect
 
 from ..declaration import Tool, tool_of
 
@@ -54,7 +53,7 @@ def summary_of(name: str) -> str:
         return load_tool(name).summary
     body = ast.parse(source).body
     function = next(f for f in body if isinstance(f, ast.FunctionDef) and f.name == name)
-    return inspect.cleandoc(ast.get_docstring(function) or "").partition("\n")[0]
+    return (ast.get_docstring(function) or "").partition("\n")[0]
 
 
 def load_tools() -> tuple[Tool, ...]:
