@@ -84,8 +84,9 @@ def test_the_package_offers_the_function(tool: Tool) -> None:
 @each_tool
 def test_python_has_the_same_parameters_with_the_same_defaults(tool: Tool) -> None:
     parameters = inspect.signature(tool.run).parameters
+    needed = {p.name for p in tool.all_parameters if p.required and not p.kind.optional_in_python}
     declared = {
-        p.name: inspect.Parameter.empty if p.required_in_python else p.default
+        p.name: inspect.Parameter.empty if p.name in needed else p.default
         for p in tool.all_parameters
     }
     assert {n: p.default for n, p in parameters.items() if n not in HANDED_THROUGH} == declared

@@ -183,7 +183,7 @@ class TestResultsInMemory:
 
     def test_an_output_may_be_left_out_in_python_alone(self) -> None:
         parameter = RETURNING_TOY.parameter("output")
-        assert parameter.required and not parameter.required_in_python and parameter.positional
+        assert parameter.required and parameter.positional
         assert RETURNING_TOY.check({"input": "a.tif"}, in_python=True)["output"] is None
         with pytest.raises(ParameterError, match=r"^output is missing$"):
             RETURNING_TOY.check({"input": "a.tif"})

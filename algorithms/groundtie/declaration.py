@@ -78,21 +78,17 @@ class Parameter:
         """Whether the command line takes it by position, without an option's name."""
         return self.required and not self.kind.option
 
-    @property
-    def required_in_python(self) -> bool:
-        """Whether the Python function has no default for it."""
-        return self.required and not self.kind.optional_in_python
-
     def check(self, value: Any, called: str, *, in_python: bool = False) -> Any:
-        """Return `value` in its proper type; raise `ParameterError` if it cannot be right.
+        """Return `value`, or the default for None, in its proper type.
 
-        `called` is the parameter's name in the error message.
+        Raises `ParameterError` if it cannot be right; `called` is the parameter's name in it.
         """
-        if value is None:
-            if self.required_in_python if in_python else self.required:
-                raise ParameterError(f"{called} is missing")
-            return None
-        return self.kind.check(called, value)
+        value = self.default if value is None else value
+        if value is not None:
+            return self.kind.check(called, value)
+        if self.required and not (in_python and self.kind.optional_in_python):
+            raise ParameterError(f"{called} is missing")
+        return None
 
 
 @dataclass(frozen=True)
@@ -179,7 +175,7 @@ class Tool:
         if unknown:
             raise ParameterError(f"{self.name} has no parameter {sorted(unknown)[0]}")
         checked = {
-            p.name: p.check(_value(p, values), spell(p), in_python=in_python)
+            p.name: p.check(values.get(p.name), spell(p), in_python=in_python)
             for p in self.all_parameters
         }
         check_different(
@@ -231,11 +227,6 @@ def tool(
 def tool_of(function: Callable[..., Any]) -> Tool:
     """Return the declaration of a function that `tool` decorated."""
     return cast(Tool, function.__groundtie_tool__)  # type: ignore[attr-defined]
-
-
-def _value(parameter: Parameter, values: Mapping[str, Any]) -> Any:
-    value = values.get(parameter.name)
-    return parameter.default if value is None else value
 
 
 def _declare(
