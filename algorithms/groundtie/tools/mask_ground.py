@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..declaration import Output, tool
+from ..declaration import Output, given_files, tool
 from ..masks.ground import find_ground
 from ..masks.scene import Scene, write_mask
 from ..progress import SILENT, Progress
@@ -34,4 +34,5 @@ def mask_ground(
         ground = find_ground(scene, progress.part(0.0, 0.7))
         with Outputs() as outputs:
             share = write_mask(scene, outputs.stage(output), ground.select, progress.part(0.7, 1.0))
-    return WrittenMask(share, {}, "between layover and radar shadow", {"mask": output})
+    files = given_files({"mask": output})
+    return WrittenMask(share, {}, "between layover and radar shadow", files)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from ..declaration import Output, tool
+from ..declaration import Output, given_files, tool
 from ..kinds import RasterOut
 from ..masks.regions import HIGH_PERCENT, WIDTH_M, find_regions
 from ..masks.scene import Scene, write_mask
@@ -50,7 +50,7 @@ def mask_regions(
     and neither bright nor radar shadow. Long ones are thinned to their skeleton and broadened by a
     window; strong scatterers inside are masked. The mask is for the registration of this image.
     """
-    files = {"mask": output, "regions": regions, "skeleton": skeleton}
+    files = given_files({"mask": output, "regions": regions, "skeleton": skeleton})
     with bounded_cache(), open_raster(input) as source:
         scene = Scene.of(source, band)
         found = find_regions(scene, mask_width, mask_high_percent, progress.part(0.0, 0.7))

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from ..declaration import Output, tool
+from ..declaration import Output, given_files, tool
 from ..errors import ParameterError
 from ..geometry.views import View, split_views, stated_view
 from ..kinds import RasterOut
@@ -58,7 +58,7 @@ def mask_surface(
             "the view of the reference is not known: put its STAC item beside it, or give views"
         )
     known = (view,) if other is None else (view, stated_view(other))
-    files = {"mask": output, "reasons": reasons}
+    files = given_files({"mask": output, "reasons": reasons})
     with bounded_cache(), ExitStack() as stack:
         scene = Scene.of(stack.enter_context(open_raster(reference)))
         ground, fit = fitted_ground(scene, StatedSurface(surface_model, known), stack)

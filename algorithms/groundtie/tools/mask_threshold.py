@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..declaration import Output, tool
+from ..declaration import Output, given_files, tool
 from ..masks.scene import Scene, write_mask
 from ..masks.threshold import HIGH_PERCENT, ThresholdMask
 from ..progress import SILENT, Progress
@@ -43,4 +43,4 @@ def mask_threshold(
     limits = {"low": mask.low, "high": mask.high}
     finite = {name: at if math.isfinite(at) else None for name, at in limits.items()}
     words = f"block means of {mask.low:g} to {mask.high:g}"
-    return WrittenMask(share, finite, words, {"mask": output})
+    return WrittenMask(share, finite, words, given_files({"mask": output}))

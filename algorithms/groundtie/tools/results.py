@@ -28,19 +28,14 @@ class WrittenMask:
         What else is known of it, by name; None: there is none.
     words
         The same in words.
-    asked
-        The files, by name; None: not asked for.
+    files
+        What was written, by name.
     """
 
     share: float
     numbers: Mapping[str, Any]
     words: str
-    asked: Mapping[str, Path | None]
-
-    @property
-    def files(self) -> dict[str, str]:
-        """What was written, by name."""
-        return given_files(self.asked)
+    files: dict[str, str]
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
