@@ -9,7 +9,7 @@ from typing import Annotated
 from ..batches.batch import Batch
 from ..batches.result import BatchResult
 from ..declaration import Output, tool
-from ..kinds import Choice, FileIn, FileOut, Flag, FolderOut, Number
+from ..kinds import Choice, FileIn, FileOut, Flag, FolderOut
 from ..progress import SILENT, Progress
 from ..tables import SUFFIXES
 from . import NAMES, load_tool
@@ -61,16 +61,7 @@ def batch(
             "files, parameters, version and outputs are unchanged.",
         ),
     ] = False,
-    workers: Annotated[
-        int | None,
-        Number(
-            label="Workers",
-            help="Number of rows that run at the same time; by default one per processor.",
-            integer=True,
-            minimum=1,
-            maximum=256,
-        ),
-    ] = None,
+    workers: general.RowWorkers = None,
     scheduler: general.Scheduler = None,
     json_log: Annotated[
         Path | None,

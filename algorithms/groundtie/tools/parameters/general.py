@@ -44,17 +44,17 @@ Resampling = Annotated[
         advanced=True,
     ),
 ]
-Workers = Annotated[
-    int | None,
-    Number(
-        label="Workers",
-        help="Number of threads; by default one per processor.",
-        integer=True,
-        minimum=1,
-        maximum=256,
-        common=True,
-    ),
-]
+_THREADS = Number(
+    label="Workers",
+    help="Number of threads; by default one per processor.",
+    integer=True,
+    minimum=1,
+    maximum=256,
+    common=True,
+)
+Workers = Annotated[int | None, _THREADS]
+_ROWS_HELP = "Number of rows that run at the same time; by default one per processor."
+RowWorkers = Annotated[int | None, replace(_THREADS, help=_ROWS_HELP, common=False)]
 Scheduler = Annotated[
     str | None,
     Text(
