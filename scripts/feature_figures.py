@@ -12,6 +12,7 @@ from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
 
 import groundtie
+from groundtie.features.scale_space import FIRST_SCALE_PX
 from groundtie.masks.open_ground import OpenGround
 from groundtie.masks.scene import Scene
 from groundtie.masks.surface_model import Reason
@@ -28,7 +29,8 @@ def features(scenes: Scenes) -> Figure:
     figure, axes = canvas(5.8, 2.5, 2)
     for each, name in zip(axes, ("sift", "sift-oct"), strict=True):
         found = sift_detector(name).detect(window)
-        first = found.octave < 0
+        # Half a layer below the first one of the image at its own size.
+        first = found.scale_px < FIRST_SCALE_PX * 2 ** (1 / 6)
         each.imshow(stretched(np.log(values + 1.0)), cmap="gray")
         for chosen, colour in ((first, ORANGE), (~first, BLUE)):
             for (col, row), scale in zip(

@@ -18,9 +18,7 @@ SIDE = 200
 def points(*rows: tuple[float, float, float, float]) -> Keypoints:
     """Return features from columns, rows, scales and orientations."""
     table = np.array(rows, float)
-    return Keypoints(
-        table[:, :2], table[:, 2], table[:, 3], np.ones(len(table)), np.zeros(len(table), int)
-    )
+    return Keypoints(table[:, :2], table[:, 2], table[:, 3], np.ones(len(table)))
 
 
 def image(seed: int = 0) -> NDArray[np.float32]:

@@ -12,13 +12,7 @@ from groundtie.studies.sift_variants import SiftVariantDescriptor, sift_detector
 
 def points(px: np.ndarray) -> Keypoints:
     count = len(px)
-    return Keypoints(
-        np.asarray(px, float),
-        np.full(count, 2.0),
-        np.zeros(count),
-        np.ones(count),
-        np.zeros(count, int),
-    )
+    return Keypoints(np.asarray(px, float), np.full(count, 2.0), np.zeros(count), np.ones(count))
 
 
 def test_names_of_variants() -> None:

@@ -12,7 +12,7 @@ def circles(px: np.ndarray, scale: float | np.ndarray = 2.0) -> Keypoints:
     px = np.asarray(px, float)
     count = len(px)
     scales = np.broadcast_to(np.asarray(scale, float), (count,)).copy()
-    return Keypoints(px, scales, np.zeros(count), np.ones(count), np.zeros(count, int))
+    return Keypoints(px, scales, np.zeros(count), np.ones(count))
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,6 @@ def by_opencv(image: NDArray[np.uint8], upright: bool) -> tuple[Keypoints, NDArr
         np.array([point.size / 2 for point in points]),
         np.deg2rad([point.angle for point in points]),
         np.array([point.response for point in points]),
-        np.array([point.octave & 0xFF for point in points]),
     )
     return found, theirs / np.linalg.norm(theirs, axis=1, keepdims=True)
 

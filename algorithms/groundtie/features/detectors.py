@@ -10,7 +10,7 @@ to compress.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -76,13 +76,11 @@ class SiftDetector:
 
     def _opencv(self, grey: ByteImage) -> Keypoints:
         sift = cv2.SIFT.create(0, LAYERS, self.contrast, _EDGE_RATIO, FIRST_SCALE_PX)
-        rows = [(*k.pt, k.size, k.response, k.octave) for k in sift.detect(grey, None)]
+        rows = [(*k.pt, k.size, k.response) for k in sift.detect(grey, None)]
         # OpenCV repeats a keypoint for each of its orientations.
-        table = np.unique(np.array(rows, float).reshape(-1, 5), axis=0)
-        # The octave is the lowest byte, a signed number.
-        octave = (table[:, 4].astype(int) & 0xFF).astype(np.uint8).astype(np.int8).astype(int)
+        table = np.unique(np.array(rows, float).reshape(-1, 4), axis=0)
         position = table[:, :2] - _OPENCV_OFFSET_PX
-        return Keypoints(position, table[:, 2] / 2, np.zeros(len(table)), table[:, 3], octave)
+        return Keypoints(position, table[:, 2] / 2, np.zeros(len(table)), table[:, 3])
 
 
 @dataclass(frozen=True)
@@ -99,8 +97,7 @@ class SiftOctDetector(SiftDetector):
         scale_px = np.sqrt(found.scale_px**2 + more)
         # The first half-sized pixel is the mean of the first two.
         position_px = 2 * found.position_px + 0.5
-        none = np.zeros(len(found))
-        return Keypoints(position_px, 2 * scale_px, none, found.response, found.octave + 1)
+        return replace(found, position_px=position_px, scale_px=2 * scale_px)
 
 
 def to_grey(image: FloatImage, valid: NDArray[np.bool_]) -> ByteImage:

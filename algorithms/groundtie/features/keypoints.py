@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..rasters.grid import FloatArray
 
@@ -27,22 +26,18 @@ class Keypoints:
         ones.
     response
         How far it stands out; larger is stronger, shape (n,).
-    octave
-        Octave of the scale space, shape (n,): -1 on the image at twice its size, 0 on the image
-        itself, 1 at half its size …
     """
 
     position_px: FloatArray
     scale_px: FloatArray
     orientation_rad: FloatArray
     response: FloatArray
-    octave: NDArray[np.int_]
 
     @classmethod
     def none(cls) -> Keypoints:
         """Return an empty table."""
         nothing = np.zeros(0)
-        return cls(np.zeros((0, 2)), nothing, nothing, nothing, np.zeros(0, int))
+        return cls(np.zeros((0, 2)), nothing, nothing, nothing)
 
     def __len__(self) -> int:
         return len(self.position_px)

@@ -94,8 +94,7 @@ def _peaks(
     offset, height, rows, cols = offset[near], height[near], rows[near], cols[near]
     position = 2**octave * (np.column_stack([cols, rows]) + offset[:, :2])
     side = sides[middle] + offset[:, 2] * (sides[1] - sides[0])
-    count = len(position)
-    return Keypoints(position, sigma_of(side), np.zeros(count), height, np.full(count, octave))
+    return Keypoints(position, sigma_of(side), np.zeros(len(position)), height)
 
 
 def _vertices(
