@@ -28,7 +28,6 @@ def test_near_matches_are_the_nearest_of_the_gate() -> None:
     assert 0 < mutual.sum() < 150
     np.testing.assert_array_equal(found.first, np.nonzero(mutual)[0])
     np.testing.assert_array_equal(found.second, nearest[mutual])
-    np.testing.assert_allclose(found.distance, two[mutual, 0], rtol=1e-4)
     np.testing.assert_allclose(found.ratio, two[mutual, 0] / two[mutual, 1], rtol=1e-4)
 
 

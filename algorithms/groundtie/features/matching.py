@@ -27,15 +27,13 @@ class Matches:
     ----------
     first, second
         Row numbers in both tables, shape (n,).
-    distance
-        Between their descriptors, shape (n,).
     ratio
-        The distance over that to the next best partner, 0 to 1; 0 if there is no other.
+        Distance of their descriptors over that to the next best partner, 0 to 1, shape (n,); 0 if
+        there is no other.
     """
 
     first: Indices
     second: Indices
-    distance: FloatArray
     ratio: FloatArray
 
     def __len__(self) -> int:
@@ -43,19 +41,16 @@ class Matches:
 
     def take(self, which: NDArray[np.bool_]) -> Matches:
         """Return the matches that the mask `which` selects."""
-        return Matches(
-            self.first[which], self.second[which], self.distance[which], self.ratio[which]
-        )
+        return Matches(self.first[which], self.second[which], self.ratio[which])
 
     @classmethod
-    def of(cls, nearest: Nearest, ratio: float = 1.0) -> Matches:
-        """Return the nearest partners whose ratio is no larger than `ratio`."""
+    def of(cls, nearest: Nearest) -> Matches:
+        """Return the keypoints that have a nearest partner, and these."""
         which = np.nonzero(nearest.index >= 0)[0]
         distance, following = nearest.distance[which], nearest.next_distance[which]
-        ratios = np.ones(len(which))
-        np.divide(distance, following, out=ratios, where=following > 0)
-        kept = ratios <= ratio
-        return cls(which[kept], nearest.index[which[kept]], distance[kept], ratios[kept])
+        ratio = np.ones(len(which))
+        np.divide(distance, following, out=ratio, where=following > 0)
+        return cls(which, nearest.index[which], ratio)
 
 
 @dataclass(frozen=True)

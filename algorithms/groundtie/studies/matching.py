@@ -46,8 +46,8 @@ def match(
     method
         "exact", or "kd-tree": approximately, by a forest of k-d trees.
     """
-    forward = _nearest(first, second, method)
-    found = Matches.of(forward, ratio)
+    found = Matches.of(_nearest(first, second, method))
+    found = found.take(found.ratio <= ratio)
     if not mutual:
         return found
     back = _nearest(second, first, method).index
