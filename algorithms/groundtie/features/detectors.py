@@ -20,7 +20,7 @@ from ..rasters.patch import Patch, reduced_patch
 from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from .keypoints import Keypoints
-from .scale_space import FIRST_SCALE_PX, IMAGE_BLUR_PX, LAYERS
+from .scale_space import FIRST_SCALE_PX, IMAGE_BLUR_PX, LAYERS, distance_to_masked
 
 ByteImage = NDArray[np.uint8]
 
@@ -119,9 +119,7 @@ def seen_whole(
 
     The image's own border does not count.
     """
-    if valid.all():
-        return np.ones(len(found), bool)
-    distance = cv2.distanceTransform(valid.astype(np.uint8), cv2.DIST_L2, 5)
+    distance = distance_to_masked(valid)
     last = np.array(valid.shape)[::-1] - 1
     cols, rows = np.clip(np.rint(found.position_px).astype(int), 0, last).T
     return np.asarray(distance[rows, cols] > scales * found.scale_px)

@@ -77,7 +77,7 @@ def describe_at_scales(
     owners = [np.zeros(0, int)]
     layer_of = _layer_of(found.scale_px)
     layers = [int(layer) for layer in np.unique(layer_of)]
-    distance = _distance(valid)
+    distance = distance_to_masked(valid)
     for layer, level in zip(layers, _scale_space(image, layers), strict=True):
         pixel = 2 ** _octave_of(layer)
         seen = distance[::pixel, ::pixel] > _SEES_SCALES * _scale_of(layer)
@@ -115,15 +115,17 @@ def gradient_at_scale(image: FloatImage, valid: NDArray[np.bool_], scale_px: flo
     """
     layer = _layer_of(scale_px)
     (level,) = _scale_space(image, [layer])
-    return _gradient(level, _distance(valid) > _SEES_SCALES * _scale_of(layer), differences)
+    return _gradient(
+        level, distance_to_masked(valid) > _SEES_SCALES * _scale_of(layer), differences
+    )
 
 
 def _layer_of(scale_px: Any) -> Any:
     return np.rint(LAYERS * np.log2(scale_px / FIRST_SCALE_PX)).astype(int)
 
 
-def _distance(valid: NDArray[np.bool_]) -> FloatImage:
-    """Return how far each pixel is from a masked one."""
+def distance_to_masked(valid: NDArray[np.bool_]) -> FloatImage:
+    """Return how far each pixel is from a masked one, in pixels; infinite without one."""
     if valid.all():
         return np.full(valid.shape, np.inf, np.float32)
     return np.asarray(cv2.distanceTransform(valid.astype(np.uint8), cv2.DIST_L2, 5), np.float32)
