@@ -27,7 +27,7 @@ from .results import forget_layers, load_on_completion, show_report
 from .styling import LoadedLayers, icon_of
 from .tool_loading import LazyTool
 from .translation import tr
-from .unavailable import UnavailableAlgorithm, broken, named_tools
+from .unavailable import UnavailableAlgorithm, broken
 from .values import Reader, with_layers_as_files
 from .wording import in_words
 
@@ -84,7 +84,7 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
             return  # the provider's own: what runs, or shows a dialog, is made from it
         for parameter in self._tool.parameters:
             made = definition(parameter)
-            made.setHelp(in_words(tr(parameter.kind.help), self._tool, named_tools()))
+            made.setHelp(in_words(tr(parameter.kind.help), self._tool))
             self.addParameter(made)
         preselect(self, self._tool)
         for output in self._tool.outputs:
@@ -232,7 +232,7 @@ def help_html(tool: Any) -> str:
     """Return the help of a tool and of its parameters as HTML."""
 
     def worded(text: str) -> str:
-        return _escaped(in_words(tr(" ".join(text.split())), tool, named_tools()))
+        return _escaped(in_words(tr(" ".join(text.split())), tool))
 
     paragraphs = [tool.summary, *tool.description.split("\n\n")]
     parts = [f"<p>{worded(text)}</p>" for text in paragraphs if text]

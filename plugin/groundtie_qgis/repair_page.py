@@ -119,7 +119,7 @@ class RepairPage(QWidget):
         self._reference, self._input, self._sensor = reference, ortho, image
         self.change(opened, "translation")
 
-    def open(self, reference: Any, input: Any, path: Any, kind: str = "affine") -> None:
+    def open(self, reference: Any, input: Any, path: Any) -> None:
         """Take the tie points of a registration; None: begin with none."""
         from .dependencies import rasterio_env
 
@@ -130,7 +130,7 @@ class RepairPage(QWidget):
                 opened = review.Review.open(path, input.source())
             else:
                 opened = review.without_points(reference.source(), input.source())
-        self.change(opened, kind)
+        self.change(opened, "affine")
         self.text.setText(self._summary() if path is not None else tr(FIRST_POINTS))
 
     def close_points(self) -> None:

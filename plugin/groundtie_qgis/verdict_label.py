@@ -9,7 +9,6 @@ from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QLabel
 
 from .translation import tr
-from .unavailable import named_tools
 from .wording import in_words
 
 _GREEN, _RED = "#1a7f37", "#b3261e"
@@ -30,7 +29,7 @@ class VerdictLabel(QLabel):
         heading = tr("✔ Accepted") if good else tr("✘ Not registered")
         for layer in layers:
             text = text.replace(layer.source(), layer.name())
-        lines = html.escape(in_words(text, None, named_tools())).split("\n")
+        lines = html.escape(in_words(text, None)).split("\n")
         self.setText(
             f'<p style="color: {_GREEN if good else _RED}"><b>{heading}</b></p>'
             f"<p>{'<br>'.join(lines)}</p>"

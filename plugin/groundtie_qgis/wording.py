@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from typing import Any
 
 from .choice_labels import label_of
 from .translation import tr
+from .unavailable import named_tools
 
 
 def choice_label(word: str) -> str:
@@ -15,7 +15,7 @@ def choice_label(word: str) -> str:
     return tr(label_of(word))
 
 
-def in_words(text: str, tool: Any, tools: Iterable[Any]) -> str:
+def in_words(text: str, tool: Any) -> str:
     """Return a help text with the titles of tools and the labels of a tool's parameters.
 
     Parameters
@@ -24,17 +24,13 @@ def in_words(text: str, tool: Any, tools: Iterable[Any]) -> str:
         The text of a declaration.
     tool
         The tool whose text it is; None: of none.
-    tools
-        All tools.
     """
-    named = {other.name: tr(other.title) for other in tools}
+    named = {other.name: tr(other.title) for other in named_tools()}
     parameters = () if tool is None else tool.parameters
     named |= {parameter.name: tr(parameter.kind.label) for parameter in parameters}
     # Short names are English words, too: only what is said to be a tool is one.
     words = (name for name in named if "_" in name or name == "coregister")
     long = "|".join(sorted(words, key=len, reverse=True))
     short = "|".join(sorted(named, key=len, reverse=True))
-    pattern = rf"`({short})`|(?:the tool|das Werkzeug) ({short})\b" + (
-        rf"|\b({long})\b" if long else ""
-    )
+    pattern = rf"`({short})`|(?:the tool|das Werkzeug) ({short})\b|\b({long})\b"
     return re.sub(pattern, lambda found: f"“{named[next(filter(None, found.groups()))]}”", text)
