@@ -24,7 +24,7 @@ from toys import TOY
 
 from groundtie import load_transform
 from groundtie.cli import main
-from groundtie.tools import NAMES, load_tool, summary_of
+from groundtie.tools import NAMES, load_tool, named_tool
 from groundtie.version import __version__
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -161,8 +161,10 @@ def test_the_command_starts_without_loading_the_tools(option: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_summary_in_the_list_of_tools_is_the_declared_one(name: str) -> None:
-    assert summary_of(name) == load_tool(name).summary
+def test_what_lists_of_tools_show_is_what_is_declared(name: str) -> None:
+    named, tool = named_tool(name), load_tool(name)
+    declared = (name, tool.title, tool.group, tool.summary)
+    assert (named.name, named.title, named.group, named.summary) == declared
 
 
 def test_help_of_a_tool_tells_everything_of_its_parameters(

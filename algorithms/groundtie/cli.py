@@ -63,9 +63,9 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
 
 
 def _all_tools() -> ToolGroup:
-    from .tools import NAMES, load_tool, summary_of
+    from .tools import NAMES, load_tool, named_tool
 
-    return ToolGroup(NAMES, load_tool, summary_of)
+    return ToolGroup(NAMES, load_tool, lambda name: named_tool(name).summary)
 
 
 def _these_tools(tools: Sequence[Tool]) -> ToolGroup:

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import ast
-import importlib.util
-from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 from qgis.core import (
@@ -17,56 +13,22 @@ from qgis.core import (
 )
 from qgis.PyQt.QtGui import QIcon
 
-from .library import library_name
+from .library import library_module
 from .pages import help_url
 from .styling import icon_of
 from .translation import tr
 
 
-@dataclass(frozen=True)
-class NamedTool:
-    """What can be given of a tool without importing it."""
-
-    name: str
-    title: str
-    group: str
-    summary: str
-
-
 @cache
-def named_tools() -> list[NamedTool]:
-    """Read names, titles and groups of the tools from their source."""
-    spec = importlib.util.find_spec(f"{library_name()}.tools")
-    folders = spec.submodule_search_locations if spec is not None else None
-    sources = sorted(path for folder in folders or () for path in Path(folder).glob("*.py"))
-    return [tool for path in sources for tool in _declared(path.read_text(encoding="utf-8"))]
+def named_tools() -> list[Any]:
+    """Return name, title, group and summary of the tools; none of them is imported for it."""
+    tools = library_module("tools")
+    return [tools.named_tool(name) for name in tools.NAMES]
 
 
 def broken(error: ImportError) -> str:
     """Return one line that states which package cannot be used."""
     return tr("GroundTie cannot use a Python package: {}").format(" ".join(str(error).split()))
-
-
-def _declared(source: str) -> list[NamedTool]:
-    functions = [node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]
-    return [
-        NamedTool(
-            function.name,
-            **_texts(decorator),
-            summary=(ast.get_docstring(function) or "").partition("\n")[0],
-        )
-        for function in functions
-        for decorator in function.decorator_list
-        if isinstance(decorator, ast.Call) and ast.unparse(decorator.func) == "tool"
-    ]
-
-
-def _texts(decorator: ast.Call) -> dict[str, str]:
-    return {
-        keyword.arg: ast.literal_eval(keyword.value)
-        for keyword in decorator.keywords
-        if keyword.arg in ("title", "group")
-    }
 
 
 class UnavailableAlgorithm(QgsProcessingAlgorithm):
@@ -80,7 +42,7 @@ class UnavailableAlgorithm(QgsProcessingAlgorithm):
         What is missing, in one line.
     """
 
-    def __init__(self, tool: NamedTool, reason: str) -> None:
+    def __init__(self, tool: Any, reason: str) -> None:
         super().__init__()
         self._tool = tool
         self._reason = reason
@@ -89,7 +51,7 @@ class UnavailableAlgorithm(QgsProcessingAlgorithm):
         return UnavailableAlgorithm(self._tool, self._reason)
 
     def name(self) -> str:
-        return self._tool.name
+        return str(self._tool.name)
 
     def displayName(self) -> str:
         return tr(self._tool.title)
@@ -98,7 +60,7 @@ class UnavailableAlgorithm(QgsProcessingAlgorithm):
         return tr(self._tool.group)
 
     def groupId(self) -> str:
-        return self._tool.group.lower().replace(" ", "_")
+        return str(self._tool.group).lower().replace(" ", "_")
 
     def shortHelpString(self) -> str:
         return self._reason
