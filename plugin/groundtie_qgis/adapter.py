@@ -16,7 +16,6 @@ from qgis.core import (
     QgsProcessingOutputNumber,
     QgsProcessingOutputString,
 )
-from qgis.PyQt.QtGui import QIcon
 
 from .definitions import definition, qgis_name
 from .dependencies import complaint, missing_for, rasterio_env
@@ -27,17 +26,16 @@ from .results import forget_layers, load_on_completion, show_report
 from .styling import LoadedLayers, icon_of
 from .tool_loading import LazyTool
 from .translation import tr
-from .unavailable import UnavailableAlgorithm, broken
+from .unavailable import NamedAlgorithm, UnavailableAlgorithm, broken
 from .values import Reader, with_layers_as_files
 from .wording import in_words
 
 
-class ToolAlgorithm(QgsProcessingAlgorithm):
+class ToolAlgorithm(NamedAlgorithm):
     """The Processing algorithm of one declared tool."""
 
     def __init__(self, tool: Any) -> None:
-        super().__init__()
-        self._tool = tool
+        super().__init__(tool)
         self._inputs: dict[str, Any] = {}
         self._alike: dict[str, Any] = {}
         self._about = ""
@@ -48,18 +46,6 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
         except ImportError as error:  # a package is there, but broken
             return UnavailableAlgorithm(self._tool, broken(error))
         return ToolAlgorithm(self._tool)
-
-    def name(self) -> str:
-        return str(self._tool.name)
-
-    def displayName(self) -> str:
-        return tr(self._tool.title)
-
-    def group(self) -> str:
-        return tr(self._tool.group)
-
-    def groupId(self) -> str:
-        return str(self._tool.group).lower().replace(" ", "_")
 
     def tags(self) -> list[str]:
         return [tag.strip() for tag in plugin_metadata().get("tags", "").split(",") if tag]
@@ -72,9 +58,6 @@ class ToolAlgorithm(QgsProcessingAlgorithm):
 
     def helpUrl(self) -> str:
         return help_url(self.name())
-
-    def icon(self) -> QIcon:
-        return QIcon(self.svgIconPath())
 
     def svgIconPath(self) -> str:
         return str(icon_of(self.name()))

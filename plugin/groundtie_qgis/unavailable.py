@@ -1,4 +1,4 @@
-"""Stands in for the tools where packages are missing that they need: it states what to install."""
+"""What is shown of a tool without importing it, and what stands in for one that lacks packages."""
 
 from __future__ import annotations
 
@@ -31,24 +31,18 @@ def broken(error: ImportError) -> str:
     return tr("GroundTie cannot use a Python package: {}").format(" ".join(str(error).split()))
 
 
-class UnavailableAlgorithm(QgsProcessingAlgorithm):
-    """A tool that cannot run, and reports why.
+class NamedAlgorithm(QgsProcessingAlgorithm):
+    """What the toolbox shows of a tool's algorithm.
 
     Parameters
     ----------
     tool
-        Which tool.
-    reason
-        What is missing, in one line.
+        The tool, of which nothing has to be imported.
     """
 
-    def __init__(self, tool: Any, reason: str) -> None:
+    def __init__(self, tool: Any) -> None:
         super().__init__()
         self._tool = tool
-        self._reason = reason
-
-    def createInstance(self) -> UnavailableAlgorithm:
-        return UnavailableAlgorithm(self._tool, self._reason)
 
     def name(self) -> str:
         return str(self._tool.name)
@@ -62,14 +56,33 @@ class UnavailableAlgorithm(QgsProcessingAlgorithm):
     def groupId(self) -> str:
         return str(self._tool.group).lower().replace(" ", "_")
 
+    def icon(self) -> QIcon:
+        return QIcon(str(icon_of(self.name())))
+
+
+class UnavailableAlgorithm(NamedAlgorithm):
+    """A tool that cannot run, and reports why.
+
+    Parameters
+    ----------
+    tool
+        Which tool.
+    reason
+        What is missing, in one line.
+    """
+
+    def __init__(self, tool: Any, reason: str) -> None:
+        super().__init__(tool)
+        self._reason = reason
+
+    def createInstance(self) -> UnavailableAlgorithm:
+        return UnavailableAlgorithm(self._tool, self._reason)
+
     def shortHelpString(self) -> str:
         return self._reason
 
     def helpUrl(self) -> str:
         return help_url("qgis")
-
-    def icon(self) -> QIcon:
-        return QIcon(str(icon_of(self.name())))
 
     def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:
         """Declare nothing: the parameters are in what cannot be imported."""
