@@ -45,10 +45,6 @@ class Context:
         """Return the context of a part of this work, from `start` to `end` (0 to 1)."""
         return replace(self, progress=self.progress.part(start, end))
 
-    def once(self) -> Context:
-        """Return this context for a step whose reference is shown in no other registration."""
-        return replace(self, memo=None)
-
     def quiet(self) -> Context:
         """Return this context without progress, for a step that is too short to report."""
         return replace(self, progress=Progress(is_cancelled=self.progress.is_cancelled))

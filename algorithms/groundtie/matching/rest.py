@@ -96,7 +96,7 @@ def survey_rest(
     is_doubtful = same.has_sharp_edges or same.is_finer_than_ground
     if not locked.is_explained or (is_doubtful and not same.is_same_view):
         # Another input leaves something else of the reference.
-        once = context.once()
+        once = replace(context, memo=None)
         left = survey_model(fused, transform.model, places, elsewhere_px, once, locked)
     if locked.is_explained:
         # A copy may be blended into other ground, of which the same windows are no part.
