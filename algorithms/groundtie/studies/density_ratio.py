@@ -68,7 +68,6 @@ def fit_density_ratio(
     y: ArrayLike,
     centres: FloatArray,
     width: float,
-    start: FloatArray | None = None,
     tolerance: float = TOLERANCE,
 ) -> DensityRatio:
     """Fit the ratio of densities to pairs of values.
@@ -81,17 +80,13 @@ def fit_density_ratio(
         Centres (x, y) of the kernels, shape (b, 2); usually some of the pairs.
     width
         Standard deviation of the kernels.
-    start
-        Shares of the kernels to start from, positive, shape (b,). The problem is convex: they
-        decide on the time that is taken, not on the result.
     tolerance
         By how much the mean of log w may fall short of its maximum.
     """
     along_x, along_y = _kernels(np.asarray(x), np.asarray(y), centres, width)
     # The mean of a kernel over all combinations of x and y is a product, too.
     means = along_x.mean(axis=0) * along_y.mean(axis=0)
-    shares = np.full(len(centres), 1.0) if start is None else start
-    shares = _most_likely(along_x * along_y / means, shares, tolerance)
+    shares = _most_likely(along_x * along_y / means, tolerance)
     return DensityRatio(centres, width, shares / means)
 
 
@@ -234,15 +229,16 @@ def _log(ratio: FloatArray) -> FloatArray:
     return np.asarray(np.log(np.maximum(ratio, np.finfo(float).tiny)))
 
 
-def _most_likely(kernels: FloatArray, shares: FloatArray, tolerance: float) -> FloatArray:
+def _most_likely(kernels: FloatArray, tolerance: float) -> FloatArray:
     """Return shares ≥ 0 of kernels of mean 1, shape (n, b), that maximise Σ log(kernels · shares).
 
-    Their sum is 1. Steps of expectation and maximisation start; Newton's steps within the
-    constraint, each a problem of least squares, finish. No kernel's gradient may exceed 1 at the
-    maximum, and by what it does the likelihood falls short of it at most.
+    Their sum is 1. Steps of expectation and maximisation start, from equal shares; Newton's steps
+    within the constraint, each a problem of least squares, finish. The problem is convex. No
+    kernel's gradient may exceed 1 at the maximum, and by what it does the likelihood falls short of
+    it at most.
     """
     kernels = np.maximum(kernels, np.finfo(float).tiny ** 0.5)
-    shares = shares / shares.sum()
+    shares = np.full(kernels.shape[1], 1 / kernels.shape[1])
     for _ in range(_FIRST_STEPS):
         shares = shares * _gradient(kernels, shares)
     for _ in range(_LAST_STEPS):
