@@ -17,7 +17,6 @@ from groundtie.simulation.polygons import (
     main_frame,
     points_along,
     rectangle,
-    strip_along,
     subdivide,
 )
 
@@ -177,11 +176,3 @@ class TestInset:
     def test_none_where_nothing_is_left(self) -> None:
         assert inset(rectangle((0, 0), (20, 5), 0.0), 6.0) is None
         assert inset([(0.0, 0.0), (100.0, 0.0), (0.0, 20.0)], 5.0) is None
-
-
-def test_strip_along_a_street() -> None:
-    street = rectangle((10, 5), (40, 4), 0.6)
-    beside = (10 - 2.5 * math.sin(0.6), 5 + 2.5 * math.cos(0.6))
-    np.testing.assert_allclose(
-        strip_along(street, 2.5, 1.0, 3.0), rectangle(beside, (43, 1), 0.6), atol=1e-9
-    )

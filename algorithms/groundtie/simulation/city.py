@@ -17,7 +17,6 @@ from .polygons import (
     main_frame,
     moved,
     rectangle,
-    strip_along,
     subdivide,
 )
 
@@ -47,7 +46,8 @@ class _Street:
 
     def carriageway(self, kerb: float) -> Polygon:
         """Return the part for cars, which reaches into the streets at both ends."""
-        return strip_along(self.lane, 0.0, self.half_width - kerb, kerb + 1)
+        centre, half, angle = main_frame(self.lane)
+        return rectangle(centre, (half[0] + (kerb + 1), self.half_width - kerb), angle)
 
 
 class CityLayout(Canvas):

@@ -157,19 +157,3 @@ def inset(polygon: Polygon, distance: float) -> Polygon | None:
     inner = corners + distance * (normal + before) / mitre[:, None]
     left = np.sum((np.roll(inner, -1, axis=0) - inner) * along, axis=1) / length
     return None if left.min() < distance / 2 else [(x, y) for x, y in inner.tolist()]
-
-
-def strip_along(polygon: Polygon, offset: float, half_width: float, longer: float) -> Polygon:
-    """Return the strip that runs along a long polygon at some distance from its middle line.
-
-    Parameters
-    ----------
-    polygon : list of points
-        Long convex polygon.
-    offset, half_width : float
-        Where the strip's middle line is, and half its width.
-    longer : float
-        How much further than the polygon the strip reaches at both ends.
-    """
-    centre, half, angle = main_frame(polygon)
-    return rectangle(moved(centre, 0.0, offset, angle), (half[0] + longer, half_width), angle)
