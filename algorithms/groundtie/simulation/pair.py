@@ -169,7 +169,13 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
     is_radar = options.input == SAR
     radar = _radar_image(scenes.radar, options, positions if is_radar else None)
     progress.update(0.4, "looking with the camera")
-    camera = _camera_image(scenes.camera, options, None if is_radar else positions, progress)
+    camera = camera_image(
+        scenes.camera,
+        options.optical,
+        None if is_radar else positions,
+        1.0 if is_radar else options.pixel_ratio,
+        progress,
+    )
     image = InputImage(lambda px: truth(reference_grid.pixel_to_map(px)), nominal)
     return SimulatedPair(
         options=options,
@@ -198,21 +204,38 @@ def _radar_image(
     return quantise_amplitude(add_speckle(seen, options.sar.looks, speckle), options.sar)[None]
 
 
-def _camera_image(
-    scene: Scene, options: PairOptions, positions: Positions | None, progress: Progress
+def camera_image(
+    scene: Scene,
+    options: OpticalOptions,
+    positions: Positions | None,
+    pixel_ratio: float,
+    progress: Progress,
 ) -> npt.NDArray[np.uint16]:
-    """Return the camera's image, (bands, rows, columns): as it is, or as the input shows it."""
-    radiance = render_radiance(scene, options.optical)
+    """Return the camera's image, (bands, rows, columns).
+
+    Parameters
+    ----------
+    scene
+        When the image was taken.
+    options
+        How the camera looks.
+    positions
+        Where the image's pixels lie; None: on those of the scene without its margin.
+    pixel_ratio
+        Their size over that of the scene's pixels.
+    progress
+        Receives every band.
+    """
+    radiance = render_radiance(scene, options)
     rows, columns = scene.window
     image = []
     for band, light in enumerate(radiance):
         progress.update(0.5 + 0.5 * band / len(radiance), "resampling the optical image")
         # Below 0.6 px the cubic kernel could not follow the scene any more.
-        ratio = 1.0 if positions is None else options.pixel_ratio
-        blur(light, max(options.optical.psf_sigma_px * ratio, 0.6))
+        blur(light, max(options.psf_sigma_px * pixel_ratio, 0.6))
         seen = light[rows, columns] if positions is None else resample(light, positions)
-        noise = random_stream(options.scene.seed, Stream.OPTICAL_NOISE, band)
-        image.append(quantise(seen, options.optical, noise))
+        noise = random_stream(scene.seed, Stream.OPTICAL_NOISE, band)
+        image.append(quantise(seen, options, noise))
     return np.stack(image)
 
 

@@ -11,16 +11,16 @@ from scipy.ndimage import map_coordinates
 
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
-from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, FloatArray, Grid, reproject
+from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, FloatArray, Grid, mesh, reproject
 from ..sensor.rpc_fit import RPCFit, fit_rpc
 from .attitude import AttitudeError, AttitudeOptions
 from .camera import PushBroom
 from .check_points import InputImage, RoofPoints, ground_points, roof_points
 from .held import SENSOR_BYTES, require_memory
-from .misregistration import Positions, resample
-from .noise import Stream, random_stream, strips
-from .optical import OpticalOptions, blur, quantise, render_radiance
-from .pair import in_steps, map_grid, object_reach_px, scene_grid
+from .misregistration import Positions
+from .noise import strips
+from .optical import OpticalOptions
+from .pair import camera_image, in_steps, map_grid, object_reach_px, scene_grid
 from .sar import SarOptions, render_sar
 from .scene import SceneOptions, generate_scenes
 
@@ -176,14 +176,7 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
     progress.update(0.25, "looking with the radar")
     reference = render_sar(scenes.radar, options.sar)
     progress.update(0.4, "looking with the camera")
-    radiance = render_radiance(scenes.camera, view)
-    seen = _seen(camera, terrain, size)
-    image = np.empty((len(radiance), size[1], size[0]), np.uint16)
-    for band, light in enumerate(radiance):
-        progress.update(0.5 + 0.5 * band / len(radiance), "resampling the optical image")
-        blur(light, view.psf_sigma_px)
-        noise = random_stream(scene_options.seed, Stream.OPTICAL_NOISE, band)
-        image[band] = quantise(resample(light, seen), view, noise)
+    image = camera_image(scenes.camera, view, _seen(camera, terrain, size), 1.0, progress)
     exact, delivered = _rpcs(options, camera, error, grid)
     optical = InputImage(
         lambda px: camera.project(terrain.under(grid.pixel_to_map(px))),
@@ -241,8 +234,7 @@ def _seen(camera: PushBroom, terrain: Terrain, size: tuple[int, int]) -> Positio
     """Return where the scene's pixels are that the image's pixels see."""
     places = np.empty((2, size[1], size[0]))
     for _, start, stop in strips(size[1]):
-        column, row = np.meshgrid(np.arange(size[0]), np.arange(start, stop))
-        px = np.stack([column, row], axis=-1).reshape(-1, 2).astype(float)
+        px = mesh(np.arange(size[0]), np.arange(start, stop)).astype(float)
         place = terrain.grid.map_to_pixel(terrain.seen_by(camera, px))
         places[:, start:stop] = place[:, ::-1].T.reshape(2, stop - start, size[0])
     return Positions((size[1], size[0]), lambda start, stop: places[:, start:stop])
