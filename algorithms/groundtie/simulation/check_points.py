@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import map_coordinates
 
-from ..rasters.grid import FloatArray, Grid
+from ..rasters.grid import FloatArray, Grid, mesh
 from .cover import OPEN_GROUND, Cover
 from .noise import Stream, random_stream
 from .optical import OpticalOptions, direction
@@ -153,7 +153,7 @@ def _drawn(
 ) -> tuple[FloatArray, tuple[IntArray, IntArray]]:
     """Places in each cell of a lattice: reference pixels, and (row, column) of the scene."""
     side = np.arange(_PER_SIDE)
-    cell = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 1, 2)
+    cell = mesh(side, side)[:, None]
     drawn = random_stream(scene.seed, stream).random((len(cell), _TRIES, 2))
     px = (cell + drawn) / _PER_SIDE * [grid.width - 1, grid.height - 1]
     column, row = np.rint(px).astype(np.intp).transpose(2, 0, 1) + scene.margin_px

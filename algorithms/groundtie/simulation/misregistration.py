@@ -15,7 +15,7 @@ from scipy.ndimage import map_coordinates, spline_filter
 from ..errors import ParameterError
 from ..geometry.models import DEGREE, Frame, Model, PolynomialModel, monomials
 from ..geometry.transform import Transform
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, mesh
 from ..rasters.reading import FloatImage
 from .noise import Stream, random_stream, strips
 
@@ -112,8 +112,7 @@ def _drawn_warp(
         raise ParameterError("warp must be less than a twentieth of the input's longer side")
     drawn = generator.uniform(-1, 1, (terms, 2))
     side = np.linspace(-1, 1, 41)
-    uv = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
-    displacement = monomials(uv, degree)[:, 1:] @ drawn
+    displacement = monomials(mesh(side, side), degree)[:, 1:] @ drawn
     return drawn * (largest / np.hypot(*displacement.T).max())
 
 
@@ -174,9 +173,8 @@ def _on_scene(
     truth: Transform, scene_grid: Grid, rows: npt.NDArray[Any], columns: npt.NDArray[Any]
 ) -> npt.NDArray[np.float64]:
     """Return scene (row, column) of a lattice of input pixels, shape (2, rows, columns)."""
-    column, row = np.meshgrid(columns, rows)
-    xy = truth.inverse(np.stack([column, row], axis=-1).reshape(-1, 2))
-    px = scene_grid.map_to_pixel(xy).reshape(*column.shape, 2)
+    xy = truth.inverse(mesh(columns, rows))
+    px = scene_grid.map_to_pixel(xy).reshape(len(rows), len(columns), 2)
     return np.ascontiguousarray(px.transpose(2, 0, 1)[::-1])
 
 
