@@ -117,7 +117,7 @@ def count_detector(case: RealCase, detector: str) -> DetectorCount:
         case.name,
         detector,
         fastest.detections,
-        tuple(fastest.repeated.scores.tolist()),
+        tuple(fastest.repeated.tolist()),
         fastest.matched.matches,
         fastest.filtered.matches,
         int(fastest.matched.by_class[:2].sum()),

@@ -99,9 +99,7 @@ def repeated(detector: SurfDetector | SiftDetector, change: str) -> float:
         scale_px=second.scale_px / scale,
     )
     ahead = first.position_px @ matrix[:, :2].T + matrix[:, 2]
-    return float(
-        repeatability(inner(first, ahead), inner(back, second.position_px)).scores[:4].sum()
-    )
+    return float(repeatability(inner(first, ahead), inner(back, second.position_px))[:4].sum())
 
 
 def inner(found: Keypoints, elsewhere: FloatArray) -> Keypoints:

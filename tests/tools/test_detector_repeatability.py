@@ -49,7 +49,7 @@ def test_all_variants_are_compared(registered: TexturedPair, tmp_path: Path) -> 
         rows = list(csv.DictReader(file))
     assert [row["variant"] for row in rows] == [one.variant for one in found.evaluations]
     assert int(rows[1]["filtered"]) == oct.filtered.matches
-    assert float(rows[1]["repeatability_0_10"]) == pytest.approx(oct.repeated.scores[0], abs=1e-4)
+    assert float(rows[1]["repeatability_0_10"]) == pytest.approx(oct.repeated[0], abs=1e-4)
     numbers = json.loads((tmp_path / "numbers.json").read_text())
     assert numbers["variants"][0]["detections"] == list(sift.detections)
     assert cv2.imread(str(tmp_path / "picture.png")).shape[2] == 3
@@ -66,7 +66,7 @@ def test_a_transform_registers_the_input(tmp_path: Path, registered: TexturedPai
         ).evaluations[0]
         for given in (path, None)
     )
-    assert with_it.repeated.scores[0] > 3 * without.repeated.scores[0]
+    assert with_it.repeated[0] > 3 * without.repeated[0]
 
 
 def test_the_middle_of_a_large_overlap_is_looked_at(

@@ -15,11 +15,12 @@ from ..features.tiles import Describing, Detecting
 from ..geometry.fitting import fit_model
 from ..geometry.models import PARAMETERS
 from ..matching.keypoints import lying_in
+from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask
 from .gradients import GRADIENTS
 from .matching import filter_matches, match
-from .repeatability import CLASS_NAMES, Repeatability, classes, overlap_error, repeatability
+from .repeatability import CLASS_NAMES, classes, overlap_error, repeatability
 from .sift_variants import DETECTORS, SiftVariantDescriptor, sift_detector
 
 _TURNING = "oriented"
@@ -117,7 +118,7 @@ class Evaluation:
     detections
         Features of the reference and of the input.
     repeated
-        How many of them correspond.
+        Which share of them correspond (see `repeatability`), shape (5,).
     matched, filtered
         Matches by the descriptors alone, and those that filtered matching leaves.
     detecting_s, matching_s
@@ -126,7 +127,7 @@ class Evaluation:
 
     variant: str
     detections: tuple[int, int]
-    repeated: Repeatability
+    repeated: FloatArray
     matched: Consistency
     filtered: Consistency
     detecting_s: float
@@ -137,7 +138,7 @@ class Evaluation:
         return {
             "variant": self.variant,
             "detections": list(self.detections),
-            "repeatability": dict(zip(CLASS_NAMES, self.repeated.scores.tolist(), strict=True)),
+            "repeatability": dict(zip(CLASS_NAMES, self.repeated.tolist(), strict=True)),
             "matched": self.matched.summary(),
             "filtered": self.filtered.summary(),
             "detecting_s": self.detecting_s,

@@ -6,8 +6,6 @@ circles overlap enough, after both were scaled so that the first's radius is 30 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -55,29 +53,8 @@ def classes(errors: FloatArray) -> NDArray[np.int_]:
     return np.bincount(np.searchsorted(CLASS_LIMITS, errors), minlength=len(CLASS_NAMES))
 
 
-@dataclass(frozen=True)
-class Repeatability:
-    """Correspondences of two sets of features by class of their overlap error.
-
-    Parameters
-    ----------
-    counts
-        Correspondences in each of `CLASS_NAMES`, shape (5,); the last one is of features without.
-    possible
-        Features in the smaller of both sets.
-    """
-
-    counts: NDArray[np.int_]
-    possible: int
-
-    @property
-    def scores(self) -> FloatArray:
-        """Correspondences in each class over those that were possible, shape (5,)."""
-        return self.counts / max(self.possible, 1)
-
-
-def repeatability(first: Keypoints, second: Keypoints) -> Repeatability:
-    """Return how many features correspond, each at most once, by the class of their overlap error.
+def repeatability(first: Keypoints, second: Keypoints) -> FloatArray:
+    """Return which share of features correspond, each at most once, by class of overlap error.
 
     Pairs are made from the smallest overlap error to the largest; features that are left, or
     overlap by less than the largest class limit allows, count as the last class.
@@ -86,10 +63,14 @@ def repeatability(first: Keypoints, second: Keypoints) -> Repeatability:
     ----------
     first, second
         Features in the pixels of the first image.
+
+    Returns
+    -------
+    Correspondences in each of `CLASS_NAMES` over the features of the smaller set, shape (5,).
     """
     possible = min(len(first), len(second))
     if possible == 0:
-        return Repeatability(np.zeros(len(CLASS_NAMES), int), 0)
+        return np.zeros(len(CLASS_NAMES))
     # Circles whose centres are a radius apart overlap by less than any limit allows.
     pairs = cKDTree(first.position_px).query_ball_tree(cKDTree(second.position_px), _RADIUS_PX)
     one = np.repeat(np.arange(len(first)), [len(p) for p in pairs])
@@ -105,4 +86,4 @@ def repeatability(first: Keypoints, second: Keypoints) -> Repeatability:
             kept.append(pair)
     counts = classes(errors[kept])
     counts[-1] = possible - len(kept)
-    return Repeatability(counts, possible)
+    return np.asarray(counts / possible)

@@ -25,7 +25,7 @@ def draw_evaluations(path: Path, evaluations: Sequence[Evaluation]) -> None:
     for i, one in enumerate(evaluations):
         x = at + (i - (len(evaluations) - 1) / 2) * width
         colour = f"C{i}"
-        left.bar(x[:-1], 100 * one.repeated.scores[:-1], width, color=colour, label=one.variant)
+        left.bar(x[:-1], 100 * one.repeated[:-1], width, color=colour, label=one.variant)
         right.bar(x, one.matched.by_class, width, color=colour, alpha=0.35)
         right.bar(x, one.filtered.by_class, width, color=colour, label=one.variant)
     left.set(

@@ -54,7 +54,7 @@ class RepeatabilityResult:
         return [
             *(
                 f"{one.variant}: {one.detections[0]} and {one.detections[1]} features, "
-                f"{one.repeated.scores[0]:.0%} repeat within {CLASS_NAMES[0]} overlap error; "
+                f"{one.repeated[0]:.0%} repeat within {CLASS_NAMES[0]} overlap error; "
                 f"{one.matched.matches} matches, {one.filtered.matches} after filtering; "
                 f"{one.detecting_s + one.matching_s:.2f} s"
                 for one in self.evaluations
@@ -213,7 +213,7 @@ def _row(one: Evaluation) -> dict[str, Any]:
         "reference_features": one.detections[0],
         "input_features": one.detections[1],
     }
-    row |= _by_class("repeatability", [f"{score:.4f}" for score in one.repeated.scores])
+    row |= _by_class("repeatability", [f"{score:.4f}" for score in one.repeated])
     for name, part in (("matches", one.matched), ("filtered", one.filtered)):
         row[name] = part.matches
         row[f"{name}_std_x_px"], row[f"{name}_std_y_px"] = (f"{std:.3f}" for std in part.std_px)
