@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..context import Context
+from ..declaration import file_lines, given_files
 from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.grid import Grid
 from ..rasters.whole import write_raster
@@ -71,7 +72,7 @@ class SurfaceResult:
             peak,
             second_peak(deviations, peak),
             window.chip_px,
-            {name: str(path) for name, path in files.items() if path is not None},
+            given_files(files),
         )
 
     def write(self) -> None:
@@ -142,7 +143,7 @@ class SurfaceResult:
                 f"second peak: {right:+.2f} px right, {down:+.2f} px down, "
                 f"{self.second_ratio:.2f} of the first's height"
             )
-        return [*lines, *(f"{name}: {path}" for name, path in self.files.items())]
+        return lines + file_lines(self.files)
 
 
 def _draw(path: Path, result: SurfaceResult) -> None:
