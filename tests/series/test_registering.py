@@ -72,7 +72,9 @@ def matching(monkeypatch: pytest.MonkeyPatch, one_thread: Context) -> Make:
         monkeypatch.setattr(registering, "register_pair", register)
         polygons = [box(*(boxes or {}).get(k, WHOLE)) for k in range(count)]
         footprints = Footprints(tuple(polygons))
-        return Matching(dates, footprints, FRAME, SETTINGS, known or {}, one_thread)
+        return Matching(
+            dates, footprints, FRAME, SETTINGS, known or {}, one_thread, None, lambda _: None
+        )
 
     return make
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,7 +137,7 @@ def adjust(
     largest = largest_statistic(links)
     while True:
         kept &= _reached(links, kept, count, hub)
-        network = _Network(frame, links, kept, count, hub)
+        network = _Network(frame, list(compress(links, kept)), count, hub)
         solution = network.settled()
         found = network.statistics(solution)
         statistics[kept] = found
@@ -183,14 +184,9 @@ class _Network:
     """The links that are used, and the dates that they reach from the hub."""
 
     frame: SeriesFrame
-    all_links: Sequence[Link]
-    kept: Mask
+    links: Sequence[Link]
     count: int
     hub: int
-
-    @property
-    def links(self) -> list[Link]:
-        return [link for link, is_kept in zip(self.all_links, self.kept, strict=True) if is_kept]
 
     @property
     def free(self) -> list[int]:
@@ -307,10 +303,7 @@ class _Network:
 
 def _reached(links: Sequence[Link], kept: Mask, count: int, hub: int) -> Mask:
     """Return which links are connected with the hub by those that are kept, shape (m,)."""
-    edges = [
-        (link.first, link.second) for link, is_kept in zip(links, kept, strict=True) if is_kept
-    ]
-    part = _parts(edges, count)
+    part = _parts([(link.first, link.second) for link in compress(links, kept)], count)
     return np.array([part[link.first] == part[hub] for link in links], bool)
 
 

@@ -35,10 +35,6 @@ _MOST_TRIES = 3
 _WANTED_LINKS = 2
 
 
-def _forget(_: PairResult) -> None:
-    """Keep nothing."""
-
-
 @dataclass
 class Matching:
     """The registrations of a series, done as they are needed.
@@ -71,8 +67,8 @@ class Matching:
     settings: Settings
     known: Mapping[str, PairResult]
     context: Context
-    executor: Executor | None = None
-    keep: Callable[[PairResult], None] = _forget
+    executor: Executor | None
+    keep: Callable[[PairResult], None]
     results: dict[tuple[int, int], PairResult] = field(default_factory=dict)
     described: Memo | None = None
     done: int = 0
