@@ -41,15 +41,14 @@ class Arrows:
 
     Parameters
     ----------
-    start_px, vector_px
-        Where the arrows begin in the matching grid, and what they span there, shape (n, 2).
+    vector_px
+        What the arrows span in the matching grid, shape (n, 2).
     exaggeration
         How many times longer than the residuals they are.
     scale_px
         Residual that the scale's arrow stands for.
     """
 
-    start_px: FloatArray
     vector_px: FloatArray
     exaggeration: float
     scale_px: float
@@ -65,18 +64,18 @@ def residual_arrows(errors: PointErrors, grid: Grid) -> Arrows:
     if which.any():
         typical = max(float(np.median(errors.length_px[which])), _SMALLEST_PX)
         factor = max(round_length(0.04 * side / typical), 1.0)
-    return _arrows(errors.position_px, errors.error_px, factor, side)
+    return _arrows(errors.error_px, factor, side)
 
 
-def scaled_arrows(start_px: FloatArray, by_px: FloatArray, longest_px: float, grid: Grid) -> Arrows:
+def scaled_arrows(by_px: FloatArray, longest_px: float, grid: Grid) -> Arrows:
     """Exaggerate by a round factor so that what is long is no more than a tenth of the grid."""
     side = max(grid.width, grid.height)
     factor = max(round_length(0.1 * side / max(longest_px, _SMALLEST_PX)), 1.0)
-    return _arrows(start_px, by_px, factor, side)
+    return _arrows(by_px, factor, side)
 
 
-def _arrows(start_px: FloatArray, by_px: FloatArray, factor: float, side: int) -> Arrows:
-    return Arrows(start_px, by_px * factor, factor, round_length(0.12 * side / factor))
+def _arrows(by_px: FloatArray, factor: float, side: int) -> Arrows:
+    return Arrows(by_px * factor, factor, round_length(0.12 * side / factor))
 
 
 def error_reach_px(errors: PointErrors, verdict: Verdict) -> float:
@@ -146,7 +145,7 @@ def residual_map(errors: PointErrors, grid: Grid) -> Figure:
         (disagreeing, CHECK_COLOUR, 0.35),
         (errors.agreeing, CHECK_COLOUR, 1.0),
     ):
-        draw_arrows(axes, arrows.start_px[which], arrows.vector_px[which], colour, strength)
+        draw_arrows(axes, errors.position_px[which], arrows.vector_px[which], colour, strength)
     draw_scale(axes, arrows, grid)
     return axes.figure
 

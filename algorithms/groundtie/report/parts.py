@@ -60,9 +60,8 @@ def parts_map(survey: Survey) -> Figure:
     for part in parts:
         other[list(part.members)] = False
     px = survey.centres.astype(float)
-    arrows = figures.scaled_arrows(
-        px, survey.shifts_px, max(part.distance_px for part in parts), grid
-    )
+    farthest_px = max(part.distance_px for part in parts)
+    arrows = figures.scaled_arrows(survey.shifts_px, farthest_px, grid)
     axes.plot(*px[confirming].T, "o", color=figures.FIT_COLOUR, ms=6)
     axes.plot(*px[other].T, "x", color=figures.REJECTED_COLOUR, ms=6)
     for k, part in enumerate(parts):
