@@ -174,14 +174,10 @@ class Series:
         """Return the transforms of all registered dates, by their names."""
         return {date.name: date.transform for date in self.dates if date.transform is not None}
 
-    def file_of(self, date: SeriesDate) -> str | None:
-        """Return the name of a date's raster in the folder; None: there is none."""
-        written = self.written.get(date.name)
-        return None if written is None else str(written["file"])
-
     def rows(self) -> list[dict[str, Any]]:
         """Return the table, one row a date (see `TABLE_COLUMNS`)."""
-        return [date.row(self.frame, self.file_of(date)) for date in self.dates]
+        files = {name: written["file"] for name, written in self.written.items()}
+        return [date.row(self.frame, files.get(date.name)) for date in self.dates]
 
     def loops(self) -> dict[str, Any]:
         """Return how well triplets of dates close."""
