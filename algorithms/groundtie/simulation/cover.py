@@ -127,6 +127,7 @@ class ParcelBook:
 
     def __init__(self, generator: np.random.Generator) -> None:
         self._generator = generator
+        # In the order of the table's columns.
         self._rows: list[tuple[int, float, float, Reflectance, float, float, float]] = []
 
     def add(
@@ -149,13 +150,5 @@ class ParcelBook:
 
     def table(self) -> ParcelTable:
         """Return all parcels added so far."""
-        cover, height, backscatter, reflectance, rows, window, wall = zip(*self._rows, strict=True)
-        return ParcelTable(
-            np.array(cover, np.uint8),
-            np.array(height, np.float32),
-            np.array(backscatter, np.float32),
-            np.array(reflectance, np.float32),
-            np.array(rows, np.float32),
-            np.array(window, np.float32),
-            np.array(wall, np.float32),
-        )
+        cover, *numbers = zip(*self._rows, strict=True)
+        return ParcelTable(np.array(cover, np.uint8), *(np.array(n, np.float32) for n in numbers))
