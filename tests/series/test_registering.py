@@ -15,7 +15,7 @@ from shapely.geometry import box
 from groundtie.context import Context
 from groundtie.errors import SchedulerError, WorkerLostError
 from groundtie.series import registering
-from groundtie.series.dates import Footprints
+from groundtie.series.dates import footprint_shares
 from groundtie.series.pairs import PairResult, PairTask, Settings, pair_key
 from groundtie.series.registering import Matching
 
@@ -71,9 +71,9 @@ def matching(monkeypatch: pytest.MonkeyPatch, one_thread: Context) -> Make:
 
         monkeypatch.setattr(registering, "register_pair", register)
         polygons = [box(*(boxes or {}).get(k, WHOLE)) for k in range(count)]
-        footprints = Footprints(tuple(polygons))
+        shares = footprint_shares(polygons)
         return Matching(
-            dates, footprints, FRAME, SETTINGS, known or {}, one_thread, None, lambda _: None
+            dates, shares, FRAME, SETTINGS, known or {}, one_thread, None, lambda _: None
         )
 
     return make
@@ -224,13 +224,13 @@ def test_dates_that_do_not_overlap_are_not_tried(matching: Make) -> None:
     found = matching(3, boxes={2: (100, 100, 110, 110)})
     found.from_hub(0)
     assert set(found.results) == {(0, 1)}
-    assert found.footprints.share(0, 1) == pytest.approx(1.0)
+    assert found.shares[frozenset((0, 1))] == pytest.approx(1.0)
 
 
 def test_shares_are_of_the_smaller_footprint(matching: Make) -> None:
     found = matching(3, boxes={1: (5, 0, 10, 10), 2: (9, 0, 19, 10)})
-    assert found.footprints.share(0, 1) == pytest.approx(1.0)
-    assert found.footprints.share(2, 0) == pytest.approx(0.1)
+    assert found.shares[frozenset((0, 1))] == pytest.approx(1.0)
+    assert found.shares[frozenset((2, 0))] == pytest.approx(0.1)
 
 
 def test_the_best_overlap_beside_the_next_in_time(matching: Make) -> None:

@@ -21,7 +21,7 @@ from ..rasters.reading import bounded_cache
 from ..registration.registered_output import model_for_grid
 from ..registration.series_evidence import DateEvidence
 from ..registration.user_masks import UserMask
-from .dates import Date, Footprints, open_dates
+from .dates import Date, footprint_shares, open_dates
 from .delivery import SeriesFiles
 from .frame import SeriesFrame
 from .inputs import Listed, list_dates
@@ -129,10 +129,10 @@ class SeriesCall:
         frame = stored.frames.get(key)  # that of the registrations which need not be done again
         if frame is None:
             frame = SeriesFrame.around(home.source.grid, [date.source.grid for date in dates])
-        footprints = Footprints.of(dates, frame.grid.crs)
+        footprints = [date.footprint(frame.grid.crs) for date in dates]
         matching = Matching(
             dates,
-            footprints,
+            footprint_shares(footprints),
             frame,
             self.settings,
             stored.pairs,

@@ -158,36 +158,20 @@ def open_dates(
     return dates, failures
 
 
-@dataclass(frozen=True)
-class Footprints:
-    """Where the valid pixels of dates lie on one map.
+def footprint_shares(polygons: Sequence[Any]) -> dict[frozenset[int], float]:
+    """Return which share of the smaller of two footprints they have in common; 0 is left out.
 
     Parameters
     ----------
     polygons
-        A polygon for each date.
+        The footprint of each date, on one map.
     """
-
-    polygons: tuple[Any, ...]
-
-    @classmethod
-    def of(cls, dates: Sequence[Date], crs: CRS | None) -> Footprints:
-        """Draw the footprints of dates on a map."""
-        return cls(tuple(date.footprint(crs) for date in dates))
-
-    @cached_property
-    def shares(self) -> dict[frozenset[int], float]:
-        """Share of the smaller footprint that two dates have in common; 0 is left out."""
-        found = {}
-        for (first, one), (second, other) in combinations(enumerate(self.polygons), 2):
-            common = one.intersection(other).area
-            if common > 0:
-                found[frozenset((first, second))] = float(common / min(one.area, other.area))
-        return found
-
-    def share(self, first: int, second: int) -> float:
-        """Return which share of the smaller footprint two dates have in common."""
-        return self.shares.get(frozenset((first, second)), 0.0)
+    found = {}
+    for (first, one), (second, other) in combinations(enumerate(polygons), 2):
+        common = one.intersection(other).area
+        if common > 0:
+            found[frozenset((first, second))] = float(common / min(one.area, other.area))
+    return found
 
 
 def file_facts(path: Path | str | None) -> tuple[Any, ...]:

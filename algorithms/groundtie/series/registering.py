@@ -15,7 +15,7 @@ from ..executors import POLL_SECONDS, result_of
 from ..memo import Memo
 from ..memory import described_bytes
 from .closure import triplet_closures
-from .dates import Date, Footprints
+from .dates import Date
 from .frame import PARAMETERS, FloatArray, SeriesFrame
 from .network import Link, adjust
 from .pairs import PairResult, PairTask, Settings, pair_key, register_pair
@@ -43,8 +43,8 @@ class Matching:
     ----------
     dates
         The dates, in the order of their times.
-    footprints
-        Theirs.
+    shares
+        Which share of the smaller footprint two dates have in common; see `footprint_shares`.
     frame, settings
         See `register_pair`.
     known
@@ -62,7 +62,7 @@ class Matching:
     """
 
     dates: Sequence[Date]
-    footprints: Footprints
+    shares: Mapping[frozenset[int], float]
     frame: SeriesFrame
     settings: Settings
     known: Mapping[str, PairResult]
@@ -113,8 +113,7 @@ class Matching:
     def freely(self) -> int:
         """Register as `from_hub` from the best of several dates, and return it."""
         shares = [
-            sum(self.footprints.share(i, j) for j in range(len(self.dates)))
-            for i in range(len(self.dates))
+            sum(self._share(i, j) for j in range(len(self.dates))) for i in range(len(self.dates))
         ]
         middle = (len(self.dates) - 1) / 2
         order = sorted(
@@ -180,7 +179,7 @@ class Matching:
 
         What becomes of one does not depend on the others: they may run at once.
         """
-        worth = [ends for ends in pairs if self.footprints.share(*ends) >= _LEAST_SHARE]
+        worth = [ends for ends in pairs if self._share(*ends) >= _LEAST_SHARE]
         # What is refused where the hub has it is searched for.
         while asked := {frozenset(ends): ends for ends in worth if not self._is_done(ends, hub)}:
             self._register(tuple(asked.values()), hub)
@@ -253,9 +252,9 @@ class Matching:
         for number, date in enumerate(chain[:-1]):
             following = chain[number + 1]
             pairs.append((date, following))
-            share = self.footprints.share(date, following)
-            best = max(chain[number + 1 :], key=lambda other: self.footprints.share(date, other))
-            if self.footprints.share(date, best) > share + _MUCH_MORE:
+            share = self._share(date, following)
+            best = max(chain[number + 1 :], key=lambda other: self._share(date, other))
+            if self._share(date, best) > share + _MUCH_MORE:
                 pairs.append((date, best))
         return pairs
 
@@ -268,8 +267,7 @@ class Matching:
             best = [
                 other
                 for other in self._nearest(date, lacking)
-                if self._known(date, other) is None
-                and self.footprints.share(date, other) >= _LEAST_SHARE
+                if self._known(date, other) is None and self._share(date, other) >= _LEAST_SHARE
             ]
             if best:
                 lacking.remove(best[0])
@@ -299,8 +297,12 @@ class Matching:
         """Return dates, those of the best overlap and nearest in time first."""
         return sorted(
             (other for other in among if other != date),
-            key=lambda other: (-round(self.footprints.share(date, other), 1), abs(other - date)),
+            key=lambda other: (-round(self._share(date, other), 1), abs(other - date)),
         )
+
+    def _share(self, first: int, second: int) -> float:
+        """Return which share of the smaller footprint two dates have in common."""
+        return self.shares.get(frozenset((first, second)), 0.0)
 
     def _degree(self, date: int) -> int:
         return sum(date in ends for ends, result in self.results.items() if result.accepted)
