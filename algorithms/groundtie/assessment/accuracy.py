@@ -80,11 +80,6 @@ class Assessment:
         """Return all numbers by name."""
         return {name: errors.summary() for name, errors in self.parts().items()}
 
-    @property
-    def can_be_judged(self) -> bool:
-        """Whether there are points that took no part in the fit."""
-        return len(self.check_points) + len(self.test_points) > 0
-
     def judge(self, max_error_px: float) -> Verdict:
         """Accept or refuse the registration by its check points, without such by test points.
 
@@ -100,13 +95,14 @@ class Assessment:
         TooFewPointsError
             There are neither check points nor test points.
         """
-        if not self.can_be_judged:
+        name, judged = "check points", self.check_points
+        if not len(judged):
+            name, judged = "test points", self.test_points
+        if not len(judged):
             raise TooFewPointsError(
                 "no points took no part in the fit: give check points, or tie points with the "
                 "role check"
             )
-        name = "check points" if len(self.check_points) else "test points"
-        judged = self.check_points if len(self.check_points) else self.test_points
         px, metres = judged.in_pixels, judged.in_metres
         ways = {"two-way": self.two_way, "three-way": self.three_way}
         misses = {name: errors.in_pixels.rmse for name, errors in ways.items()}
