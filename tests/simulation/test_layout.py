@@ -14,7 +14,7 @@ def laid_out(
 ) -> tuple[np.ndarray, ParcelTable]:
     book = ParcelBook(np.random.default_rng(seed))
     changes = Changes(0.0, np.random.default_rng(1))
-    layout = Layout(shape, px_per_m, density, np.random.default_rng(seed), book, changes)
+    layout = Layout(shape, px_per_m, np.random.default_rng(seed), book, changes, density)
     return layout.draw()[0], book.table()
 
 

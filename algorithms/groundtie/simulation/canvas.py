@@ -83,10 +83,11 @@ class Changes:
         return (Acquisition.RADAR,) if drawn < self.share / 2 else (Acquisition.CAMERA,)
 
 
+@dataclass
 class Canvas:
     """Draws parcels: the ground at once, what stands on it for each of the images.
 
-    Parameters
+    Attributes
     ----------
     shape : tuple of int
         Rows and columns of the label image.
@@ -100,19 +101,15 @@ class Canvas:
         What changes between the images.
     """
 
-    def __init__(
-        self,
-        shape: tuple[int, int],
-        px_per_m: float,
-        generator: np.random.Generator,
-        book: ParcelBook,
-        changes: Changes,
-    ) -> None:
-        self.labels: Labels = np.zeros(shape, np.int32)
-        self._scale = px_per_m
-        self._random = generator
-        self._book = book
-        self._changes = changes
+    shape: tuple[int, int]
+    px_per_m: float
+    generator: np.random.Generator
+    book: ParcelBook
+    changes: Changes
+
+    def __post_init__(self) -> None:
+        """Start with nothing drawn."""
+        self.labels: Labels = np.zeros(self.shape, np.int32)
         self._cover_of: list[Cover] = []
         self._things: list[Standing | Tree] = []
         self._trees: list[Point] = []
@@ -146,7 +143,7 @@ class Canvas:
         """Draw a rotated square that reaches beyond the scene on all sides: streets follow it."""
         height, width = self.labels.shape
         half = math.hypot(height, width) / 2
-        angle = self._random.uniform(0, math.pi / 2)
+        angle = self.generator.uniform(0, math.pi / 2)
         return rectangle((width / 2, height / 2), (half, half), angle)
 
     def _touches(self, outline: Polygon, covers: tuple[Cover, ...]) -> bool:
@@ -156,8 +153,8 @@ class Canvas:
     def _scatter_trees(self, polygon: Polygon, mean_count: float, share: float = 0.9) -> None:
         """Draw places of trees in the middle share of the box around a polygon."""
         centre, half, angle = main_frame(polygon)
-        for _ in range(int(self._random.poisson(mean_count))):
-            u, v = (self._random.uniform(-share, share) * h for h in half)
+        for _ in range(int(self.generator.poisson(mean_count))):
+            u, v = (self.generator.uniform(-share, share) * h for h in half)
             self._trees.append(moved(centre, u, v, angle))
 
     def _plant_trees(
@@ -165,11 +162,11 @@ class Canvas:
     ) -> None:
         """Let trees grow in their places, with crowns of `crown_m` to 4 m in radius."""
         parcels = [
-            self._add(Cover.FOREST, self._random.uniform(4, highest_m)) for _ in range(kinds)
+            self._add(Cover.FOREST, self.generator.uniform(4, highest_m)) for _ in range(kinds)
         ]
         for place in self._trees:
-            kind, size = self._random.random(2).tolist()
-            radius = (crown_m + (4.0 - crown_m) * size) * self._scale
+            kind, size = self.generator.random(2).tolist()
+            radius = (crown_m + (4.0 - crown_m) * size) * self.px_per_m
             if radius >= 1:
                 crown = self._blob(place, radius)
                 self._things.append(Tree(crown, parcels[int(kind * kinds)], place, keep_off))
@@ -177,16 +174,16 @@ class Canvas:
     def _river(self, half_m: Point, bank_m: float) -> tuple[Polygon, Polygon]:
         """Draw the outlines of the banks and of the water of a winding river across the scene."""
         height, width = self.labels.shape
-        angle = self._random.uniform(0, math.pi)
+        angle = self.generator.uniform(0, math.pi)
         length = math.hypot(height, width)
-        s = np.linspace(-length / 2, length / 2, max(int(length / (8 * self._scale)), 20))
+        s = np.linspace(-length / 2, length / 2, max(int(length / (8 * self.px_per_m)), 20))
         wave = np.zeros_like(s)
         for wavelength, amplitude in ((900.0, 70.0), (380.0, 28.0), (170.0, 7.0)):
-            phase = self._random.uniform(0, 2 * math.pi)
-            wave += amplitude * np.sin(2 * math.pi * s / (wavelength * self._scale) + phase)
-        wave = wave * self._scale + self._random.uniform(-0.2, 0.2) * min(height, width)
-        widest = self._random.uniform(*half_m) * self._scale
-        half = widest * (1 + 0.25 * np.sin(s / (60 * self._scale)))
+            phase = self.generator.uniform(0, 2 * math.pi)
+            wave += amplitude * np.sin(2 * math.pi * s / (wavelength * self.px_per_m) + phase)
+        wave = wave * self.px_per_m + self.generator.uniform(-0.2, 0.2) * min(height, width)
+        widest = self.generator.uniform(*half_m) * self.px_per_m
+        half = widest * (1 + 0.25 * np.sin(s / (60 * self.px_per_m)))
 
         def outline(reach: npt.NDArray[np.float64]) -> Polygon:
             along = np.concatenate([s, s[::-1]])
@@ -195,7 +192,7 @@ class Canvas:
             y = height / 2 + along * math.sin(angle) + across * math.cos(angle)
             return list(zip(x.tolist(), y.tolist(), strict=True))
 
-        return outline(half + bank_m * self._scale), outline(half)
+        return outline(half + bank_m * self.px_per_m), outline(half)
 
     def _blob(self, centre: Point, radius: float) -> Polygon:
         turn = np.linspace(0, 2 * math.pi, 60, endpoint=False)
@@ -209,7 +206,7 @@ class Canvas:
         self, cover: Cover, height_m: float = 0.0, rows_rad: float = 0.0, window_m: float = 0.0
     ) -> int:
         self._cover_of.append(cover)
-        return self._book.add(cover, height_m, rows_rad, window_m)
+        return self.book.add(cover, height_m, rows_rad, window_m)
 
     def _touches_scene(self, polygon: Polygon) -> bool:
         height, width = self.labels.shape

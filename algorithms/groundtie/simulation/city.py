@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .blocks import QUARTERS, Building, Quarter
-from .canvas import BOTH, Acquisition, Canvas, Changes, Labels, Standing
-from .cover import Cover, ParcelBook
+from .canvas import BOTH, Acquisition, Canvas, Labels, Standing
+from .cover import Cover
 from .polygons import (
     Point,
     Polygon,
@@ -50,10 +50,11 @@ class _Street:
         return rectangle(centre, (half[0] + (kerb + 1), self.half_width - kerb), angle)
 
 
+@dataclass
 class CityLayout(Canvas):
     """Draws the parcels of a dense city.
 
-    Parameters
+    Attributes
     ----------
     shape, px_per_m, generator, book, changes
         See `Canvas`.
@@ -61,25 +62,19 @@ class CityLayout(Canvas):
         Source of cars and trains, which differ in the two images.
     """
 
-    def __init__(
-        self,
-        shape: tuple[int, int],
-        px_per_m: float,
-        generator: np.random.Generator,
-        book: ParcelBook,
-        changes: Changes,
-        traffic: np.random.Generator,
-    ) -> None:
-        super().__init__(shape, px_per_m, generator, book, changes)
-        self._traffic = traffic
+    traffic: np.random.Generator
+
+    def __post_init__(self) -> None:
+        """Start with nothing drawn."""
+        super().__post_init__()
         self._buildings: list[Building] = []
 
     def draw(self) -> tuple[Labels, Labels]:
         """Draw the whole city; see `Canvas.images`."""
         self.labels[:] = self._add(Cover.PAVEMENT)
         outline = self._rotated_outline()
-        boulevard = self._random.uniform(*_BOULEVARD_M) * self._scale
-        parts = subdivide(outline, _DISTRICT_M2 * self._scale**2, boulevard, self._random)
+        boulevard = self.generator.uniform(*_BOULEVARD_M) * self.px_per_m
+        parts = subdivide(outline, _DISTRICT_M2 * self.px_per_m**2, boulevard, self.generator)
         streets: list[_Street] = []
         for district in parts.cells:
             if self._touches_scene(district):
@@ -97,26 +92,26 @@ class CityLayout(Canvas):
 
     def _draw_district(self, district: Polygon) -> list[_Street]:
         shares = np.cumsum([quarter.share for quarter in QUARTERS])
-        quarter = QUARTERS[int(np.searchsorted(shares, self._random.random() * shares[-1]))]
-        street = self._random.uniform(*quarter.street_m) * self._scale
-        parts = subdivide(district, quarter.block_m2 * self._scale**2, street, self._random)
+        quarter = QUARTERS[int(np.searchsorted(shares, self.generator.random() * shares[-1]))]
+        street = self.generator.uniform(*quarter.street_m) * self.px_per_m
+        parts = subdivide(district, quarter.block_m2 * self.px_per_m**2, street, self.generator)
         for block in parts.cells:
-            if self._random.random() < _OPEN_BLOCK_SHARE:
+            if self.generator.random() < _OPEN_BLOCK_SHARE:
                 self._draw_open_block(block)
             else:
                 self._draw_block(block, quarter)
-        trees = bool(self._random.random() < 0.3)
+        trees = bool(self.generator.random() < 0.3)
         return [_Street(lane, street / 2, trees) for lane in parts.lanes]
 
     def _draw_open_block(self, block: Polygon) -> None:
-        park = self._random.random() < 0.6
+        park = self.generator.random() < 0.6
         self._fill(block, self._add(Cover.GRASS if park else Cover.PAVEMENT))
         self._scatter_over(block, 1 / 300 if park else 1 / 1500)
 
     def _draw_block(self, block: Polygon, quarter: Quarter) -> None:
-        green = self._random.random() < 0.3
+        green = self.generator.random() < 0.3
         self._fill(block, self._add(Cover.GRASS if green else quarter.ground))
-        self._buildings += quarter.build(block, self._scale, self._random)
+        self._buildings += quarter.build(block, self.px_per_m, self.generator)
         self._scatter_over(block, quarter.trees_per_m2)
 
     def _draw_streets(self, streets: list[_Street]) -> None:
@@ -125,26 +120,26 @@ class CityLayout(Canvas):
             self._fill(street.lane, self._add(Cover.PAVEMENT))
         asphalt = [self._add(Cover.ASPHALT) for _ in range(_KINDS)]
         for number, street in enumerate(streets):
-            self._fill(street.carriageway(_KERB_M * self._scale), asphalt[number % _KINDS])
+            self._fill(street.carriageway(_KERB_M * self.px_per_m), asphalt[number % _KINDS])
             if street.trees:
                 for side in (-1, 1):
-                    offset = side * (street.half_width - 0.5 * _KERB_M * self._scale)
+                    offset = side * (street.half_width - 0.5 * _KERB_M * self.px_per_m)
                     self._trees += self._places(street.lane, offset, _TREE_PITCH_M)
 
     def _draw_river(self) -> None:
-        if self._random.random() < _RIVER_CHANCE:
+        if self.generator.random() < _RIVER_CHANCE:
             quay, water = self._river((14, 28), 8)
             self._fill(quay, self._add(Cover.PAVEMENT), convex=False)
             self._fill(water, self._add(Cover.WATER), convex=False)
 
     def _draw_railway(self) -> list[Standing]:
         """Draw the tracks and return the trains."""
-        if self._random.random() >= _RAILWAY_CHANCE:
+        if self.generator.random() >= _RAILWAY_CHANCE:
             return []
         height, width = self.labels.shape
-        angle = self._random.uniform(0, math.pi)
-        half_width = self._random.uniform(12, 26) * self._scale
-        aside = self._random.uniform(-0.35, 0.35) * min(height, width)
+        angle = self.generator.uniform(0, math.pi)
+        half_width = self.generator.uniform(12, 26) * self.px_per_m
+        aside = self.generator.uniform(-0.35, 0.35) * min(height, width)
         centre = moved((width / 2, height / 2), 0.0, aside, angle)
         tracks = rectangle(centre, (math.hypot(height, width), half_width), angle)
         self._fill(tracks, self._add(Cover.RAIL, rows_rad=angle + math.pi / 2))
@@ -152,9 +147,9 @@ class CityLayout(Canvas):
         trains = []
         for when in Acquisition:
             for _ in range(_TRAINS):
-                along, across = self._traffic.uniform(-1, 1, 2).tolist()
-                u, v = along * width / 2, across * (half_width - 3 * self._scale)
-                half_train = (70 * self._scale, 1.5 * self._scale)
+                along, across = self.traffic.uniform(-1, 1, 2).tolist()
+                u, v = along * width / 2, across * (half_width - 3 * self.px_per_m)
+                half_train = (70 * self.px_per_m, 1.5 * self.px_per_m)
                 train = rectangle(moved(centre, u, v, angle), half_train, angle)
                 trains.append(Standing(train, coach, (when,)))
         return trains
@@ -165,29 +160,29 @@ class CityLayout(Canvas):
             outline, _ = building.parts[0]
             if self._touches(outline, keep_off):
                 continue
-            when = self._changes.draw()
-            window_m = self._random.uniform(*_WINDOW_M)
+            when = self.changes.draw()
+            window_m = self.generator.uniform(*_WINDOW_M)
             for part, height_m in building.parts:
                 roof = self._add(Cover.BUILDING, height_m, window_m=window_m)
                 self._things.append(Standing(part, roof, when))
 
     def _park_cars(self, streets: list[_Street]) -> None:
         """Put cars along the kerbs and on the lanes, others in each image."""
-        if self._scale * _CAR_M[1] < 1:
+        if self.px_per_m * _CAR_M[1] < 1:
             return
         kinds = [self._add(Cover.CAR, 1.5) for _ in range(_KINDS)]
         # Pixels that are touched are filled: half of one is taken off on all sides.
-        half_car = (_CAR_M[0] / 2 * self._scale - 0.4, _CAR_M[1] / 2 * self._scale - 0.4)
+        half_car = (_CAR_M[0] / 2 * self.px_per_m - 0.4, _CAR_M[1] / 2 * self.px_per_m - 0.4)
         for street in streets:
             *_, angle = main_frame(street.lane)
-            kerb = street.half_width - (_KERB_M + 1.2) * self._scale
+            kerb = street.half_width - (_KERB_M + 1.2) * self.px_per_m
             for offset, pitch_m in (
                 *((side * kerb, _PARKING_PITCH_M) for side in (-1, 1)),
                 *((side * kerb / 2, _MOVING_PITCH_M) for side in (-1, 1)),
             ):
                 for place in self._places(street.lane, offset, pitch_m):
                     for when in BOTH:
-                        drawn, kind = self._traffic.random(2).tolist()
+                        drawn, kind = self.traffic.random(2).tolist()
                         if drawn < _PARKED_SHARE and self._cover_at(place) == Cover.ASPHALT:
                             car = rectangle(place, half_car, angle)
                             self._things.append(Standing(car, kinds[int(kind * _KINDS)], (when,)))
@@ -196,11 +191,11 @@ class CityLayout(Canvas):
         """Places in the scene at even distances along a lane."""
         centre, half, angle = main_frame(lane)
         cos, sin = math.cos(angle), math.sin(angle)
-        along = np.arange(-half[0], half[0], pitch_m * self._scale)
+        along = np.arange(-half[0], half[0], pitch_m * self.px_per_m)
         x, y = centre[0] + along * cos - offset * sin, centre[1] + along * sin + offset * cos
         height, width = self.labels.shape
         inside = (x > 0) & (x < width - 1) & (y > 0) & (y < height - 1)
         return list(zip(x[inside].tolist(), y[inside].tolist(), strict=True))
 
     def _scatter_over(self, block: Polygon, per_m2: float) -> None:
-        self._scatter_trees(block, area(block) / self._scale**2 * per_m2, 0.92)
+        self._scatter_trees(block, area(block) / self.px_per_m**2 * per_m2, 0.92)

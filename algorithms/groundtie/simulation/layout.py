@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .canvas import Canvas, Changes, Labels, Standing
-from .cover import Cover, ParcelBook
+from .canvas import Canvas, Labels, Standing
+from .cover import Cover
 from .polygons import (
     Polygon,
     fitted_rectangle,
@@ -61,10 +61,11 @@ def highest_object_m(density: str) -> float:
     return max(CANOPY_M[1], *(use.height_m[1] for use, _ in DENSITIES[density]))
 
 
+@dataclass
 class Layout(Canvas):
     """Draws the parcels of a scene in the country or of a town.
 
-    Parameters
+    Attributes
     ----------
     shape, px_per_m, generator, book, changes
         See `Canvas`; `px_per_m` scales the sizes in `Use`.
@@ -72,25 +73,19 @@ class Layout(Canvas):
         One of `DENSITIES`.
     """
 
-    def __init__(
-        self,
-        shape: tuple[int, int],
-        px_per_m: float,
-        density: str,
-        generator: np.random.Generator,
-        book: ParcelBook,
-        changes: Changes,
-    ) -> None:
-        super().__init__(shape, px_per_m, generator, book, changes)
-        self._density = density
+    density: str
+
+    def __post_init__(self) -> None:
+        """Start with nothing drawn."""
+        super().__post_init__()
         self._buildings: list[tuple[Polygon, float]] = []
 
     def draw(self) -> tuple[Labels, Labels]:
         """Draw the whole scene; see `Canvas.images`."""
         self.labels[:] = self._add(Cover.GRASS)
         outline = self._rotated_outline()
-        arterial = _ARTERIAL_M[self._density] * self._scale
-        districts = subdivide(outline, _DISTRICT_M2 * self._scale**2, arterial, self._random)
+        arterial = _ARTERIAL_M[self.density] * self.px_per_m
+        districts = subdivide(outline, _DISTRICT_M2 * self.px_per_m**2, arterial, self.generator)
         for district in districts.cells:
             if self._touches_scene(district):
                 self._draw_district(district)
@@ -102,10 +97,10 @@ class Layout(Canvas):
         return self.images()
 
     def _draw_district(self, district: Polygon) -> None:
-        uses, weights = zip(*DENSITIES[self._density], strict=True)
-        use: Use = uses[int(np.searchsorted(np.cumsum(weights), self._random.random()))]
+        uses, weights = zip(*DENSITIES[self.density], strict=True)
+        use: Use = uses[int(np.searchsorted(np.cumsum(weights), self.generator.random()))]
         blocks = subdivide(
-            district, use.block_m2 * self._scale**2, use.street_m * self._scale, self._random
+            district, use.block_m2 * self.px_per_m**2, use.street_m * self.px_per_m, self.generator
         )
         street = self._add(Cover.ROAD)
         for lane in blocks.lanes:
@@ -115,30 +110,30 @@ class Layout(Canvas):
                 self._draw_lots(block, use)
             else:
                 self._draw_open_block(block, use)
-        if use is FARMLAND and self._random.random() < _FARMSTEAD_CHANCE:
+        if use is FARMLAND and self.generator.random() < _FARMSTEAD_CHANCE:
             self._place_farmstead(blocks.cells[0])
 
     def _draw_open_block(self, block: Polygon, use: Use) -> None:
         _, half, angle = main_frame(block)
         if use is FOREST:
-            self._fill(block, self._add(Cover.FOREST, self._random.uniform(*CANOPY_M)))
+            self._fill(block, self._add(Cover.FOREST, self.generator.uniform(*CANOPY_M)))
         elif use is PARK:
             self._fill(block, self._add(Cover.GRASS))
-            self._scatter_trees(block, half[0] * half[1] / (120 * self._scale**2))
+            self._scatter_trees(block, half[0] * half[1] / (120 * self.px_per_m**2))
         else:
             self._fill(block, self._add(Cover.FIELD, rows_rad=angle + math.pi / 2))
 
     def _draw_lots(self, block: Polygon, use: Use) -> None:
         ground = Cover.PAVEMENT if use is DENSE else Cover.GRASS
         self._fill(block, self._add(ground))
-        for lot in subdivide(block, use.lot_m2 * self._scale**2, 0.0, self._random).cells:
+        for lot in subdivide(block, use.lot_m2 * self.px_per_m**2, 0.0, self.generator).cells:
             if ground is Cover.GRASS:
                 self._fill(lot, self._add(Cover.GRASS))
-            fill = (self._random.uniform(*use.fill), self._random.uniform(*use.fill))
+            fill = (self.generator.uniform(*use.fill), self.generator.uniform(*use.fill))
             footprint = fitted_rectangle(lot, fill)
             if footprint is not None:
                 # Squared and more: many low buildings, few towers.
-                share = self._random.random() ** 2.5
+                share = self.generator.random() ** 2.5
                 low, high = use.height_m
                 self._buildings.append((footprint, low + (high - low) * share))
             self._scatter_trees(lot, use.trees_per_lot)
@@ -149,20 +144,20 @@ class Layout(Canvas):
             u, v = (0.55 - 0.3 * k) * half[0], (0.6 - 0.2 * (k % 2)) * half[1]
             place = moved(centre, u, v, angle)
             size = (
-                self._random.uniform(6, 12) * self._scale,
-                self._random.uniform(4, 7) * self._scale,
+                self.generator.uniform(6, 12) * self.px_per_m,
+                self.generator.uniform(4, 7) * self.px_per_m,
             )
-            self._buildings.append((rectangle(place, size, angle), self._random.uniform(4, 8)))
+            self._buildings.append((rectangle(place, size, angle), self.generator.uniform(4, 8)))
             self._trees.append((place[0] + 1.4 * size[0], place[1] + 1.6 * size[1]))
 
     def _draw_waters(self) -> None:
         """Draw all banks, then all waters, so that no bank runs through another water."""
         height, width = self.labels.shape
         shores = [self._river((6, 14), 5)]
-        area_m2 = height * width / self._scale**2
-        for _ in range(int(self._random.poisson(area_m2 / _LAKE_M2))):
-            centre = (self._random.uniform(0, width), self._random.uniform(0, height))
-            radius = self._random.uniform(20, 70) * self._scale
+        area_m2 = height * width / self.px_per_m**2
+        for _ in range(int(self.generator.poisson(area_m2 / _LAKE_M2))):
+            centre = (self.generator.uniform(0, width), self.generator.uniform(0, height))
+            radius = self.generator.uniform(20, 70) * self.px_per_m
             shores.append((self._blob(centre, radius * 1.15), self._blob(centre, radius)))
         for bank, _ in shores:
             self._fill(bank, self._add(Cover.GRASS), convex=False)
@@ -173,4 +168,4 @@ class Layout(Canvas):
         for footprint, height_m in self._buildings:
             if not self._touches(footprint, (Cover.WATER,)):
                 building = self._add(Cover.BUILDING, height_m)
-                self._things.append(Standing(footprint, building, self._changes.draw()))
+                self._things.append(Standing(footprint, building, self.changes.draw()))

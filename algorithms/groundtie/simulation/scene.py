@@ -196,7 +196,7 @@ def _layout(options: SceneOptions, shape: tuple[int, int], book: ParcelBook) -> 
     if options.density == CITY:
         traffic = random_stream(options.seed, Stream.TRAFFIC)
         return CityLayout(shape, scale, generator, book, changes, traffic)
-    return Layout(shape, scale, options.density, generator, book, changes)
+    return Layout(shape, scale, generator, book, changes, options.density)
 
 
 def _terrain(options: SceneOptions, shape: tuple[int, int]) -> npt.NDArray[np.float32]:
