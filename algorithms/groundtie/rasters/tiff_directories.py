@@ -54,7 +54,7 @@ Tags = dict[int, Tag]
 
 @dataclass
 class Image:
-    """One image of a file: the raster, an overview, or the mask of one.
+    """One image of a file: the raster or an overview, each with its mask, or such a mask.
 
     Parameters
     ----------
@@ -64,6 +64,8 @@ class Image:
         Type, count and bytes of what it states, by number.
     planes
         In how many planes its bands lie: 1, or one each.
+    mask
+        Which of its pixels are valid; None: nothing states it.
     offsets, counts
         Where each block lies and how many bytes it has, shape (planes, rows, cols); 0: not yet.
     """
@@ -72,6 +74,7 @@ class Image:
     height: int
     tags: Tags
     planes: int = 1
+    mask: Image | None = None
     offsets: NDArray[np.uint64] = field(init=False)
     counts: NDArray[np.uint64] = field(init=False)
 
@@ -80,31 +83,17 @@ class Image:
         self.offsets, self.counts = np.zeros(shape, np.uint64), np.zeros(shape, np.uint64)
 
     @property
-    def pixels(self) -> int:
-        """Number of pixels."""
-        return self.width * self.height
+    def images(self) -> list[Image]:
+        """It and its mask, in the order of their directories."""
+        return [self] if self.mask is None else [self, self.mask]
 
     def overview(self) -> Image:
-        """Return an image of half the size of this one, without blocks yet."""
+        """Return an image of half the size of this one, and its mask, without blocks yet."""
         width, height = -(-self.width // 2), -(-self.height // 2)
         kind = _OVERVIEW | _number(self.tags.get(_KIND, _short(0)))
         shared = {tag: self.tags[tag] for tag in _SHARED if tag in self.tags}
-        return Image(width, height, {**shared, _KIND: _long(kind)}, self.planes)
-
-    def mask(self) -> Image:
-        """Return the mask of this image, one bit a pixel, without blocks yet."""
-        tags = {
-            _KIND: _long(_MASK),
-            _BITS: _short(1),
-            _COMPRESSION: self.tags[_COMPRESSION],
-            _COLOURS: _short(_COLOURS_OF_MASK),
-            _SAMPLES: _short(1),
-            _PLANES: _short(1),
-            _TILE_WIDTH: _short(BLOCK),
-            _TILE_HEIGHT: _short(BLOCK),
-            _FORMAT: _short(_UNSIGNED),
-        }
-        return Image(self.width, self.height, tags)
+        mask = None if self.mask is None else self.mask.overview()
+        return Image(width, height, {**shared, _KIND: _long(kind)}, self.planes, mask)
 
     def blocks(self, window: Window) -> Iterator[tuple[int, int, Window]]:
         """Return the row and column of each block that a window touches, and its pixels."""
@@ -127,7 +116,7 @@ class Image:
         return sorted({**self.tags, **made}.items())
 
 
-def base_image(template: bytes, width: int, height: int) -> Image:
+def base_image(template: bytes, width: int, height: int, masked: bool) -> Image:
     """Return a raster's image of a size with what a template states, without blocks yet.
 
     Parameters
@@ -136,10 +125,24 @@ def base_image(template: bytes, width: int, height: int) -> Image:
         A classic TIFF file, little endian, of the same bands and blocks.
     width, height
         In pixels.
+    masked
+        Whether it has a mask, of one bit a pixel.
     """
     tags = tags_of(template)
     separate = _number(tags[_PLANES]) == 2
-    return Image(width, height, tags, _number(tags[_SAMPLES]) if separate else 1)
+    of_mask = {
+        _KIND: _long(_MASK),
+        _BITS: _short(1),
+        _COMPRESSION: tags[_COMPRESSION],
+        _COLOURS: _short(_COLOURS_OF_MASK),
+        _SAMPLES: _short(1),
+        _PLANES: _short(1),
+        _TILE_WIDTH: _short(BLOCK),
+        _TILE_HEIGHT: _short(BLOCK),
+        _FORMAT: _short(_UNSIGNED),
+    }
+    mask = Image(width, height, of_mask) if masked else None
+    return Image(width, height, tags, _number(tags[_SAMPLES]) if separate else 1, mask)
 
 
 def tags_of(content: bytes) -> Tags:

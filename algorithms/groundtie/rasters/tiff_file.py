@@ -27,23 +27,6 @@ from .windows import Window
 _BEST_COMPRESSION = 1032
 
 
-@dataclass(frozen=True)
-class Level:
-    """An image in one of the sizes that a file holds, and its mask, if there is one."""
-
-    image: Image
-    mask: Image | None
-
-    @property
-    def images(self) -> list[Image]:
-        """Both, in the order of their directories."""
-        return [self.image] if self.mask is None else [self.image, self.mask]
-
-    def overview(self) -> Level:
-        """Return the next level, of half the size, without blocks yet."""
-        return Level(self.image.overview(), None if self.mask is None else self.mask.overview())
-
-
 @dataclass
 class _Open:
     """A block of which a part is known."""
@@ -99,7 +82,7 @@ class TiledFile:
     """
 
     path: Path
-    levels: Sequence[Level]
+    levels: Sequence[Image]
     pixels: PixelType
     bands: int
     executor: Executor
@@ -146,7 +129,7 @@ class TiledFile:
         level
             0: the raster; else its overviews in the order of their sizes.
         """
-        image = self.levels[level].image
+        image = self.levels[level]
         window = window or Window(0, 0, image.width, image.height)
         values = values.reshape(-1, *values.shape[-2:])
         if image.planes == 1:
@@ -203,8 +186,9 @@ class TiledFile:
     def _raw_bytes(self) -> int:
         """Bytes of all pixels, not compressed."""
         pixel = self.bands * self.pixels.memory.itemsize
-        raw = sum(level.image.pixels * pixel for level in self.levels)
-        return raw + sum(level.mask.pixels // 8 for level in self.levels if level.mask is not None)
+        masked = self.levels[0].mask is not None
+        sizes = (level.width * level.height for level in self.levels)
+        return sum(size * pixel + masked * (size // 8) for size in sizes)
 
     @cached_property
     def _big(self) -> bool:

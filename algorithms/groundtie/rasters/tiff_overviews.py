@@ -19,7 +19,7 @@ from scipy import sparse
 from .averaging import overlaps, weighted_sums
 from .handles import OpenDataset
 from .metadata import numpy_dtype
-from .tiff_file import Level
+from .tiff_directories import Image
 from .windows import Mask, Window
 
 # Files beside the one that is written are none of its own.
@@ -50,27 +50,22 @@ class Reduced:
     ----------
     handles
         Of that level in the file, in which it is finished.
-    before, level
-        That level, and the one that is made, half its size.
+    level
+        The overview, half the size of that level.
     nearest
         Whether pixels are picked; else they are averages of what is valid.
     """
 
     handles: OpenDataset
-    before: Level
-    level: Level
+    level: Image
     nearest: bool
 
     def tasks(self, bands: int) -> list[Task]:
         """Return which bands, from 1, and windows are read at a time."""
-        image = self.level.image
-        together = [list(range(1, bands + 1))]
-        groups = together if image.planes == 1 else [[band] for band in together[0]]
-        return [
-            (group, place)
-            for _, _, place in image.blocks(Window(0, 0, image.width, image.height))
-            for group in groups
-        ]
+        numbers = range(1, bands + 1)
+        groups = [[*numbers]] if self.level.planes == 1 else [[number] for number in numbers]
+        whole = Window(0, 0, self.level.width, self.level.height)
+        return [(group, place) for _, _, place in self.level.blocks(whole) for group in groups]
 
     def read(self, task: Task) -> tuple[NDArray[Any], Mask | None]:
         """Return bands of a window, (bands, h, w), and, beside the first, what is valid, (h, w)."""
@@ -79,14 +74,12 @@ class Reduced:
             found = None if self.nearest else self._means(dataset, bands, window)
             return found or self._resampled(dataset, bands, window)
 
-    @property
-    def _scale(self) -> tuple[float, float]:
+    def _scale(self, dataset: Any) -> tuple[float, float]:
         """Return how many columns and rows of the level before a pixel of the overview has.
 
         A last row or column of an odd number is shared by all of the overview's pixels.
         """
-        before, made = self.before.image, self.level.image
-        return before.width / made.width, before.height / made.height
+        return dataset.width / self.level.width, dataset.height / self.level.height
 
     def _has_mask(self, bands: list[int]) -> bool:
         return self.level.mask is not None and bands[0] == 1
@@ -95,7 +88,7 @@ class Reduced:
         self, dataset: Any, bands: list[int], window: Window
     ) -> tuple[NDArray[Any], Mask | None]:
         """Return what GDAL makes of any pixels."""
-        x, y = self._scale
+        x, y = self._scale(dataset)
         place = rasterio.windows.Window(
             window.col * x, window.row * y, window.width * x, window.height * y
         )
@@ -115,10 +108,10 @@ class Reduced:
         """Return the same of usual pixels, in a tenth of the time; None: they are not."""
         if dataset.dtypes[0] not in _MEANS:
             return None
-        before, made = self.before.image, self.level.image
+        made = self.level
         precision = np.result_type(dataset.dtypes[0], np.float32)
-        rows, down = _shares(before.height, made.height, window.row, window.height, precision)
-        cols, across = _shares(before.width, made.width, window.col, window.width, precision)
+        rows, down = _shares(dataset.height, made.height, window.row, window.height, precision)
+        cols, across = _shares(dataset.width, made.width, window.col, window.width, precision)
         place = rasterio.windows.Window.from_slices(rows, cols)
         masks = _masks(dataset, bands, place)
         if masks is None:
@@ -127,7 +120,7 @@ class Reduced:
         values = dataset.read(bands, window=place)
         means = np.empty((len(bands), window.height, window.width), values.dtype)
         known = np.ones(means.shape, bool)
-        x, y = self._scale
+        x, y = self._scale(dataset)
         for band, mask, into, valid in zip(values, masks, means, known, strict=True):
             weight: Any = x * y
             if mask is not None:

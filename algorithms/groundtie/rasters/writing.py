@@ -25,7 +25,7 @@ from .metadata import BandInfo, fits
 from .reading import RasterSource
 from .tiff_blocks import PixelType
 from .tiff_directories import BLOCK, base_image
-from .tiff_file import Level, TiledFile, require_space
+from .tiff_file import TiledFile, require_space
 from .tiff_overviews import Reduced, before_level
 from .tiling import in_order
 
@@ -100,9 +100,8 @@ def create_like(
     profile = _profile(source, grid, nodata, interleave, pixels)
     with writing(path):
         template, beside = _template(source, profile, rpc_tags)
-    base = base_image(template, grid.width, grid.height)
-    levels = [Level(base, base.mask() if masked else None)]
-    while max(levels[-1].image.width, levels[-1].image.height) > BLOCK:
+    levels = [base_image(template, grid.width, grid.height, masked)]
+    while max(levels[-1].width, levels[-1].height) > BLOCK:
         levels.append(levels[-1].overview())
     is_cog = final_name(path).lower().endswith(COG_SUFFIXES)
     with (
@@ -209,7 +208,7 @@ def _write_overviews(file: TiledFile, *, nearest: bool, progress: Progress) -> N
         file.finish(number)
         part = progress.part((number - 1) / (count - 1), number / (count - 1))
         with before_level(file.path, number) as handles:
-            reduced = Reduced(handles, file.levels[number - 1], file.levels[number], nearest)
+            reduced = Reduced(handles, file.levels[number], nearest)
             tasks = reduced.tasks(file.bands)
             for i, found in enumerate(in_order(file.executor, reduced.read, tasks, file.ahead)):
                 values, valid = found
