@@ -30,7 +30,7 @@ def test_the_speckle_filter_is_told_besides_what_the_file_says(tmp_path: Path) -
     with open_raster(tmp_path / "a.tif") as source:
         like = with_speckle_filter(source, "lee, 7 px")
         with create_like(like, source.grid, tmp_path / "b.tif", nodata=None) as dataset:
-            dataset.write(GREY, 1)
+            dataset.write(GREY)
     with rasterio.open(tmp_path / "b.tif") as dataset:
         assert dataset.tags()[SPECKLE_FILTER] == "lee, 7 px"
         assert dataset.tags()["PLACE"] == "here"

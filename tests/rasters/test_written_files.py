@@ -21,7 +21,7 @@ from rasterio.crs import CRS
 from rasterio.enums import Resampling
 
 from groundtie.errors import OutputError
-from groundtie.rasters import tiff_directories
+from groundtie.rasters import tiff_file
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.delivery import warp_raster
 from groundtie.rasters.grid import Grid
@@ -141,7 +141,7 @@ def test_large_files_are_big_tiffs(
     masked: Path, monkeypatch: pytest.MonkeyPatch, big: bool, cog: bool
 ) -> None:
     if big:
-        monkeypatch.setattr(tiff_directories, "_LARGEST_CLASSIC", 0)
+        monkeypatch.setattr(tiff_file, "_LARGEST_CLASSIC", 0)
     out = copied(masked, cog=cog)
     assert out.read_bytes()[:4] == (b"II\x2b\0" if big else b"II\x2a\0")
     with rasterio.open(out) as dataset, rasterio.open(masked) as source:

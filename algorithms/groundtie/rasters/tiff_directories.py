@@ -10,7 +10,7 @@ Source: [Adobe1992], [OGC2023].
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -34,9 +34,6 @@ _SHARED = (_BITS, _COMPRESSION, _COLOURS, _SAMPLES, _PLANES, _PREDICTOR, _PALETT
 # Kinds of images, which may add up.
 _OVERVIEW, _MASK = 1, 4
 _COLOURS_OF_MASK, _UNSIGNED = 4, 1
-
-# BigTIFF begins where the offsets of TIFF end; as GDAL's IF_SAFER, well before.
-_LARGEST_CLASSIC = 2_000_000_000
 
 # What a Cloud Optimized GeoTIFF states of its blocks: in front of each lies its size, behind it its
 # last bytes again. Source: [OGC2023].
@@ -159,19 +156,6 @@ def tags_of(content: bytes) -> Tags:
         where = place + 8 if size <= 4 else struct.unpack_from("<I", content, place + 8)[0]
         tags[tag] = (kind, number, content[where : where + size])
     return tags
-
-
-def needs_big(images: Iterable[Image], raw_bytes: int) -> bool:
-    """Return whether a file may grow beyond what a classic TIFF can hold.
-
-    Parameters
-    ----------
-    images
-        All of them.
-    raw_bytes
-        Of their pixels, not compressed.
-    """
-    return raw_bytes + sum(16 * image.offsets.size for image in images) > _LARGEST_CLASSIC
 
 
 def header(images: Sequence[Image], big: bool, cog: bool = False) -> bytes:

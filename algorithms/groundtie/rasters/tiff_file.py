@@ -20,11 +20,14 @@ from numpy.typing import NDArray
 
 from .atomic import free_bytes, no_space, writing
 from .tiff_blocks import PixelType, encoded_mask
-from .tiff_directories import AROUND_COG_BLOCK, Image, header, needs_big
+from .tiff_directories import AROUND_COG_BLOCK, Image, header
 from .windows import Window
 
 # Deflate makes no more than this out of a byte: two bits for 258 of them, [Deutsch1996] 3.2.5.
 _BEST_COMPRESSION = 1032
+
+# BigTIFF begins where the offsets of TIFF end; as GDAL's IF_SAFER, well before.
+_LARGEST_CLASSIC = 2_000_000_000
 
 
 @dataclass
@@ -111,7 +114,7 @@ class TiledFile:
     def write(
         self,
         values: NDArray[Any],
-        indexes: int | Sequence[int] | None = None,
+        indexes: Sequence[int] | None = None,
         *,
         window: Window | None = None,
         level: int = 0,
@@ -137,9 +140,9 @@ class TiledFile:
                 raise ValueError("all bands of a plane are written together")
             self._put(image, 0, np.moveaxis(values, 0, -1), window, self.pixels.encoded)
             return
-        numbers = range(1, self.bands + 1) if indexes is None else np.atleast_1d(indexes)
+        numbers = range(1, self.bands + 1) if indexes is None else indexes
         for number, band in zip(numbers, values, strict=True):
-            self._put(image, int(number) - 1, band[:, :, None], window, self.pixels.encoded)
+            self._put(image, number - 1, band[:, :, None], window, self.pixels.encoded)
 
     def write_mask(self, valid: NDArray[Any], *, window: Window, level: int = 0) -> None:
         """Write which pixels, shape (h, w), are valid: all but 0."""
@@ -192,7 +195,9 @@ class TiledFile:
 
     @cached_property
     def _big(self) -> bool:
-        return needs_big(self._images, self._raw_bytes)
+        """Whether the file may grow beyond what a classic TIFF can hold."""
+        directories = sum(16 * image.offsets.size for image in self._images)
+        return self._raw_bytes + directories > _LARGEST_CLASSIC
 
     @cached_property
     def _start(self) -> int:
