@@ -127,27 +127,17 @@ class ArrayHandles:
         """Leave the array as it is."""
 
     def read(
-        self,
-        indexes: int | Sequence[int] | None = None,
-        *,
-        window: Any,
-        out_dtype: Any = None,
+        self, indexes: Sequence[int] | None = None, *, window: Any, out_dtype: Any = None
     ) -> NDArray[Any]:
-        """Return a copy of one band of a window, (h, w), or of several, (bands, h, w)."""
-        return np.array(np.ma.getdata(self._part(indexes, window)), dtype=out_dtype)
+        """Return a copy of some bands of a window, by default of all, (bands, h, w)."""
+        part = np.ma.getdata(self._bands[(slice(None), *window.toslices())])
+        chosen = slice(None) if indexes is None else [index - 1 for index in indexes]
+        return np.array(part[chosen], dtype=out_dtype)
 
-    def read_masks(self, indexes: int, *, window: Any) -> NDArray[np.uint8]:
+    def read_masks(self, index: int, *, window: Any) -> NDArray[np.uint8]:
         """Return 255 where a band of a window is not masked, else 0; shape (h, w)."""
-        masked = np.ma.getmaskarray(self._part(indexes, window))
+        masked = np.ma.getmaskarray(self._bands[(index - 1, *window.toslices())])
         return np.where(masked, 0, 255).astype(np.uint8)
-
-    def _part(self, indexes: int | Sequence[int] | None, window: Any) -> NDArray[Any]:
-        part = self._bands[(slice(None), *window.toslices())]
-        if indexes is None:
-            return part
-        if isinstance(indexes, int):
-            return part[indexes - 1]
-        return part[[index - 1 for index in indexes]]
 
 
 def read_by(
