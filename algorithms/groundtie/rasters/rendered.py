@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .grid import Grid
 from .handles import read_by
@@ -32,7 +31,9 @@ _RADAR_OF_TERRAIN = 2.0
 
 @dataclass(frozen=True)
 class Light:
-    """Where the sun or a radar stands, seen from the ground.
+    """Where the sun or a radar stands, seen from the ground: 45° above the horizon.
+
+    This elevation hardly counts: similarity asks where brightness changes, not by how much.
 
     Parameters
     ----------
@@ -40,14 +41,10 @@ class Light:
         One of `LIGHTS`.
     azimuth_deg
         Clockwise from north.
-    elevation_deg
-        Above the horizon: of a radar 90° minus its incidence angle. It hardly counts: similarity
-        asks where brightness changes, not by how much.
     """
 
     kind: str
     azimuth_deg: float
-    elevation_deg: float = 45.0
 
     @property
     def enlargement(self) -> float:
@@ -64,12 +61,10 @@ class Light:
         azimuth = math.radians(self.azimuth_deg)
         away = -(east * np.float32(math.sin(azimuth)) + north * np.float32(math.cos(azimuth)))
         if self.kind == SUN:
-            cot = np.float32(1 / math.tan(math.radians(self.elevation_deg)))
-            direct = np.maximum(1 + away * cot, 0) / np.sqrt(1 + east**2 + north**2)
+            direct = np.maximum(1 + away, 0) / np.sqrt(1 + east**2 + north**2)
             return np.asarray(_AMBIENT + (1 - _AMBIENT) * direct, np.float32)
-        tan = np.float32(math.tan(math.radians(self.elevation_deg)))
-        power = 1 / np.maximum(1 - away * tan, np.float32(1 / _BRIGHTEST))
-        return np.asarray(np.where(away < -tan, 0, np.sqrt(power)), np.float32)
+        power = 1 / np.maximum(1 - away, np.float32(1 / _BRIGHTEST))
+        return np.asarray(np.where(away < -1, 0, np.sqrt(power)), np.float32)
 
 
 def rendered(source: RasterSource, light: Light, band: int | None = None) -> RasterSource:
@@ -111,25 +106,16 @@ class _Rendering:
     def close(self) -> None:
         self.heights.close()
 
-    def read(
-        self,
-        indexes: int | Sequence[int] | None = None,
-        *,
-        window: Any,
-        out_dtype: Any = None,
-    ) -> NDArray[Any]:
-        """Return the brightness of a window, (h, w), or (1, h, w); NaN if unknown."""
+    def read(self, indexes: Sequence[int], *, window: Any, out_dtype: Any) -> FloatImage:
+        """Return the brightness of a window, shape (1, h, w); NaN if unknown.
+
+        It has one band, of float32, and nothing but these tells what is valid.
+        """
         (top, bottom), (left, right) = window.toranges()
         around = Window(int(left) - 1, int(top) - 1, int(right - left) + 2, int(bottom - top) + 2)
         values, valid = self.heights.read(around, self.band)
         values[~valid] = np.nan
-        image = self.light.shade(*_slopes(values, self.heights.grid))
-        image = image.astype(out_dtype or np.float32, copy=False)
-        return image if isinstance(indexes, int) else image[None]
-
-    def read_masks(self, indexes: int, *, window: Any) -> NDArray[np.uint8]:
-        """Return 255 where the brightness of a window is known, else 0; shape (h, w)."""
-        return np.where(np.isnan(self.read(1, window=window)), 0, 255).astype(np.uint8)
+        return self.light.shade(*_slopes(values, self.heights.grid))[None]
 
 
 def _slopes(heights_m: FloatImage, grid: Grid) -> tuple[FloatImage, FloatImage]:
