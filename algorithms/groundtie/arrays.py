@@ -181,18 +181,15 @@ def in_memory(value: Any) -> Any:
     ParameterError
         It is one of these, but of no use.
     """
-    if isinstance(value, Raster) or is_dataset(value):
+    # What rasterio has opened: a file, a `MemoryFile` or a `WarpedVRT`.
+    is_dataset = hasattr(value, "read_masks") and hasattr(value, "nodatavals")
+    if isinstance(value, Raster) or is_dataset:
         return value
     if isinstance(value, np.ndarray):
         return Raster(value)
     if hasattr(value, "dims") and hasattr(value, "coords"):
         return Raster.from_xarray(value)
     return None
-
-
-def is_dataset(value: Any) -> bool:
-    """Return whether rasterio has opened this: a file, a `MemoryFile` or a `WarpedVRT`."""
-    return hasattr(value, "read_masks") and hasattr(value, "nodatavals")
 
 
 def _pixels(values: Any) -> NDArray[Any]:
