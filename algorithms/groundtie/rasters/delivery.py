@@ -79,7 +79,7 @@ class _Warp:
         place, bands = task
         px = coordinates(self.target.window(*place), self.to_input_px)
         size = (self.source.grid.width, self.source.grid.height)
-        out = np.empty((len(bands), place.height, place.width), self.source.dtype)
+        out = np.zeros((len(bands), place.height, place.width), self.source.dtype)
         valid = np.zeros(out.shape, bool)
         found = read_around(
             px,
@@ -88,16 +88,13 @@ class _Warp:
             self.factor,
             lambda window, shape: self.source.read_bands(window, bands, shape),
         )
-        if found is None:
-            for i, band in enumerate(bands):
-                out[i] = fill_value(self.source, self.nodata, band)
-            return out, valid[0]
-        images, shown, px = found
-        for first in range(0, len(bands), _BANDS):
-            part = slice(first, first + _BANDS)
-            out[part], valid[part] = resample(
-                images[part], shown[part], px, self.method, self.source.dtype
-            )
+        if found is not None:
+            images, shown, px = found
+            for first in range(0, len(bands), _BANDS):
+                part = slice(first, first + _BANDS)
+                out[part], valid[part] = resample(
+                    images[part], shown[part], px, self.method, self.source.dtype
+                )
         for values, known, band in zip(out, valid, bands, strict=True):
             fill = fill_value(self.source, self.nodata, band)
             if self.nodata is not None or band == self.source.alpha_band:
