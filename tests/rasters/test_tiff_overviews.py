@@ -105,9 +105,7 @@ def _overview(
         with create_like(source, grid, staged, nodata=nodata, masked=masked) as file:
             for tile in tiles(grid):
                 rows, cols = tile.slices
-                file.write(image[:, rows, cols], window=tile)
-                if masked:
-                    file.write_mask(mask[rows, cols], window=tile)
+                file.write(image[:, rows, cols], window=tile, valid=mask[rows, cols])
     with rasterio.open(folder / "b.tif", overview_level=0) as overview:
         values = overview.read()
         # rasterio warns of masks beside an alpha band.

@@ -151,7 +151,6 @@ def warp_raster(
         The user cancelled.
     """
     warp = _Warp.of(source, to_input_px, target, resampling)
-    masked = warp.leaves_gaps
     interleave = "band" if len(warp.groups) > 1 else None
     pixels = progress.part(0, 1 - _OVERVIEWS)
     with (
@@ -161,16 +160,14 @@ def warp_raster(
             path,
             nodata=warp.nodata,
             interleave=interleave,
-            masked=masked,
+            masked=warp.leaves_gaps,
             workers=workers,
             progress=progress.part(1 - _OVERVIEWS, 1),
         ) as file,
         ThreadPoolExecutor(workers) as pool,
     ):
         for tile, group, values, known in warp.tiles(pool, workers + 1, pixels):
-            file.write(values, group, window=tile)
-            if masked and group is warp.groups[0]:
-                file.write_mask(known, window=tile)
+            file.write(values, group, window=tile, valid=known)
     progress.update(1.0)
 
 
@@ -237,17 +234,19 @@ def write_with_geotransform(
     """
     if (grid.width, grid.height) != (source.grid.width, source.grid.height):
         raise ValueError("a new geotransform does not change the size of a raster")
-    nodata = source.bands[0].nodata
     count = tile_count(grid)
-    masked, overviews = source.has_mask_band, progress.part(1 - _OVERVIEWS, 1)
     with create_like(
-        source, grid, path, nodata=nodata, masked=masked, rpc_tags=rpc_tags, progress=overviews
+        source,
+        grid,
+        path,
+        nodata=source.bands[0].nodata,
+        masked=source.has_mask_band,
+        rpc_tags=rpc_tags,
+        progress=progress.part(1 - _OVERVIEWS, 1),
     ) as file:
         for i, tile in enumerate(tiles(grid)):
             values, mask = source.read_untouched(tile)
-            file.write(values, window=tile)
-            if masked:
-                file.write_mask(mask, window=tile)
+            file.write(values, window=tile, valid=mask)
             progress.update((i + 1) / count * (1 - _OVERVIEWS))
     progress.update(1.0)
 

@@ -210,16 +210,14 @@ class RasterSource:
             return native(self, window)
         return average_window(native, self, self, window, out_shape)
 
-    def read_untouched(self, window: Window) -> tuple[NDArray[Any], NDArray[np.uint8]]:
+    def read_untouched(self, window: Window) -> tuple[NDArray[Any], NDArray[np.uint8] | None]:
         """Read all bands, shape (bands, h, w), and the mask, (h, w), of a window inside as stored.
 
-        The mask is all 255 if the raster has no mask band.
+        The mask is None if the raster has no mask band.
         """
         place = rasterio.windows.Window(*window)
         with self._handles.borrow() as dataset:
-            mask = np.full((window.height, window.width), 255, np.uint8)
-            if self.has_mask_band:
-                mask = dataset.read_masks(1, window=place)
+            mask = dataset.read_masks(1, window=place) if self.has_mask_band else None
             return dataset.read(window=place), mask
 
 

@@ -117,6 +117,7 @@ class TiledFile:
         indexes: Sequence[int] | None = None,
         *,
         window: Window | None = None,
+        valid: NDArray[Any] | None = None,
         level: int = 0,
     ) -> None:
         """Write pixels of some bands; each must be written once, and not change any more.
@@ -129,27 +130,25 @@ class TiledFile:
             The bands, from 1; None: all. Where all lie in one plane they must be all.
         window
             Their place; None: the whole image.
+        valid
+            Which pixels are valid, shape (h, w): all but 0. It becomes the mask, if the file has
+            one, and counts beside the first band only.
         level
             0: the raster; else its overviews in the order of their sizes.
         """
         image = self.levels[level]
         window = window or Window(0, 0, image.width, image.height)
         values = values.reshape(-1, *values.shape[-2:])
+        numbers = range(1, self.bands + 1) if indexes is None else indexes
         if image.planes == 1:
             if len(values) != self.bands:
                 raise ValueError("all bands of a plane are written together")
             self._put(image, 0, np.moveaxis(values, 0, -1), window, self.pixels.encoded)
-            return
-        numbers = range(1, self.bands + 1) if indexes is None else indexes
-        for number, band in zip(numbers, values, strict=True):
-            self._put(image, number - 1, band[:, :, None], window, self.pixels.encoded)
-
-    def write_mask(self, valid: NDArray[Any], *, window: Window, level: int = 0) -> None:
-        """Write which pixels, shape (h, w), are valid: all but 0."""
-        mask = self.levels[level].mask
-        if mask is None:
-            raise ValueError("this file has no mask")
-        self._put(mask, 0, np.asarray(valid) != 0, window, encoded_mask)
+        else:
+            for number, band in zip(numbers, values, strict=True):
+                self._put(image, number - 1, band[:, :, None], window, self.pixels.encoded)
+        if image.mask is not None and valid is not None and 1 in numbers:
+            self._put(image.mask, 0, valid != 0, window, encoded_mask)
 
     def finish(self, levels: int) -> None:
         """Write all blocks that were given, and let readers know the first levels."""

@@ -68,7 +68,10 @@ class Reduced:
         return [(group, place) for _, _, place in self.level.blocks(whole) for group in groups]
 
     def read(self, task: Task) -> tuple[NDArray[Any], Mask | None]:
-        """Return bands of a window, (bands, h, w), and, beside the first, what is valid, (h, w)."""
+        """Return bands of a window, (bands, h, w), and what is valid in the first, (h, w).
+
+        None where it may stay unknown: there is no mask, or the band is not the file's first.
+        """
         bands, window = task
         with env_ctx_if_needed(), self.handles.borrow() as dataset:
             found = None if self.nearest else self._means(dataset, bands, window)
@@ -80,9 +83,6 @@ class Reduced:
         A last row or column of an odd number is shared by all of the overview's pixels.
         """
         return dataset.width / self.level.width, dataset.height / self.level.height
-
-    def _has_mask(self, bands: list[int]) -> bool:
-        return self.level.mask is not None and bands[0] == 1
 
     def _resampled(
         self, dataset: Any, bands: list[int], window: Window
@@ -97,14 +97,14 @@ class Reduced:
         # Where nothing is valid GDAL leaves complex pixels as they are in memory.
         values = np.zeros((len(bands), *shape), numpy_dtype(dataset.dtypes[0]))
         dataset.read(bands, out=values, window=place, resampling=how)
-        if not self._has_mask(bands):
+        if self.level.mask is None or bands[0] != 1:
             return values, None
         mask = dataset.read_masks(1, window=place, out_shape=shape, resampling=how)
         return values, mask > 0
 
     def _means(
         self, dataset: Any, bands: list[int], window: Window
-    ) -> tuple[NDArray[Any], Mask | None] | None:
+    ) -> tuple[NDArray[Any], Mask] | None:
         """Return the same of usual pixels, in a tenth of the time; None: they are not."""
         if dataset.dtypes[0] not in _MEANS:
             return None
@@ -133,7 +133,7 @@ class Reduced:
             if dataset.nodata is not None and (into[valid] == fill).any():
                 return None
             into[~valid] = fill
-        return means, known[0] if self._has_mask(bands) else None
+        return means, known[0]
 
 
 def _shares(

@@ -213,9 +213,7 @@ def _write_overviews(file: TiledFile, *, nearest: bool, progress: Progress) -> N
             for i, found in enumerate(in_order(file.executor, reduced.read, tasks, file.ahead)):
                 values, valid = found
                 bands, window = tasks[i]
-                file.write(values, bands, window=window, level=number)
-                if valid is not None:
-                    file.write_mask(valid, window=window, level=number)
+                file.write(values, bands, window=window, valid=valid, level=number)
                 part.update((i + 1) / len(tasks))
 
 

@@ -52,8 +52,7 @@ class RasterFilter:
         like = _as_amplitudes(source) if source.is_complex else source
         # Without speckle, only the tag identifies it as a radar image.
         like = with_speckle_filter(like, f"{self.filter.name}, {self.filter.window_px} px")
-        workers = context.workers
-        masked = source.has_mask_band
+        workers, masked = context.workers, source.has_mask_band
         with create_like(
             like, source.grid, path, nodata=nodata, masked=masked, workers=workers
         ) as file:
@@ -64,9 +63,7 @@ class RasterFilter:
                 workers + 1,
             )
             for i, (tile, bands, valid) in enumerate(filtered):
-                file.write(bands, window=tile)
-                if masked:
-                    file.write_mask(valid, window=tile)
+                file.write(bands, window=tile, valid=valid)
                 context.update((i + 1) / tile_count(source.grid))
 
     def tile(self, tile: Window) -> tuple[NDArray[Any], Mask]:
