@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from rasterio.enums import ColorInterp
 
 from ..errors import GeoreferencingError, raised_by
@@ -98,6 +99,15 @@ def working_dtype(dtype: np.dtype[Any]) -> np.dtype[Any]:
         return dtype
     exact_in_float32 = dtype.itemsize <= 2 or dtype == np.float32
     return np.dtype(np.float32 if exact_in_float32 else np.float64)
+
+
+def rounded(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return floating-point values, which are lost, in another type."""
+    if dtype.kind in "fc" or values.dtype == dtype:
+        return values.astype(dtype, copy=False)
+    limits = np.iinfo(dtype)
+    np.rint(values, out=values)
+    return np.clip(values, limits.min, limits.max, out=values).astype(dtype)
 
 
 def fits(value: float, dtype: np.dtype[Any]) -> bool:

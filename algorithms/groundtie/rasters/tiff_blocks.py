@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .metadata import rounded
 from .tiff_directories import BLOCK
 from .windows import Mask
 
@@ -48,9 +49,8 @@ class PixelType:
         """Return a block, shape (h, w, samples), at most `BLOCK` high and wide, as stored."""
         values = _whole(values)
         if self.name in _PAIRS:
-            parts = np.rint(np.stack([values.real, values.imag], axis=-1))
-            limits = np.iinfo(_PAIRS[self.name])
-            stored = np.clip(parts, limits.min, limits.max).astype(_PAIRS[self.name])
+            parts = np.stack([values.real, values.imag], axis=-1)
+            stored = rounded(parts, np.dtype(_PAIRS[self.name]))
         else:
             stored = np.ascontiguousarray(values, self.memory.newbyteorder("<"))
         if self.predictor == _DIFFERENCES:

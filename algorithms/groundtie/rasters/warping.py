@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from .grid import FloatArray, Grid, PointFunction
 from .kernels import REACH, interpolate
 from .lattice import ON_PIXELS, DenseMap, lattice, row_strips
-from .metadata import working_dtype
+from .metadata import rounded, working_dtype
 from .reading import FloatImage, RasterSource
 from .windows import Mask, Window
 
@@ -80,13 +80,13 @@ def _resample(
     """Return `resample` of an image, whose bands are valid at the same pixels."""
     if method != "nearest" and valid.all() and _are_inside(px, valid.shape, REACH[method]):
         values = interpolate(image.astype(working_dtype(image.dtype)), px, method)
-        return _rounded(values, dtype), np.ones(px.shape[1:], bool)
+        return rounded(values, dtype), np.ones(px.shape[1:], bool)
     nearest = np.rint(px)
     known, whole = _validity(valid, nearest, REACH[method])
     if method == "nearest":
         cols, rows = np.where(known, nearest, 0).astype(np.intp)
         values = np.where(known, image[..., rows, cols], image.dtype.type(0))
-        return _rounded(values, dtype), known
+        return rounded(values, dtype), known
     filled = np.where(valid, image, image.dtype.type(0)).astype(working_dtype(image.dtype))
     values = interpolate(filled, px, method)
     partly = known & ~whole
@@ -95,7 +95,7 @@ def _resample(
         weight = interpolate(valid.astype(filled.real.dtype), there, "bilinear")
         values[..., partly] = (interpolate(filled, there, "bilinear") / weight)[..., 0, :]
     values[..., ~known] = 0
-    return _rounded(values, dtype), known
+    return rounded(values, dtype), known
 
 
 def _validity(valid: Mask, nearest: NDArray[Any], reach: int) -> tuple[Mask, Mask]:
@@ -289,12 +289,3 @@ def _inside_window(px: FloatArray, window: Window, factor: tuple[int, int]) -> N
 
 def _on_pixels(px: NDArray[Any]) -> bool:
     return bool(np.abs(px - np.rint(px)).max(initial=0) < ON_PIXELS)
-
-
-def _rounded(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Return floating-point values, which are lost, in another type."""
-    if dtype.kind in "fc" or values.dtype == dtype:
-        return values.astype(dtype, copy=False)
-    limits = np.iinfo(dtype)
-    np.rint(values, out=values)
-    return np.clip(values, limits.min, limits.max, out=values).astype(dtype)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..errors import RasterContentError
+from ..rasters.metadata import rounded
 from ..rasters.patch import middle_window
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
@@ -87,15 +88,13 @@ class RasterFilter:
         filtered = self.filter(power, valid)
         if self.values == AMPLITUDE:
             filtered = np.sqrt(filtered)
-        if dtype.kind in "iu":
-            limits = np.iinfo(dtype)
-            filtered = np.clip(np.rint(filtered), limits.min, limits.max)
+        filtered = rounded(filtered, dtype)
         if source.is_complex:
             return filtered
         # Without a nodata value, an invalid pixel keeps its value.
         nodata = source.bands[band - 1].nodata
         fill = values if nodata is None else fill_value(source, nodata, band)
-        return np.where(valid, filtered.astype(dtype), fill)
+        return np.where(valid, filtered, fill)
 
 
 def _as_amplitudes(source: RasterSource) -> RasterSource:
