@@ -9,6 +9,7 @@ plain convolution with all dampings alike.
 from __future__ import annotations
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 
 from ..rasters.reading import FloatImage, Mask
@@ -56,7 +57,7 @@ def enhanced_frost(
     half = (padded.shape[0] - step.shape[0]) // 2
     total = _polynomial(padded, step, half)
     if valid.all():
-        weight = _horner(_pixels_at(half), step)
+        weight = polyval(step, _pixels_at(half))
     else:
         weight = np.maximum(_polynomial(valid.astype(np.float32), step, half), np.float32(1e-6))
     return np.asarray(total / weight)
@@ -79,14 +80,6 @@ def _polynomial(padded: FloatImage, step: FloatImage, half: int) -> FloatImage:
             total += lines[half + down : half + down + height]
             if down:
                 total += lines[half - down : half - down + height]
-    return total
-
-
-def _horner(coefficients: NDArray[np.float32], step: FloatImage) -> FloatImage:
-    total = np.full_like(step, coefficients[-1])
-    for coefficient in coefficients[-2::-1]:
-        total *= step
-        total += coefficient
     return total
 
 
