@@ -100,7 +100,7 @@ class TiledFile:
             # Without a buffer: what cannot be written must not be tried again when it is closed.
             self._file = self.path.open("w+b", buffering=0)
             try:
-                _write(self._file, bytes(self._start))
+                _write(self._file, bytes(len(header(self._images, self._big))))
             except OSError:
                 self._file.close()
                 raise
@@ -197,10 +197,6 @@ class TiledFile:
         """Whether the file may grow beyond what a classic TIFF can hold."""
         directories = sum(16 * image.offsets.size for image in self._images)
         return self._raw_bytes + directories > _LARGEST_CLASSIC
-
-    @cached_property
-    def _start(self) -> int:
-        return len(header(self._images, self._big))
 
     def _put(
         self,

@@ -46,7 +46,7 @@ def write_raster(
     }
     if grid.geotransform is not None:
         profile["transform"] = grid.geotransform
-    # In memory: a full disk is no exception within GDAL (see `tiff`).
+    # In memory: a full disk is no exception within GDAL (see `tiff_directories`).
     with MemoryFile() as memory:
         with memory.open(**profile) as raster:
             raster.write(image)
