@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ..progress import SILENT, Progress
 from ..rasters.averaging import area_average
 from ..rasters.grid import Grid
-from ..rasters.pair import nominal_pixels
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask, RasterSource, Window
 from ..rasters.tiff_directories import BLOCK
@@ -118,7 +117,7 @@ def sampled_onto(
     grid: Grid, raster: RasterSource, method: str, band: int | None = None
 ) -> tuple[FloatImage, Mask]:
     """Return a raster of any grid and map on the pixels of another: see `warping.sample`."""
-    return sample(raster, grid, nominal_pixels(grid, raster.grid), method, band)
+    return sample(raster, grid, grid.to_pixels_of(raster.grid), method, band)
 
 
 def write_mask(

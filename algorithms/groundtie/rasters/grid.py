@@ -81,6 +81,10 @@ class Grid:
         """Return the pixel positions (col, row), shape (n, 2), of the map positions `xy`."""
         return apply_affine(~self.centre_transform, xy)
 
+    def to_pixels_of(self, other: Grid) -> PointFunction:
+        """Return the function from map positions, as this grid has them, to another's pixels."""
+        return lambda xy: other.map_to_pixel(reproject(xy, self.crs, other.crs))
+
     def contains(self, px: ArrayLike) -> NDArray[np.bool_]:
         """Return for each pixel position, shape (n, 2), whether it lies on a pixel of this grid."""
         px = np.asarray(px, float)

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import GeoreferencingError, NoOverlapError, SameFileError
 from ..geometry.limits import SearchLimits
 from .colours import Colours
-from .grid import FloatArray, Grid, PointFunction, finite, reproject
+from .grid import FloatArray, Grid, PointFunction, finite
 from .patch import Patch, empty_areas
 from .reading import FloatImage, Mask, RasterSource, Window
 from .warping import sample, sample_bands
@@ -82,7 +82,7 @@ class Image:
     def shown_on(self, grid: Grid, to_px: PointFunction) -> Mask:
         """Return what the mask, which there must be, lets take part; parameters as `read_onto`."""
         assert self.mask is not None
-        own, to_mask = self.source.grid, nominal_pixels(self.source.grid, self.mask.grid)
+        own, to_mask = self.source.grid, self.source.grid.to_pixels_of(self.mask.grid)
         shown, known = sample(
             self.mask, grid, lambda xy: to_mask(own.pixel_to_map(to_px(xy))), "nearest", 1
         )
@@ -163,7 +163,7 @@ class ImagePair:
 
     def nominal_px(self, xy: FloatArray) -> FloatArray:
         """Return the input pixels at reference map positions of its nominal place, shape (n, 2)."""
-        return nominal_pixels(self.grid, self.input.source.grid)(xy)
+        return self.grid.to_pixels_of(self.input.source.grid)(xy)
 
 
 def make_pair(
@@ -207,7 +207,7 @@ def make_pair(
     grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
     radius = default_radius_m(grid) if search_radius_m is None else search_radius_m
     limits = SearchLimits(radius, rotation_deg, (1 / scale, scale))
-    outline = nominal_pixels(inp.grid, ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
+    outline = inp.grid.to_pixels_of(ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
     nominal = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
     if not limits.is_shift and not ref.grid.is_georeferenced:
         outline = outline + np.subtract(ref.grid.centre_px, inp.grid.centre_px)
@@ -275,11 +275,6 @@ def default_radius_m(grid: Grid) -> float:
 def coarser_m(reference: Grid, input: Grid) -> float:
     """Return the pixel size of the coarser of two grids, in metres."""
     return max(reference.pixel_size_m, input.pixel_size_m if input.is_georeferenced else 0.0)
-
-
-def nominal_pixels(source: Grid, target: Grid) -> PointFunction:
-    """Return the function from map positions of `source` to pixels of `target`."""
-    return lambda xy: target.map_to_pixel(reproject(xy, source.crs, target.crs))
 
 
 def _box(grid: Grid, outline_px: FloatArray, margin_px: float) -> Window | None:
