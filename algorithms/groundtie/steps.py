@@ -27,7 +27,6 @@ from .geometry.transform import Transform
 from .matching.surface_fit import FIT_RADIUS_PX, check_points
 from .rasters.patch import Patch
 from .rasters.reading import bounded_cache, open_raster
-from .registration.evidence import SearchEvidence
 from .registration.opening import open_pair
 from .registration.pipeline import mask_pair
 from .registration.scene import SceneInfo
@@ -237,7 +236,7 @@ def judge(
             check = stages.check(estimate, running)
             surveys = stages.survey(estimate, scene, running)
         except TooFewPointsError as error:
-            return judge_search(SearchEvidence(error))
+            return judge_search(error)
         return judge_evidence(stages.evidence(estimate, check, surveys, scene))
 
 

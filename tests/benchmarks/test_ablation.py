@@ -12,11 +12,10 @@ from benchmarks.ablation import leave_out, left_out
 from benchmarks.attempt import Outcome
 from benchmarks.suites import run_cases
 from groundtie.errors import NothingFoundError
-from groundtie.registration.evidence import SearchEvidence
 from groundtie.registration.verdict import judge_search
 
 RULE = "nothing in common"
-FOUND_NOTHING = SearchEvidence(NothingFoundError("nothing found"))
+FOUND_NOTHING = NothingFoundError("nothing found")
 
 
 @pytest.fixture(autouse=True)

@@ -21,14 +21,13 @@ from groundtie.registration.delivery import (
     Call,
     RegistrationFiles,
 )
-from groundtie.registration.evidence import SearchEvidence
 from groundtie.registration.registered_output import RegisteredOutput
 from groundtie.registration.registration import Registration
 from groundtie.registration.specification import SAR_SAR
 from groundtie.registration.verdict import judge_search
 
 __all__ = ["context"]
-LOST = judge_search(SearchEvidence(NothingFoundError("nothing in common was found")))
+LOST = judge_search(NothingFoundError("nothing in common was found"))
 
 
 def refused(registration: Registration) -> Registration:

@@ -13,12 +13,11 @@ from textured_pairs import TexturedPair, listing
 from groundtie.errors import NothingFoundError
 from groundtie.matching.check import CHECK_RADIUS_PX, Check
 from groundtie.registration.delivery import Call, RegistrationFiles
-from groundtie.registration.evidence import SearchEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.specification import Specification
 from groundtie.registration.verdict import judge_search
 
-LOST = judge_search(SearchEvidence(NothingFoundError("nothing in common was found")))
+LOST = judge_search(NothingFoundError("nothing in common was found"))
 
 
 def refused(registration: Registration) -> Registration:

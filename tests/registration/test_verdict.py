@@ -30,13 +30,12 @@ from groundtie.registration.evidence import (
     SCENE,
     SURVEY,
     RegistrationEvidence,
-    SearchEvidence,
 )
 from groundtie.registration.rules import RULES, Rule
 from groundtie.registration.verdict import NOT_JUDGED, Verdict, judge, judge_search
 
 TRUTH = Transform.nominal(UTM, GRID)
-LOST = judge_search(SearchEvidence(NothingFoundError("nothing in common was found")))
+LOST = judge_search(NothingFoundError("nothing in common was found"))
 
 
 def judged(check: TiePoints, estimate: Estimate | None = None, max_error: float = 3.0) -> Verdict:
@@ -215,7 +214,7 @@ def test_a_search_that_failed_is_a_refusal_and_bad_input_is_not() -> None:
     assert (LOST.accepted, LOST.rule) == (False, "nothing in common")
     assert LOST.reason == "nothing in common was found"
     with pytest.raises(BandError, match="no band 7"):
-        judge_search(SearchEvidence(BandError("there is no band 7")))
+        judge_search(BandError("there is no band 7"))
 
 
 def test_what_the_model_predicts_is_judged_not_the_nominal_place() -> None:

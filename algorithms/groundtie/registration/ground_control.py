@@ -28,7 +28,6 @@ from ..rasters.pair import Image, ImagePair
 from ..rasters.reading import RasterSource
 from ..sensor.control_points import ControlPoints
 from ..sensor.orientation import Orientation, sensor_grid
-from .evidence import SearchEvidence
 from .opening import OpenPair, pair_images
 from .pipeline import begin, mask_pair, register
 from .registration import Registration
@@ -134,7 +133,7 @@ def match_ground_control(
     try:
         coarse = Stages.of(pair.images, masked, spec).coarse(context.part(0.1, 0.4))
     except (NothingFoundError, TooFewPointsError) as error:
-        refused = replace(begun, verdict=judge_search(SearchEvidence(error)))
+        refused = replace(begun, verdict=judge_search(error))
         return GroundControl(refused, None)
     shift_px = _shift_in_image(pair.pair, by, coarse)
     if np.hypot(*shift_px) > _COARSE_PX:

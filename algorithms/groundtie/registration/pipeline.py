@@ -15,7 +15,7 @@ from ..errors import NoOverlapError, NothingFoundError, TooFewPointsError
 from ..masks.used import NONE, MaskUsed
 from ..matching.surveys import Surveys
 from ..rasters.reading import bounded_cache
-from .evidence import Exchanged, ImagesEvidence, RegistrationEvidence, SearchEvidence
+from .evidence import Exchanged, ImagesEvidence, RegistrationEvidence
 from .masks import Masked, ground_instead, with_ground_mask
 from .opening import OpenPair
 from .registration import Registration
@@ -23,7 +23,7 @@ from .scene import SceneInfo
 from .specification import Specification
 from .stages import Stages
 from .surface_masks import with_surface_mask
-from .verdict import NOT_JUDGED, judge, judge_search, refuse_images
+from .verdict import NOT_JUDGED, decide, judge, judge_search
 
 
 def run(
@@ -63,7 +63,9 @@ def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: 
 
 def begin(opened: OpenPair, masked: Masked, scene: SceneInfo, spec: Specification) -> Registration:
     """Return a registration of which only the images are judged: refused by them, or by no rule."""
-    verdict = refuse_images(ImagesEvidence(scene, masked.used)) or NOT_JUDGED
+    verdict = decide(ImagesEvidence(scene, masked.used), "")
+    if verdict.accepted:
+        verdict = NOT_JUDGED
     return Registration(masked.pair, spec, scene, masked.used, verdict, started=opened.started)
 
 
@@ -98,7 +100,7 @@ def _register_once(
         estimate, check = stages.checked(context.part(0.0, 0.9))
         surveys = stages.survey(estimate, scene, context.part(0.9, 1.0))
     except (NothingFoundError, TooFewPointsError) as error:
-        return replace(result, verdict=judge_search(SearchEvidence(error)))
+        return replace(result, verdict=judge_search(error))
     evidence = stages.evidence(estimate, check, surveys, scene)
     verdict = judge(evidence)
     if verdict.accepted and _asks_for_exchange(evidence, scene, spec):

@@ -16,7 +16,6 @@ from ..sensor.control_points import ControlPoints
 from ..sensor.height_check import HeightCheck, check_heights
 from ..sensor.orientation import sensor_grid
 from ..sensor.rpc_fit import RPCFit
-from .evidence import SearchEvidence
 from .refinement_evidence import RefinementEvidence
 from .sensor_input import OrientedImage
 from .verdict import Verdict, judge_refinement, judge_search
@@ -94,7 +93,7 @@ class Refinement:
         try:
             adjustment = adjust(control, model)
         except TooFewPointsError as error:
-            verdict = judge_search(SearchEvidence(error))
+            verdict = judge_search(error)
             raise _refused(image, verdict) from error
         blunders = np.zeros(len(table), bool)
         blunders[np.flatnonzero(fitted)[~adjustment.used]] = True

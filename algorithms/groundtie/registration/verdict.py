@@ -7,11 +7,11 @@ from collections.abc import Collection, Iterator
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
+from ..errors import GroundTieError
 from ..geometry.accuracy import UNKNOWN_ELLIPSE, Ellipse
 from .evidence import (
     AGREEMENT,
     EvidenceOfPoints,
-    ImagesEvidence,
     RegistrationEvidence,
     SearchEvidence,
 )
@@ -149,23 +149,17 @@ def decide(evidence: Evidence, confirmed: str) -> Verdict:
     return Verdict(False, reason, rule=rule.name, advice=rule.advice, is_final=rule.is_final)
 
 
-def refuse_images(evidence: ImagesEvidence) -> Verdict | None:
-    """Return the refusal of a pair before anything is matched; None: it may be matched."""
-    verdict = decide(evidence, "")
-    return None if verdict.accepted else verdict
-
-
-def judge_search(evidence: SearchEvidence) -> Verdict:
-    """Return the verdict on a registration that did not come as far as check points.
+def judge_search(failure: GroundTieError) -> Verdict:
+    """Return the verdict on a registration whose search or fit came to no transform.
 
     Raises
     ------
     GroundTieError
         The failure itself, if no rule names it: it is no refusal, but bad input.
     """
-    verdict = decide(evidence, "")
+    verdict = decide(SearchEvidence(failure), "")
     if verdict.accepted:
-        raise evidence.failure
+        raise failure
     return verdict
 
 
