@@ -31,7 +31,7 @@ LOST = judge_search(NothingFoundError("nothing in common was found"))
 
 
 def refused(registration: Registration) -> Registration:
-    return replace(registration, estimate=None, check=None, verdict=LOST)
+    return replace(registration, evidence=None, check=None, verdict=LOST)
 
 
 def files_in(folder: Path) -> RegistrationFiles:
@@ -55,17 +55,6 @@ def test_files_of_an_accepted_registration(
     assert RegistrationFiles().named(registration) == {}
     output = RegisteredOutput(tmp_path / "o.tif", "reference", "cubic")
     assert RegistrationFiles(output).named(registration) == {"output": tmp_path / "o.tif"}
-
-
-def test_files_that_a_registration_without_points_does_not_have_are_not_named(
-    registration: Registration, tmp_path: Path, context: Context
-) -> None:
-    """A pose is accepted without tie points."""
-    posed = replace(registration, check=None)
-    kept = Call("", "", files_in(tmp_path)).deliver(posed, context, ExitStack())
-    assert set(listing(tmp_path)) == {"t.json", "r.html", "r.json"}
-    assert kept.files == {"transform": tmp_path / "t.json", "report": tmp_path / "r.html"}
-    assert set(kept.summary()["files"]) == {"transform", "report"}
 
 
 def test_a_refused_registration_writes_its_report_and_raises(

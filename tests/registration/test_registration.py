@@ -21,7 +21,7 @@ LOST = judge_search(NothingFoundError("nothing in common was found"))
 
 
 def refused(registration: Registration) -> Registration:
-    return replace(registration, estimate=None, check=None, verdict=LOST)
+    return replace(registration, evidence=None, check=None, verdict=LOST)
 
 
 def first_checks(registration: Registration, count: int) -> Registration:

@@ -40,10 +40,9 @@ class RegistrationFiles:
         """Return what `write` writes of a registration, by name."""
         results = {
             "output": None if self.output is None else self.output.path,
-            # A pose has none.
-            "tie_points": None if registration.tie_points is None else self.tie_points,
+            "tie_points": self.tie_points,
             "transform": self.transform,
-            "displacement": None if registration.evidence is None else self.displacement,
+            "displacement": self.displacement,
         }
         named = {**(results if registration.verdict.accepted else {}), "report": self.report}
         return {name: path for name, path in named.items() if path is not None}
@@ -78,14 +77,15 @@ class RegistrationFiles:
     ) -> Grid | None:
         """Write what an accepted registration leaves, and return the registered raster's grid."""
         transform, points = registration.accepted(), registration.tie_points
-        if self.tie_points is not None and points is not None:
+        evidence = registration.evidence
+        assert points is not None and evidence is not None
+        if self.tie_points is not None:
             write_tie_points(outputs.stage(self.tie_points), points, transform)
         if self.transform is not None:
             write_json(outputs.stage(self.transform), transform.to_json())
         reference = registration.pair.reference.source
-        if self.displacement is not None and registration.evidence is not None:
-            staged = outputs.stage(self.displacement)
-            write_displacement(registration.evidence, reference, staged)
+        if self.displacement is not None:
+            write_displacement(evidence, reference, outputs.stage(self.displacement))
         if self.output is None:
             return None
         context.update(0.0, "writing the registered image")

@@ -107,14 +107,7 @@ def _register_once(
         exchanged = _exchanged(opened, masked, scene, spec, evidence, context.quiet())
         evidence = replace(evidence, exchanged=exchanged)
         verdict = judge(evidence)
-    return replace(
-        result,
-        verdict=verdict,
-        estimate=estimate,
-        check=check,
-        survey=surveys.whole,
-        evidence=evidence,
-    )
+    return replace(result, verdict=verdict, check=check, evidence=evidence)
 
 
 def _asks_for_exchange(

@@ -15,12 +15,10 @@ from ..arrays import Raster
 from ..context import threads
 from ..declaration import file_lines, given_files
 from ..errors import NotRegisteredError
-from ..geometry.estimation import Estimate
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..masks.used import MaskUsed
 from ..matching.check import Check
-from ..matching.survey import Survey
 from ..raster_names import file_name
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_to_array
@@ -59,14 +57,10 @@ class Registration:
         Which mask was used.
     verdict
         Whether the registration can be trusted.
-    estimate
-        The transform and the points of its fit; None if there is none.
     check
-        The check points; None without a transform.
-    survey
-        Where chips all over the overlap match; None without a transform.
+        The check points, with their surfaces; None without a transform.
     evidence
-        What the verdict rests on; None without a transform, or of a pose.
+        What the verdict rests on; None without a transform.
     parameters
         What the tool was called with.
     started
@@ -84,9 +78,7 @@ class Registration:
     scene: SceneInfo
     mask: MaskUsed
     verdict: Verdict = NOT_JUDGED
-    estimate: Estimate | None = None
     check: Check | None = None
-    survey: Survey | None = None
     evidence: RegistrationEvidence | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     started: float = 0.0
@@ -97,14 +89,14 @@ class Registration:
     @property
     def transform(self) -> Transform | None:
         """Reference map position ↔ input pixel position, whatever the verdict on it."""
-        return None if self.estimate is None else self.estimate.transform
+        return None if self.evidence is None else self.evidence.estimate.transform
 
     @property
     def tie_points(self) -> TiePoints | None:
         """All tie points, those of the fit first."""
-        if self.estimate is None or self.check is None:
+        if self.evidence is None:
             return None
-        return TiePoints.concatenate([self.estimate.points, self.check.points])
+        return TiePoints.concatenate([self.evidence.estimate.points, self.evidence.check])
 
     def accepted(self) -> Transform:
         """Return the transform of a registration that was accepted, so that has one."""
@@ -189,17 +181,17 @@ class Registration:
             points=self.tie_points,
             transform=self.transform,
             surfaces=self.extreme_surfaces() if with_surfaces else (),
-            survey=self.survey,
+            survey=None if self.evidence is None else self.evidence.surveys.whole,
             parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
         )
 
     def extreme_surfaces(self) -> tuple[tuple[str, Surface], ...]:
         """Return the similarity surfaces of the check points with the best and worst residuals."""
-        if self.check is None or self.estimate is None:
+        if self.check is None or self.transform is None:
             return ()
         used = np.flatnonzero(self.check.points.used)
-        residuals = self.check.points.take(used).residual_px(self.estimate.transform)
+        residuals = self.check.points.take(used).residual_px(self.transform)
         found = extremes(np.hypot(*residuals.T), _EXTREMES)
         return tuple((label, self.check.surfaces[used[k]]) for label, k in found)
 

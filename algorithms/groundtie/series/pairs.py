@@ -257,9 +257,8 @@ def _measured(
 
     The covariance is that of the jackknife over blocks of points ([Efron1993] chapter 11).
     """
-    estimate = found.estimate
-    assert estimate is not None
-    grid = found.pair.grid
+    assert found.evidence is not None
+    estimate, grid = found.evidence.estimate, found.pair.grid
 
     def displacement(model: Any) -> FloatArray:
         return frame.displacement_of(lambda xy: _nominal(model, xy, first, second, grids, frame))
