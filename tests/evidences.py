@@ -18,10 +18,10 @@ from groundtie.matching.parts import ELSEWHERE_PX
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.matching.surveys import Surveys
-from groundtie.registration.evidence import RegistrationEvidence
+from groundtie.registration.evidence import Evidence, RegistrationEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.scene import ImageFacts, SceneInfo
-from groundtie.registration.verdict import Evidence, refusals
+from groundtie.registration.verdict import refusals
 from groundtie.sensor.adjustment import Control, adjust
 
 GRID = utm_grid(600, 500)

@@ -5,14 +5,14 @@ import pytest
 from evidences import IMAGE_SIZE, control, refinement
 
 from groundtie.geometry.accuracy import Common
-from groundtie.registration.verdict import judge_refinement
+from groundtie.registration.verdict import judge
 from groundtie.sensor.adjustment import Control
 
 
 def test_points_that_agree_confirm() -> None:
     fit, check = control((20, -9)), control((20, -9), 15, seed=1)
     evidence = refinement(fit, check, 0.5)
-    verdict = judge_refinement(evidence)
+    verdict = judge(evidence)
     assert verdict.accepted
     assert evidence.held_out.name == "check points"
     assert evidence.before.rmse == pytest.approx(np.hypot(20, 9), abs=0.2)
@@ -24,7 +24,7 @@ def test_points_that_agree_confirm() -> None:
 def test_without_check_points_each_is_judged_by_a_fit_without_it() -> None:
     fit = control((20, -9))
     evidence = refinement(fit)
-    verdict = judge_refinement(evidence)
+    verdict = judge(evidence)
     assert verdict.accepted
     assert evidence.held_out.name == "points left out in turn"
     assert verdict.check_points == 40
@@ -33,7 +33,7 @@ def test_without_check_points_each_is_judged_by_a_fit_without_it() -> None:
 def test_what_is_not_better_than_before_is_refused() -> None:
     fit = control((0, 0))
     check = control((0, 0), 15, noise_px=0.01, seed=1)
-    verdict = judge_refinement(refinement(fit, check))
+    verdict = judge(refinement(fit, check))
     assert not verdict.accepted
     assert "not nearer than before" in verdict.reason
 
@@ -48,7 +48,7 @@ def test_what_is_not_better_than_before_is_refused() -> None:
     ],
 )
 def test_refusals(fit: Control, check: Control | None, max_error_px: float, reason: str) -> None:
-    verdict = judge_refinement(refinement(fit, check, 1.0, max_error_px, "shift"))
+    verdict = judge(refinement(fit, check, 1.0, max_error_px, "shift"))
     assert not verdict.accepted
     assert reason in verdict.reason
 
@@ -59,7 +59,7 @@ def test_what_displaces_all_control_alike_is_part_of_the_error(
 ) -> None:
     """90 % of normal errors lie within 2.15 standard deviations; 3 px let 4.55 px pass."""
     found = refinement(control((20, -9)), common=Common(np.zeros(2), sigma_px))
-    verdict = judge_refinement(found)
+    verdict = judge(found)
     assert verdict.accepted == is_accepted
     assert verdict.check_ce90_px == pytest.approx(2.15 * sigma_px, rel=0.05)
 
@@ -69,5 +69,5 @@ def test_a_model_that_points_do_not_hold_is_refused() -> None:
     fit = control((20, -9), 20, 1.2)
     strip = fit.expected_px * [1.0, 0.26]
     narrow = Control(strip, strip + fit.found_px - fit.expected_px, fit.covariance_px2, IMAGE_SIZE)
-    verdict = judge_refinement(refinement(narrow, None, 1.0, 2.2, "affine"))
+    verdict = judge(refinement(narrow, None, 1.0, 2.2, "affine"))
     assert not verdict.accepted

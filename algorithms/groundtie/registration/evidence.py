@@ -36,6 +36,13 @@ POSE, AGREEMENT, ERROR, SCENE = "pose", "agreement", "error", "scene"
 SURVEY, REFINEMENT, SERIES = "survey", "refinement", "series"
 
 
+class Evidence(Protocol):
+    """What a verdict rests on; its stages name the rules that read it."""
+
+    @property
+    def stages(self) -> Collection[str]: ...
+
+
 @dataclass(frozen=True)
 class ImagesEvidence:
     """What is known of a pair before anything is matched.
@@ -151,23 +158,33 @@ class HeldOut:
         return self.max_error_px / math.sqrt(2) * CE90_FACTOR
 
 
-class EvidenceOfPoints(Protocol):
+class EvidenceOfPoints(Evidence, Protocol):
     """Evidence of which points that took no part in a fit are a part.
 
     Parameters
     ----------
-    stages
-        Whose rules read it.
+    judged
+        What the points confirm or not, in words.
     held_out
         How the points agree.
+    fit_points, fit_points_used
+        How many points the fit had, and how many of them it used.
+    metres_per_px
+        Side of a pixel that errors are in, on the ground; None: not known.
     extrapolated_share
         Share of the area outside of the hull of the points that hold the model.
     """
 
     @property
-    def stages(self) -> Collection[str]: ...
+    def judged(self) -> str: ...
     @property
     def held_out(self) -> HeldOut: ...
+    @property
+    def fit_points(self) -> int: ...
+    @property
+    def fit_points_used(self) -> int: ...
+    @property
+    def metres_per_px(self) -> float | None: ...
     @property
     def extrapolated_share(self) -> float: ...
 
@@ -238,6 +255,22 @@ class RegistrationEvidence:
     exchanged: Exchanged | None = None
 
     stages: ClassVar = (IMAGES, AGREEMENT, ERROR, SCENE, SURVEY)
+    judged: ClassVar = "the registration"
+
+    @property
+    def fit_points(self) -> int:
+        """How many points the fit had."""
+        return len(self.estimate.points)
+
+    @property
+    def fit_points_used(self) -> int:
+        """How many of them it used."""
+        return int(self.estimate.points.used.sum())
+
+    @property
+    def metres_per_px(self) -> float | None:
+        """Side of a matching pixel; None without georeferencing."""
+        return self.grid.metres_per_pixel
 
     @cached_property
     def counted(self) -> TiePoints:

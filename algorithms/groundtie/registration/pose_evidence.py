@@ -133,7 +133,16 @@ class PoseSurveyEvidence:
     is_shift: bool = False
 
     stages: ClassVar = (AGREEMENT, ERROR, SURVEY)
+    judged: ClassVar = "it, and no other pose matches nearly as well"
+    # The pose is what a search found; chips all over are none that it was fitted to.
+    fit_points: ClassVar = 0
+    fit_points_used: ClassVar = 0
     mask: ClassVar = MaskUsed(NONE, None, 1.0, "a pose is searched for without a mask")
+
+    @property
+    def metres_per_px(self) -> float | None:
+        """Side of a pixel that the chips were matched at; None without georeferencing."""
+        return self.found.grid.metres_per_pixel
 
     @property
     def surveys(self) -> Surveys:

@@ -12,23 +12,12 @@ from .layover import CHIPS_MEAN_OVER_SCATTER
 from .pose_evidence import PoseEvidence, PoseSurveyEvidence
 from .rules.pose import SAME_SHARE
 from .scene import SceneInfo
-from .verdict import Verdict, decide, decide_by_points
+from .verdict import Verdict, decide, judge
 
 
 def judge_pose(evidence: PoseEvidence) -> Verdict:
     """Return the verdict on the best candidate of a search."""
     return decide(evidence, "no other pose matches nearly as well")
-
-
-def judge_pose_survey(evidence: PoseSurveyEvidence) -> Verdict:
-    """Return the verdict on a pose by chips all over; errors in pixels they were matched at."""
-    return decide_by_points(
-        evidence,
-        "chips all over confirm it, and no other pose matches nearly as well",
-        0,
-        0,
-        evidence.found.grid.metres_per_pixel,
-    )
 
 
 def confirm_pose(
@@ -56,7 +45,6 @@ def confirm_pose(
     moved = windows.pose(found.transform)
     grid, shift = windows.reference_grid, Pose(shift_px=moved.shift_px)
     is_shift = moved_px(moved, shift, (grid.height, grid.width)) <= POSE_TOLERANCE_PX
-    evidence = PoseSurveyEvidence(found, factor, is_shift)
-    verdict = judge_pose_survey(evidence)
+    verdict = judge(PoseSurveyEvidence(found, factor, is_shift))
     # What the chips confirm is where they have moved it.
     return verdict, moved if verdict.accepted else pose

@@ -18,7 +18,7 @@ from ..sensor.orientation import sensor_grid
 from ..sensor.rpc_fit import RPCFit
 from .refinement_evidence import RefinementEvidence
 from .sensor_input import OrientedImage
-from .verdict import Verdict, judge_refinement, judge_search
+from .verdict import Verdict, judge, judge_search
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class Refinement:
             common,
         )
         kept = replace(points, points=table.reject(blunders, "blunder"))
-        verdict = judge_refinement(evidence)
+        verdict = judge(evidence)
         return cls(image, kept, control, check, adjustment, fit, evidence, verdict)
 
     @property

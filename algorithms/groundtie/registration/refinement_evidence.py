@@ -34,9 +34,9 @@ class RefinementEvidence:
         Share of the sides of the image that control spreads over, the smaller one.
     extrapolated_share
         Share of the image outside of the hull of the control.
-    control_points, control_points_used
+    fit_points, fit_points_used
         How many points the fit had, and how many of them it used.
-    pixel_m
+    metres_per_px
         Side of an image pixel on the ground.
     folding_px
         By how much RPCs with the bias folded in miss it.
@@ -50,13 +50,14 @@ class RefinementEvidence:
     after_px: FloatArray
     extent: float
     extrapolated_share: float
-    control_points: int
-    control_points_used: int
-    pixel_m: float
+    fit_points: int
+    fit_points_used: int
+    metres_per_px: float
     folding_px: float
     needs_spread: bool = True
 
     stages: ClassVar = (AGREEMENT, ERROR, REFINEMENT)
+    judged: ClassVar = "the refined RPCs"
 
     @property
     def before(self) -> Statistics:

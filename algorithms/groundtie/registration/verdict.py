@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 from ..errors import GroundTieError
 from ..geometry.accuracy import UNKNOWN_ELLIPSE, Ellipse
-from .evidence import (
-    AGREEMENT,
-    EvidenceOfPoints,
-    RegistrationEvidence,
-    SearchEvidence,
-)
-from .refinement_evidence import RefinementEvidence
+from .evidence import AGREEMENT, Evidence, EvidenceOfPoints, SearchEvidence
 from .rules import RULES, Rule
 
 
@@ -125,13 +119,6 @@ def both_units(px: float, metres: float) -> str:
 NOT_JUDGED = Verdict(False, "not judged")
 
 
-class Evidence(Protocol):
-    """What a verdict rests on; its stages name the rules that read it."""
-
-    @property
-    def stages(self) -> Collection[str]: ...
-
-
 def refusals(evidence: Evidence) -> Iterator[tuple[Rule, str]]:
     """Yield the rules of the evidence's stages that refuse, and why; the first of them decides."""
     for rule in RULES:
@@ -163,43 +150,14 @@ def judge_search(failure: GroundTieError) -> Verdict:
     return verdict
 
 
-def judge(evidence: RegistrationEvidence) -> Verdict:
-    """Return the verdict on a registration by its check points and its scene."""
-    estimate = evidence.estimate
-    metres = evidence.grid.metres_per_pixel
-    return decide_by_points(
-        evidence,
-        "check points confirm the registration",
-        len(estimate.points),
-        int(estimate.points.used.sum()),
-        metres,
-    )
-
-
-def judge_refinement(evidence: RefinementEvidence) -> Verdict:
-    """Return the verdict on refined RPCs, its errors in image pixels and in metres."""
-    return decide_by_points(
-        evidence,
-        f"{evidence.held_out.name} confirm the refined RPCs",
-        evidence.control_points,
-        evidence.control_points_used,
-        evidence.pixel_m,
-    )
-
-
-def decide_by_points(
-    evidence: EvidenceOfPoints,
-    confirmed: str,
-    fit_points: int,
-    fit_points_used: int,
-    metres_per_px: float | None,
-) -> Verdict:
+def judge(evidence: EvidenceOfPoints) -> Verdict:
     """Return what the rules make of evidence, with the numbers that its held-out points give."""
-    points, metres = evidence.held_out, math.nan if metres_per_px is None else metres_per_px
+    points, metres = evidence.held_out, evidence.metres_per_px
+    metres = math.nan if metres is None else metres
     verdict = replace(
-        decide(evidence, confirmed),
-        fit_points=fit_points,
-        fit_points_used=fit_points_used,
+        decide(evidence, f"{points.name} confirm {evidence.judged}"),
+        fit_points=evidence.fit_points,
+        fit_points_used=evidence.fit_points_used,
         check_points=points.total,
         check_points_agreeing=points.agreeing,
         log10_chance=points.log10_chance,

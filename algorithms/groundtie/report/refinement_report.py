@@ -59,7 +59,7 @@ class RefinementReport(Page):
             "verdict": verdict,
             "held_out": evidence.held_out.name,
             "errors": {
-                name: {"px": each, "m": each.scaled(evidence.pixel_m)}
+                name: {"px": each, "m": each.scaled(evidence.metres_per_px)}
                 for name, each in measured.items()
             },
             "bias": bias,
@@ -67,7 +67,7 @@ class RefinementReport(Page):
             "facts": self._facts(),
             "warnings": self.heights.warnings(),
             **figures.shown_residuals(residuals, grid),
-            **figures.shown_errors(residuals, verdict, evidence.pixel_m),
+            **figures.shown_errors(residuals, verdict, evidence.metres_per_px),
             "grid": grid,
             "pictures": self.comparison,
         }
